@@ -1,0 +1,7 @@
+"""Codegen: a `Compensator` and a target enter, a folder of C with its manifest leaves.
+
+One folder a target; the core `dz_comp` is common to all of them.
+"""
+
+if __name__ != "dzdesign.codegen":
+    raise ImportError("import this room as dzdesign.codegen: a top-level 'codegen' may be another package")

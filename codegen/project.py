@@ -1,0 +1,175 @@
+"""`generate`: a `Compensator` and a target in, the files of a C project out."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from dzdesign.codegen.integer_form import IntegerForm, integer_form
+from dzdesign.codegen.target import Target
+from dzdesign.core.artefacts import TOOL, sha256_of, to_json
+from dzdesign.core.errors import InputError, nearest
+from dzdesign.derivation.law import law
+from dzdesign.design.compensator import Compensator
+
+if TYPE_CHECKING:
+    import jinja2
+
+SCHEMA = "dzdesign.firmware/1"
+#: One folder a target; each has `target.py` with a `TARGET` and its templates.
+TARGET_NAMES = ("f28335",)
+CORE_FILES = {"core/dz_comp.c": "dz_comp.c.jinja", "core/dz_comp.h": "dz_comp.h.jinja"}
+NODES_IN_A_ROW = 5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Firmware:
+    """The files of a C project, path to text, and the manifest that names their origin."""
+
+    files: Mapping[str, str]
+    manifest: Mapping[str, Any]
+
+
+def target_named(name: str) -> Target:
+    """Return the target of that name.
+
+    Raises
+    ------
+    InputError
+        If there is none; the nearest name is proposed.
+    """
+    if name not in TARGET_NAMES:
+        raise InputError(f"there is no target '{name}'{nearest(name, TARGET_NAMES)}; known: {', '.join(TARGET_NAMES)}")
+    return import_module(f"dzdesign.codegen.{name}.target").TARGET
+
+
+def generate(compensator: Compensator, target_name: str, compensator_bytes: bytes | None = None) -> Firmware:
+    """Generate the C project of a compensator for a target.
+
+    Parameters
+    ----------
+    compensator : Compensator
+        From `dzdesign.design.designing.design` or compensator.json.
+    target_name : str
+        One of `TARGET_NAMES`.
+    compensator_bytes : bytes, optional
+        The file it was read from; without it the document as it would be written.
+
+    Raises
+    ------
+    InputError
+        If the target is unknown, or its converter or PWM differs from the compensator's signals.
+    """
+    target = target_named(target_name)
+    signals = compensator.signals
+    for what, asked, has in (
+        ("compare value", signals.compare_max, target.compare_max),
+        ("command code", signals.command_code_max, target.adc_code_max),
+        ("pressure code", signals.pressure_code_max, target.adc_code_max),
+    ):
+        if asked != has:
+            raise InputError(
+                f"the compensator's largest {what} is {asked}, but target {target.name} has {has}; "
+                "design it again for that target"
+            )
+    document = compensator_bytes or to_json(compensator.to_document()).encode()
+    digest = sha256_of(document)
+    context = core_context(compensator, integer_form(compensator))
+    files = {
+        path: _render("dzdesign.codegen", template, digest, context) for path, template in CORE_FILES.items()
+    }
+    for path, template in target.templates.items():
+        files[path] = _render(f"dzdesign.codegen.{target.name}", template, digest, target.context)
+    files["compensator.json"] = document.decode()
+    manifest = {
+        "schema": SCHEMA,
+        "tool": TOOL,
+        "made_from": [{"source": "compensator.json", "sha256": digest}],
+        "target": target.name,
+        "law": compensator.law_name,
+        "core": list(CORE_FILES),
+    }
+    return Firmware(files=files, manifest=manifest)
+
+
+def core_context(compensator: Compensator, form: IntegerForm) -> dict[str, str | list[str]]:
+    """Return the flat plan of printed strings for the core's templates."""
+    chosen, signals = law(compensator.law_name), compensator.signals
+    scale = form.table[0] // compensator.beta_numerators[0] * compensator.beta_denominator
+    reverse = signals.pressure_span_MPa * compensator.reverse_codes / signals.pressure_code_max
+    largest = ((1 << form.reciprocal_shift) - 1) // max(
+        1, form.reciprocal * form.divisor - (1 << form.reciprocal_shift)
+    )
+    return {
+        "law_text": str(chosen.output).replace("**", "^"),
+        "law_equation": chosen.equation,
+        "kappa_text": _rational(compensator.k_x_max_over_u_max),
+        "u_min0_text": _rational(compensator.u_min0_over_u_max),
+        "u_max_V": f"{float(compensator.u_max_V):g}",
+        "compare_max": str(signals.compare_max),
+        "adc_code_max": str(max(signals.command_code_max, signals.pressure_code_max)),
+        "command_code_max": str(signals.command_code_max),
+        "pressure_code_max": str(signals.pressure_code_max),
+        "pressure_span_MPa": f"{float(signals.pressure_span_MPa):g}",
+        "reverse_codes": str(compensator.reverse_codes),
+        "reverse_text": f"-{float(reverse):.3f} MPa",
+        "table_length": str(len(form.table)),
+        "table_rows": [
+            " ".join(f"UINT32_C({value})," for value in form.table[start : start + NODES_IN_A_ROW])
+            for start in range(0, len(form.table), NODES_IN_A_ROW)
+        ],
+        "beta_scale": str(scale),
+        "step_codes": str(compensator.beta_step_codes),
+        "step_MPa": f"{float(signals.dp_MPa(compensator.beta_step_codes)):.4f}",
+        "step_shift": str(form.step_shift),
+        "step_mask": str(compensator.beta_step_codes - 1),
+        "fallback": str(form.fallback),
+        "slope": str(form.slope),
+        "slope_c": _int32(form.slope),
+        "offset": str(form.offset),
+        "offset_c": _int32(form.offset),
+        "linear": str(form.linear),
+        "linear_shift": str(form.linear_shift),
+        "half": str(form.half),
+        "shift": str(form.shift),
+        "divisor": str(form.divisor),
+        "reciprocal": str(form.reciprocal),
+        "reciprocal_shift": str(form.reciprocal_shift),
+        "largest": str(largest),
+    }
+
+
+def _rational(value: Fraction) -> str:
+    return f"{value.numerator}/{value.denominator} = {float(value):.6f}"
+
+
+def _int32(value: int) -> str:
+    """Print a 32-bit constant that is one on every compiler, whatever its `long` is."""
+    return f"{'-' if value < 0 else ''}INT32_C({abs(value)})"
+
+
+def environment(package: str) -> "jinja2.Environment":
+    """Return the renderer of a package's templates: strict, so that a name without a value is an error."""
+    import jinja2
+
+    return jinja2.Environment(
+        loader=jinja2.PackageLoader(package, "templates"),
+        undefined=jinja2.StrictUndefined,
+        keep_trailing_newline=True,
+        trim_blocks=True,
+        autoescape=False,  # C and make, not HTML
+    )
+
+
+def banner(template: str, digest: str) -> tuple[str, ...]:
+    """Return the lines that open every generated file: tool, template, hash of the compensator; no date."""
+    return (
+        f"Generated by dzdesign {TOOL['version']} from template {template}. Do not edit: generate it again.",
+        f"Compensator SHA-256: {digest}",
+    )
+
+
+def _render(package: str, template: str, digest: str, context: Mapping[str, str | list[str]]) -> str:
+    page = environment(package).get_template(template)
+    return page.render(banner=banner(template, digest), project="dzdesign", **context)

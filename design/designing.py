@@ -1,0 +1,159 @@
+"""`design`: a `ValveModel` and an engineer's choices in, a proved `Compensator` out."""
+
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+from dzdesign.core.artefacts import sha256_of, to_json
+from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.derivation.law import law
+from dzdesign.design.beta_table import (
+    DENOMINATOR,
+    STEP_CODES,
+    OffsetCeiling,
+    choose_beta_table,
+    offset_ceiling,
+)
+from dzdesign.design.compensator import Certificate, Compensator
+from dzdesign.design.signals import Signals
+from dzdesign.identify.model import SideModel, ValveModel
+
+#: k x_max/u_max and u_min0/u_max are integers over this: finer than half a PWM count of 60 000.
+COEFFICIENT_DENOMINATOR = 1 << 16
+#: Share of the sensor's span by which the difference may read negative before it counts as a failed sensor.
+REVERSE_SHARE = Fraction(1, 100)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DesignOptions:
+    """Choices of the engineer.
+
+    Attributes
+    ----------
+    law_name : str
+        ``paper`` (Eq. 18) or ``target`` (meets Eq. 16).
+    signals : Signals
+        Scalings of the converter and the PWM.
+    """
+
+    law_name: str = "paper"
+    signals: Signals = field(default_factory=Signals)
+
+
+def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes: bytes | None = None) -> Compensator:
+    """Design the compensator of a valve, every coefficient rational and the certificate proved on them.
+
+    Parameters
+    ----------
+    valve : ValveModel
+        From `dzdesign.identify.identify` or valve.json.
+    options : DesignOptions, optional
+        Choices of the engineer.
+    valve_bytes : bytes, optional
+        The file the valve was read from, for its hash; without it the hash is of the document as it would be written.
+
+    Raises
+    ------
+    InputError
+        If the law can't be used for this valve.
+    RequirementError
+        If a proof fails.
+    """
+    options = options or DesignOptions()
+    signals, side = options.signals, valve.positive
+    chosen = law(options.law_name)
+    if not side.beta_dp_MPa:
+        raise InputError(
+            "the valve was identified without a pressure drop, so no offset can be certified at any pressure; "
+            "record the ramp test again with a column of dP (or pA and pB)"
+        )
+    u_max = Fraction(repr(valve.u_max_V))
+    kappa = _over(Fraction(repr(side.k_x_max_over_u_max)), "nearest")
+    # Half a count less, because the compare value of the offset may be rounded up.
+    u_min0 = _over(Fraction(repr(side.u_min0_V)) / u_max - Fraction(1, 2 * signals.compare_max), "down")
+    if u_min0 <= 0:
+        raise InputError(f"u_min0 is {side.u_min0_V:.4f} V, less than one count of the PWM; there is nothing to compensate")
+    ceiling = offset_ceiling(side, signals, u_max)
+    table = choose_beta_table(ceiling, u_min0, side.trend, signals.pressure_code_max)
+    document = valve_bytes.decode() if valve_bytes is not None else to_json(valve.to_document())
+    compensator = Compensator(
+        law_name=chosen.name,
+        signals=signals,
+        u_max_V=u_max,
+        k_x_max_over_u_max=kappa,
+        u_min0_over_u_max=u_min0,
+        beta_numerators=table,
+        beta_denominator=DENOMINATOR,
+        beta_step_codes=STEP_CODES,
+        reverse_codes=int(REVERSE_SHARE * signals.pressure_code_max),
+        certificate=Certificate(
+            confidence=side.confidence,
+            guard=side.guard,
+            level_L_min=side.level_L_min,
+            dp_MPa=(Fraction(repr(side.beta_dp_MPa[0])), Fraction(repr(side.beta_dp_MPa[-1]))),
+            smallest_margin_V=_smallest_margin(ceiling, table, u_min0) * u_max,
+        ),
+        costs=(),
+        valve_document=document,
+        valve_sha256=sha256_of(document.encode()),
+    )
+    _prove_monotone(compensator)
+    return _with_costs(compensator, side)
+
+
+def _over(value: Fraction, rounding: str) -> Fraction:
+    """Return `value` as an integer over `COEFFICIENT_DENOMINATOR`, rounded to nearest or down."""
+    scaled = value * COEFFICIENT_DENOMINATOR
+    numerator = scaled.numerator // scaled.denominator if rounding == "down" else round(scaled)
+    return Fraction(numerator, COEFFICIENT_DENOMINATOR)
+
+
+def _smallest_margin(ceiling: OffsetCeiling, table: tuple[int, ...], u_min0: Fraction) -> Fraction:
+    """Return the least distance over u_max between ceiling and offset on the certified codes; never negative."""
+    scale = DENOMINATOR * STEP_CODES
+    margins = []
+    for code in ceiling.certified or range(len(ceiling.limit)):
+        index, share = divmod(code, STEP_CODES)
+        beta = Fraction(table[index] * (STEP_CODES - share) + table[index + 1] * share, scale)
+        margins.append(ceiling.limit[code] - beta * u_min0)
+    smallest = min(margins)
+    if smallest < 0:
+        raise RequirementError(f"the offset exceeds the certified one by {float(-smallest):.2e} of u_max")
+    return smallest
+
+
+def _prove_monotone(compensator: Compensator) -> None:
+    """Prove that more command gives more drive, at every pressure: the gain is affine in beta, so its ends decide."""
+    chosen = law(compensator.law_name)
+    betas = (
+        Fraction(min(compensator.beta_numerators), DENOMINATOR),
+        Fraction(max(compensator.beta_numerators), DENOMINATOR),
+    )
+    if min(chosen.evaluate_gain(beta, compensator.k_x_max_over_u_max) for beta in betas) <= 0:
+        raise InputError(
+            f"law '{chosen.name}' would fall with rising command: beta (1 - k x_max/u_max) must stay below 1, but "
+            f"k x_max/u_max = {float(compensator.k_x_max_over_u_max):.3f}; use --law target"
+        )
+
+
+def _with_costs(compensator: Compensator, side: SideModel) -> Compensator:
+    """Add what the choices cost: the residual dead zone per test and the drive at full command."""
+    from dataclasses import replace
+
+    signals, u_max = compensator.signals, float(compensator.u_max_V)
+    lines = []
+    for test in side.tests:
+        code = round(signals.dp_code(Fraction(repr(test.dp_MPa))))
+        offset = float(compensator.drive(0, code))
+        gain = float(compensator.drive(signals.command_code_max, code)) - offset
+        parts = [f"{test.dp_MPa:.2f} MPa: offset {offset * u_max:.3f} V"]
+        for name, knee in (("opening", test.u_knee_rising_V), ("closing", test.u_knee_falling_V)):
+            if knee is not None:
+                parts.append(f"dead zone that remains on {name} {(knee / u_max - offset) / gain:.2%} of command (knee)")
+        parts.append(f"drive at full command {offset + gain:.2%}")
+        lines.append(", ".join(parts))
+    low, high = (float(end) for end in compensator.certificate.dp_MPa)
+    lines.append(
+        f"outside {low:.2f} to {high:.2f} MPa the nearest tested beta is held and nothing is certified; "
+        f"a pressure difference below -{compensator.reverse_codes} codes is taken as a failed sensor: smallest beta"
+    )
+    return replace(compensator, costs=tuple(lines))

@@ -1,0 +1,3 @@
+"""Dead-zone compensators for proportional valves without a spool-position sensor."""
+
+__version__ = "0.1.0"

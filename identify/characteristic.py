@@ -1,0 +1,241 @@
+"""What one branch shows of the valve's characteristic: plateau, knee, first flow seen, noise."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from dzdesign.core.errors import InputError
+from dzdesign.identify.branches import BIN_WIDTH, Bins, Branch, bin_branch
+
+#: Share of the command's range, from the top, over which the largest flow is read.
+TOP = 0.05
+#: A sample further than this many robust standard deviations from the line is an outlier.
+GATE = 6.0
+#: Blocks into which the residuals in time order are cut, to see how coloured the noise is.
+BLOCKS = 16
+#: Flow below this share of the largest is no useful flow: the level of "first flow seen" of a meter without floor.
+USEFUL_FLOW = 0.005
+#: The tail runs from the first flow seen to this multiple of it.
+TAIL = 3.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BranchShape:
+    """One branch of one ramp test, described.
+
+    Attributes
+    ----------
+    rising : bool
+        Direction of the command.
+    bins : Bins
+        Sufficient statistics of the knee window, outliers left out (V, m³/s at the nominal pressure drop).
+    y_max : float
+        Largest flow at the nominal pressure drop, m³/s.
+    slope, knee : float
+        Start values: the straight line over the knee window, m³/(s V), and its zero, V.
+    sigma : float
+        Robust standard deviation of one sample about the line, m³/s.
+    colour : float
+        Long-run variance over variance of one sample (1 for white noise, more for coloured noise or a bent line).
+    level : float
+        Flow of "first flow seen", m³/s.
+    onset, onset_se : float
+        Zero of the straight line through the tail, V, and its standard error.
+    saturates : bool
+        True if the flow at full command lies clearly below the straight line.
+    outliers : int
+        Samples gated out of the window.
+    """
+
+    rising: bool
+    bins: Bins
+    y_max: float
+    slope: float
+    knee: float
+    sigma: float
+    colour: float
+    level: float
+    onset: float
+    onset_se: float
+    saturates: bool
+    outliers: int
+
+
+def smooth_profile(u: np.ndarray, y: np.ndarray, u_max: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return command and flow averaged over bins of u and freed of single spikes (medians of five bins)."""
+    used, index = np.unique(np.floor(u / (BIN_WIDTH * u_max)).astype(int), return_inverse=True)
+    n = np.bincount(index, minlength=used.size)
+    u_mean = np.bincount(index, weights=u) / n
+    y_mean = np.bincount(index, weights=y) / n
+    if used.size < 200:  # one level a step, as a staircase test gives: nothing to smooth over
+        return u_mean, y_mean
+    padded = np.pad(y_mean, 2, mode="edge")
+    return u_mean, np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)
+
+
+def crossing(u: np.ndarray, y: np.ndarray, level: float) -> float:
+    """Return the command above which the profile stays at or above `level` (linear between its points)."""
+    below = np.flatnonzero(y < level)
+    if below.size == 0:
+        return float(u[0])
+    last = int(below[-1])
+    if last + 1 == u.size:
+        return float(u[-1])
+    share = (level - y[last]) / (y[last + 1] - y[last])
+    return float(u[last] + share * (u[last + 1] - u[last]))
+
+
+def flow_at_top(u_profile: np.ndarray, y_profile: np.ndarray) -> float:
+    """Return the flow at the largest command: the line through the top `TOP` of its range, read at the end."""
+    top = u_profile >= u_profile[-1] - TOP * np.ptp(u_profile)
+    u, y = u_profile[top], y_profile[top]
+    if u.size < 5:
+        return float(np.median(y))
+    slope = np.sum((u - u.mean()) * (y - y.mean())) / np.sum((u - u.mean()) ** 2)
+    return float(y.mean() + slope * (u_profile[-1] - u.mean()))
+
+
+def find_meter_floor(u: np.ndarray, q: np.ndarray, u_max: float) -> float:
+    """Return the flow at which the meter wakes up, m³/s, or 0 if it shows no floor.
+
+    A meter with a floor reads (about) zero, then jumps: between its noise and its floor there are next to no
+    readings, although the ramp sweeps those flows at the same pace as the flows above.
+    """
+    u_profile, q_profile = smooth_profile(u, q, u_max)
+    q_max = flow_at_top(u_profile, q_profile)
+    start, half = (crossing(u_profile, q_profile, share * q_max) for share in (0.12, 0.5))
+    straight = int(np.sum((u >= start) & (u <= half)))
+    density = straight / (0.38 * q_max)  # readings per unit of flow where the valve is known to open smoothly
+    shut = q[u < 0.5 * start]
+    if shut.size < 5 or straight < 100:
+        return 0.0
+    noise = 1.4826 * float(np.median(np.abs(shut - np.median(shut))))
+    lowest = max(3 * noise, 1e-3 * q_max)
+    # Near the opening only: far below it, thousands of shut readings would put some of their noise into the gap.
+    near = u > start - 0.5 * (half - start)
+    readings = np.sort(q[near & (q > lowest) & (q < 0.5 * q_max)])
+    expected = density * (readings - lowest)
+    gap = np.flatnonzero((np.arange(readings.size) < 0.1 * expected) & (expected > 20))
+    return float(readings[gap[-1]]) if gap.size else 0.0
+
+
+def _line(u: np.ndarray, y: np.ndarray) -> tuple[float, float]:
+    """Return slope and zero of the least-squares line."""
+    centre = u.mean()
+    slope = float(np.sum((u - centre) * (y - y.mean())) / np.sum((u - centre) ** 2))
+    return slope, float(centre - y.mean() / slope)
+
+
+def _colour(residual: np.ndarray, sigma: float) -> float:
+    """Return the long-run variance factor from the means of `BLOCKS` blocks in time order."""
+    blocks = np.array_split(residual, min(BLOCKS, residual.size // 2))
+    if len(blocks) < 4:
+        return 1.0
+    spread = sum(block.size * block.mean() ** 2 for block in blocks) / (len(blocks) - 2)
+    return max(1.0, spread / sigma**2)
+
+
+def describe_branch(
+    branch: Branch,
+    y: np.ndarray,
+    *,
+    u_max: float,
+    floor: float,
+    window: tuple[float, float],
+    source: str,
+) -> BranchShape:
+    """Describe one branch: where the straight part lies, its line, its noise, and the tail below it.
+
+    Parameters
+    ----------
+    branch : Branch
+        Samples, command in V.
+    y : (N,) array
+        Flow brought to the nominal pressure drop, m³/s.
+    u_max : float
+        Full command, V.
+    floor : float
+        Meter floor, m³/s.
+    window : tuple of float
+        Shares of the largest flow between which the characteristic is taken as straight.
+    source : str
+        File name for messages.
+
+    Raises
+    ------
+    InputError
+        If the window holds too few samples for a line.
+    """
+    u_profile, y_profile = smooth_profile(branch.u, y, u_max)
+    y_max = flow_at_top(u_profile, y_profile)
+    u_low, u_high = (crossing(u_profile, y_profile, share * y_max) for share in window)
+    inside = (branch.u >= u_low) & (branch.u <= u_high)
+    if inside.sum() < 5 or not u_high > u_low:
+        raise InputError(
+            f"'{source}': only {inside.sum()} samples lie between {window[0]:.0%} and {window[1]:.0%} of the largest "
+            "flow, expected at least 5; record a slower ramp or more levels"
+        )
+    u_in, y_in, q_in = branch.u[inside], y[inside], branch.q[inside]
+    censored = q_in < 0.5 * floor
+    slope, knee = _line(u_in[~censored], y_in[~censored])
+    for _ in range(3):
+        residual = y_in - slope * (u_in - knee)
+        sigma = 1.4826 * float(np.median(np.abs(residual[~censored]))) or 1e-6 * y_max
+        # A zero reading is a censored sample only where flow below the floor is credible.
+        credible = slope * (u_in - knee) < floor + GATE * sigma
+        kept = np.where(censored, credible, np.abs(residual) < GATE * sigma)
+        slope, knee = _line(u_in[kept & ~censored], y_in[kept & ~censored])
+    seen = kept & ~censored
+    residual = y_in[seen] - slope * (u_in[seen] - knee)
+    sigma = float(np.sqrt(np.sum(residual**2) / max(seen.sum() - 2, 1))) or 1e-6 * y_max
+    level = max(floor, USEFUL_FLOW * y_max, 5 * _quiet_noise(branch, y, knee))
+    onset, onset_se = _tail_onset(branch.u, y, u_profile, y_profile, level, slope)
+    return BranchShape(
+        rising=branch.rising,
+        bins=bin_branch(u_in[kept], y_in[kept], censored[kept], u_max),
+        y_max=y_max,
+        slope=slope,
+        knee=knee,
+        sigma=sigma,
+        colour=_colour(residual, sigma),
+        level=level,
+        onset=onset,
+        onset_se=onset_se,
+        saturates=y_max < 0.93 * slope * (branch.u.max() - knee),
+        outliers=int((~kept).sum()),
+    )
+
+
+def _quiet_noise(branch: Branch, y: np.ndarray, knee: float) -> float:
+    """Return the robust noise of the mean reading of a bin while the valve is shut (u below half the knee)."""
+    shut = y[branch.u < 0.5 * knee]
+    if shut.size < 5:
+        return 0.0
+    samples_in_bin = max(1.0, shut.size / max(1, len(np.unique(np.floor(branch.u[: shut.size] * 100)))))
+    return 1.4826 * float(np.median(np.abs(shut - np.median(shut)))) / math.sqrt(samples_in_bin)
+
+
+def _tail_onset(
+    u: np.ndarray, y: np.ndarray, u_profile: np.ndarray, y_profile: np.ndarray, level: float, slope: float
+) -> tuple[float, float]:
+    """Extrapolate the first flow seen to zero: the valve opens (or closes) no later than this, as far as can be seen.
+
+    A soft edge passes flow below the knee. What the meter sees of it is the tail from `level` to `TAIL` times it; the
+    line through the tail crosses zero at or below the knee's. What happens below `level` stays hidden.
+    """
+    u_first = crossing(u_profile, y_profile, level)
+    u_last = crossing(u_profile, y_profile, TAIL * level)
+    tail = (u >= u_first) & (u <= u_last) & (y > 0.5 * level)
+    if tail.sum() < 6:
+        # Too few samples for a line (a staircase): the chord between the two crossings.
+        return u_first - (u_last - u_first) / (TAIL - 1), u_last - u_first
+    tail_slope, onset = _line(u[tail], y[tail])
+    if tail_slope <= 0.1 * slope:  # a leak or a notch: no line, so nothing below the first flow is trusted
+        return u_first - (u_last - u_first) / (TAIL - 1), u_last - u_first
+    residual = y[tail] - tail_slope * (u[tail] - onset)
+    n, centre = tail.sum(), u[tail].mean()
+    variance = np.sum(residual**2) / (n - 2)
+    lever = 1 / n + (centre - onset) ** 2 / np.sum((u[tail] - centre) ** 2)
+    sigma = math.sqrt(variance) or 1e-12
+    return onset, math.sqrt(variance * lever * _colour(residual, sigma)) / tail_slope

@@ -1,0 +1,237 @@
+"""`ValveModel`: what identification found, as the artefact valve.json (schema dzdesign.valve/1)."""
+
+from dataclasses import asdict, dataclass, fields
+from typing import Any
+
+from dzdesign.core.artefacts import TOOL, parse_document
+from dzdesign.core.errors import InputError
+
+SCHEMA = "dzdesign.valve/1"
+TRENDS = ("decreasing", "flat", "increasing")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TestResult:
+    """One ramp test: thresholds in V, flows in L/min, pressure drop in MPa; None where a branch or dP is missing.
+
+    ``u_knee_*`` are the straight part of Q/sqrt(dP) extrapolated to zero; ``u_onset_*`` the tail above the meter's
+    floor extrapolated to zero. ``u_guard_V`` is the threshold that the certificate protects (the lower of knee and
+    onset on the guarded branch), ``u_guard_lower_V`` its lower confidence bound.
+    """
+
+    __test__ = False  # not a test case, whatever its name
+
+    source: str
+    dp_MPa: float | None
+    u_knee_rising_V: float | None
+    u_knee_falling_V: float | None
+    u_knee_se_V: float
+    u_onset_rising_V: float | None
+    u_onset_falling_V: float | None
+    u_guard_V: float
+    u_guard_lower_V: float
+    slope_L_min_V: float
+    q_max_L_min: float
+    saturates: bool
+    noise_L_min: float
+    noise_colour: float
+    outliers: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SideModel:
+    """One side of the valve (one direction of flow).
+
+    Attributes
+    ----------
+    tests : tuple of TestResult
+        In the order of rising pressure drop.
+    reference_dp_MPa : float or None
+        dP0; None where the ramp test has no pressure.
+    u_min0_V : float
+        The law's offset at dP0: the largest that the certificate allows, V.
+    k_x_max_over_u_max : float
+        Command that full stroke takes beyond the threshold, over u_max.
+    k_V_mm : float or None
+        k of Eq. (11) in V/mm, where x_max was given.
+    trend : {"decreasing", "flat", "increasing"}
+        How the threshold runs with the pressure drop.
+    trend_change_V, trend_change_se_V : float or None
+        Its change over the tested range, and the standard error.
+    beta_dp_MPa, beta : tuple of float
+        Nodes of the piecewise linear beta(dP); empty where dP is unknown.
+    confidence : float
+        With which all lower bounds hold together.
+    guard : {"closing", "opening"}
+        The threshold that the certificate protects.
+    level_L_min : float
+        Flow below which this data can't tell open from shut.
+    certified_steps_V : tuple of float
+        Staircase: lower bound of the guarded threshold between neighbouring beta nodes.
+    active_constraints : tuple of str
+        Constraints of the two fits that hold with equality.
+    """
+
+    tests: tuple[TestResult, ...]
+    reference_dp_MPa: float | None
+    u_min0_V: float
+    k_x_max_over_u_max: float
+    k_V_mm: float | None
+    trend: str
+    trend_change_V: float | None
+    trend_change_se_V: float | None
+    beta_dp_MPa: tuple[float, ...]
+    beta: tuple[float, ...]
+    confidence: float
+    guard: str
+    level_L_min: float
+    certified_steps_V: tuple[float, ...]
+    active_constraints: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        if self.trend not in TRENDS:
+            raise InputError(f"trend is '{self.trend}', expected one of {', '.join(TRENDS)}")
+        if len(self.beta) != len(self.beta_dp_MPa) or any(
+            right <= left for left, right in zip(self.beta_dp_MPa, self.beta_dp_MPa[1:], strict=False)
+        ):
+            raise InputError("the nodes of beta must be as many as their pressure drops, which must rise")
+        if not 0 < self.u_min0_V:
+            raise InputError(f"u_min0 is {self.u_min0_V} V, expected a positive threshold")
+
+    @property
+    def valid_dp_MPa(self) -> tuple[float, float] | None:
+        """Tested interval of dP in MPa; nothing is certified outside it."""
+        return (self.beta_dp_MPa[0], self.beta_dp_MPa[-1]) if self.beta_dp_MPa else None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Warning_:
+    """Something a person should know: `code` for machines, `text` with the numbers and what to do, `source` file."""
+
+    code: str
+    text: str
+    source: str | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ValveModel:
+    """The identified valve.
+
+    Attributes
+    ----------
+    u_max_V : float
+        Full command.
+    meter_floor_L_min, meter_lag_s, meter_zero_L_min : float
+        What was taken of the flow meter: floor (given or found), lag, bound of its zero error.
+    knee_window : tuple of float
+        Shares of the largest flow between which the characteristic was taken as straight.
+    positive : SideModel
+        The side of positive commands.
+    warnings : tuple of Warning_
+        In the order in which they matter.
+    made_from : tuple of (str, str)
+        Source file and its SHA-256.
+    """
+
+    u_max_V: float
+    meter_floor_L_min: float
+    meter_lag_s: float
+    meter_zero_L_min: float
+    knee_window: tuple[float, float]
+    positive: SideModel
+    warnings: tuple[Warning_, ...]
+    made_from: tuple[tuple[str, str], ...]
+
+    def to_document(self) -> dict[str, Any]:
+        """Return the JSON document of schema dzdesign.valve/1; numbers rounded to a microvolt's worth."""
+        side = self.positive
+        valid = side.valid_dp_MPa
+        document = {
+            "schema": SCHEMA,
+            "tool": TOOL,
+            "made_from": [{"source": source, "sha256": digest} for source, digest in self.made_from],
+            "u_max_V": self.u_max_V,
+            "meter": {
+                "floor_L_min": self.meter_floor_L_min,
+                "lag_s": self.meter_lag_s,
+                "zero_L_min": self.meter_zero_L_min,
+            },
+            "knee_window": list(self.knee_window),
+            "sides": {
+                "positive": {
+                    "tests": [asdict(test) for test in side.tests],
+                    "reference": {"dp_MPa": side.reference_dp_MPa, "u_min_V": side.u_min0_V},
+                    "k_x_max_over_u_max": side.k_x_max_over_u_max,
+                    "k_V_mm": side.k_V_mm,
+                    "trend": side.trend,
+                    "trend_change_V": side.trend_change_V,
+                    "trend_change_se_V": side.trend_change_se_V,
+                    "beta": {"dp_MPa": list(side.beta_dp_MPa), "beta": list(side.beta)},
+                    "valid_dp_MPa": list(valid) if valid else None,
+                    "certificate": {
+                        "confidence": side.confidence,
+                        "guard": side.guard,
+                        "level_L_min": side.level_L_min,
+                        "steps_V": list(side.certified_steps_V),
+                    },
+                    "active_constraints": list(side.active_constraints),
+                }
+            },
+            "warnings": [asdict(warning) for warning in self.warnings],
+        }
+        return _rounded(document)
+
+
+def _rounded(value: Any) -> Any:
+    """Round every float to 7 decimals: below every error here, and the same bytes on every machine."""
+    if isinstance(value, float):
+        return round(value, 7)
+    if isinstance(value, dict):
+        return {key: _rounded(item) for key, item in value.items()}
+    return [_rounded(item) for item in value] if isinstance(value, list | tuple) else value
+
+
+def valve_from_document(content: bytes, source: str) -> ValveModel:
+    """Read valve.json; a missing or misshapen key is named.
+
+    Raises
+    ------
+    InputError
+        If the document is not a valve of this schema.
+    """
+    document = parse_document(content, source, (SCHEMA,))
+    try:
+        side = document["sides"]["positive"]
+        known = {field.name for field in fields(TestResult)}
+        certificate = side["certificate"]
+        positive = SideModel(
+            tests=tuple(TestResult(**{key: test[key] for key in known}) for test in side["tests"]),
+            reference_dp_MPa=side["reference"]["dp_MPa"],
+            u_min0_V=side["reference"]["u_min_V"],
+            k_x_max_over_u_max=side["k_x_max_over_u_max"],
+            k_V_mm=side["k_V_mm"],
+            trend=side["trend"],
+            trend_change_V=side["trend_change_V"],
+            trend_change_se_V=side["trend_change_se_V"],
+            beta_dp_MPa=tuple(side["beta"]["dp_MPa"]),
+            beta=tuple(side["beta"]["beta"]),
+            confidence=certificate["confidence"],
+            guard=certificate["guard"],
+            level_L_min=certificate["level_L_min"],
+            certified_steps_V=tuple(certificate["steps_V"]),
+            active_constraints=tuple(side["active_constraints"]),
+        )
+        return ValveModel(
+            u_max_V=document["u_max_V"],
+            meter_floor_L_min=document["meter"]["floor_L_min"],
+            meter_lag_s=document["meter"]["lag_s"],
+            meter_zero_L_min=document["meter"]["zero_L_min"],
+            knee_window=tuple(document["knee_window"]),
+            positive=positive,
+            warnings=tuple(Warning_(**warning) for warning in document["warnings"]),
+            made_from=tuple((item["source"], item["sha256"]) for item in document["made_from"]),
+        )
+    except KeyError as error:
+        raise InputError(f"'{source}' lacks the key {error}; make it again with `dzdesign identify`") from error
+    except (TypeError, IndexError) as error:
+        raise InputError(f"'{source}' is not shaped like a valve ({error}); make it again with `dzdesign identify`") from error
