@@ -181,7 +181,7 @@ _BEYOND = (
     ),
     Equation(
         number="B5",
-        title="Eq. (18) does not meet the target (16): its flow exceeds it by",
+        title="Eq. (18) does not meet the target (16): its flow is",
         kind=Kind.BEYOND,
         symbol=Q,
         members=(
@@ -190,7 +190,7 @@ _BEYOND = (
         ),
         grounds=_flow_at_dP1("(18)"),
         eliminate=_FLOW_UNKNOWNS,
-        note="The two flows are equal only if beta = 1 or k x_max = u_max.",
+        note="Above the target for beta < 1 and k x_max < u_max; on it only if beta = 1 or k x_max = u_max.",
     ),
 )
 

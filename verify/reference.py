@@ -1,0 +1,72 @@
+"""The exactly rounded law at every code pair, computed without the firmware's arithmetic.
+
+Starts from the rationals in compensator.json and the law of `dzdesign.derivation`; along a row of constant pressure the
+law is a straight line in the command code, so its rounded values come from exact addition with carry: quotient and
+remainder advance by the quotient and remainder of the slope. No multiplication, shift or reciprocal is shared with the
+generated C.
+"""
+
+from collections.abc import Iterator
+from fractions import Fraction
+from math import lcm
+from typing import Any
+
+import numpy as np
+
+from dzdesign.core.errors import RequirementError
+from dzdesign.derivation.law import law
+
+
+class ExactLaw:
+    """The law of a compensator document on integer codes.
+
+    Parameters
+    ----------
+    document : dict
+        compensator.json, parsed and checked.
+    """
+
+    def __init__(self, document: dict[str, Any]) -> None:
+        signals, table = document["signals"], document["beta"]
+        self.command_max: int = signals["command_code_max"]
+        self.pressure_max: int = signals["pressure_code_max"]
+        self.compare_max: int = signals["compare_max"]
+        self.reverse: int = document["reverse_codes"]
+        self._law = law(document["law"])
+        self._kappa = Fraction(*document["k_x_max_over_u_max"])
+        self._u_min0 = Fraction(*document["u_min0_over_u_max"])
+        self._nodes = [Fraction(numerator, table["denominator"]) for numerator in table["numerators"]]
+        self._step: int = table["step_codes"]
+
+    def beta(self, dp_code: int) -> Fraction:
+        """Return beta at a difference of pressure codes; below ``-reverse`` the smallest one."""
+        if dp_code < -self.reverse:
+            return min(self._nodes)
+        place = Fraction(max(dp_code, 0), self._step)
+        left = place.numerator // place.denominator
+        return self._nodes[left] + (place - left) * (self._nodes[left + 1] - self._nodes[left])
+
+    def line(self, beta: Fraction) -> tuple[Fraction, Fraction]:
+        """Return the law at one beta in counts: slope per command code, and value at code 0."""
+        gain = self._law.evaluate_gain(beta, self._kappa)
+        offset = self._law.evaluate_offset(beta, self._u_min0)
+        return gain * self.compare_max / self.command_max, offset * self.compare_max
+
+    def rows(self, betas: list[Fraction]) -> Iterator[np.ndarray]:
+        """Yield, for command codes 0, 1, ..., the rounded and limited compare values at all `betas`."""
+        lines = [self.line(beta) for beta in betas]
+        half = Fraction(1, 2)
+        scale = lcm(*(value.denominator for slope, start in lines for value in (slope, start + half)))
+        if scale >= 2**62:
+            raise RequirementError(f"the law's common denominator needs {scale.bit_length()} bits, expected at most 62")
+        # floor(value + 1/2) rounds to nearest, a half up.
+        starts = [divmod(int((start + half) * scale), scale) for _, start in lines]
+        slopes = [divmod(int(slope * scale), scale) for slope, _ in lines]
+        quotient, remainder = (np.array(column, dtype=np.int64) for column in zip(*starts, strict=True))
+        step, carry = (np.array(column, dtype=np.int64) for column in zip(*slopes, strict=True))
+        for _ in range(self.command_max + 1):
+            yield np.clip(quotient, 0, self.compare_max)
+            remainder = remainder + carry
+            over = remainder >= scale
+            remainder = np.where(over, remainder - scale, remainder)
+            quotient = quotient + step + over
