@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dzdesign.core.artefacts import read_bytes, sha256_of, write_file
+from dzdesign.core.artefacts import read_bytes, sha256_of
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.units import si_factor
 
@@ -109,15 +109,25 @@ def read_ramp_file(path: Path, u_max: float = 10.0) -> RampTest:
     )
 
 
-def write_ramp_file(path: Path, columns: Mapping[str, np.ndarray], comments: tuple[str, ...] = ()) -> None:
-    """Write a ramp file: comment lines, header, rows with four decimals; gzip (without a date) if so named."""
+def ramp_file_bytes(columns: Mapping[str, np.ndarray], comments: tuple[str, ...], *, compress: bool) -> bytes:
+    """Return the bytes of a ramp file: comment lines, header, rows with four decimals; gzip carries no date.
+
+    Parameters
+    ----------
+    columns : mapping
+        Label with unit, such as ``"u_V"``, to an (N,) array.
+    comments : tuple of str
+        Lines without the leading ``#``.
+    compress : bool
+        Whether to gzip.
+    """
     out = io.StringIO()
     for line in comments:
         out.write(f"# {line}\n")
     out.write(",".join(columns) + "\n")
     np.savetxt(out, np.column_stack(list(columns.values())), fmt="%.4f", delimiter=",")
     data = out.getvalue().encode()
-    write_file(path, gzip.compress(data, mtime=0) if str(path).endswith(".gz") else data)
+    return gzip.compress(data, mtime=0) if compress else data
 
 
 def _decode(content: bytes, path: Path) -> str:

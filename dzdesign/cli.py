@@ -1,0 +1,170 @@
+"""The command line: what can be said, and what an error or a failed requirement becomes.
+
+Exit status: 0 holds, 1 a requirement does not hold (said which), 2 bad input or usage. Every heavy import happens inside
+the command that needs it (`dzdesign.commands`), so that `--help` costs no more than argparse.
+"""
+
+import argparse
+import os
+import sys
+from importlib import import_module
+
+from dzdesign import __version__
+from dzdesign.core.errors import DzdesignError, RequirementError
+
+DOES_NOT_HOLD, BAD_INPUT, INTERRUPTED = 1, 2, 130
+
+#: Command -> (one line of help, function that runs it, its options). An option is (names, keywords of add_argument).
+Option = tuple[tuple[str, ...], dict]
+
+
+def _given(*names: str, **keywords: object) -> Option:
+    if "default" in keywords:
+        keywords["help"] = f"{keywords['help']} (default: %(default)s)"
+    return names, keywords
+
+
+OUTPUT = ("-o", "--output")
+LAW = _given("--law", default="paper", metavar="LAW", help="paper: Eq. (18); target: meets Eq. (16)")
+SPAN = _given("--pressure-span", default="20 MPa", metavar="P", help="span of both pressure sensors")
+PLANT = _given("--plant", metavar="PLANT.toml", help="plant of the closed loop (default: see the documentation)")
+
+COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
+    "demo": (
+        "run the whole pipeline on the bundled example",
+        "dzdesign.demo:run_demo",
+        (_given("folder", metavar="DIR", help="folder for the artefacts"),),
+    ),
+    "derive": (
+        "re-derive the paper's equations and print premises and verdicts",
+        "dzdesign.commands:run_derive",
+        (
+            _given("--format", default="text", metavar="F", help="text, json, latex or html"),
+            _given(*OUTPUT, metavar="FILE", help="file to write (default: standard output)"),
+        ),
+    ),
+    "identify": (
+        "ramp tests in, valve.json out: k, thresholds, beta(dP)",
+        "dzdesign.commands:run_identify",
+        (
+            _given("ramps", nargs="+", metavar="RAMP", help="table with a header such as time_s,u_V,dP_MPa,Q_Lmin"),
+            _given(*OUTPUT, default="valve.json", metavar="FILE", help="file to write"),
+            _given("--dp0", metavar="P", help='reference pressure drop (default: the test nearest to "1 MPa")'),
+            _given("--u-max", default="10 V", metavar="U", help="full command"),
+            _given("--meter-floor", metavar="Q", help="flow below which the meter reads zero (default: found)"),
+            _given("--meter-lag", default="0 s", metavar="T", help="lag of the flow meter"),
+            _given("--meter-zero", default="0 L/min", metavar="Q", help="bound of the meter's zero error"),
+            _given("--x-max", metavar="X", help='stroke, such as "1.8 mm": gives k in V/mm'),
+            _given("--confidence", default="0.99", metavar="C", help="of all lower bounds together"),
+            _given("--knee-window", default="12-50", metavar="A-B", help="per cent of the largest flow taken as straight"),
+        ),
+    ),
+    "design": (
+        "valve.json in, compensator.json out: the law with exact coefficients, certified",
+        "dzdesign.commands:run_design",
+        (
+            _given("valve", metavar="VALVE.json", help="made by `dzdesign identify`"),
+            _given(*OUTPUT, default="compensator.json", metavar="FILE", help="file to write"),
+            LAW,
+            SPAN,
+        ),
+    ),
+    "codegen": (
+        "compensator.json in, a folder of C out",
+        "dzdesign.commands:run_codegen",
+        (
+            _given("source", metavar="COMPENSATOR.json", help="made by `dzdesign design`; a valve.json is designed first"),
+            _given(*OUTPUT, default="firmware", metavar="DIR", help="folder to write"),
+            _given("--target", default="f28335", metavar="NAME", help="microcontroller"),
+            LAW,
+            SPAN,
+        ),
+    ),
+    "verify": (
+        "firmware in, evidence out: every input, and the closed loop",
+        "dzdesign.commands:run_verify",
+        (
+            _given("firmware", metavar="DIR", help="made by `dzdesign codegen`"),
+            _given(*OUTPUT, default="evidence", metavar="DIR", help="folder to write"),
+            PLANT,
+        ),
+    ),
+    "simulate": (
+        "ramp tests of a simulated valve, marked as such",
+        "dzdesign.commands:run_simulate",
+        (
+            _given(*OUTPUT, default="ramps", metavar="DIR", help="folder to write"),
+            PLANT,
+            _given("--dp", action="append", metavar="P", help="pressure drop of a test; repeat it (default: 0.5 to 5 MPa)"),
+            _given("--ramp-time", default="100 s", metavar="T", help="from zero to full command"),
+            _given("--seed", default="1", metavar="N", help="of the noise"),
+        ),
+    ),
+}
+
+
+def build_parser() -> tuple[argparse.ArgumentParser, dict[str, argparse.ArgumentParser]]:
+    """Return the parser and those of its commands."""
+    parser = argparse.ArgumentParser(
+        prog="dzdesign",
+        description="Dead-zone compensators for proportional valves without a spool sensor: "
+        "from ramp tests to checked C.",
+        epilog="Example: dzdesign identify ramps/*.csv -o valve.json",
+    )
+    parser.add_argument("--version", action="version", version=f"dzdesign {__version__}")
+    choices = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    commands = {}
+    for name, (help_line, run, options) in COMMANDS.items():
+        command = choices.add_parser(name, help=help_line, description=help_line[0].upper() + help_line[1:] + ".")
+        for names, keywords in options:
+            command.add_argument(*names, **keywords)
+        command.add_argument("--config", metavar="TOML", help="file with options of the same names")
+        command.add_argument("--json", action="store_true", help="print the result as JSON")
+        command.set_defaults(run=run)
+        commands[name] = command
+    return parser, commands
+
+
+def parse(argv: list[str]) -> argparse.Namespace:
+    """Parse the command line; what a TOML file says stands in for the defaults.
+
+    Raises
+    ------
+    InputError
+        If the file can't be read or names no option.
+    """
+    parser, commands = build_parser()
+    args = parser.parse_args(argv)
+    if args.config:
+        from dzdesign.config import options_from_file
+
+        names = {action.dest for command in commands.values() for action in command._actions}
+        command = commands[args.command]
+        mine = {action.dest for action in command._actions}
+        values = options_from_file(args.config, names - {"help", "config", "json", "ramps"})
+        command.set_defaults(**{key: value for key, value in values.items() if key in mine})
+        args = parser.parse_args(argv)
+    return args
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the command line and return the exit status."""
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):  # a console that can't print a character prints a ? instead
+            stream.reconfigure(errors="replace")
+    try:
+        args = parse(sys.argv[1:] if argv is None else argv)
+        module, function = args.run.split(":")
+        return getattr(import_module(module), function)(args)
+    except RequirementError as error:
+        print(f"dzdesign: does not hold: {error}", file=sys.stderr)
+        return DOES_NOT_HOLD
+    except DzdesignError as error:
+        print(f"dzdesign: {error}", file=sys.stderr)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        print("dzdesign: interrupted; nothing half-written was left", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return DOES_NOT_HOLD

@@ -1,0 +1,187 @@
+"""The commands: read, call one room, write the artefact whole, print what a person wants to know."""
+
+import argparse
+import glob
+import sys
+from pathlib import Path
+
+from dzdesign.core.artefacts import (
+    TOOL,
+    check_folder_may_be_written,
+    parse_document,
+    read_bytes,
+    to_json,
+    write_file,
+    write_folder,
+)
+from dzdesign.core.errors import InputError
+from dzdesign.core.units import parse_quantity
+
+
+def say(text: str) -> None:
+    """Tell of progress, on stderr: stdout is for results."""
+    print(f"dzdesign: {text}", file=sys.stderr)
+
+
+def expand(patterns: list[str]) -> list[Path]:
+    """Return the files that the patterns name; cmd.exe leaves ``*.csv`` to the program."""
+    paths = []
+    for pattern in patterns:
+        matches = sorted(glob.glob(pattern)) if glob.has_magic(pattern) and not Path(pattern).exists() else [pattern]
+        if not matches:
+            raise InputError(f"no file matches '{pattern}'")
+        paths += [Path(match) for match in matches]
+    return paths
+
+
+def _number(text: str, option: str) -> float:
+    try:
+        return float(text)
+    except ValueError as error:
+        raise InputError(f"{option} is '{text}', expected a number") from error
+
+
+def _window(text: str) -> tuple[float, float]:
+    low, _, high = text.replace("%", "").partition("-")
+    return _number(low, "--knee-window") / 100, _number(high, "--knee-window") / 100
+
+
+def _optional(text: str | None, quantity: str, option: str) -> float | None:
+    return None if text is None else parse_quantity(text, quantity, option)
+
+
+def run_identify(args: argparse.Namespace) -> int:
+    """Identify a valve from ramp tests."""
+    from dzdesign.identify.identification import IdentifyOptions, identify
+    from dzdesign.identify.ramp_files import read_ramp_file
+    from dzdesign.tables import print_valve
+
+    u_max = parse_quantity(args.u_max, "voltage", "--u-max")
+    options = IdentifyOptions(
+        u_max=u_max,
+        dp0=_optional(args.dp0, "pressure", "--dp0"),
+        meter_floor=_optional(args.meter_floor, "flow", "--meter-floor"),
+        meter_lag=parse_quantity(args.meter_lag, "time", "--meter-lag"),
+        meter_zero=parse_quantity(args.meter_zero, "flow", "--meter-zero"),
+        x_max=_optional(args.x_max, "length", "--x-max"),
+        confidence=_number(args.confidence, "--confidence"),
+        knee_window=_window(args.knee_window),
+    )
+    tests = [read_ramp_file(path, u_max) for path in expand(args.ramps)]
+    say(f"fitting {len(tests)} ramp test{'s' if len(tests) > 1 else ''}")
+    valve = identify(tests, options)
+    document = valve.to_document()
+    write_file(Path(args.output), to_json(document))
+    if args.json:
+        print(to_json(document), end="")
+    else:
+        print_valve(valve)
+        print(f"Written: {args.output}")
+    return 0
+
+
+def _design(valve_path: Path, content: bytes, args: argparse.Namespace) -> "Compensator":  # noqa: F821
+    from fractions import Fraction
+
+    from dzdesign.design.designing import DesignOptions, design
+    from dzdesign.design.signals import Signals
+    from dzdesign.identify.model import valve_from_document
+
+    span_MPa = Fraction(round(parse_quantity(args.pressure_span, "pressure", "--pressure-span")), 10**6)
+    options = DesignOptions(law_name=args.law, signals=Signals(pressure_span_MPa=span_MPa))
+    return design(valve_from_document(content, str(valve_path)), options, content)
+
+
+def run_design(args: argparse.Namespace) -> int:
+    """Design the compensator of a valve."""
+    from dzdesign.tables import print_compensator
+
+    path = Path(args.valve)
+    compensator = _design(path, read_bytes(path, "valve file"), args)
+    document = compensator.to_document()
+    write_file(Path(args.output), to_json(document))
+    if args.json:
+        print(to_json(document), end="")
+    else:
+        print_compensator(compensator)
+        print(f"Written: {args.output}")
+    return 0
+
+
+def run_codegen(args: argparse.Namespace) -> int:
+    """Generate the firmware of a compensator."""
+    from dzdesign.codegen.project import generate, target_named
+    from dzdesign.design.compensator import SCHEMA as COMPENSATOR_SCHEMA
+    from dzdesign.design.compensator import compensator_from_document
+    from dzdesign.identify.model import SCHEMA as VALVE_SCHEMA
+    from dzdesign.tables import print_firmware
+
+    target_named(args.target)
+    check_folder_may_be_written(Path(args.output))
+    path = Path(args.source)
+    content = read_bytes(path, "compensator file")
+    document = parse_document(content, str(path), (COMPENSATOR_SCHEMA, VALVE_SCHEMA))
+    if document["schema"] == VALVE_SCHEMA:
+        firmware = generate(_design(path, content, args), args.target)
+    else:
+        firmware = generate(compensator_from_document(content, str(path)), args.target, content)
+    write_folder(Path(args.output), firmware.files, firmware.manifest)
+    if args.json:
+        print(to_json(firmware.manifest), end="")
+    else:
+        print_firmware(firmware, args.output)
+    return 0
+
+
+def run_verify(args: argparse.Namespace) -> int:
+    """Verify a firmware folder and write the evidence."""
+    from dzdesign.tables import print_verification
+    from dzdesign.verify.plant import read_plant
+    from dzdesign.verify.verification import SCHEMA, evidence_files, verify
+
+    output = Path(args.output)
+    check_folder_may_be_written(output)
+    plant = read_plant(Path(args.plant)) if args.plant else None
+    source = Path(args.plant).name if args.plant else ""
+    verification = verify(Path(args.firmware), plant, source, say=say)
+    manifest = {"schema": SCHEMA, "tool": TOOL, "made_from": verification.document["made_from"]}
+    write_folder(output, evidence_files(verification), manifest)
+    if args.json:
+        print(to_json(verification.document), end="")
+    else:
+        print_verification(verification)
+        print(f"Evidence: {output}")
+    return 0 if verification.holds else 1
+
+
+def run_simulate(args: argparse.Namespace) -> int:
+    """Write ramp tests of a simulated valve."""
+    from dzdesign.verify.plant import Plant, read_plant
+    from dzdesign.verify.simulation import Bench, simulated_files
+
+    plant = read_plant(Path(args.plant)) if args.plant else Plant()
+    texts = args.dp or ["0.5 MPa", "1 MPa", "2 MPa", "3 MPa", "4 MPa", "5 MPa"]
+    pressures = [parse_quantity(text, "pressure", "--dp") / 1e6 for text in texts]
+    ramp_s = parse_quantity(args.ramp_time, "time", "--ramp-time")
+    seed = _number(args.seed, "--seed")
+    if seed != int(seed) or seed < 0:
+        raise InputError(f"--seed is '{args.seed}', expected a whole number of zero or more")
+    check_folder_may_be_written(Path(args.output))
+    files, manifest = simulated_files(plant, pressures, ramp_s, Bench(seed=int(seed)), say=say)
+    write_folder(Path(args.output), files, manifest)
+    print(to_json(manifest) if args.json else f"Written: {len(files)} simulated ramp tests in {args.output}")
+    return 0
+
+
+def run_derive(args: argparse.Namespace) -> int:
+    """Re-derive the paper's equations; 1 if one does not follow."""
+    from dzdesign.derivation.equations import verify_equations
+    from dzdesign.derivation.report import render
+
+    verdicts = verify_equations()
+    text = render(verdicts, "json" if args.json else args.format)
+    if args.output:
+        write_file(Path(args.output), text)
+    else:
+        print(text, end="")
+    return 0 if all(verdict.holds for verdict in verdicts) else 1

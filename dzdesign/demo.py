@@ -1,0 +1,53 @@
+"""`dzdesign demo DIR`: the main job on the bundled example, from ramp tests to checked C."""
+
+import argparse
+from importlib.resources import as_file, files
+from pathlib import Path
+
+from dzdesign.commands import say
+from dzdesign.core.artefacts import TOOL, check_folder_may_be_written, to_json, write_file, write_folder
+from dzdesign.core.errors import InputError
+
+
+def run_demo(args: argparse.Namespace) -> int:
+    """Run the pipeline on the bundled ramp tests and print the closing table."""
+    from dzdesign.codegen.project import generate
+    from dzdesign.derivation.equations import verify_equations
+    from dzdesign.design.designing import design
+    from dzdesign.identify.identification import identify
+    from dzdesign.identify.ramp_files import read_ramp_file
+    from dzdesign.tables import print_demo
+    from dzdesign.verify.plant import read_plant
+    from dzdesign.verify.verification import SCHEMA, evidence_files, verify
+
+    folder = Path(args.folder)
+    for part in ("firmware", "evidence"):
+        check_folder_may_be_written(folder / part)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"the folder '{folder}' can't be made: {error.strerror}") from error
+    verdicts = verify_equations()
+    follow = sum(verdict.holds for verdict in verdicts)
+    say(f"derivation: {follow} of {len(verdicts)} statements hold")
+    with as_file(files("dzdesign.example")) as example:
+        tests = [read_ramp_file(path) for path in sorted((example / "ramps").glob("*.csv.gz"))]
+        plant = read_plant(example / "plant.toml")
+    say(f"identifying the valve from {len(tests)} simulated ramp tests")
+    valve = identify(tests)
+    valve_json = to_json(valve.to_document())
+    write_file(folder / "valve.json", valve_json)
+    say("designing the compensator")
+    compensator = design(valve, valve_bytes=valve_json.encode())
+    compensator_json = to_json(compensator.to_document())
+    write_file(folder / "compensator.json", compensator_json)
+    firmware = generate(compensator, "f28335", compensator_json.encode())
+    write_folder(folder / "firmware", firmware.files, firmware.manifest)
+    verification = verify(folder / "firmware", plant, "plant.toml of the example", say=say)
+    manifest = {"schema": SCHEMA, "tool": TOOL, "made_from": verification.document["made_from"]}
+    write_folder(folder / "evidence", evidence_files(verification), manifest)
+    if args.json:
+        print(to_json(verification.document), end="")
+    else:
+        print_demo(valve, verification, str(folder))
+    return 0 if verification.holds and follow == len(verdicts) else 1

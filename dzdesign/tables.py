@@ -1,0 +1,163 @@
+"""Results as tables on stdout, by rich; plain where stdout is no terminal."""
+
+import sys
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+    from dzdesign.codegen.project import Firmware
+    from dzdesign.design.compensator import Compensator
+    from dzdesign.identify.model import ValveModel
+    from dzdesign.verify.verification import Verification
+
+#: Columns of a page when stdout is a file or a pipe.
+FILE_WIDTH = 140
+
+
+def _console() -> "Console":
+    from rich.console import Console
+
+    return Console(highlight=False, width=None if sys.stdout.isatty() else FILE_WIDTH)
+
+
+def _table(title: str, *columns: str) -> "Table":
+    from rich import box
+    from rich.table import Table
+
+    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left", title_style="bold")
+    for index, column in enumerate(columns):
+        table.add_column(column, justify="left" if index == 0 else "right")
+    return table
+
+
+def _volts(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3f}"
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.1f} %"
+
+
+def print_valve(valve: "ValveModel") -> None:
+    """Print thresholds per ramp test, the law's parameters and every warning."""
+    side = valve.positive
+    table = _table(
+        "Thresholds (V)", "ramp test", "dP (MPa)", "knee opening", "knee closing", "± (1 s.e.)", "guarded", "lower bound",
+        "beta", "Q max (L/min)",
+    )  # fmt: skip
+    betas = side.beta or ("-",)
+    for test, beta in zip(side.tests, betas, strict=True):
+        table.add_row(
+            test.source,
+            "?" if test.dp_MPa is None else f"{test.dp_MPa:.3f}",
+            _volts(test.u_knee_rising_V),
+            _volts(test.u_knee_falling_V),
+            f"{test.u_knee_se_V:.4f}",
+            _volts(test.u_guard_V),
+            _volts(test.u_guard_lower_V),
+            beta if isinstance(beta, str) else f"{beta:.4f}",
+            f"{test.q_max_L_min:.2f}",
+        )
+    console = _console()
+    console.print(table)
+    at = "" if side.reference_dp_MPa is None else f" at dP0 = {side.reference_dp_MPa:.3f} MPa"
+    lines = [
+        f"u_min0 = {side.u_min0_V:.4f} V{at}: the law's offset, under the lower bound of the {side.guard} threshold "
+        f"({side.confidence:.0%} for all tests together)",
+        f"k x_max/u_max = {side.k_x_max_over_u_max:.4f}"
+        + (f", k = {side.k_V_mm:.4f} V/mm" if side.k_V_mm is not None else ""),
+        f"trend with dP: {side.trend}"
+        + ("" if side.trend_change_V is None else f" ({1e3 * side.trend_change_V:+.1f} ± {1e3 * side.trend_change_se_V:.1f} mV)"),
+        f"meter floor: {valve.meter_floor_L_min:.2f} L/min; lag taken as {valve.meter_lag_s:g} s",
+    ]  # fmt: skip
+    for line in lines:
+        console.print(line, markup=False, soft_wrap=True)
+    for warning in valve.warnings:
+        source = f"{warning.source}: " if warning.source else ""
+        console.print(f"warning [{warning.code}] {source}{warning.text}", markup=False, soft_wrap=True)
+
+
+def print_compensator(compensator: "Compensator") -> None:
+    """Print the law, the certificate and what the choices cost."""
+    from dzdesign.derivation.law import law
+
+    chosen, certificate = law(compensator.law_name), compensator.certificate
+    low, high = (float(end) for end in certificate.dp_MPa)
+    console = _console()
+    for line in (
+        f"law {chosen.name} {chosen.equation}: u_O = {chosen.output}",
+        f"k x_max/u_max = {compensator.k_x_max_over_u_max}, u_min0/u_max = {compensator.u_min0_over_u_max}, "
+        f"beta: {len(compensator.beta_numerators)} nodes over {compensator.beta_denominator}",
+        f"certificate: the offset stays below the {certificate.confidence:.0%} lower bound of the {certificate.guard} "
+        f"threshold from {low:.3f} to {high:.3f} MPa, smallest margin "
+        f"{1e3 * float(certificate.smallest_margin_V):.3f} mV; flow below {certificate.level_L_min:.2f} L/min "
+        "could not be told from none",
+        *(f"cost: {line}" for line in compensator.costs),
+    ):
+        console.print(line, markup=False, soft_wrap=True)
+
+
+def print_firmware(firmware: "Firmware", folder: str) -> None:
+    """Print the files of a firmware folder."""
+    print(f"Firmware for {firmware.manifest['target']}, law {firmware.manifest['law']}, in {folder}:")
+    for name in firmware.files:
+        print(f"  {name}")
+
+
+def print_verification(verification: "Verification") -> None:
+    """Print every check and the closed loop, per pressure drop."""
+    console = _console()
+    for check in verification.checks:
+        console.print(f"{'holds' if check.holds else 'FAILS'}  {check.name}: {check.text}", markup=False, soft_wrap=True)
+    if not verification.loops:
+        return
+    table = _table(
+        f"Closed loop (plant: {verification.plant_source}); dead zones in per cent of full command, onset of flow",
+        "dP (MPa)", "without: opening", "closing", "with: opening", "closing", "Q at zero, no beta", "with beta",
+        "Q max without", "with (L/min)",
+    )  # fmt: skip
+    for loop in verification.loops:
+        result = loop.result
+        table.add_row(
+            f"{result.dp_MPa:.2f}",
+            _percent(result.dead_zone_opening),
+            _percent(result.dead_zone_closing),
+            _percent(result.residual_opening),
+            _percent(result.residual_closing),
+            f"{result.q_zero_without_beta_L_min:.2f}",
+            f"{result.q_zero_L_min:.2f}",
+            f"{result.q_max_direct_L_min:.1f}",
+            f"{result.q_max_L_min:.1f}",
+        )
+    console.print(table)
+
+
+def print_demo(valve: "ValveModel", verification: "Verification", folder: str) -> None:
+    """Print the demo's closing table: per pressure drop, what was found and what the compensator does."""
+    table = _table(
+        "Simulated example valve, 0-10 V ramps in closed loop with the generated C",
+        "dP (MPa)", "threshold open/close (V)", "dead zone without", "with: opening", "with: closing",
+        "Q at zero without beta", "with beta (L/min)",
+    )  # fmt: skip
+    tests = {round(test.dp_MPa, 6): test for test in valve.positive.tests}
+    for loop in verification.loops:
+        result = loop.result
+        test = tests[round(result.dp_MPa, 6)]
+        table.add_row(
+            f"{result.dp_MPa:.2f}",
+            f"{_volts(test.u_knee_rising_V)} / {_volts(test.u_knee_falling_V)}",
+            _percent(result.dead_zone_opening),
+            _percent(result.residual_opening),
+            _percent(result.residual_closing),
+            f"{result.q_zero_without_beta_L_min:.2f}",
+            f"{result.q_zero_L_min:.2f}",
+        )
+    console = _console()
+    console.print(table)
+    inputs = verification.inputs
+    console.print(f"Inputs checked: {inputs.inputs}, wrong: {inputs.wrong}", markup=False, soft_wrap=True)
+    failed = [check.name for check in verification.checks if not check.holds]
+    console.print("Every requirement holds." if not failed else f"DOES NOT HOLD: {', '.join(failed)}", markup=False, soft_wrap=True)
+    console.print(f"Artefacts: {folder}", markup=False, soft_wrap=True)

@@ -1,0 +1,196 @@
+"""The compiled core in closed loop with the plant: ramps up and down, the pulse resolved, the pressures through the ADC."""
+
+import ctypes
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+
+from dzdesign.core.errors import InputError
+from dzdesign.verify.host_compiler import load_library
+from dzdesign.verify.plant import Plant, period_step
+
+#: Periods of the PWM between two records: 100 a second, as in the paper's tests.
+PERIODS_PER_RECORD = 25
+RECORD_S = PERIODS_PER_RECORD * 400e-6
+#: Pressure behind the edge: what both sensors see beside the drop.
+BACK_PRESSURE_MPA = 1.0
+#: Flow counts as flow from this share of the largest flow on: no meter stands between.
+FLOW_SHARE = 1e-3
+MODES = {"direct": 0, "compensated": 1, "without beta": 2}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RampSequence:
+    """Command over time: hold at zero, ramp up, hold at full command, ramp down, hold at zero; all in s."""
+
+    rest: float = 3.0
+    ramp: float = 100.0
+    top: float = 2.0
+
+    def command(self) -> np.ndarray:
+        """Return the command as a share of u_max, one value a record."""
+        corners = np.cumsum([0, self.rest, self.ramp, self.top, self.ramp, self.rest])
+        time = np.arange(0, corners[-1], RECORD_S)
+        return np.interp(time, corners, [0, 0, 1, 1, 0, 0])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoopRun:
+    """Records of one run, 100 a second: time in s, command share, compare value, dP in MPa, flow in L/min, all (N,)."""
+
+    time: np.ndarray
+    command: np.ndarray
+    compare: np.ndarray
+    dp_MPa: np.ndarray
+    q_L_min: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PressureResult:
+    """The closed loop at one pressure drop, as shares of u_max and L/min.
+
+    Dead zones are the commands at which the plant's own flow passes `FLOW_SHARE` of the largest (no meter between),
+    on the opening and on the closing branch, without compensator and with it. Flow at zero command is taken at the
+    end, after closing; `without_beta` with the pressures frozen at dP0.
+    """
+
+    dp_MPa: float
+    dead_zone_opening: float
+    dead_zone_closing: float
+    residual_opening: float
+    residual_closing: float
+    q_zero_L_min: float
+    q_zero_without_beta_L_min: float
+    q_max_direct_L_min: float
+    q_max_L_min: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoopComparison:
+    """Result at one pressure drop, and the two runs it was read from."""
+
+    result: PressureResult
+    direct: LoopRun
+    compensated: LoopRun
+
+
+class ClosedLoop:
+    """One plant and, where given, one generated core, compiled into one native loop.
+
+    Parameters
+    ----------
+    plant : Plant
+        Parameters.
+    firmware : Path or None
+        Firmware folder; None leaves only the direct drive.
+    pressure_span_MPa, code_max, compare_max : float, int, int
+        Scalings of the core's inputs and output.
+    """
+
+    def __init__(
+        self,
+        plant: Plant,
+        firmware: Path | None = None,
+        *,
+        pressure_span_MPa: float = 20.0,
+        code_max: int = 4095,
+        compare_max: int = 60000,
+    ) -> None:
+        import casadi as ca
+
+        step = period_step(plant)
+        generator = ca.CodeGenerator("plant_step.c")
+        generator.add(step)
+        sources = {"plant_step.c": generator.dump()}
+        sources["loop.c"] = files("dzdesign.verify").joinpath("loop.c").read_text(encoding="utf-8")
+        if firmware is None:
+            sources["direct.c"] = (
+                "#include <stdint.h>\n"
+                "uint16_t dz_comp(uint16_t u, uint16_t a, uint16_t b) { (void)a; (void)b; return u; }\n"
+            )
+        else:
+            for name in ("dz_comp.c", "dz_comp.h"):
+                sources[name] = (firmware / "core" / name).read_text(encoding="utf-8")
+        self._library = load_library(sources, "the closed loop")
+        self._work_sizes = max(step.sz_w(), 1), max(step.sz_iw(), 1)
+        self._scalings = (float(pressure_span_MPa), int(code_max), float(compare_max))
+        self._has_core = firmware is not None
+
+    def run(
+        self, command: np.ndarray, supply_MPa: float, mode: str = "direct", dp_frozen_MPa: float = 0.0
+    ) -> LoopRun:
+        """Run the loop from rest.
+
+        Parameters
+        ----------
+        command : (N,) array
+            Share of u_max, one value a record of 10 ms.
+        supply_MPa : float
+            Pressure drop at no flow.
+        mode : {"direct", "compensated", "without beta"}
+            What drives the PWM.
+        dp_frozen_MPa : float
+            The pressure drop that mode "without beta" shows to the core.
+        """
+        if mode != "direct" and not self._has_core:
+            raise InputError("this loop was built without a compensator; give the firmware folder")
+        command = np.ascontiguousarray(command, dtype=float)
+        record, state = np.empty((command.size, 3)), np.zeros(4)
+        # Of this run alone, so that runs may go on side by side (ctypes lets go of the interpreter's lock).
+        work = np.zeros(self._work_sizes[0]), np.zeros(self._work_sizes[1], dtype=np.int64)
+        span, code_max, compare_max = self._scalings
+        if supply_MPa + BACK_PRESSURE_MPA > span:
+            raise InputError(f"{supply_MPa:g} MPa and the back pressure of {BACK_PRESSURE_MPA:g} MPa exceed the sensor")
+        pointer = [array.ctypes.data_as(ctypes.c_void_p) for array in (command, *work, state, record)]
+        self._library.dz_loop(
+            ctypes.c_int32(command.size),
+            ctypes.c_int32(PERIODS_PER_RECORD),
+            ctypes.c_int32(MODES[mode]),
+            pointer[0],
+            *(ctypes.c_double(value) for value in (supply_MPa, BACK_PRESSURE_MPA, dp_frozen_MPa, span)),
+            ctypes.c_int32(code_max),
+            ctypes.c_double(compare_max),
+            *pointer[1:],
+        )
+        return LoopRun(
+            time=np.arange(command.size) * RECORD_S,
+            command=command,
+            compare=record[:, 0],
+            dp_MPa=record[:, 1],
+            q_L_min=record[:, 2],
+        )
+
+
+def compare_at_pressure(loop: ClosedLoop, dp_MPa: float, dp0_MPa: float, sequence: RampSequence) -> LoopComparison:
+    """Run the ramp without and with the compensator at one pressure drop, and read dead zones and flows."""
+    command = sequence.command()
+    direct = loop.run(command, dp_MPa)
+    with_core = loop.run(command, dp_MPa, "compensated")
+    # Only the flow at zero command is asked of this one, so it may open and close the valve quickly.
+    quick = RampSequence(rest=sequence.rest, ramp=5.0, top=0.5).command()
+    without_beta = loop.run(quick, dp_MPa, "without beta", dp_frozen_MPa=dp0_MPa)
+    level = FLOW_SHARE * direct.q_L_min.max()
+    result = PressureResult(
+        dp_MPa=dp_MPa,
+        dead_zone_opening=dead_zone(direct, level, rising=True),
+        dead_zone_closing=dead_zone(direct, level, rising=False),
+        residual_opening=dead_zone(with_core, level, rising=True),
+        residual_closing=dead_zone(with_core, level, rising=False),
+        q_zero_L_min=float(with_core.q_L_min[-1]),
+        q_zero_without_beta_L_min=float(without_beta.q_L_min[-1]),
+        q_max_direct_L_min=float(direct.q_L_min.max()),
+        q_max_L_min=float(with_core.q_L_min.max()),
+    )
+    return LoopComparison(result=result, direct=direct, compensated=with_core)
+
+
+def dead_zone(run: LoopRun, level: float, *, rising: bool) -> float:
+    """Return the command share at which flow first reaches `level` going up, or last holds it going down."""
+    top = int(np.argmax(run.command))
+    flows = np.flatnonzero(run.q_L_min > level)
+    part = flows[flows <= top] if rising else flows[flows > top]
+    if part.size == 0:
+        return 1.0
+    return float(run.command[part[0] if rising else part[-1]])

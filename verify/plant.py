@@ -1,0 +1,233 @@
+"""The plant of Eqs. (19)-(24), with what a real valve's measurements need, and its step over one PWM period in CasADi.
+
+Added to the paper's equations, each of them off where its parameter is zero: preload, overlap, stops, a pressure force
+that moves the threshold, flow force, a play in the magnetic force (hysteresis), droop of the supply.
+"""
+
+import json
+import math
+import tomllib
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from dzdesign.core.artefacts import read_bytes
+from dzdesign.core.errors import InputError, nearest
+from dzdesign.identify.model import SideModel
+
+if TYPE_CHECKING:
+    import casadi
+
+PWM_PERIOD_S = 400e-6
+#: Runge-Kutta steps over the on-phase and over the off-phase of a period.
+STEPS_PER_PHASE = 3
+#: Stops are stiff springs, so that the motion stays a smooth ordinary differential equation.
+STOP_STIFFNESS_N_M = 3e6
+STOP_DAMPING_N_S_M = 400.0
+MPA, L_MIN = 1e6, 1e-3 / 60
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plant:
+    """Parameters of the plant; the names are those of Eqs. (19)-(24), the units stand in them.
+
+    Attributes
+    ----------
+    u_max_V : float
+        Command at which the PWM is fully on; the amplifier of Eq. (19) sees u_max or 0.
+    K_a, K_fi_V_A, R_c_ohm, r_p_ohm, L_c_H : float
+        Amplifier gain (K_e of Eq. 19), current feedback, coil.
+    K_i_N_A, m_e_kg, B_e_N_s_m, K_et_N_m : float
+        Force per current, mass, damping, spring.
+    preload_N, pressure_force_N_MPa, flow_force_N_mm_MPa : float
+        Parts of the load force f_eL: at rest; falling with dP; growing with dP and opening.
+    overlap_mm, stroke_mm : float
+        Travel before the edge opens; travel to the stop.
+    hysteresis_V : float
+        Width of the play between current and force, in volts of command.
+    C_d_W_mm, rho_kg_m3 : float
+        Discharge coefficient times area gradient, and density, of Eq. (24).
+    droop_MPa_L_min2 : float
+        Loss of pressure drop per flow squared.
+    """
+
+    u_max_V: float = 10.0
+    K_a: float = 4.0
+    K_fi_V_A: float = 9.0
+    R_c_ohm: float = 3.5
+    r_p_ohm: float = 0.5
+    L_c_H: float = 0.04
+    K_i_N_A: float = 60.0
+    m_e_kg: float = 0.06
+    B_e_N_s_m: float = 45.0
+    K_et_N_m: float = 15000.0
+    preload_N: float = 27.6
+    pressure_force_N_MPa: float = 0.32
+    flow_force_N_mm_MPa: float = 1.5
+    overlap_mm: float = 0.3
+    stroke_mm: float = 2.2
+    hysteresis_V: float = 0.15
+    C_d_W_mm: float = 3.2
+    rho_kg_m3: float = 860.0
+    droop_MPa_L_min2: float = 4e-4
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not isinstance(value, int | float) or not math.isfinite(value) or value < 0:
+                raise InputError(f"plant parameter {field.name} is {value!r}, expected a number of zero or more")
+        for name in ("u_max_V", "K_a", "R_c_ohm", "L_c_H", "K_i_N_A", "m_e_kg", "K_et_N_m", "rho_kg_m3", "C_d_W_mm"):
+            if getattr(self, name) <= 0:
+                raise InputError(f"plant parameter {name} is {getattr(self, name)}, expected a positive number")
+        if self.stroke_mm <= self.overlap_mm:
+            raise InputError(f"the stroke of {self.stroke_mm} mm ends inside the overlap of {self.overlap_mm} mm")
+
+    @property
+    def force_per_volt(self) -> float:
+        """Force in N per volt of command at rest, from Eqs. (19)-(22)."""
+        return self.K_i_N_A * self.K_a / (self.R_c_ohm + self.r_p_ohm + self.K_a * self.K_fi_V_A)
+
+
+def read_plant(path: Path) -> Plant:
+    """Read a plant from TOML; a key that is none of `Plant`'s is refused, with the nearest that is.
+
+    Raises
+    ------
+    InputError
+        If the file can't be read or a value does not fit.
+    """
+    content = read_bytes(path, "plant file")
+    try:
+        values = tomllib.loads(content.decode())
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"'{path}' is not TOML: {error}") from error
+    known = [field.name for field in fields(Plant)]
+    for key in values:
+        if key not in known:
+            raise InputError(f"'{path}': there is no plant parameter '{key}'{nearest(key, known)}")
+    return Plant(**values)
+
+
+def plants_from_tests(side: SideModel, u_max_V: float) -> dict[float, Plant]:
+    """Return, per tested pressure drop in MPa, the default plant with the identified thresholds, slope and stroke.
+
+    The dynamics stay those of the default plant; what was identified at rest is taken over: both knees (their mean by
+    the preload, their difference by the play), the slope and the travel to full flow. It stands in for the valve where
+    no better plant is given; the closed loop then checks the design and the C, not the identification.
+    """
+    plants = {}
+    for test in side.tests:
+        base = Plant(u_max_V=u_max_V, pressure_force_N_MPa=0, flow_force_N_mm_MPa=0, droop_MPa_L_min2=0, overlap_mm=0.3)
+        knees = [knee for knee in (test.u_knee_rising_V, test.u_knee_falling_V) if knee is not None]
+        middle, hysteresis = sum(knees) / len(knees), max(knees[0] - knees[-1], 0.0)
+        # A threshold below the spring force of the overlap is met with less overlap.
+        overlap = min(base.overlap_mm, 0.5 * middle * base.force_per_volt / base.K_et_N_m * 1e3)
+        travel_mm_V = base.force_per_volt / base.K_et_N_m * 1e3
+        speed = math.sqrt(2 * test.dp_MPa * MPA / base.rho_kg_m3)
+        plants[test.dp_MPa] = replace(
+            base,
+            overlap_mm=overlap,
+            preload_N=middle * base.force_per_volt - base.K_et_N_m * overlap * 1e-3,
+            hysteresis_V=hysteresis,
+            stroke_mm=overlap + side.k_x_max_over_u_max * u_max_V * travel_mm_V,
+            C_d_W_mm=test.slope_L_min_V * L_MIN / (travel_mm_V * 1e-3) / speed * 1e3,
+        )
+    return plants
+
+
+def plant_document(plant: Plant) -> dict[str, Any]:
+    """Return the parameters as they stand in a file."""
+    return json.loads(json.dumps(asdict(plant)))
+
+
+def derivatives(plant: Plant) -> tuple["casadi.SX", "casadi.SX", "casadi.SX"]:
+    """Return state, inputs and their derivatives of Eqs. (19)-(24), lowered from SymPy to CasADi.
+
+    Returns
+    -------
+    tuple
+        state (i in A, x_e in m, v in m/s); inputs (amplifier voltage in V, force offset of the play in N, supply
+        pressure drop in MPa); d state/dt.
+    """
+    import casadi as ca
+    import sympy
+
+    from dzdesign.derivation import plant as equations
+
+    state, inputs = ca.SX.sym("state", 3), ca.SX.sym("inputs", 3)
+    current, position, speed = (state[index] for index in range(3))
+    voltage, play_force, supply = (inputs[index] for index in range(3))
+    opening = ca.fmax(position - plant.overlap_mm * 1e-3, 0)
+    dp_MPa, _ = orifice(plant, opening, supply)
+    at_rest = STOP_STIFFNESS_N_M * ca.fmin(position, 0)
+    at_end = STOP_STIFFNESS_N_M * ca.fmax(position - plant.stroke_mm * 1e-3, 0)
+    touching = ca.logic_or(position < 0, position > plant.stroke_mm * 1e-3)
+    load = (
+        plant.preload_N
+        - plant.pressure_force_N_MPa * dp_MPa
+        + plant.flow_force_N_mm_MPa * 1e3 * dp_MPa * opening
+        + at_rest
+        + at_end
+        + touching * STOP_DAMPING_N_S_M * speed
+        - play_force
+    )
+    parameters = (
+        plant.K_a, plant.K_fi_V_A, plant.K_i_N_A, plant.R_c_ohm, plant.r_p_ohm, plant.L_c_H, plant.m_e_kg,
+        plant.B_e_N_s_m, plant.K_et_N_m,
+    )  # fmt: skip
+    lowered = sympy.lambdify(
+        (*equations.STATE, *equations.INPUTS, *equations.PARAMETERS), list(equations.state_derivatives()), modules=[]
+    )
+    return state, inputs, ca.vertcat(*lowered(current, position, speed, voltage, load, *parameters))
+
+
+def orifice(plant: Plant, opening_m: Any, supply_MPa: Any) -> tuple[Any, Any]:
+    """Return pressure drop (MPa) and flow (L/min) across the edge, the supply's droop solved for in closed form.
+
+    Eq. (24) is Q = G sqrt(dP); with dP = supply - droop Q^2 that gives dP = supply / (1 + droop G^2).
+    """
+    import casadi as ca
+    import sympy
+
+    from dzdesign.derivation import plant as equations
+
+    flow = sympy.lambdify(
+        (equations.STATE[1], *equations.FLOW_PARAMETERS), equations.flow(), modules=[{"sqrt": ca.sqrt}]
+    )
+    conductance = flow(opening_m, 1.0, plant.C_d_W_mm * 1e-3, plant.rho_kg_m3, MPA) / L_MIN  # L/min at 1 MPa
+    dp_MPa = supply_MPa / (1 + plant.droop_MPa_L_min2 * conductance**2)
+    return dp_MPa, conductance * ca.sqrt(dp_MPa)
+
+
+def period_step(plant: Plant) -> "casadi.Function":
+    """Return the plant's step over one PWM period, the pulse resolved: on for `duty`, off for the rest.
+
+    Returns
+    -------
+    casadi.Function
+        ``(state[4], duty, supply_MPa) -> (state[4], dp_MPa, Q_L_min)``; the fourth state is the play of the magnetic
+        force, in V of command.
+    """
+    import casadi as ca
+
+    inner, inputs, rates = derivatives(plant)
+    rate = ca.Function("rate", [inner, inputs], [rates])
+    state, duty, supply = ca.SX.sym("x", 4), ca.SX.sym("duty"), ca.SX.sym("supply")
+    volts_per_ampere = plant.K_i_N_A / plant.force_per_volt
+    # The play acts on the current at the start of the period, where the ripple of the pulse is the same every time.
+    seen = state[0] * volts_per_ampere
+    half = plant.hysteresis_V / 2
+    play = ca.fmin(ca.fmax(state[3], seen - half), seen + half)
+    play_force = (play - seen) * plant.force_per_volt
+    x = state[:3]
+    for voltage, share in ((plant.u_max_V, duty), (0.0, 1 - duty)):
+        h = share * PWM_PERIOD_S / STEPS_PER_PHASE
+        given = ca.vertcat(voltage, play_force, supply)
+        for _ in range(STEPS_PER_PHASE):  # classical Runge-Kutta, order 4
+            k1 = rate(x, given)
+            k2 = rate(x + h / 2 * k1, given)
+            k3 = rate(x + h / 2 * k2, given)
+            k4 = rate(x + h * k3, given)
+            x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+    dp_MPa, flow = orifice(plant, ca.fmax(x[1] - plant.overlap_mm * 1e-3, 0), supply)
+    return ca.Function("plant_step", [state, duty, supply], [ca.vertcat(x, play), dp_MPa, flow])

@@ -1,0 +1,266 @@
+"""`verify`: a firmware folder in, evidence out: strict compilation, every input, closed loop."""
+
+import io
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from dzdesign.core.artefacts import MANIFEST_NAME, TOOL, parse_document, read_bytes, sha256_of, to_json
+from dzdesign.core.errors import RequirementError
+from dzdesign.identify.model import valve_from_document
+from dzdesign.verify.all_inputs import InputCheck, check_all_inputs
+from dzdesign.verify.closed_loop import ClosedLoop, LoopComparison, RampSequence, compare_at_pressure
+from dzdesign.verify.host_compiler import check_strictly, find_compilers, host_compiler
+from dzdesign.verify.plant import Plant, plant_document, plants_from_tests
+
+SCHEMA = "dzdesign.evidence/1"
+FIRMWARE_SCHEMA = "dzdesign.firmware/1"
+#: Flow at zero command below this is none: the plant's edge is shut, only the last bits of a number remain.
+NO_FLOW_L_MIN = 1e-9
+#: Runs side by side.
+WORKERS = 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Check:
+    """One requirement: its name, whether it holds, and the figures in a sentence."""
+
+    name: str
+    holds: bool
+    text: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verification:
+    """All evidence about one firmware folder.
+
+    Attributes
+    ----------
+    checks : tuple of Check
+        Every requirement that was tried; the firmware holds if all of them do.
+    inputs : InputCheck or None
+        Figures of the input check; None if the core did not compile.
+    loops : tuple of LoopComparison
+        Closed loop, one a tested pressure drop.
+    plant_source : str
+        Where the plant of the closed loop came from.
+    document : dict
+        verification.json.
+    """
+
+    checks: tuple[Check, ...]
+    inputs: InputCheck | None
+    loops: tuple[LoopComparison, ...]
+    plant_source: str
+    document: dict[str, Any]
+
+    @property
+    def holds(self) -> bool:
+        """True if every requirement holds."""
+        return all(check.holds for check in self.checks)
+
+
+def verify(
+    folder: Path,
+    plant: Plant | None = None,
+    plant_source: str = "",
+    sequence: RampSequence | None = None,
+    say: Callable[[str], None] = lambda _: None,
+) -> Verification:
+    """Verify a firmware folder.
+
+    Parameters
+    ----------
+    folder : Path
+        Made by `dzdesign codegen`.
+    plant : Plant, optional
+        For the closed loop; without it one is made from the identified thresholds.
+    plant_source : str
+        Name of the plant's file, for the evidence.
+    sequence : RampSequence, optional
+        The command over time; 0-10 V in 100 s and back by default.
+    say : callable
+        Told each stage before it begins.
+
+    Raises
+    ------
+    InputError
+        If the folder is no firmware, or there is no C compiler.
+    """
+    folder = Path(folder)
+    manifest_bytes = read_bytes(folder / MANIFEST_NAME, "firmware manifest")
+    manifest = parse_document(manifest_bytes, str(folder / MANIFEST_NAME), (FIRMWARE_SCHEMA,))
+    document = parse_document(
+        read_bytes(folder / "compensator.json", "compensator"),
+        str(folder / "compensator.json"),
+        ("dzdesign.compensator/1",),
+    )
+    host_compiler()
+    say("compiling the core with every warning an error")
+    checks = [_files_unchanged(folder, manifest), _compiles_strictly(folder)]
+    inputs, loops = None, ()
+    if checks[1].holds:
+        say("comparing every input with the exact law")
+        inputs = check_all_inputs(folder)
+        checks += _input_checks(inputs)
+        say("running the closed loop")
+        loops = _run_loops(folder, document, plant, sequence or RampSequence())
+        checks.append(_no_flow_at_zero(loops))
+    source = plant_source or "made from the identified thresholds"
+    return Verification(
+        checks=tuple(checks),
+        inputs=inputs,
+        loops=loops,
+        plant_source=source,
+        document={
+            "schema": SCHEMA,
+            "tool": TOOL,
+            "made_from": [{"source": f"{folder.name}/{MANIFEST_NAME}", "sha256": sha256_of(manifest_bytes)}],
+            "holds": all(check.holds for check in checks),
+            "checks": [asdict(check) for check in checks],
+            "inputs": asdict(inputs) if inputs else None,
+            "closed_loop": {
+                "plant": plant_document(plant) if plant else None,
+                "plant_source": source,
+                "pressures": [asdict(loop.result) for loop in loops],
+            },
+        },
+    )
+
+
+def _files_unchanged(folder: Path, manifest: dict[str, Any]) -> Check:
+    """Tell which generated files differ from the manifest: what is checked must be what was generated."""
+    changed = [
+        name
+        for name, digest in manifest["files"].items()
+        if not (folder / name).is_file() or sha256_of((folder / name).read_bytes()) != digest
+    ]
+    text = f"changed or missing: {', '.join(changed)}" if changed else f"{len(manifest['files'])} files as generated"
+    return Check(name="files as generated", holds=not changed, text=text)
+
+
+def _compiles_strictly(folder: Path) -> Check:
+    compilers = find_compilers()
+    try:
+        for compiler in compilers:
+            check_strictly(folder / "core" / "dz_comp.c", compiler)
+    except RequirementError as error:
+        return Check(name="compiles without a warning", holds=False, text=str(error))
+    names = ", ".join(sorted({Path(compiler).name for compiler in compilers}))
+    return Check(
+        name="compiles without a warning",
+        holds=True,
+        text=f"-std=c99 -Wall -Wextra -Wconversion -Wpedantic -Werror: {names}",
+    )
+
+
+def _input_checks(inputs: InputCheck) -> list[Check]:
+    """Return one requirement per property of the input check."""
+    found = inputs.first_wrong or ""
+    return [
+        Check(
+            name="equals the exactly rounded law",
+            holds=inputs.wrong == 0,
+            text=f"{inputs.inputs} inputs checked, {inputs.wrong} wrong" + (f" ({found})" if found else ""),
+        ),
+        Check(
+            name="within range, monotone",
+            holds=not (inputs.out_of_range or inputs.not_monotone_in_u or inputs.not_monotone_in_dp),
+            text=f"{inputs.out_of_range} out of range, {inputs.not_monotone_in_u} falls with rising command, "
+            f"{inputs.not_monotone_in_dp} steps against the law in dP",
+        ),
+        Check(
+            name="no over-compensation on the tested interval",
+            holds=inputs.over_compensated == 0,
+            text=f"{inputs.over_compensated} pressure codes above the threshold's lower bound, "
+            f"smallest margin {1e3 * inputs.smallest_margin_V:.3f} mV",
+        ),
+        Check(
+            name="depends on the pressures by their difference only",
+            holds=inputs.odd_pairs == 0,
+            text=f"{inputs.odd_pairs} pairs of pressure codes differ",
+        ),
+        Check(
+            name="impossible codes fall back",
+            holds=inputs.bad_fallbacks == 0,
+            text=f"{inputs.bad_fallbacks} codes beyond the converter's range without the safe value",
+        ),
+    ]
+
+
+def _run_loops(
+    folder: Path, document: dict[str, Any], plant: Plant | None, sequence: RampSequence
+) -> tuple[LoopComparison, ...]:
+    """Run the closed loop at every tested pressure drop, two at a time."""
+    valve = valve_from_document(to_json(document["valve"]).encode(), "compensator.json")
+    side, signals = valve.positive, document["signals"]
+    span = signals["pressure_span_MPa"][0] / signals["pressure_span_MPa"][1]
+    scalings = {
+        "pressure_span_MPa": span,
+        "code_max": signals["pressure_code_max"],
+        "compare_max": signals["compare_max"],
+    }
+    if plant is None:
+        plants = plants_from_tests(side, valve.u_max_V)
+        loops = {dp: ClosedLoop(one, folder, **scalings) for dp, one in plants.items()}
+    else:
+        loops = dict.fromkeys(side.beta_dp_MPa, ClosedLoop(plant, folder, **scalings))
+    with ThreadPoolExecutor(WORKERS) as pool:
+        runs = pool.map(
+            lambda item: compare_at_pressure(item[1], item[0], side.reference_dp_MPa, sequence), loops.items()
+        )
+        return tuple(runs)
+
+
+def _no_flow_at_zero(loops: tuple[LoopComparison, ...]) -> Check:
+    worst = max(loops, key=lambda loop: loop.result.q_zero_L_min).result
+    return Check(
+        name="no flow at zero command in the closed loop",
+        holds=worst.q_zero_L_min <= NO_FLOW_L_MIN,
+        text=f"at most {worst.q_zero_L_min:.4g} L/min after closing (at {worst.dp_MPa:.2f} MPa), "
+        f"{max(loop.result.q_zero_without_beta_L_min for loop in loops):.3g} L/min without beta",
+    )
+
+
+def evidence_files(verification: Verification) -> dict[str, str | bytes]:
+    """Return the files of the evidence folder: verification.json and the plot of the closed loop."""
+    contents: dict[str, str | bytes] = {"verification.json": to_json(verification.document)}
+    if verification.loops:
+        contents["closed_loop.svg"] = _plot(verification.loops)
+    return contents
+
+
+def _plot(loops: tuple[LoopComparison, ...]) -> bytes:
+    """Draw flow over command, without and with the compensator, both branches, one colour a pressure drop."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    with matplotlib.rc_context({"svg.hashsalt": "dzdesign", "svg.fonttype": "path"}):
+        figure, axes = plt.subplots(figsize=(8, 5), layout="constrained")
+        colours = plt.get_cmap("viridis")
+        for index, loop in enumerate(loops):
+            colour = colours(index / max(len(loops) - 1, 1) * 0.9)
+            axes.plot(100 * loop.direct.command, loop.direct.q_L_min, ":", color=colour)
+            axes.plot(
+                100 * loop.compensated.command,
+                loop.compensated.q_L_min,
+                color=colour,
+                label=f"{loop.result.dp_MPa:.2f} MPa",
+            )
+        axes.set(
+            xlabel="command (% of full)",
+            ylabel="flow (L/min)",
+            title="Closed loop: without (dotted) and with (solid) the compensator",
+            xlim=(0, 100),
+            ylim=(0, None),
+        )
+        axes.grid(alpha=0.3)
+        axes.legend(title="pressure drop")
+        out = io.BytesIO()
+        figure.savefig(out, format="svg", metadata={"Date": None})
+        plt.close(figure)
+    return out.getvalue()
