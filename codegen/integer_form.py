@@ -122,7 +122,7 @@ def _share(slope: int, offset: int, command_max: int) -> int:
 
 
 def _largest_quotient(compensator: Compensator, common: int, divisor: int) -> int:
-    """Return a bound of ``total >> shift``: the law's largest value at any beta of the table, rounded, times divisor."""
+    """Return a bound of ``total >> shift``: the law's largest value at any node, times divisor."""
     ends = [
         compensator.drive(compensator.signals.command_code_max, index * compensator.beta_step_codes)
         for index in range(len(compensator.beta_numerators) - 1)

@@ -76,9 +76,7 @@ def generate(compensator: Compensator, target_name: str, compensator_bytes: byte
     document = compensator_bytes or to_json(compensator.to_document()).encode()
     digest = sha256_of(document)
     context = core_context(compensator, integer_form(compensator))
-    files = {
-        path: _render("dzdesign.codegen", template, digest, context) for path, template in CORE_FILES.items()
-    }
+    files = {path: _render("dzdesign.codegen", template, digest, context) for path, template in CORE_FILES.items()}
     for path, template in target.templates.items():
         files[path] = _render(f"dzdesign.codegen.{target.name}", template, digest, target.context)
     files["compensator.json"] = document.decode()
@@ -101,7 +99,12 @@ def core_context(compensator: Compensator, form: IntegerForm) -> dict[str, str |
     largest = ((1 << form.reciprocal_shift) - 1) // max(
         1, form.reciprocal * form.divisor - (1 << form.reciprocal_shift)
     )
+    zero_command = [
+        compensator.compare(0, node * compensator.beta_step_codes) for node in range(len(form.table) - 1)
+    ]
     return {
+        "zero_command_low": str(min(zero_command)),
+        "zero_command_high": str(max(zero_command)),
         "law_text": str(chosen.output).replace("**", "^"),
         "law_equation": chosen.equation,
         "kappa_text": _rational(compensator.k_x_max_over_u_max),

@@ -98,5 +98,6 @@ def parse_quantity(text: str, quantity: str, option: str) -> float:
             f"{option} is '{text}', expected a number and a unit such as '1 {EXAMPLES[quantity].split(',')[0]}'"
         ) from error
     if not unit:
-        raise InputError(f"{option} is '{text}' without a unit; write for example '{text} {EXAMPLES[quantity].split(',')[0]}'")
+        example = f"{text} {EXAMPLES[quantity].split(',')[0]}"
+        raise InputError(f"{option} is '{text}' without a unit; write for example '{example}'")
     return value * si_factor(unit, quantity)

@@ -6,6 +6,4 @@ here. `proof.py` judges statements and may not know any; new ones go into `premi
 """
 
 if __name__ != "dzdesign.derivation":
-    raise ImportError(
-        "import this room as dzdesign.derivation: a top-level 'derivation' may be another package"
-    )
+    raise ImportError("import this room as dzdesign.derivation: a top-level 'derivation' may be another package")

@@ -6,6 +6,7 @@
 from collections.abc import Sequence
 
 import sympy
+
 from dzdesign.derivation.premises import PREMISES
 from dzdesign.derivation.proof import Equation, Ground, Kind, Verdict, prove
 from dzdesign.derivation.symbols import (

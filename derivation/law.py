@@ -6,6 +6,7 @@ from functools import cache
 from typing import Any
 
 import sympy
+
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.derivation.symbols import beta, k, kappa, u_i, u_max, u_min0, x_max
 

@@ -8,6 +8,7 @@ from functools import cache
 from typing import NamedTuple
 
 import sympy
+
 from dzdesign.derivation.symbols import (
     B_e,
     C_d,

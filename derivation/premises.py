@@ -1,6 +1,7 @@
 """What the paper starts from, transcribed once: the statements that no other statement proves."""
 
 import sympy
+
 from dzdesign.derivation.proof import Equation, Kind
 from dzdesign.derivation.symbols import (
     Q_O,

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import sympy
+
 from dzdesign.core.errors import RequirementError
 
 

@@ -6,6 +6,7 @@ from html import escape
 from typing import Any
 
 import sympy
+
 from dzdesign.core.artefacts import TOOL, to_json
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.derivation.proof import Kind, Verdict
@@ -206,9 +207,7 @@ def _html(verdicts: Sequence[Verdict]) -> str:
         for verdict in members:
             body += _html_statement(verdict, anchors)
     head = f'<meta charset="utf-8"><title>{escape(TITLE)}</title>\n<style>\n{_STYLE}\n</style>'
-    return "\n".join(
-        ["<!DOCTYPE html>", f'<html lang="en"><head>{head}</head><body>', *body, "</body></html>", ""]
-    )
+    return "\n".join(["<!DOCTYPE html>", f'<html lang="en"><head>{head}</head><body>', *body, "</body></html>", ""])
 
 
 def _html_statement(verdict: Verdict, anchors: dict[str, str]) -> Iterator[str]:

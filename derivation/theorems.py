@@ -1,6 +1,7 @@
 """What ties the law of `law.py` to the paper's equations, and what the paper does not say."""
 
 import sympy
+
 from dzdesign.derivation.law import law
 from dzdesign.derivation.proof import Equation, Ground, Kind
 from dzdesign.derivation.symbols import (

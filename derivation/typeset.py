@@ -4,8 +4,9 @@ from collections.abc import Iterator
 from typing import Any
 
 import sympy
-from dzdesign.derivation.symbols import LATEX_NAMES, dP, dP0, dP1, rho
 from sympy.printing.mathml import MathMLPresentationPrinter
+
+from dzdesign.derivation.symbols import LATEX_NAMES, dP, dP0, dP1, rho
 
 _HTML_NAMES = {dP: sympy.Symbol("ΔP"), dP0: sympy.Symbol("ΔP_0"), dP1: sympy.Symbol("ΔP_1")}
 

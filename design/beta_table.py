@@ -1,7 +1,9 @@
 """The table of beta in the firmware: the best nodes that lie under the certified offset at every pressure code."""
 
+from bisect import bisect_left
 from dataclasses import dataclass
 from fractions import Fraction
+from math import ceil, floor
 
 import numpy as np
 
@@ -15,6 +17,8 @@ DP_CODE_ERROR = 1
 STEP_CODES = 64
 #: Nodes are integers over this; beta stays below 2, so a node fits 16 bits.
 DENOMINATOR = 1 << 15
+#: valve.json has seven decimals, so a sum of two of its numbers is right to this, in V.
+DECIMALS = Fraction(1, 10**6)
 #: Distance kept from the bounds for the LP solver's tolerance; the exact proof below does not rely on it.
 SOLVER_MARGIN = 1e-7
 
@@ -35,37 +39,50 @@ class OffsetCeiling:
     certified: range
 
 
-def certified_curve(side: SideModel, dp_MPa: Fraction) -> Fraction:
-    """Return beta(dP) u_min0 in V by the selector of Eq. (7), exactly from the numbers of valve.json.
+class CertifiedOffset:
+    """The offset curve and its bounds, exactly from the decimal numbers of valve.json.
 
-    For dP <= dP0 the paper holds beta = 1; where the threshold grows with dP that would over-compensate, so there the
-    smaller of the two is taken. Outside the tested interval the nearest node is held.
+    Parameters
+    ----------
+    side : SideModel
+        One side of the valve, tested at one pressure drop or more.
     """
-    nodes = [Fraction(repr(value)) for value in side.beta_dp_MPa]
-    beta = [Fraction(repr(value)) for value in side.beta]
-    u_min0 = Fraction(repr(side.u_min0_V))
-    if not nodes:
-        return u_min0
-    at = min(max(dp_MPa, nodes[0]), nodes[-1])
-    right = next(index for index, node in enumerate(nodes) if node >= at)
-    value = beta[right]
-    if right and nodes[right] != at:
-        share = (at - nodes[right - 1]) / (nodes[right] - nodes[right - 1])
-        value = beta[right - 1] + share * (beta[right] - beta[right - 1])
-    if dp_MPa <= Fraction(repr(side.reference_dp_MPa)):
-        value = min(value, Fraction(1))
-    return value * u_min0
 
+    def __init__(self, side: SideModel) -> None:
+        self._nodes = [Fraction(repr(value)) for value in side.beta_dp_MPa]
+        self._beta = [Fraction(repr(value)) for value in side.beta]
+        self._u_min0 = Fraction(repr(side.u_min0_V))
+        self._dp0 = Fraction(repr(side.reference_dp_MPa))
+        self._steps = [Fraction(repr(step)) for step in side.certified_steps_V]
+        self._lowest = min(Fraction(repr(test.u_guard_lower_V)) for test in side.tests)
 
-def staircase_limit(side: SideModel, dp_MPa: Fraction) -> Fraction | None:
-    """Return the lower bound of the guarded threshold at dP in V, or None outside the tested interval."""
-    nodes = [Fraction(repr(value)) for value in side.beta_dp_MPa]
-    bounds = [Fraction(repr(test.u_guard_lower_V)) for test in side.tests]
-    if not nodes or not nodes[0] <= dp_MPa <= nodes[-1]:
-        return None
-    steps = [Fraction(repr(step)) for step in side.certified_steps_V]
-    touching = [step for left, right, step in zip(nodes, nodes[1:], steps, strict=False) if left <= dp_MPa <= right]
-    return min(touching) if touching else min(bounds)
+    def curve(self, dp_MPa: Fraction) -> Fraction:
+        """Return beta(dP) u_min0 in V by the selector of Eq. (7).
+
+        For dP <= dP0 the paper holds beta = 1; where the threshold grows with dP that would over-compensate, so there
+        the smaller of the two is taken. Outside the tested interval the nearest node is held.
+        """
+        nodes, beta = self._nodes, self._beta
+        at = min(max(dp_MPa, nodes[0]), nodes[-1])
+        right = bisect_left(nodes, at)
+        value = beta[right]
+        if right and nodes[right] != at:
+            share = (at - nodes[right - 1]) / (nodes[right] - nodes[right - 1])
+            value = beta[right - 1] + share * (beta[right] - beta[right - 1])
+        if dp_MPa <= self._dp0:
+            value = min(value, Fraction(1))
+        return value * self._u_min0
+
+    def bound(self, dp_MPa: Fraction) -> Fraction | None:
+        """Return the lower bound of the guarded threshold at dP in V, or None outside the tested interval."""
+        nodes = self._nodes
+        if not nodes[0] <= dp_MPa <= nodes[-1]:
+            return None
+        if not self._steps:
+            return self._lowest
+        right = bisect_left(nodes, dp_MPa)
+        touching = self._steps[max(right - 1, 0) : right + (nodes[right] == dp_MPa)]
+        return min(touching)
 
 
 def offset_ceiling(side: SideModel, signals: Signals, u_max_V: Fraction) -> OffsetCeiling:
@@ -76,12 +93,19 @@ def offset_ceiling(side: SideModel, signals: Signals, u_max_V: Fraction) -> Offs
     RequirementError
         If the identified curve itself lies above the staircase somewhere: valve.json contradicts itself.
     """
+    first, last = (signals.dp_code(Fraction(repr(end))) for end in (side.beta_dp_MPa[0], side.beta_dp_MPa[-1]))
+    if last > signals.pressure_code_max:
+        raise InputError(
+            f"the sensor's span of {float(signals.pressure_span_MPa):g} MPa ends below the tested pressure drop of "
+            f"{side.beta_dp_MPa[-1]:g} MPa; give the real span with --pressure-span"
+        )
     half_count = Fraction(1, 2 * signals.compare_max)
+    certified = CertifiedOffset(side)
     values = []
     for code in range(-DP_CODE_ERROR, signals.pressure_code_max + DP_CODE_ERROR + 1):
         dp_MPa = signals.dp_MPa(code)
-        curve, bound = certified_curve(side, dp_MPa), staircase_limit(side, dp_MPa)
-        if bound is not None and curve > bound + Fraction(1, 10**6):  # valve.json has 7 decimals
+        curve, bound = certified.curve(dp_MPa), certified.bound(dp_MPa)
+        if bound is not None and curve > bound + DECIMALS:
             raise RequirementError(
                 f"beta u_min0 is {float(curve):.4f} V at {float(dp_MPa):.3f} MPa, above the threshold's lower bound of "
                 f"{float(bound):.4f} V; make valve.json again with `dzdesign identify`"
@@ -89,18 +113,10 @@ def offset_ceiling(side: SideModel, signals: Signals, u_max_V: Fraction) -> Offs
         values.append((curve if bound is None else min(curve, bound)) / u_max_V - half_count)
     span = 2 * DP_CODE_ERROR + 1
     limit = tuple(min(values[code : code + span]) for code in range(signals.pressure_code_max + 1))
-    if not side.beta_dp_MPa:
-        return OffsetCeiling(limit=limit, certified=range(0))
-    first, last = (signals.dp_code(Fraction(repr(end))) for end in (side.beta_dp_MPa[0], side.beta_dp_MPa[-1]))
-    if last > signals.pressure_code_max:
-        raise InputError(
-            f"the sensor's span of {float(signals.pressure_span_MPa):g} MPa ends below the tested pressure drop of "
-            f"{side.beta_dp_MPa[-1]:g} MPa; give the real span with --pressure-span"
-        )
-    return OffsetCeiling(limit=limit, certified=range(-(-first.numerator // first.denominator), int(last) + 1))
+    return OffsetCeiling(limit=limit, certified=range(ceil(first), floor(last) + 1))
 
 
-def choose_beta_table(ceiling: OffsetCeiling, u_min0: Fraction, trend: str, code_max: int) -> tuple[int, ...]:
+def choose_beta_table(ceiling: OffsetCeiling, u_min0: Fraction, trend: str | None, code_max: int) -> tuple[int, ...]:
     """Choose the nodes of beta that give the largest offset under the ceiling: a linear programme, then integers.
 
     Parameters
@@ -109,8 +125,8 @@ def choose_beta_table(ceiling: OffsetCeiling, u_min0: Fraction, trend: str, code
         Limits over u_max.
     u_min0 : Fraction
         Reference offset over u_max.
-    trend : {"decreasing", "flat", "increasing"}
-        Direction in which beta must run.
+    trend : {"decreasing", "flat", "increasing"} or None
+        Direction in which beta must run; flat, or unknown, it is constant.
     code_max : int
         Largest pressure code.
 
@@ -133,8 +149,10 @@ def choose_beta_table(ceiling: OffsetCeiling, u_min0: Fraction, trend: str, code
     beta = cp.Variable(size)
     # Only a threshold that grows with the pressure drop needs a beta above 1 (Eq. 7).
     constraints = [weights @ beta <= limit, beta <= (2 - 2 / DENOMINATOR if trend == "increasing" else 1)]
-    if trend != "flat":
-        constraints.append(cp.diff(beta) <= 0 if trend == "decreasing" else cp.diff(beta) >= 0)
+    if trend == "decreasing":
+        constraints.append(cp.diff(beta) <= 0)
+    elif trend == "increasing":
+        constraints.append(cp.diff(beta) >= 0)
     else:
         constraints.append(cp.diff(beta) == 0)
     problem = cp.Problem(cp.Maximize(cp.sum(weights @ beta) + beta[-1]), constraints)
@@ -150,7 +168,9 @@ def choose_beta_table(ceiling: OffsetCeiling, u_min0: Fraction, trend: str, code
     return _lower_until_proved(nodes, ceiling, u_min0, trend)
 
 
-def _lower_until_proved(nodes: list[int], ceiling: OffsetCeiling, u_min0: Fraction, trend: str) -> tuple[int, ...]:
+def _lower_until_proved(
+    nodes: list[int], ceiling: OffsetCeiling, u_min0: Fraction, trend: str | None
+) -> tuple[int, ...]:
     """Lower nodes by single counts until every code is proved, in exact arithmetic, to lie under the ceiling."""
     scale = DENOMINATOR * STEP_CODES
     for code, limit in enumerate(ceiling.limit):

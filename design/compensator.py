@@ -88,7 +88,7 @@ class Compensator:
                 raise InputError(f"{name} is {value}, expected a power of two, so that the firmware needs no division")
         nodes = self.signals.pressure_code_max // self.beta_step_codes + 2
         if len(self.beta_numerators) != nodes:
-            raise InputError(f"beta has {len(self.beta_numerators)} nodes, expected {nodes} to span every pressure code")
+            raise InputError(f"beta has {len(self.beta_numerators)} nodes, expected {nodes} for every code")
         if not all(0 < numerator < 2 * self.beta_denominator for numerator in self.beta_numerators):
             raise InputError("every beta must lie between 0 and 2, exclusive")
         if not 0 < self.u_min0_over_u_max < 1:
@@ -214,5 +214,3 @@ def compensator_from_document(content: bytes, source: str) -> Compensator:
         raise InputError(
             f"'{source}' is not shaped like a compensator ({error}); make it again with `dzdesign design`"
         ) from error
-
-

@@ -71,7 +71,7 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
     # Half a count less, because the compare value of the offset may be rounded up.
     u_min0 = _over(Fraction(repr(side.u_min0_V)) / u_max - Fraction(1, 2 * signals.compare_max), "down")
     if u_min0 <= 0:
-        raise InputError(f"u_min0 is {side.u_min0_V:.4f} V, less than one count of the PWM; there is nothing to compensate")
+        raise InputError(f"u_min0 is {side.u_min0_V:.4f} V, less than one count of the PWM: no dead zone")
     ceiling = offset_ceiling(side, signals, u_max)
     table = choose_beta_table(ceiling, u_min0, side.trend, signals.pressure_code_max)
     document = valve_bytes.decode() if valve_bytes is not None else to_json(valve.to_document())

@@ -32,7 +32,7 @@ class Signals:
             if not 1 <= getattr(self, name) <= 65535:
                 raise InputError(f"{name} is {getattr(self, name)}, expected 1 to 65535 (16 bits)")
         if self.pressure_span_MPa <= 0:
-            raise InputError(f"the sensor's span is {float(self.pressure_span_MPa):g} MPa, expected a positive pressure")
+            raise InputError(f"the sensor's span is {float(self.pressure_span_MPa):g} MPa, expected more than zero")
 
     def dp_MPa(self, dp_code: int) -> Fraction:
         """Return the pressure drop that a difference of pressure codes stands for, exactly."""

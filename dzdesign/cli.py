@@ -1,7 +1,7 @@
 """The command line: what can be said, and what an error or a failed requirement becomes.
 
-Exit status: 0 holds, 1 a requirement does not hold (said which), 2 bad input or usage. Every heavy import happens inside
-the command that needs it (`dzdesign.commands`), so that `--help` costs no more than argparse.
+Exit status: 0 holds, 1 a requirement does not hold (said which), 2 bad input or usage. Every heavy import happens
+inside the command that needs it (`dzdesign.commands`), so that `--help` costs no more than argparse.
 """
 
 import argparse
@@ -56,7 +56,7 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
             _given("--meter-zero", default="0 L/min", metavar="Q", help="bound of the meter's zero error"),
             _given("--x-max", metavar="X", help='stroke, such as "1.8 mm": gives k in V/mm'),
             _given("--confidence", default="0.99", metavar="C", help="of all lower bounds together"),
-            _given("--knee-window", default="12-50", metavar="A-B", help="per cent of the largest flow taken as straight"),
+            _given("--knee-window", default="12-50", metavar="A-B", help="per cent of the largest flow, straight"),
         ),
     ),
     "design": (
@@ -73,7 +73,7 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
         "compensator.json in, a folder of C out",
         "dzdesign.commands:run_codegen",
         (
-            _given("source", metavar="COMPENSATOR.json", help="made by `dzdesign design`; a valve.json is designed first"),
+            _given("source", metavar="COMPENSATOR.json", help="or a VALVE.json, designed with the options below"),
             _given(*OUTPUT, default="firmware", metavar="DIR", help="folder to write"),
             _given("--target", default="f28335", metavar="NAME", help="microcontroller"),
             LAW,
@@ -95,7 +95,7 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
         (
             _given(*OUTPUT, default="ramps", metavar="DIR", help="folder to write"),
             PLANT,
-            _given("--dp", action="append", metavar="P", help="pressure drop of a test; repeat it (default: 0.5 to 5 MPa)"),
+            _given("--dp", action="append", metavar="P", help="pressure drop, repeatable (default: 0.5 to 5 MPa)"),
             _given("--ramp-time", default="100 s", metavar="T", help="from zero to full command"),
             _given("--seed", default="1", metavar="N", help="of the noise"),
         ),

@@ -44,8 +44,8 @@ def print_valve(valve: "ValveModel") -> None:
     """Print thresholds per ramp test, the law's parameters and every warning."""
     side = valve.positive
     table = _table(
-        "Thresholds (V)", "ramp test", "dP (MPa)", "knee opening", "knee closing", "± (1 s.e.)", "guarded", "lower bound",
-        "beta", "Q max (L/min)",
+        "Thresholds (V)", "ramp test", "dP (MPa)", "knee opening", "knee closing", "± (1 s.e.)", "guarded",
+        "lower bound", "beta", "Q max (L/min)",
     )  # fmt: skip
     betas = side.beta or ("-",)
     for test, beta in zip(side.tests, betas, strict=True):
@@ -68,8 +68,10 @@ def print_valve(valve: "ValveModel") -> None:
         f"({side.confidence:.0%} for all tests together)",
         f"k x_max/u_max = {side.k_x_max_over_u_max:.4f}"
         + (f", k = {side.k_V_mm:.4f} V/mm" if side.k_V_mm is not None else ""),
-        f"trend with dP: {side.trend}"
-        + ("" if side.trend_change_V is None else f" ({1e3 * side.trend_change_V:+.1f} ± {1e3 * side.trend_change_se_V:.1f} mV)"),
+        "trend with dP: can't be said from one ramp test"
+        if side.trend is None
+        else f"trend with dP: {side.trend} "
+        f"({1e3 * side.trend_change_V:+.1f} ± {1e3 * side.trend_change_se_V:.1f} mV over the tested range)",
         f"meter floor: {valve.meter_floor_L_min:.2f} L/min; lag taken as {valve.meter_lag_s:g} s",
     ]  # fmt: skip
     for line in lines:
@@ -110,7 +112,8 @@ def print_verification(verification: "Verification") -> None:
     """Print every check and the closed loop, per pressure drop."""
     console = _console()
     for check in verification.checks:
-        console.print(f"{'holds' if check.holds else 'FAILS'}  {check.name}: {check.text}", markup=False, soft_wrap=True)
+        verdict = "holds" if check.holds else "FAILS"
+        console.print(f"{verdict}  {check.name}: {check.text}", markup=False, soft_wrap=True)
     if not verification.loops:
         return
     table = _table(
@@ -159,5 +162,6 @@ def print_demo(valve: "ValveModel", verification: "Verification", folder: str) -
     inputs = verification.inputs
     console.print(f"Inputs checked: {inputs.inputs}, wrong: {inputs.wrong}", markup=False, soft_wrap=True)
     failed = [check.name for check in verification.checks if not check.holds]
-    console.print("Every requirement holds." if not failed else f"DOES NOT HOLD: {', '.join(failed)}", markup=False, soft_wrap=True)
+    verdict = f"DOES NOT HOLD: {', '.join(failed)}" if failed else "Every requirement holds."
+    console.print(verdict, markup=False, soft_wrap=True)
     console.print(f"Artefacts: {folder}", markup=False, soft_wrap=True)

@@ -52,9 +52,9 @@ def lower_bounds(threshold: np.ndarray, se: np.ndarray, confidence: float, budge
     budget : (T,) array
         Systematic error to allow for beside the noise, V (the meter's zero).
     """
-    from scipy.stats import t
+    from scipy.special import stdtrit
 
-    quantile = t.ppf(1 - (1 - confidence) / threshold.size, DEGREES_OF_FREEDOM)
+    quantile = stdtrit(DEGREES_OF_FREEDOM, 1 - (1 - confidence) / threshold.size)
     return threshold - quantile * se - budget
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -62,7 +63,7 @@ class IdentifyOptions:
         if not self.u_max > 0:
             raise InputError(f"u_max is {self.u_max} V, expected a positive command")
         if not 0.5 <= self.confidence < 1:
-            raise InputError(f"the confidence is {self.confidence}, expected a number from 0.5 to below 1, such as 0.99")
+            raise InputError(f"the confidence is {self.confidence}, expected 0.5 to below 1, such as 0.99")
         if not 0 < self.knee_window[0] < self.knee_window[1] <= 1:
             raise InputError(f"the knee window is {self.knee_window}, expected two rising shares such as '12-50 %'")
         for name in ("meter_floor", "meter_lag", "meter_zero"):
@@ -149,9 +150,7 @@ def _split_all(
     return split
 
 
-def _refuse_a_shut_valve(
-    test: RampTest, branches: tuple[Branch | None, Branch | None], u_max: float
-) -> None:
+def _refuse_a_shut_valve(test: RampTest, branches: tuple[Branch | None, Branch | None], u_max: float) -> None:
     """Refuse a test whose flow at full command does not stand out of the meter's noise."""
     for branch in branches:
         if branch is None:
@@ -167,9 +166,7 @@ def _refuse_a_shut_valve(
             )
 
 
-def _found_floor(
-    split: list[tuple[RampTest, tuple[Branch | None, Branch | None]]], options: IdentifyOptions
-) -> float:
+def _found_floor(split: list[tuple[RampTest, tuple[Branch | None, Branch | None]]], options: IdentifyOptions) -> float:
     """Return the largest meter floor that any branch shows (one meter, so one floor), m³/s."""
     return max(
         find_meter_floor(branch.u, branch.q, options.u_max)
@@ -202,9 +199,7 @@ def _describe(
         # Eq. (1): Q grows as sqrt(dP); below a tenth of the nominal pressure the ratio would only carry noise.
         y = branch.q if dp is None else branch.q * np.sqrt(dp / np.maximum(branch.dp, 0.1 * dp))
         shapes.append(
-            describe_branch(
-                branch, y, u_max=options.u_max, floor=floor, window=options.knee_window, source=test.source
-            )
+            describe_branch(branch, y, u_max=options.u_max, floor=floor, window=options.knee_window, source=test.source)
         )
         q_max = max(q_max, flow_at_top(*smooth_profile(branch.u, branch.q, options.u_max)))
     return DescribedTest(test=test, dp=dp, branches=branches, shapes=(shapes[0], shapes[1]), q_max=q_max)
@@ -215,7 +210,7 @@ def _in_order_of_pressure(described: list[DescribedTest]) -> list[DescribedTest]
     if len(described) < 2:
         return described
     described = sorted(described, key=lambda item: (item.dp, item.test.source))
-    for left, right in zip(described, described[1:], strict=False):
+    for left, right in pairwise(described):
         if right.dp - left.dp < SAME_PRESSURE * right.dp:
             raise InputError(
                 f"the pressure drop repeats: '{left.test.source}' ({left.dp / MPA:.3f} MPa) and "
@@ -294,9 +289,7 @@ def _side_model(
     steps, ceiling = staircase(bound, trend[0])
     reference = _reference(described, options.dp0)
     offset = fit_offset(threshold, threshold_se, ceiling, reference, u_max=options.u_max, trend=trend[0])
-    results = tuple(
-        _test_result(item, knees, row, threshold[row], bound[row]) for row, item in enumerate(described)
-    )
+    results = tuple(_test_result(item, knees, row, threshold[row], bound[row]) for row, item in enumerate(described))
     slope = float(np.nanmean(knees.slope[reference]))
     y_max = float(np.mean([shape.y_max for shape in described[reference].shapes if shape]))
     k_x_max = y_max / slope  # Eq. (11) at full stroke: Q_max = slope (k x_max)
@@ -308,7 +301,7 @@ def _side_model(
         u_min0_V=offset.u_min0,
         k_x_max_over_u_max=k_x_max / options.u_max,
         k_V_mm=k_x_max / (options.x_max * 1e3) if options.x_max else None,
-        trend=trend[0],
+        trend=trend[0] if several else None,
         trend_change_V=trend[1] if several else None,
         trend_change_se_V=trend[2] if several else None,
         beta_dp_MPa=tuple(item.dp / MPA for item in described) if known else (),
@@ -359,6 +352,4 @@ def _warnings(
     }
     top = {item.test.source: float(item.test.u.max()) for item in described}
     bottom = {item.test.source: float(item.test.u.min()) for item in described}
-    return find_warnings(
-        side, floor_L_min=floor / L_MIN, u_max=options.u_max, sag=sag, u_top=top, u_bottom=bottom
-    )
+    return find_warnings(side, floor_L_min=floor / L_MIN, u_max=options.u_max, sag=sag, u_top=top, u_bottom=bottom)

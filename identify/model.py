@@ -54,8 +54,8 @@ class SideModel:
         Command that full stroke takes beyond the threshold, over u_max.
     k_V_mm : float or None
         k of Eq. (11) in V/mm, where x_max was given.
-    trend : {"decreasing", "flat", "increasing"}
-        How the threshold runs with the pressure drop.
+    trend : {"decreasing", "flat", "increasing"} or None
+        How the threshold runs with the pressure drop; None where fewer than two were tested.
     trend_change_V, trend_change_se_V : float or None
         Its change over the tested range, and the standard error.
     beta_dp_MPa, beta : tuple of float
@@ -77,7 +77,7 @@ class SideModel:
     u_min0_V: float
     k_x_max_over_u_max: float
     k_V_mm: float | None
-    trend: str
+    trend: str | None
     trend_change_V: float | None
     trend_change_se_V: float | None
     beta_dp_MPa: tuple[float, ...]
@@ -89,13 +89,13 @@ class SideModel:
     active_constraints: tuple[str, ...]
 
     def __post_init__(self) -> None:
-        if self.trend not in TRENDS:
+        if self.trend not in TRENDS and not (self.trend is None and len(self.tests) == 1):
             raise InputError(f"trend is '{self.trend}', expected one of {', '.join(TRENDS)}")
         if len(self.beta) != len(self.beta_dp_MPa) or any(
             right <= left for left, right in zip(self.beta_dp_MPa, self.beta_dp_MPa[1:], strict=False)
         ):
             raise InputError("the nodes of beta must be as many as their pressure drops, which must rise")
-        if not 0 < self.u_min0_V:
+        if not self.u_min0_V > 0:
             raise InputError(f"u_min0 is {self.u_min0_V} V, expected a positive threshold")
 
     @property
@@ -234,4 +234,6 @@ def valve_from_document(content: bytes, source: str) -> ValveModel:
     except KeyError as error:
         raise InputError(f"'{source}' lacks the key {error}; make it again with `dzdesign identify`") from error
     except (TypeError, IndexError) as error:
-        raise InputError(f"'{source}' is not shaped like a valve ({error}); make it again with `dzdesign identify`") from error
+        raise InputError(
+            f"'{source}' is not shaped like a valve ({error}); make it again with `dzdesign identify`"
+        ) from error

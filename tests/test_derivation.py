@@ -13,6 +13,7 @@ import casadi
 import numpy as np
 import pytest
 import sympy
+
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.derivation import law as law_module
 from dzdesign.derivation import plant, report, symbols

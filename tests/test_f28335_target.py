@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 
 import jinja2
 import pytest
+
 from dzdesign.codegen.f28335 import target as f28335
 from dzdesign.codegen.f28335.target import TARGET
 from dzdesign.core.errors import DzdesignError

@@ -1,4 +1,4 @@
-"""The compiled core in closed loop with the plant: ramps up and down, the pulse resolved, the pressures through the ADC."""
+"""The compiled core in closed loop with the plant: ramps up and down, the pulse resolved, pressures through the ADC."""
 
 import ctypes
 from dataclasses import dataclass
@@ -118,9 +118,7 @@ class ClosedLoop:
         self._scalings = (float(pressure_span_MPa), int(code_max), float(compare_max))
         self._has_core = firmware is not None
 
-    def run(
-        self, command: np.ndarray, supply_MPa: float, mode: str = "direct", dp_frozen_MPa: float = 0.0
-    ) -> LoopRun:
+    def run(self, command: np.ndarray, supply_MPa: float, mode: str = "direct", dp_frozen_MPa: float = 0.0) -> LoopRun:
         """Run the loop from rest.
 
         Parameters

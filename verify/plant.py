@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 PWM_PERIOD_S = 400e-6
 #: Runge-Kutta steps over the on-phase and over the off-phase of a period.
-STEPS_PER_PHASE = 3
+STEPS_PER_PHASE = 2
 #: Stops are stiff springs, so that the motion stays a smooth ordinary differential equation.
 STOP_STIFFNESS_N_M = 3e6
 STOP_DAMPING_N_S_M = 400.0

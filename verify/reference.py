@@ -35,16 +35,17 @@ class ExactLaw:
         self._law = law(document["law"])
         self._kappa = Fraction(*document["k_x_max_over_u_max"])
         self._u_min0 = Fraction(*document["u_min0_over_u_max"])
-        self._nodes = [Fraction(numerator, table["denominator"]) for numerator in table["numerators"]]
+        self._nodes: list[int] = table["numerators"]
+        self._denominator: int = table["denominator"]
         self._step: int = table["step_codes"]
 
     def beta(self, dp_code: int) -> Fraction:
         """Return beta at a difference of pressure codes; below ``-reverse`` the smallest one."""
         if dp_code < -self.reverse:
-            return min(self._nodes)
-        place = Fraction(max(dp_code, 0), self._step)
-        left = place.numerator // place.denominator
-        return self._nodes[left] + (place - left) * (self._nodes[left + 1] - self._nodes[left])
+            return Fraction(min(self._nodes), self._denominator)
+        left, past = divmod(max(dp_code, 0), self._step)
+        rise = self._nodes[left + 1] - self._nodes[left]
+        return Fraction(self._nodes[left] * self._step + rise * past, self._denominator * self._step)
 
     def line(self, beta: Fraction) -> tuple[Fraction, Fraction]:
         """Return the law at one beta in counts: slope per command code, and value at code 0."""
@@ -54,7 +55,8 @@ class ExactLaw:
 
     def rows(self, betas: list[Fraction]) -> Iterator[np.ndarray]:
         """Yield, for command codes 0, 1, ..., the rounded and limited compare values at all `betas`."""
-        lines = [self.line(beta) for beta in betas]
+        at = {beta: self.line(beta) for beta in set(betas)}
+        lines = [at[beta] for beta in betas]
         half = Fraction(1, 2)
         scale = lcm(*(value.denominator for slope, start in lines for value in (slope, start + half)))
         if scale >= 2**62:
