@@ -15,7 +15,7 @@ from dzdesign.design.beta_table import (
 )
 from dzdesign.design.compensator import Certificate, Compensator
 from dzdesign.design.signals import Signals
-from dzdesign.identify.model import SideModel, ValveModel
+from dzdesign.identify.model import SideModel, ValveModel, valve_from_document
 
 #: k x_max/u_max and u_min0/u_max are integers over this: finer than half a PWM count of 60 000.
 COEFFICIENT_DENOMINATOR = 1 << 16
@@ -59,6 +59,9 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
         If a proof fails.
     """
     options = options or DesignOptions()
+    document = valve_bytes.decode() if valve_bytes is not None else to_json(valve.to_document())
+    # The file's rounded numbers, so that the same valve gives the same firmware by whichever way it comes here.
+    valve = valve_from_document(document.encode(), "valve.json")
     signals, side = options.signals, valve.positive
     chosen = law(options.law_name)
     if not side.beta_dp_MPa:
@@ -74,7 +77,6 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
         raise InputError(f"u_min0 is {side.u_min0_V:.4f} V, less than one count of the PWM: no dead zone")
     ceiling = offset_ceiling(side, signals, u_max)
     table = choose_beta_table(ceiling, u_min0, side.trend, signals.pressure_code_max)
-    document = valve_bytes.decode() if valve_bytes is not None else to_json(valve.to_document())
     compensator = Compensator(
         law_name=chosen.name,
         signals=signals,

@@ -1,0 +1,47 @@
+"""What many tests share: the bundled example through the pipeline, once."""
+
+from importlib.resources import files
+from pathlib import Path
+
+import pytest
+
+from dzdesign.core.artefacts import to_json, write_folder
+from dzdesign.identify.ramp_files import read_ramp_file
+
+
+@pytest.fixture(scope="session")
+def example_folder() -> Path:
+    return Path(str(files("dzdesign.example")))
+
+
+@pytest.fixture(scope="session")
+def example_tests(example_folder):
+    return [read_ramp_file(path) for path in sorted((example_folder / "ramps").glob("*.csv.gz"))]
+
+
+@pytest.fixture(scope="session")
+def example_valve(example_tests):
+    from dzdesign.identify.identification import identify
+
+    return identify(example_tests)
+
+
+@pytest.fixture(scope="session")
+def example_compensator(example_valve):
+    from dzdesign.design.designing import design
+
+    return design(example_valve)
+
+
+@pytest.fixture(scope="session")
+def example_firmware(example_compensator):
+    from dzdesign.codegen.project import generate
+
+    return generate(example_compensator, "f28335", to_json(example_compensator.to_document()).encode())
+
+
+@pytest.fixture
+def firmware_folder(example_firmware, tmp_path):
+    folder = tmp_path / "firmware"
+    write_folder(folder, example_firmware.files, example_firmware.manifest)
+    return folder

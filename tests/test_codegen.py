@@ -1,0 +1,139 @@
+"""The integer form against the exact law, and what the C may not contain."""
+
+import dataclasses
+import re
+import subprocess
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from synthetic import needs_compiler
+
+from dzdesign.codegen.integer_form import integer_form
+from dzdesign.codegen.project import generate
+from dzdesign.core.artefacts import to_json
+from dzdesign.core.errors import InputError
+from dzdesign.design.designing import DesignOptions, design
+from dzdesign.verify.host_compiler import STRICT, find_compilers
+
+
+def evaluate(form, compensator, command: int, dp_code: int) -> int:
+    """Do in Python, with integers of any size, what the C is meant to do."""
+    if dp_code < -compensator.reverse_codes:
+        beta = form.fallback
+    else:
+        step = 1 << form.step_shift
+        node, share = divmod(max(dp_code, 0), step)
+        beta = form.table[node] * (step - share) + form.table[node + 1] * share
+    total = beta * (form.slope * command + form.offset) + (form.linear * command << form.linear_shift) + form.half
+    assert total >= 0
+    return min((total >> form.shift) // form.divisor, compensator.signals.compare_max)
+
+
+def random_compensators(base, count: int, seed: int):
+    """Vary every coefficient of a compensator at random, within what a valve can have."""
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        falling = np.sort(rng.integers(20000, 32769, len(base.beta_numerators)))[::-1]
+        yield dataclasses.replace(
+            base,
+            law_name=str(rng.choice(["paper", "target"])),
+            k_x_max_over_u_max=Fraction(int(rng.integers(2000, 65536)), 65536),
+            u_min0_over_u_max=Fraction(int(rng.integers(100, 60000)), 65536),
+            beta_numerators=tuple(int(value) for value in falling),
+        )
+
+
+def test_integer_form_equals_the_exact_law_at_random_and_at_corners(example_compensator):
+    rng = np.random.default_rng(20)
+    for compensator in random_compensators(example_compensator, 60, seed=19):
+        form = integer_form(compensator)
+        commands = [0, 1, 4094, 4095, *rng.integers(0, 4096, 20)]
+        codes = [-4095, -41, -40, -1, 0, 1, 63, 64, 65, 4094, 4095, *rng.integers(-100, 4096, 20)]
+        for command in map(int, commands):
+            for code in map(int, codes):
+                assert evaluate(form, compensator, command, code) == compensator.compare(command, code)
+
+
+def test_reciprocal_is_exact_for_every_quotient_that_can_occur(example_compensator):
+    form = integer_form(example_compensator)
+    quotients = np.arange(0, 2 * 60000 * form.divisor, dtype=np.uint64)
+    by_product = (quotients * np.uint64(form.reciprocal)) >> np.uint64(form.reciprocal_shift)
+    assert np.array_equal(by_product, quotients // np.uint64(form.divisor))
+
+
+def test_same_input_same_bytes(example_compensator, example_firmware):
+    again = generate(example_compensator, "f28335", to_json(example_compensator.to_document()).encode())
+    assert dict(again.files) == dict(example_firmware.files)
+
+
+@pytest.mark.parametrize("law_name", ["paper", "target"])
+@needs_compiler
+def test_core_compiles_strictly_with_every_compiler(example_valve, law_name, tmp_path):
+    firmware = generate(design(example_valve, DesignOptions(law_name=law_name)), "f28335")
+    for name in ("dz_comp.c", "dz_comp.h"):
+        (tmp_path / name).write_text(firmware.files[f"core/{name}"])
+    for compiler in find_compilers():
+        command = [compiler, *STRICT, "-O2", "-c", str(tmp_path / "dz_comp.c"), "-o", str(tmp_path / "core.o")]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+
+
+def test_core_has_no_floating_point_no_division_and_no_state(example_firmware):
+    code = re.sub(r"/\*.*?\*/", "", example_firmware.files["core/dz_comp.c"], flags=re.DOTALL)
+    assert not re.search(r"\b(float|double)\b|\d\.\d|%", code)
+    assert "/" not in code.replace("#include", "")
+    static_data = re.findall(r"^static (?!const )(?!int32_t \w+\()", code, flags=re.MULTILINE)
+    assert static_data == []
+
+
+def test_generated_files_carry_the_hash_of_their_compensator_and_no_date(example_firmware):
+    digest = example_firmware.manifest["made_from"][0]["sha256"]
+    for name, text in example_firmware.files.items():
+        if name != "compensator.json":
+            assert digest in text, name
+            assert not re.search(r"20\d\d-\d\d-\d\d", text), name
+
+
+def test_names_from_users_do_not_reach_the_c(example_valve):
+    tests = tuple(dataclasses.replace(test, source='*/ #error "x" \n.csv') for test in example_valve.positive.tests)
+    hostile = dataclasses.replace(example_valve, positive=dataclasses.replace(example_valve.positive, tests=tests))
+    firmware = generate(design(hostile), "f28335")
+    for name, text in firmware.files.items():
+        assert name == "compensator.json" or '#error "x"' not in text
+
+
+def test_a_target_with_another_pwm_is_refused(example_compensator):
+    signals = dataclasses.replace(example_compensator.signals, compare_max=30000)
+    with pytest.raises(InputError, match="60000"):
+        generate(dataclasses.replace(example_compensator, signals=signals), "f28335")
+
+
+def test_scalings_too_rich_for_the_integers_are_refused(example_compensator):
+    awkward = dataclasses.replace(
+        example_compensator,
+        k_x_max_over_u_max=Fraction(10**12 + 39, 3 * 10**12),
+        u_min0_over_u_max=Fraction(7, 10**9 + 7),
+    )
+    with pytest.raises(InputError, match=r"bits|reciprocal"):
+        integer_form(awkward)
+
+
+@needs_compiler
+def test_core_and_hardware_link_as_one_program(example_firmware, tmp_path):
+    """The generated core takes the place of the stand-in: the ISR calls it on the model of the device."""
+    stub = Path(__file__).parent / "f28335"
+    for name, text in example_firmware.files.items():
+        target = tmp_path / name
+        target.parent.mkdir(exist_ok=True)
+        target.write_text(text)
+    command = [find_compilers()[0], *STRICT, "-c", f"-I{tmp_path / 'core'}", f"-I{stub}", f"-I{tmp_path / 'f28335'}"]
+    for source in ("core/dz_comp.c", "f28335/dz_isr.c", "f28335/dz_hardware.c"):
+        done = subprocess.run(
+            [*command, str(tmp_path / source), "-o", str(tmp_path / "one.o")],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr

@@ -1,0 +1,256 @@
+"""Identification against valves whose truth is known: synthetic lines, and the bundled example's plant."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from synthetic import L_MIN, MPA, Truth, synthetic_ramp
+
+from dzdesign.core.errors import InputError
+from dzdesign.identify.bounds import find_trend, lower_bounds, staircase
+from dzdesign.identify.branches import bin_branch, split_branches, sweep_direction
+from dzdesign.identify.characteristic import find_meter_floor
+from dzdesign.identify.identification import IdentifyOptions, identify
+from dzdesign.identify.model import valve_from_document
+
+PRESSURES = (0.5, 1.0, 2.0, 3.0, 5.0)
+
+
+def valve_of(threshold_at, *, seed: int = 0, pressures=PRESSURES, options=None, **truth):
+    """Identify a synthetic valve whose rising knee at dP is ``threshold_at(dP)``."""
+    tests = [
+        synthetic_ramp(dp, Truth(knee_rising=threshold_at(dp), slope=4 * math.sqrt(dp), **truth), seed=seed)
+        for dp in pressures
+    ]
+    return identify(tests, options)
+
+
+def falling_threshold(dp: float) -> float:
+    return 5.5 - 0.06 * dp
+
+
+@pytest.fixture(scope="module")
+def falling_valve():
+    return valve_of(falling_threshold)
+
+
+class TestKnees:
+    def test_both_knees_are_found_within_their_standard_errors(self, falling_valve):
+        for test in falling_valve.positive.tests:
+            rising = falling_threshold(test.dp_MPa)
+            assert abs(test.u_knee_rising_V - rising) < 4.5 * test.u_knee_se_V
+            assert abs(test.u_knee_falling_V - (rising - 0.1)) < 4.5 * test.u_knee_se_V
+
+    def test_error_shrinks_with_the_noise(self):
+        se = [valve_of(falling_threshold, noise=noise).positive.tests[1].u_knee_se_V for noise in (0.2, 0.05)]
+        assert se[1] == pytest.approx(se[0] / 4, rel=0.3)
+
+    def test_sagging_pressure_is_taken_sample_by_sample(self):
+        sagging = valve_of(falling_threshold, sag=0.3)
+        for test in sagging.positive.tests:
+            assert test.u_knee_rising_V == pytest.approx(falling_threshold(test.dp_MPa), abs=0.01)
+
+    def test_readings_under_a_high_floor_are_censored_not_zero(self):
+        # 35 % of the largest flow: a good part of the knee window reads zero.
+        test = synthetic_ramp(1.0, Truth(floor=6.5), seed=3)
+        options = IdentifyOptions(meter_floor=6.5 * L_MIN)
+        result = identify([test], options).positive.tests[0]
+        assert result.u_knee_rising_V == pytest.approx(5.4, abs=0.03)
+        assert result.u_knee_falling_V == pytest.approx(5.3, abs=0.03)
+
+    def test_joint_fit_without_constraints_is_the_least_squares_line(self):
+        test = synthetic_ramp(1.0, Truth(noise=0.1), seed=5)
+        valve = identify([test])
+        rising = test.u[: test.u.size // 2], test.q[: test.u.size // 2] / L_MIN
+        top = rising[1].max()
+        low, high = 5.4 + 0.12 * top / 4, 5.4 + 0.5 * top / 4
+        inside = (rising[0] > low) & (rising[0] < high)
+        slope, start = np.polyfit(rising[0][inside], rising[1][inside], 1)
+        # The window's edges come from noisy readings, so a few samples differ; far below one standard error.
+        assert valve.positive.tests[0].u_knee_rising_V == pytest.approx(-start / slope, abs=1.5e-3)
+
+    def test_outliers_and_lost_rows_do_not_move_the_knee(self):
+        clean = synthetic_ramp(1.0, Truth(), seed=7)
+        rng = np.random.default_rng(11)
+        keep = rng.random(clean.u.size) > 0.02
+        q = clean.q.copy()
+        hit = rng.random(q.size) < 0.01
+        q[hit] = rng.choice([0.0, 40.0], hit.sum()) * L_MIN
+        spoiled = dataclasses.replace(clean, time=clean.time[keep], u=clean.u[keep], q=q[keep], dp=clean.dp[keep])
+        before, after = (identify([test]).positive.tests[0] for test in (clean, spoiled))
+        assert after.u_knee_rising_V == pytest.approx(before.u_knee_rising_V, abs=4 * before.u_knee_se_V)
+        assert after.outliers > 10
+
+    def test_declared_lag_is_taken_out(self):
+        test = synthetic_ramp(1.0, Truth(noise=0.02), seed=2)
+        late = dataclasses.replace(test, q=np.interp(test.time - 0.5, test.time, test.q))
+        plain = identify([late]).positive.tests[0]
+        corrected = identify([late], IdentifyOptions(meter_lag=0.5)).positive.tests[0]
+        assert plain.u_knee_rising_V - 5.4 == pytest.approx(0.05, abs=0.01)
+        assert corrected.u_knee_rising_V == pytest.approx(5.4, abs=0.005)
+        assert corrected.u_knee_falling_V == pytest.approx(5.3, abs=0.005)
+
+
+class TestLaw:
+    def test_offset_lies_under_the_true_threshold_everywhere(self, falling_valve):
+        side = falling_valve.positive
+        low, high = side.valid_dp_MPa
+        for dp in np.linspace(low, high, 400):
+            offset = side.u_min0_V * np.interp(dp, side.beta_dp_MPa, side.beta)
+            assert offset < falling_threshold(dp) - 0.1
+
+    def test_beta_is_one_at_the_reference_and_monotone(self, falling_valve):
+        side = falling_valve.positive
+        assert np.interp(side.reference_dp_MPa, side.beta_dp_MPa, side.beta) == pytest.approx(1, abs=1e-6)
+        assert np.all(np.diff(side.beta) <= 1e-6)
+        assert side.trend == "decreasing"
+
+    def test_offset_lies_under_the_staircase_at_every_node(self, falling_valve):
+        side = falling_valve.positive
+        for index, step in enumerate(side.certified_steps_V):
+            for node in (index, index + 1):
+                if node == index or node == len(side.beta) - 1:
+                    assert side.beta[node] * side.u_min0_V <= step + 1e-6
+
+    def test_growing_threshold_gives_growing_beta_under_the_truth(self):
+        side = valve_of(lambda dp: 5.0 + 0.05 * dp).positive
+        assert side.trend == "increasing"
+        assert np.all(np.diff(side.beta) >= -1e-6)
+        for dp in np.linspace(*side.valid_dp_MPa, 200):
+            assert side.u_min0_V * np.interp(dp, side.beta_dp_MPa, side.beta) < 5.0 + 0.05 * dp - 0.1
+
+    def test_constant_threshold_is_flat_although_first_flow_seen_falls(self):
+        # A floor of 0.6 L/min is reached at a lower command where the slope is steeper: no trend of the valve.
+        valve = valve_of(lambda dp: 3.5, floor=0.6)
+        assert valve.positive.trend == "flat"
+        assert valve.positive.beta == pytest.approx((1.0,) * len(PRESSURES))
+        assert "flat-trend" in {warning.code for warning in valve.warnings}
+
+    def test_k_x_max_comes_from_saturation(self):
+        valve = valve_of(falling_threshold, saturation=12.0, pressures=(1.0,))
+        assert valve.positive.tests[0].saturates
+        assert valve.positive.k_x_max_over_u_max == pytest.approx(12 / 4 / 10, rel=0.01)
+
+    def test_k_in_volts_per_millimetre_needs_the_stroke(self):
+        side = valve_of(falling_threshold, pressures=(1.0,), options=IdentifyOptions(x_max=1.8e-3)).positive
+        assert side.k_V_mm == pytest.approx(10 * side.k_x_max_over_u_max / 1.8)
+
+    def test_meter_zero_is_budgeted(self):
+        free, guarded = (
+            valve_of(falling_threshold, options=IdentifyOptions(meter_zero=zero * L_MIN)).positive
+            for zero in (0.0, 0.15)
+        )
+        slope = free.tests[1].slope_L_min_V
+        lowered = free.tests[1].u_guard_lower_V - guarded.tests[1].u_guard_lower_V
+        assert lowered == pytest.approx(0.15 / slope, rel=0.02)
+
+
+class TestInvariance:
+    def test_order_of_files_does_not_matter(self):
+        tests = [synthetic_ramp(dp, Truth(knee_rising=falling_threshold(dp))) for dp in PRESSURES]
+        assert identify(tests).to_document() == identify(tests[::-1]).to_document()
+
+    def test_samples_in_the_dead_zone_do_not_move_the_knee(self):
+        test = synthetic_ramp(1.0, Truth(), seed=4)
+        rest = np.arange(500) / 50.0
+        longer = dataclasses.replace(
+            test,
+            time=np.concatenate([rest, test.time + 10]),
+            u=np.concatenate([np.zeros(500), test.u]),
+            q=np.concatenate([np.zeros(500), test.q]),
+            dp=np.concatenate([np.full(500, test.dp[0]), test.dp]),
+        )
+        short, long = (identify([each]).positive.tests[0] for each in (test, longer))
+        assert long.u_knee_rising_V == pytest.approx(short.u_knee_rising_V, abs=1e-6)
+
+    def test_document_round_trip(self, falling_valve):
+        from dzdesign.core.artefacts import to_json
+
+        text = to_json(falling_valve.to_document())
+        again = valve_from_document(text.encode(), "valve.json")
+        assert to_json(again.to_document()) == text
+
+
+class TestParts:
+    @pytest.mark.parametrize("noise", [0.0, 0.05])
+    def test_sweeps_are_told_apart_through_noise_and_holds(self, noise):
+        up = np.linspace(0, 10, 1000)
+        u = np.concatenate([np.zeros(50), up, np.full(50, 10), up[::-1], np.zeros(50)])
+        u = u + noise * np.random.default_rng(1).standard_normal(u.size)
+        direction = sweep_direction(u)
+        assert np.all(direction[80:1040] == 1)
+        assert np.all(direction[1110:2080] == -1)
+
+    def test_a_recording_that_starts_at_the_top_has_both_branches(self):
+        down_up = np.concatenate([np.linspace(10, 0, 500), np.linspace(0, 10, 500)])
+        assert np.all(sweep_direction(down_up)[:490] == -1)
+        assert np.all(sweep_direction(down_up)[510:] == 1)
+
+    def test_bins_are_sufficient_for_a_line(self):
+        rng = np.random.default_rng(0)
+        u, y = rng.uniform(2, 6, 5000), rng.normal(size=5000)
+        bins = bin_branch(u, y, np.zeros(5000, dtype=bool), 10.0)
+        slope, knee = 1.3, 2.2
+        direct = np.sum((y - slope * (u - knee)) ** 2)
+        miss = bins.n * (bins.y - slope * (bins.u - knee)) ** 2
+        binned = np.sum(miss + bins.c_yy - 2 * slope * bins.c_uy + slope**2 * bins.c_uu)
+        assert binned == pytest.approx(direct, rel=1e-12)
+
+    @pytest.mark.parametrize(("floor", "expected"), [(0.6, 0.6), (0.0, 0.0)])
+    def test_meter_floor_is_found_where_there_is_one(self, floor, expected):
+        test = synthetic_ramp(1.0, Truth(floor=floor, noise=0.05), rate_Hz=100)
+        rising, _ = split_branches(test, 0.0)
+        assert find_meter_floor(rising.u, rising.q, 10.0) / L_MIN == pytest.approx(expected, abs=0.1)
+
+    def test_simultaneous_bounds_cover(self):
+        # 99 % for all five together: among 2000 replicates 20 failures are expected, 34 is the 99.9 % quantile.
+        rng = np.random.default_rng(42)
+        failures = 0
+        for _ in range(2000):
+            blocks = rng.standard_normal((5, 16))
+            estimate, se = blocks.mean(axis=1), blocks.std(axis=1, ddof=2) / 4
+            failures += bool(np.any(lower_bounds(estimate, se, 0.99, np.zeros(5)) > 0))
+        assert failures <= 34
+
+    @pytest.mark.parametrize("shape", [np.sqrt, np.square, np.log1p], ids=["concave", "convex", "log"])
+    @pytest.mark.parametrize("sign", [-1, 1])
+    def test_chords_under_the_ceiling_stay_under_any_monotone_threshold(self, shape, sign):
+        dp = np.array([0.5, 1.0, 2.0, 3.5, 5.0])
+        threshold = 5 + sign * 0.1 * shape(dp)
+        trend = "increasing" if sign > 0 else "decreasing"
+        _, ceiling = staircase(threshold, trend)
+        dense = np.linspace(0.5, 5, 1000)
+        assert np.all(np.interp(dense, dp, ceiling) <= 5 + sign * 0.1 * shape(dense) + 1e-12)
+
+    def test_a_small_change_is_flat_however_significant(self):
+        dp = np.array([1.0, 2.0, 3.0]) * MPA
+        assert find_trend(dp, np.array([5.0, 4.997, 4.994]), np.full(3, 1e-5), 10.0)[0] == "flat"
+        assert find_trend(dp, np.array([5.0, 4.98, 4.96]), np.full(3, 1e-3), 10.0)[0] == "decreasing"
+
+    def test_refusals_say_why(self):
+        shut = synthetic_ramp(1.0, Truth(knee_rising=20.0))
+        with pytest.raises(InputError, match="never opens"):
+            identify([shut])
+        twice = [synthetic_ramp(1.0, Truth(), source=name) for name in ("a.csv", "b.csv")]
+        with pytest.raises(InputError, match="pressure drop repeats"):
+            identify(twice)
+
+
+def test_one_branch_is_said_and_guards_opening():
+    valve = identify([synthetic_ramp(1.0, Truth(), falling=False)])
+    assert valve.positive.guard == "opening"
+    assert "one-branch" in {warning.code for warning in valve.warnings}
+    assert valve.positive.trend is None
+
+
+def test_example_knees_match_the_plant_that_made_them(example_valve, example_folder):
+    from dzdesign.verify.plant import read_plant
+
+    plant = read_plant(example_folder / "plant.toml")
+    for test in example_valve.positive.tests:
+        force = plant.preload_N - plant.pressure_force_N_MPa * test.dp_MPa + plant.K_et_N_m * plant.overlap_mm * 1e-3
+        middle = force / plant.force_per_volt
+        # 30 mV: the meter's lag of 0.1 s, undeclared, is 10 mV; the flow force bends the line.
+        assert test.u_knee_rising_V == pytest.approx(middle + plant.hysteresis_V / 2, abs=0.03)
+        assert test.u_knee_falling_V == pytest.approx(middle - plant.hysteresis_V / 2, abs=0.03)

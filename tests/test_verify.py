@@ -1,0 +1,203 @@
+"""The checkers are checked: faults seeded in the C, in the law and in the design must be seen."""
+
+import dataclasses
+import json
+import re
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from synthetic import needs_compiler
+
+from dzdesign.core.artefacts import to_json, write_folder
+from dzdesign.verify.all_inputs import check_all_inputs
+from dzdesign.verify.closed_loop import ClosedLoop, RampSequence, dead_zone
+from dzdesign.verify.plant import PWM_PERIOD_S, Plant, derivatives, period_step, plants_from_tests
+from dzdesign.verify.reference import ExactLaw
+from dzdesign.verify.verification import verify
+
+pytestmark = needs_compiler
+
+QUICK = RampSequence(rest=0.5, ramp=4.0, top=0.5)
+
+
+def mutate(folder, pattern: str, replacement: str) -> None:
+    """Change one place of the generated core."""
+    source = folder / "core" / "dz_comp.c"
+    text = source.read_text()
+    changed, count = re.subn(pattern, replacement, text, count=1)
+    assert count == 1 and changed != text, pattern
+    source.write_text(changed)
+
+
+def test_the_generated_core_equals_the_law_on_every_input(firmware_folder):
+    result = check_all_inputs(firmware_folder)
+    assert result.holds
+    assert result.inputs == 4096 * 8191
+    assert result.wrong == 0 and result.largest_error == 0
+
+
+def one_more(match: re.Match) -> str:
+    return match.group(1) + str(int(match.group(2)) + 1) + match.group(3)
+
+
+FAULTS = {
+    "slope": (r"(-INT32_C\()(\d+)(\) \*)", one_more),
+    "offset": (r"(\+ INT32_C\()(\d+)(\);)", one_more),
+    "half": (r"(straight \+ UINT64_C\()(\d+)(\))", lambda m: m.group(1) + str(int(m.group(2)) * 2) + m.group(3)),
+    "reciprocal": (r"(quotient \* UINT32_C\()(\d+)(\))", lambda m: m.group(1) + str(int(m.group(2)) - 1) + m.group(3)),
+    "shift": (r"sum >> 32", "sum >> 31"),
+    "table": (r"(UINT32_C\()(\d+)(\), UINT32_C)", one_more),
+    "mask": (r"dp_code & 63u", "dp_code & 31u"),
+    "fallback": (r"(BETA_FALLBACK INT32_C\()(\d+)(\))", one_more),
+    "reverse >= becomes >": (r"dp_code >= -REVERSE_CODES", "dp_code > -REVERSE_CODES"),
+    "command <= becomes <": (r"u_adc <= COMMAND_CODE_MAX", "u_adc < COMMAND_CODE_MAX"),
+    "pressure <= becomes <": (r"p_a_adc <= PRESSURE_CODE_MAX", "p_a_adc < PRESSURE_CODE_MAX"),
+    "depends on one pressure": (
+        r"\(int32_t\)p_a_adc - \(int32_t\)p_b_adc",
+        "(int32_t)p_a_adc - (int32_t)(p_b_adc & 4094u)",
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_seeded_fault_in_the_c_is_found(firmware_folder, fault):
+    mutate(firmware_folder, *FAULTS[fault])
+    assert not check_all_inputs(firmware_folder).holds
+
+
+def test_a_missing_limit_is_found_where_the_law_reaches_full_drive(example_compensator, tmp_path):
+    from dzdesign.codegen.project import generate
+
+    long_stroke = dataclasses.replace(example_compensator, k_x_max_over_u_max=Fraction(3, 4))
+    firmware = generate(long_stroke, "f28335")
+    write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
+    assert check_all_inputs(tmp_path / "fw").holds
+    mutate(tmp_path / "fw", r"compare = DZ_COMPARE_MAX;", "compare += 0u;")
+    assert not check_all_inputs(tmp_path / "fw").holds
+
+
+def test_an_offset_above_the_bound_is_over_compensation(example_compensator, tmp_path):
+    """A wrong design, rightly coded: the C equals its law, and the law is refused."""
+    from dzdesign.codegen.project import generate
+
+    raised = tuple(min(numerator + 60, 32768) for numerator in example_compensator.beta_numerators)
+    greedy = dataclasses.replace(example_compensator, beta_numerators=raised)
+    firmware = generate(greedy, "f28335")
+    write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
+    result = check_all_inputs(tmp_path / "fw")
+    assert result.wrong == 0
+    assert result.over_compensated > 0 and not result.holds
+
+
+def test_a_changed_file_fails_the_verification(firmware_folder):
+    readme = firmware_folder / "f28335" / "README.md"
+    readme.write_text(readme.read_text() + "\n")
+    result = verify(firmware_folder, sequence=QUICK)
+    assert [check.name for check in result.checks if not check.holds] == ["files as generated"]
+
+
+def test_a_core_that_does_not_compile_fails_the_verification(firmware_folder):
+    mutate(firmware_folder, r"return beta;", "return bet;")
+    result = verify(firmware_folder, sequence=QUICK)
+    assert not result.holds and result.inputs is None
+
+
+def test_reference_agrees_with_the_compensator_at_random(example_compensator):
+    exact = ExactLaw(json.loads(to_json(example_compensator.to_document())))
+    rng = np.random.default_rng(3)
+    codes = [int(code) for code in rng.integers(-4095, 4096, 40)]
+    for command, row in enumerate(exact.rows([exact.beta(code) for code in codes])):
+        if command % 97 == 0 or command == 4095:
+            assert row.tolist() == [example_compensator.compare(command, code) for code in codes]
+
+
+class TestPlant:
+    def test_current_settles_where_equations_19_to_21_say(self):
+        plant = Plant()
+        run = ClosedLoop(plant).run(np.full(200, 0.6), 1.0)
+        force = plant.force_per_volt * 6.0
+        # Eq. (23) at rest, with the edge open: spring, preload, pressure and flow force against the solenoid.
+        opening = (
+            (force - plant.preload_N + plant.pressure_force_N_MPa * run.dp_MPa[-1])
+            - (plant.K_et_N_m * plant.overlap_mm * 1e-3)
+            - plant.force_per_volt * plant.hysteresis_V / 2
+        )
+        opening /= plant.K_et_N_m + plant.flow_force_N_mm_MPa * 1e3 * run.dp_MPa[-1]
+        flow = plant.C_d_W_mm * 1e-3 * opening * np.sqrt(2 * run.dp_MPa[-1] * 1e6 / plant.rho_kg_m3) * 6e4
+        assert run.q_L_min[-1] == pytest.approx(flow, rel=2e-3)
+
+    def test_step_agrees_with_tight_cvodes(self):
+        import casadi as ca
+
+        plant = Plant(hysteresis_V=0.0)
+        step = period_step(plant)
+        inner, inputs, rates = derivatives(plant)
+        duty, supply = 0.75, 1.0
+        phases = []
+        for share in (duty, 1 - duty):
+            problem = {"x": inner, "p": inputs, "ode": rates}
+            options = {"abstol": 1e-13, "reltol": 1e-12, "max_num_steps": 100000}
+            phases.append(ca.integrator("phase", "cvodes", problem, 0, share * PWM_PERIOD_S, options))
+        ours, theirs = np.zeros(4), np.zeros(3)
+        for _ in range(150):
+            seen = theirs[0] * plant.K_i_N_A / plant.force_per_volt
+            ours = np.asarray(step(ours, duty, supply)[0]).ravel()
+            for integrate, voltage in zip(phases, (plant.u_max_V, 0.0), strict=True):
+                theirs = np.asarray(integrate(x0=theirs, p=[voltage, 0 * seen, supply])["xf"]).ravel()
+        assert ours[0] == pytest.approx(theirs[0], abs=1e-6)
+        assert ours[1] == pytest.approx(theirs[1], abs=2e-9)  # of 1.5 mm
+
+    def test_runge_kutta_converges_with_order_four(self, monkeypatch):
+        from dzdesign.verify import plant as module
+
+        ends = {}
+        for steps in (2, 4, 8, 64):
+            monkeypatch.setattr(module, "STEPS_PER_PHASE", steps)
+            step = period_step(Plant(hysteresis_V=0.0))
+            state = np.zeros(4)
+            for _ in range(30):  # before the spool leaves its stop: the motion is smooth
+                state = np.asarray(step(state, 0.3, 1.0)[0]).ravel()
+            ends[steps] = state[0]
+        errors = [abs(ends[steps] - ends[64]) for steps in (2, 4)]
+        assert errors[0] / errors[1] == pytest.approx(16, rel=0.35)
+
+    def test_hysteresis_is_the_width_of_the_play(self):
+        plant = Plant(hysteresis_V=0.3)
+        run = ClosedLoop(plant).run(RampSequence(rest=1, ramp=50, top=1).command(), 1.0)
+        width = dead_zone(run, 0.02, rising=True) - dead_zone(run, 0.02, rising=False)
+        assert width * 10 == pytest.approx(0.3, abs=0.02)
+
+    def test_plant_made_from_the_tests_has_their_thresholds(self, example_valve):
+        plants = plants_from_tests(example_valve.positive, 10.0)
+        for test in example_valve.positive.tests[::2]:
+            run = ClosedLoop(plants[test.dp_MPa]).run(RampSequence(rest=1, ramp=60, top=1).command(), test.dp_MPa)
+            assert dead_zone(run, 0.02, rising=True) * 10 == pytest.approx(test.u_knee_rising_V, abs=0.03)
+            assert dead_zone(run, 0.02, rising=False) * 10 == pytest.approx(test.u_knee_falling_V, abs=0.03)
+
+
+def test_closed_loop_removes_the_dead_zone_and_without_beta_leaks(firmware_folder, example_folder):
+    from dzdesign.verify.plant import read_plant
+
+    result = verify(firmware_folder, read_plant(example_folder / "plant.toml"), sequence=QUICK)
+    assert result.holds
+    for loop in result.loops:
+        # The quick ramp lags by some tens of millivolts.
+        assert loop.result.dead_zone_opening > 0.5
+        assert loop.result.residual_opening < 0.085
+        assert loop.result.q_zero_L_min == 0
+    at_highest = result.loops[-1].result
+    assert at_highest.q_zero_without_beta_L_min > 0.3
+
+
+def test_a_law_without_its_guard_leaks_in_the_loop(example_compensator, example_folder, tmp_path):
+    """The closed loop sees over-compensation on its own: an offset of the opening threshold, at every pressure."""
+    from dzdesign.codegen.project import generate
+    from dzdesign.verify.plant import read_plant
+
+    leaky = dataclasses.replace(example_compensator, u_min0_over_u_max=Fraction(55, 100))
+    firmware = generate(leaky, "f28335")
+    write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
+    result = verify(tmp_path / "fw", read_plant(example_folder / "plant.toml"), sequence=QUICK)
+    failed = {check.name for check in result.checks if not check.holds}
+    assert "no flow at zero command in the closed loop" in failed
