@@ -77,8 +77,9 @@ def generate(compensator: Compensator, target_name: str, compensator_bytes: byte
     digest = sha256_of(document)
     context = core_context(compensator, integer_form(compensator))
     files = {path: _render("dzdesign.codegen", template, digest, context) for path, template in CORE_FILES.items()}
+    hardware = {**target.context, **{key: context[key] for key in ("u_max_V", "pressure_span_MPa")}}
     for path, template in target.templates.items():
-        files[path] = _render(f"dzdesign.codegen.{target.name}", template, digest, target.context)
+        files[path] = _render(f"dzdesign.codegen.{target.name}", template, digest, hardware)
     files["compensator.json"] = document.decode()
     manifest = {
         "schema": SCHEMA,

@@ -20,7 +20,6 @@ SEQUENCE_ADCCLKS = Fraction(113, 2)  # three channels with ACQ_PS = 15, cascaded
 SAMPLE_TIMEOUT_S = Fraction(32, 10**4)  # four sample periods
 WATCHDOG_COUNTS = 512 * 256  # OSCCLK / 512 into eight bits, WDPS = /1
 ADC_BITS, ADC_SPAN_V = 12, 3
-ATTENUATION = Fraction(3, 10)  # 0-10 V command to the 0-3 V of the converter
 EVENT_PRESCALE = {1: "ET_1ST", 2: "ET_2ND", 3: "ET_3RD"}
 
 
@@ -132,9 +131,8 @@ def converter() -> dict[str, str]:
         "adc_code_max": str(2**ADC_BITS - 1),
         "adc_span_v": str(ADC_SPAN_V),
         "adcclk_max_mhz": printed(Fraction(ADCCLK_MAX_HZ, 10**6)),
-        "attenuation": printed(ATTENUATION),
-        "code_at_1_v": str(int(2**ADC_BITS * ATTENUATION / ADC_SPAN_V)),
-        "code_at_5_v": str(int(2**ADC_BITS * 5 * ATTENUATION / ADC_SPAN_V)),
+        "code_at_tenth": str(2**ADC_BITS // 10),
+        "code_at_half": str(2**ADC_BITS // 2),
     }
 
 
