@@ -100,9 +100,7 @@ def core_context(compensator: Compensator, form: IntegerForm) -> dict[str, str |
     largest = ((1 << form.reciprocal_shift) - 1) // max(
         1, form.reciprocal * form.divisor - (1 << form.reciprocal_shift)
     )
-    zero_command = [
-        compensator.compare(0, node * compensator.beta_step_codes) for node in range(len(form.table) - 1)
-    ]
+    zero_command = [compensator.compare(0, node * compensator.beta_step_codes) for node in range(len(form.table) - 1)]
     return {
         "zero_command_low": str(min(zero_command)),
         "zero_command_high": str(max(zero_command)),

@@ -156,8 +156,8 @@ def choose_beta_table(ceiling: OffsetCeiling, u_min0: Fraction, trend: str | Non
     else:
         constraints.append(cp.diff(beta) == 0)
     problem = cp.Problem(cp.Maximize(cp.sum(weights @ beta) + beta[-1]), constraints)
-    problem.solve(solver=cp.CLARABEL)
-    if problem.status not in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
+    problem.solve(solver=cp.HIGHS)  # a simplex ends in a vertex: no interior-point fuzz to round away
+    if problem.status != cp.OPTIMAL:
         raise RequirementError(f"no table of beta lies under the certified offset (solver: {problem.status})")
     # A thousandth of a count, so that a beta of 1 to within the solver's error stays 1.
     nodes = [int(np.floor(value * DENOMINATOR + 1e-3)) for value in beta.value]

@@ -24,7 +24,7 @@ class Certificate:
     guard : str
         ``closing`` or ``opening``: the threshold that they bound.
     level_L_min : float
-        Flow below which the ramp tests could not tell open from shut.
+        Flow that counted as flow when the thresholds were identified.
     dp_MPa : tuple of Fraction, or None
         Interval of the pressure drop on which it holds; None if the valve was tested without a pressure drop.
     smallest_margin_V : Fraction, or None

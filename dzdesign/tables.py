@@ -95,7 +95,7 @@ def print_compensator(compensator: "Compensator") -> None:
         f"certificate: the offset stays below the {certificate.confidence:.0%} lower bound of the {certificate.guard} "
         f"threshold from {low:.3f} to {high:.3f} MPa, smallest margin "
         f"{1e3 * float(certificate.smallest_margin_V):.3f} mV; flow below {certificate.level_L_min:.2f} L/min "
-        "could not be told from none",
+        "(meter's floor, its noise, or 0.5 % of the largest flow) counts as none",
         *(f"cost: {line}" for line in compensator.costs),
     ):
         console.print(line, markup=False, soft_wrap=True)

@@ -12,12 +12,18 @@ from dzdesign.identify.branches import BIN_WIDTH, Bins, Branch, bin_branch
 TOP = 0.05
 #: A sample further than this many robust standard deviations from the line is an outlier.
 GATE = 6.0
+#: Noise below this share of the largest flow is not believed: no meter is that fine.
+FINEST_NOISE = 1e-5
 #: Blocks into which the residuals in time order are cut, to see how coloured the noise is.
 BLOCKS = 16
-#: Flow below this share of the largest is no useful flow: the level of "first flow seen" of a meter without floor.
+#: Flow below this share of the largest is no useful flow, however fine the meter.
 USEFUL_FLOW = 0.005
+#: Standard deviations of a shut reading above which a single reading is flow.
+NOISE_LEVEL = 3.0
 #: The tail runs from the first flow seen to this multiple of it.
 TAIL = 3.0
+#: Fewest samples in the tail for a line.
+TAIL_SAMPLES = 12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +45,7 @@ class BranchShape:
     colour : float
         Long-run variance over variance of one sample (1 for white noise, more for coloured noise or a bent line).
     level : float
-        Flow of "first flow seen", m³/s.
+        Flow that counts as flow, m³/s: the meter's floor, its noise or `USEFUL_FLOW`, whichever is largest.
     onset, onset_se : float
         Zero of the straight line through the tail, V, and its standard error.
     saturates : bool
@@ -181,16 +187,17 @@ def describe_branch(
     slope, knee = _line(u_in[~censored], y_in[~censored])
     for _ in range(3):
         residual = y_in - slope * (u_in - knee)
-        sigma = 1.4826 * float(np.median(np.abs(residual[~censored]))) or 1e-6 * y_max
+        sigma = max(1.4826 * float(np.median(np.abs(residual[~censored]))), FINEST_NOISE * y_max)
         # A zero reading is a censored sample only where flow below the floor is credible.
         credible = slope * (u_in - knee) < floor + GATE * sigma
         kept = np.where(censored, credible, np.abs(residual) < GATE * sigma)
         slope, knee = _line(u_in[kept & ~censored], y_in[kept & ~censored])
     seen = kept & ~censored
     residual = y_in[seen] - slope * (u_in[seen] - knee)
-    sigma = float(np.sqrt(np.sum(residual**2) / max(seen.sum() - 2, 1))) or 1e-6 * y_max
-    level = max(floor, USEFUL_FLOW * y_max, 5 * _quiet_noise(branch, y, knee))
-    onset, onset_se = _tail_onset(branch.u, y, u_profile, y_profile, level, slope)
+    sigma = max(float(np.sqrt(np.sum(residual**2) / max(seen.sum() - 2, 1))), FINEST_NOISE * y_max)
+    noise = _quiet_noise(branch, y, knee)
+    level = max(floor, USEFUL_FLOW * y_max, NOISE_LEVEL * noise)
+    onset, onset_se = _tail_onset(branch.u, y, (u_profile, y_profile), level, slope, noise)
     return BranchShape(
         rising=branch.rising,
         bins=bin_branch(u_in[kept], y_in[kept], censored[kept], u_max),
@@ -208,34 +215,35 @@ def describe_branch(
 
 
 def _quiet_noise(branch: Branch, y: np.ndarray, knee: float) -> float:
-    """Return the robust noise of the mean reading of a bin while the valve is shut (u below half the knee)."""
+    """Return the robust standard deviation of a reading while the valve is shut (u below half the knee), m³/s."""
     shut = y[branch.u < 0.5 * knee]
-    if shut.size < 5:
-        return 0.0
-    samples_in_bin = max(1.0, shut.size / max(1, len(np.unique(np.floor(branch.u[: shut.size] * 100)))))
-    return 1.4826 * float(np.median(np.abs(shut - np.median(shut)))) / math.sqrt(samples_in_bin)
+    return 1.4826 * float(np.median(np.abs(shut - np.median(shut)))) if shut.size >= 5 else 0.0
 
 
 def _tail_onset(
-    u: np.ndarray, y: np.ndarray, u_profile: np.ndarray, y_profile: np.ndarray, level: float, slope: float
+    u: np.ndarray, y: np.ndarray, profile: tuple[np.ndarray, np.ndarray], level: float, slope: float, noise: float
 ) -> tuple[float, float]:
     """Extrapolate the first flow seen to zero: the valve opens (or closes) no later than this, as far as can be seen.
 
     A soft edge passes flow below the knee. What the meter sees of it is the tail from `level` to `TAIL` times it; the
     line through the tail crosses zero at or below the knee's. What happens below `level` stays hidden.
+
+    Returns
+    -------
+    tuple of float
+        The zero and its standard error, V.
     """
-    u_first = crossing(u_profile, y_profile, level)
-    u_last = crossing(u_profile, y_profile, TAIL * level)
-    tail = (u >= u_first) & (u <= u_last) & (y > 0.5 * level)
-    if tail.sum() < 6:
-        # Too few samples for a line (a staircase): the chord between the two crossings.
-        return u_first - (u_last - u_first) / (TAIL - 1), u_last - u_first
-    tail_slope, onset = _line(u[tail], y[tail])
-    if tail_slope <= 0.1 * slope:  # a leak or a notch: no line, so nothing below the first flow is trusted
-        return u_first - (u_last - u_first) / (TAIL - 1), u_last - u_first
-    residual = y[tail] - tail_slope * (u[tail] - onset)
-    n, centre = tail.sum(), u[tail].mean()
-    variance = np.sum(residual**2) / (n - 2)
-    lever = 1 / n + (centre - onset) ** 2 / np.sum((u[tail] - centre) ** 2)
-    sigma = math.sqrt(variance) or 1e-12
-    return onset, math.sqrt(variance * lever * _colour(residual, sigma)) / tail_slope
+    first, last = crossing(*profile, level), crossing(*profile, TAIL * level)
+    tail = (u >= first) & (u <= last) & (y > 0.5 * level)
+    if tail.sum() >= TAIL_SAMPLES:
+        tail_slope, onset = _line(u[tail], y[tail])
+        if tail_slope > 0.1 * slope:  # else a notch or a leak: no line, so the chord below
+            residual = y[tail] - tail_slope * (u[tail] - onset)
+            sigma = math.sqrt(np.sum(residual**2) / (tail.sum() - 2))
+            lever = 1 / tail.sum() + (u[tail].mean() - onset) ** 2 / np.sum((u[tail] - u[tail].mean()) ** 2)
+            return onset, sigma * math.sqrt(lever * _colour(residual, max(sigma, 1e-12))) / tail_slope
+    # Too few samples for a line, as in a staircase test: the chord, its ends known to one level of the command.
+    at = int(np.clip(np.searchsorted(profile[0], first), 1, profile[0].size - 1))
+    gap = float(profile[0][at] - profile[0][at - 1])
+    width = max(last - first, gap)
+    return first - width / (TAIL - 1), gap + noise * width / ((TAIL - 1) * level)

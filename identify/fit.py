@@ -1,15 +1,22 @@
 """The constrained fits in CasADi: knees and slopes of all ramp tests jointly; the offset curve under its bounds."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.characteristic import BranchShape
 
+if TYPE_CHECKING:
+    import casadi as ca
+
 #: A constraint is active when its slack is below this share of u_max.
 ACTIVE = 1e-7
-IPOPT = {"ipopt.print_level": 0, "print_time": False, "ipopt.sb": "yes", "ipopt.tol": 1e-9, "ipopt.max_iter": 300}
+IPOPT = {"ipopt.print_level": 0, "print_time": False, "ipopt.sb": "yes", "ipopt.tol": 1e-8, "ipopt.max_iter": 300}
+QRQP = {"print_iter": False, "print_header": False, "print_time": False, "error_on_fail": False}
+#: No test outweighs another by more than this, however quiet its meter was.
+LARGEST_WEIGHT = 1e4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,41 +71,39 @@ def fit_knees(
     where = [(row, column) for row, pair in enumerate(shapes) for column, shape in enumerate(pair) if shape]
     position = {place: index for index, place in enumerate(where)}
     slopes, knees = ca.MX.sym("slope", len(where)), ca.MX.sym("knee", len(where))
+    scales = [_expected_errors(shapes[row][column]) for row, column in where]
+    knee_of = {
+        place: shapes[place[0]][place[1]].knee / u_max + knees[index] * scales[index][1] / u_max
+        for place, index in position.items()
+    }
     cost = 0
-    start = np.empty(2 * len(where))
-    for index, (row, column) in enumerate(where):
-        shape = shapes[row][column]
-        start[index], start[len(where) + index] = 1.0, shape.knee / u_max
-        cost += _branch_cost(shape, slopes[index], knees[index], floor, u_max)
-    constraints, names = [], []
     for (row, column), index in position.items():
-        above = position.get((row + 1, column))
-        if above is not None and trend != "flat":
-            step = knees[above] - knees[index]
+        slope = 1 + slopes[index] * scales[index][0]
+        cost += _branch_cost(shapes[row][column], slope, knee_of[row, column], floor, u_max)
+    constraints, names = [], []
+    for row, column in where:
+        if trend != "flat" and (row + 1, column) in position:
+            step = knee_of[row + 1, column] - knee_of[row, column]
             constraints.append(step if trend == "increasing" else -step)
             names.append(f"{'falling' if column else 'rising'} knee of test {row + 1} to {row + 2}")
     variables = ca.vertcat(slopes, knees)
-    samples = sum(float(shapes[row][column].bins.n.sum()) for row, column in where)
-    # Per sample, so that the solver's tolerance means the same for long and short recordings.
-    problem = {"x": variables, "f": cost / samples, "g": ca.vertcat(*constraints)}
-    solver = ca.nlpsol("knees", "ipopt", problem, IPOPT)
-    solution = solver(x0=start, lbg=0.0, ubg=ca.inf)
+    solver = ca.nlpsol("knees", "ipopt", {"x": variables, "f": cost, "g": ca.vertcat(*constraints)}, IPOPT)
+    solution = solver(x0=0.0, lbg=0.0, ubg=ca.inf)
     if not solver.stats()["success"]:
         raise InputError(
             f"the joint fit did not converge ({solver.stats()['return_status']}); "
-            "look at the ramp tests with --plots, or leave out the one that is unlike the others"
+            "look at the ramp tests, and leave out the one that is unlike the others"
         )
-    best = np.asarray(solution["x"]).ravel()
-    slack = np.asarray(solution["g"]).ravel()
-    hessian, _ = ca.hessian(cost, variables)
-    covariance = np.linalg.inv(np.asarray(ca.Function("h", [variables], [hessian])(best)))
+    best, slack = np.asarray(solution["x"]).ravel(), np.asarray(solution["g"]).ravel()
+    hessian = np.asarray(ca.Function("h", [variables], [ca.hessian(cost, variables)[0]])(best))
+    variance = np.diag(np.linalg.inv(hessian))
     knee, knee_se, slope = (np.full((len(shapes), 2), np.nan) for _ in range(3))
-    for index, (row, column) in enumerate(where):
-        shape = shapes[row][column]
-        variance = covariance[len(where) + index, len(where) + index] * shape.colour
-        knee[row, column] = best[len(where) + index] * u_max
-        knee_se[row, column] = np.sqrt(variance) * u_max
-        slope[row, column] = best[index] * shape.slope
+    for (row, column), index in position.items():
+        shape, (slope_scale, knee_scale) = shapes[row][column], scales[index]
+        last = len(where) + index
+        knee[row, column] = shape.knee + best[last] * knee_scale
+        knee_se[row, column] = np.sqrt(variance[last] * shape.colour) * knee_scale
+        slope[row, column] = (1 + best[index] * slope_scale) * shape.slope
     return KneeFit(
         knee=knee,
         knee_se=knee_se,
@@ -108,17 +113,24 @@ def fit_knees(
     )
 
 
-def _branch_cost(shape: BranchShape, slope: "object", knee: "object", floor: float, u_max: float) -> "object":
+def _expected_errors(shape: BranchShape) -> tuple[float, float]:
+    """Return rough standard errors of slope (relative) and knee (V): in their units the fit is well scaled."""
+    n = max(float(shape.bins.n.sum()), 1.0)
+    knee = shape.sigma / (shape.slope * np.sqrt(n))
+    return knee * shape.slope / shape.y_max, knee
+
+
+def _branch_cost(shape: BranchShape, slope: "ca.MX", knee: "ca.MX", floor: float, u_max: float) -> "ca.MX":
     """Return the negative log-likelihood of one branch; slope in units of the start value, knee over u_max."""
     import casadi as ca
 
     bins, per_sigma = shape.bins, shape.slope * u_max / shape.sigma
     line = per_sigma * slope
-    u, y = bins.u / u_max, bins.y / shape.sigma
-    spread = ca.DM(bins.c_yy / shape.sigma**2), ca.DM(bins.c_uy / (u_max * shape.sigma)), ca.DM(bins.c_uu / u_max**2)
-    miss = ca.DM(y) - line * (ca.DM(u) - knee)
-    squares = ca.DM(bins.n) * miss**2 + spread[0] - 2 * line * spread[1] + line**2 * spread[2]
-    cost = ca.sum1(squares) / 2
+    miss = ca.DM(bins.y / shape.sigma) - line * (ca.DM(bins.u / u_max) - knee)
+    # Inside a bin the sum of squares has a closed form: sum (dy - line du)^2 about the bin's means.
+    c_uy = float(bins.c_uy.sum()) / (u_max * shape.sigma)
+    c_uu = float(bins.c_uu.sum()) / u_max**2
+    cost = (ca.sum1(ca.DM(bins.n) * miss**2) - 2 * line * c_uy + line**2 * c_uu) / 2
     cut = bins.censored > 0
     if cut.any():
         depth = floor / shape.sigma - line * (ca.DM(bins.u_all[cut] / u_max) - knee)
@@ -172,26 +184,21 @@ def fit_offset(
             "without opening the valve at zero command; check the ramp tests and the meter's zero"
         )
     size = guard.size
-    u_min0, beta = ca.MX.sym("u_min0"), ca.MX.sym("beta", size)
-    weight = (guard_se.max() / guard_se) ** 2
-    cost = ca.sum1(ca.DM(weight) * (ca.DM(guard / u_max) - u_min0 * beta) ** 2)
-    step = beta[1:] - beta[:-1] if size > 1 else ca.MX(0, 1)
+    # In the offset itself, o = beta u_min0, the problem is a convex quadratic programme; beta(dP0) = 1 then makes
+    # u_min0 the offset at the reference. The unknown is what the offset gives up under its ceiling, in units of u_max.
+    given_up = ca.MX.sym("given_up", size)
+    offset = ca.DM(ceiling / u_max) - given_up
+    weight = np.clip((guard_se.max() / guard_se) ** 2, 1, LARGEST_WEIGHT)
+    cost = ca.sum1(ca.DM(weight) * (ca.DM(guard / u_max) - offset) ** 2)
+    step = offset[1:] - offset[:-1] if size > 1 else ca.MX(0, 1)
     low, high = {"decreasing": (-np.inf, 0.0), "increasing": (0.0, np.inf), "flat": (0.0, 0.0)}[trend]
-    problem = {
-        "x": ca.vertcat(u_min0, beta),
-        "f": cost,
-        "g": ca.vertcat(u_min0 * beta - ca.DM(ceiling / u_max), step, beta[reference] - 1),
-    }
-    solver = ca.nlpsol("offset", "ipopt", problem, {**IPOPT, "ipopt.bound_relax_factor": 0.0})
-    lower = np.concatenate([np.full(size, -np.inf), np.full(size - 1, low), [0.0]])
-    upper = np.concatenate([np.zeros(size), np.full(size - 1, high), [0.0]])
-    start = np.concatenate([[ceiling.min() / u_max], np.ones(size)])
-    solution = solver(x0=start, lbx=0.0, lbg=lower, ubg=upper)
+    solver = ca.qpsol("offset", "qrqp", {"x": given_up, "f": cost, "g": step}, QRQP)
+    solution = solver(x0=0.0, lbx=0.0, lbg=low, ubg=high)
     if not solver.stats()["success"]:
         raise InputError(
             f"beta(dP) could not be fitted under its bounds ({solver.stats()['return_status']}); "
             "check that the ramp tests belong to one valve"
         )
-    best = np.asarray(solution["x"]).ravel()
-    slack = -np.asarray(solution["g"]).ravel()[:size]
-    return OffsetFit(u_min0=float(best[0] * u_max), beta=best[1:], active=slack < ACTIVE)
+    slack = np.maximum(np.asarray(solution["x"]).ravel(), 0.0)
+    found = ceiling - slack * u_max
+    return OffsetFit(u_min0=float(found[reference]), beta=found / found[reference], active=slack < ACTIVE)

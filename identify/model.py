@@ -65,7 +65,7 @@ class SideModel:
     guard : {"closing", "opening"}
         The threshold that the certificate protects.
     level_L_min : float
-        Flow below which this data can't tell open from shut.
+        Flow that counts as flow: the largest of the meter's floor, its noise and half a per cent of the largest flow.
     certified_steps_V : tuple of float
         Staircase: lower bound of the guarded threshold between neighbouring beta nodes.
     active_constraints : tuple of str
