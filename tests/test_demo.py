@@ -1,6 +1,8 @@
 """The main job as a user runs it, and that the same input gives the same bytes."""
 
 import json
+import re
+from pathlib import Path
 
 import pytest
 from synthetic import needs_compiler
@@ -38,7 +40,11 @@ def test_demo_prints_the_table_and_where_things_are(demo, capsys):
     ):
         assert words in out
     assert str(demo) in out
-    assert out.count("\n  ") >= 7
+    readme = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+    rows = [line.strip() for line in readme.splitlines() if re.match(r"\s+\d\.\d\d +\d\.\d{3} / ", line)]
+    assert len(rows) == 6
+    printed = [line.strip() for line in out.splitlines()]
+    assert [row for row in rows if row not in printed] == []
 
 
 @needs_compiler

@@ -12,7 +12,7 @@ from synthetic import needs_compiler
 from dzdesign.core.artefacts import to_json, write_folder
 from dzdesign.verify.all_inputs import check_all_inputs
 from dzdesign.verify.closed_loop import ClosedLoop, RampSequence, dead_zone
-from dzdesign.verify.plant import PWM_PERIOD_S, Plant, derivatives, period_step, plants_from_tests
+from dzdesign.verify.plant import PWM_PERIOD_S, STATES, Plant, derivatives, period_step, plants_from_tests
 from dzdesign.verify.reference import ExactLaw
 from dzdesign.verify.verification import verify
 
@@ -139,12 +139,11 @@ class TestPlant:
             problem = {"x": inner, "p": inputs, "ode": rates}
             options = {"abstol": 1e-13, "reltol": 1e-12, "max_num_steps": 100000}
             phases.append(ca.integrator("phase", "cvodes", problem, 0, share * PWM_PERIOD_S, options))
-        ours, theirs = np.zeros(4), np.zeros(3)
+        ours, theirs = np.zeros(STATES), np.zeros(3)
         for _ in range(150):
-            seen = theirs[0] * plant.K_i_N_A / plant.force_per_volt
             ours = np.asarray(step(ours, duty, supply)[0]).ravel()
             for integrate, voltage in zip(phases, (plant.u_max_V, 0.0), strict=True):
-                theirs = np.asarray(integrate(x0=theirs, p=[voltage, 0 * seen, supply])["xf"]).ravel()
+                theirs = np.asarray(integrate(x0=theirs, p=[voltage, 0.0, supply])["xf"]).ravel()
         assert ours[0] == pytest.approx(theirs[0], abs=1e-6)
         assert ours[1] == pytest.approx(theirs[1], abs=2e-9)  # of 1.5 mm
 
@@ -155,7 +154,7 @@ class TestPlant:
         for steps in (2, 4, 8, 64):
             monkeypatch.setattr(module, "STEPS_PER_PHASE", steps)
             step = period_step(Plant(hysteresis_V=0.0))
-            state = np.zeros(4)
+            state = np.zeros(STATES)
             for _ in range(30):  # before the spool leaves its stop: the motion is smooth
                 state = np.asarray(step(state, 0.3, 1.0)[0]).ravel()
             ends[steps] = state[0]

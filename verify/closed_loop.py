@@ -9,7 +9,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.verify.host_compiler import load_library
-from dzdesign.verify.plant import Plant, period_step
+from dzdesign.verify.plant import STATES, Plant, period_step
 
 #: Periods of the PWM between two records: 100 a second, as in the paper's tests.
 PERIODS_PER_RECORD = 25
@@ -135,7 +135,7 @@ class ClosedLoop:
         if mode != "direct" and not self._has_core:
             raise InputError("this loop was built without a compensator; give the firmware folder")
         command = np.ascontiguousarray(command, dtype=float)
-        record, state = np.empty((command.size, 3)), np.zeros(4)
+        record, state = np.empty((command.size, 3)), np.zeros(STATES)
         # Of this run alone, so that runs may go on side by side (ctypes lets go of the interpreter's lock).
         work = np.zeros(self._work_sizes[0]), np.zeros(self._work_sizes[1], dtype=np.int64)
         span, code_max, compare_max = self._scalings

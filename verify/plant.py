@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 PWM_PERIOD_S = 400e-6
 #: Runge-Kutta steps over the on-phase and over the off-phase of a period.
 STEPS_PER_PHASE = 2
+#: Numbers in the state of `period_step`; loop.c has the same.
+STATES = 5
 #: Stops are stiff springs, so that the motion stays a smooth ordinary differential equation.
 STOP_STIFFNESS_N_M = 3e6
 STOP_DAMPING_N_S_M = 400.0
@@ -205,21 +207,20 @@ def period_step(plant: Plant) -> "casadi.Function":
     Returns
     -------
     casadi.Function
-        ``(state[4], duty, supply_MPa) -> (state[4], dp_MPa, Q_L_min)``; the fourth state is the play of the magnetic
-        force, in V of command.
+        ``(state[5], duty, supply_MPa) -> (state[5], dp_MPa, Q_L_min)``. Beyond current, travel and speed, it holds
+        the play of the magnetic force and the mean current of the last period, both in V of command.
     """
     import casadi as ca
 
     inner, inputs, rates = derivatives(plant)
-    rate = ca.Function("rate", [inner, inputs], [rates])
-    state, duty, supply = ca.SX.sym("x", 4), ca.SX.sym("duty"), ca.SX.sym("supply")
+    # The integral of the current rides along: its mean over the period is free of the pulse's ripple.
+    rate = ca.Function("rate", [ca.vertcat(inner, ca.SX.sym("charge")), inputs], [ca.vertcat(rates, inner[0])])
+    state, duty, supply = ca.SX.sym("x", STATES), ca.SX.sym("duty"), ca.SX.sym("supply")
     volts_per_ampere = plant.K_i_N_A / plant.force_per_volt
-    # The play acts on the current at the start of the period, where the ripple of the pulse is the same every time.
-    seen = state[0] * volts_per_ampere
-    half = plant.hysteresis_V / 2
-    play = ca.fmin(ca.fmax(state[3], seen - half), seen + half)
-    play_force = (play - seen) * plant.force_per_volt
-    x = state[:3]
+    half, mean = plant.hysteresis_V / 2, state[4]
+    play = ca.fmin(ca.fmax(state[3], mean - half), mean + half)
+    play_force = (play - mean) * plant.force_per_volt
+    x = ca.vertcat(state[:3], 0)
     for voltage, share in ((plant.u_max_V, duty), (0.0, 1 - duty)):
         h = share * PWM_PERIOD_S / STEPS_PER_PHASE
         given = ca.vertcat(voltage, play_force, supply)
@@ -230,4 +231,5 @@ def period_step(plant: Plant) -> "casadi.Function":
             k4 = rate(x + h * k3, given)
             x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
     dp_MPa, flow = orifice(plant, ca.fmax(x[1] - plant.overlap_mm * 1e-3, 0), supply)
-    return ca.Function("plant_step", [state, duty, supply], [ca.vertcat(x, play), dp_MPa, flow])
+    after = ca.vertcat(x[:3], play, x[3] / PWM_PERIOD_S * volts_per_ampere)
+    return ca.Function("plant_step", [state, duty, supply], [after, dp_MPa, flow])
