@@ -44,7 +44,7 @@ class IntegerForm:
     reciprocal, reciprocal_shift : int
         Of the divisor.
     fallback : int
-        Interpolated value B of the smallest beta, times scale_beta: for a pressure signal that can't be right.
+        scale_beta times the smallest beta numerator: for a pressure signal that can't be right.
     """
 
     table: tuple[int, ...]
@@ -108,7 +108,7 @@ def integer_form(compensator: Compensator) -> IntegerForm:
         divisor=divisor,
         reciprocal=reciprocal,
         reciprocal_shift=reciprocal_shift,
-        fallback=scale_beta * min(c.beta_numerators) * c.beta_step_codes,
+        fallback=scale_beta * min(c.beta_numerators),
     )
     _prove_widths(form, compensator)
     return form

@@ -21,7 +21,7 @@ from dzdesign.verify.host_compiler import STRICT, find_compilers
 def evaluate(form, compensator, command: int, dp_code: int) -> int:
     """Do in Python, with integers of any size, what the C is meant to do."""
     if dp_code < -compensator.reverse_codes:
-        beta = form.fallback
+        beta = form.fallback << form.step_shift
     else:
         step = 1 << form.step_shift
         node, share = divmod(max(dp_code, 0), step)

@@ -49,7 +49,7 @@ FAULTS = {
     "shift": (r"sum >> 32", "sum >> 31"),
     "table": (r"(UINT32_C\()(\d+)(\), UINT32_C)", one_more),
     "mask": (r"dp_code & 63u", "dp_code & 31u"),
-    "fallback": (r"(BETA_FALLBACK INT32_C\()(\d+)(\))", one_more),
+    "fallback": (r"(BETA_FALLBACK UINT32_C\()(\d+)(\))", one_more),
     "reverse >= becomes >": (r"dp_code >= -REVERSE_CODES", "dp_code > -REVERSE_CODES"),
     "command <= becomes <": (r"u_adc <= COMMAND_CODE_MAX", "u_adc < COMMAND_CODE_MAX"),
     "pressure <= becomes <": (r"p_a_adc <= PRESSURE_CODE_MAX", "p_a_adc < PRESSURE_CODE_MAX"),
