@@ -1,5 +1,6 @@
 """Artefact files: read, write whole or not at all, hash, check the schema."""
 
+import contextlib
 import hashlib
 import json
 import os
@@ -26,17 +27,23 @@ def read_bytes(path: Path, what: str) -> bytes:
     """Read a whole file, or say in one sentence why it can't be read."""
     try:
         return Path(path).read_bytes()
-    except FileNotFoundError as error:
-        raise InputError(f"{what} '{path}' does not exist") from error
-    except IsADirectoryError as error:
-        raise InputError(f"{what} '{path}' is a folder, expected a file") from error
+    except (FileNotFoundError, NotADirectoryError) as error:
+        raise InputError(f"{what} '{path}' does not exist; check the name and the folder") from error
     except OSError as error:
+        if os.path.isdir(path):  # Windows calls reading a folder a lack of permission
+            raise InputError(f"{what} '{path}' is a folder, expected a file") from error
         raise InputError(f"{what} '{path}' can't be read: {error.strerror}") from error
+    except ValueError as error:  # a name with a NUL, from a TOML file
+        raise InputError(f"{what} '{path}' can't be a file's name ({error})") from error
 
 
 def to_json(document: Mapping[str, Any]) -> str:
     """Return the document as JSON text; a NaN or an infinity is an error, never written."""
     return json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _no_number(word: str) -> float:
+    raise ValueError(f"{word} is not a number of JSON")
 
 
 def parse_document(content: bytes, source: str, schemas: tuple[str, ...]) -> dict[str, Any]:
@@ -45,23 +52,77 @@ def parse_document(content: bytes, source: str, schemas: tuple[str, ...]) -> dic
     Raises
     ------
     InputError
-        If it is no JSON object or has another schema.
+        If it is no JSON object in UTF-8, holds what can't be written again (NaN, half a character), or has another
+        schema.
     """
     expected = " or ".join(schemas)
     try:
-        document = json.loads(content)
+        # JSON in UTF-16, or after a byte order mark, would be read here and stumbled over later.
+        document = json.loads(content.decode("utf-8"), parse_constant=_no_number)
+        to_json(document).encode()
     except (ValueError, RecursionError) as error:
         raise InputError(f"'{source}' is not JSON ({error}); expected an artefact of schema {expected}") from error
     found = document.get("schema") if isinstance(document, dict) else None
     if found not in schemas:
-        raise InputError(f"'{source}' has the schema {found!r}, expected {expected}")
+        raise InputError(f"'{source}' has the schema {str(found)[:40]!r}, expected {expected}; give another file")
     return document
 
 
-def write_file(path: Path, content: str | bytes) -> None:
-    """Write a file whole or not at all: a temporary file beside it, then one rename."""
+def _family(schema: object) -> str:
+    """Return a schema's name without its version: ``dzdesign.valve`` of ``dzdesign.valve/1``."""
+    return str(schema).partition("/")[0]
+
+
+def check_file_may_be_written(path: Path, schema: str | None = None) -> None:
+    """Refuse to write over what is no regular file or, where the schema is given, no earlier artefact of its kind.
+
+    `identify -o *.csv` names a measurement as its output; a measurement is not to be had again.
+    """
+    path = Path(path)
+    try:
+        if path.is_dir():
+            raise InputError(f"'{path}' is a folder, expected the name of a file to write; choose another with -o")
+        if not path.exists():
+            if not path.absolute().parent.is_dir():
+                raise InputError(f"'{path}' can't be written: its folder does not exist; make it, or choose another -o")
+            return
+        if not path.is_file():
+            raise InputError(f"'{path}' is a device or a pipe, expected a file to write; choose another name with -o")
+        if schema is None or path.stat().st_size == 0:
+            return
+        document = _json_object(path)
+    except (OSError, ValueError) as error:
+        raise InputError(f"'{path}' can't be written: {_reason(error)}; choose another place with -o") from error
+    if document is None or _family(document.get("schema")) != _family(schema):
+        raise InputError(
+            f"'{path}' exists and is no {schema} of dzdesign, so it is left alone; choose another name with -o"
+        )
+
+
+def _reason(error: OSError | ValueError) -> str:
+    return getattr(error, "strerror", None) or str(error)
+
+
+def write_file(path: Path, content: str | bytes, schema: str | None = None) -> None:
+    """Write a file whole or not at all: a temporary file beside it, then one rename.
+
+    Parameters
+    ----------
+    path : Path
+        Where it goes; its folder must exist.
+    content : str or bytes
+        Text is written in UTF-8.
+    schema : str, optional
+        Of a JSON artefact: an existing file of another kind is left alone.
+
+    Raises
+    ------
+    InputError
+        If the place can't be written, or holds a file that would be lost.
+    """
     path = Path(path)
     data = content.encode() if isinstance(content, str) else content
+    check_file_may_be_written(path, schema)
     temporary = None
     try:
         with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as handle:
@@ -71,33 +132,61 @@ def write_file(path: Path, content: str | bytes) -> None:
             os.fsync(handle.fileno())
         os.chmod(temporary, 0o644)
         os.replace(temporary, path)
-    except OSError as error:
+        temporary = None
+    except (OSError, ValueError) as error:
+        raise InputError(f"'{path}' can't be written: {_reason(error)}; choose another place with -o") from error
+    finally:  # an interrupt, too, leaves no half-written file behind
         if temporary:
             Path(temporary).unlink(missing_ok=True)
-        raise InputError(f"'{path}' can't be written: {error.strerror}; choose another place with -o") from error
+
+
+def _json_object(path: Path) -> dict[str, Any] | None:
+    """Return the JSON object that a file holds, or None if it holds anything else."""
+    try:
+        document = json.loads(path.read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return None
+    return document if isinstance(document, dict) else None
 
 
 def _manifest_of(folder: Path) -> dict[str, Any] | None:
     """Return the manifest that dzdesign left in `folder`, or None."""
-    try:
-        document = json.loads((folder / MANIFEST_NAME).read_bytes())
-    except (OSError, ValueError):
-        return None
-    ours = isinstance(document, dict) and str(document.get("schema", "")).startswith("dzdesign.")
+    document = _json_object(folder / MANIFEST_NAME)
+    ours = document is not None and str(document.get("schema", "")).startswith("dzdesign.")
     return document if ours and isinstance(document.get("files"), dict) else None
 
 
-def check_folder_may_be_written(folder: Path) -> None:
-    """Refuse a folder whose contents dzdesign did not make, or in which somebody changed a generated file."""
+def check_folder_may_be_written(folder: Path, schema: str | None = None) -> None:
+    """Refuse a folder whose contents dzdesign did not make, or in which somebody changed a generated file.
+
+    Parameters
+    ----------
+    folder : Path
+        Where an output is to go.
+    schema : str, optional
+        Of the manifest to be written; a folder of another kind (the firmware, named again for its evidence) is refused.
+    """
     folder = Path(folder)
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"'{folder}' is a file, expected a folder to write into; choose another name with -o")
-    if not folder.is_dir() or not any(folder.iterdir()):
-        return
+    try:
+        ancestry = (folder, *folder.absolute().parents)
+        nearest = next((one for one in ancestry if one.exists()), folder)
+        if nearest.exists() and not nearest.is_dir():
+            raise InputError(f"'{nearest}' is a file, expected a folder to write into; choose another name with -o")
+        if folder.is_dir() and any(folder.iterdir()):
+            _check_folder_is_ours(folder, schema)
+    except (OSError, ValueError) as error:
+        raise InputError(f"the folder '{folder}' can't be written: {_reason(error)}; choose another with -o") from error
+
+
+def _check_folder_is_ours(folder: Path, schema: str | None) -> None:
     manifest = _manifest_of(folder)
     if manifest is None:
         raise InputError(
             f"'{folder}' is not empty and was not made by dzdesign, so it is left alone; choose a new folder with -o"
+        )
+    if schema is not None and _family(manifest["schema"]) != _family(schema):
+        raise InputError(
+            f"'{folder}' holds {manifest['schema']}, which {schema} would replace; choose a new folder with -o"
         )
     for name, digest in manifest["files"].items():
         path = folder / name
@@ -109,15 +198,20 @@ def check_folder_may_be_written(folder: Path) -> None:
 
 
 def _carry_over(folder: Path, staging: Path, generated: set[str]) -> None:
-    """Move what a person added to an earlier output (build products, notes) into the new one."""
+    """Copy what a person added to an earlier output (build products, notes, links) into the new one."""
     for path in sorted(folder.rglob("*")):
         name = path.relative_to(folder).as_posix()
-        if path.is_file() and name not in generated and name != MANIFEST_NAME:
-            target = staging / name
-            if target.exists():
-                raise InputError(f"'{path}' is not dzdesign's and stands where a new file goes; move it away")
-            target.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy2(path, target)
+        if name in generated or name == MANIFEST_NAME:
+            continue
+        target = staging / name
+        if path.is_dir() and not path.is_symlink():
+            if not any(path.iterdir()):  # an empty one may matter: git's refs/heads
+                target.mkdir(parents=True, exist_ok=True)
+            continue
+        if os.path.lexists(target):
+            raise InputError(f"'{path}' is not dzdesign's and stands where a new file goes; move it away")
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(path, target, follow_symlinks=False)
 
 
 def write_folder(folder: Path, files: Mapping[str, str | bytes], manifest: Mapping[str, Any]) -> None:
@@ -141,10 +235,11 @@ def write_folder(folder: Path, files: Mapping[str, str | bytes], manifest: Mappi
     contents = {name: text.encode() if isinstance(text, str) else text for name, text in files.items()}
     listing = {name: sha256_of(data) for name, data in contents.items()}
     contents[MANIFEST_NAME] = to_json({**manifest, "files": listing}).encode()
-    folder = Path(folder).absolute()
-    check_folder_may_be_written(folder)
+    folder = Path(folder)
+    check_folder_may_be_written(folder, manifest.get("schema"))
     staging = None
     try:
+        folder = Path(os.path.realpath(folder))  # a link stays, its target is replaced
         folder.parent.mkdir(parents=True, exist_ok=True)
         staging = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
         os.chmod(staging, 0o755)
@@ -155,16 +250,29 @@ def write_folder(folder: Path, files: Mapping[str, str | bytes], manifest: Mappi
         if folder.is_dir():
             old = _manifest_of(folder)
             _carry_over(folder, staging, set(old["files"]) if old else set())
-            retired = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}.old."))
-            os.replace(folder, retired / "old")
-            os.replace(staging, folder)
-            shutil.rmtree(retired)
+            _exchange(folder, staging)
         else:
             os.replace(staging, folder)
-    except OSError as error:
+    except (OSError, ValueError) as error:
         raise InputError(
-            f"the folder '{folder}' can't be written: {error.strerror}; choose another place with -o"
+            f"the folder '{folder}' can't be written: {_reason(error)}; choose another place with -o"
         ) from error
     finally:
         if staging:
             shutil.rmtree(staging, ignore_errors=True)
+
+
+def _exchange(folder: Path, staging: Path) -> None:
+    """Put `staging` in the place of `folder`; if that fails half-way the old one comes back."""
+    retired = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}.old."))
+    old = retired / "old"
+    try:
+        os.replace(folder, old)
+        os.replace(staging, folder)
+    except BaseException:
+        if old.exists() and not folder.exists():
+            os.replace(old, folder)
+        with contextlib.suppress(OSError):  # not empty if the old one could not come back: then it stays there
+            retired.rmdir()
+        raise
+    shutil.rmtree(retired, ignore_errors=True)

@@ -26,3 +26,14 @@ def nearest(name: str, known: Iterable[str]) -> str:
     """
     matches = difflib.get_close_matches(name, list(known), n=1, cutoff=0.6)
     return f" (did you mean '{matches[0]}'?)" if matches else ""
+
+
+def one_line(text: str) -> str:
+    """Return a message on one line: a file name or a cell may hold line breaks, or codes that steer a terminal.
+
+    Examples
+    --------
+    >>> one_line("ramp\\n1.csv")
+    'ramp 1.csv'
+    """
+    return "".join(character if character.isprintable() else " " for character in text)

@@ -1,9 +1,11 @@
 """Units at the border: text such as ``"1 MPa"`` or a column's unit becomes an SI number, by way of pint."""
 
+import math
+import re
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from dzdesign.core.errors import InputError
+from dzdesign.core.errors import InputError, nearest
 
 if TYPE_CHECKING:
     import pint
@@ -22,8 +24,14 @@ EXAMPLES = {
 SPELLINGS = {
     "lmin": "L/min", "l_min": "L/min", "lpm": "L/min", "l/min": "L/min", "gpm": "gallon/minute",
     "m3/s": "m**3/s", "m3s": "m**3/s", "m3/h": "m**3/hour", "cm3/s": "cm**3/s", "%": "percent",
-    "pct": "percent",
+    "pct": "percent", "kgf/cm2": "kgf/cm**2", "n/mm2": "N/mm**2",
 }  # fmt: skip
+#: Names with one-digit powers, times or per one another. A unit comes from a file, and pint computes what it reads:
+#: ``9**9**9**9`` would never end.
+FACTOR = r"[^\W\d]\w*(?:(?:\*\*|\^)-?\d)?"
+UNIT = re.compile(rf"{FACTOR}(?:\s*[*/·\s]\s*{FACTOR})*")
+LONGEST_UNIT = 40
+NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", re.ASCII)
 
 
 @lru_cache(maxsize=1)
@@ -55,11 +63,17 @@ def si_factor(unit: str, quantity: str) -> float:
     """
     spelled = SPELLINGS.get(unit.strip().lower(), unit.strip())
     try:
+        if len(spelled) > LONGEST_UNIT or not UNIT.fullmatch(spelled):
+            raise ValueError(f"{spelled!r} is not a product of units")
         # A unit scales from zero: gauge offsets (degC, dBm) have no place in these quantities.
         factor = _registry().Quantity(1.0, spelled).to(SI_UNIT[quantity]).magnitude
     except Exception as error:  # pint and its tokenizer raise many kinds; all mean "not this unit"
+        known = EXAMPLES[quantity].split(", ")
+        by_lower_case = {name.lower(): name for name in known}  # BAR, Mpa: the commonest slip
+        hint = f" (did you mean '{by_lower_case[spelled.lower()]}'?)" if spelled.lower() in by_lower_case else ""
         raise InputError(
-            f"'{unit}' is not a unit of {quantity} that dzdesign knows (expected for example {EXAMPLES[quantity]})"
+            f"'{unit[:LONGEST_UNIT]}' is not a unit of {quantity} that dzdesign knows{hint or nearest(unit, known)}; "
+            f"expected for example {EXAMPLES[quantity]}"
         ) from error
     return float(factor)
 
@@ -86,18 +100,18 @@ def parse_quantity(text: str, quantity: str, option: str) -> float:
     >>> parse_quantity("1 MPa", "pressure", "--dp0")
     1000000.0
     """
+    example = EXAMPLES[quantity].split(",")[0]
     words = text.strip().replace(",", ".")
-    cut = len(words)
-    while cut and not (words[cut - 1].isdigit() or words[cut - 1] == "."):
-        cut -= 1
-    unit = words[cut:].strip()
-    try:
-        value = float(words[:cut])
-    except ValueError as error:
-        raise InputError(
-            f"{option} is '{text}', expected a number and a unit such as '1 {EXAMPLES[quantity].split(',')[0]}'"
-        ) from error
+    number = NUMBER.match(words)
+    unit = words[number.end() :].strip() if number else ""
+    if number is None or unit[:1] == ".":
+        raise InputError(f"{option} is '{text}', expected a number and a unit such as '1 {example}'")
     if not unit:
-        example = f"{text} {EXAMPLES[quantity].split(',')[0]}"
-        raise InputError(f"{option} is '{text}' without a unit; write for example '{example}'")
-    return value * si_factor(unit, quantity)
+        raise InputError(f"{option} is '{text}' without a unit; write for example '{text} {example}'")
+    try:
+        value = float(number.group()) * si_factor(unit, quantity)
+    except InputError as error:
+        raise InputError(f"{option} is '{text}': {error}") from error
+    if not math.isfinite(value):
+        raise InputError(f"{option} is '{text}', more than a number can hold; expected for example '1 {example}'")
+    return value

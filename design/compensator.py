@@ -3,14 +3,49 @@
 import json
 from dataclasses import dataclass
 from fractions import Fraction
+from types import NoneType
 from typing import Any
 
 from dzdesign.core.artefacts import TOOL, parse_document, to_json
 from dzdesign.core.errors import InputError
+from dzdesign.core.shape import Exactly, Number, check_shape
 from dzdesign.derivation.law import law
 from dzdesign.design.signals import Signals
+from dzdesign.identify.model import valve_from_document
 
 SCHEMA = "dzdesign.compensator/1"
+REMEDY = "make it again with `dzdesign design`"
+#: What compensator.json must hold; a rational is a pair of integers that a double can still approximate.
+CODE = Number(1, 65535, whole=True)
+RATIONAL = Exactly(2, Number(-(10**60), 10**60, whole=True))
+SHAPE = {
+    "made_from": [{"source": str, "sha256": str}],
+    "law": str,
+    "u_max_V": RATIONAL,
+    "signals": {
+        "command_code_max": CODE,
+        "pressure_code_max": CODE,
+        "pressure_span_MPa": RATIONAL,
+        "compare_max": CODE,
+    },
+    "k_x_max_over_u_max": RATIONAL,
+    "u_min0_over_u_max": RATIONAL,
+    "beta": {
+        "denominator": Number(1, 2**30, whole=True),
+        "step_codes": CODE,
+        "numerators": [Number(1, 2**31, whole=True)],
+    },
+    "reverse_codes": Number(0, 65535, whole=True),
+    "certificate": {
+        "confidence": Number(0.5, 1),
+        "guard": str,
+        "level_L_min": Number(0, 1e6),
+        "dp_MPa": (Exactly(2, RATIONAL), NoneType),
+        "smallest_margin_V": (RATIONAL, NoneType),
+    },
+    "costs": [str],
+    "valve": dict,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,7 +128,9 @@ class Compensator:
             raise InputError("every beta must lie between 0 and 2, exclusive")
         if not 0 < self.u_min0_over_u_max < 1:
             raise InputError(f"u_min0 is {float(self.u_min0_over_u_max):.3f} of u_max, expected between 0 and 1")
-        if self.k_x_max_over_u_max <= 0:
+        if not 0 < self.u_max_V <= 10**4:
+            raise InputError(f"u_max is {float(self.u_max_V):g} V, expected a positive command")
+        if not 0 < self.k_x_max_over_u_max <= 10**3:
             raise InputError("k x_max/u_max must be positive")
 
     @property
@@ -163,10 +200,10 @@ def _pair(value: Fraction) -> list[int]:
     return [value.numerator, value.denominator]
 
 
-def _fraction(pair: Any) -> Fraction:
+def _fraction(pair: list[int], name: str) -> Fraction:
     numerator, denominator = pair
-    if not (type(numerator) is int and type(denominator) is int and denominator > 0):
-        raise TypeError(f"{pair} is not a rational number")
+    if denominator <= 0:
+        raise InputError(f"'{name}' is {pair}, expected a positive denominator")
     return Fraction(numerator, denominator)
 
 
@@ -179,6 +216,13 @@ def compensator_from_document(content: bytes, source: str) -> Compensator:
         If the document is not a compensator of this schema.
     """
     document = parse_document(content, source, (SCHEMA,))
+    check_shape(document, SHAPE, source, REMEDY)
+    if not document["made_from"]:
+        raise InputError(f"'{source}': 'made_from' is empty, expected the valve's hash; {REMEDY}")
+    ends_known, margin_known = (document["certificate"][key] is not None for key in ("dp_MPa", "smallest_margin_V"))
+    if ends_known != margin_known:
+        raise InputError(f"'{source}': 'certificate' has one of dp_MPa and smallest_margin_V, expected both; {REMEDY}")
+    valve_from_document(to_json(document["valve"]).encode(), f"{source}: valve")
     try:
         signals, beta, certificate = document["signals"], document["beta"], document["certificate"]
         ends = certificate["dp_MPa"]
@@ -187,12 +231,12 @@ def compensator_from_document(content: bytes, source: str) -> Compensator:
             signals=Signals(
                 command_code_max=signals["command_code_max"],
                 pressure_code_max=signals["pressure_code_max"],
-                pressure_span_MPa=_fraction(signals["pressure_span_MPa"]),
+                pressure_span_MPa=_fraction(signals["pressure_span_MPa"], "signals.pressure_span_MPa"),
                 compare_max=signals["compare_max"],
             ),
-            u_max_V=_fraction(document["u_max_V"]),
-            k_x_max_over_u_max=_fraction(document["k_x_max_over_u_max"]),
-            u_min0_over_u_max=_fraction(document["u_min0_over_u_max"]),
+            u_max_V=_fraction(document["u_max_V"], "u_max_V"),
+            k_x_max_over_u_max=_fraction(document["k_x_max_over_u_max"], "k_x_max_over_u_max"),
+            u_min0_over_u_max=_fraction(document["u_min0_over_u_max"], "u_min0_over_u_max"),
             beta_numerators=tuple(beta["numerators"]),
             beta_denominator=beta["denominator"],
             beta_step_codes=beta["step_codes"],
@@ -201,16 +245,14 @@ def compensator_from_document(content: bytes, source: str) -> Compensator:
                 confidence=certificate["confidence"],
                 guard=certificate["guard"],
                 level_L_min=certificate["level_L_min"],
-                dp_MPa=(_fraction(ends[0]), _fraction(ends[1])) if ends else None,
-                smallest_margin_V=_fraction(certificate["smallest_margin_V"]) if ends else None,
+                dp_MPa=tuple(_fraction(end, "certificate.dp_MPa") for end in ends) if ends else None,
+                smallest_margin_V=_fraction(certificate["smallest_margin_V"], "certificate.smallest_margin_V")
+                if ends
+                else None,
             ),
             costs=tuple(document["costs"]),
             valve_document=to_json(document["valve"]),
             valve_sha256=document["made_from"][0]["sha256"],
         )
-    except KeyError as error:
-        raise InputError(f"'{source}' lacks the key {error}; make it again with `dzdesign design`") from error
-    except (TypeError, ValueError, IndexError, ZeroDivisionError) as error:
-        raise InputError(
-            f"'{source}' is not shaped like a compensator ({error}); make it again with `dzdesign design`"
-        ) from error
+    except InputError as error:
+        raise InputError(f"'{source}': {error}; {REMEDY}") from error

@@ -6,11 +6,13 @@ inside the command that needs it (`dzdesign.commands`), so that `--help` costs n
 
 import argparse
 import os
+import re
 import sys
 from importlib import import_module
+from typing import NoReturn
 
 from dzdesign import __version__
-from dzdesign.core.errors import DzdesignError, RequirementError
+from dzdesign.core.errors import DzdesignError, InputError, RequirementError, nearest, one_line
 
 DOES_NOT_HOLD, BAD_INPUT, INTERRUPTED = 1, 2, 130
 
@@ -103,9 +105,22 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
 }
 
 
+class _Parser(argparse.ArgumentParser):
+    """A parser whose errors are one line, as every other error, and name the nearest word that is known."""
+
+    #: Commands and options that a mistyped word is compared with.
+    known: tuple[str, ...] = ()
+
+    def error(self, message: str) -> NoReturn:
+        """Raise instead of printing the usage."""
+        wrong = re.search(r"unrecognized arguments: ([^\s=]+)|invalid choice: '([^']*)'", message)
+        hint = nearest(wrong[1] or wrong[2], self.known) if wrong else ""
+        raise InputError(f"{message}{hint}; see `{self.prog} --help`")
+
+
 def build_parser() -> tuple[argparse.ArgumentParser, dict[str, argparse.ArgumentParser]]:
     """Return the parser and those of its commands."""
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="dzdesign",
         description="Dead-zone compensators for proportional valves without a spool sensor: "
         "from ramp tests to checked C.",
@@ -122,6 +137,10 @@ def build_parser() -> tuple[argparse.ArgumentParser, dict[str, argparse.Argument
         command.add_argument("--json", action="store_true", help="print the result as JSON")
         command.set_defaults(run=run)
         commands[name] = command
+    parser.known = (
+        *COMMANDS,
+        *sorted({word for command in commands.values() for word in command._option_string_actions}),
+    )
     return parser, commands
 
 
@@ -131,19 +150,24 @@ def parse(argv: list[str]) -> argparse.Namespace:
     Raises
     ------
     InputError
-        If the file can't be read or names no option.
+        If the command line is wrong, or the file can't be read or names no option.
     """
     parser, commands = build_parser()
     args = parser.parse_args(argv)
-    if args.config:
-        from dzdesign.config import options_from_file
+    if not args.config:
+        return args
+    from dzdesign.config import options_from_file
 
-        names = {action.dest for command in commands.values() for action in command._actions}
-        command = commands[args.command]
-        mine = {action.dest for action in command._actions}
-        values = options_from_file(args.config, names - {"help", "config", "json", "ramps"})
-        command.set_defaults(**{key: value for key, value in values.items() if key in mine})
-        args = parser.parse_args(argv)
+    every = [action for command in commands.values() for action in command._actions if action.option_strings]
+    repeatable = {action.dest for action in every if isinstance(action, argparse._AppendAction)}
+    known = {action.dest for action in every} - {"help", "config", "json"}
+    command = commands[args.command]
+    mine = {action.dest for action in command._actions}
+    values = options_from_file(args.config, known, repeatable)
+    command.set_defaults(**{key: value for key, value in values.items() if key in mine - repeatable})
+    given, args = args, parser.parse_args(argv)
+    for key in mine & repeatable & values.keys():  # argparse would add to a default instead of standing in for it
+        setattr(args, key, getattr(given, key) or values[key])
     return args
 
 
@@ -157,10 +181,10 @@ def main(argv: list[str] | None = None) -> int:
         module, function = args.run.split(":")
         return getattr(import_module(module), function)(args)
     except RequirementError as error:
-        print(f"dzdesign: does not hold: {error}", file=sys.stderr)
+        print(f"dzdesign: does not hold: {one_line(str(error))}", file=sys.stderr)
         return DOES_NOT_HOLD
     except DzdesignError as error:
-        print(f"dzdesign: {error}", file=sys.stderr)
+        print(f"dzdesign: {one_line(str(error))}", file=sys.stderr)
         return BAD_INPUT
     except KeyboardInterrupt:
         print("dzdesign: interrupted; nothing half-written was left", file=sys.stderr)

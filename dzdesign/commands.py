@@ -2,11 +2,14 @@
 
 import argparse
 import glob
+import os
+import re
 import sys
 from pathlib import Path
 
 from dzdesign.core.artefacts import (
     TOOL,
+    check_file_may_be_written,
     check_folder_may_be_written,
     parse_document,
     read_bytes,
@@ -27,23 +30,31 @@ def expand(patterns: list[str]) -> list[Path]:
     """Return the files that the patterns name; cmd.exe leaves ``*.csv`` to the program."""
     paths = []
     for pattern in patterns:
-        matches = sorted(glob.glob(pattern)) if glob.has_magic(pattern) and not Path(pattern).exists() else [pattern]
+        matches = sorted(glob.glob(pattern)) if glob.has_magic(pattern) and not os.path.exists(pattern) else [pattern]
         if not matches:
-            raise InputError(f"no file matches '{pattern}'")
+            raise InputError(f"no file matches '{pattern}'; check the name and the folder")
         paths += [Path(match) for match in matches]
     return paths
 
 
-def _number(text: str, option: str) -> float:
+def _number(text: str, option: str, example: str) -> float:
     try:
         return float(text)
     except ValueError as error:
-        raise InputError(f"{option} is '{text}', expected a number") from error
+        raise InputError(f"{option} is '{text}', expected a number such as {example}") from error
 
 
 def _window(text: str) -> tuple[float, float]:
-    low, _, high = text.replace("%", "").partition("-")
-    return _number(low, "--knee-window") / 100, _number(high, "--knee-window") / 100
+    ends = re.fullmatch(r"\s*(\d+\.?\d*)\s*%?\s*-\s*(\d+\.?\d*)\s*%?\s*", text, re.ASCII)
+    if ends is None:
+        raise InputError(f"--knee-window is '{text}', expected two per cents of the largest flow such as '12-50'")
+    return float(ends[1]) / 100, float(ends[2]) / 100
+
+
+def _seed(text: str) -> int:
+    if not re.fullmatch(r"\d{1,18}", text, re.ASCII):
+        raise InputError(f"--seed is '{text}', expected a whole number of zero or more, such as 1")
+    return int(text)
 
 
 def _optional(text: str | None, quantity: str, option: str) -> float | None:
@@ -53,6 +64,7 @@ def _optional(text: str | None, quantity: str, option: str) -> float | None:
 def run_identify(args: argparse.Namespace) -> int:
     """Identify a valve from ramp tests."""
     from dzdesign.identify.identification import IdentifyOptions, identify
+    from dzdesign.identify.model import SCHEMA
     from dzdesign.identify.ramp_files import read_ramp_file
     from dzdesign.tables import print_valve
 
@@ -64,14 +76,15 @@ def run_identify(args: argparse.Namespace) -> int:
         meter_lag=parse_quantity(args.meter_lag, "time", "--meter-lag"),
         meter_zero=parse_quantity(args.meter_zero, "flow", "--meter-zero"),
         x_max=_optional(args.x_max, "length", "--x-max"),
-        confidence=_number(args.confidence, "--confidence"),
+        confidence=_number(args.confidence, "--confidence", "0.99"),
         knee_window=_window(args.knee_window),
     )
+    check_file_may_be_written(Path(args.output), SCHEMA)
     tests = [read_ramp_file(path, u_max) for path in expand(args.ramps)]
     say(f"fitting {len(tests)} ramp test{'s' if len(tests) > 1 else ''}")
     valve = identify(tests, options)
     document = valve.to_document()
-    write_file(Path(args.output), to_json(document))
+    write_file(Path(args.output), to_json(document), SCHEMA)
     if args.json:
         print(to_json(document), end="")
     else:
@@ -94,12 +107,14 @@ def _design(valve_path: Path, content: bytes, args: argparse.Namespace) -> "Comp
 
 def run_design(args: argparse.Namespace) -> int:
     """Design the compensator of a valve."""
+    from dzdesign.design.compensator import SCHEMA
     from dzdesign.tables import print_compensator
 
     path = Path(args.valve)
+    check_file_may_be_written(Path(args.output), SCHEMA)
     compensator = _design(path, read_bytes(path, "valve file"), args)
     document = compensator.to_document()
-    write_file(Path(args.output), to_json(document))
+    write_file(Path(args.output), to_json(document), SCHEMA)
     if args.json:
         print(to_json(document), end="")
     else:
@@ -110,14 +125,14 @@ def run_design(args: argparse.Namespace) -> int:
 
 def run_codegen(args: argparse.Namespace) -> int:
     """Generate the firmware of a compensator."""
-    from dzdesign.codegen.project import generate, target_named
+    from dzdesign.codegen.project import SCHEMA, generate, target_named
     from dzdesign.design.compensator import SCHEMA as COMPENSATOR_SCHEMA
     from dzdesign.design.compensator import compensator_from_document
     from dzdesign.identify.model import SCHEMA as VALVE_SCHEMA
     from dzdesign.tables import print_firmware
 
     target_named(args.target)
-    check_folder_may_be_written(Path(args.output))
+    check_folder_may_be_written(Path(args.output), SCHEMA)
     path = Path(args.source)
     content = read_bytes(path, "compensator file")
     document = parse_document(content, str(path), (COMPENSATOR_SCHEMA, VALVE_SCHEMA))
@@ -140,7 +155,7 @@ def run_verify(args: argparse.Namespace) -> int:
     from dzdesign.verify.verification import SCHEMA, evidence_files, verify
 
     output = Path(args.output)
-    check_folder_may_be_written(output)
+    check_folder_may_be_written(output, SCHEMA)
     plant = read_plant(Path(args.plant)) if args.plant else None
     source = Path(args.plant).name if args.plant else ""
     verification = verify(Path(args.firmware), plant, source, say=say)
@@ -162,12 +177,12 @@ def run_simulate(args: argparse.Namespace) -> int:
     plant = read_plant(Path(args.plant)) if args.plant else Plant()
     texts = args.dp or ["0.5 MPa", "1 MPa", "2 MPa", "3 MPa", "4 MPa", "5 MPa"]
     pressures = [parse_quantity(text, "pressure", "--dp") / 1e6 for text in texts]
+    if len({f"{dp_MPa:g}" for dp_MPa in pressures}) < len(pressures):  # one file each, named by it
+        raise InputError(f"--dp repeats a pressure drop ({', '.join(texts)}); give each of them once")
     ramp_s = parse_quantity(args.ramp_time, "time", "--ramp-time")
-    seed = _number(args.seed, "--seed")
-    if seed != int(seed) or seed < 0:
-        raise InputError(f"--seed is '{args.seed}', expected a whole number of zero or more")
+    bench = Bench(seed=_seed(args.seed))
     check_folder_may_be_written(Path(args.output))
-    files, manifest = simulated_files(plant, pressures, ramp_s, Bench(seed=int(seed)), say=say)
+    files, manifest = simulated_files(plant, pressures, ramp_s, bench, say=say)
     write_folder(Path(args.output), files, manifest)
     print(to_json(manifest) if args.json else f"Written: {len(files)} simulated ramp tests in {args.output}")
     return 0
@@ -178,6 +193,8 @@ def run_derive(args: argparse.Namespace) -> int:
     from dzdesign.derivation.equations import verify_equations
     from dzdesign.derivation.report import render
 
+    if args.output:
+        check_file_may_be_written(Path(args.output))
     verdicts = verify_equations()
     text = render(verdicts, "json" if args.json else args.format)
     if args.output:

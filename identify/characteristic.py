@@ -142,6 +142,17 @@ def _colour(residual: np.ndarray, sigma: float) -> float:
     return max(1.0, spread / sigma**2)
 
 
+def _refuse_no_line(u: np.ndarray, window: tuple[float, float], floor: float, source: str) -> None:
+    """Refuse samples that hold no straight line: too few above the meter's floor, or all at one command."""
+    levels = np.unique(u).size
+    if u.size < 5 or levels < 2:
+        raise InputError(
+            f"'{source}': {u.size} samples at {levels} levels of the command lie between {window[0]:.0%} and "
+            f"{window[1]:.0%} of the largest flow and above half the meter's floor of {floor * 6e4:.3g} L/min, "
+            "expected at least 5 at 2 levels; record a slower ramp or more levels, or correct --meter-floor"
+        )
+
+
 def describe_branch(
     branch: Branch,
     y: np.ndarray,
@@ -184,6 +195,7 @@ def describe_branch(
         )
     u_in, y_in, q_in = branch.u[inside], y[inside], branch.q[inside]
     censored = q_in < 0.5 * floor
+    _refuse_no_line(u_in[~censored], window, floor, source)
     slope, knee = _line(u_in[~censored], y_in[~censored])
     for _ in range(3):
         residual = y_in - slope * (u_in - knee)
@@ -191,6 +203,7 @@ def describe_branch(
         # A zero reading is a censored sample only where flow below the floor is credible.
         credible = slope * (u_in - knee) < floor + GATE * sigma
         kept = np.where(censored, credible, np.abs(residual) < GATE * sigma)
+        _refuse_no_line(u_in[kept & ~censored], window, floor, source)
         slope, knee = _line(u_in[kept & ~censored], y_in[kept & ~censored])
     seen = kept & ~censored
     residual = y_in[seen] - slope * (u_in[seen] - knee)

@@ -19,6 +19,8 @@ MPA = 1e6
 L_MIN = 1e-3 / 60
 #: Two tests whose pressure drops differ by less than this share are the same test twice.
 SAME_PRESSURE = 0.02
+#: Pressure drops beyond these, Pa, are a wrong unit.
+SMALLEST_DP, LARGEST_DP = 1e3, 200 * MPA
 #: dP0 names the tested pressure drop within this share of it.
 REFERENCE_TOLERANCE = 0.1
 #: dP0 of the paper, taken where the user names none: the test nearest to it.
@@ -187,6 +189,11 @@ def _describe(
         # Nominal is the pressure drop at (almost) no flow, which the supply's droop has not touched.
         shut = test.dp[(test.u >= 0) & (test.u <= 0.05 * options.u_max)]
         dp = float(np.median(shut if shut.size >= 5 else test.dp))
+        if 0 < dp < SMALLEST_DP or dp > LARGEST_DP:
+            raise InputError(
+                f"'{test.source}': the pressure drop is {dp / MPA:.3g} MPa, expected {SMALLEST_DP / MPA:g} to "
+                f"{LARGEST_DP / MPA:g} MPa; correct the unit in the header (mPa is a thousandth of a pascal)"
+            )
         if dp <= 0:
             raise InputError(
                 f"'{test.source}': the pressure drop is {dp / MPA:.3f} MPa, expected a positive one; "

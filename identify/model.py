@@ -1,13 +1,49 @@
 """`ValveModel`: what identification found, as the artefact valve.json (schema dzdesign.valve/1)."""
 
 from dataclasses import asdict, dataclass, fields
+from types import NoneType
 from typing import Any
 
 from dzdesign.core.artefacts import TOOL, parse_document
 from dzdesign.core.errors import InputError
+from dzdesign.core.shape import Exactly, Number, check_shape
 
 SCHEMA = "dzdesign.valve/1"
 TRENDS = ("decreasing", "flat", "increasing")
+REMEDY = "make it again with `dzdesign identify`"
+#: What valve.json must hold; the ends are far beyond any valve, and keep the exact arithmetic from overflowing.
+VOLTAGE, PRESSURE, FLOW = Number(-1e4, 1e4), Number(1e-6, 1e3), Number(0, 1e6)
+TEST_SHAPE = {
+    "source": str,
+    "dp_MPa": (PRESSURE, NoneType),
+    **dict.fromkeys(
+        ("u_knee_rising_V", "u_knee_falling_V", "u_onset_rising_V", "u_onset_falling_V"), (VOLTAGE, NoneType)
+    ),
+    **dict.fromkeys(("u_knee_se_V", "u_guard_V", "u_guard_lower_V"), VOLTAGE),
+    **dict.fromkeys(("slope_L_min_V", "q_max_L_min", "noise_L_min", "noise_colour"), FLOW),
+    "saturates": bool,
+    "outliers": Number(0, 1e12, whole=True),
+}
+SIDE_SHAPE = {
+    "tests": [TEST_SHAPE],
+    "reference": {"dp_MPa": (PRESSURE, NoneType), "u_min_V": VOLTAGE},
+    "k_x_max_over_u_max": Number(1e-3, 1e3),
+    "k_V_mm": (float, NoneType),
+    "trend": (str, NoneType),
+    "trend_change_V": (VOLTAGE, NoneType),
+    "trend_change_se_V": (VOLTAGE, NoneType),
+    "beta": {"dp_MPa": [PRESSURE], "beta": [Number(0, 2)]},
+    "certificate": {"confidence": Number(0.5, 1), "guard": str, "level_L_min": FLOW, "steps_V": [VOLTAGE]},
+    "active_constraints": [str],
+}
+SHAPE = {
+    "made_from": [{"source": str, "sha256": str}],
+    "u_max_V": Number(1e-3, 1e4),
+    "meter": {"floor_L_min": FLOW, "lag_s": Number(0, 1e6), "zero_L_min": FLOW},
+    "knee_window": Exactly(2, Number(0, 1)),
+    "sides": {"positive": SIDE_SHAPE},
+    "warnings": [{"code": str, "text": str, "source": (str, NoneType)}],
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,6 +131,16 @@ class SideModel:
             right <= left for left, right in zip(self.beta_dp_MPa, self.beta_dp_MPa[1:], strict=False)
         ):
             raise InputError("the nodes of beta must be as many as their pressure drops, which must rise")
+        if not self.tests or (self.beta_dp_MPa and len(self.tests) != len(self.beta_dp_MPa)):
+            raise InputError(
+                f"{len(self.tests)} tests stand beside {len(self.beta_dp_MPa)} nodes of beta, expected one each"
+            )
+        if len(self.certified_steps_V) != len(self.tests) - 1:
+            raise InputError(f"{len(self.certified_steps_V)} steps bound {len(self.tests)} tests, expected one fewer")
+        if self.beta_dp_MPa and (self.reference_dp_MPa is None or any(test.dp_MPa is None for test in self.tests)):
+            raise InputError("a pressure drop is missing beside the nodes of beta; expected one per test and dP0")
+        if any(test.u_knee_rising_V is None and test.u_knee_falling_V is None for test in self.tests):
+            raise InputError("a test has no knee, neither rising nor falling; expected at least one")
         if not self.u_min0_V > 0:
             raise InputError(f"u_min0 is {self.u_min0_V} V, expected a positive threshold")
 
@@ -200,6 +246,7 @@ def valve_from_document(content: bytes, source: str) -> ValveModel:
         If the document is not a valve of this schema.
     """
     document = parse_document(content, source, (SCHEMA,))
+    check_shape(document, SHAPE, source, REMEDY)
     try:
         side = document["sides"]["positive"]
         known = {field.name for field in fields(TestResult)}
@@ -228,12 +275,10 @@ def valve_from_document(content: bytes, source: str) -> ValveModel:
             meter_zero_L_min=document["meter"]["zero_L_min"],
             knee_window=tuple(document["knee_window"]),
             positive=positive,
-            warnings=tuple(Warning_(**warning) for warning in document["warnings"]),
+            warnings=tuple(
+                Warning_(**{key: item[key] for key in ("code", "text", "source")}) for item in document["warnings"]
+            ),
             made_from=tuple((item["source"], item["sha256"]) for item in document["made_from"]),
         )
-    except KeyError as error:
-        raise InputError(f"'{source}' lacks the key {error}; make it again with `dzdesign identify`") from error
-    except (TypeError, IndexError) as error:
-        raise InputError(
-            f"'{source}' is not shaped like a valve ({error}); make it again with `dzdesign identify`"
-        ) from error
+    except InputError as error:
+        raise InputError(f"'{source}': {error}; {REMEDY}") from error

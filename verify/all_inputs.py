@@ -89,12 +89,16 @@ class CompiledCore:
     """
 
     def __init__(self, folder: Path, pressure_max: int) -> None:
-        core = {name: (folder / "core" / name).read_text(encoding="utf-8") for name in ("dz_comp.c", "dz_comp.h")}
+        # Whatever was edited in is compiled as it stands: a comment in another encoding is no reason to stop.
+        core = {
+            name: (folder / "core" / name).read_text(encoding="utf-8", errors="surrogateescape")
+            for name in ("dz_comp.c", "dz_comp.h")
+        }
         driver = files("dzdesign.verify").joinpath("fill_inputs.c").read_text(encoding="utf-8")
         self._library = load_library({**core, "fill_inputs.c": driver}, "the core dz_comp.c")
         self._library.dz_count_odd_pairs.restype = ctypes.c_int64
         self.pressure_max = pressure_max
-        self.sha256 = sha256_of("".join(core.values()).encode())
+        self.sha256 = sha256_of("".join(core.values()).encode(errors="surrogateescape"))
 
     def row(self, command: int, *, high: bool) -> np.ndarray:
         """Return the compare values at one command for all differences of pressure codes, lowest first."""

@@ -84,14 +84,21 @@ def load_library(sources: Mapping[str, str], what: str) -> ctypes.CDLL:
     ctypes.CDLL
     """
     compiler = host_compiler()
-    key = sha256_of("\0".join([compiler, *(f"{name}\0{text}" for name, text in sorted(sources.items()))]).encode())
+    key = sha256_of(
+        "\0".join([compiler, *(f"{name}\0{text}" for name, text in sorted(sources.items()))]).encode(
+            errors="surrogateescape"
+        )
+    )
     folder = Path(_build_folder().name) / key[:32]
     library = folder / f"{key[:32]}{'.dll' if sys.platform == 'win32' else '.so'}"
     if not library.exists():
         folder.mkdir(exist_ok=True)
         for name, text in sources.items():
-            (folder / name).write_text(text, encoding="utf-8")
+            (folder / name).write_text(text, encoding="utf-8", errors="surrogateescape")
         units = [str(folder / name) for name in sources if name.endswith(".c")]
         position = [] if sys.platform == "win32" else ["-fPIC"]
         _run([compiler, "-std=c99", "-O2", *position, "-shared", *units, "-o", str(library), "-lm"], what)
-    return ctypes.CDLL(str(library))
+    try:
+        return ctypes.CDLL(str(library))
+    except OSError as error:
+        raise RequirementError(f"{what} does not link: {str(error).rpartition(': ')[2]}") from error

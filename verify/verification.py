@@ -1,6 +1,7 @@
 """`verify`: a firmware folder in, evidence out: strict compilation, every input, closed loop."""
 
 import io
+import json
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
@@ -9,6 +10,8 @@ from typing import Any
 
 from dzdesign.core.artefacts import MANIFEST_NAME, TOOL, parse_document, read_bytes, sha256_of, to_json
 from dzdesign.core.errors import RequirementError
+from dzdesign.core.shape import check_shape
+from dzdesign.design.compensator import compensator_from_document
 from dzdesign.identify.model import valve_from_document
 from dzdesign.verify.all_inputs import InputCheck, check_all_inputs
 from dzdesign.verify.closed_loop import ClosedLoop, LoopComparison, RampSequence, compare_at_pressure
@@ -94,22 +97,25 @@ def verify(
     folder = Path(folder)
     manifest_bytes = read_bytes(folder / MANIFEST_NAME, "firmware manifest")
     manifest = parse_document(manifest_bytes, str(folder / MANIFEST_NAME), (FIRMWARE_SCHEMA,))
-    document = parse_document(
-        read_bytes(folder / "compensator.json", "compensator"),
-        str(folder / "compensator.json"),
-        ("dzdesign.compensator/1",),
-    )
+    check_shape(manifest, {"files": dict}, str(folder / MANIFEST_NAME), "make it again with `dzdesign codegen`")
+    content = read_bytes(folder / "compensator.json", "compensator")
+    compensator_from_document(content, str(folder / "compensator.json"))  # every key that is read below
+    document = json.loads(content)
     host_compiler()
     say("compiling the core with every warning an error")
     checks = [_files_unchanged(folder, manifest), _compiles_strictly(folder)]
     inputs, loops = None, ()
     if checks[1].holds:
         say("comparing every input with the exact law")
-        inputs = check_all_inputs(folder)
+        try:
+            inputs = check_all_inputs(folder)
+        except RequirementError as error:
+            checks.append(Check(name="equals the exactly rounded law", holds=False, text=str(error)))
+    if inputs:
         checks += _input_checks(inputs)
         say("running the closed loop")
         loops = _run_loops(folder, document, plant, sequence or RampSequence())
-        checks.append(_no_flow_at_zero(loops))
+        checks += [_plant_opens(loops), _no_flow_at_zero(loops)]
     source = plant_source or "made from the identified thresholds"
     return Verification(
         checks=tuple(checks),
@@ -214,6 +220,17 @@ def _run_loops(
             lambda item: compare_at_pressure(item[1], item[0], side.reference_dp_MPa, sequence), loops.items()
         )
         return tuple(runs)
+
+
+def _plant_opens(loops: tuple[LoopComparison, ...]) -> Check:
+    """Tell whether flow passes at full command: of a plant that stays shut, or whose motion is not finite, the other
+    figures of the closed loop say nothing."""
+    least = min(loops, key=lambda loop: loop.result.q_max_L_min).result
+    return Check(
+        name="the plant of the closed loop opens",
+        holds=least.q_max_L_min > NO_FLOW_L_MIN,
+        text=f"{least.q_max_L_min:.4g} L/min at full command and {least.dp_MPa:.2f} MPa, where it is least",
+    )
 
 
 def _no_flow_at_zero(loops: tuple[LoopComparison, ...]) -> Check:
