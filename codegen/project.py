@@ -102,6 +102,7 @@ def core_context(compensator: Compensator, form: IntegerForm) -> dict[str, str |
     )
     zero_command = [compensator.compare(0, node * compensator.beta_step_codes) for node in range(len(form.table) - 1)]
     return {
+        "certificate_text": certificate_text(compensator),
         "zero_command_low": str(min(zero_command)),
         "zero_command_high": str(max(zero_command)),
         "law_text": str(chosen.output).replace("**", "^"),
@@ -140,6 +141,16 @@ def core_context(compensator: Compensator, form: IntegerForm) -> dict[str, str |
         "reciprocal_shift": str(form.reciprocal_shift),
         "largest": str(largest),
     }
+
+
+def certificate_text(compensator: Compensator) -> str:
+    """Say in one comment line what the offset is certified for."""
+    certificate = compensator.certificate
+    low, high = (float(end) for end in certificate.dp_MPa)
+    return (
+        f"Certified for {low:.2f} to {high:.2f} MPa: below the {certificate.confidence:.0%} bound of the "
+        f"{certificate.guard} threshold; flow below {certificate.level_L_min:.2f} L/min counts as none."
+    )
 
 
 def _rational(value: Fraction) -> str:

@@ -86,7 +86,7 @@ class Compensator:
     u_max_V : Fraction
         Full command.
     k_x_max_over_u_max, u_min0_over_u_max : Fraction
-        Coefficients, integers over a power of two.
+        Coefficients, integers over a power of two; k x_max counts from the law's offset u_min0 on, not from the knee.
     beta_numerators : tuple of int
         Nodes of beta, over `beta_denominator`, at pressure codes 0, step, 2 step, ...; straight between them.
     beta_denominator, beta_step_codes : int

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 from dzdesign.core.artefacts import sha256_of, to_json
-from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.errors import InputError, RequirementError, nearest
 from dzdesign.derivation.law import law
 from dzdesign.design.beta_table import (
     DENOMINATOR,
@@ -19,6 +19,7 @@ from dzdesign.identify.model import SideModel, ValveModel, valve_from_document
 
 #: k x_max/u_max and u_min0/u_max are integers over this: finer than half a PWM count of 60 000.
 COEFFICIENT_DENOMINATOR = 1 << 16
+GUARDS = ("closing", "opening")
 #: Share of the sensor's span by which the difference may read negative before it counts as a failed sensor.
 REVERSE_SHARE = Fraction(1, 100)
 
@@ -33,10 +34,20 @@ class DesignOptions:
         ``paper`` (Eq. 18) or ``target`` (meets Eq. 16).
     signals : Signals
         Scalings of the converter and the PWM.
+    guard : {"closing", "opening"}
+        The threshold that the certificate must protect. Zero command comes after closing, so a valve of which no
+        falling branch was recorded is refused unless "opening" is asked for.
     """
 
     law_name: str = "paper"
     signals: Signals = field(default_factory=Signals)
+    guard: str = "closing"
+
+    def __post_init__(self) -> None:
+        if self.guard not in GUARDS:
+            raise InputError(
+                f"the guard is '{self.guard}'{nearest(self.guard, GUARDS)}, expected {' or '.join(GUARDS)}"
+            )
 
 
 def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes: bytes | None = None) -> Compensator:
@@ -69,8 +80,17 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
             "the valve was identified without a pressure drop, so no offset can be certified at any pressure; "
             "record the ramp test again with a column of dP (or pA and pB)"
         )
+    if side.guard != options.guard:
+        raise InputError(
+            f"the ramp tests bound the {side.guard} threshold, but the {options.guard} one is to be guarded; "
+            + (
+                "record the falling branch too, or accept flow at zero command after closing with --guard opening"
+                if side.guard == "opening"
+                else "leave out --guard opening, the closing threshold is the safer one"
+            )
+        )
     u_max = Fraction(repr(valve.u_max_V))
-    kappa = _over(Fraction(repr(side.k_x_max_over_u_max)), "nearest")
+    kappa = _over(_travel(side, u_max), "nearest")
     # Half a count less, because the compare value of the offset may be rounded up.
     u_min0 = _over(Fraction(repr(side.u_min0_V)) / u_max - Fraction(1, 2 * signals.compare_max), "down")
     if u_min0 <= 0:
@@ -100,6 +120,19 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
     )
     _prove_monotone(compensator)
     return _with_costs(compensator, side)
+
+
+def _travel(side: SideModel, u_max: Fraction) -> Fraction:
+    """Return k x_max/u_max for a law whose offset is u_min0: from there to the command of full flow on opening.
+
+    Identification gives k x_max from the knee on. The law starts lower, at the guarded offset; without the difference
+    full command would not reach full flow (u_O(u_max) = u_max exactly if k x_max = u_max - u_min0).
+    """
+    reference = min(side.tests, key=lambda test: abs(test.dp_MPa - side.reference_dp_MPa))
+    knee = reference.u_knee_rising_V if reference.u_knee_rising_V is not None else reference.u_knee_falling_V
+    below_knee = max(Fraction(repr(knee)) - Fraction(repr(side.u_min0_V)), Fraction(0))
+    travel = Fraction(repr(side.k_x_max_over_u_max)) + below_knee / u_max
+    return min(travel, 1 - Fraction(repr(side.u_min0_V)) / u_max)  # beyond full drive there is nothing
 
 
 def _over(value: Fraction, rounding: str) -> Fraction:
@@ -154,6 +187,11 @@ def _with_costs(compensator: Compensator, side: SideModel) -> Compensator:
         parts.append(f"drive at full command {offset + gain:.2%}")
         lines.append(", ".join(parts))
     low, high = (float(end) for end in compensator.certificate.dp_MPa)
+    if side.trend == "increasing":
+        lines.append(
+            "the threshold grows with the pressure drop, so a pressure signal that reads too high raises the offset: a "
+            "broken wire of sensor B is not recognised; monitor the sensors outside the compensator"
+        )
     lines.append(
         f"outside {low:.2f} to {high:.2f} MPa the nearest tested beta is held and nothing is certified; "
         f"a pressure difference below -{compensator.reverse_codes} codes is taken as a failed sensor: smallest beta"

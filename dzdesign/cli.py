@@ -27,9 +27,10 @@ def _given(*names: str, **keywords: object) -> Option:
 
 
 OUTPUT = ("-o", "--output")
-LAW = _given("--law", default="paper", metavar="LAW", help="paper: Eq. (18); target: meets Eq. (16)")
-SPAN = _given("--pressure-span", default="20 MPa", metavar="P", help="span of both pressure sensors")
-PLANT = _given("--plant", metavar="PLANT.toml", help="plant of the closed loop (default: see the documentation)")
+LAW = _given("--law", metavar="LAW", help="paper: Eq. (18); target: meets Eq. (16) (default: paper)")
+SPAN = _given("--pressure-span", metavar="P", help='span of both pressure sensors (default: "20 MPa")')
+GUARD = _given("--guard", metavar="G", help="threshold to protect: closing or opening (default: closing)")
+PLANT = _given("--plant", metavar="PLANT.toml", help="plant, like examples/paper_valve/plant.toml")
 
 COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
     "demo": (
@@ -69,17 +70,21 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
             _given(*OUTPUT, default="compensator.json", metavar="FILE", help="file to write"),
             LAW,
             SPAN,
+            GUARD,
         ),
     ),
     "codegen": (
         "compensator.json in, a folder of C out",
         "dzdesign.commands:run_codegen",
         (
-            _given("source", metavar="COMPENSATOR.json", help="or a VALVE.json, designed with the options below"),
+            _given(
+                "source", metavar="COMPENSATOR.json", help="or a VALVE.json: designed first, with the options below"
+            ),
             _given(*OUTPUT, default="firmware", metavar="DIR", help="folder to write"),
             _given("--target", default="f28335", metavar="NAME", help="microcontroller"),
             LAW,
             SPAN,
+            GUARD,
         ),
     ),
     "verify": (

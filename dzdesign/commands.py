@@ -100,8 +100,9 @@ def _design(valve_path: Path, content: bytes, args: argparse.Namespace) -> "Comp
     from dzdesign.design.signals import Signals
     from dzdesign.identify.model import valve_from_document
 
-    span_MPa = Fraction(round(parse_quantity(args.pressure_span, "pressure", "--pressure-span")), 10**6)
-    options = DesignOptions(law_name=args.law, signals=Signals(pressure_span_MPa=span_MPa))
+    span_MPa = Fraction(round(parse_quantity(args.pressure_span or "20 MPa", "pressure", "--pressure-span")), 10**6)
+    signals = Signals(pressure_span_MPa=span_MPa)
+    options = DesignOptions(law_name=args.law or "paper", signals=signals, guard=args.guard or "closing")
     return design(valve_from_document(content, str(valve_path)), options, content)
 
 
@@ -139,6 +140,11 @@ def run_codegen(args: argparse.Namespace) -> int:
     if document["schema"] == VALVE_SCHEMA:
         firmware = generate(_design(path, content, args), args.target)
     else:
+        for option, value in (("--law", args.law), ("--pressure-span", args.pressure_span), ("--guard", args.guard)):
+            if value is not None:
+                raise InputError(
+                    f"{option} is an option of the design, and '{path}' is designed; use `dzdesign design`"
+                )
         firmware = generate(compensator_from_document(content, str(path)), args.target, content)
     write_folder(Path(args.output), firmware.files, firmware.manifest)
     if args.json:

@@ -4,6 +4,8 @@ import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from fractions import Fraction
+
     from rich.console import Console
     from rich.table import Table
 
@@ -28,12 +30,16 @@ def _table(title: str, *columns: str) -> "Table":
 
     table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left", title_style="bold")
     for index, column in enumerate(columns):
-        table.add_column(column, justify="left" if index == 0 else "right")
+        table.add_column(column, justify="left" if index == 0 else "right", overflow="fold")
     return table
 
 
 def _volts(value: float | None) -> str:
     return "-" if value is None else f"{value:.3f}"
+
+
+def _rational(value: "Fraction") -> str:
+    return f"{value} = {float(value):.5f}"
 
 
 def _percent(share: float) -> str:
@@ -44,8 +50,8 @@ def print_valve(valve: "ValveModel") -> None:
     """Print thresholds per ramp test, the law's parameters and every warning."""
     side = valve.positive
     table = _table(
-        "Thresholds (V)", "ramp test", "dP (MPa)", "knee opening", "knee closing", "± (1 s.e.)", "guarded",
-        "lower bound", "beta", "Q max (L/min)",
+        "Thresholds (V)", "ramp test", "dP (MPa)", "knee opening", "knee closing", "s.e. of knee", "onset closing",
+         "bound", "beta", "Q max (L/min)",
     )  # fmt: skip
     betas = side.beta or ("-",)
     for test, beta in zip(side.tests, betas, strict=True):
@@ -55,7 +61,7 @@ def print_valve(valve: "ValveModel") -> None:
             _volts(test.u_knee_rising_V),
             _volts(test.u_knee_falling_V),
             f"{test.u_knee_se_V:.4f}",
-            _volts(test.u_guard_V),
+            _volts(test.u_onset_falling_V),
             _volts(test.u_guard_lower_V),
             beta if isinstance(beta, str) else f"{beta:.4f}",
             f"{test.q_max_L_min:.2f}",
@@ -64,8 +70,11 @@ def print_valve(valve: "ValveModel") -> None:
     console.print(table)
     at = "" if side.reference_dp_MPa is None else f" at dP0 = {side.reference_dp_MPa:.3f} MPa"
     lines = [
-        f"u_min0 = {side.u_min0_V:.4f} V{at}: the law's offset, under the lower bound of the {side.guard} threshold "
-        f"({side.confidence:.0%} for all tests together)",
+        f"bound: {side.confidence:.0%} lower bound, for all tests together, of the {side.guard} threshold (the lower "
+        f"of knee and onset); flow below {side.level_L_min:.2f} L/min (meter's floor, its noise, or 0.5 % of the "
+        "largest flow) counts as none",
+        f"u_min0 = {side.u_min0_V:.4f} V{at}: the law's offset. Between two tests only the lower of their bounds is "
+        "certain, so each offset stays under the neighbour's; more tests raise it",
         f"k x_max/u_max = {side.k_x_max_over_u_max:.4f}"
         + (f", k = {side.k_V_mm:.4f} V/mm" if side.k_V_mm is not None else ""),
         "trend with dP: can't be said from one ramp test"
@@ -90,12 +99,12 @@ def print_compensator(compensator: "Compensator") -> None:
     console = _console()
     for line in (
         f"law {chosen.name} {chosen.equation}: u_O = {chosen.output}",
-        f"k x_max/u_max = {compensator.k_x_max_over_u_max}, u_min0/u_max = {compensator.u_min0_over_u_max}, "
+        f"k x_max/u_max = {_rational(compensator.k_x_max_over_u_max)} (from the offset to full flow), "
+        f"u_min0/u_max = {_rational(compensator.u_min0_over_u_max)}, "
         f"beta: {len(compensator.beta_numerators)} nodes over {compensator.beta_denominator}",
         f"certificate: the offset stays below the {certificate.confidence:.0%} lower bound of the {certificate.guard} "
-        f"threshold from {low:.3f} to {high:.3f} MPa, smallest margin "
-        f"{1e3 * float(certificate.smallest_margin_V):.3f} mV; flow below {certificate.level_L_min:.2f} L/min "
-        "(meter's floor, its noise, or 0.5 % of the largest flow) counts as none",
+        f"threshold from {low:.3f} to {high:.3f} MPa, at every pressure code; flow below "
+        f"{certificate.level_L_min:.2f} L/min (meter's floor, its noise, or 0.5 % of the largest flow) counts as none",
         *(f"cost: {line}" for line in compensator.costs),
     ):
         console.print(line, markup=False, soft_wrap=True)
@@ -112,7 +121,7 @@ def print_verification(verification: "Verification") -> None:
     """Print every check and the closed loop, per pressure drop."""
     console = _console()
     for check in verification.checks:
-        verdict = "holds" if check.holds else "FAILS"
+        verdict = {True: "holds", False: "FAILS", None: "NOT CHECKED"}[check.holds]
         console.print(f"{verdict}  {check.name}: {check.text}", markup=False, soft_wrap=True)
     if not verification.loops:
         return

@@ -6,6 +6,8 @@ import numpy as np
 FLAT_CHANGE = 1e-3
 #: Standard errors that a change must exceed to count as a trend.
 TREND_SIGNIFICANCE = 3.0
+#: Standard errors by which a knee must depart from the trend to contradict it.
+DEPARTURE_SIGNIFICANCE = 5.0
 #: Blocks of residuals behind a standard error, less the line's two parameters.
 DEGREES_OF_FREEDOM = 14
 
@@ -38,6 +40,20 @@ def find_trend(dp: np.ndarray, threshold: np.ndarray, se: np.ndarray, u_max: flo
     if abs(change) < max(FLAT_CHANGE * u_max, TREND_SIGNIFICANCE * change_se):
         return "flat", float(change), float(change_se)
     return ("decreasing" if change < 0 else "increasing"), float(change), float(change_se)
+
+
+def excess_departure(departure: np.ndarray, se: np.ndarray, u_max: float) -> np.ndarray:
+    """Return by how much each knee departs from one direction with the pressure drop, V; zero within its errors.
+
+    Parameters
+    ----------
+    departure, se : (T,) array
+        Distance of each knee from the fit under the trend, and its standard error, V.
+    u_max : float
+        Full command, V; a departure below `FLAT_CHANGE` of it is the budget of systematic errors.
+    """
+    real = departure > np.maximum(DEPARTURE_SIGNIFICANCE * se, FLAT_CHANGE * u_max)
+    return np.where(real, departure, 0.0)
 
 
 def lower_bounds(threshold: np.ndarray, se: np.ndarray, confidence: float, budget: np.ndarray) -> np.ndarray:

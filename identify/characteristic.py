@@ -46,8 +46,8 @@ class BranchShape:
         Long-run variance over variance of one sample (1 for white noise, more for coloured noise or a bent line).
     level : float
         Flow that counts as flow, m³/s: the meter's floor, its noise or `USEFUL_FLOW`, whichever is largest.
-    onset, onset_se : float
-        Zero of the straight line through the tail, V, and its standard error.
+    onset, onset_se, onset_slope : float
+        Zero of the straight line through the tail, V, its standard error, and the line's slope, m³/(s V).
     saturates : bool
         True if the flow at full command lies clearly below the straight line.
     outliers : int
@@ -64,6 +64,7 @@ class BranchShape:
     level: float
     onset: float
     onset_se: float
+    onset_slope: float
     saturates: bool
     outliers: int
 
@@ -210,7 +211,7 @@ def describe_branch(
     sigma = max(float(np.sqrt(np.sum(residual**2) / max(seen.sum() - 2, 1))), FINEST_NOISE * y_max)
     noise = _quiet_noise(branch, y, knee)
     level = max(floor, USEFUL_FLOW * y_max, NOISE_LEVEL * noise)
-    onset, onset_se = _tail_onset(branch.u, y, (u_profile, y_profile), level, slope, noise)
+    onset, onset_se, onset_slope = _tail_onset(branch.u, y, (u_profile, y_profile), level, slope, noise)
     return BranchShape(
         rising=branch.rising,
         bins=bin_branch(u_in[kept], y_in[kept], censored[kept], u_max),
@@ -222,6 +223,7 @@ def describe_branch(
         level=level,
         onset=onset,
         onset_se=onset_se,
+        onset_slope=onset_slope,
         saturates=y_max < 0.93 * slope * (branch.u.max() - knee),
         outliers=int((~kept).sum()),
     )
@@ -235,7 +237,7 @@ def _quiet_noise(branch: Branch, y: np.ndarray, knee: float) -> float:
 
 def _tail_onset(
     u: np.ndarray, y: np.ndarray, profile: tuple[np.ndarray, np.ndarray], level: float, slope: float, noise: float
-) -> tuple[float, float]:
+) -> tuple[float, float, float]:
     """Extrapolate the first flow seen to zero: the valve opens (or closes) no later than this, as far as can be seen.
 
     A soft edge passes flow below the knee. What the meter sees of it is the tail from `level` to `TAIL` times it; the
@@ -244,7 +246,7 @@ def _tail_onset(
     Returns
     -------
     tuple of float
-        The zero and its standard error, V.
+        The zero and its standard error, V; the tail's slope, m³/(s V).
     """
     first, last = crossing(*profile, level), crossing(*profile, TAIL * level)
     tail = (u >= first) & (u <= last) & (y > 0.5 * level)
@@ -254,9 +256,11 @@ def _tail_onset(
             residual = y[tail] - tail_slope * (u[tail] - onset)
             sigma = math.sqrt(np.sum(residual**2) / (tail.sum() - 2))
             lever = 1 / tail.sum() + (u[tail].mean() - onset) ** 2 / np.sum((u[tail] - u[tail].mean()) ** 2)
-            return onset, sigma * math.sqrt(lever * _colour(residual, max(sigma, 1e-12))) / tail_slope
+            se = sigma * math.sqrt(lever * _colour(residual, max(sigma, 1e-12))) / tail_slope
+            return onset, se, tail_slope
     # Too few samples for a line, as in a staircase test: the chord, its ends known to one level of the command.
     at = int(np.clip(np.searchsorted(profile[0], first), 1, profile[0].size - 1))
     gap = float(profile[0][at] - profile[0][at - 1])
     width = max(last - first, gap)
-    return first - width / (TAIL - 1), gap + noise * width / ((TAIL - 1) * level)
+    chord = (TAIL - 1) * level / width
+    return first - level / chord, gap + noise / chord, chord

@@ -1,13 +1,13 @@
 """`identify`: ramp tests in, `ValveModel` out. Reads as the pipeline: split, describe, fit, bound, law's offset."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.bounds import find_trend, lower_bounds, staircase
+from dzdesign.identify.bounds import excess_departure, find_trend, lower_bounds, staircase
 from dzdesign.identify.branches import Branch, split_branches
 from dzdesign.identify.characteristic import BranchShape, describe_branch, find_meter_floor, flow_at_top, smooth_profile
 from dzdesign.identify.fit import KneeFit, fit_knees, fit_offset
@@ -21,6 +21,10 @@ L_MIN = 1e-3 / 60
 SAME_PRESSURE = 0.02
 #: Pressure drops beyond these, Pa, are a wrong unit.
 SMALLEST_DP, LARGEST_DP = 1e3, 200 * MPA
+#: Commands within this share of u_max are at rest.
+AT_REST = 0.01
+#: A reading at rest below this share of the largest flow is no zero error.
+ZERO_SHARE = 2e-3
 #: dP0 names the tested pressure drop within this share of it.
 REFERENCE_TOLERANCE = 0.1
 #: dP0 of the paper, taken where the user names none: the test nearest to it.
@@ -111,11 +115,15 @@ def identify(tests: Sequence[RampTest], options: IdentifyOptions | None = None) 
     options = options or IdentifyOptions()
     if not tests:
         raise InputError("no ramp tests were given; expected at least one file")
+    zeros = [_reading_at_zero(test, options.u_max) for test in tests]
+    tests = [replace(test, q=test.q - zero) for test, zero in zip(tests, zeros, strict=True)]
+    zero_of = {test.source: zero / L_MIN for test, zero in zip(tests, zeros, strict=True) if zero}
     split = _split_all(tests, options)
     floor = options.meter_floor if options.meter_floor is not None else _found_floor(split, options)
     described = _in_order_of_pressure([_describe(*item, floor=floor, options=options) for item in split])
-    trend, change, change_se, knees = _fit_with_trend(described, floor, options)
-    side = _side_model(described, knees, (trend, change, change_se), options)
+    _refuse_mixed_branches(described)
+    trend, change, change_se, knees, departure = _fit_with_trend(described, floor, options)
+    side = _side_model(described, knees, departure, (trend, change, change_se), options)
     u_max = options.u_max
     return ValveModel(
         u_max_V=u_max,
@@ -124,9 +132,22 @@ def identify(tests: Sequence[RampTest], options: IdentifyOptions | None = None) 
         meter_zero_L_min=options.meter_zero / L_MIN,
         knee_window=options.knee_window,
         positive=side,
-        warnings=_warnings(described, side, floor, options),
+        warnings=_warnings(described, side, departure, zero_of, floor, options),
         made_from=tuple((item.test.source, item.test.sha256) for item in described),
     )
+
+
+def _reading_at_zero(test: RampTest, u_max: float) -> float:
+    """Return what the meter reads at zero command where that is not zero, m³/s: its zero error, or a leak.
+
+    Thousands of readings at rest tell it far better than any declared bound; 0 is returned where it does not stand out.
+    """
+    rest = test.q[(test.u >= -AT_REST * u_max) & (test.u <= AT_REST * u_max)]
+    if rest.size < 20:
+        return 0.0
+    zero = float(np.median(rest))
+    error = 1.4826 * float(np.median(np.abs(rest - zero))) / np.sqrt(rest.size)
+    return zero if abs(zero) > max(5 * error, ZERO_SHARE * float(np.abs(test.q).max())) else 0.0
 
 
 def _split_all(
@@ -228,44 +249,64 @@ def _in_order_of_pressure(described: list[DescribedTest]) -> list[DescribedTest]
 
 def _fit_with_trend(
     described: list[DescribedTest], floor: float, options: IdentifyOptions
-) -> tuple[str, float, float, KneeFit]:
-    """Fit the knees freely, see which way they run, and fit them again under that direction."""
+) -> tuple[str, float, float, KneeFit, np.ndarray]:
+    """Fit the knees freely, see which way they run, and fit them again under that direction.
+
+    Returns
+    -------
+    tuple
+        Trend, its change and standard error (V), the fit, and how far each test's knees depart from that direction (V,
+        beyond their own error): data that contradict the certificate's one premise have to pay for it.
+    """
     shapes = [item.shapes for item in described]
     free = fit_knees(shapes, floor=floor, u_max=options.u_max, trend="flat")
     if len(described) < 2:
-        return "flat", float("nan"), float("nan"), free
+        return "flat", float("nan"), float("nan"), free, np.zeros(1)
     dp = np.array([item.dp for item in described])
-    mean = np.nanmean(free.knee, axis=1)
-    mean_se = np.nanmax(free.knee_se, axis=1)
+    # Every test has the same branches (`_refuse_mixed_branches`), so hysteresis does not enter the comparison.
+    mean, mean_se = np.nanmean(free.knee, axis=1), np.nanmax(free.knee_se, axis=1)
     trend, change, change_se = find_trend(dp, mean, mean_se, options.u_max)
-    knees = free if trend == "flat" else fit_knees(shapes, floor=floor, u_max=options.u_max, trend=trend)
-    return trend, change, change_se, knees
+    if trend == "flat":
+        departure = np.nanmax(np.abs(free.knee - np.nanmean(free.knee, axis=0)), axis=1)
+        return trend, change, change_se, free, excess_departure(departure, mean_se, options.u_max)
+    knees = fit_knees(shapes, floor=floor, u_max=options.u_max, trend=trend)
+    departure = np.nanmax(np.abs(free.knee - knees.knee), axis=1)
+    return trend, change, change_se, knees, excess_departure(departure, mean_se, options.u_max)
 
 
-def _guard(described: list[DescribedTest], knees: KneeFit, options: IdentifyOptions) -> tuple[str, np.ndarray, ...]:
+def _refuse_mixed_branches(described: list[DescribedTest]) -> None:
+    """Refuse tests of which some have a branch that others lack: they can't be compared."""
+    for column, name in ((0, "rising"), (1, "falling")):
+        lacking = [item.test.source for item in described if item.shapes[column] is None]
+        if lacking and len(lacking) < len(described):
+            raise InputError(
+                f"'{lacking[0]}' has no {name} branch while other ramp tests have one; "
+                "record every pressure drop up and down, or leave that file out"
+            )
+
+
+def _guard(
+    described: list[DescribedTest], knees: KneeFit, departure: np.ndarray, options: IdentifyOptions
+) -> tuple[str, np.ndarray, np.ndarray, np.ndarray]:
     """Return which branch is guarded, its thresholds, standard errors and lower bounds (V), all (T,).
 
     Guarded is the lower of knee and onset: a soft edge passes flow below the knee. Zero command comes after closing,
-    so the falling branch is guarded wherever every test has one.
+    so the falling branch is guarded wherever there is one.
     """
-    closing = all(item.shapes[1] for item in described)
-    column = 1 if closing else 0
-    if not closing and not all(item.shapes[0] for item in described):
-        raise InputError(
-            "some ramp tests have only a rising branch and others only a falling one; "
-            "record every pressure drop up and down"
-        )
+    column = 1 if described[0].shapes[1] else 0
     shapes = [item.shapes[column] for item in described]
     knee, knee_se = knees.knee[:, column], knees.knee_se[:, column]
     onset, onset_se = (np.array([getattr(shape, name) for shape in shapes]) for name in ("onset", "onset_se"))
-    budget = np.array([options.meter_zero / shape.slope for shape in shapes])
+    # A zero error of the meter moves each zero by the error over the slope of the line that was extrapolated.
+    knee_budget = departure.max() + np.array([options.meter_zero / shape.slope for shape in shapes])
+    onset_budget = departure.max() + np.array([options.meter_zero / shape.onset_slope for shape in shapes])
     bound = np.minimum(
-        lower_bounds(knee, knee_se, options.confidence, budget),
-        lower_bounds(onset, onset_se, options.confidence, budget),
+        lower_bounds(knee, knee_se, options.confidence, knee_budget),
+        lower_bounds(onset, onset_se, options.confidence, onset_budget),
     )
     lower_is_knee = knee <= onset
     return (
-        "closing" if closing else "opening",
+        "closing" if column else "opening",
         np.where(lower_is_knee, knee, onset),
         np.where(lower_is_knee, knee_se, onset_se),
         bound,
@@ -289,10 +330,14 @@ def _reference(described: list[DescribedTest], dp0: float | None) -> int:
 
 
 def _side_model(
-    described: list[DescribedTest], knees: KneeFit, trend: tuple[str, float, float], options: IdentifyOptions
+    described: list[DescribedTest],
+    knees: KneeFit,
+    departure: np.ndarray,
+    trend: tuple[str, float, float],
+    options: IdentifyOptions,
 ) -> SideModel:
     """Assemble one side: guarded thresholds, bounds, staircase, the law's offset and k x_max."""
-    guard, threshold, threshold_se, bound = _guard(described, knees, options)
+    guard, threshold, threshold_se, bound = _guard(described, knees, departure, options)
     steps, ceiling = staircase(bound, trend[0])
     reference = _reference(described, options.dp0)
     offset = fit_offset(threshold, threshold_se, ceiling, reference, u_max=options.u_max, trend=trend[0])
@@ -350,7 +395,12 @@ def _test_result(item: DescribedTest, knees: KneeFit, row: int, guard: float, bo
 
 
 def _warnings(
-    described: list[DescribedTest], side: SideModel, floor: float, options: IdentifyOptions
+    described: list[DescribedTest],
+    side: SideModel,
+    departure: np.ndarray,
+    zero_of: dict[str, float],
+    floor: float,
+    options: IdentifyOptions,
 ) -> tuple[Warning_, ...]:
     sag = {
         item.test.source: 1 - float(np.median(item.test.dp[item.test.u >= 0.97 * item.test.u.max()])) / item.dp
@@ -359,4 +409,13 @@ def _warnings(
     }
     top = {item.test.source: float(item.test.u.max()) for item in described}
     bottom = {item.test.source: float(item.test.u.min()) for item in described}
-    return find_warnings(side, floor_L_min=floor / L_MIN, u_max=options.u_max, sag=sag, u_top=top, u_bottom=bottom)
+    return find_warnings(
+        side,
+        floor_L_min=floor / L_MIN,
+        u_max=options.u_max,
+        sag=sag,
+        u_top=top,
+        u_bottom=bottom,
+        zero_L_min=zero_of,
+        departure_V={item.test.source: float(gap) for item, gap in zip(described, departure, strict=True) if gap > 0},
+    )

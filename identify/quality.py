@@ -16,6 +16,8 @@ def find_warnings(
     sag: Mapping[str, float],
     u_top: Mapping[str, float],
     u_bottom: Mapping[str, float],
+    zero_L_min: Mapping[str, float],
+    departure_V: Mapping[str, float],
 ) -> tuple[Warning_, ...]:
     """Return the warnings about one side.
 
@@ -31,12 +33,44 @@ def find_warnings(
         Source -> share of the pressure drop lost at full command.
     u_top, u_bottom : mapping
         Source -> largest and smallest command, V.
+    zero_L_min : mapping
+        Source -> flow read at zero command, where it is not zero.
+    departure_V : mapping
+        Source -> departure of the knees from one direction with the pressure drop, where it is beyond their error.
     """
     return (
+        *_about_the_meter(zero_L_min),
+        *_about_order(departure_V),
         *_about_pressure(side, sag),
         *_about_branches(side, u_max, u_top, u_bottom),
         *_about_the_edge(side, floor_L_min, u_max),
     )
+
+
+def _about_the_meter(zero_L_min: Mapping[str, float]) -> Iterator[Warning_]:
+    for source, zero in zero_L_min.items():
+        yield Warning_(
+            code="meter-zero",
+            text=(
+                f"the flow reads {zero:+.3f} L/min at zero command: taken as the meter's zero error and subtracted"
+                + ("; if it is a leak, the valve passes it whatever the compensator does" if zero > 0 else "")
+                + ". Set the meter to zero and record again"
+            ),
+            source=source,
+        )
+
+
+def _about_order(departure_V: Mapping[str, float]) -> Iterator[Warning_]:
+    for source, gap in departure_V.items():
+        yield Warning_(
+            code="not-monotone",
+            text=(
+                f"its knee departs by {1e3 * gap:.0f} mV from a threshold that runs one way with the pressure drop, on "
+                "which the certificate rests; all bounds are lowered by the departure. Repeat this test and its "
+                "neighbours"
+            ),
+            source=source,
+        )
 
 
 def _about_pressure(side: SideModel, sag: Mapping[str, float]) -> Iterator[Warning_]:

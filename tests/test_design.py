@@ -126,3 +126,16 @@ def test_loss_against_the_certified_curve_is_small(example_valve, example_compen
     loss = curve * side.u_min0_V - table
     assert loss.min() > 0
     assert loss.mean() < 0.005
+
+
+def test_full_command_gives_full_drive_at_the_reference(example_compensator):
+    # The law starts below the knee; its travel is counted from there, so no flow is lost at the top.
+    code = int(example_compensator.signals.dp_code(Fraction(1)))
+    assert example_compensator.compare(4095, code) >= 59990
+
+
+def test_a_valve_without_its_falling_branch_needs_a_word():
+    valve = identify([synthetic_ramp(dp, Truth(), falling=False) for dp in (1.0,)])
+    with pytest.raises(InputError, match="--guard opening"):
+        design(valve)
+    assert design(valve, DesignOptions(guard="opening")).certificate.guard == "opening"

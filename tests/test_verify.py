@@ -172,7 +172,7 @@ class TestPlant:
         for test in example_valve.positive.tests[::2]:
             run = ClosedLoop(plants[test.dp_MPa]).run(RampSequence(rest=1, ramp=60, top=1).command(), test.dp_MPa)
             assert dead_zone(run, 0.02, rising=True) * 10 == pytest.approx(test.u_knee_rising_V, abs=0.03)
-            assert dead_zone(run, 0.02, rising=False) * 10 == pytest.approx(test.u_knee_falling_V, abs=0.03)
+            assert dead_zone(run, 0.02, rising=False) * 10 == pytest.approx(test.u_guard_V, abs=0.03)
 
 
 def test_closed_loop_removes_the_dead_zone_and_without_beta_leaks(firmware_folder, example_folder):
@@ -200,3 +200,19 @@ def test_a_law_without_its_guard_leaks_in_the_loop(example_compensator, example_
     result = verify(tmp_path / "fw", read_plant(example_folder / "plant.toml"), sequence=QUICK)
     failed = {check.name for check in result.checks if not check.holds}
     assert "no flow at zero command in the closed loop" in failed
+
+
+def test_what_could_not_be_checked_is_not_passed(tmp_path):
+    """Rising ramps alone: where the valve closes is not known, so zero command after closing is not checked."""
+    from synthetic import Truth, synthetic_ramp
+
+    from dzdesign.codegen.project import generate
+    from dzdesign.design.designing import DesignOptions, design
+    from dzdesign.identify.identification import identify
+
+    valve = identify([synthetic_ramp(1.0, Truth(), falling=False)])
+    firmware = generate(design(valve, DesignOptions(guard="opening")), "f28335")
+    write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
+    result = verify(tmp_path / "fw", sequence=QUICK)
+    assert [check.holds for check in result.checks if "zero command in" in check.name] == [None]
+    assert not result.holds and result.document["holds"] is False

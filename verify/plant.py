@@ -116,15 +116,17 @@ def read_plant(path: Path) -> Plant:
 def plants_from_tests(side: SideModel, u_max_V: float) -> dict[float, Plant]:
     """Return, per tested pressure drop in MPa, the default plant with the identified thresholds, slope and stroke.
 
-    The dynamics stay those of the default plant; what was identified at rest is taken over: both knees (their mean by
-    the preload, their difference by the play), the slope and the travel to full flow. It stands in for the valve where
-    no better plant is given; the closed loop then checks the design and the C, not the identification.
+    The dynamics stay those of the default plant; what was identified at rest is taken over, at a constant pressure
+    drop: it opens at the rising knee and closes at the guarded threshold (the onset, where the edge is soft). It stands
+    in for the valve where no better plant is given; the closed loop then checks the design and the C, not the
+    identification.
     """
     plants = {}
     for test in side.tests:
         base = Plant(u_max_V=u_max_V, pressure_force_N_MPa=0, flow_force_N_mm_MPa=0, droop_MPa_L_min2=0, overlap_mm=0.3)
-        knees = [knee for knee in (test.u_knee_rising_V, test.u_knee_falling_V) if knee is not None]
-        middle, hysteresis = sum(knees) / len(knees), max(knees[0] - knees[-1], 0.0)
+        opens = test.u_knee_rising_V if test.u_knee_rising_V is not None else test.u_guard_V
+        closes = test.u_guard_V if side.guard == "closing" else opens
+        middle, hysteresis = (opens + closes) / 2, max(opens - closes, 0.0)
         # A threshold below the spring force of the overlap is met with less overlap.
         overlap = min(base.overlap_mm, 0.5 * middle * base.force_per_volt / base.K_et_N_m * 1e3)
         travel_mm_V = base.force_per_volt / base.K_et_N_m * 1e3
