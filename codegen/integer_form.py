@@ -123,17 +123,15 @@ def _share(slope: int, offset: int, command_max: int) -> int:
 
 def _largest_quotient(compensator: Compensator, common: int, divisor: int) -> int:
     """Return a bound of ``total >> shift``: the law's largest value at any node, times divisor."""
-    ends = [
-        compensator.drive(compensator.signals.command_code_max, index * compensator.beta_step_codes)
-        for index in range(len(compensator.beta_numerators) - 1)
-    ]
-    starts = [
-        compensator.drive(0, index * compensator.beta_step_codes)
-        for index in range(len(compensator.beta_numerators) - 1)
-    ]
+    command_max, pressure_max = compensator.signals.command_code_max, compensator.signals.pressure_code_max
+    # Every node that a code reaches, and the fallback's smallest beta: along dP the law is straight between them.
+    codes = [index * compensator.beta_step_codes for index in range(len(compensator.beta_numerators) - 1)]
+    codes += [pressure_max, -pressure_max]
+    ends = [compensator.drive(command_max, code) for code in codes]
+    starts = [compensator.drive(0, code) for code in codes]
     if min(ends + starts) < 0:
         raise InputError("the law asks for a negative drive somewhere; check k x_max/u_max and u_min0")
-    # One count more for rounding, and the last table node, which no code reaches.
+    # One count more for rounding.
     largest = max(ends + starts) * compensator.signals.compare_max + 2
     return int(largest * divisor) + divisor
 
@@ -144,6 +142,8 @@ def _exact_reciprocal(divisor: int, largest: int) -> tuple[int, int]:
     With m = ceil(2^s / d) and e = m d - 2^s the quotient is exact as long as ``n e < 2^s`` (for n = q d + r the error
     n e / (d 2^s) must stay below 1/d).
     """
+    if divisor == 1:
+        return 1, 0
     for shift in range(32, 64):
         reciprocal = -(-(1 << shift) // divisor)
         if largest * (reciprocal * divisor - (1 << shift)) < 1 << shift:

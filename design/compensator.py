@@ -121,6 +121,8 @@ class Compensator:
             value = getattr(self, name)
             if value < 1 or value & (value - 1):
                 raise InputError(f"{name} is {value}, expected a power of two, so that the firmware needs no division")
+        if not 0 <= self.reverse_codes <= self.signals.pressure_code_max // 20:
+            raise InputError(f"reverse_codes is {self.reverse_codes}, expected noise about zero: up to 5 % of the span")
         nodes = self.signals.pressure_code_max // self.beta_step_codes + 2
         if len(self.beta_numerators) != nodes:
             raise InputError(f"beta has {len(self.beta_numerators)} nodes, expected {nodes} for every code")
@@ -222,7 +224,9 @@ def compensator_from_document(content: bytes, source: str) -> Compensator:
     ends_known, margin_known = (document["certificate"][key] is not None for key in ("dp_MPa", "smallest_margin_V"))
     if ends_known != margin_known:
         raise InputError(f"'{source}': 'certificate' has one of dp_MPa and smallest_margin_V, expected both; {REMEDY}")
-    valve_from_document(to_json(document["valve"]).encode(), f"{source}: valve")
+    valve = valve_from_document(to_json(document["valve"]).encode(), f"{source}: valve")
+    if _fraction(document["u_max_V"], "u_max_V") != Fraction(repr(valve.u_max_V)):
+        raise InputError(f"'{source}': 'u_max_V' is not that of its valve, {valve.u_max_V:g} V; {REMEDY}")
     try:
         signals, beta, certificate = document["signals"], document["beta"], document["certificate"]
         ends = certificate["dp_MPa"]

@@ -115,12 +115,13 @@ def find_meter_floor(u: np.ndarray, q: np.ndarray, u_max: float) -> float:
     straight = int(np.sum((u >= start) & (u <= half)))
     density = straight / (0.38 * q_max)  # readings per unit of flow where the valve is known to open smoothly
     shut = q[u < 0.5 * start]
-    if shut.size < 5 or straight < 100:
+    if shut.size < 5 or straight < 100 or u_profile.size < 200:  # a staircase skips flows, whatever the meter
         return 0.0
     noise = 1.4826 * float(np.median(np.abs(shut - np.median(shut))))
     lowest = max(3 * noise, 1e-3 * q_max)
     # Near the opening only: far below it, thousands of shut readings would put some of their noise into the gap.
-    near = u > start - 0.5 * (half - start)
+    # It reaches down to where the profile leaves the noise, or a soft edge's small flows would be cut off and missed.
+    near = u > min(start - 0.5 * (half - start), crossing(u_profile, q_profile, lowest))
     readings = np.sort(q[near & (q > lowest) & (q < 0.5 * q_max)])
     expected = density * (readings - lowest)
     gap = np.flatnonzero((np.arange(readings.size) < 0.1 * expected) & (expected > 20))

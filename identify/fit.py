@@ -43,7 +43,12 @@ class KneeFit:
 
 
 def fit_knees(
-    shapes: list[tuple[BranchShape | None, BranchShape | None]], *, floor: float, u_max: float, trend: str
+    shapes: list[tuple[BranchShape | None, BranchShape | None]],
+    *,
+    floor: float,
+    u_max: float,
+    trend: str,
+    ordered: int = 1,
 ) -> KneeFit:
     """Fit knees and slopes of all ramp tests jointly, the knees monotone in the pressure drop.
 
@@ -60,6 +65,8 @@ def fit_knees(
         Full command, V.
     trend : {"decreasing", "increasing", "flat"}
         Direction in which the knees must run; "flat" leaves them free.
+    ordered : int
+        Column of the branch whose knees must run that way (1: falling); the other branch may run otherwise.
 
     Raises
     ------
@@ -82,7 +89,7 @@ def fit_knees(
         cost += _branch_cost(shapes[row][column], slope, knee_of[row, column], floor, u_max)
     constraints, names = [], []
     for row, column in where:
-        if trend != "flat" and (row + 1, column) in position:
+        if trend != "flat" and column == ordered and (row + 1, column) in position:
             step = knee_of[row + 1, column] - knee_of[row, column]
             constraints.append(step if trend == "increasing" else -step)
             names.append(f"{'falling' if column else 'rising'} knee of test {row + 1} to {row + 2}")

@@ -263,15 +263,19 @@ def _fit_with_trend(
     if len(described) < 2:
         return "flat", float("nan"), float("nan"), free, np.zeros(1)
     dp = np.array([item.dp for item in described])
-    # Every test has the same branches (`_refuse_mixed_branches`), so hysteresis does not enter the comparison.
-    mean, mean_se = np.nanmean(free.knee, axis=1), np.nanmax(free.knee_se, axis=1)
-    trend, change, change_se = find_trend(dp, mean, mean_se, options.u_max)
+    column = _guarded_column(described)
+    knee, knee_se = free.knee[:, column], free.knee_se[:, column]
+    trend, change, change_se = find_trend(dp, knee, knee_se, options.u_max)
     if trend == "flat":
-        departure = np.nanmax(np.abs(free.knee - np.nanmean(free.knee, axis=0)), axis=1)
-        return trend, change, change_se, free, excess_departure(departure, mean_se, options.u_max)
-    knees = fit_knees(shapes, floor=floor, u_max=options.u_max, trend=trend)
-    departure = np.nanmax(np.abs(free.knee - knees.knee), axis=1)
-    return trend, change, change_se, knees, excess_departure(departure, mean_se, options.u_max)
+        return trend, change, change_se, free, excess_departure(np.abs(knee - knee.mean()), knee_se, options.u_max)
+    knees = fit_knees(shapes, floor=floor, u_max=options.u_max, trend=trend, ordered=column)
+    departure = np.abs(knee - knees.knee[:, column])
+    return trend, change, change_se, knees, excess_departure(departure, knee_se, options.u_max)
+
+
+def _guarded_column(described: list[DescribedTest]) -> int:
+    """Return 1 (the falling branch) wherever there is one, else 0: zero command comes after closing."""
+    return 1 if described[0].shapes[1] else 0
 
 
 def _refuse_mixed_branches(described: list[DescribedTest]) -> None:
@@ -290,10 +294,9 @@ def _guard(
 ) -> tuple[str, np.ndarray, np.ndarray, np.ndarray]:
     """Return which branch is guarded, its thresholds, standard errors and lower bounds (V), all (T,).
 
-    Guarded is the lower of knee and onset: a soft edge passes flow below the knee. Zero command comes after closing,
-    so the falling branch is guarded wherever there is one.
+    Guarded is the lower of knee and onset: a soft edge passes flow below the knee.
     """
-    column = 1 if described[0].shapes[1] else 0
+    column = _guarded_column(described)
     shapes = [item.shapes[column] for item in described]
     knee, knee_se = knees.knee[:, column], knees.knee_se[:, column]
     onset, onset_se = (np.array([getattr(shape, name) for shape in shapes]) for name in ("onset", "onset_se"))

@@ -4,12 +4,17 @@ from dataclasses import asdict, dataclass, fields
 from types import NoneType
 from typing import Any
 
+import numpy as np
+
 from dzdesign.core.artefacts import TOOL, parse_document
 from dzdesign.core.errors import InputError
 from dzdesign.core.shape import Exactly, Number, check_shape
+from dzdesign.identify.bounds import staircase
 
 SCHEMA = "dzdesign.valve/1"
 TRENDS = ("decreasing", "flat", "increasing")
+#: Numbers of the file are right to seven decimals; a comparison of two allows ten times that.
+ROUNDING_V = 1e-6
 REMEDY = "make it again with `dzdesign identify`"
 #: What valve.json must hold; the ends are far beyond any valve, and keep the exact arithmetic from overflowing.
 VOLTAGE, PRESSURE, FLOW = Number(-1e4, 1e4), Number(1e-6, 1e3), Number(0, 1e6)
@@ -141,6 +146,15 @@ class SideModel:
             raise InputError("a pressure drop is missing beside the nodes of beta; expected one per test and dP0")
         if any(test.u_knee_rising_V is None and test.u_knee_falling_V is None for test in self.tests):
             raise InputError("a test has no knee, neither rising nor falling; expected at least one")
+        if any(test.u_guard_lower_V > test.u_guard_V + ROUNDING_V for test in self.tests):
+            raise InputError("a lower bound lies above the threshold that it bounds")
+        if self.beta_dp_MPa and any(
+            abs(test.dp_MPa - node) > ROUNDING_V for test, node in zip(self.tests, self.beta_dp_MPa, strict=True)
+        ):
+            raise InputError("the nodes of beta must stand at the tests' pressure drops")
+        steps, _ = staircase(np.array([test.u_guard_lower_V for test in self.tests]), self.trend or "flat")
+        if any(abs(step - known) > ROUNDING_V for step, known in zip(steps, self.certified_steps_V, strict=True)):
+            raise InputError("the certified steps do not follow from the tests' lower bounds")
         if not self.u_min0_V > 0:
             raise InputError(f"u_min0 is {self.u_min0_V} V, expected a positive threshold")
 

@@ -137,3 +137,16 @@ def test_core_and_hardware_link_as_one_program(example_firmware, tmp_path):
             check=False,
         )
         assert done.returncode == 0, done.stderr
+
+
+def test_a_law_whose_divisor_cancels_needs_no_reciprocal(example_compensator):
+    even = dataclasses.replace(
+        example_compensator,
+        law_name="target",
+        k_x_max_over_u_max=Fraction(273 * 100, 65536),
+    )
+    form = integer_form(even)
+    assert form.divisor == 1
+    for command in (0, 1, 1000, 4095):
+        assert evaluate(form, even, command, 500) == even.compare(command, 500)
+    assert "273" not in generate(even, "f28335").files["core/dz_comp.c"].split("uint16_t dz_comp(")[1]

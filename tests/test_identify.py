@@ -324,3 +324,26 @@ class TestHonesty:
         for dp in np.linspace(*side.valid_dp_MPa, 100):
             offset = side.u_min0_V * np.interp(dp, side.beta_dp_MPa, side.beta)
             assert offset < np.interp(dp, PRESSURES, list(opening.values())) - 0.1
+
+    def test_a_progressive_spool_is_no_meter_floor(self):
+        # Q ~ (u - u_min)^2 passes through the small flows quickly; without a floor none may be found.
+        test = synthetic_ramp(1.0, Truth(noise=0.02), rate_Hz=100)
+        rising = np.arange(test.u.size) < test.u.size // 2
+        travel = np.clip(test.u - np.where(rising, 5.0, 4.9), 0, None)
+        noise = test.q - np.clip(4 * (test.u - np.where(rising, 5.4, 5.3)), 0, 100) * L_MIN
+        progressive = dataclasses.replace(test, q=3 * travel**2 * L_MIN + noise)
+        valve = identify([progressive])
+        assert valve.meter_floor_L_min == 0
+        # At the offset the closing valve passes less than the level that counts as flow.
+        assert 3 * max(valve.positive.u_min0_V - 4.9, 0) ** 2 < valve.positive.level_L_min
+
+    def test_branches_that_trend_apart_follow_the_guarded_one(self):
+        tests = []
+        for dp in PRESSURES:
+            opening, closing = 5.6 - 0.06 * dp, 5.0 + 0.02 * dp
+            truth = Truth(knee_rising=opening, hysteresis=opening - closing, slope=4 * math.sqrt(dp))
+            tests.append(synthetic_ramp(dp, truth))
+        side = identify(tests).positive
+        assert side.trend == "increasing"
+        for dp in np.linspace(*side.valid_dp_MPa, 50):
+            assert side.u_min0_V * np.interp(dp, side.beta_dp_MPa, side.beta) < 5.0 + 0.02 * dp

@@ -53,6 +53,7 @@ FAULTS = {
     "reverse >= becomes >": (r"dp_code >= -REVERSE_CODES", "dp_code > -REVERSE_CODES"),
     "command <= becomes <": (r"u_adc <= COMMAND_CODE_MAX", "u_adc < COMMAND_CODE_MAX"),
     "pressure <= becomes <": (r"p_a_adc <= PRESSURE_CODE_MAX", "p_a_adc < PRESSURE_CODE_MAX"),
+    "p_b not looked at": (r" && \(p_b_adc <= PRESSURE_CODE_MAX\)", ""),
     "depends on one pressure": (
         r"\(int32_t\)p_a_adc - \(int32_t\)p_b_adc",
         "(int32_t)p_a_adc - (int32_t)(p_b_adc & 4094u)",
@@ -216,3 +217,14 @@ def test_what_could_not_be_checked_is_not_passed(tmp_path):
     result = verify(tmp_path / "fw", sequence=QUICK)
     assert [check.holds for check in result.checks if "zero command in" in check.name] == [None]
     assert not result.holds and result.document["holds"] is False
+
+
+def test_a_span_that_ends_at_the_tested_pressure_can_be_verified(example_valve, tmp_path):
+    from dzdesign.codegen.project import generate
+    from dzdesign.design.designing import DesignOptions, design
+    from dzdesign.design.signals import Signals
+
+    options = DesignOptions(signals=Signals(pressure_span_MPa=Fraction(51, 10)))
+    firmware = generate(design(example_valve, options), "f28335")
+    write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
+    assert verify(tmp_path / "fw", sequence=QUICK).holds

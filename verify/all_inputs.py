@@ -229,7 +229,10 @@ def _bad_fallbacks(core: CompiledCore, exact: ExactLaw) -> int:
     (safe,) = np.stack(list(exact.rows([exact.beta(-exact.pressure_max)])), axis=1)
     bad = 0
     for outside in (exact.pressure_max + 1, OUTSIDE):
-        for pair in ((outside, 0), (0, outside), (outside, outside), (outside, exact.pressure_max)):
-            bad += int(np.count_nonzero(core.column(*pair, commands).astype(np.int64) != safe))
-    beyond = core.column(0, 0, OUTSIDE + 1)[commands:]
-    return bad + int(np.count_nonzero(beyond))
+        for inside in (0, 1, exact.pressure_max // 2, exact.pressure_max):
+            for pair in ((outside, inside), (inside, outside)):
+                bad += int(np.count_nonzero(core.column(*pair, commands).astype(np.int64) != safe))
+        bad += int(np.count_nonzero(core.column(outside, outside, commands).astype(np.int64) != safe))
+    for pair in ((0, 0), (exact.pressure_max, 0), (0, exact.pressure_max), (exact.pressure_max, exact.pressure_max)):
+        bad += int(np.count_nonzero(core.column(*pair, OUTSIDE + 1)[commands:]))
+    return bad

@@ -139,15 +139,16 @@ class ClosedLoop:
         # Of this run alone, so that runs may go on side by side (ctypes lets go of the interpreter's lock).
         work = np.zeros(self._work_sizes[0]), np.zeros(self._work_sizes[1], dtype=np.int64)
         span, code_max, compare_max = self._scalings
-        if supply_MPa + BACK_PRESSURE_MPA > span:
-            raise InputError(f"{supply_MPa:g} MPa and the back pressure of {BACK_PRESSURE_MPA:g} MPa exceed the sensor")
+        back_MPa = min(BACK_PRESSURE_MPA, span - supply_MPa)
+        if back_MPa < 0:
+            raise InputError(f"a pressure drop of {supply_MPa:g} MPa exceeds the sensors' span of {span:g} MPa")
         pointer = [array.ctypes.data_as(ctypes.c_void_p) for array in (command, *work, state, record)]
         self._library.dz_loop(
             ctypes.c_int32(command.size),
             ctypes.c_int32(PERIODS_PER_RECORD),
             ctypes.c_int32(MODES[mode]),
             pointer[0],
-            *(ctypes.c_double(value) for value in (supply_MPa, BACK_PRESSURE_MPA, dp_frozen_MPa, span)),
+            *(ctypes.c_double(value) for value in (supply_MPa, back_MPa, dp_frozen_MPa, span)),
             ctypes.c_int32(code_max),
             ctypes.c_double(compare_max),
             *pointer[1:],
