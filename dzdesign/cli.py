@@ -14,7 +14,7 @@ from typing import NoReturn
 from dzdesign import __version__
 from dzdesign.core.errors import DzdesignError, InputError, RequirementError, nearest, one_line
 
-DOES_NOT_HOLD, BAD_INPUT, INTERRUPTED = 1, 2, 130
+DOES_NOT_HOLD, BAD_INPUT, INTERRUPTED, PIPE_CLOSED = 1, 2, 130, 141
 
 #: Command -> (one line of help, function that runs it, its options). An option is (names, keywords of add_argument).
 Option = tuple[tuple[str, ...], dict]
@@ -196,4 +196,4 @@ def main(argv: list[str] | None = None) -> int:
         return INTERRUPTED
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return DOES_NOT_HOLD
+        return PIPE_CLOSED

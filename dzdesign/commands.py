@@ -63,8 +63,9 @@ def _optional(text: str | None, quantity: str, option: str) -> float | None:
 
 def run_identify(args: argparse.Namespace) -> int:
     """Identify a valve from ramp tests."""
-    from dzdesign.identify.identification import IdentifyOptions, identify
+    from dzdesign.identify.identification import identify
     from dzdesign.identify.model import SCHEMA
+    from dzdesign.identify.options import IdentifyOptions
     from dzdesign.identify.ramp_files import read_ramp_file
     from dzdesign.tables import print_valve
 

@@ -1,95 +1,22 @@
-"""`identify`: ramp tests in, `ValveModel` out. Reads as the pipeline: split, describe, fit, bound, law's offset."""
+"""`identify`: ramp tests in, `ValveModel` out. Reads as the pipeline: describe, fit, bound, the law's offset."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.bounds import excess_departure, find_trend, lower_bounds, staircase
-from dzdesign.identify.branches import Branch, split_branches
-from dzdesign.identify.characteristic import BranchShape, describe_branch, find_meter_floor, flow_at_top, smooth_profile
+from dzdesign.identify.described_tests import L_MIN, MPA, DescribedTest, describe_tests
 from dzdesign.identify.fit import KneeFit, fit_knees, fit_offset
 from dzdesign.identify.model import SideModel, TestResult, ValveModel, Warning_
+from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.quality import find_warnings
 from dzdesign.identify.ramp_files import RampTest
 
-MPA = 1e6
-L_MIN = 1e-3 / 60
-#: Two tests whose pressure drops differ by less than this share are the same test twice.
-SAME_PRESSURE = 0.02
-#: Pressure drops beyond these, Pa, are a wrong unit.
-SMALLEST_DP, LARGEST_DP = 1e3, 200 * MPA
-#: Commands within this share of u_max are at rest.
-AT_REST = 0.01
-#: A reading at rest below this share of the largest flow is no zero error.
-ZERO_SHARE = 2e-3
 #: dP0 names the tested pressure drop within this share of it.
 REFERENCE_TOLERANCE = 0.1
 #: dP0 of the paper, taken where the user names none: the test nearest to it.
 PAPER_DP0 = 1 * MPA
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class IdentifyOptions:
-    """Choices of the engineer, SI.
-
-    Attributes
-    ----------
-    u_max : float
-        Full command, V.
-    dp0 : float or None
-        Reference pressure drop, Pa; None takes the test nearest to 1 MPa.
-    meter_floor : float or None
-        Flow below which the meter reads zero, m³/s; None finds it in the data.
-    meter_lag : float
-        Lag of the flow meter, s.
-    meter_zero : float
-        Bound of the meter's zero error, m³/s, against which the certificate guards.
-    x_max : float or None
-        Stroke, m; with it k comes in V/mm.
-    confidence : float
-        Of all lower bounds together.
-    knee_window : tuple of float
-        Shares of the largest flow between which the characteristic is taken as straight. The lower edge is 12 %: on a
-        bent characteristic the knee moves with it, on a straight one it does not matter.
-    """
-
-    u_max: float = 10.0
-    dp0: float | None = None
-    meter_floor: float | None = None
-    meter_lag: float = 0.0
-    meter_zero: float = 0.0
-    x_max: float | None = None
-    confidence: float = 0.99
-    knee_window: tuple[float, float] = (0.12, 0.5)
-
-    def __post_init__(self) -> None:
-        if not self.u_max > 0:
-            raise InputError(f"u_max is {self.u_max} V, expected a positive command")
-        if not 0.5 <= self.confidence < 1:
-            raise InputError(f"the confidence is {self.confidence}, expected 0.5 to below 1, such as 0.99")
-        if not 0 < self.knee_window[0] < self.knee_window[1] <= 1:
-            raise InputError(f"the knee window is {self.knee_window}, expected two rising shares such as '12-50 %'")
-        for name in ("meter_floor", "meter_lag", "meter_zero"):
-            if (getattr(self, name) or 0) < 0:
-                raise InputError(f"{name} is negative, expected zero or more")
-        for name in ("dp0", "x_max"):
-            value = getattr(self, name)
-            if value is not None and not value > 0:
-                raise InputError(f"{name} is {value}, expected a positive number")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DescribedTest:
-    """One ramp test with its nominal pressure drop (Pa, None if unknown), its branches and their shapes."""
-
-    test: RampTest
-    dp: float | None
-    branches: tuple[Branch | None, Branch | None]
-    shapes: tuple[BranchShape | None, BranchShape | None]
-    q_max: float
 
 
 def identify(tests: Sequence[RampTest], options: IdentifyOptions | None = None) -> ValveModel:
@@ -113,15 +40,8 @@ def identify(tests: Sequence[RampTest], options: IdentifyOptions | None = None) 
         Where no threshold can be given, with the reason.
     """
     options = options or IdentifyOptions()
-    if not tests:
-        raise InputError("no ramp tests were given; expected at least one file")
-    zeros = [_reading_at_zero(test, options.u_max) for test in tests]
-    tests = [replace(test, q=test.q - zero) for test, zero in zip(tests, zeros, strict=True)]
-    zero_of = {test.source: zero / L_MIN for test, zero in zip(tests, zeros, strict=True) if zero}
-    split = _split_all(tests, options)
-    floor = options.meter_floor if options.meter_floor is not None else _found_floor(split, options)
-    described = _in_order_of_pressure([_describe(*item, floor=floor, options=options) for item in split])
-    _refuse_mixed_branches(described)
+    group = describe_tests(tests, options)
+    described, floor = group.tests, group.floor
     trend, change, change_se, knees, departure = _fit_with_trend(described, floor, options)
     side = _side_model(described, knees, departure, (trend, change, change_se), options)
     u_max = options.u_max
@@ -132,123 +52,13 @@ def identify(tests: Sequence[RampTest], options: IdentifyOptions | None = None) 
         meter_zero_L_min=options.meter_zero / L_MIN,
         knee_window=options.knee_window,
         positive=side,
-        warnings=_warnings(described, side, departure, zero_of, floor, options),
+        warnings=_warnings(described, side, departure, group.zero_L_min, floor, options),
         made_from=tuple((item.test.source, item.test.sha256) for item in described),
     )
 
 
-def _reading_at_zero(test: RampTest, u_max: float) -> float:
-    """Return what the meter reads at zero command where that is not zero, m³/s: its zero error, or a leak.
-
-    Thousands of readings at rest tell it far better than any declared bound; 0 is returned where it does not stand out.
-    """
-    rest = test.q[(test.u >= -AT_REST * u_max) & (test.u <= AT_REST * u_max)]
-    if rest.size < 20:
-        return 0.0
-    zero = float(np.median(rest))
-    error = 1.4826 * float(np.median(np.abs(rest - zero))) / np.sqrt(rest.size)
-    return zero if abs(zero) > max(5 * error, ZERO_SHARE * float(np.abs(test.q).max())) else 0.0
-
-
-def _split_all(
-    tests: Sequence[RampTest], options: IdentifyOptions
-) -> list[tuple[RampTest, tuple[Branch | None, Branch | None]]]:
-    """Split every test into branches; refuse what has no ramp, too large a command, or no flow."""
-    split = []
-    for test in tests:
-        top = float(test.u.max())
-        if top > 1.05 * options.u_max:
-            raise InputError(
-                f"'{test.source}': the command reaches {top:.2f} V, above u_max = {options.u_max:g} V; give --u-max"
-            )
-        branches = split_branches(test, options.meter_lag)
-        if branches == (None, None):
-            raise InputError(f"'{test.source}' holds no ramp of the command from near zero up; expected a ramp test")
-        if test.dp is None and len(tests) > 1:
-            raise InputError(
-                f"'{test.source}' has no column of dP (or pA and pB); several ramp tests can only be told apart by it"
-            )
-        split.append((test, branches))
-        _refuse_a_shut_valve(test, branches, options.u_max)
-    return split
-
-
-def _refuse_a_shut_valve(test: RampTest, branches: tuple[Branch | None, Branch | None], u_max: float) -> None:
-    """Refuse a test whose flow at full command does not stand out of the meter's noise."""
-    for branch in branches:
-        if branch is None:
-            continue
-        bottom = branch.q[branch.u <= branch.u.min() + 0.05 * np.ptp(branch.u)]
-        noise = 1.4826 * float(np.median(np.abs(bottom - np.median(bottom))))
-        rise = flow_at_top(*smooth_profile(branch.u, branch.q, u_max)) - float(np.median(bottom))
-        if rise <= max(6 * noise, 0.01 * L_MIN):
-            raise InputError(
-                f"'{test.source}': the valve never opens: the flow at {branch.u.max():.2f} V is "
-                f"{rise / L_MIN:.3f} L/min above that at zero, within the meter's noise of {noise / L_MIN:.3f} L/min; "
-                "check the solenoid, the supply and the column of Q"
-            )
-
-
-def _found_floor(split: list[tuple[RampTest, tuple[Branch | None, Branch | None]]], options: IdentifyOptions) -> float:
-    """Return the largest meter floor that any branch shows (one meter, so one floor), m³/s."""
-    return max(
-        find_meter_floor(branch.u, branch.q, options.u_max)
-        for _, branches in split
-        for branch in branches
-        if branch is not None
-    )
-
-
-def _describe(
-    test: RampTest, branches: tuple[Branch | None, Branch | None], *, floor: float, options: IdentifyOptions
-) -> DescribedTest:
-    """Bring the flow to the nominal pressure drop, sample by sample, and describe both branches."""
-    dp = None
-    shapes = []
-    q_max = 0.0
-    if test.dp is not None:
-        # Nominal is the pressure drop at (almost) no flow, which the supply's droop has not touched.
-        shut = test.dp[(test.u >= 0) & (test.u <= 0.05 * options.u_max)]
-        dp = float(np.median(shut if shut.size >= 5 else test.dp))
-        if 0 < dp < SMALLEST_DP or dp > LARGEST_DP:
-            raise InputError(
-                f"'{test.source}': the pressure drop is {dp / MPA:.3g} MPa, expected {SMALLEST_DP / MPA:g} to "
-                f"{LARGEST_DP / MPA:g} MPa; correct the unit in the header (mPa is a thousandth of a pascal)"
-            )
-        if dp <= 0:
-            raise InputError(
-                f"'{test.source}': the pressure drop is {dp / MPA:.3f} MPa, expected a positive one; "
-                "swap pA and pB, or correct the sign of dP"
-            )
-    for branch in branches:
-        if branch is None:
-            shapes.append(None)
-            continue
-        # Eq. (1): Q grows as sqrt(dP); below a tenth of the nominal pressure the ratio would only carry noise.
-        y = branch.q if dp is None else branch.q * np.sqrt(dp / np.maximum(branch.dp, 0.1 * dp))
-        shapes.append(
-            describe_branch(branch, y, u_max=options.u_max, floor=floor, window=options.knee_window, source=test.source)
-        )
-        q_max = max(q_max, flow_at_top(*smooth_profile(branch.u, branch.q, options.u_max)))
-    return DescribedTest(test=test, dp=dp, branches=branches, shapes=(shapes[0], shapes[1]), q_max=q_max)
-
-
-def _in_order_of_pressure(described: list[DescribedTest]) -> list[DescribedTest]:
-    """Sort by pressure drop; refuse two tests at one pressure drop."""
-    if len(described) < 2:
-        return described
-    described = sorted(described, key=lambda item: (item.dp, item.test.source))
-    for left, right in pairwise(described):
-        if right.dp - left.dp < SAME_PRESSURE * right.dp:
-            raise InputError(
-                f"the pressure drop repeats: '{left.test.source}' ({left.dp / MPA:.3f} MPa) and "
-                f"'{right.test.source}' ({right.dp / MPA:.3f} MPa); give one ramp test per pressure drop"
-            )
-    return described
-
-
 def _fit_with_trend(
-    described: list[DescribedTest], floor: float, options: IdentifyOptions
+    described: tuple[DescribedTest, ...], floor: float, options: IdentifyOptions
 ) -> tuple[str, float, float, KneeFit, np.ndarray]:
     """Fit the knees freely, see which way they run, and fit them again under that direction.
 
@@ -273,24 +83,13 @@ def _fit_with_trend(
     return trend, change, change_se, knees, excess_departure(departure, knee_se, options.u_max)
 
 
-def _guarded_column(described: list[DescribedTest]) -> int:
+def _guarded_column(described: tuple[DescribedTest, ...]) -> int:
     """Return 1 (the falling branch) wherever there is one, else 0: zero command comes after closing."""
     return 1 if described[0].shapes[1] else 0
 
 
-def _refuse_mixed_branches(described: list[DescribedTest]) -> None:
-    """Refuse tests of which some have a branch that others lack: they can't be compared."""
-    for column, name in ((0, "rising"), (1, "falling")):
-        lacking = [item.test.source for item in described if item.shapes[column] is None]
-        if lacking and len(lacking) < len(described):
-            raise InputError(
-                f"'{lacking[0]}' has no {name} branch while other ramp tests have one; "
-                "record every pressure drop up and down, or leave that file out"
-            )
-
-
 def _guard(
-    described: list[DescribedTest], knees: KneeFit, departure: np.ndarray, options: IdentifyOptions
+    described: tuple[DescribedTest, ...], knees: KneeFit, departure: np.ndarray, options: IdentifyOptions
 ) -> tuple[str, np.ndarray, np.ndarray, np.ndarray]:
     """Return which branch is guarded, its thresholds, standard errors and lower bounds (V), all (T,).
 
@@ -316,7 +115,7 @@ def _guard(
     )
 
 
-def _reference(described: list[DescribedTest], dp0: float | None) -> int:
+def _reference(described: tuple[DescribedTest, ...], dp0: float | None) -> int:
     """Return the index of the test at dP0."""
     if described[0].dp is None:
         if dp0 is not None:
@@ -333,7 +132,7 @@ def _reference(described: list[DescribedTest], dp0: float | None) -> int:
 
 
 def _side_model(
-    described: list[DescribedTest],
+    described: tuple[DescribedTest, ...],
     knees: KneeFit,
     departure: np.ndarray,
     trend: tuple[str, float, float],
@@ -398,7 +197,7 @@ def _test_result(item: DescribedTest, knees: KneeFit, row: int, guard: float, bo
 
 
 def _warnings(
-    described: list[DescribedTest],
+    described: tuple[DescribedTest, ...],
     side: SideModel,
     departure: np.ndarray,
     zero_of: dict[str, float],

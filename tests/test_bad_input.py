@@ -327,7 +327,7 @@ COMPENSATORS = [
     (("u_max_V",), [10, 0], "'u_max_V' is [10, 0], expected a positive denominator"),
     (("u_max_V",), [10], "'u_max_V' has 1 items, expected 2"),
     (("u_max_V",), 10.0, "'u_max_V' is 10.0, expected a list"),
-    (("u_max_V",), [-10, 1], "expected a positive command"),
+    (("u_max_V",), [-10, 1], "is not that of its valve"),
     (("k_x_max_over_u_max", 0), 10**70, "'k_x_max_over_u_max[0]' is 1000"),
     (("k_x_max_over_u_max", 0), -1, "k x_max/u_max must be positive"),
     (("k_x_max_over_u_max", 1), -(2**16), "expected a positive denominator"),

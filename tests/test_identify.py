@@ -11,8 +11,9 @@ from dzdesign.core.errors import InputError
 from dzdesign.identify.bounds import find_trend, lower_bounds, staircase
 from dzdesign.identify.branches import bin_branch, split_branches, sweep_direction
 from dzdesign.identify.characteristic import find_meter_floor
-from dzdesign.identify.identification import IdentifyOptions, identify
+from dzdesign.identify.identification import identify
 from dzdesign.identify.model import valve_from_document
+from dzdesign.identify.options import IdentifyOptions
 
 PRESSURES = (0.5, 1.0, 2.0, 3.0, 5.0)
 

@@ -1,0 +1,55 @@
+"""Choices of the engineer for an identification."""
+
+from dataclasses import dataclass
+
+from dzdesign.core.errors import InputError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class IdentifyOptions:
+    """Choices of the engineer, SI.
+
+    Attributes
+    ----------
+    u_max : float
+        Full command, V.
+    dp0 : float or None
+        Reference pressure drop, Pa; None takes the test nearest to 1 MPa.
+    meter_floor : float or None
+        Flow below which the meter reads zero, m³/s; None finds it in the data.
+    meter_lag : float
+        Lag of the flow meter, s.
+    meter_zero : float
+        Bound of the meter's zero error, m³/s, against which the certificate guards.
+    x_max : float or None
+        Stroke, m; with it k comes in V/mm.
+    confidence : float
+        Of all lower bounds together.
+    knee_window : tuple of float
+        Shares of the largest flow between which the characteristic is taken as straight. The lower edge is 12 %: on a
+        bent characteristic the knee moves with it, on a straight one it does not matter.
+    """
+
+    u_max: float = 10.0
+    dp0: float | None = None
+    meter_floor: float | None = None
+    meter_lag: float = 0.0
+    meter_zero: float = 0.0
+    x_max: float | None = None
+    confidence: float = 0.99
+    knee_window: tuple[float, float] = (0.12, 0.5)
+
+    def __post_init__(self) -> None:
+        if not self.u_max > 0:
+            raise InputError(f"u_max is {self.u_max} V, expected a positive command")
+        if not 0.5 <= self.confidence < 1:
+            raise InputError(f"the confidence is {self.confidence}, expected 0.5 to below 1, such as 0.99")
+        if not 0 < self.knee_window[0] < self.knee_window[1] <= 1:
+            raise InputError(f"the knee window is {self.knee_window}, expected two rising shares such as '12-50 %'")
+        for name in ("meter_floor", "meter_lag", "meter_zero"):
+            if (getattr(self, name) or 0) < 0:
+                raise InputError(f"{name} is negative, expected zero or more")
+        for name in ("dp0", "x_max"):
+            value = getattr(self, name)
+            if value is not None and not value > 0:
+                raise InputError(f"{name} is {value}, expected a positive number")
