@@ -90,3 +90,19 @@ def test_derive_prints_every_equation_and_holds(capsys):
     out = capsys.readouterr().out
     for number in range(8, 19):
         assert f"({number})" in out
+
+
+def test_a_wrong_equation_makes_derive_fail(capsys, monkeypatch):
+    """Feed a doubled compensation signal (13): its own verdict turns, and the exit status with it."""
+    from dataclasses import replace
+
+    from dzdesign.derivation import equations
+
+    right = equations.verify_equations
+    wrong = [
+        replace(one, members=tuple(2 * member for member in one.members)) if one.number == "(13)" else one
+        for one in equations.EQUATIONS
+    ]
+    monkeypatch.setattr(equations, "verify_equations", lambda: right(wrong))
+    assert main(["derive"]) == 1
+    assert "does not follow" in capsys.readouterr().out
