@@ -34,6 +34,8 @@ COLUMN_NAMES = {
 QUANTITY_OF_COLUMN = {"time": "time", "u": "voltage", "dP": "pressure", "pA": "pressure", "pB": "pressure", "Q": "flow"}
 #: How a column is best named, for the messages.
 EXAMPLE_LABELS = {"time": "time_s", "u": "u_V", "dP": "dP_MPa", "pA": "pA_MPa", "pB": "pB_MPa", "Q": "Q_Lmin"}
+#: Units of a command that is a share of u_max.
+PER_CENT = ("%", "pct", "percent")
 #: Fewest complete rows in which two branches with a threshold could stand.
 MIN_ROWS = 20
 #: Joins the cells of a line inside: no cell of a text file holds it.
@@ -211,7 +213,9 @@ def _read_header(lines: Lines, path: Path) -> tuple[dict[str, tuple[str, str]], 
         quantity, unit = split_label(label)
         if quantity is None:
             continue
-        if quantity in columns:
+        if quantity in columns and not _fits(unit, quantity):
+            continue  # an oil temperature T_degC beside the time t_s, a set point Q_set beside Q_Lmin
+        if quantity in columns and _fits(columns[quantity][1], quantity):
             raise InputError(
                 f"'{path}' row {number} has two columns of {quantity}: '{columns[quantity][0]}' and '{label}'; "
                 "keep one, or give the other another name"
@@ -239,6 +243,11 @@ def _missing_column(quantity: str, labels: list[str], columns: Collection[str], 
         f"'{path}' has no column of {quantity} (columns found: {found}){hint}; "
         "expected names with units such as time_s,u_V,dP_MPa,Q_Lmin"
     )
+
+
+def _fits(unit: str, column: str) -> bool:
+    """Tell whether a column of that kind may be in that unit."""
+    return _measures(unit, QUANTITY_OF_COLUMN[column]) or (column == "u" and unit.lower() in PER_CENT)
 
 
 def _measures(unit: str, quantity: str) -> bool:
@@ -301,7 +310,7 @@ def _factor(name: str, unit: str, label: str, u_max: float, path: Path) -> float
     if not unit:
         raise InputError(f"'{path}' column '{label}' has no unit; write for example {EXAMPLE_LABELS[name]}")
     try:
-        if name == "u" and unit.lower() in ("%", "pct", "percent"):
+        if name == "u" and unit.lower() in PER_CENT:
             return u_max * si_factor(unit, "ratio")
         return si_factor(unit, QUANTITY_OF_COLUMN[name])
     except InputError as error:

@@ -275,3 +275,17 @@ def test_gzip_with_a_changed_byte_is_refused(refusal):
         changed = content.copy()
         changed[place] ^= 0x10
         assert "gzip" in refusal(bytes(changed))
+
+
+@pytest.mark.parametrize("header", ["t_s,u_V,dP_MPa,Q_Lmin,T_degC,Q_set", "T_degC,t_s,u_V,dP_MPa,Q_Lmin,Q_set"])
+def test_a_column_of_another_kind_with_the_same_letter_is_left_alone(header, tmp_path):
+    names = header.split(",")
+    rows = []
+    for index in range(60):
+        value = {"t_s": index, "u_V": index / 6, "dP_MPa": 1, "Q_Lmin": index, "T_degC": 40, "Q_set": 7}
+        rows.append(",".join(str(value[name]) for name in names))
+    path = tmp_path / "ramp.csv"
+    path.write_text("\n".join([header, *rows]) + "\n")
+    test = read_ramp_file(path)
+    assert test.time[-1] == 59
+    assert test.q[-1] * 60000 == pytest.approx(59)
