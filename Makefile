@@ -3,8 +3,9 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
+DOCS   := docs/derivation
 
-.PHONY: demo test lint lock clean
+.PHONY: demo test lint docs lock clean
 
 demo: $(STAMP)
 	$(BIN)/dzdesign demo demo
@@ -14,6 +15,13 @@ test: lint
 
 lint: $(STAMP)
 	$(BIN)/ruff check .
+
+# The account of the paper as a page, for LaTeX and for machines; built, never committed.
+docs: $(STAMP)
+	mkdir -p $(DOCS)
+	$(BIN)/dzdesign derive --format html -o $(DOCS)/index.html
+	$(BIN)/dzdesign derive --format latex -o $(DOCS)/derivation.tex
+	$(BIN)/dzdesign derive --format json -o $(DOCS)/derivation.json
 
 $(STAMP): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit("dzdesign needs Python 3.11 or newer; this is " + sys.version.split()[0] + ". Try: make PYTHON=python3.12") if sys.version_info < (3, 11) else None'
@@ -28,4 +36,4 @@ lock:
 	    --generate-hashes --no-annotate --no-header --quiet --upgrade -o requirements.lock
 
 clean:
-	rm -rf $(VENV) build *.egg-info .pytest_cache .ruff_cache
+	rm -rf $(VENV) $(DOCS) build *.egg-info .pytest_cache .ruff_cache

@@ -10,11 +10,11 @@ multiplication by a reciprocal that is proved exact for every dividend that can 
 """
 
 from dataclasses import dataclass
-from fractions import Fraction
 from math import lcm
 
 from dzdesign.core.errors import InputError
 from dzdesign.derivation.law import law
+from dzdesign.derivation.scaling import Line, evaluate_line
 from dzdesign.design.compensator import Compensator
 
 INT32_MAX = 2**31 - 1
@@ -72,14 +72,23 @@ def integer_form(compensator: Compensator) -> IntegerForm:
     c = compensator
     command_max, compare_max = c.signals.command_code_max, c.signals.compare_max
     chosen = law(c.law_name)
-    # Eq. (18) is affine in beta: u_O/u_max = beta (g1 x + u_min0/u_max) + g0 x.
-    g0 = chosen.evaluate_gain(Fraction(0), c.k_x_max_over_u_max)
-    g1 = chosen.evaluate_gain(Fraction(1), c.k_x_max_over_u_max) - g0
-    o1 = chosen.evaluate_offset(Fraction(1), c.u_min0_over_u_max)
+
+    def line(beta: int) -> Line:
+        return evaluate_line(
+            chosen,
+            beta=beta,
+            kappa=c.k_x_max_over_u_max,
+            u_min0_over_u_max=c.u_min0_over_u_max,
+            n_adc=command_max,
+            n_full=compare_max,
+        )
+
+    # Eq. (18) is affine in beta: in counts it is beta (per_command c + constant) + plain c.
+    without, whole = line(beta=0), line(beta=1)
     beta_unit = c.beta_denominator * c.beta_step_codes
-    per_command = g1 * compare_max / command_max / beta_unit
-    constant = o1 * compare_max / beta_unit
-    plain = g0 * compare_max / command_max
+    per_command = (whole.slope - without.slope) / beta_unit
+    constant = (whole.start - without.start) / beta_unit
+    plain = without.slope
     common = lcm(per_command.denominator, constant.denominator, plain.denominator)
     divisor = common
     shift = 0

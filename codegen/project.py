@@ -96,7 +96,7 @@ def core_context(compensator: Compensator, form: IntegerForm) -> dict[str, str |
     """Return the flat plan of printed strings for the core's templates."""
     chosen, signals = law(compensator.law_name), compensator.signals
     scale = form.table[0] // compensator.beta_numerators[0] * compensator.beta_denominator
-    reverse = signals.pressure_span_MPa * compensator.reverse_codes / signals.pressure_code_max
+    reverse = signals.dp_MPa(compensator.reverse_codes)
     largest = ((1 << form.reciprocal_shift) - 1) // max(
         1, form.reciprocal * form.divisor - (1 << form.reciprocal_shift)
     )

@@ -1,8 +1,8 @@
-"""Derivation: the paper's premises enter; re-derived equations with verdicts, and the law, leave.
+"""Derivation: the paper's equations and the theorems enter; verdicts with their derivations, and the law, leave.
 
-The law (14)/(18) is stated here once (`law.py`); design, codegen's documentation and verify take it from
-here. `proof.py` judges statements and may not know any; new ones go into `premises.py`, `equations.py` or
-`theorems.py`.
+`law.py`, `scaling.py` and `plant.py` state once what design, codegen and verify compute by, and `lowering.py` turns it
+into functions. `proof.py` judges statements and may not know any; a new one goes beside its like, and `account.py` puts
+all of them in order.
 """
 
 if __name__ != "dzdesign.derivation":

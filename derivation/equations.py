@@ -1,14 +1,8 @@
-"""Eqs. (3), (8)-(10) and (12)-(18), transcribed once, each with the premises from which it is to follow.
-
-`EQUATIONS` is the whole argument in an order in which each statement stands after those it rests on.
-"""
-
-from collections.abc import Sequence
+"""Eqs. (1)-(18), transcribed once: what the paper starts from, and what it derives from that."""
 
 import sympy
 
-from dzdesign.derivation.premises import PREMISES
-from dzdesign.derivation.proof import Equation, Ground, Kind, Verdict, prove
+from dzdesign.derivation.statement import Ground, Kind, Statement
 from dzdesign.derivation.symbols import (
     K_0,
     K_1,
@@ -23,6 +17,7 @@ from dzdesign.derivation.symbols import (
     dP,
     dP0,
     dP1,
+    f,
     gamma_0,
     gamma_1,
     headroom,
@@ -34,20 +29,65 @@ from dzdesign.derivation.symbols import (
     u_max,
     u_min,
     u_min0,
+    u_min1,
     u_no,
     u_O,
     x,
     x_max,
 )
-from dzdesign.derivation.theorems import THEOREMS
 
-_AT_REFERENCE = (
-    Equation(
+_ORIFICE = C_d * W * sympy.sqrt(2 * dP / rho)
+
+#: Section 1 up to Eq. (7), with the readings of its figures that the rest needs.
+APPROACH = (
+    Statement(
+        number="(1)",
+        title="dead-zone model",
+        kind=Kind.PREMISE,
+        symbol=Q,
+        members=(
+            sympy.Piecewise(
+                (-_ORIFICE * x, sympy.And(-u_max <= u_i, u_i <= -u_min)),
+                (0, sympy.And(-u_min < u_i, u_i < u_min)),
+                (_ORIFICE * x, sympy.And(u_min <= u_i, u_i <= u_max)),
+            ),
+        ),
+        see=("T6d",),
+        note="x is the opening of the edge, not the travel of the spool: x = 0 at the threshold. u_i is the valve's "
+        "input; behind a compensator that is its output u_O.",
+    ),
+    Statement(
+        number="Fig. 3, line",
+        title="target line through (0, 0) and (u_max, Q_max)",
+        kind=Kind.ASSUMPTION,
+        symbol=Q_O,
+        members=(Q_max / u_max * u_i,),
+        see=("T7d",),
+        note="Read off the figure and the text below Eq. (1); the abstract ends the line elsewhere.",
+    ),
+    Statement(
+        number="K_e",
+        title="output flow gain: flow per command",
+        kind=Kind.DEFINITION,
+        symbol=K_e,
+        members=(Q_O / u_i,),
+        note="The words below Eq. (2).",
+    ),
+    Statement(
+        number="(2)",
+        title="flow gain of the target line",
+        kind=Kind.PAPER,
+        symbol=K_e,
+        members=(Q_max / u_max,),
+        grounds=(Ground(number="K_e"), Ground(number="Fig. 3, line")),
+        eliminate=(Q_O,),
+    ),
+    Statement(
         number="Q_max",
         title="maximum flow (text below Eq. 2)",
         kind=Kind.PAPER,
         symbol=Q_max,
-        members=(C_d * W * x_max * sympy.sqrt(2 * dP / rho),),
+        members=(_ORIFICE * x_max,),
         grounds=(
             Ground(
                 number="(1)",
@@ -56,16 +96,65 @@ _AT_REFERENCE = (
             ),
         ),
     ),
-    Equation(
+    Statement(
         number="(3)",
         title="flow gain by the orifice equation",
         kind=Kind.PAPER,
         symbol=K_e,
-        members=(C_d * W * x_max * sympy.sqrt(2 * dP / rho) / u_max,),
+        members=(_ORIFICE * x_max / u_max,),
         grounds=(Ground(number="(2)"), Ground(number="Q_max")),
         eliminate=(Q_max,),
+        see=("T7b",),
+        note="With C_d constant (Assumption 2).",
     ),
-    Equation(
+    Statement(
+        number="(4)",
+        title="threshold over pressure drop",
+        kind=Kind.PREMISE,
+        symbol=u_min,
+        members=(f(dP),),
+        see=("T9b", "T9c"),
+        note="f is fitted to the ramp tests by least squares. The temperature does not enter (Assumption 1).",
+    ),
+    Statement(
+        number="(5)",
+        title="correction coefficient at dP1",
+        kind=Kind.PREMISE,
+        symbol=beta,
+        members=(u_min1 / u_min0,),
+        see=("T3b", "T9c"),
+    ),
+    Statement(
+        number="(6)",
+        title="compensation above the reference",
+        kind=Kind.PREMISE,
+        symbol=u_no,
+        members=(beta * u_0,),
+        see=("T1c", "(6c)"),
+        corrected_by="(6c)",
+        note="The paper's choice. It scales the whole compensation signal; the target asks for less: (6c).",
+    ),
+    Statement(
+        number="(7)",
+        title="selector",
+        kind=Kind.PREMISE,
+        symbol=u_no,
+        members=(sympy.Piecewise((beta * u_0, dP1 > dP0), (u_0, dP1 <= dP0)),),
+        see=("T4b", "T4c"),
+        note="Contains (6).",
+    ),
+)
+
+#: Section 1.1.
+AT_REFERENCE = (
+    Statement(
+        number="gamma_0",
+        title="flow per opening at dP0 (text below Eq. 8)",
+        kind=Kind.DEFINITION,
+        symbol=gamma_0,
+        members=(C_d * W * sympy.sqrt(2 * dP0 / rho),),
+    ),
+    Statement(
         number="(8)",
         title="flow gain at the reference",
         kind=Kind.PAPER,
@@ -76,8 +165,9 @@ _AT_REFERENCE = (
             Ground(number="gamma_0"),
         ),
         eliminate=(gamma_0,),
+        note="x_max does not depend on dP (Assumption 3).",
     ),
-    Equation(
+    Statement(
         number="(9)",
         title="wanted flow at the reference",
         kind=Kind.PAPER,
@@ -85,8 +175,9 @@ _AT_REFERENCE = (
         members=(K_0 * u_i,),
         grounds=(Ground(number="Fig. 3, line"), Ground(number="(2)", at=((K_e, K_0),), where="at dP = dP0")),
         eliminate=(Q_max,),
+        see=("T1a",),
     ),
-    Equation(
+    Statement(
         number="(10)",
         title="opening that passes the wanted flow",
         kind=Kind.PAPER,
@@ -106,7 +197,32 @@ _AT_REFERENCE = (
             ),
         ),
     ),
-    Equation(
+    Statement(
+        number="(11)",
+        title="opening in proportion to the command beyond the threshold",
+        kind=Kind.ASSUMPTION,
+        symbol=u_i_prime,
+        members=(k * x,),
+        see=("T2b", "T8a"),
+        note="The paper calls it approximately linear; it holds up to the spool's stop.",
+    ),
+    Statement(
+        number="Fig. 3, command",
+        title="command at which the valve passes the wanted flow",
+        kind=Kind.ASSUMPTION,
+        symbol=u_O,
+        members=(u_i_prime + u_min0,),
+        note="Read off the figure: u_i' is the part of the command that opens the edge.",
+    ),
+    Statement(
+        number="u_O",
+        title="output of the compensator: compensation signal plus input",
+        kind=Kind.DEFINITION,
+        symbol=u_O,
+        members=(u_0 + u_i,),
+        note="Eqs. (14) and (18) print u_0 on both sides; the left one is the output u_O.",
+    ),
+    Statement(
         number="(12)",
         title="compensation signal in Fig. 3",
         kind=Kind.PAPER,
@@ -115,16 +231,16 @@ _AT_REFERENCE = (
         grounds=(Ground(number="Fig. 3, command"), Ground(number="u_O")),
         eliminate=(u_O,),
     ),
-    Equation(
+    Statement(
         number="(13)",
         title="compensation signal at the reference",
         kind=Kind.PAPER,
         symbol=u_0,
         members=((k * x_max / u_max - 1) * u_i + u_min0,),
-        grounds=tuple(Ground(number=number) for number in ("(8)", "gamma_0", "(9)", "(10)", "(11)", "(12)")),
-        eliminate=(K_0, gamma_0, Q_O, x, u_i_prime),
+        grounds=tuple(Ground(number=number) for number in ("(12)", "(11)", "(10)", "(9)", "(8)", "gamma_0")),
+        eliminate=(u_i_prime, x, Q_O, K_0, gamma_0),
     ),
-    Equation(
+    Statement(
         number="(14)",
         title="law at the reference",
         kind=Kind.PAPER,
@@ -132,12 +248,21 @@ _AT_REFERENCE = (
         members=(u_0 + u_i, k * x_max / u_max * u_i + u_min0),
         grounds=(Ground(number="u_O"), Ground(number="(13)")),
         eliminate=(u_0,),
+        see=("T1a", "T2b"),
         note="Printed with u_0 on the left, which is the output u_O.",
     ),
 )
 
-_OFF_REFERENCE = (
-    Equation(
+#: Section 1.2.
+OFF_REFERENCE = (
+    Statement(
+        number="gamma_1",
+        title="flow per opening at dP1 (text below Eq. 15)",
+        kind=Kind.DEFINITION,
+        symbol=gamma_1,
+        members=(C_d * W * sympy.sqrt(2 * dP1 / rho),),
+    ),
+    Statement(
         number="(15)",
         title="flow gain off the reference",
         kind=Kind.PAPER,
@@ -148,8 +273,10 @@ _OFF_REFERENCE = (
             Ground(number="gamma_1"),
         ),
         eliminate=(gamma_1,),
+        see=("T7a", "T7c"),
+        note="The published maxima contradict it: they grow far more slowly with dP.",
     ),
-    Equation(
+    Statement(
         number="(16)",
         title="wanted flow off the reference",
         kind=Kind.PAPER,
@@ -160,10 +287,11 @@ _OFF_REFERENCE = (
             Ground(number="(2)", at=((K_e, K_1),), where="at dP = dP1"),
         ),
         eliminate=(Q_max,),
-        note="Fig. 3 draws the line at the reference; (16) takes it to hold at dP1 too, as the target. "
-        "The flow that Eq. (18) gives there is another: see B5.",
+        see=("T1c", "T1d"),
+        note="As a target. Fig. 3 draws the line at the reference; (16) takes it to hold at dP1 too. As a claim about "
+        "the valve under Eq. (18) it does not follow: T1c.",
     ),
-    Equation(
+    Statement(
         number="(17)",
         title="compensation signal off the reference",
         kind=Kind.PAPER,
@@ -172,7 +300,7 @@ _OFF_REFERENCE = (
         grounds=(Ground(number="(6)"), Ground(number="(13)")),
         eliminate=(u_0,),
     ),
-    Equation(
+    Statement(
         number="(18)",
         title="law off the reference",
         kind=Kind.PAPER,
@@ -180,34 +308,7 @@ _OFF_REFERENCE = (
         members=(u_no + u_i, (beta * k * x_max / u_max - beta + 1) * u_i + beta * u_min0),
         grounds=(Ground(number="u_O", at=((u_0, u_no),), where="with u_no for u_0"), Ground(number="(17)")),
         eliminate=(u_no,),
+        see=("T1b", "T1c", "T3a", "T4a"),
         note="Printed with u_0 on the left, which is the output u_O.",
     ),
 )
-
-EQUATIONS = PREMISES + _AT_REFERENCE + _OFF_REFERENCE + THEOREMS
-
-
-def verify_equations(equations: Sequence[Equation] = EQUATIONS) -> tuple[Verdict, ...]:
-    """Derive each equation from the premises that it names.
-
-    Parameters
-    ----------
-    equations : sequence of Equation, optional
-        Statements, each after those it rests on.
-
-    Returns
-    -------
-    tuple of Verdict
-        One per statement, in order.
-
-    Raises
-    ------
-    RequirementError
-        If the premises of a statement are circular or missing.
-
-    Examples
-    --------
-    >>> all(verdict.holds for verdict in verify_equations())
-    True
-    """
-    return prove(equations)

@@ -8,6 +8,7 @@ from typing import Any
 import sympy
 
 from dzdesign.core.errors import InputError, nearest
+from dzdesign.derivation.lowering import lower
 from dzdesign.derivation.symbols import beta, k, kappa, u_i, u_max, u_min0, x_max
 
 _LAW_SYMBOLS = {u_i, beta, k, x_max, u_max, u_min0}
@@ -103,23 +104,14 @@ class Law:
         return _compiled_offset(self)(beta, u_min0)
 
 
-def _compile(expression: sympy.Expr, arguments: tuple[sympy.Symbol, ...]) -> Callable[..., Any]:
-    # A fraction in the formula would be printed as a float division: integers only.
-    integers = all(number.is_Integer for number in expression.atoms(sympy.Number))
-    if not integers or expression.free_symbols - set(arguments):
-        raise ValueError(f"{expression} is not an expression in {arguments} with integer coefficients")
-    # No numeric module: the printed formula is bare arithmetic, and the numbers decide what it computes in.
-    return sympy.lambdify(arguments, expression, modules=[])
-
-
 @cache
 def _compiled_gain(law: Law) -> Callable[..., Any]:
-    return _compile(law.gain.subs(k, kappa * u_max / x_max), (beta, kappa))
+    return lower(law.gain.subs(k, kappa * u_max / x_max), (beta, kappa))
 
 
 @cache
 def _compiled_offset(law: Law) -> Callable[..., Any]:
-    return _compile(law.offset, (beta, u_min0))
+    return lower(law.offset, (beta, u_min0))
 
 
 _LAWS = (

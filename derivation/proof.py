@@ -1,156 +1,112 @@
 """Proves statements from the premises that they name, and from nothing else.
 
-A statement is ``symbol = member = ... = member``. A premise has no grounds and is taken as given; anything
-else follows if its grounds, solved for the symbol, give each of its members exactly.
+A premise has no grounds and is taken as given; anything else follows if its grounds, solved for its symbol, give each
+of its members exactly. Where they do not, the difference is factored: it says on which condition they would.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from enum import StrEnum
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import sympy
 
 from dzdesign.core.errors import RequirementError
+from dzdesign.derivation.conditions import Finding, judge_condition
+from dzdesign.derivation.identity import agree
+from dzdesign.derivation.solving import solve_relations
+from dzdesign.derivation.statement import Case, Ground, Kind, Name, Outcome, Statement
+from dzdesign.derivation.steps import Relation, Step, derive_in_steps
+from dzdesign.derivation.units import find_unit_error
 
 
-class Kind(StrEnum):
-    """Where a statement comes from; the first four are taken as given."""
+@dataclass(frozen=True, kw_only=True)
+class CaseProof:
+    """The derivation of one case of a statement; most statements have a single one, without words.
 
-    PREMISE = "premise"  # an equation that the paper starts from
-    ASSUMPTION = "assumption"  # a reading of a figure, or an approximation that the paper makes
-    DEFINITION = "definition"  # the meaning of a new name
-    CHOICE = "choice"  # ours, not the paper's
-    PAPER = "paper"  # an equation that the paper derives
-    LAW = "law"  # ties the law of `law.py` to the paper's equations
-    BEYOND = "beyond the paper"  # what the paper does not say
-
-    @property
-    def is_given(self) -> bool:
-        return self in (Kind.PREMISE, Kind.ASSUMPTION, Kind.DEFINITION, Kind.CHOICE)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Ground:
-    """A statement used as a premise of another one, at certain values of its symbols.
-
-    Parameters
+    Attributes
     ----------
-    number : str
-        Number of the statement used.
-    at : tuple of (sympy.Symbol, sympy.Expr)
-        What replaces its symbols: ``((dP, dP0),)`` takes it at the reference pressure drop. Values whose
-        signs SymPy knows also decide between the cases of a piecewise statement.
+    statement : Statement
     where : str
-        The same in words.
+        The case in words.
+    derived : sympy.Expr
+        What the grounds give for the symbol.
+    discrepancies : tuple of sympy.Expr
+        Derived minus published, one per member; zero where they agree.
+    relations : tuple of Relation
+        The grounds at the values at which the case uses them.
+    solution : mapping
+        The statement's symbol and the eliminated ones, solved for.
+    reached : sympy.Expr
+        The form in which a derivation states the result: as published, or as derived where the two differ.
     """
 
-    number: str
-    at: tuple[tuple[sympy.Symbol, sympy.Expr], ...] = ()
-    where: str = ""
+    statement: Statement
+    where: str
+    derived: sympy.Expr
+    discrepancies: tuple[sympy.Expr, ...]
+    relations: tuple[Relation, ...]
+    solution: Mapping[Name, sympy.Expr]
+    reached: sympy.Expr
 
-    def __str__(self) -> str:
-        return f"{self.number} {self.where}" if self.where else self.number
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Equation:
-    """A statement as published, with the grounds from which it is to follow.
-
-    Parameters
-    ----------
-    number : str
-        The paper's number, or a name for what has none.
-    title : str
-        What it says, in words.
-    kind : Kind
-        Where it comes from.
-    symbol : sympy.Symbol
-        Left-hand side.
-    members : tuple of sympy.Expr
-        Right-hand sides ``symbol = member = ... = member``, as published. A statement that rests on this
-        one uses the last.
-    grounds : tuple of Ground
-        The premises; empty for what is taken as given.
-    eliminate : tuple of sympy.Symbol
-        Symbols of the grounds that are solved for along with `symbol`.
-    note : str
-        What a reader should know beyond the verdict.
-
-    Raises
-    ------
-    ValueError
-        If the statement defines its symbol by itself, or has grounds that do not fit its kind.
-    """
-
-    number: str
-    title: str
-    kind: Kind
-    symbol: sympy.Symbol
-    members: tuple[sympy.Expr, ...]
-    grounds: tuple[Ground, ...] = ()
-    eliminate: tuple[sympy.Symbol, ...] = ()
-    note: str = ""
-
-    def __post_init__(self) -> None:
-        if not self.members or any(member.has(self.symbol) for member in self.members):
-            raise ValueError(f"{self.number}: needs right-hand sides that are free of {self.symbol}")
-        if self.kind.is_given == bool(self.grounds):
-            wanted = "has no" if self.kind.is_given else "needs"
-            raise ValueError(f"{self.number}: a statement of kind {self.kind} {wanted} grounds")
-
-    @property
-    def published(self) -> sympy.Eq:
-        """The equation in its last published form, the one that other statements use."""
-        return sympy.Eq(self.symbol, self.members[-1], evaluate=False)
+    @cached_property
+    def steps(self) -> tuple[Step, ...]:
+        """How the grounds lead to the result, one after another."""
+        return derive_in_steps(self.relations, self.statement, self.solution, self.reached)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdict:
     """What the engine found about one statement.
 
-    Parameters
+    Attributes
     ----------
-    number, title, kind, symbol, members, grounds, note
-        As in `Equation`.
-    holds : bool
-        Whether it may be relied on; true for what is taken as given.
-    verdict : str
-        ``follows``, ``does not follow``, ``rests on ...``, or the kind of what is taken as given.
-    derived : sympy.Expr or None
-        What the grounds give for `symbol`.
-    discrepancy : sympy.Expr or None
-        Derived minus published, exactly, where they differ.
+    statement : Statement
+    outcome : Outcome
+    words : str
+        The outcome with its condition, or the reason, in words.
+    as_expected : bool
+        Whether a correct account finds this.
+    proofs : tuple of CaseProof
+        One per case; empty for what is given and for what could not be solved.
+    necessary : bool or None
+        Whether the condition was proved necessary; None where there is none.
+    inherited : tuple of str
+        Grounds that follow only on a condition, which this statement therefore needs too.
+    unit_error : str
+        What is wrong with its units; empty where they are right.
     """
 
-    number: str
-    title: str
-    kind: Kind
-    symbol: sympy.Symbol
-    members: tuple[sympy.Expr, ...]
-    grounds: tuple[Ground, ...]
-    note: str
-    holds: bool
-    verdict: str
-    derived: sympy.Expr | None = None
-    discrepancy: sympy.Expr | None = None
+    statement: Statement
+    outcome: Outcome
+    words: str
+    as_expected: bool
+    proofs: tuple[CaseProof, ...] = ()
+    necessary: bool | None = None
+    inherited: tuple[str, ...] = ()
+    unit_error: str = ""
 
     @property
-    def statement(self) -> str:
-        """The statement as plain text."""
-        return " = ".join(sympy.sstr(side) for side in (self.symbol, *self.members))
+    def number(self) -> str:
+        return self.statement.number
 
     @property
-    def premises(self) -> tuple[str, ...]:
-        """The grounds in words."""
-        return tuple(str(ground) for ground in self.grounds)
+    def holds(self) -> bool:
+        """Whether other statements may rely on it."""
+        return self.outcome is not Outcome.DOES_NOT_FOLLOW
+
+    @property
+    def discrepancy(self) -> sympy.Expr | None:
+        """The first difference between what was derived and what is published, or None."""
+        differences = (value for proof in self.proofs for value in proof.discrepancies)
+        return next((sympy.factor(value) for value in differences if value != 0), None)
 
 
-def prove(equations: Sequence[Equation]) -> tuple[Verdict, ...]:
+def prove(statements: Sequence[Statement]) -> tuple[Verdict, ...]:
     """Judge each statement from its grounds.
 
     Parameters
     ----------
-    equations : sequence of Equation
+    statements : sequence of Statement
         Premises and statements; each stands after its grounds.
 
     Returns
@@ -164,104 +120,183 @@ def prove(equations: Sequence[Equation]) -> tuple[Verdict, ...]:
         If a number appears twice, or a statement rests on itself, on a later one, on an unknown one, or on a
         copy of itself. As each statement rests on earlier ones only, no chain of premises can be circular.
     """
-    earlier: dict[str, Equation] = {}
+    earlier: dict[str, Statement] = {}
     verdicts: dict[str, Verdict] = {}
-    order = [equation.number for equation in equations]
-    for equation in equations:
-        if equation.number in earlier:
-            raise RequirementError(f"{equation.number} is stated twice")
-        _check_grounds(equation, earlier, order)
-        verdicts[equation.number] = _judge(equation, earlier, verdicts)
-        earlier[equation.number] = equation
+    order = [statement.number for statement in statements]
+    for statement in statements:
+        if statement.number in earlier:
+            raise RequirementError(f"{statement.number} is stated twice")
+        _check_grounds(statement, earlier, order)
+        verdicts[statement.number] = _with_units(judge(statement, earlier, verdicts))
+        earlier[statement.number] = statement
     return tuple(verdicts.values())
 
 
-def _check_grounds(equation: Equation, earlier: Mapping[str, Equation], order: Sequence[str]) -> None:
-    for ground in equation.grounds:
-        if ground.number == equation.number:
-            raise RequirementError(f"{equation.number} is its own premise")
+def _check_grounds(statement: Statement, earlier: Mapping[str, Statement], order: Sequence[str]) -> None:
+    for ground in statement.grounds:
+        if ground.number == statement.number:
+            raise RequirementError(f"{statement.number} is its own premise")
         if ground.number in order and ground.number not in earlier:
             raise RequirementError(
-                f"{equation.number} rests on {ground.number}, which stands after it: that may be circular"
+                f"{statement.number} rests on {ground.number}, which stands after it: that may be circular"
             )
         if ground.number not in earlier:
-            raise RequirementError(f"{equation.number} rests on {ground.number}, which is not stated")
+            raise RequirementError(f"{statement.number} rests on {ground.number}, which is not stated")
         # A tie between `law.py` and the paper compares two transcriptions, so there a copy is the point.
         # A special case of an earlier statement is a result; the statement itself is not.
         premise = earlier[ground.number]
-        is_copy = premise.symbol == equation.symbol and _agree(premise.members[-1], equation.members[-1])
-        if is_copy and equation.kind is not Kind.LAW:
-            raise RequirementError(f"{equation.number} rests on a copy of itself, {ground.number}")
+        is_copy = premise.symbol == statement.symbol and agree(premise.members[-1], statement.members[-1])
+        if is_copy and statement.kind is not Kind.LAW and ground.derivative is None:
+            raise RequirementError(f"{statement.number} rests on a copy of itself, {ground.number}")
 
 
-def _judge(equation: Equation, earlier: Mapping[str, Equation], verdicts: Mapping[str, Verdict]) -> Verdict:
-    def verdict(text: str, holds: bool = False, **found: sympy.Expr) -> Verdict:
-        return Verdict(
-            number=equation.number,
-            title=equation.title,
-            kind=equation.kind,
-            symbol=equation.symbol,
-            members=equation.members,
-            grounds=equation.grounds,
-            note=equation.note,
-            holds=holds,
-            verdict=text,
-            **found,
-        )
+def _with_units(verdict: Verdict) -> Verdict:
+    """Check the units too: what does not follow may be wrong in them, nothing else may."""
+    error = find_unit_error(verdict.statement)
+    expected = verdict.as_expected and not (error and verdict.holds)
+    return replace(verdict, unit_error=error, as_expected=expected)
 
-    if equation.kind.is_given:
-        return verdict(equation.kind.value, holds=True)
-    relations = [_relation(earlier[ground.number], ground) for ground in equation.grounds]
-    solution = _solve(relations, (equation.symbol, *equation.eliminate))
-    if isinstance(solution, str):
-        return verdict(f"does not follow: {solution}")
-    derived = solution[equation.symbol]
-    for member in equation.members:
-        published = member.xreplace(solution)
-        if not _agree(derived, published):
-            return verdict("does not follow", derived=derived, discrepancy=sympy.factor(derived - published))
-    unsound = [ground.number for ground in equation.grounds if not verdicts[ground.number].holds]
+
+def judge(statement: Statement, earlier: Mapping[str, Statement], verdicts: Mapping[str, Verdict]) -> Verdict:
+    """Judge one statement by its logic alone.
+
+    Parameters
+    ----------
+    statement : Statement
+    earlier : mapping of str to Statement
+        Its grounds, by number.
+    verdicts : mapping of str to Verdict
+        What was found about them.
+
+    Returns
+    -------
+    Verdict
+    """
+
+    def verdict(outcome: Outcome, words: str, flawed: bool = False, **found: object) -> Verdict:
+        expected = outcome is statement.expected and not flawed
+        return Verdict(statement=statement, outcome=outcome, words=words, as_expected=expected, **found)
+
+    if statement.kind.is_given:
+        return verdict(Outcome.GIVEN, statement.kind.value)
+    proofs = _proofs(statement, earlier)
+    if isinstance(proofs, str):
+        return verdict(Outcome.DOES_NOT_FOLLOW, f"does not follow: {proofs}", flawed=True)
+    differences = [value for proof in proofs for value in proof.discrepancies if value != 0]
+    finding = _finding(statement, proofs, differences)
+    unsound = [ground.number for ground in statement.grounds if not verdicts[ground.number].holds]
     if unsound:
-        return verdict(f"rests on {', '.join(unsound)}, which does not follow", derived=derived)
-    return verdict("follows", holds=True, derived=derived)
+        words = f"rests on {', '.join(unsound)}, which does not follow"
+        return verdict(Outcome.DOES_NOT_FOLLOW, words, flawed=True, proofs=proofs)
+    inherited = tuple(dict.fromkeys(n for ground in statement.grounds for n in _conditional(verdicts[ground.number])))
+    outcome, words = finding.outcome, finding.words
+    if inherited and outcome is Outcome.FOLLOWS:
+        outcome, words = Outcome.FOLLOWS_IF, f"follows on the condition of {', '.join(inherited)}"
+    elif inherited and outcome is Outcome.FOLLOWS_IF:
+        words += f", and on the condition of {', '.join(inherited)}"
+    return verdict(
+        outcome, words, flawed=finding.flawed, proofs=proofs, necessary=finding.necessary, inherited=inherited
+    )
 
 
-def _relation(equation: Equation, ground: Ground) -> tuple[sympy.Expr, sympy.Expr]:
+def _conditional(verdict: Verdict) -> tuple[str, ...]:
+    own = (verdict.number,) if verdict.necessary is not None else ()
+    return own + verdict.inherited if verdict.outcome is Outcome.FOLLOWS_IF else ()
+
+
+def _finding(statement: Statement, proofs: Sequence[CaseProof], differences: Sequence[sympy.Expr]) -> Finding:
+    if statement.condition is not None:
+        return judge_condition(statement.condition, differences)
+    if differences:
+        return Finding(Outcome.DOES_NOT_FOLLOW, "does not follow")
+    if statement.positive_if is None:
+        return Finding(Outcome.FOLLOWS, "follows")
+    claim = sympy.sstr(statement.positive_if)
+    if all(_sign_agrees(statement, case, proof) for case, proof in zip(_cases(statement), proofs, strict=True)):
+        return Finding(Outcome.FOLLOWS, f"follows; positive exactly if {claim}")
+    return Finding(Outcome.DOES_NOT_FOLLOW, f"does not follow: positive not exactly if {claim}", flawed=True)
+
+
+def _sign_agrees(statement: Statement, case: Case, proof: CaseProof) -> bool:
+    """Whether the derived value is positive in just the cases in which the claim is true."""
+    claim = statement.positive_if.xreplace(dict(case.at))
+    if claim == sympy.true:
+        return proof.derived.is_positive is True
+    if claim == sympy.false:
+        return proof.derived.is_nonpositive is True
+    # The claim's own margin, times something positive, is the value: the two have one sign.
+    if not isinstance(claim, sympy.StrictGreaterThan | sympy.StrictLessThan):
+        return False
+    return sympy.factor(sympy.cancel(sympy.factor(proof.derived) / (claim.gts - claim.lts))).is_positive is True
+
+
+def _cases(statement: Statement) -> tuple[Case, ...]:
+    return statement.cases or (Case(at=(), where=""),)
+
+
+def _proofs(statement: Statement, earlier: Mapping[str, Statement]) -> tuple[CaseProof, ...] | str:
+    """Derive every case, or say why one can't be."""
+    proofs = []
+    chosen: set[sympy.Basic] = set()
+    for case in _cases(statement):
+        replacements = dict(case.at)
+        relations = tuple(_relation(earlier[ground.number], ground, replacements) for ground in statement.grounds)
+        solution = solve_relations(relations, (statement.symbol, *statement.eliminate))
+        if isinstance(solution, str):
+            return solution
+        derived = solution[statement.symbol]
+        members = [_branch(member, replacements, solution, chosen) for member in statement.members]
+        if None in members:
+            return f"a case does not decide between the branches of {statement.number} itself"
+        published = [member.xreplace(solution) for member in members]
+        differences = tuple(sympy.S.Zero if agree(derived, member) else derived - member for member in published)
+        reached = derived if any(differences) else members[-1]
+        proofs.append(
+            CaseProof(
+                statement=statement,
+                where=case.where,
+                derived=derived,
+                discrepancies=differences,
+                relations=relations,
+                solution=solution,
+                reached=reached,
+            )
+        )
+    idle = [sympy.sstr(condition) for condition in _conditions(statement) if condition not in chosen]
+    return f"no case stands for {', '.join(idle)}" if idle else tuple(proofs)
+
+
+def _conditions(statement: Statement) -> list[sympy.Basic]:
+    return [
+        condition for member in statement.members if isinstance(member, sympy.Piecewise) for _, condition in member.args
+    ]
+
+
+def _branch(
+    member: sympy.Expr, case: Mapping[Name, sympy.Expr], solution: Mapping[Name, sympy.Expr], chosen: set[sympy.Basic]
+) -> sympy.Expr | None:
+    """Return a member at a case; of a piecewise one the branch that holds there, whose condition joins `chosen`."""
+    if not isinstance(member, sympy.Piecewise):
+        return member.xreplace(case)
+    for value, condition in member.args:
+        decided = condition.xreplace(case).xreplace(solution)
+        if decided == sympy.true:
+            chosen.add(condition)
+            return value.xreplace(case)
+        if decided != sympy.false:
+            return None
+    return None
+
+
+def _relation(statement: Statement, ground: Ground, case: Mapping[Name, sympy.Expr]) -> Relation:
+    name, value = statement.symbol, statement.members[ground.member]
+    if ground.derivative is not None:
+        by, name = ground.derivative
+        value = sympy.diff(value, by)
     # xreplace replaces all symbols at once, so that u_i -> -u_i does not eat its own result.
     replacements = dict(ground.at)
-    return equation.symbol.xreplace(replacements), equation.members[-1].xreplace(replacements)
-
-
-def _solve(
-    relations: Sequence[tuple[sympy.Expr, sympy.Expr]], unknowns: tuple[sympy.Symbol, ...]
-) -> dict[sympy.Symbol, sympy.Expr] | str:
-    """Return each unknown in the symbols that remain, or the reason why there is no such thing."""
-    # A piecewise expression none of whose cases holds is nan to SymPy.
-    if any(value.has(sympy.Piecewise, sympy.nan) for _, value in relations):
-        return "the case of a piecewise premise is not decided"
-    solutions = sympy.solve([symbol - value for symbol, value in relations], unknowns, dict=True)
-    if len(solutions) != 1:
-        return "the premises contradict each other" if not solutions else "the premises allow several values"
-    solution = {unknown: sympy.factor(value) for unknown, value in solutions[0].items()}
-    undetermined = [
-        str(unknown)
-        for unknown in unknowns
-        if unknown not in solution or solution[unknown].free_symbols & set(unknowns)
-    ]
-    if undetermined:
-        return f"the premises do not determine {', '.join(undetermined)}"
-    return solution
-
-
-def _agree(left: sympy.Expr, right: sympy.Expr) -> bool:
-    """Whether two rational functions of symbols, and of roots of single symbols, are identical."""
-    if left.has(sympy.Piecewise) or right.has(sympy.Piecewise):
-        return left == right
-    # A root and its symbol are two generators to `cancel`; writing each symbol as a square makes them one.
-    squares = {symbol: sympy.Dummy(symbol.name, positive=True) ** 2 for symbol in _under_root(left - right)}
-    return sympy.cancel((left - right).xreplace(squares)) == 0
-
-
-def _under_root(expression: sympy.Expr) -> set[sympy.Symbol]:
-    roots = (power for power in expression.atoms(sympy.Pow) if not power.exp.is_Integer)
-    return {root.base for root in roots if root.base.is_Symbol}
+    return Relation(
+        ground=ground,
+        left=name.xreplace(replacements).xreplace(case),
+        right=value.xreplace(replacements).xreplace(case),
+    )

@@ -1,39 +1,63 @@
-"""Renders verdicts for a terminal, for machines, for LaTeX and for a browser."""
+"""Renders the account of the paper for a terminal, for machines, for LaTeX and for a browser."""
 
-import textwrap
-from collections.abc import Callable, Iterator, Sequence
-from html import escape
-from typing import Any
+from collections.abc import Callable, Sequence
 
-import sympy
+from dzdesign.core.errors import InputError, RequirementError, nearest
+from dzdesign.derivation.account import PAPER_NUMBERS
+from dzdesign.derivation.proof import Verdict
+from dzdesign.derivation.prose import Words, parse_prose
+from dzdesign.derivation.report_content import SOURCE, Content, Entry
+from dzdesign.derivation.report_html import write_html
+from dzdesign.derivation.report_json import write_json
+from dzdesign.derivation.report_latex import write_latex
+from dzdesign.derivation.report_text import write_text
+from dzdesign.derivation.report_wording import describe, refer
+from dzdesign.derivation.statement import Outcome, Statement
 
-from dzdesign.core.artefacts import TOOL, to_json
-from dzdesign.core.errors import InputError, nearest
-from dzdesign.derivation.proof import Kind, Verdict
-from dzdesign.derivation.typeset import latex, mathml, text_rows
-
-SCHEMA = "dzdesign.derivation/1"
-TITLE = "Derivation of the dead-zone compensation law"
-_WIDTH = 100  # columns of the text report
-
-_SECTIONS = (
-    ("Taken as given", tuple(kind for kind in Kind if kind.is_given)),
-    ("The paper's equations, derived", (Kind.PAPER,)),
-    ("The law of this tool against the paper's", (Kind.LAW,)),
-    ("Beyond the paper", (Kind.BEYOND,)),
-)
+_WRITERS: dict[str, Callable[[Content], str]] = {
+    "text": write_text,
+    "json": write_json,
+    "latex": write_latex,
+    "html": write_html,
+}
+FORMATS = tuple(_WRITERS)
+_COUNTED = {
+    Outcome.GIVEN: "taken as given",
+    Outcome.FOLLOWS: "follow",
+    Outcome.FOLLOWS_IF: "follow on a condition",
+    Outcome.DOES_NOT_FOLLOW: "do not follow",
+}
 
 
-def render(verdicts: Sequence[Verdict], format: str) -> str:
-    """Render verdicts as one document.
+def check_format(format: str) -> None:
+    """Refuse a format that there is not.
+
+    Parameters
+    ----------
+    format : str
+
+    Raises
+    ------
+    InputError
+        If it is none of `FORMATS`.
+    """
+    if format not in FORMATS:
+        known = ", ".join(FORMATS)
+        raise InputError(f"unknown format {format!r}{nearest(format, FORMATS)}: choose one of {known}")
+
+
+def render(verdicts: Sequence[Verdict], format: str, only: Sequence[str] | None = None) -> str:
+    """Render an account as one document.
 
     Parameters
     ----------
     verdicts : sequence of Verdict
-        What `verify_equations` returns.
+        What `verify_statements` returns.
     format : str
-        One of `FORMATS`: ``text``, ``json`` (schema ``dzdesign.derivation/1``), ``latex`` (a document that
+        One of `FORMATS`: ``text``, ``json`` (schema ``dzdesign.derivation/2``), ``latex`` (a document that
         compiles by itself) or ``html`` (one page without scripts that needs no network).
+    only : sequence of str, optional
+        Numbers of the statements to show, such as `closure` returns; all of them unless given.
 
     Returns
     -------
@@ -44,201 +68,124 @@ def render(verdicts: Sequence[Verdict], format: str) -> str:
     ------
     InputError
         If there is no such format.
+    RequirementError
+        If all is to be shown, and an equation of the paper is missing.
     """
-    if format not in _RENDERERS:
-        known = ", ".join(FORMATS)
-        raise InputError(f"unknown format {format!r}{nearest(format, FORMATS)}: choose one of {known}")
-    return _RENDERERS[format](verdicts)
+    check_format(format)
+    numbers = [verdict.number for verdict in verdicts]
+    missing = [number for number in PAPER_NUMBERS if number not in numbers]
+    if only is None and missing:
+        raise RequirementError(f"the account leaves out {', '.join(missing)} of the paper's equations")
+    return _WRITERS[format](_compose(verdicts, numbers if only is None else only))
 
 
-def _sections(verdicts: Sequence[Verdict]) -> Iterator[tuple[str, list[Verdict]]]:
-    for heading, kinds in _SECTIONS:
-        members = [verdict for verdict in verdicts if verdict.kind in kinds]
-        if members:
-            yield heading, members
+def closure(statements: Sequence[Statement], wanted: Sequence[str]) -> tuple[str, ...]:
+    """Return the numbers of some statements and of all that they rest on, in the order of the account.
+
+    Parameters
+    ----------
+    statements : sequence of Statement
+        Each after those it rests on.
+    wanted : sequence of str
+        As a person writes them: ``(18)``, ``18``, ``T3b``, ``t3b``; several in one, with commas between.
+
+    Returns
+    -------
+    tuple of str
+
+    Raises
+    ------
+    InputError
+        If there is no such statement.
+
+    Examples
+    --------
+    >>> from dzdesign.derivation.account import STATEMENTS
+    >>> closure(STATEMENTS, ["2"])
+    ('Fig. 3, line', 'K_e', '(2)')
+    """
+    numbers = {statement.number.lower(): statement.number for statement in statements}
+    needed: set[str] = set()
+    for text in wanted:
+        # A comma may also be part of a name: Fig. 3, line.
+        parts = [text] if _key(text, numbers) in numbers else text.split(",")
+        needed.update(_number(part, numbers) for part in parts)
+    for statement in reversed(statements):
+        if statement.number in needed:
+            needed.update(ground.number for ground in statement.grounds)
+    return tuple(statement.number for statement in statements if statement.number in needed)
 
 
-def _summary(verdicts: Sequence[Verdict]) -> str:
-    derived = [verdict for verdict in verdicts if not verdict.kind.is_given]
-    failed = [verdict.number for verdict in derived if not verdict.holds]
-    given = len(verdicts) - len(derived)
-    if failed:
-        return f"{len(failed)} of {len(derived)} statements do not hold: {', '.join(failed)}."
-    return f"All {len(derived)} statements follow from the {given} taken as given."
+def _key(text: str, numbers: dict[str, str]) -> str:
+    key = text.strip().lower()
+    return f"({key})" if f"({key})" in numbers else key
 
 
-# --- text ---------------------------------------------------------------------------------------------------
+def _number(text: str, numbers: dict[str, str]) -> str:
+    key = _key(text, numbers)
+    if key not in numbers:
+        near = nearest(key, numbers) or nearest(f"({key})", numbers)
+        for lower, number in numbers.items():
+            near = near.replace(f"'{lower}'", f"'{number}'")
+        raise InputError(f"no statement '{text.strip()}'{near}; give one such as 18, 6c or T3b")
+    return numbers[key]
 
 
-def _text(verdicts: Sequence[Verdict]) -> str:
-    lines = [TITLE, "=" * len(TITLE)]
-    for heading, members in _sections(verdicts):
-        lines += ["", heading, "-" * len(heading)]
-        for verdict in members:
-            lines += ["", *_text_statement(verdict)]
-    return "\n".join([*lines, "", _summary(verdicts), ""])
+# --- what the report says of the whole ------------------------------------------------------------------------
 
 
-def _text_statement(verdict: Verdict) -> Iterator[str]:
-    room = _WIDTH - len(verdict.number) - len(verdict.verdict) - 4
-    yield f"{verdict.number}  {verdict.title:<{room}}  {verdict.verdict}"
-    left = f"    {verdict.symbol} "
-    for member in verdict.members:
-        left += "= "
-        for row in text_rows(member):
-            yield left + row
-            left = " " * len(left)
-        left = left[:-2]
-    if verdict.discrepancy is not None:
-        yield f"    derived: {verdict.symbol} = {'; '.join(text_rows(verdict.derived))}"
-        yield f"    derived minus published: {'; '.join(text_rows(verdict.discrepancy))}"
-    if verdict.premises:
-        yield from _wrapped("from: ", "; ".join(verdict.premises))
-    if verdict.note:
-        yield from _wrapped("note: ", verdict.note)
-
-
-def _wrapped(label: str, text: str) -> list[str]:
-    indent = "    " + " " * len(label)
-    return textwrap.wrap(text, _WIDTH, initial_indent="    " + label, subsequent_indent=indent)
-
-
-# --- json ---------------------------------------------------------------------------------------------------
-
-
-def _json(verdicts: Sequence[Verdict]) -> str:
-    document = {
-        "schema": SCHEMA,
-        "tool": TOOL,
-        "holds": all(verdict.holds for verdict in verdicts),
-        "statements": [_json_statement(verdict) for verdict in verdicts],
-    }
-    return to_json(document)
-
-
-def _json_statement(verdict: Verdict) -> dict[str, Any]:
-    return {
-        "number": verdict.number,
-        "title": verdict.title,
-        "kind": verdict.kind.value,
-        "statement": verdict.statement,
-        "latex": _latex_chain(verdict),
-        "premises": [{"number": ground.number, "where": ground.where} for ground in verdict.grounds],
-        "verdict": verdict.verdict,
-        "holds": verdict.holds,
-        "derived": None if verdict.derived is None else sympy.sstr(verdict.derived),
-        "discrepancy": None if verdict.discrepancy is None else sympy.sstr(verdict.discrepancy),
-        "note": verdict.note,
-    }
-
-
-# --- latex --------------------------------------------------------------------------------------------------
-
-_LATEX_ESCAPES = str.maketrans(
-    {
-        "\\": r"\textbackslash{}",
-        "~": r"\textasciitilde{}",
-        "^": r"\textasciicircum{}",
-        "<": r"\textless{}",
-        ">": r"\textgreater{}",
-        **{character: "\\" + character for character in "&%$#_{}"},
-    }
-)
-
-
-def _latex(verdicts: Sequence[Verdict]) -> str:
-    lines = [
-        r"\documentclass{article}",
-        r"\usepackage[T1]{fontenc}",
-        r"\usepackage{amsmath}",
-        r"\setlength{\parindent}{0pt}",
-        r"\begin{document}",
-        rf"\section*{{{TITLE}}}",
-        _summary(verdicts).translate(_LATEX_ESCAPES),
-    ]
-    for heading, members in _sections(verdicts):
-        lines.append(rf"\subsection*{{{heading}}}")
-        for verdict in members:
-            lines += _latex_statement(verdict)
-    return "\n".join([*lines, r"\end{document}", ""])
-
-
-def _latex_statement(verdict: Verdict) -> Iterator[str]:
-    title = f"{verdict.number} {verdict.title}".translate(_LATEX_ESCAPES)
-    yield rf"\paragraph{{{title}}} \emph{{{verdict.verdict.translate(_LATEX_ESCAPES)}}}"
-    rows = r" \\ ".join(f"&= {latex(member)}" for member in verdict.members)
-    yield rf"\begin{{align*}} {latex(verdict.symbol)} {rows} \end{{align*}}"
-    if verdict.discrepancy is not None:
-        yield rf"Derived minus published: \[ {latex(verdict.discrepancy)} \]"
-    if verdict.premises:
-        yield "From " + "; ".join(verdict.premises).translate(_LATEX_ESCAPES) + r".\par"
-    if verdict.note:
-        yield verdict.note.translate(_LATEX_ESCAPES)
-
-
-def _latex_chain(verdict: Verdict) -> str:
-    return " = ".join(latex(side) for side in (verdict.symbol, *verdict.members))
-
-
-# --- html ---------------------------------------------------------------------------------------------------
-
-_STYLE = """\
-body { font: 16px/1.5 system-ui, sans-serif; max-width: 52rem; margin: 2rem auto; padding: 0 1rem;
-  color: #222; background: #fff; }
-section.statement { border-left: 4px solid #8a94a0; padding: .2rem 1rem; margin: 1.2rem 0; }
-section.follows { border-color: #2e7d32; }
-section.fails { border-color: #c62828; background: #fdecea; }
-h3 { font-size: 1rem; margin: 0; display: flex; gap: 1rem; }
-h3 .verdict { margin-left: auto; font-weight: normal; }
-math { margin: .6rem 0; font-size: 1.15em; }
-p { margin: .2rem 0; }
-.note { color: #555; }
-@media (prefers-color-scheme: dark) {
-  body { background: #16191d; color: #ddd; } .note { color: #aaa; }
-  section.fails { background: #3a1c1c; } a { color: #8ab4f8; }
-}"""
-
-
-def _html(verdicts: Sequence[Verdict]) -> str:
-    body = [f"<h1>{escape(TITLE)}</h1>", f"<p>{escape(_summary(verdicts))}</p>"]
-    anchors = {verdict.number: f"s{index}" for index, verdict in enumerate(verdicts)}
-    for heading, members in _sections(verdicts):
-        body.append(f"<h2>{escape(heading)}</h2>")
-        for verdict in members:
-            body += _html_statement(verdict, anchors)
-    head = f'<meta charset="utf-8"><title>{escape(TITLE)}</title>\n<style>\n{_STYLE}\n</style>'
-    return "\n".join(["<!DOCTYPE html>", f'<html lang="en"><head>{head}</head><body>', *body, "</body></html>", ""])
-
-
-def _html_statement(verdict: Verdict, anchors: dict[str, str]) -> Iterator[str]:
-    outcome = "given" if verdict.kind.is_given else "follows" if verdict.holds else "fails"
-    yield f'<section class="statement {outcome}" id="{anchors[verdict.number]}">'
-    yield (
-        f"<h3><span>{escape(verdict.number)}</span> <span>{escape(verdict.title)}</span>"
-        f'<span class="verdict">{escape(verdict.verdict)}</span></h3>'
+def _compose(verdicts: Sequence[Verdict], shown: Sequence[str]) -> Content:
+    """Say what the account found, of the statements to show."""
+    book = {verdict.number: verdict for verdict in verdicts}
+    entries = {number: describe(book[number], book) for number in shown}
+    sections: dict[str, list[Entry]] = {}
+    for entry in entries.values():
+        sections.setdefault(entry.verdict.statement.section, []).append(entry)
+    table = tuple(entries[number] for number in PAPER_NUMBERS if number in entries)
+    partial = len(shown) < len(book)
+    return Content(
+        title="Derivation of the dead-zone compensation law" + (", in part" if partial else ""),
+        source=SOURCE,
+        summary=_summary([entry.verdict for entry in entries.values()], [entry.verdict for entry in table]),
+        wrong=tuple(_fault(entry) for entry in entries.values() if _is_wrong(entry.verdict)),
+        conditional=tuple(
+            (*_headed(entry), *entry.judgement)
+            for entry in entries.values()
+            if entry.verdict.outcome is Outcome.FOLLOWS_IF
+        ),
+        table=table,
+        sections=tuple((section, tuple(members)) for section, members in sections.items()),
     )
-    yield _html_math(verdict.symbol, *verdict.members)
-    if verdict.discrepancy is not None:
-        yield f"<p>Derived minus published:</p>{_html_math(verdict.discrepancy)}"
-    if verdict.grounds:
-        links = (
-            f'<a href="#{anchors[ground.number]}">{escape(ground.number)}</a> {escape(ground.where)}'.rstrip()
-            for ground in verdict.grounds
+
+
+def _summary(verdicts: Sequence[Verdict], paper: Sequence[Verdict]) -> tuple[Words, ...]:
+    wrong = [verdict for verdict in verdicts if not verdict.as_expected]
+    expected = f"{len(verdicts) - len(wrong)} of {len(verdicts)} statements are as a correct account finds them"
+    lines: list[Words] = [(expected + ("; these are not:" if wrong else "."),)]
+    for verdict in wrong:
+        expected = f" should be found to be “{verdict.statement.expected.value}”, but: "
+        unit = f"; its units: {verdict.unit_error}" if verdict.unit_error else ""
+        lines.append((refer(verdict.statement), expected, *parse_prose(verdict.words), unit, "."))
+    if paper:
+        which = f"the {len(paper)} equations" if len(paper) > 1 else "the one equation"
+        counts = "; ".join(
+            f"{words}: {sum(verdict.outcome is outcome for verdict in paper)}" for outcome, words in _COUNTED.items()
         )
-        yield f"<p>from {'; '.join(links)}</p>"
-    if verdict.note:
-        yield f'<p class="note">{escape(verdict.note)}</p>'
-    yield "</section>"
+        lines.append((f"Of {which} of the paper that stand here, {counts}.",))
+    return tuple(lines)
 
 
-def _html_math(*sides: sympy.Expr) -> str:
-    return f'<math display="block">{"<mo>=</mo>".join(map(mathml, sides))}</math>'
+def _is_wrong(verdict: Verdict) -> bool:
+    return verdict.outcome is Outcome.DOES_NOT_FOLLOW or bool(verdict.statement.corrected_by)
 
 
-_RENDERERS: dict[str, Callable[[Sequence[Verdict]], str]] = {
-    "text": _text,
-    "json": _json,
-    "latex": _latex,
-    "html": _html,
-}
-FORMATS = tuple(_RENDERERS)
+def _fault(entry: Entry) -> Words:
+    words = (*_headed(entry), *(entry.judgement or ("the paper's choice.",)))
+    if entry.correction is None:
+        return words
+    display = entry.correction.display
+    return (*words, " ", *entry.correction.words, *((" ", display) if display else ()))
+
+
+def _headed(entry: Entry) -> Words:
+    return (refer(entry.verdict.statement), " ", *entry.title, ": ")

@@ -10,6 +10,7 @@ from dzdesign.core.artefacts import TOOL, parse_document, to_json
 from dzdesign.core.errors import InputError
 from dzdesign.core.shape import Exactly, Number, check_shape
 from dzdesign.derivation.law import law
+from dzdesign.derivation.scaling import drive, evaluate_line
 from dzdesign.design.signals import Signals
 from dzdesign.identify.model import valve_from_document
 
@@ -150,16 +151,25 @@ class Compensator:
             left * (self.beta_step_codes - share) + right * share, self.beta_denominator * self.beta_step_codes
         )
 
+    def counts(self, command_code: int, dp_code: int) -> Fraction:
+        """Return the compare value of the law at a code pair, exactly: not rounded, not limited."""
+        line = evaluate_line(
+            law(self.law_name),
+            beta=self.beta(dp_code),
+            kappa=self.k_x_max_over_u_max,
+            u_min0_over_u_max=self.u_min0_over_u_max,
+            n_adc=self.signals.command_code_max,
+            n_full=self.signals.compare_max,
+        )
+        return line.slope * command_code + line.start
+
     def drive(self, command_code: int, dp_code: int) -> Fraction:
         """Return u_O/u_max of the law at a code pair, exactly and before it is limited to 0...1."""
-        chosen, beta = law(self.law_name), self.beta(dp_code)
-        gain = chosen.evaluate_gain(beta, self.k_x_max_over_u_max)
-        offset = chosen.evaluate_offset(beta, self.u_min0_over_u_max)
-        return gain * Fraction(command_code, self.signals.command_code_max) + offset
+        return drive(self.counts(command_code, dp_code), self.signals.compare_max)
 
     def compare(self, command_code: int, dp_code: int) -> int:
         """Return the PWM compare value: the law rounded to the nearest count (a half goes up), limited to the range."""
-        counts = self.drive(command_code, dp_code) * self.signals.compare_max
+        counts = self.counts(command_code, dp_code)
         rounded = (2 * counts.numerator + counts.denominator) // (2 * counts.denominator)
         return min(max(rounded, 0), self.signals.compare_max)
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from dzdesign.core.errors import InputError
+from dzdesign.derivation.scaling import pressure_drop, pressure_drop_code
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,8 +37,8 @@ class Signals:
 
     def dp_MPa(self, dp_code: int) -> Fraction:
         """Return the pressure drop that a difference of pressure codes stands for, exactly."""
-        return self.pressure_span_MPa * dp_code / self.pressure_code_max
+        return pressure_drop(dp_code, span=self.pressure_span_MPa, code_max=self.pressure_code_max)
 
     def dp_code(self, dp_MPa: Fraction) -> Fraction:
         """Return the difference of pressure codes that a pressure drop makes, exactly (not rounded)."""
-        return dp_MPa * self.pressure_code_max / self.pressure_span_MPa
+        return pressure_drop_code(dp_MPa, span=self.pressure_span_MPa, code_max=self.pressure_code_max)

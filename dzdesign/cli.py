@@ -39,10 +39,12 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
         (_given("folder", metavar="DIR", help="folder for the artefacts"),),
     ),
     "derive": (
-        "re-derive the paper's equations and print premises and verdicts",
+        "re-derive the paper's equations: premises, steps and a verdict for each",
         "dzdesign.commands:run_derive",
         (
             _given("--format", default="text", metavar="F", help="text, json, latex or html"),
+            _given("--equation", action="append", metavar="N", help="18 or T3b: this one and what it rests on"),
+            _given("--mutate", action="store_true", help="instead, make every equation wrong; count what is caught"),
             _given(*OUTPUT, metavar="FILE", help="file to write (default: standard output)"),
         ),
     ),
@@ -165,7 +167,7 @@ def parse(argv: list[str]) -> argparse.Namespace:
 
     every = [action for command in commands.values() for action in command._actions if action.option_strings]
     repeatable = {action.dest for action in every if isinstance(action, argparse._AppendAction)}
-    known = {action.dest for action in every} - {"help", "config", "json"}
+    known = {action.dest for action in every if action.nargs != 0} - {"config"}  # no flags
     command = commands[args.command]
     mine = {action.dest for action in command._actions}
     values = options_from_file(args.config, known, repeatable)

@@ -196,16 +196,38 @@ def run_simulate(args: argparse.Namespace) -> int:
 
 
 def run_derive(args: argparse.Namespace) -> int:
-    """Re-derive the paper's equations; 1 if one does not follow."""
-    from dzdesign.derivation.equations import verify_equations
-    from dzdesign.derivation.report import render
+    """Re-derive the paper's equations; 1 if one of those shown is not found as a correct account finds it."""
+    from dzdesign.derivation import account
+    from dzdesign.derivation.report import check_format, closure, render
 
+    if args.mutate:
+        return _run_mutations(args)
+    format = "json" if args.json else args.format
+    check_format(format)
     if args.output:
         check_file_may_be_written(Path(args.output))
-    verdicts = verify_equations()
-    text = render(verdicts, "json" if args.json else args.format)
+    shown = closure(account.STATEMENTS, args.equation) if args.equation else None
+    verdicts = account.verify_statements()
+    text = render(verdicts, format, shown)
     if args.output:
         write_file(Path(args.output), text)
     else:
         print(text, end="")
-    return 0 if all(verdict.holds for verdict in verdicts) else 1
+    wrong = [verdict for verdict in verdicts if not verdict.as_expected and (shown is None or verdict.number in shown)]
+    return 1 if wrong else 0
+
+
+def _run_mutations(args: argparse.Namespace) -> int:
+    """Count the wrong equations that the account catches; 1 if one of them is not caught."""
+    from dzdesign.derivation.account import verify_statements
+    from dzdesign.derivation.mutation import mutation_document, score_mutations
+    from dzdesign.tables import print_mutations
+
+    document = mutation_document(score_mutations(verify_statements()))
+    if args.output:
+        write_file(Path(args.output), to_json(document))
+    elif args.json:
+        print(to_json(document), end="")
+    else:
+        print_mutations(document)
+    return 0 if document["caught"] == document["mutants"] else 1

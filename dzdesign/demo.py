@@ -12,7 +12,7 @@ from dzdesign.core.errors import InputError
 def run_demo(args: argparse.Namespace) -> int:
     """Run the pipeline on the bundled ramp tests and print the closing table."""
     from dzdesign.codegen.project import generate
-    from dzdesign.derivation.equations import verify_equations
+    from dzdesign.derivation.account import verify_statements
     from dzdesign.design.designing import design
     from dzdesign.identify.identification import identify
     from dzdesign.identify.ramp_files import read_ramp_file
@@ -27,10 +27,9 @@ def run_demo(args: argparse.Namespace) -> int:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"the folder '{folder}' can't be made: {error.strerror}") from error
-    verdicts = verify_equations()
-    derived = [verdict for verdict in verdicts if not verdict.kind.is_given]
-    follow = sum(verdict.holds for verdict in derived)
-    say(f"derivation: {follow} of {len(derived)} derived statements follow")
+    verdicts = verify_statements()
+    expected = sum(verdict.as_expected for verdict in verdicts)
+    say(f"derivation: {expected} of {len(verdicts)} statements are as a correct account finds them")
     with as_file(files("dzdesign.example")) as example:
         tests = [read_ramp_file(path) for path in sorted((example / "ramps").glob("*.csv.gz"))]
         plant = read_plant(example / "plant.toml")
@@ -51,4 +50,4 @@ def run_demo(args: argparse.Namespace) -> int:
         print(to_json(verification.document), end="")
     else:
         print_demo(valve, verification, str(folder))
-    return 0 if verification.holds and follow == len(derived) else 1
+    return 0 if verification.holds and expected == len(verdicts) else 1

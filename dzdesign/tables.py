@@ -174,3 +174,18 @@ def print_demo(valve: "ValveModel", verification: "Verification", folder: str) -
     verdict = f"DOES NOT HOLD: {', '.join(failed)}" if failed else "Every requirement holds."
     console.print(verdict, markup=False, soft_wrap=True)
     console.print(f"Artefacts: {folder}", markup=False, soft_wrap=True)
+
+
+def print_mutations(document: dict) -> None:
+    """Print how many wrong equations were caught, those that were not, and the changes that mean the same."""
+    table = _table("Wrong equations", "statement", "wrong", "caught", "same meaning")
+    for row in document["statements"]:
+        table.add_row(row["number"], str(row["mutants"]), str(row["caught"]), str(len(row["equivalent"]) or ""))
+    console = _console()
+    console.print(table)
+    for row in document["statements"]:
+        for survivor in row["survivors"]:
+            console.print(f"not caught, {row['number']}: {survivor}", markup=False)
+        for text in row["equivalent"]:
+            console.print(f"same meaning, {row['number']}: {text}", markup=False)
+    console.print(f"{document['caught']} of {document['mutants']} wrong equations are caught.")

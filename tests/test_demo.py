@@ -83,26 +83,3 @@ def test_simulate_same_seed_same_bytes(tmp_path, example_folder):
     bundled = read_ramp_file(example_folder / "ramps" / "ramp_dP1.csv.gz")
     # Another compiler may round the last bit of the plant differently; the file has four decimals.
     assert abs(again.q - bundled.q).max() < 2e-4 / 60000
-
-
-def test_derive_prints_every_equation_and_holds(capsys):
-    assert main(["derive"]) == 0
-    out = capsys.readouterr().out
-    for number in range(8, 19):
-        assert f"({number})" in out
-
-
-def test_a_wrong_equation_makes_derive_fail(capsys, monkeypatch):
-    """Feed a doubled compensation signal (13): its own verdict turns, and the exit status with it."""
-    from dataclasses import replace
-
-    from dzdesign.derivation import equations
-
-    right = equations.verify_equations
-    wrong = [
-        replace(one, members=tuple(2 * member for member in one.members)) if one.number == "(13)" else one
-        for one in equations.EQUATIONS
-    ]
-    monkeypatch.setattr(equations, "verify_equations", lambda: right(wrong))
-    assert main(["derive"]) == 1
-    assert "does not follow" in capsys.readouterr().out

@@ -1,404 +1,411 @@
-"""Every equation follows, every wrong one is caught, and the law is the same for every kind of number."""
+"""Every equation has its verdict, every wrong one is caught, and the engine is not easily fooled."""
 
-import doctest
-import itertools
-import json
-import shutil
-import subprocess
+import math
+import random
 from dataclasses import replace
-from fractions import Fraction
-from html.parser import HTMLParser
 
-import casadi
-import numpy as np
 import pytest
 import sympy
 
-from dzdesign.core.errors import InputError, RequirementError
-from dzdesign.derivation import law as law_module
-from dzdesign.derivation import plant, report, symbols
+from dzdesign.core.errors import RequirementError
+from dzdesign.derivation import identity, plant, units
 from dzdesign.derivation import symbols as s
-from dzdesign.derivation.equations import EQUATIONS, verify_equations
-from dzdesign.derivation.law import LAW_NAMES, Law, law
-from dzdesign.derivation.proof import Equation, Ground, Kind
+from dzdesign.derivation.account import PAPER_NUMBERS, SECTIONS, STATEMENTS, verify_statements
+from dzdesign.derivation.mutation import score_mutations
+from dzdesign.derivation.proof import judge
+from dzdesign.derivation.published import FIRST
+from dzdesign.derivation.statement import Case, Condition, Ground, Kind, Outcome, Statement, Value
+from dzdesign.derivation.transfer import laplace
 
-BY_NUMBER = {equation.number: equation for equation in EQUATIONS}
-DERIVED = [equation for equation in EQUATIONS if not equation.kind.is_given]
-GIVEN = [equation for equation in EQUATIONS if equation.kind.is_given]
+BY_NUMBER = {statement.number: statement for statement in STATEMENTS}
+DERIVED = [statement for statement in STATEMENTS if not statement.kind.is_given]
 FOREIGN = sympy.Symbol("foreign", positive=True)
+SEED = 20261121
 
 
 @pytest.fixture(scope="module")
 def verdicts():
-    return verify_equations()
+    return {verdict.number: verdict for verdict in verify_statements()}
 
 
-def number_of(equation):
-    return equation.number
+def number_of(statement):
+    return statement.number
 
 
-# --- the equations ------------------------------------------------------------------------------------------
+# --- the account --------------------------------------------------------------------------------------------
+
+GIVEN, FOLLOWS, IF, NOT = Outcome.GIVEN, Outcome.FOLLOWS, Outcome.FOLLOWS_IF, Outcome.DOES_NOT_FOLLOW
+#: Read off the paper by hand, not off the account.
+PAPER = {
+    **dict.fromkeys((1, 4, 5, 6, 7, 11, 19, 20, 21, 22, 23, 24), GIVEN),
+    **dict.fromkeys((2, 3, 8, 9, 10, 12, 13, 14, 15, 16, 17, 18, 26), FOLLOWS),
+    **dict.fromkeys((25, 27, 28, 32), IF),
+    **dict.fromkeys((29, 30, 31), NOT),
+}
 
 
-def test_every_statement_holds(verdicts):
-    assert [verdict.number for verdict in verdicts if not verdict.holds] == []
+def test_all_32_equations_have_their_verdict(verdicts):
+    assert [int(number.strip("()")) for number in PAPER_NUMBERS] == sorted(PAPER) == list(range(1, 33))
+    assert {number: verdicts[f"({number})"].outcome for number in PAPER} == PAPER
 
 
-def test_every_equation_of_the_first_section_is_there():
-    numbers = {f"({n})" for n in range(1, 19)}
-    assert numbers <= set(BY_NUMBER)
-    derived = {"(3)", "(8)", "(9)", "(10)", "(12)", "(13)", "(14)", "(15)", "(16)", "(17)", "(18)"}
-    assert {number for number in numbers if not BY_NUMBER[number].kind.is_given} == derived
+def test_every_statement_is_as_expected(verdicts):
+    assert [verdict.number for verdict in verdicts.values() if not verdict.as_expected] == []
 
 
-def test_assumptions_are_not_reported_as_results(verdicts):
-    outcome = {verdict.number: verdict.verdict for verdict in verdicts}
-    assert outcome["(11)"] == outcome["Fig. 3, line"] == outcome["Fig. 3, command"] == "assumption"
-    assert outcome["(5)"] == "premise"
-    assert outcome["(18)"] == "follows"
+def test_every_condition_is_proved_necessary(verdicts):
+    conditional = [verdict for verdict in verdicts.values() if verdict.statement.condition is not None]
+    assert len(conditional) >= 13
+    assert all(verdict.necessary for verdict in conditional)
 
 
-def as_given(equation):
-    """The same statement, taken as given: what has been proved once need not be proved for each mutant."""
-    if equation.kind.is_given:
-        return equation
-    return replace(equation, kind=Kind.PREMISE, grounds=(), eliminate=())
-
-
-def judge(equation, mutant=None):
-    """The verdict on `equation` when its grounds are taken as published, but for the mutated one."""
-    given = {ground.number: as_given(BY_NUMBER[ground.number]) for ground in equation.grounds}
-    if mutant is not None:
-        given[mutant.number] = mutant
-    return verify_equations([*given.values(), equation])[-1]
-
-
-def mutated(expression):
-    """Expressions that differ from this one by a coefficient, a sign, a term, a symbol or a case."""
-    if isinstance(expression, sympy.Piecewise):
-        yield from mutated_piecewise(expression)
-    elif expression == 0:
-        yield s.Q_max
-    else:
-        yield 2 * expression
-        yield -expression
-        yield expression + FOREIGN
-        terms = sympy.Add.make_args(sympy.expand(expression))
-        if len(terms) > 1:
-            yield from (expression + term for term in terms)
-            yield from (expression - 2 * term for term in terms)
-    yield from (expression.xreplace({symbol: FOREIGN}) for symbol in sorted(expression.free_symbols, key=str))
-
-
-def mutated_piecewise(expression):
-    cases = [tuple(case) for case in expression.args]
-    for index, (value, condition) in enumerate(cases):
-        for wrong in mutated(value):
-            yield sympy.Piecewise(*cases[:index], (wrong, condition), *cases[index + 1 :])
-        for relation in sorted(condition.atoms(sympy.core.relational.Relational), key=str):
-            wrong = condition.xreplace({relation: relation.negated})
-            yield sympy.Piecewise(*cases[:index], (value, wrong), *cases[index + 1 :])
-
-
-@pytest.mark.parametrize("equation", DERIVED, ids=number_of)
-def test_a_mutated_result_does_not_follow(equation):
-    for index, member in enumerate(equation.members):
-        for wrong in mutated(member):
-            members = (*equation.members[:index], wrong, *equation.members[index + 1 :])
-            verdict = judge(replace(equation, members=members))
-            assert not verdict.holds, f"{equation.number} = {wrong} was accepted"
+def test_what_does_not_follow_is_corrected_by_what_does(verdicts):
+    for verdict in verdicts.values():
+        if verdict.outcome is NOT and verdict.statement.kind is Kind.PAPER:
+            assert verdicts[verdict.statement.corrected_by].holds
             assert verdict.discrepancy is not None
 
 
-@pytest.mark.parametrize("premise", GIVEN, ids=number_of)
-def test_a_mutated_premise_turns_a_verdict(premise):
-    users = [user for user in DERIVED if premise.number in {ground.number for ground in user.grounds}]
-    for wrong in mutated(premise.members[-1]):
-        mutant = replace(premise, members=(wrong,))
-        caught = any(not judge(user, mutant).holds for user in users)
-        assert caught, f"{premise.number} = {wrong} was accepted"
+def test_every_reference_between_statements_exists():
+    for statement in STATEMENTS:
+        assert {*statement.see} <= set(BY_NUMBER), statement.number
+        assert statement.corrected_by in {"", *BY_NUMBER}, statement.number
+        assert statement.section in SECTIONS
 
 
-@pytest.mark.parametrize("equation", [e for e in DERIVED if len(e.grounds) > 1], ids=number_of)
-def test_every_named_premise_is_needed(equation):
-    for index in range(len(equation.grounds)):
-        fewer = equation.grounds[:index] + equation.grounds[index + 1 :]
-        assert not judge(replace(equation, grounds=fewer)).holds, f"{equation.grounds[index]} is not needed"
+def test_the_conditions_are_handed_on(verdicts):
+    assert verdicts["T6b"].inherited == ("(28)", "(27)", "(25)")
+    assert verdicts["T6b"].words == "follows on the condition of (28), (27), (25)"
+
+
+def test_units_find_the_mixed_sums_and_nothing_else(verdicts):
+    wrong = {verdict.number: verdict.unit_error for verdict in verdicts.values() if verdict.unit_error}
+    mixed = "a sum of counts and V"
+    assert {number: wrong[number] for number in ("(30)", "(31)", "T5a")} == dict.fromkeys(
+        ("(30)", "(31)", "T5a"), mixed
+    )
+    assert set(wrong) == {"(30)", "(31)", "T5a", "T7d"}
+
+
+@pytest.mark.parametrize("statement", DERIVED, ids=number_of)
+def test_a_derivation_can_be_read_to_its_end(statement, verdicts):
+    verdict = verdicts[statement.number]
+    for proof in verdict.proofs:
+        assert proof.steps
+        assert identity.agree(proof.steps[-1].result.xreplace(dict(proof.solution)), proof.derived)
+        named = {ground.number for step in proof.steps for ground in step.used}
+        assert named <= {ground.number for ground in statement.grounds}
+
+
+def test_every_change_of_meaning_is_caught(verdicts):
+    scores = score_mutations(list(verdicts.values()))
+    assert [score.number for score in scores] == [statement.number for statement in STATEMENTS]
+    assert {score.number: score.survivors for score in scores if score.survivors} == {}
+    assert all(score.mutants for score in scores)
+    assert sum(score.mutants for score in scores) > 2500
+    # Only comparisons can be changed without a change of meaning.
+    assert {score.number for score in scores if score.equivalent} <= {"(1)", "(7)", "opening", "T3a", "valve", "T8c"}
+
+
+@pytest.mark.parametrize("statement", [e for e in DERIVED if len(e.grounds) > 1], ids=number_of)
+def test_every_named_premise_is_needed(statement, verdicts):
+    for index in range(len(statement.grounds)):
+        fewer = statement.grounds[:index] + statement.grounds[index + 1 :]
+        verdict = judge(replace(statement, grounds=fewer), BY_NUMBER, verdicts)
+        assert not verdict.as_expected, f"{statement.grounds[index]} is not needed"
+
+
+# --- the engine ---------------------------------------------------------------------------------------------
+
+
+def changed(number, **changes):
+    return [replace(e, **changes) if e.number == number else e for e in STATEMENTS]
 
 
 def test_what_rests_on_a_failed_statement_does_not_hold():
-    equation = BY_NUMBER["(8)"]
-    wrong = replace(equation, members=(2 * equation.members[0], equation.members[1]))
-    outcome = {v.number: v for v in verify_equations([wrong if e is equation else e for e in EQUATIONS])}
-    assert outcome["(8)"].verdict == "does not follow"
-    assert sympy.simplify(outcome["(8)"].discrepancy + equation.members[0]) == 0
-    assert outcome["(13)"].verdict == "rests on (8), which does not follow"
+    members = BY_NUMBER["(8)"].members
+    outcome = {v.number: v for v in verify_statements(changed("(8)", members=(2 * members[0], members[1])))}
+    assert outcome["(8)"].words == "does not follow"
+    assert identity.agree(outcome["(8)"].discrepancy, -members[0])
+    assert outcome["(13)"].words == "rests on (8), which does not follow"
     assert not outcome["(18)"].holds
     assert outcome["(15)"].holds
+    assert not outcome["(30)"].as_expected  # not even the claim that it does not follow may rest on it
+
+
+def given(number, symbol, value):
+    return Statement(number=number, title="", kind=Kind.PREMISE, symbol=symbol, members=(sympy.sympify(value),))
+
+
+def claim(symbol, member, *numbers, **more):
+    grounds = tuple(Ground(number=number) for number in numbers)
+    return Statement(
+        number="claim",
+        title="",
+        kind=Kind.PAPER,
+        symbol=symbol,
+        members=(sympy.sympify(member),),
+        grounds=grounds,
+        **more,
+    )
+
+
+def last_words(*statements):
+    return verify_statements(statements)[-1].words
 
 
 def test_contradicting_premises_are_named():
-    one = replace(BY_NUMBER["(5)"], number="one", members=(sympy.Integer(1),))
-    two = replace(BY_NUMBER["(5)"], number="two", members=(sympy.Integer(2),))
-    grounds = (Ground(number="one"), Ground(number="two"))
-    claim = replace(one, number="claim", kind=Kind.PAPER, members=(FOREIGN,), grounds=grounds)
-    verdict = verify_equations([one, two, claim])[-1]
-    assert verdict.verdict == "does not follow: the premises contradict each other"
+    contradiction = "does not follow: the premises contradict each other"
+    one, two = given("one", s.beta, 1), given("two", s.beta, 2)
+    assert last_words(one, two, claim(s.beta, FOREIGN, "one", "two")) == contradiction
+    # SymPy's solver passes over a relation that has no unknown in it; the engine may not.
+    slope = given("slope", s.slope, s.beta)
+    unused = given("unused", s.kappa, 3)
+    assert last_words(one, slope, unused, claim(s.slope, 1, "slope", "one", "unused")) == contradiction
+    # An opening is not negative.
+    assert last_words(given("one", s.x, -s.guard), claim(s.x, FOREIGN, "one")) == contradiction
+
+
+def test_what_is_not_determined_is_named():
+    both = given("both", s.slope, s.u_O + s.u_0)
+    words = last_words(both, claim(s.u_O, FOREIGN, "both", eliminate=(s.u_0,)))
+    assert words in (
+        "does not follow: the premises do not determine u_O",
+        "does not follow: the premises do not determine u_0",
+        "does not follow: the premises do not determine u_O, u_0",
+    )
+
+
+@pytest.mark.parametrize(
+    ("any_of", "words"),
+    [
+        (((sympy.Eq(s.beta, 1),),), "follows if beta = 1 (sufficient; not proved necessary)"),
+        (((sympy.Eq(s.beta, 1),), (sympy.Eq(s.kappa, 1),)), "follows if beta = 1 or kappa = 1 (necessary)"),
+        (((sympy.Eq(s.beta, 1), sympy.Eq(s.kappa, 1)),), "follows if beta = 1 and kappa = 1 (sufficient; not proved"),
+        (((sympy.Eq(s.beta, 2),),), "does not follow, not even if beta = 2"),
+    ],
+)
+def test_a_condition_must_suffice_and_be_needed(any_of, words):
+    difference = (s.beta - 1) * (s.kappa - 1)
+    condition = Condition(any_of=any_of, discrepancy=difference)
+    verdict = verify_statements(
+        [given("one", s.slope, difference), claim(s.slope, 0, "one", condition=condition, expected=IF)]
+    )[-1]
+    assert verdict.words.startswith(words)
+    assert verdict.as_expected == ("(necessary)" in words)
+
+
+def test_a_condition_that_is_not_needed_or_hides_another_difference_is_seen():
+    condition = Condition(any_of=((sympy.Eq(s.beta, 1),),), discrepancy=s.beta - 1)
+    one, two = given("one", s.slope, s.beta), given("two", s.beta, s.kappa)
+    words = last_words(one, two, claim(s.slope, s.kappa, "one", "two", condition=condition, eliminate=(s.beta,)))
+    assert words == "follows, also without beta = 1"
+    words = last_words(one, claim(s.slope, 2 - s.beta, "one", condition=condition, expected=IF))
+    assert words == "does not follow, and the difference is another one"
+
+
+def test_a_condition_ruled_out_by_published_numbers_is_no_condition():
+    def words(published):
+        condition = Condition(
+            any_of=((sympy.Eq(s.beta, 1),),), discrepancy=s.beta - 1, ruled_out_by=((s.beta, sympy.sympify(published)),)
+        )
+        return last_words(given("one", s.slope, s.beta), claim(s.slope, 1, "one", condition=condition, expected=NOT))
+
+    assert words("9/10") == "does not follow (beta = 9/10): it would only if beta = 1"
+    assert words(1) == "follows if beta = 1 (necessary)"
+
+
+def test_a_piecewise_claim_needs_a_case_for_every_branch():
+    selector = BY_NUMBER["L2"]
+    verdict = {v.number: v for v in verify_statements(changed("L2", cases=selector.cases[:1]))}["L2"]
+    assert verdict.words == "does not follow: no case stands for dP0 < dP1"
+    undecided = Case(at=((s.dP1, FOREIGN),), where="")
+    verdict = {v.number: v for v in verify_statements(changed("L2", cases=(*selector.cases, undecided)))}["L2"]
+    assert verdict.words == "does not follow: the case of a piecewise premise is not decided"
+
+
+@pytest.mark.parametrize("claim", [s.beta < 2, s.beta > s.kappa, s.beta * (1 - s.k * s.x_max / s.u_max) < 2])
+def test_a_wrong_sign_claim_is_seen(claim):
+    verdict = {v.number: v for v in verify_statements(changed("T4a", positive_if=claim))}["T4a"]
+    assert verdict.words.startswith("does not follow: positive not exactly if")
+    assert not verdict.as_expected
 
 
 def with_grounds(number, *grounds):
-    wrong = replace(BY_NUMBER[number], grounds=tuple(Ground(number=ground) for ground in grounds))
-    return [wrong if equation.number == number else equation for equation in EQUATIONS]
+    return changed(number, grounds=tuple(Ground(number=ground) for ground in grounds))
 
 
 def test_a_statement_is_not_its_own_premise():
     with pytest.raises(RequirementError, match=r"\(13\) is its own premise"):
-        verify_equations(with_grounds("(13)", "(12)", "(13)"))
+        verify_statements(with_grounds("(13)", "(12)", "(13)"))
 
 
 def test_a_circular_chain_is_rejected():
     # (13) from (14) and (14) from (13): each would give the other.
     with pytest.raises(RequirementError, match=r"\(13\) rests on \(14\), which stands after it"):
-        verify_equations(with_grounds("(13)", "u_O", "(14)"))
+        verify_statements(with_grounds("(13)", "u_O", "(14)"))
 
 
 def test_a_copy_is_not_a_premise():
-    copy = Equation(
-        number="copy",
-        title="",
-        kind=Kind.PREMISE,
-        symbol=s.u_0,
-        members=(sympy.expand(BY_NUMBER["(13)"].members[-1]),),
-    )
+    copy = given("copy", s.u_0, sympy.expand(BY_NUMBER["(13)"].members[-1]))
     with pytest.raises(RequirementError, match=r"\(13\) rests on a copy of itself, copy"):
-        verify_equations([copy, *with_grounds("(13)", "copy")])
+        verify_statements([copy, *with_grounds("(13)", "copy")])
 
 
 def test_unknown_and_repeated_statements_are_rejected():
     with pytest.raises(RequirementError, match=r"\(13\) rests on \(99\), which is not stated"):
-        verify_equations(with_grounds("(13)", "(99)"))
+        verify_statements(with_grounds("(13)", "(99)"))
     with pytest.raises(RequirementError, match=r"\(1\) is stated twice"):
-        verify_equations([*EQUATIONS, EQUATIONS[0]])
+        verify_statements([*STATEMENTS, STATEMENTS[0]])
 
 
-def test_equations_check_themselves():
+def test_statements_check_themselves():
     with pytest.raises(ValueError, match="free of u_O"):
         replace(BY_NUMBER["(18)"], members=(s.u_O,))
     with pytest.raises(ValueError, match="needs grounds"):
         replace(BY_NUMBER["(18)"], grounds=())
     with pytest.raises(ValueError, match="has no grounds"):
         replace(BY_NUMBER["(1)"], grounds=(Ground(number="(2)"),))
+    with pytest.raises(ValueError, match="could not convert"):
+        Value(label="", at=(), unit="V", published="about 2")
+    with pytest.raises(ValueError, match="may be true or false"):
+        Condition(any_of=((sympy.true,),))
+    with pytest.raises(ValueError, match=r"x_max.* is not a number"):
+        Value(label="", at=(), unit="m", of=s.x_max).exact(BY_NUMBER["(18)"])
 
 
-# The thresholds are published: 53.9 % at 1 MPa and 51.7 % at 5 MPa for the first valve (section 4.2), 43.2 %
-# and 42.2 % for the second (Fig. 19); the drive left over is taken as k x_max / u_max.
-@pytest.mark.parametrize(("at_dP0", "at_dP1", "excess"), [("53.9", "51.7", 1.048), ("43.2", "42.2", 1.018)])
-def test_excess_of_eq_18_over_the_target(at_dP0, at_dP1, excess):
-    factor = BY_NUMBER["B5"].members[-1] / s.Q_O_prime
-    beta = sympy.Rational(at_dP1) / sympy.Rational(at_dP0)
-    kappa = 1 - sympy.Rational(at_dP0) / 100
-    ratio = factor.subs({s.beta: beta, s.k: kappa * s.u_max / s.x_max})
-    assert float(ratio) == pytest.approx(excess, abs=5e-4)
+@pytest.mark.parametrize(
+    ("number", "member", "error"),
+    [
+        ("(2)", s.Q_max / s.dP0, "m^3/s/V on the left"),
+        ("(14)", s.u_O**0 + s.u_i, "dimensionless"),
+        ("(11)", s.k * s.x + s.dP, "a sum of"),
+        ("(5)", FOREIGN, "the unit of foreign is not known"),
+    ],
+)
+def test_wrong_units_are_seen(number, member, error):
+    statement = BY_NUMBER[number]
+    wrong = replace(statement, symbol=sympy.Symbol("u_O_") if statement.symbol == s.u_O else statement.symbol)
+    wrong = replace(statement, members=(member,))
+    assert units.find_unit_error(wrong).replace("a number", "dimensionless").find(error) >= 0
 
 
-# --- the law ------------------------------------------------------------------------------------------------
-
-BETAS = [Fraction(n, 20) for n in (1, 13, 19, 20, 21)]
-KAPPAS = [Fraction(n, 7) for n in (1, 3, 7, 9)]
-
-
-@pytest.mark.parametrize("name", LAW_NAMES)
-def test_law_is_exact_on_fractions(name):
-    for beta, kappa in itertools.product(BETAS, KAPPAS):
-        gain = law(name).evaluate_gain(beta, kappa)
-        offset = law(name).evaluate_offset(beta, Fraction(27, 5))
-        values = {s.beta: sympy.Rational(beta), s.k: sympy.Rational(kappa), s.x_max: 1, s.u_max: 1}
-        assert type(gain) is type(offset) is Fraction
-        assert sympy.Rational(gain) == law(name).gain.subs(values)
-        assert sympy.Rational(offset) == law(name).offset.subs({**values, s.u_min0: sympy.Rational(27, 5)})
+def test_the_laplace_transform_needs_a_linear_equation(monkeypatch):
+    square = sympy.Eq(s.f_e, s.K_i * s.i**2)
+    monkeypatch.setitem(plant.PLANT_EQUATIONS, "(22)", square)
+    with pytest.raises(ValueError, match=r"\(22\) is not linear"):
+        laplace("(22)")
 
 
-@pytest.mark.parametrize("name", LAW_NAMES)
-def test_law_agrees_on_every_number_type(name):
-    beta, kappa, u_min0 = np.array(BETAS, dtype=float)[:, None], np.array(KAPPAS, dtype=float), 5.4
-    exact = [[float(law(name).evaluate_gain(b, q)) for q in KAPPAS] for b in BETAS]
-    np.testing.assert_allclose(law(name).evaluate_gain(beta, kappa) + 0 * beta, exact, atol=1e-15)
-
-    b, q = casadi.SX.sym("b"), casadi.SX.sym("q")
-    outputs = [law(name).evaluate_gain(b, q), law(name).evaluate_offset(b, u_min0)]
-    lowered = casadi.Function("law", [b, q], outputs)
-    for row, column in np.ndindex(len(BETAS), len(KAPPAS)):
-        gain, offset = lowered(float(BETAS[row]), float(KAPPAS[column]))
-        assert float(gain) == pytest.approx(exact[row][column], abs=1e-15)
-        assert float(offset) == pytest.approx(float(BETAS[row]) * u_min0, rel=1e-15)
+# --- numbers ------------------------------------------------------------------------------------------------
 
 
-def test_the_paper_law_is_monotone_exactly_if_beta_times_one_minus_kappa_is_below_one():
-    for beta, kappa in itertools.product([*BETAS, Fraction(7, 6), Fraction(3)], KAPPAS):
-        assert (law("paper").evaluate_gain(beta, kappa) > 0) == (beta * (1 - kappa) < 1)
-        assert law("target").evaluate_gain(beta, kappa) > 0
+def figure(number, label):
+    statement = BY_NUMBER[number]
+    value = next(value for value in statement.values if label in value.label)
+    return float(value.exact(statement))
 
 
-def test_the_laws_agree_at_the_reference_and_differ_beside_it():
-    for kappa in KAPPAS:
-        assert law("paper").evaluate_gain(1, kappa) == law("target").evaluate_gain(1, kappa) == kappa
-    assert law("paper").evaluate_gain(Fraction(9, 10), Fraction(1, 2)) > Fraction(1, 2)
-    assert law("paper").offset == law("target").offset
+@pytest.mark.parametrize(
+    ("number", "label", "expected", "digits"),
+    [
+        ("T1b", "first valve", 1.048, 3),
+        ("T1b", "second valve", 1.018, 3),
+        ("T3b", "simulation", 0.94, 2),
+        ("T3b", "first valve", 1.12, 2),
+        ("T5c", "without", 20, 1),
+        ("T5c", "second valve", 54.6, 1),
+        ("T5c", "first valve", 63.1, 1),
+        ("T7a", "first valve", 0.30, 2),
+    ],
+)
+def test_the_papers_numbers(number, label, expected, digits):
+    assert round(figure(number, label), digits) == expected
 
 
-@pytest.mark.parametrize("name", LAW_NAMES)
-def test_gain_and_offset_make_up_the_output(name):
-    assert sympy.expand(law(name).gain * s.u_i + law(name).offset - law(name).output) == 0
+def test_a_difference_from_the_paper_is_explained():
+    for statement in STATEMENTS:
+        for value in statement.values:
+            assert value.exact(statement).is_number
+            assert not value.published or value.agrees(statement) or value.remark, f"{statement.number}: {value.label}"
 
 
-def test_unknown_law_names_the_nearest():
-    with pytest.raises(InputError, match=r"unknown law 'papper' \(did you mean 'paper'\?\).*paper, target"):
-        law("papper")
+class Valve:
+    """A valve in plain floating point, with nothing of the account: the dead zone, a straight part, a stop."""
+
+    def __init__(self, draw):
+        self.u_max, self.k, self.x_max = 10.0, draw.uniform(2e3, 6e3), draw.uniform(0.6e-3, 1.2e-3)
+        self.conductance = draw.uniform(0.5, 2) * 1e-6  # m^3/s per m and Pa^0.5
+        self.u_min0 = draw.uniform(3, 5)
+        self.beta = draw.uniform(0.8, 0.99)
+        self.dP0, self.dP1 = 1e6, draw.uniform(2e6, 6e6)
+
+    def flow(self, u, u_min, dP):
+        return self.conductance * math.sqrt(dP) * max(0.0, u - u_min) / self.k
+
+    def symbols(self):
+        return {
+            s.u_max: self.u_max, s.k: self.k, s.x_max: self.x_max, s.u_min0: self.u_min0, s.beta: self.beta,
+            s.u_min1: self.beta * self.u_min0, s.dP0: self.dP0, s.dP1: self.dP1,
+            s.C_d: self.conductance, s.W: 1.0, s.rho: 2.0,
+        }  # fmt: skip
 
 
-@pytest.mark.parametrize(("output", "complaint"), [(s.u_i**2, "not affine"), (s.u_i * FOREIGN, "foreign")])
-def test_a_law_checks_its_output(output, complaint):
-    with pytest.raises(ValueError, match=complaint):
-        Law(name="wrong", equation="", output=output, note="")
+@pytest.fixture(params=range(5), ids=lambda n: f"seed{SEED + n}")
+def valve(request):
+    return Valve(random.Random(SEED + request.param))
 
 
-def test_a_law_with_a_fraction_is_not_lowered_to_floats():
-    halved = Law(name="halved", equation="", output=law("paper").output / 2, note="")
-    with pytest.raises(ValueError, match="integer coefficients"):
-        halved.evaluate_offset(1, 1)
+def evaluated(expression, values):
+    result = expression.subs(values)
+    assert result.is_number, result
+    return float(result)
 
 
-# --- the plant ----------------------------------------------------------------------------------------------
+def test_theorem_1_on_a_plain_valve(valve):
+    kappa, u_min1 = valve.k * valve.x_max / valve.u_max, valve.beta * valve.u_min0
+    factor = BY_NUMBER["T1b"].members[1] / s.Q_O_prime
+    for u_i in (0.1, 3.0, 10.0):
+        target = valve.conductance * math.sqrt(valve.dP1) * valve.x_max / valve.u_max * u_i
+        by_paper = (valve.beta * kappa - valve.beta + 1) * u_i + valve.beta * valve.u_min0
+        by_target = kappa * u_i + valve.beta * valve.u_min0
+        ratio = valve.flow(by_paper, u_min1, valve.dP1) / target
+        assert ratio == pytest.approx(evaluated(factor, valve.symbols()), rel=1e-12)
+        assert valve.flow(by_target, u_min1, valve.dP1) == pytest.approx(target, rel=1e-12)
 
 
-def test_plant_satisfies_the_published_equations():
-    derivatives = plant.state_derivatives()
-    feedback = s.K_fi * s.i
-    solution = {
-        s.di_dt: derivatives.di_dt,
-        s.dx_e_dt: derivatives.dx_e_dt,
-        s.dv_dt: derivatives.dv_dt,
-        s.u_if: feedback,
-        s.u_e: s.K_a * (s.u_i - feedback),
-        s.f_e: s.K_i * s.i,
-        s.Q: plant.flow(),
-    }
-    for number, equation in plant.PLANT_EQUATIONS.items():
-        assert sympy.simplify((equation.lhs - equation.rhs).subs(solution)) == 0, number
+def test_theorem_3_on_a_plain_valve(valve):
+    u_min1, flow = valve.beta * valve.u_min0, BY_NUMBER["T3a"].members[0]
+    for beta in (0.7 * valve.beta, valve.beta, 1.0):
+        values = {**valve.symbols(), s.beta: beta, s.gamma_1: valve.conductance * math.sqrt(valve.dP1)}
+        expected = valve.flow(beta * valve.u_min0, u_min1, valve.dP1)
+        assert evaluated(flow, values) == pytest.approx(expected, rel=1e-9, abs=1e-18)
 
 
-def test_plant_is_in_its_state_inputs_and_parameters():
-    names = {*plant.STATE, *plant.INPUTS, *plant.PARAMETERS}
-    assert set().union(*(row.free_symbols for row in plant.state_derivatives())) == names
-    assert plant.flow().free_symbols == {s.x_e, *plant.FLOW_PARAMETERS}
+def test_theorem_9_on_a_plain_valve(valve):
+    floor = 1e-8
+
+    def first_seen(dP):
+        low, high = valve.u_min0, 10.0
+        for _ in range(60):
+            middle = (low + high) / 2
+            low, high = (low, middle) if valve.flow(middle, valve.u_min0, dP) >= floor else (middle, high)
+        return high
+
+    values = {**valve.symbols(), s.Q_floor: floor, s.gamma_0: valve.conductance * math.sqrt(valve.dP0)}
+    fall = first_seen(valve.dP0) - first_seen(valve.dP1)
+    assert evaluated(BY_NUMBER["T9b"].members[-1], values) == pytest.approx(fall, rel=1e-6)
 
 
-def test_current_settles_with_its_time_constant():
-    t = sympy.Symbol("t", positive=True)
-    current = plant.steady_state_current() * (1 - sympy.exp(-t / plant.current_time_constant()))
-    slope = plant.state_derivatives().di_dt.subs(s.i, current)
-    assert sympy.simplify(sympy.diff(current, t) - slope) == 0
-    expected = s.L_c / (s.R_c + s.r_p + s.K_a * s.K_fi)
-    assert sympy.simplify(plant.current_time_constant() - expected) == 0
+def test_the_meter_explains_the_flow_at_zero_command_better():
+    measured, without, with_floor = 1.6, figure("T3b", "first valve"), figure("T9d", "first valve")
+    assert abs(with_floor - measured) < abs(without - measured) / 4
+    assert FIRST.at()
 
 
-# --- the report ---------------------------------------------------------------------------------------------
-
-
-class Outline(HTMLParser):
-    """Text of a page; fails on tags that do not match."""
-
-    def __init__(self):
-        super().__init__()
-        self.open, self.text, self.tags = [], [], set()
-
-    def handle_starttag(self, tag, attrs):
-        self.tags.add(tag)
-        if tag != "meta":
-            self.open.append(tag)
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        self.text.append(data)
-
-
-@pytest.mark.parametrize("format", report.FORMATS)
-def test_every_statement_and_verdict_is_in_the_report(verdicts, format):
-    rendered = report.render(verdicts, format)
-    assert rendered.endswith("\n")
-    plain = rendered.replace("\\_", "_")
-    for verdict in verdicts:
-        assert verdict.number in plain
-        assert verdict.verdict in plain
-
-
-def test_text_is_plain_and_says_what_fails(verdicts):
-    rendered = report.render(verdicts, "text")
-    assert rendered.isascii()
-    assert max(map(len, rendered.splitlines())) <= 100
-    assert rendered.endswith(f"All {len(DERIVED)} statements follow from the {len(GIVEN)} taken as given.\n")
-
-    wrong = judge(replace(BY_NUMBER["(18)"], members=(s.u_no - s.u_i,)))
-    rendered = report.render([wrong], "text")
-    assert "does not follow" in rendered
-    assert "derived minus published: 2*u_i" in rendered
-    assert "1 of 1 statements do not hold: (18)." in rendered
-
-
-def test_json_parses_and_its_statements_can_be_read_back(verdicts):
-    document = json.loads(report.render(verdicts, "json"))
-    assert document["schema"] == "dzdesign.derivation/1"
-    assert document["holds"] is True
-    names = {name: value for name, value in vars(symbols).items() if isinstance(value, sympy.Symbol)}
-    row = next(row for row in document["statements"] if row["number"] == "(18)")
-    left, *right = row["statement"].split(" = ")
-    assert left == "u_O"
-    assert [sympy.sympify(side, locals=names) for side in right] == list(BY_NUMBER["(18)"].members)
-    assert [premise["number"] for premise in row["premises"]] == ["u_O", "(17)"]
-
-
-def test_html_is_one_closed_page_without_scripts_or_network(verdicts):
-    rendered = report.render(verdicts, "html")
-    outline = Outline()
-    outline.feed(rendered)
-    assert outline.open == []
-    assert not outline.tags & {"script", "link", "img", "iframe"}
-    assert "http" not in rendered
-    assert "<mo><</mo>" not in rendered
-
-
-def test_html_and_latex_escape_text(verdicts):
-    hostile = replace(verdicts[0], title="<b>50 % & more_</b>", note="</p><script>")
-    rendered = report.render([hostile], "html")
-    assert "&lt;b&gt;50 % &amp; more_&lt;/b&gt;" in rendered
-    assert "<script>" not in rendered
-    assert r"50 \% \& more\_" in report.render([hostile], "latex")
-
-
-@pytest.mark.skipif(shutil.which("pdflatex") is None, reason="pdflatex is not installed")
-def test_latex_compiles(verdicts, tmp_path):
-    (tmp_path / "derivation.tex").write_text(report.render(verdicts, "latex"), encoding="utf-8")
-    command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "derivation.tex"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout[-2000:]
-
-
-def test_latex_environments_and_braces_balance(verdicts):
-    rendered = report.render(verdicts, "latex").replace(r"\{", "").replace(r"\}", "")
-    assert rendered.count(r"\begin{") == rendered.count(r"\end{")
-    assert rendered.count("{") == rendered.count("}")
-    assert rendered.count(r"\left") == rendered.count(r"\right")
-
-
-def test_unknown_format_names_the_nearest(verdicts):
-    with pytest.raises(InputError, match=r"unknown format 'htm' \(did you mean 'html'\?\)"):
-        report.render(verdicts, "htm")
-
-
-@pytest.mark.parametrize("module", [law_module, plant], ids=lambda module: module.__name__)
-def test_examples_in_the_docstrings_run(module):
-    outcome = doctest.testmod(module)
-    assert outcome.attempted > 0
-    assert outcome.failed == 0
+def test_the_current_by_its_transfer_function_is_the_current_in_time():
+    numbers = {s.K_a: 2, s.K_fi: 3, s.R_c: 5, s.r_p: 1, s.L_c: 4}
+    step = BY_NUMBER["T6a"].members[0].subs({s.U_i: 1 / s.s}).subs(numbers)
+    current = sympy.inverse_laplace_transform(step, s.s, s.t)
+    slope = plant.state_derivatives().di_dt.subs({s.u_i: 1}).subs(numbers).subs(s.i, current)
+    assert sympy.simplify(sympy.diff(current, s.t) - slope) == 0

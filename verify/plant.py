@@ -157,9 +157,9 @@ def derivatives(plant: Plant) -> tuple["casadi.SX", "casadi.SX", "casadi.SX"]:
         pressure drop in MPa); d state/dt.
     """
     import casadi as ca
-    import sympy
 
     from dzdesign.derivation import plant as equations
+    from dzdesign.derivation.lowering import lower
 
     state, inputs = ca.SX.sym("state", 3), ca.SX.sym("inputs", 3)
     current, position, speed = (state[index] for index in range(3))
@@ -182,9 +182,8 @@ def derivatives(plant: Plant) -> tuple["casadi.SX", "casadi.SX", "casadi.SX"]:
         plant.K_a, plant.K_fi_V_A, plant.K_i_N_A, plant.R_c_ohm, plant.r_p_ohm, plant.L_c_H, plant.m_e_kg,
         plant.B_e_N_s_m, plant.K_et_N_m,
     )  # fmt: skip
-    lowered = sympy.lambdify(
-        (*equations.STATE, *equations.INPUTS, *equations.PARAMETERS), list(equations.state_derivatives()), modules=[]
-    )
+    names = (*equations.STATE, *equations.INPUTS, *equations.PARAMETERS)
+    lowered = lower(list(equations.state_derivatives()), names)
     return state, inputs, ca.vertcat(*lowered(current, position, speed, voltage, load, *parameters))
 
 
@@ -194,13 +193,11 @@ def orifice(plant: Plant, opening_m: Any, supply_MPa: Any) -> tuple[Any, Any]:
     Eq. (24) is Q = G sqrt(dP); with dP = supply - droop Q^2 that gives dP = supply / (1 + droop G^2).
     """
     import casadi as ca
-    import sympy
 
     from dzdesign.derivation import plant as equations
+    from dzdesign.derivation.lowering import lower
 
-    flow = sympy.lambdify(
-        (equations.STATE[1], *equations.FLOW_PARAMETERS), equations.flow(), modules=[{"sqrt": ca.sqrt}]
-    )
+    flow = lower(equations.flow(), (equations.STATE[1], *equations.FLOW_PARAMETERS), {"sqrt": ca.sqrt})
     conductance = flow(opening_m, 1.0, plant.C_d_W_mm * 1e-3, plant.rho_kg_m3, MPA) / L_MIN  # L/min at 1 MPa
     dp_MPa = supply_MPa / (1 + plant.droop_MPa_L_min2 * conductance**2)
     return dp_MPa, conductance * ca.sqrt(dp_MPa)

@@ -15,6 +15,7 @@ import numpy as np
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.derivation.law import law
+from dzdesign.derivation.scaling import Line, evaluate_line
 
 
 class ExactLaw:
@@ -47,11 +48,16 @@ class ExactLaw:
         rise = self._nodes[left + 1] - self._nodes[left]
         return Fraction(self._nodes[left] * self._step + rise * past, self._denominator * self._step)
 
-    def line(self, beta: Fraction) -> tuple[Fraction, Fraction]:
+    def line(self, beta: Fraction) -> Line:
         """Return the law at one beta in counts: slope per command code, and value at code 0."""
-        gain = self._law.evaluate_gain(beta, self._kappa)
-        offset = self._law.evaluate_offset(beta, self._u_min0)
-        return gain * self.compare_max / self.command_max, offset * self.compare_max
+        return evaluate_line(
+            self._law,
+            beta=beta,
+            kappa=self._kappa,
+            u_min0_over_u_max=self._u_min0,
+            n_adc=self.command_max,
+            n_full=self.compare_max,
+        )
 
     def rows(self, betas: list[Fraction]) -> Iterator[np.ndarray]:
         """Yield, for command codes 0, 1, ..., the rounded and limited compare values at all `betas`."""

@@ -1,0 +1,86 @@
+"""From an expression to a function for numbers of any kind; design, codegen and verify compute by these."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from fractions import Fraction
+from typing import Any
+
+import sympy
+
+
+def lower(
+    expression: sympy.Expr | Sequence[sympy.Expr],
+    arguments: Sequence[sympy.Symbol],
+    functions: Mapping[str, Callable[[Any], Any]] | None = None,
+) -> Callable[..., Any]:
+    """Return the function that computes an expression by bare arithmetic; its arguments decide in what numbers.
+
+    Parameters
+    ----------
+    expression : sympy.Expr, or a sequence of them
+        Sums, products and whole powers of `arguments` and integers, and `functions` of such.
+    arguments : sequence of sympy.Symbol
+        What the function takes, in this order.
+    functions : mapping, optional
+        Name -> implementation, for the kind of number that will come: ``{"sqrt": casadi.sqrt}``.
+
+    Returns
+    -------
+    callable
+        Gives a number, or a tuple for a sequence. Fractions stay exact, and so do ints, which are taken as fractions
+        where all arguments are ints or fractions; arrays and CasADi expressions stay what they are.
+
+    Raises
+    ------
+    ValueError
+        If `expression` holds a number that is not an integer, a symbol that is not an argument, or a root, power or
+        function without an implementation.
+
+    Examples
+    --------
+    >>> a, b = sympy.symbols("a b")
+    >>> lower(a / b, (a, b))(1, 3)
+    Fraction(1, 3)
+    """
+    functions = dict(functions or {})
+    one = isinstance(expression, sympy.Expr)
+    expressions = (expression,) if one else tuple(expression)
+    for each in expressions:
+        for complaint in _complaints(each, set(arguments), functions):
+            raise ValueError(f"{each} can't be lowered: {complaint}")
+    # No numeric module: whatever is not in `functions` would be a NameError, never silently a float.
+    compute = sympy.lambdify(tuple(arguments), expressions, modules=[functions])
+
+    def lowered(*values: Any) -> Any:
+        # Python divides two ints to a float.
+        if all(isinstance(value, int | Fraction) for value in values):
+            values = tuple(map(Fraction, values))
+        results = compute(*values)
+        return results[0] if one else results
+
+    return lowered
+
+
+def _complaints(node: sympy.Basic, arguments: set[sympy.Symbol], functions: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what keeps an expression from being lowered exactly."""
+    parts = node.args
+    if isinstance(node, sympy.Symbol):
+        if node not in arguments:
+            yield f"{node} is not among the arguments"
+    elif isinstance(node, sympy.Pow) and not node.exp.is_Integer:
+        parts = (node.base,)
+        # Printed as sqrt(x) and 1/sqrt(x); any other power would be one of floats.
+        if abs(node.exp) != sympy.Rational(1, 2):
+            yield f"{node} is not a whole power"
+        elif "sqrt" not in functions:
+            yield f"{node} needs an implementation of sqrt"
+    elif isinstance(node, sympy.Function):
+        if node.func.__name__ not in functions:
+            yield f"{node} needs an implementation of {node.func.__name__}"
+    elif node.is_Number or node.is_NumberSymbol:
+        # A fraction would be printed as a division of ints, which is one of floats.
+        if not node.is_Integer:
+            yield f"expected integer coefficients, got {node}"
+    elif not isinstance(node, sympy.Add | sympy.Mul | sympy.Pow):
+        yield f"{node} is no sum, product or power"
+    for part in parts:
+        yield from _complaints(part, arguments, functions)

@@ -1,0 +1,272 @@
+"""What a statement is: published or ours, with the grounds, cases and conditions that it is judged by."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import sympy
+
+#: A symbol, or a Laplace transform such as I(s), that a statement gives the value of.
+Name = sympy.Symbol | sympy.core.function.AppliedUndef
+Replacements = tuple[tuple[Name, sympy.Expr], ...]
+
+
+class Kind(StrEnum):
+    """Where a statement comes from; the first four are taken as given."""
+
+    PREMISE = "premise"  # an equation that the paper starts from
+    ASSUMPTION = "assumption"  # a reading of a figure, or an approximation that the paper makes
+    DEFINITION = "definition"  # the meaning of a new name
+    CHOICE = "choice"  # ours, not the paper's
+    PAPER = "paper"  # an equation that the paper derives
+    LAW = "law"  # ties the law of `law.py` and the scaling of `scaling.py` to the paper's equations
+    CORRECTED = "corrected"  # what a published equation should read
+    THEOREM = "theorem"  # what the paper does not say
+
+    @property
+    def is_given(self) -> bool:
+        return self in (Kind.PREMISE, Kind.ASSUMPTION, Kind.DEFINITION, Kind.CHOICE)
+
+
+class Outcome(StrEnum):
+    """What can be found about a statement."""
+
+    GIVEN = "given"
+    FOLLOWS = "follows"
+    FOLLOWS_IF = "follows if"
+    DOES_NOT_FOLLOW = "does not follow"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ground:
+    """A statement used as a premise of another one, at certain values of its symbols.
+
+    Parameters
+    ----------
+    number : str
+        Number of the statement used.
+    at : tuple of (sympy.Symbol, sympy.Expr)
+        What replaces its symbols, all at once: ``((dP, dP0),)`` takes it at the reference pressure drop. Values
+        whose signs SymPy knows also decide between the cases of a piecewise statement.
+    where : str
+        The same in words.
+    member : int
+        Which of its right-hand sides is used: the last, unless said otherwise.
+    derivative : tuple of (sympy.Symbol, sympy.Symbol), optional
+        ``(by, name)``: the statement is first differentiated by the symbol `by`, and the derivative of its
+        left-hand side is called `name`.
+    """
+
+    number: str
+    at: Replacements = ()
+    where: str = ""
+    member: int = -1
+    derivative: tuple[sympy.Symbol, Name] | None = None
+
+    def __str__(self) -> str:
+        return f"{self.number} {self.where}" if self.where else self.number
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """One of the cases by which a piecewise statement is proved; together they exhaust what can occur.
+
+    Parameters
+    ----------
+    at : tuple of (sympy.Symbol, sympy.Expr)
+        Replacements that make the case, such as ``((dP1, dP0 + above),)`` with a positive `above`.
+    where : str
+        The same in words.
+    """
+
+    at: Replacements
+    where: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Condition:
+    """What has to hold for a statement to follow; whether it is also necessary is for the proof to find.
+
+    Parameters
+    ----------
+    any_of : tuple of tuple of sympy.Eq
+        The statement follows if all equations of one of these hold.
+    for_all : tuple of sympy.Symbol
+        The statement is to hold for every value of these, so each power of them counts by itself.
+    witness : tuple of (sympy.Expr, sympy.Expr)
+        To hold for every function, the statement must hold for this one; necessity is proved on it.
+    ruled_out_by : tuple of (sympy.Symbol, sympy.Expr)
+        Published values at which none of the alternatives holds: the statement does not follow then.
+    discrepancy : sympy.Expr
+        Derived minus published, as a correct account finds it, of the first case and member in which they differ.
+    words : str
+        What the paper calls the condition, in brackets.
+    """
+
+    any_of: tuple[tuple[sympy.Eq, ...], ...]
+    for_all: tuple[sympy.Symbol, ...] = ()
+    witness: tuple[tuple[sympy.Expr, sympy.Expr], ...] = ()
+    ruled_out_by: Replacements = ()
+    discrepancy: sympy.Expr = sympy.S.Zero
+    words: str = ""
+
+    def __post_init__(self) -> None:
+        equations = [equation for alternative in self.any_of for equation in alternative]
+        if not equations or not all(isinstance(equation, sympy.Eq) for equation in equations):
+            raise ValueError(f"a condition needs equations that may be true or false, got {self.any_of}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Value:
+    """A number that a statement gives with published figures put in, beside the number that the paper prints.
+
+    Parameters
+    ----------
+    label : str
+        Whose number it is.
+    at : tuple of (sympy.Symbol, sympy.Expr)
+        The published figures.
+    unit : str
+        Unit of the result, which `at` must be consistent with; for ``%`` the expression is multiplied by 100.
+    of : sympy.Expr, optional
+        The expression; the statement's last member if none is given.
+    published : str
+        The paper's number as printed, or empty where it has none.
+    remark : str
+        What could explain a difference, or what the number means.
+
+    Raises
+    ------
+    ValueError
+        If `published` is not a number.
+    """
+
+    label: str
+    at: Replacements
+    unit: str
+    of: sympy.Expr | None = None
+    published: str = ""
+    remark: str = ""
+
+    def __post_init__(self) -> None:
+        if self.published:
+            float(self.published)
+
+    def exact(self, statement: "Statement") -> sympy.Expr:
+        """Return the number exactly, in `unit`.
+
+        Parameters
+        ----------
+        statement : Statement
+            Whose value it is.
+
+        Returns
+        -------
+        sympy.Expr
+
+        Raises
+        ------
+        ValueError
+            If the published figures do not determine it.
+        """
+        expression = statement.members[-1] if self.of is None else self.of
+        number = sympy.simplify(expression.subs(dict(self.at)))
+        if not number.is_number:
+            raise ValueError(f"{statement.number}, {self.label}: {number} is not a number")
+        return 100 * number if self.unit == "%" else number
+
+    def agrees(self, statement: "Statement") -> bool:
+        """Return whether the number, rounded to the digits that the paper prints, is the paper's.
+
+        Parameters
+        ----------
+        statement : Statement
+
+        Returns
+        -------
+        bool
+        """
+        decimals = len(self.published.partition(".")[2])
+        difference = abs(self.exact(statement) - sympy.Rational(self.published))
+        return bool(difference <= sympy.Rational(1, 2 * 10**decimals))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Statement:
+    """``symbol = member = ... = member``, with the grounds from which it is to follow.
+
+    Parameters
+    ----------
+    number : str
+        The paper's number, or a name for what has none.
+    title : str
+        What it says, in words.
+    kind : Kind
+        Where it comes from.
+    symbol : sympy.Symbol or applied function
+        Left-hand side.
+    members : tuple of sympy.Expr
+        Right-hand sides, as published. A statement that rests on this one uses the last.
+    grounds : tuple of Ground
+        The premises; empty for what is taken as given.
+    eliminate : tuple of sympy.Symbol
+        Symbols of the grounds that are solved for along with `symbol`.
+    cases : tuple of Case
+        Where the members are piecewise: the cases to prove it by.
+    condition : Condition, optional
+        What is needed beside the grounds.
+    positive_if : sympy relational, optional
+        The claim that the left-hand side is positive exactly if this holds.
+    expected : Outcome, optional
+        What a correct account finds; `GIVEN` for what is taken as given, else `FOLLOWS`.
+    corrected_by : str
+        Number of the statement that says what this one should read.
+    see : tuple of str
+        Statements that qualify this one.
+    values : tuple of Value
+        Its numbers beside the paper's.
+    note : str
+        What a reader should know beyond the verdict.
+    section : str
+        Heading that it stands under.
+
+    Raises
+    ------
+    ValueError
+        If the statement defines its symbol by itself, or has grounds that do not fit its kind.
+    """
+
+    number: str
+    title: str
+    kind: Kind
+    symbol: Name
+    members: tuple[sympy.Expr, ...]
+    grounds: tuple[Ground, ...] = ()
+    eliminate: tuple[Name, ...] = ()
+    cases: tuple[Case, ...] = ()
+    condition: Condition | None = None
+    positive_if: sympy.core.relational.Relational | None = None
+    expected: Outcome | None = None
+    corrected_by: str = ""
+    see: tuple[str, ...] = ()
+    values: tuple[Value, ...] = ()
+    note: str = ""
+    section: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.members or any(member.has(self.symbol) for member in self.members):
+            raise ValueError(f"{self.number}: needs right-hand sides that are free of {self.symbol}")
+        if self.kind.is_given == bool(self.grounds):
+            wanted = "has no" if self.kind.is_given else "needs"
+            raise ValueError(f"{self.number}: a statement of kind {self.kind} {wanted} grounds")
+        if self.expected is None:
+            object.__setattr__(self, "expected", Outcome.GIVEN if self.kind.is_given else Outcome.FOLLOWS)
+
+    @property
+    def published(self) -> sympy.Eq:
+        """The statement in its last form, the one that other statements use."""
+        return sympy.Eq(self.symbol, self.members[-1], evaluate=False)
+
+    @property
+    def text(self) -> str:
+        """The statement as plain text."""
+        return " = ".join(sympy.sstr(side) for side in (self.symbol, *self.members))

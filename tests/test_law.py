@@ -1,0 +1,116 @@
+"""The law is the same for every kind of number, and the plant is what the paper prints."""
+
+import itertools
+from fractions import Fraction
+
+import casadi
+import numpy as np
+import pytest
+import sympy
+
+from dzdesign.core.errors import InputError
+from dzdesign.derivation import plant
+from dzdesign.derivation import symbols as s
+from dzdesign.derivation.law import LAW_NAMES, Law, law
+
+FOREIGN = sympy.Symbol("foreign", positive=True)
+
+# --- the law ------------------------------------------------------------------------------------------------
+
+BETAS = [Fraction(n, 20) for n in (1, 13, 19, 20, 21)]
+KAPPAS = [Fraction(n, 7) for n in (1, 3, 7, 9)]
+
+
+@pytest.mark.parametrize("name", LAW_NAMES)
+def test_law_is_exact_on_fractions(name):
+    for beta, kappa in itertools.product(BETAS, KAPPAS):
+        gain = law(name).evaluate_gain(beta, kappa)
+        offset = law(name).evaluate_offset(beta, Fraction(27, 5))
+        values = {s.beta: sympy.Rational(beta), s.k: sympy.Rational(kappa), s.x_max: 1, s.u_max: 1}
+        assert type(gain) is type(offset) is Fraction
+        assert sympy.Rational(gain) == law(name).gain.subs(values)
+        assert sympy.Rational(offset) == law(name).offset.subs({**values, s.u_min0: sympy.Rational(27, 5)})
+
+
+@pytest.mark.parametrize("name", LAW_NAMES)
+def test_law_agrees_on_every_number_type(name):
+    beta, kappa, u_min0 = np.array(BETAS, dtype=float)[:, None], np.array(KAPPAS, dtype=float), 5.4
+    exact = [[float(law(name).evaluate_gain(b, q)) for q in KAPPAS] for b in BETAS]
+    np.testing.assert_allclose(law(name).evaluate_gain(beta, kappa) + 0 * beta, exact, atol=1e-15)
+
+    b, q = casadi.SX.sym("b"), casadi.SX.sym("q")
+    outputs = [law(name).evaluate_gain(b, q), law(name).evaluate_offset(b, u_min0)]
+    lowered = casadi.Function("law", [b, q], outputs)
+    for row, column in np.ndindex(len(BETAS), len(KAPPAS)):
+        gain, offset = lowered(float(BETAS[row]), float(KAPPAS[column]))
+        assert float(gain) == pytest.approx(exact[row][column], abs=1e-15)
+        assert float(offset) == pytest.approx(float(BETAS[row]) * u_min0, rel=1e-15)
+
+
+def test_the_paper_law_is_monotone_exactly_if_beta_times_one_minus_kappa_is_below_one():
+    for beta, kappa in itertools.product([*BETAS, Fraction(7, 6), Fraction(3)], KAPPAS):
+        assert (law("paper").evaluate_gain(beta, kappa) > 0) == (beta * (1 - kappa) < 1)
+        assert law("target").evaluate_gain(beta, kappa) > 0
+
+
+def test_the_laws_agree_at_the_reference_and_differ_beside_it():
+    for kappa in KAPPAS:
+        assert law("paper").evaluate_gain(1, kappa) == law("target").evaluate_gain(1, kappa) == kappa
+    assert law("paper").evaluate_gain(Fraction(9, 10), Fraction(1, 2)) > Fraction(1, 2)
+    assert law("paper").offset == law("target").offset
+
+
+@pytest.mark.parametrize("name", LAW_NAMES)
+def test_gain_and_offset_make_up_the_output(name):
+    assert sympy.expand(law(name).gain * s.u_i + law(name).offset - law(name).output) == 0
+
+
+def test_unknown_law_names_the_nearest():
+    with pytest.raises(InputError, match=r"unknown law 'papper' \(did you mean 'paper'\?\).*paper, target"):
+        law("papper")
+
+
+@pytest.mark.parametrize(("output", "complaint"), [(s.u_i**2, "not affine"), (s.u_i * FOREIGN, "foreign")])
+def test_a_law_checks_its_output(output, complaint):
+    with pytest.raises(ValueError, match=complaint):
+        Law(name="wrong", equation="", output=output, note="")
+
+
+def test_a_law_with_a_fraction_is_not_lowered_to_floats():
+    halved = Law(name="halved", equation="", output=law("paper").output / 2, note="")
+    with pytest.raises(ValueError, match="integer coefficients"):
+        halved.evaluate_offset(1, 1)
+
+
+# --- the plant ----------------------------------------------------------------------------------------------
+
+
+def test_plant_satisfies_the_published_equations():
+    derivatives = plant.state_derivatives()
+    feedback = s.K_fi * s.i
+    solution = {
+        s.di_dt: derivatives.di_dt,
+        s.dx_e_dt: derivatives.dx_e_dt,
+        s.dv_dt: derivatives.dv_dt,
+        s.u_if: feedback,
+        s.u_e: s.K_a * (s.u_i - feedback),
+        s.f_e: s.K_i * s.i,
+        s.Q: plant.flow(),
+    }
+    for number, equation in plant.PLANT_EQUATIONS.items():
+        assert sympy.simplify((equation.lhs - equation.rhs).subs(solution)) == 0, number
+
+
+def test_plant_is_in_its_state_inputs_and_parameters():
+    names = {*plant.STATE, *plant.INPUTS, *plant.PARAMETERS}
+    assert set().union(*(row.free_symbols for row in plant.state_derivatives())) == names
+    assert plant.flow().free_symbols == {s.x_e, *plant.FLOW_PARAMETERS}
+
+
+def test_current_settles_with_its_time_constant():
+    t = sympy.Symbol("t", positive=True)
+    current = plant.steady_state_current() * (1 - sympy.exp(-t / plant.current_time_constant()))
+    slope = plant.state_derivatives().di_dt.subs(s.i, current)
+    assert sympy.simplify(sympy.diff(current, t) - slope) == 0
+    expected = s.L_c / (s.R_c + s.r_p + s.K_a * s.K_fi)
+    assert sympy.simplify(plant.current_time_constant() - expected) == 0
