@@ -1,12 +1,15 @@
 """What one branch shows of the valve's characteristic: plateau, knee, first flow seen, noise."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.branches import BIN_WIDTH, Bins, Branch, bin_branch
+from dzdesign.identify.noise import Roughness, colour_factor, measure_roughness
 
 #: Share of the command's range, from the top, over which the largest flow is read.
 TOP = 0.05
@@ -24,6 +27,14 @@ NOISE_LEVEL = 3.0
 TAIL = 3.0
 #: Fewest samples in the tail for a line.
 TAIL_SAMPLES = 12
+#: Upper ends to which the window is widened while the characteristic goes on straight, over the largest flow.
+WIDER = (0.65, 0.8, 0.9, 1.0)
+#: The window may reach down to this multiple of the first flow that counts: nearer to a floor readings are cut off.
+ABOVE_LEVEL = 1.5
+#: Standard errors by which the zero of a wider window's line may depart from a narrower one's.
+STRAIGHT = 2.5
+#: Share of u_max beyond which no departure is put down to noise: slow noise and a slight bend look alike.
+LARGEST_SHIFT = 2e-3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,6 +55,10 @@ class BranchShape:
         Robust standard deviation of one sample about the line, m³/s.
     colour : float
         Long-run variance over variance of one sample (1 for white noise, more for coloured noise or a bent line).
+    window : tuple of float
+        Flows between which the characteristic was found straight, over the largest flow.
+    roughness : Roughness
+        Of the residuals in the window, which tells how slow the noise is.
     level : float
         Flow that counts as flow, m³/s: the meter's floor, its noise or `USEFUL_FLOW`, whichever is largest.
     onset, onset_se, onset_slope : float
@@ -61,6 +76,8 @@ class BranchShape:
     knee: float
     sigma: float
     colour: float
+    window: tuple[float, float]
+    roughness: Roughness
     level: float
     onset: float
     onset_se: float
@@ -163,6 +180,7 @@ def describe_branch(
     floor: float,
     window: tuple[float, float],
     source: str,
+    correlation: float = 0.0,
 ) -> BranchShape:
     """Describe one branch: where the straight part lies, its line, its noise, and the tail below it.
 
@@ -180,54 +198,142 @@ def describe_branch(
         Shares of the largest flow between which the characteristic is taken as straight.
     source : str
         File name for messages.
+    correlation : float
+        Of the noise in neighbouring samples.
 
     Raises
     ------
     InputError
         If the window holds too few samples for a line.
     """
-    u_profile, y_profile = smooth_profile(branch.u, y, u_max)
-    y_max = flow_at_top(u_profile, y_profile)
-    u_low, u_high = (crossing(u_profile, y_profile, share * y_max) for share in window)
+    profile = smooth_profile(branch.u, y, u_max)
+    y_max = flow_at_top(*profile)
+    fit = partial(_gated_line, branch, y, profile, y_max=y_max, floor=floor, source=source, correlation=correlation)
+    narrow = fit(window)
+    noise = _quiet_noise(branch, y, narrow.knee)
+    level = max(floor, USEFUL_FLOW * y_max, NOISE_LEVEL * noise)
+    line = _widest_straight(fit, narrow, lowest=ABOVE_LEVEL * level / y_max, largest_shift=LARGEST_SHIFT * u_max)
+    onset, onset_se, onset_slope = _tail_onset(branch.u, y, profile, level, line.slope, noise, correlation)
+    return BranchShape(
+        rising=branch.rising,
+        bins=bin_branch(branch.u[line.kept], y[line.kept], line.censored[line.kept], u_max),
+        y_max=y_max,
+        slope=line.slope,
+        knee=line.knee,
+        sigma=line.sigma,
+        colour=line.colour,
+        window=line.window,
+        roughness=line.roughness,
+        level=level,
+        onset=onset,
+        onset_se=onset_se,
+        onset_slope=onset_slope,
+        saturates=y_max < 0.93 * line.slope * (branch.u.max() - line.knee),
+        outliers=line.outliers,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _GatedLine:
+    """Straight line through the samples between two flows, outliers left out; arrays are over the whole branch."""
+
+    window: tuple[float, float]
+    slope: float
+    knee: float
+    knee_se: float
+    sigma: float
+    colour: float
+    kept: np.ndarray
+    censored: np.ndarray
+    roughness: Roughness
+    outliers: int
+
+
+def _gated_line(
+    branch: Branch,
+    y: np.ndarray,
+    profile: tuple[np.ndarray, np.ndarray],
+    window: tuple[float, float],
+    *,
+    y_max: float,
+    floor: float,
+    source: str,
+    correlation: float,
+) -> _GatedLine:
+    """Fit a line to the samples between two shares of the largest flow; refuse where there is none."""
+    u_low, u_high = (crossing(*profile, share * y_max) for share in window)
     inside = (branch.u >= u_low) & (branch.u <= u_high)
     if inside.sum() < 5 or not u_high > u_low:
         raise InputError(
             f"'{source}': only {inside.sum()} samples lie between {window[0]:.0%} and {window[1]:.0%} of the largest "
             "flow, expected at least 5; record a slower ramp or more levels"
         )
-    u_in, y_in, q_in = branch.u[inside], y[inside], branch.q[inside]
-    censored = q_in < 0.5 * floor
-    _refuse_no_line(u_in[~censored], window, floor, source)
-    slope, knee = _line(u_in[~censored], y_in[~censored])
+    censored = inside & (branch.q < 0.5 * floor)
+    seen = inside & ~censored
+    _refuse_no_line(branch.u[seen], window, floor, source)
+    slope, knee = _line(branch.u[seen], y[seen])
     for _ in range(3):
-        residual = y_in - slope * (u_in - knee)
-        sigma = max(1.4826 * float(np.median(np.abs(residual[~censored]))), FINEST_NOISE * y_max)
+        miss = y - slope * (branch.u - knee)
+        sigma = max(1.4826 * float(np.median(np.abs(miss[inside & ~censored]))), FINEST_NOISE * y_max)
         # A zero reading is a censored sample only where flow below the floor is credible.
-        credible = slope * (u_in - knee) < floor + GATE * sigma
-        kept = np.where(censored, credible, np.abs(residual) < GATE * sigma)
-        _refuse_no_line(u_in[kept & ~censored], window, floor, source)
-        slope, knee = _line(u_in[kept & ~censored], y_in[kept & ~censored])
-    seen = kept & ~censored
-    residual = y_in[seen] - slope * (u_in[seen] - knee)
-    sigma = max(float(np.sqrt(np.sum(residual**2) / max(seen.sum() - 2, 1))), FINEST_NOISE * y_max)
-    noise = _quiet_noise(branch, y, knee)
-    level = max(floor, USEFUL_FLOW * y_max, NOISE_LEVEL * noise)
-    onset, onset_se, onset_slope = _tail_onset(branch.u, y, (u_profile, y_profile), level, slope, noise)
-    return BranchShape(
-        rising=branch.rising,
-        bins=bin_branch(u_in[kept], y_in[kept], censored[kept], u_max),
-        y_max=y_max,
+        credible = slope * (branch.u - knee) < floor + GATE * sigma
+        kept = inside & np.where(censored, credible, np.abs(miss) < GATE * sigma)
+        seen = kept & ~censored
+        _refuse_no_line(branch.u[seen], window, floor, source)
+        slope, knee = _line(branch.u[seen], y[seen])
+    u_seen = branch.u[seen]
+    residual = y[seen] - slope * (u_seen - knee)
+    sigma = max(float(np.sqrt(np.sum(residual**2) / max(u_seen.size - 2, 1))), FINEST_NOISE * y_max)
+    lever = 1 / u_seen.size + (u_seen.mean() - knee) ** 2 / np.sum((u_seen - u_seen.mean()) ** 2)
+    roughness = measure_roughness(u_seen, residual)
+    colour = max(_colour(residual, sigma), colour_factor(correlation, roughness, sigma))
+    return _GatedLine(
+        window=window,
         slope=slope,
         knee=knee,
+        knee_se=sigma * math.sqrt(lever * colour) / slope,
         sigma=sigma,
-        colour=_colour(residual, sigma),
-        level=level,
-        onset=onset,
-        onset_se=onset_se,
-        onset_slope=onset_slope,
-        saturates=y_max < 0.93 * slope * (branch.u.max() - knee),
-        outliers=int((~kept).sum()),
+        colour=colour,
+        kept=kept,
+        censored=censored,
+        roughness=roughness,
+        outliers=int((inside & ~kept).sum()),
     )
+
+
+def _widest_straight(
+    fit: Callable[[tuple[float, float]], _GatedLine], narrow: _GatedLine, *, lowest: float, largest_shift: float
+) -> _GatedLine:
+    """Widen the window, upwards and then down to `lowest`, as long as the line's zero stays where it was.
+
+    On a straight characteristic more samples make the zero up to three times sharper; on a bent one they would move
+    it. A wider window is taken while its zero departs from that of every narrower one by no more than `STRAIGHT`
+    standard errors of the difference (for least squares on nested samples, the difference of their variances), and by
+    no more than `largest_shift`.
+    """
+    accepted = [narrow]
+
+    def agrees(wider: _GatedLine) -> bool:
+        return all(
+            abs(wider.knee - line.knee)
+            <= min(
+                STRAIGHT * max(math.sqrt(max(line.knee_se**2 - wider.knee_se**2, 0.0)), 0.1 * line.knee_se),
+                largest_shift,
+            )
+            for line in accepted
+        )
+
+    for high in WIDER:
+        if high > accepted[-1].window[1]:
+            wider = fit((narrow.window[0], high))
+            if not agrees(wider):
+                break
+            accepted.append(wider)
+    if lowest < narrow.window[0]:
+        wider = fit((lowest, accepted[-1].window[1]))
+        if agrees(wider):
+            accepted.append(wider)
+    return accepted[-1]
 
 
 def _quiet_noise(branch: Branch, y: np.ndarray, knee: float) -> float:
@@ -237,7 +343,13 @@ def _quiet_noise(branch: Branch, y: np.ndarray, knee: float) -> float:
 
 
 def _tail_onset(
-    u: np.ndarray, y: np.ndarray, profile: tuple[np.ndarray, np.ndarray], level: float, slope: float, noise: float
+    u: np.ndarray,
+    y: np.ndarray,
+    profile: tuple[np.ndarray, np.ndarray],
+    level: float,
+    slope: float,
+    noise: float,
+    correlation: float,
 ) -> tuple[float, float, float]:
     """Extrapolate the first flow seen to zero: the valve opens (or closes) no later than this, as far as can be seen.
 
@@ -257,8 +369,9 @@ def _tail_onset(
             residual = y[tail] - tail_slope * (u[tail] - onset)
             sigma = math.sqrt(np.sum(residual**2) / (tail.sum() - 2))
             lever = 1 / tail.sum() + (u[tail].mean() - onset) ** 2 / np.sum((u[tail] - u[tail].mean()) ** 2)
-            se = sigma * math.sqrt(lever * _colour(residual, max(sigma, 1e-12))) / tail_slope
-            return onset, se, tail_slope
+            roughness = measure_roughness(u[tail], residual)
+            colour = max(_colour(residual, max(sigma, 1e-12)), colour_factor(correlation, roughness, sigma))
+            return onset, sigma * math.sqrt(lever * colour) / tail_slope, tail_slope
     # Too few samples for a line, as in a staircase test: the chord, its ends known to one level of the command.
     at = int(np.clip(np.searchsorted(profile[0], first), 1, profile[0].size - 1))
     gap = float(profile[0][at] - profile[0][at - 1])

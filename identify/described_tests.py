@@ -9,6 +9,7 @@ import numpy as np
 from dzdesign.core.errors import InputError
 from dzdesign.identify.branches import Branch, split_branches
 from dzdesign.identify.characteristic import BranchShape, describe_branch, find_meter_floor, flow_at_top, smooth_profile
+from dzdesign.identify.noise import shared_correlation
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramp_files import RampTest
 
@@ -75,7 +76,13 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
     tests = [replace(test, q=test.q - zero) for test, zero in zip(tests, zeros, strict=True)]
     split = _split_all(tests, options)
     floor = options.meter_floor if options.meter_floor is not None else _found_floor(split, options)
-    described = _in_order_of_pressure([_describe(*item, floor=floor, options=options) for item in split])
+    # The noise is the meter's, so all branches tell its colour; the straight part that they show depends on it.
+    correlation = 0.0
+    for _ in range(2):
+        described = [_describe(*item, floor=floor, options=options, correlation=correlation) for item in split]
+        correlation = shared_correlation([shape.roughness for item in described for shape in item.shapes if shape])
+    described = [_describe(*item, floor=floor, options=options, correlation=correlation) for item in split]
+    described = _in_order_of_pressure(described)
     _refuse_mixed_branches(described)
     return DescribedTests(
         tests=tuple(described),
@@ -147,7 +154,12 @@ def _found_floor(split: list[tuple[RampTest, tuple[Branch | None, Branch | None]
 
 
 def _describe(
-    test: RampTest, branches: tuple[Branch | None, Branch | None], *, floor: float, options: IdentifyOptions
+    test: RampTest,
+    branches: tuple[Branch | None, Branch | None],
+    *,
+    floor: float,
+    options: IdentifyOptions,
+    correlation: float,
 ) -> DescribedTest:
     """Bring the flow to the nominal pressure drop, sample by sample, and describe both branches."""
     dp = None
@@ -174,7 +186,15 @@ def _describe(
         # Eq. (1): Q grows as sqrt(dP); below a tenth of the nominal pressure the ratio would only carry noise.
         y = branch.q if dp is None else branch.q * np.sqrt(dp / np.maximum(branch.dp, 0.1 * dp))
         shapes.append(
-            describe_branch(branch, y, u_max=options.u_max, floor=floor, window=options.knee_window, source=test.source)
+            describe_branch(
+                branch,
+                y,
+                u_max=options.u_max,
+                floor=floor,
+                window=options.knee_window,
+                source=test.source,
+                correlation=correlation,
+            )
         )
         q_max = max(q_max, flow_at_top(*smooth_profile(branch.u, branch.q, options.u_max)))
     return DescribedTest(test=test, dp=dp, branches=branches, shapes=(shapes[0], shapes[1]), q_max=q_max)

@@ -15,6 +15,8 @@ from dzdesign.identify.ramp_files import RampTest
 
 #: dP0 names the tested pressure drop within this share of it.
 REFERENCE_TOLERANCE = 0.1
+#: Standard errors by which the onset must lie below the knee to be taken for a soft edge.
+SOFT_SIGNIFICANCE = 2.0
 #: dP0 of the paper, taken where the user names none: the test nearest to it.
 PAPER_DP0 = 1 * MPA
 
@@ -93,25 +95,25 @@ def _guard(
 ) -> tuple[str, np.ndarray, np.ndarray, np.ndarray]:
     """Return which branch is guarded, its thresholds, standard errors and lower bounds (V), all (T,).
 
-    Guarded is the lower of knee and onset: a soft edge passes flow below the knee.
+    Guarded is the knee, or the onset where that lies below the knee by more than its error: a soft edge.
     """
     column = _guarded_column(described)
     shapes = [item.shapes[column] for item in described]
     knee, knee_se = knees.knee[:, column], knees.knee_se[:, column]
-    onset, onset_se = (np.array([getattr(shape, name) for shape in shapes]) for name in ("onset", "onset_se"))
+    onset = np.array([shape.onset for shape in shapes])
+    onset_se = np.array([shape.onset_se for shape in shapes])
     # A zero error of the meter moves each zero by the error over the slope of the line that was extrapolated.
     knee_budget = departure.max() + np.array([options.meter_zero / shape.slope for shape in shapes])
     onset_budget = departure.max() + np.array([options.meter_zero / shape.onset_slope for shape in shapes])
-    bound = np.minimum(
-        lower_bounds(knee, knee_se, options.confidence, knee_budget),
-        lower_bounds(onset, onset_se, options.confidence, onset_budget),
-    )
-    lower_is_knee = knee <= onset
+    # A soft edge passes flow below the knee. Where the tail agrees with the knee's line, that line is all there is.
+    soft = knee - onset > SOFT_SIGNIFICANCE * np.hypot(knee_se, onset_se)
+    knee_bound = lower_bounds(knee, knee_se, options.confidence, knee_budget)
+    onset_bound = lower_bounds(onset, onset_se, options.confidence, onset_budget)
     return (
         "closing" if column else "opening",
-        np.where(lower_is_knee, knee, onset),
-        np.where(lower_is_knee, knee_se, onset_se),
-        bound,
+        np.where(soft, onset, knee),
+        np.where(soft, onset_se, knee_se),
+        np.where(soft, np.minimum(knee_bound, onset_bound), knee_bound),
     )
 
 

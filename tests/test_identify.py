@@ -164,7 +164,8 @@ class TestInvariance:
             dp=np.concatenate([np.full(500, test.dp[0]), test.dp]),
         )
         short, long = (identify([each]).positive.tests[0] for each in (test, longer))
-        assert long.u_knee_rising_V == pytest.approx(short.u_knee_rising_V, abs=1e-6)
+        # Readings at rest say how quiet the meter is, so how far down the straight part may be followed.
+        assert abs(long.u_knee_rising_V - short.u_knee_rising_V) < 0.5 * short.u_knee_se_V
 
     def test_document_round_trip(self, falling_valve):
         from dzdesign.core.artefacts import to_json

@@ -1,0 +1,119 @@
+"""How slow the meter's noise is, and by how much that widens the errors of a straight line.
+
+Noise that forgets exponentially (a meter's filter makes it so) has a correlation r of neighbouring samples. It is
+measured about a parabola, or a bent characteristic would pass for slow noise. The parabola takes some of the slow noise
+along, so the residuals look both smaller and quicker than the noise is; what they would be on average is computed here,
+and turned round.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+#: Parameters of a parabola.
+TERMS = 3
+#: Points on which the share of the noise that a parabola takes along is computed; a longer recording is scaled to them.
+POINTS = 400
+#: Steps of the bisection for the correlation, in the logarithm of 1 - r.
+BISECTIONS = 60
+#: Nearest to 1 that a correlation is followed.
+SMALLEST_RATE = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class Roughness:
+    """Of residuals about a parabola: their number, and the sums of squares of their steps and of themselves."""
+
+    n: int
+    steps: float
+    squares: float
+
+
+def measure_roughness(u: np.ndarray, residual: np.ndarray) -> Roughness:
+    """Return the roughness of residuals about the parabola through them.
+
+    Parameters
+    ----------
+    u, residual : (N,) array
+        Commands, and residuals about any line, in the order of time.
+    """
+    if u.size > TERMS:
+        bent = np.vander((u - u.mean()) / max(np.ptp(u), 1e-300), TERMS)
+        residual = residual - bent @ np.linalg.lstsq(bent, residual, rcond=None)[0]
+    return Roughness(residual.size, float(np.sum(np.diff(residual) ** 2)), float(np.sum(residual**2)))
+
+
+def shared_correlation(roughness: Sequence[Roughness]) -> float:
+    """Return the correlation of neighbouring samples by all residuals together: one meter, one kind of noise.
+
+    Parameters
+    ----------
+    roughness : sequence of Roughness
+        One per branch.
+
+    Returns
+    -------
+    float
+        Zero for white noise; just below 1 where the noise is slower than the recordings can show.
+    """
+    measured = [item for item in roughness if item.n > 2 * TERMS and item.steps > 0]
+    if not measured:
+        return 0.0
+
+    def excess(rate: float) -> float:
+        # E[steps] = 2 (1 - r) (n - 1) s^2, which hardly scatters, and E[squares] = (n - taken) s^2.
+        return sum(
+            item.n
+            * (item.squares / item.steps - (item.n - taken_by_parabola(1 - rate, item.n)) / (2 * rate * (item.n - 1)))
+            for item in measured
+        )
+
+    if excess(1.0) <= 0:
+        return 0.0
+    low, high = np.log(SMALLEST_RATE), 0.0
+    if excess(SMALLEST_RATE) >= 0:
+        return 1 - SMALLEST_RATE
+    for _ in range(BISECTIONS):
+        middle = (low + high) / 2
+        low, high = (low, middle) if excess(float(np.exp(middle))) > 0 else (middle, high)
+    return 1 - float(np.exp((low + high) / 2))
+
+
+def colour_factor(correlation: float, roughness: Roughness, sigma: float) -> float:
+    """Return the variance of a line's parameters over what white noise of the residuals' size would give.
+
+    Parameters
+    ----------
+    correlation : float
+        Of neighbouring samples.
+    roughness : Roughness
+        Of the residuals.
+    sigma : float
+        Standard deviation of the residuals about the line.
+    """
+    n = roughness.n
+    if n < 3 or sigma <= 0:
+        return 1.0
+    long_run = min((1 + correlation) / (1 - correlation), n / 2)
+    # The steps tell the noise's variance far better than the few independent stretches that slow noise leaves.
+    variance = roughness.steps / (2 * (1 - correlation) * (n - 1))
+    return long_run * variance / sigma**2
+
+
+def taken_by_parabola(correlation: float, n: int) -> float:
+    """Return how many samples' worth of noise a parabola takes along: 3 of white noise, nearly n of slow."""
+    if correlation < 1 - 10 / POINTS:  # short memory: each parameter takes one sample's worth of the long-run variance
+        return min(TERMS * (1 + correlation) / (1 - correlation), n - 1.0)
+    points = min(n, POINTS)
+    rate = -float(np.log(correlation)) * n / points
+    return min(_taken(round(rate, 9), points) * n / points, n - 1.0)
+
+
+@lru_cache(maxsize=4096)
+def _taken(rate: float, points: int) -> float:
+    lags = np.exp(-rate * np.arange(points))
+    covariance = lags[np.abs(np.subtract.outer(np.arange(points), np.arange(points)))]
+    orthonormal = np.linalg.qr(np.vander(np.linspace(-1, 1, points), TERMS))[0]
+    return float(np.trace(orthonormal.T @ covariance @ orthonormal))
