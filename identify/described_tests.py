@@ -113,7 +113,8 @@ def _split_all(
             raise InputError(f"'{test.source}' holds no ramp of the command from near zero up; expected a ramp test")
         if test.dp is None and len(tests) > 1:
             raise InputError(
-                f"'{test.source}' has no column of dP (or pA and pB); several ramp tests can only be told apart by it"
+                f"'{test.source}' has no column of dP (or pA and pB); several ramp tests can only be told apart by it: "
+                "record it, or declare it by --dp or [dp]"
             )
         split.append((test, branches))
         _refuse_a_shut_valve(test, branches, options.u_max)

@@ -219,5 +219,6 @@ def _warnings(
         u_top=top,
         u_bottom=bottom,
         zero_L_min=zero_of,
+        declared=[item.test.source for item in described if item.test.dp_is_declared],
         departure_V={item.test.source: float(gap) for item, gap in zip(described, departure, strict=True) if gap > 0},
     )

@@ -255,7 +255,7 @@ def test_a_file_of_options_that_is_no_text(refusal, bench):
 
 def test_options_from_a_file_stand_in_for_the_defaults(bench, capsys):
     (bench / "options.toml").write_text(
-        "\ufeffu-max = '20 V'\nconfidence = 0.9\ndp = '2 MPa'\ntarget = 'f28335'\n", "utf-8"
+        "\ufeffu-max = '20 V'\nconfidence = 0.9\ndp = ['2 MPa']\ntarget = 'f28335'\n", "utf-8"
     )
     assert main(["identify", "a.csv", "-o", "new.json", "--config", "options.toml", "--confidence", "0.8"]) == 0
     valve = json.loads(Path("new.json").read_text())
