@@ -52,7 +52,12 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
         "ramp tests in, valve.json out: k, thresholds, beta(dP)",
         "dzdesign.commands:run_identify",
         (
-            _given("ramps", nargs="+", metavar="RAMP", help="table with a header such as time_s,u_V,dP_MPa,Q_Lmin"),
+            _given(
+                "ramps",
+                nargs="+",
+                metavar="RAMP",
+                help="CSV, TDMS, MAT, HDF5, Parquet or Feather: columns time_s, u_V, dP_MPa, Q_Lmin",
+            ),
             _given(*OUTPUT, default="valve.json", metavar="FILE", help="file to write"),
             _given(
                 "--columns",

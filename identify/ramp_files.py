@@ -11,6 +11,7 @@ import numpy as np
 from dzdesign.core.artefacts import read_bytes, sha256_of
 from dzdesign.core.errors import InputError
 from dzdesign.core.units import si_factor
+from dzdesign.identify.binary_tables import binary_reader
 from dzdesign.identify.column_labels import EXAMPLE_LABELS, PER_CENT, QUANTITY_OF_COLUMN, Column, find_columns
 from dzdesign.identify.table import QUOTED_CHARACTERS, Table
 from dzdesign.identify.text_tables import text_table
@@ -62,8 +63,9 @@ def read_ramp_file(
     Parameters
     ----------
     path : Path
-        A table with a header row such as ``time_s,u_V,dP_MPa,Q_Lmin`` (or ``u [V]``, ``u (V)``); lines that start
-        with ``#`` are comments, blank cells are missing samples. ``pA`` and ``pB`` may stand in place of ``dP``.
+        CSV, TDMS, MAT, HDF5, Parquet or Feather: a table with labels such as ``time_s,u_V,dP_MPa,Q_Lmin`` (or
+        ``u [V]``, ``u (V)``). In text, lines that start with ``#`` are comments, blank cells are
+        missing samples. ``pA`` and ``pB`` may stand in place of ``dP``.
     u_max : float
         Command in V that 100 % means, where the command is in per cent.
     columns : mapping, optional
@@ -109,8 +111,22 @@ def read_ramp_file(
 
 
 def read_table(content: bytes, path: Path) -> Table:
-    """Read a table of any known format."""
-    return text_table(content, path)
+    """Read a table of any known format; its first bytes tell which, not its name.
+
+    Parameters
+    ----------
+    content : bytes
+        CSV (plain or gzip), TDMS, MAT, HDF5, Parquet or Feather.
+    path : Path
+        For messages.
+
+    Raises
+    ------
+    InputError
+        If it is none of these, or not a whole one.
+    """
+    read = binary_reader(content, path) or text_table
+    return read(content, path)
 
 
 def _refuse_two_pressures(table: Table, found: Mapping[str, Column], dp: float | None) -> None:
