@@ -81,6 +81,18 @@ def _refuse_unnamed(tests: list["RampTest"], declared: str | dict[str, str] | No
             )
 
 
+def _refuse_copies(tests: list["RampTest"]) -> None:  # noqa: F821
+    """Refuse a recording that is given twice: counted as a repetition it would feign certainty."""
+    known: dict[str, str] = {}
+    for test in tests:
+        if test.sha256 in known:
+            raise InputError(
+                f"'{test.source}' is byte for byte the same recording as '{known[test.sha256]}'; give it once "
+                "(a repeated ramp test is welcome, a copy is no repetition)"
+            )
+        known[test.sha256] = test.source
+
+
 def run_identify(args: argparse.Namespace) -> int:
     """Identify a valve from ramp tests."""
     from dzdesign.identify.column_labels import parse_columns
@@ -106,6 +118,7 @@ def run_identify(args: argparse.Namespace) -> int:
     tests = [
         read_ramp_file(path, u_max, columns=columns, dp=_declared_dp(path, args.dp)) for path in expand(args.ramps)
     ]
+    _refuse_copies(tests)
     _refuse_unnamed(tests, args.dp)
     say(f"fitting {len(tests)} ramp test{'s' if len(tests) > 1 else ''}")
     valve = identify(tests, options)
