@@ -16,6 +16,8 @@ from dzdesign.core.errors import DzdesignError, InputError, RequirementError, ne
 
 DOES_NOT_HOLD, BAD_INPUT, INTERRUPTED, PIPE_CLOSED = 1, 2, 130, 141
 
+#: Options that may be a table in the TOML file.
+TABLES = ("columns", "dp")
 #: Command -> (one line of help, function that runs it, its options). An option is (names, keywords of add_argument).
 Option = tuple[tuple[str, ...], dict]
 
@@ -52,8 +54,25 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
         "ramp tests in, valve.json out: k, thresholds, beta(dP)",
         "dzdesign.commands:run_identify",
         (
-            _given("ramps", nargs="+", metavar="RAMP", help="table with a header such as time_s,u_V,dP_MPa,Q_Lmin"),
+            _given(
+                "ramps",
+                nargs="+",
+                metavar="RAMP",
+                help="CSV, TDMS, MAT, HDF5, Parquet or Feather: columns time_s, u_V, dP_MPa, Q_Lmin",
+            ),
             _given(*OUTPUT, default="valve.json", metavar="FILE", help="file to write"),
+            _given(
+                "--columns",
+                metavar="MAP",
+                help='columns, such as "u=AO0:V, Q=Flow (L/min)": a quantity (time, u, dP, pA, pB, Q), its '
+                "label in the file and, after a colon, the unit that the label lacks; in the TOML file a table",
+            ),
+            _given(
+                "--dp",
+                metavar="P",
+                help='pressure drop of files without a column of it, such as "1 MPa"; in the TOML file also a table '
+                "[dp] from file name (or pattern) to pressure",
+            ),
             _given("--dp0", metavar="P", help='reference pressure drop (default: the test nearest to "1 MPa")'),
             _given("--u-max", default="10 V", metavar="U", help="full command"),
             _given("--meter-floor", metavar="Q", help="flow below which the meter reads zero (default: found)"),
@@ -169,13 +188,20 @@ def parse(argv: list[str]) -> argparse.Namespace:
     repeatable = {action.dest for action in every if isinstance(action, argparse._AppendAction)}
     known = {action.dest for action in every if action.nargs != 0} - {"config"}  # no flags
     command = commands[args.command]
-    mine = {action.dest for action in command._actions}
-    values = options_from_file(args.config, known, repeatable)
-    command.set_defaults(**{key: value for key, value in values.items() if key in mine - repeatable})
+    mine = {action.dest: isinstance(action, argparse._AppendAction) for action in command._actions}
+    values = options_from_file(args.config, known, repeatable, TABLES)
+    values = {key: value for key, value in values.items() if key in mine and _is_meant(value, mine[key])}
+    command.set_defaults(**{key: value for key, value in values.items() if not mine[key]})
     given, args = args, parser.parse_args(argv)
-    for key in mine & repeatable & values.keys():  # argparse would add to a default instead of standing in for it
-        setattr(args, key, getattr(given, key) or values[key])
+    for key, value in values.items():
+        if mine[key]:  # argparse would add to a default instead of standing in for it
+            setattr(args, key, getattr(given, key) or ([value] if isinstance(value, str) else value))
     return args
+
+
+def _is_meant(value: str | list[str] | dict[str, str], repeatable: bool) -> bool:
+    """Tell whether a value of the file is for this command: `dp` is a list for simulate, a table for identify."""
+    return not isinstance(value, dict if repeatable else list)
 
 
 def main(argv: list[str] | None = None) -> int:

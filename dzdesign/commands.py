@@ -1,6 +1,7 @@
 """The commands: read, call one room, write the artefact whole, print what a person wants to know."""
 
 import argparse
+import fnmatch
 import glob
 import os
 import re
@@ -17,7 +18,7 @@ from dzdesign.core.artefacts import (
     write_file,
     write_folder,
 )
-from dzdesign.core.errors import InputError
+from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.units import parse_quantity
 
 
@@ -61,8 +62,40 @@ def _optional(text: str | None, quantity: str, option: str) -> float | None:
     return None if text is None else parse_quantity(text, quantity, option)
 
 
+def _declared_dp(path: Path, declared: str | dict[str, str] | None) -> float | None:
+    """Return the pressure drop that --dp or [dp] declares for a file, in Pa; a name goes before a pattern."""
+    if declared is None or isinstance(declared, str):
+        return _optional(declared, "pressure", "--dp")
+    patterns = [name for name in declared if name == path.name]
+    patterns += [name for name in declared if fnmatch.fnmatchcase(path.name, name)]
+    return parse_quantity(declared[patterns[0]], "pressure", f"[dp] '{patterns[0]}'") if patterns else None
+
+
+def _refuse_unnamed(tests: list["RampTest"], declared: str | dict[str, str] | None) -> None:  # noqa: F821
+    """Refuse a file without a pressure drop where the table [dp] names others: a name was mistyped."""
+    for test in tests:
+        if isinstance(declared, dict) and test.dp is None:
+            raise InputError(
+                f"'{test.source}' has no column of dP, and no name in [dp] is its own{nearest(test.source, declared)}; "
+                f'add "{test.source}" = "1 MPa" to [dp], with its pressure drop'
+            )
+
+
+def _refuse_copies(tests: list["RampTest"]) -> None:  # noqa: F821
+    """Refuse a recording that is given twice: counted as a repetition it would feign certainty."""
+    known: dict[str, str] = {}
+    for test in tests:
+        if test.sha256 in known:
+            raise InputError(
+                f"'{test.source}' is byte for byte the same recording as '{known[test.sha256]}'; give it once "
+                "(a repeated ramp test is welcome, a copy is no repetition)"
+            )
+        known[test.sha256] = test.source
+
+
 def run_identify(args: argparse.Namespace) -> int:
     """Identify a valve from ramp tests."""
+    from dzdesign.identify.column_labels import parse_columns
     from dzdesign.identify.identification import identify
     from dzdesign.identify.model import SCHEMA
     from dzdesign.identify.options import IdentifyOptions
@@ -81,7 +114,12 @@ def run_identify(args: argparse.Namespace) -> int:
         knee_window=_window(args.knee_window),
     )
     check_file_may_be_written(Path(args.output), SCHEMA)
-    tests = [read_ramp_file(path, u_max) for path in expand(args.ramps)]
+    columns = parse_columns(args.columns) if args.columns else {}
+    tests = [
+        read_ramp_file(path, u_max, columns=columns, dp=_declared_dp(path, args.dp)) for path in expand(args.ramps)
+    ]
+    _refuse_copies(tests)
+    _refuse_unnamed(tests, args.dp)
     say(f"fitting {len(tests)} ramp test{'s' if len(tests) > 1 else ''}")
     valve = identify(tests, options)
     document = valve.to_document()

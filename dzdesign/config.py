@@ -7,8 +7,13 @@ from pathlib import Path
 from dzdesign.core.artefacts import read_bytes
 from dzdesign.core.errors import InputError, nearest
 
+#: Of an option in the file: text, a list of texts, or a table.
+Value = str | list[str] | dict[str, str]
 
-def options_from_file(path: str, known: Collection[str], repeatable: Collection[str]) -> dict[str, str | list[str]]:
+
+def options_from_file(
+    path: str, known: Collection[str], repeatable: Collection[str], tables: Collection[str] = ()
+) -> dict[str, Value]:
     """Read options; a key may be written ``meter-floor`` or ``meter_floor``, values as on the command line.
 
     Parameters
@@ -19,6 +24,8 @@ def options_from_file(path: str, known: Collection[str], repeatable: Collection[
         Options of all commands, so that one file serves every command.
     repeatable : collection of str
         Those of them that may be a list.
+    tables : collection of str
+        Those of them that may be a table of texts.
 
     Raises
     ------
@@ -30,7 +37,7 @@ def options_from_file(path: str, known: Collection[str], repeatable: Collection[
         document = tomllib.loads(content.decode("utf-8-sig"))
     except (ValueError, RecursionError) as error:
         raise InputError(f"'{path}' is not TOML: {error}; expected lines such as u-max = \"10 V\"") from error
-    options: dict[str, str | list[str]] = {}
+    options: dict[str, Value] = {}
     for key, value in document.items():
         name = key.replace("-", "_")
         if name not in known:
@@ -38,10 +45,20 @@ def options_from_file(path: str, known: Collection[str], repeatable: Collection[
             raise InputError(f"'{path}': there is no option '{key}'{hint}; see `dzdesign COMMAND --help`")
         if name in options:
             raise InputError(f"'{path}': option '{key}' is given twice, with - and with _; keep one")
-        items = value if name in repeatable and isinstance(value, list) else [value]
-        if not items or not all(isinstance(item, str | int | float) and not isinstance(item, bool) for item in items):
-            raise InputError(
-                f"'{path}': option '{key}' is {str(value)[:40]!r}, expected text such as \"1 MPa\" or a number"
-            )
-        options[name] = [str(item) for item in items] if name in repeatable else str(value)
+        options[name] = _texts(path, key, value, name in repeatable, name in tables)
     return options
+
+
+def _texts(path: str, key: str, value: object, repeatable: bool, table: bool) -> Value:
+    """Return a value as text, or as the list or table of texts that it may be."""
+    if repeatable and isinstance(value, list):
+        items = value
+    else:
+        items = list(value.values()) if table and isinstance(value, dict) else [value]
+    if not items or not all(isinstance(item, str | int | float) and not isinstance(item, bool) for item in items):
+        raise InputError(
+            f"'{path}': option '{key}' is {str(value)[:40]!r}, expected text such as \"1 MPa\" or a number"
+        )
+    if isinstance(value, dict):
+        return {name: str(item) for name, item in value.items()}
+    return [str(item) for item in items] if isinstance(value, list) else str(value)

@@ -2,23 +2,26 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.branches import Branch, split_branches
+from dzdesign.identify.branches import Branch
 from dzdesign.identify.characteristic import BranchShape, describe_branch, find_meter_floor, flow_at_top, smooth_profile
 from dzdesign.identify.noise import shared_correlation
 from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.pooling import PooledTest, pool_ramps
 from dzdesign.identify.ramp_files import RampTest
+from dzdesign.identify.ramp_splitting import Ramp, despiked, nominal_dp, split_ramps
 
 MPA = 1e6
 L_MIN = 1e-3 / 60
-#: Two tests whose pressure drops differ by less than this share are the same test twice.
-SAME_PRESSURE = 0.02
 #: Pressure drops beyond these, Pa, are a wrong unit.
 SMALLEST_DP, LARGEST_DP = 1e3, 200 * MPA
+#: A recording whose command moves by less than this share of u_max is no part of a ramp.
+SMALLEST_SWEEP = 0.1
+#: A recording that comes to this share of the largest command is whole: the valve must have opened in it.
+FULL_SWEEP = 0.95
 #: Commands within this share of u_max are at rest.
 AT_REST = 0.01
 #: A reading at rest below this share of the largest flow is no zero error.
@@ -27,13 +30,18 @@ ZERO_SHARE = 2e-3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DescribedTest:
-    """One ramp test with its nominal pressure drop (Pa, None if unknown), its branches and their shapes."""
+    """One ramp test with its nominal pressure drop (Pa, None if unknown), its branches and their shapes.
+
+    `ramps` are the ramps in it, `files` the source and SHA-256 of every file in it.
+    """
 
     test: RampTest
     dp: float | None
     branches: tuple[Branch | None, Branch | None]
     shapes: tuple[BranchShape | None, BranchShape | None]
     q_max: float
+    ramps: tuple[str, ...]
+    files: tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,14 +82,15 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
         raise InputError("no ramp tests were given; expected at least one file")
     zeros = [_reading_at_zero(test, options.u_max) for test in tests]
     tests = [replace(test, q=test.q - zero) for test, zero in zip(tests, zeros, strict=True)]
-    split = _split_all(tests, options)
-    floor = options.meter_floor if options.meter_floor is not None else _found_floor(split, options)
+    pooled = pool_ramps(_split_all(tests, options))
+    _refuse_what_shows_no_dead_zone(pooled, options)
+    floor = options.meter_floor if options.meter_floor is not None else _found_floor(pooled, options)
     # The noise is the meter's, so all branches tell its colour; the straight part that they show depends on it.
     correlation = 0.0
     for _ in range(2):
-        described = [_describe(*item, floor=floor, options=options, correlation=correlation) for item in split]
+        described = [_describe(item, floor=floor, options=options, correlation=correlation) for item in pooled]
         correlation = shared_correlation([shape.roughness for item in described for shape in item.shapes if shape])
-    described = [_describe(*item, floor=floor, options=options, correlation=correlation) for item in split]
+    described = [_describe(item, floor=floor, options=options, correlation=correlation) for item in pooled]
     described = _in_order_of_pressure(described)
     _refuse_mixed_branches(described)
     return DescribedTests(
@@ -95,8 +104,12 @@ def _reading_at_zero(test: RampTest, u_max: float) -> float:
     """Return what the meter reads at zero command where that is not zero, m³/s: its zero error, or a leak.
 
     Thousands of readings at rest tell it far better than any declared bound; 0 is returned where it does not stand out.
+    Of the hold before the first ramp only the later half counts: in the earlier one hoses and meter may still fill.
     """
-    rest = test.q[(test.u >= -AT_REST * u_max) & (test.u <= AT_REST * u_max)]
+    at_rest = np.abs(test.u) <= AT_REST * u_max
+    before = int(np.argmin(at_rest)) if not at_rest.all() else 0
+    settled = at_rest & (np.arange(at_rest.size) >= before // 2)
+    rest = test.q[settled if settled.sum() >= 20 else at_rest]
     if rest.size < 20:
         return 0.0
     zero = float(np.median(rest))
@@ -104,30 +117,61 @@ def _reading_at_zero(test: RampTest, u_max: float) -> float:
     return zero if abs(zero) > max(5 * error, ZERO_SHARE * float(np.abs(test.q).max())) else 0.0
 
 
-def _split_all(
-    tests: Sequence[RampTest], options: IdentifyOptions
-) -> list[tuple[RampTest, tuple[Branch | None, Branch | None]]]:
-    """Split every test into branches; refuse what has no ramp, too large a command, or no flow."""
-    split = []
+def _split_all(tests: Sequence[RampTest], options: IdentifyOptions) -> list[Ramp]:
+    """Split every recording into ramps; refuse what has no ramp, too large a command, a wrong pressure, or no flow."""
+    ramps = []
+    highest = max(float(despiked(test.u).max()) for test in tests)
     for test in tests:
-        top = float(test.u.max())
+        top = float(despiked(test.u).max())
         if top > 1.05 * options.u_max:
             raise InputError(
                 f"'{test.source}': the command reaches {top:.2f} V, above u_max = {options.u_max:g} V; give --u-max"
             )
-        branches = split_branches(test, options.meter_lag)
-        if branches == (None, None):
-            raise InputError(f"'{test.source}' holds no ramp of the command from near zero up; expected a ramp test")
         if test.dp is None and len(tests) > 1:
             raise InputError(
-                f"'{test.source}' has no column of dP (or pA and pB); several ramp tests can only be told apart by it"
+                f"'{test.source}' has no column of dP (or pA and pB); several ramp tests can only be told apart by it: "
+                "record it, or declare it by --dp or [dp]"
             )
-        split.append((test, branches))
-        _refuse_a_shut_valve(test, branches, options.u_max)
-    return split
+        mine = split_ramps(test, options.meter_lag)
+        if np.ptp(test.u) < SMALLEST_SWEEP * options.u_max or not any(ramp.branches for ramp in mine):
+            raise _no_ramp(test.source)
+        for ramp in mine:
+            _refuse_a_wrong_pressure(test.source, ramp.dp)
+        for item in pool_ramps(mine) if top >= FULL_SWEEP * highest else ():  # a fragment may well see no flow
+            _refuse_a_shut_valve(item.test.source, item.branches, options.u_max)
+        ramps += mine
+    return ramps
 
 
-def _refuse_a_shut_valve(test: RampTest, branches: tuple[Branch | None, Branch | None], u_max: float) -> None:
+def _no_ramp(source: str) -> InputError:
+    return InputError(f"'{source}' holds no ramp of the command from near zero up; expected a ramp test")
+
+
+def _refuse_a_wrong_pressure(source: str, dp: float | None) -> None:
+    """Refuse a pressure drop that is no valve's: a wrong unit, or ports that were swapped."""
+    if dp is None:
+        return
+    if 0 < dp < SMALLEST_DP or dp > LARGEST_DP:
+        raise InputError(
+            f"'{source}': the pressure drop is {dp / MPA:.3g} MPa, expected {SMALLEST_DP / MPA:g} to "
+            f"{LARGEST_DP / MPA:g} MPa; correct the unit in the header (mPa is a thousandth of a pascal)"
+        )
+    if dp <= 0:
+        raise InputError(
+            f"'{source}': the pressure drop is {dp / MPA:.3f} MPa, expected a positive one; "
+            "swap pA and pB, or correct the sign of dP"
+        )
+
+
+def _refuse_what_shows_no_dead_zone(pooled: list[PooledTest], options: IdentifyOptions) -> None:
+    """Refuse a pressure drop without a whole branch, and a recording or a test whose valve never opens."""
+    for item in pooled:
+        if item.branches == (None, None):
+            raise _no_ramp(item.test.source)
+        _refuse_a_shut_valve(item.test.source, item.branches, options.u_max)
+
+
+def _refuse_a_shut_valve(source: str, branches: Sequence[Branch | None], u_max: float) -> None:
     """Refuse a test whose flow at full command does not stand out of the meter's noise."""
     for branch in branches:
         if branch is None:
@@ -137,48 +181,28 @@ def _refuse_a_shut_valve(test: RampTest, branches: tuple[Branch | None, Branch |
         rise = flow_at_top(*smooth_profile(branch.u, branch.q, u_max)) - float(np.median(bottom))
         if rise <= max(6 * noise, 0.01 * L_MIN):
             raise InputError(
-                f"'{test.source}': the valve never opens: the flow at {branch.u.max():.2f} V is "
+                f"'{source}': the valve never opens: the flow at {branch.u.max():.2f} V is "
                 f"{rise / L_MIN:.3f} L/min above that at zero, within the meter's noise of {noise / L_MIN:.3f} L/min; "
                 "check the solenoid, the supply and the column of Q"
             )
 
 
-def _found_floor(split: list[tuple[RampTest, tuple[Branch | None, Branch | None]]], options: IdentifyOptions) -> float:
+def _found_floor(pooled: list[PooledTest], options: IdentifyOptions) -> float:
     """Return the largest meter floor that any branch shows (one meter, so one floor), m³/s."""
     return max(
         find_meter_floor(branch.u, branch.q, options.u_max)
-        for _, branches in split
-        for branch in branches
+        for item in pooled
+        for branch in item.branches
         if branch is not None
     )
 
 
-def _describe(
-    test: RampTest,
-    branches: tuple[Branch | None, Branch | None],
-    *,
-    floor: float,
-    options: IdentifyOptions,
-    correlation: float,
-) -> DescribedTest:
-    """Bring the flow to the nominal pressure drop, sample by sample, and describe both branches."""
-    dp = None
+def _describe(item: PooledTest, *, floor: float, options: IdentifyOptions, correlation: float) -> DescribedTest:
+    """Bring a test's flows to its nominal pressure drop and describe its branches."""
+    test, branches = item.test, item.branches
+    dp = nominal_dp(test)
     shapes = []
     q_max = 0.0
-    if test.dp is not None:
-        # Nominal is the pressure drop at (almost) no flow, which the supply's droop has not touched.
-        shut = test.dp[(test.u >= 0) & (test.u <= 0.05 * options.u_max)]
-        dp = float(np.median(shut if shut.size >= 5 else test.dp))
-        if 0 < dp < SMALLEST_DP or dp > LARGEST_DP:
-            raise InputError(
-                f"'{test.source}': the pressure drop is {dp / MPA:.3g} MPa, expected {SMALLEST_DP / MPA:g} to "
-                f"{LARGEST_DP / MPA:g} MPa; correct the unit in the header (mPa is a thousandth of a pascal)"
-            )
-        if dp <= 0:
-            raise InputError(
-                f"'{test.source}': the pressure drop is {dp / MPA:.3f} MPa, expected a positive one; "
-                "swap pA and pB, or correct the sign of dP"
-            )
     for branch in branches:
         if branch is None:
             shapes.append(None)
@@ -197,21 +221,20 @@ def _describe(
             )
         )
         q_max = max(q_max, flow_at_top(*smooth_profile(branch.u, branch.q, options.u_max)))
-    return DescribedTest(test=test, dp=dp, branches=branches, shapes=(shapes[0], shapes[1]), q_max=q_max)
+    return DescribedTest(
+        test=test,
+        dp=dp,
+        branches=branches,
+        shapes=(shapes[0], shapes[1]),
+        q_max=q_max,
+        ramps=item.ramps,
+        files=item.files,
+    )
 
 
 def _in_order_of_pressure(described: list[DescribedTest]) -> list[DescribedTest]:
-    """Sort by pressure drop; refuse two tests at one pressure drop."""
-    if len(described) < 2:
-        return described
-    described = sorted(described, key=lambda item: (item.dp, item.test.source))
-    for left, right in pairwise(described):
-        if right.dp - left.dp < SAME_PRESSURE * right.dp:
-            raise InputError(
-                f"the pressure drop repeats: '{left.test.source}' ({left.dp / MPA:.3f} MPa) and "
-                f"'{right.test.source}' ({right.dp / MPA:.3f} MPa); give one ramp test per pressure drop"
-            )
-    return described
+    """Sort by pressure drop; what was read of all ramps together may fall together with the next test's by a hair."""
+    return sorted(described, key=lambda item: (item.dp or 0.0, item.test.source))
 
 
 def _refuse_mixed_branches(described: list[DescribedTest]) -> None:

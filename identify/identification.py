@@ -27,7 +27,8 @@ def identify(tests: Sequence[RampTest], options: IdentifyOptions | None = None) 
     Parameters
     ----------
     tests : sequence of RampTest
-        One per pressure drop, in any order; a single one may lack the pressure drop.
+        Recordings, in any order; each may hold several ramps, and ramps at one pressure drop are one test. A single
+        recording may lack the pressure drop.
     options : IdentifyOptions, optional
         Choices of the engineer.
 
@@ -55,7 +56,7 @@ def identify(tests: Sequence[RampTest], options: IdentifyOptions | None = None) 
         knee_window=options.knee_window,
         positive=side,
         warnings=_warnings(described, side, departure, group.zero_L_min, floor, options),
-        made_from=tuple((item.test.source, item.test.sha256) for item in described),
+        made_from=tuple(dict.fromkeys(file for item in described for file in item.files)),
     )
 
 
@@ -195,6 +196,7 @@ def _test_result(item: DescribedTest, knees: KneeFit, row: int, guard: float, bo
         noise_L_min=max(shape.sigma for shape in shapes) / L_MIN,
         noise_colour=max(shape.colour for shape in shapes),
         outliers=sum(shape.outliers for shape in shapes),
+        ramps=item.ramps,
     )
 
 
@@ -221,5 +223,6 @@ def _warnings(
         u_top=top,
         u_bottom=bottom,
         zero_L_min=zero_of,
+        declared=[item.test.source for item in described if item.test.dp_is_declared],
         departure_V={item.test.source: float(gap) for item, gap in zip(described, departure, strict=True) if gap > 0},
     )

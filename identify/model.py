@@ -57,7 +57,7 @@ class TestResult:
 
     ``u_knee_*`` are the straight part of Q/sqrt(dP) extrapolated to zero; ``u_onset_*`` the tail above the meter's
     floor extrapolated to zero. ``u_guard_V`` is the threshold that the certificate protects (the lower of knee and
-    onset on the guarded branch), ``u_guard_lower_V`` its lower confidence bound.
+    onset on the guarded branch), ``u_guard_lower_V`` its lower confidence bound. ``ramps`` names each ramp in it.
     """
 
     __test__ = False  # not a test case, whatever its name
@@ -77,6 +77,18 @@ class TestResult:
     noise_L_min: float
     noise_colour: float
     outliers: int
+    ramps: tuple[str, ...] = ()
+
+    def to_document(self) -> dict[str, Any]:
+        """Return the entry of valve.json; of the ramps, how many and which."""
+        return {**asdict(self), "ramps": {"count": len(self.ramps), "sources": list(self.ramps)}}
+
+
+def _test_from_document(test: dict[str, Any]) -> TestResult:
+    """Read an entry of valve.json; one made before ramps were pooled is one ramp."""
+    keys = {field.name for field in fields(TestResult)} - {"ramps"}
+    ramps = test["ramps"]["sources"] if "ramps" in test else [test["source"]]
+    return TestResult(**{key: test[key] for key in keys}, ramps=tuple(ramps))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -219,7 +231,7 @@ class ValveModel:
             "knee_window": list(self.knee_window),
             "sides": {
                 "positive": {
-                    "tests": [asdict(test) for test in side.tests],
+                    "tests": [test.to_document() for test in side.tests],
                     "reference": {"dp_MPa": side.reference_dp_MPa, "u_min_V": side.u_min0_V},
                     "k_x_max_over_u_max": side.k_x_max_over_u_max,
                     "k_V_mm": side.k_V_mm,
@@ -263,10 +275,9 @@ def valve_from_document(content: bytes, source: str) -> ValveModel:
     check_shape(document, SHAPE, source, REMEDY)
     try:
         side = document["sides"]["positive"]
-        known = {field.name for field in fields(TestResult)}
         certificate = side["certificate"]
         positive = SideModel(
-            tests=tuple(TestResult(**{key: test[key] for key in known}) for test in side["tests"]),
+            tests=tuple(_test_from_document(test) for test in side["tests"]),
             reference_dp_MPa=side["reference"]["dp_MPa"],
             u_min0_V=side["reference"]["u_min_V"],
             k_x_max_over_u_max=side["k_x_max_over_u_max"],

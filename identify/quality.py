@@ -1,6 +1,6 @@
 """The quality gate that speaks: what is weak in the data, with the numbers and what to do."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 
 from dzdesign.identify.model import SideModel, Warning_
 
@@ -18,6 +18,7 @@ def find_warnings(
     u_bottom: Mapping[str, float],
     zero_L_min: Mapping[str, float],
     departure_V: Mapping[str, float],
+    declared: Collection[str] = (),
 ) -> tuple[Warning_, ...]:
     """Return the warnings about one side.
 
@@ -37,11 +38,14 @@ def find_warnings(
         Source -> flow read at zero command, where it is not zero.
     departure_V : mapping
         Source -> departure of the knees from one direction with the pressure drop, where it is beyond their error.
+    declared : collection of str
+        Sources whose pressure drop is the engineer's word.
     """
     return (
         *_about_the_meter(zero_L_min),
         *_about_order(departure_V),
         *_about_pressure(side, sag),
+        *_about_declarations(declared),
         *_about_branches(side, u_max, u_top, u_bottom),
         *_about_the_edge(side, floor_L_min, u_max),
     )
@@ -109,6 +113,18 @@ def _about_pressure(side: SideModel, sag: Mapping[str, float]) -> Iterator[Warni
                 text=f"the pressure drop sags by {share:.0%} at full command; a larger pump or accumulator would help",
                 source=source,
             )
+
+
+def _about_declarations(declared: Collection[str]) -> Iterator[Warning_]:
+    for source in declared:
+        yield Warning_(
+            code="declared-pressure",
+            text=(
+                "the pressure drop is declared, not recorded: if it sags under flow, the knee is found too low (21 mV "
+                "for 5 % on a 10 V valve like the example's). Record dP (or pA and pB)"
+            ),
+            source=source,
+        )
 
 
 def _about_branches(

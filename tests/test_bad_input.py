@@ -108,7 +108,7 @@ def refusal(bench, capsys):
         (csv(ramp(), "time_s,u_V,dP_mPa,Q_Lmin").encode(), "correct the unit in the header"),
         (csv(ramp(1.0) * [1, 1, 500, 1]).encode(), "the pressure drop is 500 MPa"),
         (
-            csv(np.column_stack([ramp()[:, 0], 2 * np.round(ramp()[:, 1] / 2), ramp()[:, 2:]])).encode(),
+            csv(np.column_stack([ramp()[:, 0], 2 * np.round(ramp()[:, 1] / 2), ramp(2.0)[:, 2:]])).encode(),
             "at 1 levels of",
         ),
         (csv(ramp()[:19]).encode(), "has 19 complete rows, expected at least 20"),
@@ -134,10 +134,10 @@ def test_a_ramp_file_that_is_none(refusal, name, words):
     assert words in line and name in line
 
 
-def test_pressures_that_repeat(refusal, bench):
+def test_a_copy_is_no_repetition(refusal, bench):
     shutil.copy("a.csv", "again.csv")
     line = refusal("identify", "a.csv", "again.csv")
-    assert "the pressure drop repeats: 'a.csv' (1.000 MPa) and 'again.csv'" in line
+    assert "'again.csv' is byte for byte the same recording as 'a.csv'; give it once" in line
 
 
 def test_several_tests_without_pressure(refusal, bench):
@@ -255,7 +255,7 @@ def test_a_file_of_options_that_is_no_text(refusal, bench):
 
 def test_options_from_a_file_stand_in_for_the_defaults(bench, capsys):
     (bench / "options.toml").write_text(
-        "\ufeffu-max = '20 V'\nconfidence = 0.9\ndp = '2 MPa'\ntarget = 'f28335'\n", "utf-8"
+        "\ufeffu-max = '20 V'\nconfidence = 0.9\ndp = ['2 MPa']\ntarget = 'f28335'\n", "utf-8"
     )
     assert main(["identify", "a.csv", "-o", "new.json", "--config", "options.toml", "--confidence", "0.8"]) == 0
     valve = json.loads(Path("new.json").read_text())

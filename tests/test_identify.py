@@ -9,11 +9,12 @@ from synthetic import L_MIN, MPA, Truth, synthetic_ramp
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.bounds import find_trend, lower_bounds, staircase
-from dzdesign.identify.branches import bin_branch, split_branches, sweep_direction
+from dzdesign.identify.branches import bin_branch
 from dzdesign.identify.characteristic import find_meter_floor
 from dzdesign.identify.identification import identify
 from dzdesign.identify.model import valve_from_document
 from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.ramp_splitting import split_ramps, sweep_direction
 
 PRESSURES = (0.5, 1.0, 2.0, 3.0, 5.0)
 
@@ -203,7 +204,7 @@ class TestParts:
     @pytest.mark.parametrize(("floor", "expected"), [(0.6, 0.6), (0.0, 0.0)])
     def test_meter_floor_is_found_where_there_is_one(self, floor, expected):
         test = synthetic_ramp(1.0, Truth(floor=floor, noise=0.05), rate_Hz=100)
-        rising, _ = split_branches(test, 0.0)
+        rising, _ = split_ramps(test, 0.0)[0].branches
         assert find_meter_floor(rising.u, rising.q, 10.0) / L_MIN == pytest.approx(expected, abs=0.1)
 
     def test_simultaneous_bounds_cover(self):
@@ -235,9 +236,6 @@ class TestParts:
         shut = synthetic_ramp(1.0, Truth(knee_rising=20.0))
         with pytest.raises(InputError, match="never opens"):
             identify([shut])
-        twice = [synthetic_ramp(1.0, Truth(), source=name) for name in ("a.csv", "b.csv")]
-        with pytest.raises(InputError, match="pressure drop repeats"):
-            identify(twice)
 
 
 def test_one_branch_is_said_and_guards_opening():

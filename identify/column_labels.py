@@ -1,0 +1,183 @@
+"""Labels of columns: which column is which quantity of a ramp test, by its label or by the engineer's word."""
+
+import re
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+from dzdesign.core.errors import InputError, nearest
+from dzdesign.core.units import si_factor
+from dzdesign.identify.table import Table
+from dzdesign.identify.text_tables import clean_label
+
+#: Spelling in a header (lower case, letters only) -> quantity of a ramp test.
+COLUMN_NAMES = {
+    "time": "time", "t": "time",
+    "u": "u", "command": "u",
+    "dp": "dP", "δp": "dP", "deltap": "dP",
+    "pa": "pA", "pb": "pB",
+    "q": "Q", "flow": "Q",
+}  # fmt: skip
+QUANTITY_OF_COLUMN = {"time": "time", "u": "voltage", "dP": "pressure", "pA": "pressure", "pB": "pressure", "Q": "flow"}
+#: How a column is best named, for the messages.
+EXAMPLE_LABELS = {"time": "time_s", "u": "u_V", "dP": "dP_MPa", "pA": "pA_MPa", "pB": "pB_MPa", "Q": "Q_Lmin"}
+EXAMPLE_UNITS = {"time": "s", "u": "V", "dP": "MPa", "pA": "MPa", "pB": "MPa", "Q": "L/min"}
+#: Units of a command that is a share of u_max.
+PER_CENT = ("%", "pct", "percent")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Column:
+    """A column that was found: its label in the file, and its unit ("" if none is known)."""
+
+    label: str
+    unit: str
+
+
+def parse_columns(text: str | Mapping[str, str]) -> dict[str, str]:
+    """Read what ``--columns`` or the table ``columns`` of the options says: quantity -> label in the file.
+
+    Parameters
+    ----------
+    text : str or mapping
+        ``"u=AO0:V, Q=Flow (L/min)"``, or the same as a mapping. A quantity is one of time, u, dP, pA, pB, Q; a label
+        stands as in the file, and a unit that it lacks follows after a colon. A comma parts two entries only before
+        another ``quantity=``, so a label may hold one.
+
+    Raises
+    ------
+    InputError
+        If a quantity is unknown or named twice, or a label is missing.
+
+    Examples
+    --------
+    >>> parse_columns("u=AO0:V, Q=Flow (L/min)")
+    {'u': 'AO0:V', 'Q': 'Flow (L/min)'}
+    """
+    if isinstance(text, str):
+        entries = [entry.partition("=")[::2] for entry in re.split(r"[,;]\s*(?=\w+\s*=)", text)]
+    else:
+        entries = list(text.items())
+    columns: dict[str, str] = {}
+    for name, label in entries:
+        name, label = name.strip(), clean_label(label)
+        quantity = COLUMN_NAMES.get(name.lower())
+        if quantity is None:
+            raise InputError(
+                f"--columns names '{name}', expected {', '.join(QUANTITY_OF_COLUMN)}{nearest(name, QUANTITY_OF_COLUMN)}"
+                '; write for example --columns "u=AO0:V, Q=Flow (L/min)"'
+            )
+        if quantity in columns:
+            raise InputError(f"--columns names {quantity} twice; keep one")
+        if not label:
+            raise InputError(f"--columns gives no label for {quantity}; write for example {quantity}=AO0:V")
+        columns[quantity] = label
+    return columns
+
+
+def find_columns(table: Table, chosen: Mapping[str, str]) -> dict[str, Column]:
+    """Return quantity -> column of a table: those that were chosen, the others by their labels.
+
+    Parameters
+    ----------
+    table : Table
+        As recorded.
+    chosen : mapping
+        Quantity -> label, or label and unit with a colon between them, as `parse_columns` gives it.
+
+    Raises
+    ------
+    InputError
+        If a quantity has no column, or two, or a chosen label is not in the table.
+    """
+    columns = {quantity: _chosen_column(table, quantity, label) for quantity, label in chosen.items()}
+    taken = {column.label for column in columns.values()}
+    pressures = {"dP", "pA", "pB"} if "dP" in chosen or {"pA", "pB"} <= chosen.keys() else set()
+    for label in table.labels:
+        quantity, unit = split_label(label)
+        if quantity is None or label in taken or quantity in chosen.keys() | pressures:
+            continue
+        unit = unit if unit and (fits(unit, quantity) or label not in table.units) else table.units.get(label, "")
+        if quantity in columns and not fits(unit, quantity):
+            continue  # an oil temperature T_degC beside the time t_s, a set point Q_set beside Q_Lmin
+        if quantity in columns and fits(columns[quantity].unit, quantity):
+            raise InputError(
+                f"'{table.path}'{table.header} has two columns of {quantity}: '{columns[quantity].label}' and "
+                f"'{label}'; keep one, give the other another name, or choose by --columns"
+            )
+        columns[quantity] = Column(label=label, unit=unit)
+    if ("pA" in columns) != ("pB" in columns) and "dP" not in columns:
+        have, lack = ("pA", "pB") if "pA" in columns else ("pB", "pA")
+        raise InputError(
+            f"'{table.path}'{table.header} has a column of {have} but none of {lack}; expected both, or dP"
+        )
+    for quantity in ("time", "u", "Q"):
+        if quantity not in columns:
+            raise _missing_column(quantity, table, columns)
+    return columns
+
+
+def _chosen_column(table: Table, quantity: str, text: str) -> Column:
+    """Return the column that was chosen: the whole text is its label, or else what stands before the last colon."""
+    label, colon, unit = (text, "", "") if text in table.labels else text.rpartition(":")
+    label, unit = (clean_label(label), unit.strip()) if colon else (text, "")
+    if label not in table.labels:
+        raise table.no_column(label, f"--columns names for {quantity}")
+    if table.labels.count(label) > 1:
+        raise InputError(f"'{table.path}'{table.header} has {table.labels.count(label)} columns '{label}'; rename one")
+    _, own = split_label(label)
+    bracketed = bool(re.search(r"[\[(]", label))
+    unit = unit or (own if bracketed or fits(own, quantity) else "") or table.units.get(label, "")
+    if not unit:
+        raise InputError(
+            f"'{table.path}' column '{label}' has no unit; write for example "
+            f'--columns "{quantity}={label}:{EXAMPLE_UNITS[quantity]}"'
+        )
+    return Column(label=label, unit=unit)
+
+
+def split_label(label: str) -> tuple[str | None, str]:
+    """Split a column's label into the quantity (None if it is not one of a ramp test's) and its unit.
+
+    Examples
+    --------
+    >>> split_label("dP_MPa"), split_label("Q [L/min]"), split_label("u (V)"), split_label("u")
+    (('dP', 'MPa'), ('Q', 'L/min'), ('u', 'V'), ('u', ''))
+    """
+    bare = clean_label(label)
+    match = re.fullmatch(r"(.+?)\s*[\[(]\s*(.*?)\s*[\])]", bare)
+    if match is None:  # the unit follows the last underscore; L_min, as artefacts spell it, has one itself
+        match = re.fullmatch(r"(.+?)_([lL]_min|[^_]*)", bare)
+    name, unit = match.groups() if match else ("", bare)
+    for candidate, its_unit in ((name, unit), (bare, "")):
+        quantity = COLUMN_NAMES.get(re.sub(r"[\s_]", "", candidate).lower())
+        if quantity:
+            return quantity, its_unit
+    return None, unit
+
+
+def _missing_column(quantity: str, table: Table, columns: Collection[str]) -> InputError:
+    """Return the error that names the columns found, and the one that may have been meant."""
+    unused = [label for label in table.labels if split_label(label)[0] not in columns]
+    bare = {re.split(r"[_\[(]", label)[0].strip().lower(): label for label in unused}
+    spellings = [name for name, its in COLUMN_NAMES.items() if its == quantity]
+    meant = [bare[near] for name in spellings for near in get_close_matches(name, bare, n=1)]
+    kind = QUANTITY_OF_COLUMN[quantity]
+    meant += [label for label in unused if _measures(table.units.get(label, "") or split_label(label)[1], kind)]
+    hint = f" (did you mean '{meant[0]}'? name it {EXAMPLE_LABELS[quantity]})" if meant else ""
+    return InputError(
+        f"'{table.path}' has no column of {quantity} (columns found: {table.found()}){hint}; "
+        "expected names with units such as time_s,u_V,dP_MPa,Q_Lmin, or --columns"
+    )
+
+
+def fits(unit: str, column: str) -> bool:
+    """Tell whether a column of that quantity may be in that unit."""
+    return _measures(unit, QUANTITY_OF_COLUMN[column]) or (column == "u" and unit.lower() in PER_CENT)
+
+
+def _measures(unit: str, quantity: str) -> bool:
+    try:
+        return bool(si_factor(unit, quantity))
+    except InputError:
+        return False
