@@ -20,6 +20,7 @@ from dzdesign.core.artefacts import (
 )
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.units import parse_quantity
+from dzdesign.progress import with_bar
 
 
 def say(text: str) -> None:
@@ -116,11 +117,12 @@ def run_identify(args: argparse.Namespace) -> int:
     check_file_may_be_written(Path(args.output), SCHEMA)
     columns = parse_columns(args.columns) if args.columns else {}
     tests = [
-        read_ramp_file(path, u_max, columns=columns, dp=_declared_dp(path, args.dp)) for path in expand(args.ramps)
+        read_ramp_file(path, u_max, columns=columns, dp=_declared_dp(path, args.dp))
+        for path in with_bar(expand(args.ramps), "reading recordings")
     ]
     _refuse_copies(tests)
     _refuse_unnamed(tests, args.dp)
-    say(f"fitting {len(tests)} ramp test{'s' if len(tests) > 1 else ''}")
+    say(f"fitting {len(tests)} recording{'s' if len(tests) > 1 else ''}")
     valve = identify(tests, options)
     document = valve.to_document()
     write_file(Path(args.output), to_json(document), SCHEMA)

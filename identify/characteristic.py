@@ -27,6 +27,8 @@ NOISE_LEVEL = 3.0
 TAIL = 3.0
 #: Fewest samples in the tail for a line.
 TAIL_SAMPLES = 12
+#: Fewest levels of the command in the tail for a line: the steps of a staircase may put all of it at one.
+TAIL_LEVELS = 3
 #: Upper ends to which the window is widened while the characteristic goes on straight, over the largest flow.
 WIDER = (0.65, 0.8, 0.9, 1.0)
 #: The window may reach down to this multiple of the first flow that counts: nearer to a floor readings are cut off.
@@ -363,7 +365,7 @@ def _tail_onset(
     """
     first, last = crossing(*profile, level), crossing(*profile, TAIL * level)
     tail = (u >= first) & (u <= last) & (y > 0.5 * level)
-    if tail.sum() >= TAIL_SAMPLES:
+    if tail.sum() >= TAIL_SAMPLES and np.unique(u[tail]).size >= TAIL_LEVELS:
         tail_slope, onset = _line(u[tail], y[tail])
         if tail_slope > 0.1 * slope:  # else a notch or a leak: no line, so the chord below
             residual = y[tail] - tail_slope * (u[tail] - onset)

@@ -104,17 +104,23 @@ def _reading_at_zero(test: RampTest, u_max: float) -> float:
     """Return what the meter reads at zero command where that is not zero, m³/s: its zero error, or a leak.
 
     Thousands of readings at rest tell it far better than any declared bound; 0 is returned where it does not stand out.
-    Of the hold before the first ramp only the later half counts: in the earlier one hoses and meter may still fill.
+    Of the hold before the first ramp only the later half counts, and none of it if it still drifts: hoses and meter
+    may be filling.
     """
     at_rest = np.abs(test.u) <= AT_REST * u_max
     before = int(np.argmin(at_rest)) if not at_rest.all() else 0
-    settled = at_rest & (np.arange(at_rest.size) >= before // 2)
-    rest = test.q[settled if settled.sum() >= 20 else at_rest]
+    third, fourth = test.q[before // 2 : 3 * before // 4], test.q[3 * before // 4 : before]
+    drifts = third.size >= 5 and abs(np.median(third) - np.median(fourth)) > 5 * _error_of_median(fourth)
+    rest = test.q[at_rest & (np.arange(at_rest.size) >= (before if drifts else before // 2))]
     if rest.size < 20:
         return 0.0
     zero = float(np.median(rest))
-    error = 1.4826 * float(np.median(np.abs(rest - zero))) / np.sqrt(rest.size)
+    error = _error_of_median(rest)
     return zero if abs(zero) > max(5 * error, ZERO_SHARE * float(np.abs(test.q).max())) else 0.0
+
+
+def _error_of_median(values: np.ndarray) -> float:
+    return 1.4826 * float(np.median(np.abs(values - np.median(values)))) / np.sqrt(values.size)
 
 
 def _split_all(tests: Sequence[RampTest], options: IdentifyOptions) -> list[Ramp]:

@@ -91,18 +91,13 @@ def read_ramp_file(
         complete &= np.isfinite(measured)
     if complete.sum() < MIN_ROWS:
         raise InputError(f"'{path}' has {complete.sum()} complete rows, expected at least {MIN_ROWS} of a ramp test")
-    backwards = np.flatnonzero(np.diff(data["time"][complete]) < 0)
-    if backwards.size:
-        row = int(np.flatnonzero(complete)[backwards[0] + 1])
-        raise InputError(
-            f"'{path}' {table.place(row)}: the time goes back; expected one recording in the order it was taken"
-        )
+    time = _clock(table, data["time"], complete)
     if measured is None and dp is not None:
         measured = np.full(complete.size, dp)
     return RampTest(
         source=path.name.encode(errors="replace").decode(),
         sha256=sha256_of(content),
-        time=data["time"][complete],
+        time=time,
         u=data["u"][complete],
         q=data["Q"][complete],
         dp=None if measured is None else measured[complete],
@@ -149,6 +144,21 @@ def _refuse_unequal_lengths(table: Table, found: Mapping[str, Column], data: Map
                 f"'{table.path}' column '{found[quantity].label}' has {array.size} samples, but "
                 f"'{found['time'].label}' has {data['time'].size}; expected one clock, so resample it before"
             )
+
+
+def _clock(table: Table, time: np.ndarray, complete: np.ndarray) -> np.ndarray:
+    """Return the times of the complete rows; a clock that jitters back by less than a sample stands still instead."""
+    time = time[complete]
+    latest = np.maximum.accumulate(time)
+    steps = np.diff(time)
+    usual = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
+    backwards = np.flatnonzero(latest - time > usual)
+    if backwards.size:
+        row = int(np.flatnonzero(complete)[backwards[0]])
+        raise InputError(
+            f"'{table.path}' {table.place(row)}: the time goes back; expected one recording in the order it was taken"
+        )
+    return latest
 
 
 def _si_numbers(table: Table, quantity: str, column: Column, u_max: float) -> np.ndarray:
