@@ -1,8 +1,8 @@
 """The Cramér-Rao bound of a threshold, from readings of which those below the meter's floor are censored (Tobit).
 
 Parameters of one ramp test, none of them known: opening threshold, closing threshold, slope and saturated flow, the
-last two common to both branches. A reading is Gaussian about ``mu = min(s max(u - u_min, 0), Q_sat)`` and is reported only
-above the floor. With z = (floor - mu)/sigma, a Tobit reading holds
+last two common to both branches. A reading is Gaussian about ``mu = min(s max(u - u_min, 0), Q_sat)`` and is reported
+only above the floor. With z = (floor - mu)/sigma, a Tobit reading holds
 
     J(z) = 1 - Phi(z) + z phi(z) + phi(z)^2 / Phi(z)
 

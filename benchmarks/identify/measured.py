@@ -2,15 +2,17 @@
 
 import json
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 from bench_model import L_MIN
 from scoreboard import Row, print_rows
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.ramp_files import read_ramp_file
+from dzdesign.identify.ramp_files import RampTest, read_ramp_file
 
 SHARED = Path(os.environ.get("DZDESIGN_SHARED_DATA", Path(__file__).parents[3] / "shared" / "data"))
 LIMIT_mV = 15.0
@@ -69,9 +71,9 @@ def _real_rows() -> list[Row]:
         return [Row(what="skipped", value=float("nan"), note=f"no folder {folder}")]
     brackets = json.loads((folder / "brackets.json").read_text())
     rows = []
-    for name, bracket in brackets.items():
+    for name, test_, bracket in _real_tests(folder, brackets):
         try:
-            side = identify([read_ramp_file(folder / name)], IdentifyOptions(meter_floor=0.0 * L_MIN)).positive
+            side = identify([test_], IdentifyOptions(u_max=max(10.0, float(test_.u.max())))).positive
         except InputError as error:
             rows.append(Row(what=name, value=float("nan"), note=f"refused: {error}"))
             continue
@@ -85,6 +87,20 @@ def _real_rows() -> list[Row]:
     return rows
 
 
+def _real_tests(folder: Path, brackets: dict) -> Iterator[tuple[str, RampTest, dict]]:
+    """Yield name, ramp test and bracket; of a bipolar velocity each side by itself, cm/s standing for L/min."""
+    for name, bracket in brackets.items():
+        if "pos_bracket_u" not in bracket:
+            yield name, read_ramp_file(folder / name), bracket
+            continue
+        time, u, velocity = np.loadtxt(folder / name, delimiter=",", skiprows=1).T
+        for sign, key in ((1, "pos_bracket_u"), (-1, "neg_bracket_u")):
+            mine = np.flatnonzero(sign * u > 0)[::sign]
+            test = RampTest(source=name, sha256="0" * 64, time=np.sort(time[mine]), u=sign * u[mine],
+                            q=sign * velocity[mine] * L_MIN, dp=None)  # fmt: skip
+            yield f"{name} ({key[:3]})", test, {"onset_bracket": sorted(sign * end for end in bracket[key])}
+
+
 def _comparisons(test, bracket: dict):
     """Yield what is compared, what was found and the interval; a knee's interval is 0.1 V either side."""
     for branch in ("rising", "falling"):
@@ -95,5 +111,5 @@ def _comparisons(test, bracket: dict):
                 continue
             if key.startswith("linear_knee"):
                 yield f"knee {branch}", knee, (value - 0.1, value + 0.1)
-            elif key.startswith(("onset_bracket", "pos_bracket")):
+            elif key.startswith("onset_bracket"):
                 yield f"onset {branch}", onset, tuple(value)

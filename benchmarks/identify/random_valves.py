@@ -63,7 +63,9 @@ def print_random_valves(*, quick: bool, seed: int) -> list[Row]:
         ]
         if not max(errors) <= GROSS * U_MAX_V:
             bound = max(cramer_rao(bench, dp).branch_V for dp in bench.pressures_MPa) if bench.noise_L_min else 0.0
-            text = f"valve {number}: {1e3 * max(errors):.0f} mV of {bench.threshold_V(1.0):.2f} V, c.r. {1e3 * bound:.0f}"
+            text = (
+                f"valve {number}: {1e3 * max(errors):.0f} mV of {bench.threshold_V(1.0):.2f} V, CRB {1e3 * bound:.0f}"
+            )
             (hidden if bound > HIDDEN * U_MAX_V else gross).append(text)
         dp = np.linspace(*side.valid_dp_MPa, 100)
         if np.any(side.u_min0_V * np.interp(dp, side.beta_dp_MPa, side.beta) > bench.closing_V(dp)):
