@@ -89,9 +89,7 @@ def test_a_wrong_estimator_is_flagged():
         return identify([dataclasses.replace(test, u=test.u + 0.08) for test in tests], options)
 
     bench = SMALL.with_changes(rate_Hz=50.0)
-    right, wrong = (
-        run_replicates(bench, 3, 1, options_for(bench), estimator) for estimator in (identify, reads_high)
-    )
+    right, wrong = (run_replicates(bench, 3, 1, options_for(bench), estimator) for estimator in (identify, reads_high))
     assert np.all(right.bound_excess < 0) and np.all(right.offset_excess < 0)
     assert np.all(wrong.bound_excess > 0)
     assert np.all(np.abs(right.middle) < 0.03) and np.all(wrong.middle > 0.05)

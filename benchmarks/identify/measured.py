@@ -58,9 +58,7 @@ def _valve_rows(label: str, tests: list, known: dict, lag: float) -> list[Row]:
             note=f"verdict {side.trend} ({change}); truth {1e3 * (truths[-1] - truths[0]):+.1f} mV",
         )
     )
-    worst = max(
-        1e3 * (test.u_guard_lower_V - known[test.source]["pos"]["u_close_falling"]) for test in side.tests
-    )
+    worst = max(1e3 * (test.u_guard_lower_V - known[test.source]["pos"]["u_close_falling"]) for test in side.tests)
     rows.append(Row(what=f"{label}, bound less closing edge", value=worst, unit="mV", note="largest over the tests"))
     return rows
 
