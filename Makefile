@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 DOCS   := docs/derivation
 
-.PHONY: demo test lint docs lock clean
+.PHONY: demo test lint docs lock clean bench-identify
 
 demo: $(STAMP)
 	$(BIN)/dzdesign demo demo
@@ -15,6 +15,14 @@ test: lint
 
 lint: $(STAMP)
 	$(BIN)/ruff check .
+
+# Under an hour on one core; `make bench-identify BENCH=--quick` takes three minutes.
+bench-identify: $(VENV)/.bench
+	$(BIN)/python benchmarks/identify/run.py $(BENCH)
+
+$(VENV)/.bench: $(STAMP)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation -e '.[bench]'
+	touch $@
 
 # The account of the paper as a page, for LaTeX and for machines; built, never committed.
 docs: $(STAMP)

@@ -154,6 +154,20 @@ def _line(u: np.ndarray, y: np.ndarray) -> tuple[float, float]:
     return slope, float(centre - y.mean() / slope)
 
 
+def _without_outliers(u: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the samples within `GATE` robust standard deviations of their line, in three rounds."""
+    kept = np.ones(u.size, dtype=bool)
+    for _ in range(3):
+        slope, zero = _line(u[kept], y[kept])
+        residual = y - slope * (u - zero)
+        sigma = 1.4826 * float(np.median(np.abs(residual - np.median(residual))))
+        inside = np.abs(residual - np.median(residual)) <= GATE * sigma
+        if inside.sum() < TAIL_SAMPLES or np.ptp(u[inside]) == 0:
+            break
+        kept = inside
+    return u[kept], y[kept]
+
+
 def _colour(residual: np.ndarray, sigma: float) -> float:
     """Return the long-run variance factor from the means of `BLOCKS` blocks in time order."""
     blocks = np.array_split(residual, min(BLOCKS, residual.size // 2))
@@ -366,12 +380,13 @@ def _tail_onset(
     first, last = crossing(*profile, level), crossing(*profile, TAIL * level)
     tail = (u >= first) & (u <= last) & (y > 0.5 * level)
     if tail.sum() >= TAIL_SAMPLES and np.unique(u[tail]).size >= TAIL_LEVELS:
-        tail_slope, onset = _line(u[tail], y[tail])
+        u_tail, y_tail = _without_outliers(u[tail], y[tail])
+        tail_slope, onset = _line(u_tail, y_tail)
         if tail_slope > 0.1 * slope:  # else a notch or a leak: no line, so the chord below
-            residual = y[tail] - tail_slope * (u[tail] - onset)
-            sigma = math.sqrt(np.sum(residual**2) / (tail.sum() - 2))
-            lever = 1 / tail.sum() + (u[tail].mean() - onset) ** 2 / np.sum((u[tail] - u[tail].mean()) ** 2)
-            roughness = measure_roughness(u[tail], residual)
+            residual = y_tail - tail_slope * (u_tail - onset)
+            sigma = math.sqrt(np.sum(residual**2) / (u_tail.size - 2))
+            lever = 1 / u_tail.size + (u_tail.mean() - onset) ** 2 / np.sum((u_tail - u_tail.mean()) ** 2)
+            roughness = measure_roughness(u_tail, residual)
             colour = max(_colour(residual, max(sigma, 1e-12)), colour_factor(correlation, roughness, sigma))
             return onset, sigma * math.sqrt(lever * colour) / tail_slope, tail_slope
     # Too few samples for a line, as in a staircase test: the chord, its ends known to one level of the command.

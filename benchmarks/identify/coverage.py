@@ -1,0 +1,83 @@
+"""2 and 3. Failures of the simultaneous lower bound, over-compensation anywhere, and the residual dead zone."""
+
+import numpy as np
+from bench_model import L_MIN, SHAPES, Bench
+from replicates import options_for, run_replicates
+from scoreboard import Row, print_rows, say, share_interval
+
+NOISES = {"white": 0.0, "AR(1) 0.9": 0.9, "AR(1) 0.99": 0.99}
+RATES_Hz = (100.0, 25.0)
+LIMIT, RESIDUAL_LIMIT = 1.0, 0.8
+#: The worst meter zero inside the declared budget: it hides flow, so that the threshold seems higher, L/min.
+BUDGET = 0.15
+
+
+def print_coverage(*, quick: bool, seed: int) -> list[Row]:
+    """Print and return the rows of part 2."""
+    count = 40 if quick else 3000
+    rows = []
+    for rate in RATES_Hz:
+        for name, ar in NOISES.items():
+            bench = Bench(ar=ar, rate_Hz=rate)
+            say(f"coverage: {name} at {rate:g} Hz, {count} replicates")
+            rows.append(_failures(f"{name}, {rate:g} Hz: bound above the truth", bench, count, seed))
+    print_rows(f"2a. Simultaneous 99 % lower bound fails (seed {seed}; correlation is per sample)", rows)
+    shapes = []
+    count = 20 if quick else 500
+    for name, shape in SHAPES.items():
+        bench = Bench(threshold_V=shape, zero_L_min=-BUDGET)
+        say(f"over-compensation: {name}, {count} replicates")
+        outcomes = run_replicates(bench, count, seed + 1, options_for(bench, meter_zero=BUDGET * L_MIN))
+        done = outcomes.offset_excess.size
+        failures = int((outcomes.offset_excess > 0).sum())
+        shapes.append(
+            Row(
+                what=f"{name}: open at zero command",
+                value=100 * failures / done,
+                limit=LIMIT,
+                unit="%",
+                note=f"{share_interval(failures, done)}; worst {1e3 * outcomes.offset_excess.max():+.1f} mV; residual "
+                f"{100 * outcomes.residual_volts.mean():.2f} % of u_max; {_trends(outcomes.trends)}",
+            )
+        )
+    title = f"2b. Offset above the closing threshold anywhere, meter zero {-BUDGET:g} L/min, declared (seed {seed + 1})"
+    print_rows(title, shapes)
+    return rows + shapes
+
+
+def print_residual(*, quick: bool, seed: int) -> list[Row]:
+    """Print and return the rows of part 3."""
+    bench, count = Bench(), 30 if quick else 200
+    say(f"residual dead zone: {count} replicates")
+    rows = []
+    outcomes = run_replicates(bench, count, seed, options_for(bench))
+    for label, values, limit in (
+        ("closing threshold less offset, over u_max", outcomes.residual_volts, RESIDUAL_LIMIT),
+        ("the same as a share of the command's range", outcomes.residual, None),
+    ):
+        note = f"mean of {count}; largest {100 * values.max():.2f} %; worst place of the interval 0.5-5 MPa"
+        rows.append(Row(what=label, value=100 * values.mean(), limit=limit, unit="%", note=note))
+    step = float(np.max(-np.diff(bench.closing_V(np.array(bench.pressures_MPa))))) / 10
+    rows.append(Row(what="of which one step of the true staircase, over u_max", value=100 * step, unit="%"))
+    print_rows(f"3. Residual dead zone beyond the hysteresis, white noise (seed {seed})", rows)
+    return rows
+
+
+def _failures(label: str, bench: Bench, count: int, seed: int) -> Row:
+    outcomes = run_replicates(bench, count, seed, options_for(bench))
+    done = outcomes.bound_excess.size
+    failures = int((outcomes.bound_excess > 0).sum())
+    opened = int((outcomes.offset_excess > 0).sum())
+    claimed = np.sqrt(np.mean(outcomes.closing_se**2)) / np.sqrt(np.mean(outcomes.closing**2))
+    return Row(
+        what=label,
+        value=100 * failures / done,
+        limit=LIMIT,
+        unit="%",
+        note=f"{share_interval(failures, done)}; {opened} over-compensate; claimed s.e. over rmse "
+        f" {claimed:.2f}; refused {len(outcomes.refusals)}; {_trends(outcomes.trends)}",
+    )
+
+
+def _trends(trends: dict[str, int]) -> str:
+    return ", ".join(f"{name} {count}" for name, count in sorted(trends.items()))

@@ -1,0 +1,114 @@
+"""Monte Carlo through the product: what each replicate gives, beside the truth."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from bench_model import L_MIN, U_MAX_V, Bench, readings
+from scoreboard import say
+
+from dzdesign.core.errors import InputError
+from dzdesign.identify.identification import identify
+from dzdesign.identify.model import ValveModel
+from dzdesign.identify.options import IdentifyOptions
+
+#: Points of the pressure drop at which the offset is held against the truth.
+GRID = 451
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcomes:
+    """Of R replicates and T tests; refused replicates are left out and counted.
+
+    Attributes
+    ----------
+    middle, closing, closing_se : (R, T) array
+        Errors of the middle of both knees, of the closing knee (V), and the closing knee's claimed standard error.
+    middle_found : (R, T) array
+        The middle of both knees itself, V.
+    bound_excess : (R,) array
+        Largest lower bound less true closing threshold over the tests, V; above 0 the simultaneous bound failed.
+    offset_excess : (R,) array
+        Largest offset less true closing threshold over the interval, V; above 0 the valve is open at zero command.
+    residual, residual_volts : (R,) array
+        Largest residual dead zone over the interval beyond the hysteresis: share of the command range, and distance
+        between offset and closing threshold over u_max.
+    beta_last : (R,) array
+        beta at the largest pressure drop.
+    trends : dict
+        Trend -> replicates.
+    refusals : tuple of str
+        Messages.
+    """
+
+    middle: np.ndarray
+    closing: np.ndarray
+    closing_se: np.ndarray
+    middle_found: np.ndarray
+    bound_excess: np.ndarray
+    offset_excess: np.ndarray
+    residual: np.ndarray
+    residual_volts: np.ndarray
+    beta_last: np.ndarray
+    trends: dict[str, int]
+    refusals: tuple[str, ...]
+
+
+def options_for(bench: Bench, **changes: object) -> IdentifyOptions:
+    """Return what an engineer with this bench declares: the meter's floor and lag."""
+    known = {"meter_floor": bench.floor_L_min * L_MIN, "meter_lag": bench.lag_s}
+    return IdentifyOptions(**(known | changes))
+
+
+def run_replicates(bench: Bench, count: int, seed: int, options: IdentifyOptions, estimator=identify) -> Outcomes:
+    """Identify `count` replicates and hold each against the truth.
+
+    Parameters
+    ----------
+    bench : Bench
+        What is measured.
+    count, seed : int
+        Replicates, and the seed of their noise.
+    options : IdentifyOptions
+        Choices of the engineer.
+    estimator : callable
+        Ramp tests and options to a `ValveModel`; the product's unless a test seeds a wrong one.
+    """
+    dp = np.array(bench.pressures_MPa)
+    rows: list[dict] = []
+    trends: dict[str, int] = {}
+    refusals: list[str] = []
+    for number, tests in enumerate(readings(bench, count, seed)):
+        if number and number % 500 == 0:
+            say(f"  {number} of {count}")
+        try:
+            valve = estimator(tests, options)
+        except InputError as error:
+            refusals.append(str(error))
+            continue
+        trends[valve.positive.trend] = trends.get(valve.positive.trend, 0) + 1
+        rows.append(_held_against_truth(valve, bench, dp))
+    columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    return Outcomes(**columns, trends=trends, refusals=tuple(refusals))
+
+
+def _held_against_truth(valve: ValveModel, bench: Bench, dp: np.ndarray) -> dict:
+    side = valve.positive
+    opening = np.array([test.u_knee_rising_V for test in side.tests])
+    closing = np.array([test.u_knee_falling_V for test in side.tests])
+    grid = np.linspace(dp[0], dp[-1], GRID)
+    beta = np.interp(grid, side.beta_dp_MPa, side.beta)
+    offset, true_closing = side.u_min0_V * beta, bench.closing_V(grid)
+    gain = beta * (side.k_x_max_over_u_max - 1) + 1  # Eq. (18)
+    short = (true_closing - offset) / U_MAX_V
+    middle = (opening + closing) / 2
+    return {
+        "middle": middle - bench.threshold_V(dp),
+        "middle_found": middle,
+        "closing": closing - bench.closing_V(dp),
+        "closing_se": np.array([test.u_knee_se_V for test in side.tests]),
+        "bound_excess": max(test.u_guard_lower_V - bench.closing_V(test.dp_MPa) for test in side.tests),
+        "offset_excess": float((offset - true_closing).max()),
+        "residual": float((short / gain).max()),
+        "residual_volts": float(short.max()),
+        "beta_last": side.beta[-1],
+    }

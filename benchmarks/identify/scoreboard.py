@@ -1,0 +1,60 @@
+"""Rows of results with their limits, as tables."""
+
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+WIDTH = 150
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """One measured number: `limit` None where it stands for comparison only; it holds if value <= limit."""
+
+    what: str
+    value: float
+    limit: float | None = None
+    unit: str = ""
+    note: str = ""
+
+    @property
+    def verdict(self) -> str:
+        """Return holds, MISSES or nothing; a number that is not one misses."""
+        if self.limit is None:
+            return ""
+        return "holds" if self.value <= self.limit else "MISSES"
+
+
+def console():
+    """Return the console of stdout."""
+    from rich.console import Console
+
+    return Console(highlight=False, width=None if sys.stdout.isatty() else WIDTH)
+
+
+def print_rows(title: str, rows: Iterable[Row]) -> None:
+    """Print rows as one table."""
+    from rich import box
+    from rich.table import Table
+
+    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left", title_style="bold")
+    for index, column in enumerate(("what", "measured", "limit", "", "note")):
+        table.add_column(column, justify="right" if index in (1, 2) else "left", overflow="fold")
+    for row in rows:
+        limit = "" if row.limit is None else f"{row.limit:g} {row.unit}".strip()
+        table.add_row(row.what, f"{row.value:.4g} {row.unit}".strip(), limit, row.verdict, row.note)
+    console().print(table)
+
+
+def say(text: str) -> None:
+    """Tell progress, on stderr."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def share_interval(failures: int, count: int) -> str:
+    """Return the 95 % interval of a share in per cent (Clopper and Pearson)."""
+    from scipy.special import betaincinv
+
+    low = betaincinv(failures, count - failures + 1, 0.025) if failures else 0.0
+    high = betaincinv(failures + 1, count - failures, 0.975) if failures < count else 1.0
+    return f"{failures} of {count}, 95 % interval {100 * low:.2f}-{100 * high:.2f} %"
