@@ -4,6 +4,7 @@ import csv
 import gzip
 import re
 import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, final
@@ -23,6 +24,8 @@ Lines = list[tuple[int, str]]
 CELL_END = "\x1f"
 #: What may stand between cells; where none of them is in the header, blanks do.
 SEPARATORS, BLANKS = ",;\t|", " "
+#: Lines before the header that are looked at for the fast way.
+MOST_COMMENTS = 1000
 
 
 @final
@@ -31,7 +34,7 @@ class TextTable(Table):
     """A table of text: `cells` holds every column as strings, `lines` the numbers of its lines, the header first."""
 
     cells: "pl.DataFrame"
-    lines: tuple[int, ...]
+    lines: Sequence[int]
 
     @property
     def header(self) -> str:
@@ -83,7 +86,10 @@ def text_table(content: bytes, path: Path) -> TextTable:
     InputError
         If it is no such text, or a row has not as many cells as the header.
     """
-    lines = _table_lines(_decode(content, path))
+    text = _decode(content, path)
+    start, lines = _plain_rows(text)
+    if not lines:
+        lines = _table_lines(text)
     if not lines:
         raise InputError(f"'{path}' is empty; expected a header row such as time_s,u_V,dP_MPa,Q_Lmin and samples")
     number, header = lines[0]
@@ -95,8 +101,42 @@ def text_table(content: bytes, path: Path) -> TextTable:
             f"'{path}' has no header row (row {number} is '{header[:QUOTED_CHARACTERS]}'); "
             "expected names with units such as time_s,u_V,dP_MPa,Q_Lmin"
         )
+    if start and (cells := _plain_cells(text[start:], separator, len(labels))) is not None:
+        return TextTable(path=path, labels=labels, cells=cells, lines=range(number, number + 1 + cells.height))
+    lines = _table_lines(text)
     cells = _read_cells(lines[1:], separator, len(labels), path)
     return TextTable(path=path, labels=labels, cells=cells, lines=tuple(number for number, _ in lines))
+
+
+def _plain_rows(text: str) -> tuple[int, Lines]:
+    """Return where the rows begin and the header, if nothing but rows follows it: no comment, quote or old line end."""
+    start = 0
+    for number in range(1, MOST_COMMENTS):
+        end = text.find("\n", start)
+        if end < 0:
+            break
+        header = _table_lines(text[start:end].removesuffix("\r"))
+        start = end + 1
+        if header:
+            plain = not any(text.find(mark, start) >= 0 for mark in '#"\r')
+            return (start, [(number, header[0][1])]) if plain and "\r" not in header[0][1] else (0, [])
+    return 0, []
+
+
+def _plain_cells(rows: str, separator: str, width: int) -> "pl.DataFrame | None":
+    """Return the cells of rows that all have as many as the header, without a look at each; None if one has not."""
+    import polars as pl
+
+    rows = rows.rstrip("\n")
+    if separator == BLANKS or not rows or width < 2:
+        return None
+    data = rows.encode()
+    characters = np.frombuffer(data, np.uint8)
+    starts = np.concatenate([[0], np.flatnonzero(characters == ord("\n")) + 1])
+    if np.any(np.add.reduceat(characters == ord(separator), starts, dtype=np.int32) != width - 1):
+        return None
+    schema = {f"c{index}": pl.String for index in range(width)}
+    return pl.read_csv(data, separator=separator, has_header=False, schema=schema, quote_char=None)
 
 
 def _decode(content: bytes, path: Path) -> str:

@@ -140,6 +140,17 @@ def test_ends_of_lines(read, end):
     assert_is_the_ramp(read(table(end=end)))
 
 
+@pytest.mark.parametrize("before", ["", "# bench 3\n\n"])
+@pytest.mark.parametrize(
+    "spoil", [lambda text: text, lambda text: text.replace(",1,", ",,", 1), lambda text: text[:-1]]
+)
+def test_plain_rows_are_read_as_rows_with_a_comment_are(read, spoil, before):
+    text = before + spoil(table())
+    plain, commented = read(text), read(text + "\n# the end\n")
+    for name in ("time", "u", "q", "dp"):
+        np.testing.assert_array_equal(getattr(plain, name), getattr(commented, name))
+
+
 def test_byte_order_mark(read):
     assert_is_the_ramp(read(b"\xef\xbb\xbf" + table().encode()))
 
