@@ -274,7 +274,7 @@ OFF_REFERENCE = (
         ),
         eliminate=(gamma_1,),
         see=("T7a", "T7c"),
-        note="The published maxima contradict it: they grow far more slowly with dP.",
+        note="The published largest flows grow far more slowly with dP: T7a.",
     ),
     Statement(
         number="(16)",

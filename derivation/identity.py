@@ -61,4 +61,4 @@ def _place(name: sympy.Expr) -> sympy.Float:
 
 def _under_root(expression: sympy.Expr) -> set[sympy.Symbol]:
     roots = (power for power in expression.atoms(sympy.Pow) if not power.exp.is_Integer and power.exp.is_Rational)
-    return {root.base for root in roots if root.base.is_Symbol}
+    return {root.base for root in roots if root.base.is_Symbol and root.base.is_nonnegative}

@@ -55,7 +55,8 @@ IMPLEMENTATION = (
         kind=Kind.PREMISE,
         symbol=n_i,
         members=(n_adc * V_pin / V_adc,),
-        note="n_adc = 4095 = 2^12 - 1 counts at V_adc = 3 V: the F28335 converts to 12 bits, not to the text's 16.",
+        note="n_adc = 4095 = 2^12 - 1 counts at V_adc = 3 V: the F28335 converts to 12 bits, in a register of "
+        "the text's 16.",
     ),
     Statement(
         number="attenuator",
@@ -98,7 +99,7 @@ IMPLEMENTATION = (
             ),
         ),
         note="Printed as hex(4095 u_i / 3), called u_i' like the command in Eq. (11); hex() only changes the notation. "
-        "It takes a pin voltage of 0-3 V, u_i is 0-10 V.",
+        "Right if u_i were the voltage at the pin; before the 0-10 V command an attenuator has to stand (our choice).",
     ),
     Statement(
         number="(29c)",
@@ -155,7 +156,8 @@ IMPLEMENTATION = (
                 remark="over nearly the whole range hex() would be given a negative number",
             ),
         ),
-        note="Its first term is scaled by 1365 counts per volt, u_min0 is not scaled at all.",
+        note="Its first term is scaled by 1365 counts per volt, u_min0 is not scaled at all. Most likely a bracket is "
+        "missing; (30c) has it, with n_adc/u_max counts per volt of the command for 1365 per volt at the pin.",
     ),
     Statement(
         number="(31)",
@@ -234,6 +236,7 @@ IMPLEMENTATION = (
         condition=Condition(
             any_of=((sympy.Eq(K_c, u_max / n_adc),),),
             for_all=(u_i,),
+            words="(with the corrected codes)",
             # Up to dP0; above it the same factor stands before Eq. (18).
             discrepancy=(1 - K_c * n_adc / u_max) * (k * x_max / u_max * u_i + u_min0),
         ),
@@ -318,7 +321,7 @@ CODES = (
                 label="first valve at 2 V",
                 at=(*FIRST.at(), (u_i, sympy.Integer(2))),
                 unit="%",
-                remark="Fig. 13 does not name its valve; its 55 % is the second's.",
+                remark="Fig. 13 does not name its valve; its 55 % fits the second, not the first.",
             ),
         ),
     ),

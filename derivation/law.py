@@ -129,7 +129,7 @@ _LAWS = (
         output=k * x_max / u_max * u_i + beta * u_min0,
         note="Gain of Eq. (14), offset of Eq. (18): its flow is the target (16) exactly wherever "
         "beta u_min0 is the threshold. For beta < 1 and k x_max < u_max it gives less flow at full command "
-        "than Eq. (18).",
+        "than Eq. (18), as long as the spool can open further than x_max.",
     ),
 )
 

@@ -79,7 +79,8 @@ METER_FLOOR = (
             )
             for valve, fall_percent in ((FIRST, "2.2"), (SECOND, "1.0"))
         ),
-        note="The numbers: a floor of 0.6 L/min, and flow that grows with the root of the pressure drop.",
+        note="The numbers: the printed thresholds taken for the true ones, a floor of 0.6 L/min, and flow that grows "
+        "with the root of the pressure drop.",
     ),
     Statement(
         number="T9c",

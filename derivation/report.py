@@ -160,7 +160,10 @@ def _compose(verdicts: Sequence[Verdict], shown: Sequence[str]) -> Content:
 
 def _summary(verdicts: Sequence[Verdict], paper: Sequence[Verdict]) -> tuple[Words, ...]:
     wrong = [verdict for verdict in verdicts if not verdict.as_expected]
-    expected = f"{len(verdicts) - len(wrong)} of {len(verdicts)} statements are as a correct account finds them"
+    expected = (
+        f"{len(verdicts) - len(wrong)} of {len(verdicts)} statements have the verdict expected of them, "
+        "those that do not hold included"
+    )
     lines: list[Words] = [(expected + ("; these are not:" if wrong else "."),)]
     for verdict in wrong:
         expected = f" should be found to be “{verdict.statement.expected.value}”, but: "
@@ -171,7 +174,7 @@ def _summary(verdicts: Sequence[Verdict], paper: Sequence[Verdict]) -> tuple[Wor
         counts = "; ".join(
             f"{words}: {sum(verdict.outcome is outcome for verdict in paper)}" for outcome, words in _COUNTED.items()
         )
-        lines.append((f"Of {which} of the paper that stand here, {counts}.",))
+        lines.append((f"Of {which} of the paper shown here, {counts}.",))
     return tuple(lines)
 
 
@@ -180,7 +183,7 @@ def _is_wrong(verdict: Verdict) -> bool:
 
 
 def _fault(entry: Entry) -> Words:
-    words = (*_headed(entry), *(entry.judgement or ("the paper's choice.",)))
+    words = (*_headed(entry), *(entry.judgement or ("the paper's choice; it does not meet the target (16).",)))
     if entry.correction is None:
         return words
     display = entry.correction.display

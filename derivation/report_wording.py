@@ -140,7 +140,7 @@ def _condition(verdict: Verdict, condition: Condition) -> Iterator:
         yield from (" ", *parse_prose(condition.words))
     if ruled_out:
         published = tuple((name, _decimal(value)) for name, value in condition.ruled_out_by)
-        yield from ("; the paper has ", *_replacements(published, "="), ".")
+        yield from ("; the published numbers give ", *_replacements(published, "="), ".")
     else:
         yield ", and only then (proved)." if verdict.necessary else ". Whether only then is not proved."
 

@@ -52,7 +52,7 @@ def solve_relations(relations: tuple[Relation, ...], unknowns: tuple[Name, ...])
         if len(values) != 1:
             return _SEVERAL if values else _CONTRADICTION
         # SymPy's solver minds the signs that a symbol may have; what is given as it stands is checked here.
-        if (name.is_nonnegative and values[0].is_negative) or (name.is_positive and values[0].is_nonpositive):
+        if _has_wrong_sign(name, values[0]):
             return _CONTRADICTION
         solved[name] = values[0]
         sides = [tuple(side.xreplace({name: values[0]}) for side in pair) for pair in sides]
@@ -89,4 +89,11 @@ def _put_back(solved: dict[Name, sympy.Expr], unknowns: tuple[Name, ...]) -> dic
     undetermined = [str(unknown) for unknown in unknowns if unknown not in solution or solution[unknown].has(*unknowns)]
     if undetermined:
         return f"the premises do not determine {', '.join(undetermined)}"
+    if any(_has_wrong_sign(name, value) for name, value in solution.items()):
+        return _CONTRADICTION
     return solution
+
+
+def _has_wrong_sign(name: Name, value: sympy.Expr) -> bool:
+    """Whether a value is one that its symbol can't have."""
+    return bool((name.is_nonnegative and value.is_negative) or (name.is_positive and value.is_nonpositive))

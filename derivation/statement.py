@@ -113,6 +113,11 @@ class Condition:
         equations = [equation for alternative in self.any_of for equation in alternative]
         if not equations or not all(isinstance(equation, sympy.Eq) for equation in equations):
             raise ValueError(f"a condition needs equations that may be true or false, got {self.any_of}")
+        decided = {symbol for equation in equations for symbol in equation.free_symbols}
+        if any(equation.lhs.free_symbols <= set(self.for_all) for equation in equations):
+            raise ValueError(
+                f"a condition on {sorted(map(str, decided & set(self.for_all)))} can't hold for all of them"
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -196,10 +196,11 @@ SIMULATION_MODEL = (
             witness=((X_e, 1 / s), (X_e.func(s + a), 1 / (s + a))),
             for_all=(s,),
             discrepancy=_FLOW_PER_TRAVEL * (X_e.func(s + a) - X_e),
-            words="a constant pressure drop (Assumption 4)",
+            words="(a constant pressure drop, Assumption 4)",
         ),
         expected=Outcome.FOLLOWS_IF,
-        note="With a pressure drop that changes, flow and travel are not in proportion; the case shown is one.",
+        note="Shown for a pressure drop that falls as exp(-2 a t) during a step: flow and travel are in "
+        "proportion only at a = 0.",
     ),
 )
 
@@ -289,7 +290,8 @@ TRANSFER_FUNCTION = (
         ),
         expected=Outcome.DOES_NOT_FOLLOW,
         corrected_by="T6e",
-        note="So the simulated dead zone of 53.5 % is not in Eqs. (19)-(24); the model of Fig. 5 must hold more.",
+        note="If the dead zone is overlap (our reading: 54 % of 1.8 mm, 0.97 mm), Eq. (24) lacks it; a preload within "
+        "f_eL would be another explanation.",
     ),
     Statement(
         number="T6e",

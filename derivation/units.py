@@ -86,7 +86,11 @@ def find_unit_error(statement: Statement) -> str:
     if left is None:
         return f"the unit of {statement.symbol} is not known"
     for member in statement.members:
-        for branch in _branches(member):
+        try:
+            branches = _branches(member)
+        except pint.DimensionalityError as error:
+            return f"a comparison of {_plain(error.units1)} with {_plain(error.units2)}"
+        for branch in branches:
             error = _error(left, branch)
             if error:
                 return error

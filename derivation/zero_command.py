@@ -100,7 +100,7 @@ ZERO_COMMAND = (
     ),
     Statement(
         number="T3b",
-        title="flow at zero command without beta",
+        title="flow at zero command without beta, for a threshold lower than at the reference",
         kind=Kind.THEOREM,
         symbol=Q,
         members=(gamma_1 * (u_min0 - u_min1) / k, Q_max1 * (u_min0 - u_min1) / (u_max - u_min1)),
@@ -124,8 +124,8 @@ ZERO_COMMAND = (
                 at=FIRST.at(),
                 unit="L/min",
                 published="1.6",
-                remark="The paper's thresholds are the first flow that its meter shows, so 0.6 L/min passes there "
-                "already: T9d gives 1.69.",
+                remark="If the paper's thresholds are the first flow that its meter shows (it starts at 0.6 L/min), "
+                "T9d gives 1.69.",
             ),
             Value(label="second valve", at=SECOND.at(), unit="L/min"),
         ),

@@ -240,12 +240,14 @@ def run_derive(args: argparse.Namespace) -> int:
     from dzdesign.derivation import account
     from dzdesign.derivation.report import check_format, closure, render
 
-    if args.mutate:
-        return _run_mutations(args)
     format = "json" if args.json else args.format
-    check_format(format)
+    check_format(args.format)
     if args.output:
         check_file_may_be_written(Path(args.output))
+    if args.mutate:
+        if args.equation:
+            raise InputError("--mutate counts over all equations; leave out --equation")
+        return _run_mutations(args)
     shown = closure(account.STATEMENTS, args.equation) if args.equation else None
     verdicts = account.verify_statements()
     text = render(verdicts, format, shown)

@@ -29,7 +29,7 @@ def run_demo(args: argparse.Namespace) -> int:
         raise InputError(f"the folder '{folder}' can't be made: {error.strerror}") from error
     verdicts = verify_statements()
     expected = sum(verdict.as_expected for verdict in verdicts)
-    say(f"derivation: {expected} of {len(verdicts)} statements are as a correct account finds them")
+    say(f"derivation: {expected} of {len(verdicts)} statements have the verdict expected of them")
     with as_file(files("dzdesign.example")) as example:
         tests = [read_ramp_file(path) for path in sorted((example / "ramps").glob("*.csv.gz"))]
         plant = read_plant(example / "plant.toml")

@@ -162,6 +162,9 @@ def test_contradicting_premises_are_named():
     slope = given("slope", s.slope, s.beta)
     unused = given("unused", s.kappa, 3)
     assert last_words(one, slope, unused, claim(s.slope, 1, "slope", "one", "unused")) == contradiction
+    # Nor may it be found negative only at the end.
+    late = given("late", s.x, s.x_e), given("later", s.x_e, -s.x_max)
+    assert last_words(*late, claim(s.x, -s.x_max, "late", "later", eliminate=(s.x_e,))) == contradiction
     # An opening is not negative.
     assert last_words(given("one", s.x, -s.guard), claim(s.x, FOREIGN, "one")) == contradiction
 
@@ -270,6 +273,8 @@ def test_statements_check_themselves():
         Value(label="", at=(), unit="V", published="about 2")
     with pytest.raises(ValueError, match="may be true or false"):
         Condition(any_of=((sympy.true,),))
+    with pytest.raises(ValueError, match="can't hold for all of them"):
+        Condition(any_of=((sympy.Eq(s.beta, 1),),), for_all=(s.beta, s.u_i))
     with pytest.raises(ValueError, match=r"x_max.* is not a number"):
         Value(label="", at=(), unit="m", of=s.x_max).exact(BY_NUMBER["(18)"])
 
@@ -288,6 +293,16 @@ def test_wrong_units_are_seen(number, member, error):
     wrong = replace(statement, symbol=sympy.Symbol("u_O_") if statement.symbol == s.u_O else statement.symbol)
     wrong = replace(statement, members=(member,))
     assert units.find_unit_error(wrong).replace("a number", "dimensionless").find(error) >= 0
+
+
+def test_units_of_a_comparison_are_seen():
+    wrong = given("one", s.u_no, sympy.Piecewise((s.u_0, s.dP1 > s.u_min), (s.beta * s.u_0, True)))
+    assert units.find_unit_error(wrong).startswith("a comparison of ")
+
+
+def test_roots_of_what_may_be_negative_are_not_merged():
+    assert not identity.agree(sympy.sqrt(s.u_1) * sympy.sqrt(s.u_2), sympy.sqrt(s.u_1 * s.u_2))
+    assert identity.agree(sympy.sqrt(s.dP0) * sympy.sqrt(s.dP1), sympy.sqrt(s.dP0 * s.dP1))
 
 
 def test_the_laplace_transform_needs_a_linear_equation(monkeypatch):
