@@ -32,6 +32,7 @@ FLOW_OVER_PRESSURE = (
         number="T7a",
         title="exponent of the flow over the pressure drop",
         kind=Kind.THEOREM,
+        provided=(sympy.Ne(dP0, dP1),),
         symbol=n,
         members=(sympy.log(Q_max1 / Q_max0) / sympy.log(dP1 / dP0),),
         grounds=(Ground(number="exponent"),),

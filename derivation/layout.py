@@ -142,8 +142,8 @@ _LAST_TERMS = ("headroom", "excess", "guard", "above", "below")
 #: What a condition is about stands on its left.
 _COMPARED = ("u_i", "u_O", "dP1", "u_min1", "u_min")
 _PRESSURES = ("dP", "dP0", "dP1")
-_MIRRORED = {"<": ">", ">": "<", "≤": "≥", "≥": "≤", "=": "="}
-_SIGNS = {"<": "<", ">": ">", "<=": "≤", ">=": "≥", "==": "="}
+_MIRRORED = {"<": ">", ">": "<", "≤": "≥", "≥": "≤", "=": "=", "≠": "≠"}
+_SIGNS = {"<": "<", ">": ">", "<=": "≤", ">=": "≥", "==": "=", "!=": "≠"}
 
 
 @cache

@@ -117,6 +117,7 @@ METER_FLOOR = (
         number="slope at dP1",
         title="flow per command at dP1 from the two ends of the straight part",
         kind=Kind.THEOREM,
+        provided=(sympy.Ne(u_max, u_seen1),),
         symbol=s_flow1,
         members=((Q_max1 - Q_floor) / (u_max - u_seen1),),
         grounds=(

@@ -162,6 +162,7 @@ def _mutants(statement: Statement, neighbours: Mapping[str, list[Name]]) -> Iter
                 yield None, text
                 continue
             yield replace(statement, members=_with(statement.members, index, wrong)), text
+    yield from _narrowed(statement)
     if statement.condition is not None:
         yield from _mutated_conditions(statement, statement.condition, neighbours)
     if isinstance(statement.positive_if, Relational):
@@ -171,6 +172,18 @@ def _mutants(statement: Statement, neighbours: Mapping[str, list[Name]]) -> Iter
                 claim = statement.positive_if.func(*sides)
                 if not _equivalent(side, wrong):
                     yield replace(statement, positive_if=claim), f"{statement.symbol} > 0 exactly if {claim}"
+
+
+def _narrowed(statement: Statement) -> Iterator[tuple[Statement, str]]:
+    """Leave out a case, or what the derivation is said to hold for."""
+    for index, case in enumerate(statement.cases):
+        others = _without(statement.cases, index)
+        if others:
+            yield replace(statement, cases=others), f"without the case {case.where}"
+    for index, provision in enumerate(statement.provided):
+        yield replace(statement, provided=_without(statement.provided, index)), f"without {provision}"
+    if statement.scope:
+        yield replace(statement, scope=""), f"without its scope, {statement.scope}"
 
 
 def _mutated_conditions(

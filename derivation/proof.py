@@ -12,6 +12,7 @@ import sympy
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.derivation.conditions import Finding, judge_condition
+from dzdesign.derivation.coverage import is_exhaustive
 from dzdesign.derivation.identity import agree
 from dzdesign.derivation.solving import solve_relations
 from dzdesign.derivation.statement import Case, Ground, Kind, Name, Outcome, Statement
@@ -72,6 +73,8 @@ class Verdict:
         Whether the condition was proved necessary; None where there is none.
     inherited : tuple of str
         Grounds that follow only on a condition, which this statement therefore needs too.
+    limited_by : tuple of str
+        Grounds, and their grounds, that are proved on a part of their range only.
     unit_error : str
         What is wrong with its units; empty where they are right.
     """
@@ -83,6 +86,7 @@ class Verdict:
     proofs: tuple[CaseProof, ...] = ()
     necessary: bool | None = None
     inherited: tuple[str, ...] = ()
+    limited_by: tuple[str, ...] = ()
     unit_error: str = ""
 
     @property
@@ -194,9 +198,21 @@ def judge(statement: Statement, earlier: Mapping[str, Statement], verdicts: Mapp
         outcome, words = Outcome.FOLLOWS_IF, f"follows on the condition of {', '.join(inherited)}"
     elif inherited and outcome is Outcome.FOLLOWS_IF:
         words += f", and on the condition of {', '.join(inherited)}"
+    limits = tuple(dict.fromkeys(n for ground in statement.grounds for n in _limits(verdicts[ground.number])))
     return verdict(
-        outcome, words, flawed=finding.flawed, proofs=proofs, necessary=finding.necessary, inherited=inherited
+        outcome,
+        words,
+        flawed=finding.flawed,
+        proofs=proofs,
+        necessary=finding.necessary,
+        inherited=inherited,
+        limited_by=limits,
     )
+
+
+def _limits(verdict: Verdict) -> tuple[str, ...]:
+    own = (verdict.number,) if verdict.statement.scope or verdict.statement.provided else ()
+    return own + verdict.limited_by
 
 
 def _conditional(verdict: Verdict) -> tuple[str, ...]:
@@ -238,12 +254,16 @@ def _proofs(statement: Statement, earlier: Mapping[str, Statement]) -> tuple[Cas
     """Derive every case, or say why one can't be."""
     proofs = []
     chosen: set[sympy.Basic] = set()
+    needed: set[sympy.Ne] = set()
     for case in _cases(statement):
         replacements = dict(case.at)
         relations = tuple(_relation(earlier[ground.number], ground, replacements) for ground in statement.grounds)
-        solution = solve_relations(relations, (statement.symbol, *statement.eliminate))
-        if isinstance(solution, str):
-            return solution
+        provided = tuple(provision.xreplace(replacements) for provision in statement.provided)
+        found = solve_relations(relations, (statement.symbol, *statement.eliminate), provided)
+        if isinstance(found, str):
+            return found
+        solution = found.values
+        needed |= {one for one, here in zip(statement.provided, provided, strict=True) if here in found.needed}
         derived = solution[statement.symbol]
         members = [_branch(member, replacements, solution, chosen) for member in statement.members]
         if None in members:
@@ -262,14 +282,33 @@ def _proofs(statement: Statement, earlier: Mapping[str, Statement]) -> tuple[Cas
                 reached=reached,
             )
         )
-    idle = [sympy.sstr(condition) for condition in _conditions(statement) if condition not in chosen]
-    return f"no case stands for {', '.join(idle)}" if idle else tuple(proofs)
+    idle = [sympy.sstr(one) for member in statement.members for one in _conditions(member) if one not in chosen]
+    if idle:
+        return f"no case stands for {', '.join(idle)}"
+    unneeded = [sympy.sstr(provision) for provision in statement.provided if provision not in needed]
+    if unneeded:
+        return f"the derivation does not need {', '.join(unneeded)}"
+    if not is_exhaustive(statement.cases, statement.within):
+        return "the cases leave something out"
+    limited = statement.within != sympy.true or not _meets_all_branches(statement, earlier)
+    if limited != bool(statement.scope):
+        return "it does not say where it is proved" if limited else "it is proved everywhere, and says where"
+    return tuple(proofs)
 
 
-def _conditions(statement: Statement) -> list[sympy.Basic]:
-    return [
-        condition for member in statement.members if isinstance(member, sympy.Piecewise) for _, condition in member.args
-    ]
+def _conditions(member: sympy.Expr) -> list[sympy.Basic]:
+    return [condition for _, condition in member.args] if isinstance(member, sympy.Piecewise) else []
+
+
+def _meets_all_branches(statement: Statement, earlier: Mapping[str, Statement]) -> bool:
+    """Whether each branch of each piecewise ground is met in one of the cases."""
+    for ground in statement.grounds:
+        branches = [one.xreplace(dict(ground.at)) for one in _conditions(earlier[ground.number].members[ground.member])]
+        decided = [[branch.xreplace(dict(case.at)) == sympy.true for branch in branches] for case in _cases(statement)]
+        # The first that is true is met; the last one's condition is often just "otherwise".
+        if branches and {case.index(True) if True in case else None for case in decided} != set(range(len(branches))):
+            return False
+    return True
 
 
 def _branch(

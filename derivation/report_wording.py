@@ -120,6 +120,13 @@ def _sentences(verdict: Verdict, book: Mapping[str, Verdict]) -> Iterator[Words]
         yield ("Follows, and is positive exactly if ", Formula((statement.positive_if,)), ".")
     elif verdict.words not in (verdict.outcome.value, statement.kind.value) and not verdict.inherited:
         yield (*parse_prose(verdict.words[0].upper() + verdict.words[1:], book), ".")
+    if statement.scope or statement.provided:
+        unequal = [part for one in statement.provided for part in (" and ", Formula((one,)))][1:]
+        scope = parse_prose(statement.scope, book)
+        yield ("Proved for ", *scope, *([" and " if scope else "", *unequal] if unequal else []), ".")
+    if verdict.limited_by:
+        names = [part for number in verdict.limited_by for part in (", ", refer(book[number].statement))]
+        yield ("Within what is proved of ", *names[1:], ".")
     if verdict.inherited:
         names = [part for number in verdict.inherited for part in (", ", refer(book[number].statement))]
         yield ("Rests on the condition of ", *names[1:], ".")

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import sympy
+from sympy.logic.boolalg import Boolean
 
 #: A symbol, or a Laplace transform such as I(s), that a statement gives the value of.
 Name = sympy.Symbol | sympy.core.function.AppliedUndef
@@ -221,6 +222,12 @@ class Statement:
         What is needed beside the grounds.
     positive_if : sympy relational, optional
         The claim that the left-hand side is positive exactly if this holds.
+    scope : str
+        Where it is proved, in words, if its cases and the branches of its grounds do not cover everything.
+    within : sympy Boolean
+        The comparisons that limit the cases, if the scope does: together with them the cases leave nothing out.
+    provided : tuple of sympy.Ne
+        What must differ for the derivation, which divides by the difference.
     expected : Outcome, optional
         What a correct account finds; `GIVEN` for what is taken as given, else `FOLLOWS`.
     corrected_by : str
@@ -250,6 +257,9 @@ class Statement:
     cases: tuple[Case, ...] = ()
     condition: Condition | None = None
     positive_if: sympy.core.relational.Relational | None = None
+    scope: str = ""
+    within: Boolean = sympy.true
+    provided: tuple[sympy.Ne, ...] = ()
     expected: Outcome | None = None
     corrected_by: str = ""
     see: tuple[str, ...] = ()

@@ -72,7 +72,9 @@ excess = sympy.Symbol("excess", positive=True)  # from the threshold up to the o
 guard = sympy.Symbol("guard", positive=True)  # from the output at zero command up to the threshold: V
 below = sympy.Symbol("below", nonnegative=True)  # dP0 - dP1: Pa
 above = sympy.Symbol("above", positive=True)  # dP1 - dP0: Pa
-y, rest = _positive("y rest")  # command beyond the threshold, and from there to full opening: V
+y = sympy.Symbol("y", nonnegative=True)  # from the threshold up to the command: V
+rest = sympy.Symbol("rest", positive=True)  # from there up to the command of full opening: V
+DISTANCES = (headroom, excess, guard, below, above, y, rest)
 
 # Plant, Eqs. (19)-(24)
 u_e, u_if = _real("u_e u_if")  # output of the amplifier, feedback: V

@@ -100,6 +100,7 @@ def _flow(law_number: str, threshold: sympy.Symbol, pressure: sympy.Symbol) -> t
     )
 
 
+_BEYOND = "0 <= u_i <= u_max, up to the spool's stop"
 _AT_DP1 = (Ground(number="(5)"), Ground(number="gamma_1"), Ground(number="(15)"), Ground(number="(16)"))
 _UNKNOWN_AT_DP1 = (x, u_i_prime, u_O, u_min1, gamma_1, K_1, Q_O_prime)
 
@@ -109,6 +110,7 @@ TARGET = (
         number="T1a",
         title="at the reference the law (14) gives the wanted flow (9)",
         kind=Kind.THEOREM,
+        scope=_BEYOND,
         symbol=Q,
         members=(Q_O,),
         grounds=(*_flow("(14)", u_min0, dP0), *(Ground(number=number) for number in ("(9)", "(8)", "gamma_0"))),
@@ -118,6 +120,7 @@ TARGET = (
         number="T1b",
         title="flow that the law (18) gives off the reference",
         kind=Kind.THEOREM,
+        scope=_BEYOND,
         symbol=Q,
         members=(
             Q_O_prime + gamma_1 * (1 - beta) * (1 - k * x_max / u_max) * u_i / k,
@@ -140,6 +143,7 @@ TARGET = (
         number="T1c",
         title="the law (18) meets the target (16)",
         kind=Kind.THEOREM,
+        scope=_BEYOND,
         symbol=Q,
         members=(Q_O_prime,),
         grounds=(*_flow("(18)", u_min1, dP1), *_AT_DP1),
@@ -157,6 +161,7 @@ TARGET = (
         number="T1d",
         title="the law `target` meets the target (16)",
         kind=Kind.THEOREM,
+        scope=_BEYOND,
         symbol=Q,
         members=(Q_O_prime,),
         grounds=(*_flow("L3", u_min1, dP1), *_AT_DP1),

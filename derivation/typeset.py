@@ -160,7 +160,7 @@ class PlainText(Notation):
         return f"({self.write(tree)})"
 
     def relation(self, sides: Sequence[str], signs: Sequence[str]) -> str:
-        ascii_signs = [{"≤": "<=", "≥": ">="}.get(sign, sign) for sign in signs]
+        ascii_signs = [{"≤": "<=", "≥": ">=", "≠": "!="}.get(sign, sign) for sign in signs]
         return sides[0] + "".join(f" {sign} {side}" for sign, side in zip(ascii_signs, sides[1:], strict=True))
 
     def cases(self, rows: Sequence[tuple[str, str | None]]) -> str:
@@ -223,7 +223,7 @@ class Latex(Notation):
         return rf"\left({inside}\right)" if r"\frac" in inside else f"({inside})"
 
     def relation(self, sides: Sequence[str], signs: Sequence[str]) -> str:
-        known = {"≤": r"\le", "≥": r"\ge"}
+        known = {"≤": r"\le", "≥": r"\ge", "≠": r"\ne"}
         words = (f" {known.get(sign, sign)} {side}" for sign, side in zip(signs, sides[1:], strict=True))
         return sides[0] + "".join(words)
 

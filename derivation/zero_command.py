@@ -34,6 +34,7 @@ from dzdesign.derivation.symbols import (
     u_O,
     x,
     x_max,
+    y,
 )
 
 _PAPER_LAW = law("paper")
@@ -58,6 +59,7 @@ ZERO_COMMAND = (
         number="T3a",
         title="flow at zero command",
         kind=Kind.THEOREM,
+        scope="beta u_min0 <= u_max",
         symbol=Q,
         members=(
             sympy.Piecewise(
@@ -83,6 +85,8 @@ ZERO_COMMAND = (
         number="largest flow",
         title="largest flow at dP1 without compensator",
         kind=Kind.THEOREM,
+        scope="u_min1 <= u_max, and the spool has not met its stop",
+        within=u_min1 <= u_max,
         symbol=Q_max1,
         members=(gamma_1 * (u_max - u_min1) / k,),
         grounds=(
@@ -102,6 +106,9 @@ ZERO_COMMAND = (
         number="T3b",
         title="flow at zero command without beta, for a threshold lower than at the reference",
         kind=Kind.THEOREM,
+        provided=(sympy.Ne(u_max, u_min1),),
+        scope="u_min1 < u_min0, a threshold lower than at the reference",
+        within=u_min1 < u_min0,
         symbol=Q,
         members=(gamma_1 * (u_min0 - u_min1) / k, Q_max1 * (u_min0 - u_min1) / (u_max - u_min1)),
         grounds=(
@@ -182,6 +189,7 @@ SHAPE = (
         number="T4b",
         title="the selector (7) is continuous at dP0",
         kind=Kind.THEOREM,
+        scope="dP1 just above dP0",
         symbol=jump,
         members=(sympy.S.Zero,),
         grounds=(
@@ -224,6 +232,7 @@ SHAPE = (
         number="T4d",
         title="the opposite command gives the opposite flow",
         kind=Kind.THEOREM,
+        scope="|u_i| from the threshold to full command",
         symbol=Q_neg,
         members=(-Q,),
         grounds=(
@@ -245,12 +254,14 @@ SHAPE = (
         number="T4e",
         title="no flow inside the dead zone, on either side",
         kind=Kind.THEOREM,
+        scope="|u_i| below the threshold",
+        within=(-u_min < u_i) & (u_i < u_min),
         symbol=Q,
         members=(sympy.S.Zero,),
         grounds=(Ground(number="(1)", at=((u_max, u_min + headroom),)),),
         cases=(
-            Case(at=((u_i, u_i_prime), (u_min, u_i_prime + guard)), where="0 <= u_i < u_min"),
-            Case(at=((u_i, -u_i_prime), (u_min, u_i_prime + guard)), where="-u_min < u_i <= 0"),
+            Case(at=((u_i, y), (u_min, y + guard)), where="0 <= u_i < u_min"),
+            Case(at=((u_i, -y), (u_min, y + guard)), where="-u_min < u_i <= 0"),
         ),
     ),
 )
