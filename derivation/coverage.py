@@ -1,6 +1,5 @@
 """Which part of its range a proof covers: a statement that is proved on a part of it only has to say on which."""
 
-from collections.abc import Sequence
 from functools import cache
 
 import sympy
@@ -11,7 +10,8 @@ from dzdesign.derivation.statement import Case
 from dzdesign.derivation.symbols import DISTANCES
 
 
-def is_exhaustive(cases: Sequence[Case], within: Boolean) -> bool:
+@cache
+def is_exhaustive(cases: tuple[Case, ...], within: Boolean) -> bool:
     """Return whether cases leave nothing out of what a statement is meant for.
 
     Each case replaces symbols by others plus a distance of known sign, as ``dP1 = dP0 + above``; so it says which
@@ -19,7 +19,7 @@ def is_exhaustive(cases: Sequence[Case], within: Boolean) -> bool:
 
     Parameters
     ----------
-    cases : sequence of Case
+    cases : tuple of Case
     within : sympy Boolean
         Comparisons that hold wherever the statement is meant to; true if that is everywhere.
 

@@ -2,7 +2,7 @@
 
 import sympy
 
-from dzdesign.derivation.published import FIRST, VALVES
+from dzdesign.derivation.published import DROP_ASSUMED, FIRST, SECOND, VALVES
 from dzdesign.derivation.statement import Condition, Ground, Kind, Outcome, Statement, Value
 from dzdesign.derivation.symbols import (
     K_0,
@@ -36,7 +36,10 @@ FLOW_OVER_PRESSURE = (
         symbol=n,
         members=(sympy.log(Q_max1 / Q_max0) / sympy.log(dP1 / dP0),),
         grounds=(Ground(number="exponent"),),
-        values=tuple(Value(label=valve.name, at=valve.at(), unit="1") for valve in VALVES),
+        values=tuple(
+            Value(label=valve.name, at=valve.at(), unit="1", remark=DROP_ASSUMED if valve is SECOND else "")
+            for valve in VALVES
+        ),
         note="The orifice equation has 0.5. The published drop is 1 and 5 MPa; a supply that gives way, or a pressure "
         "drop taken with the valve's own passages, lowers the exponent.",
     ),

@@ -263,7 +263,8 @@ CODES = (
             discrepancy=(1 - K_c * n_adc / V_adc) * k * x_max / u_max * u_i + (1 - K_c) * u_min0,
         ),
         expected=Outcome.DOES_NOT_FOLLOW,
-        note="No conversion coefficient saves the printed set: its two terms are in different units.",
+        note="The formula is (32) with n_i = n_adc/V_adc u_i, as (29) reads with V_adc for 3 V, and n_0 as (30) is "
+        "printed. No conversion coefficient saves the printed set: its two terms are in different units.",
     ),
     Statement(
         number="PWM",

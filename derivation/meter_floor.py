@@ -2,7 +2,7 @@
 
 import sympy
 
-from dzdesign.derivation.published import FIRST, SECOND
+from dzdesign.derivation.published import DROP_ASSUMED, FIRST, SECOND
 from dzdesign.derivation.statement import Ground, Kind, Statement, Value
 from dzdesign.derivation.symbols import (
     C_d,
@@ -75,9 +75,9 @@ METER_FLOOR = (
                 of=Q_floor * (u_max - u_min0) / Q_max0 * (1 - sympy.sqrt(dP0 / dP1)) / u_max,
                 at=valve.at(),
                 unit="%",
-                remark=f"the paper reads a fall of {fall_percent} %",
+                remark=f"the paper reads a fall of {fall_percent} %" + assumed,
             )
-            for valve, fall_percent in ((FIRST, "2.2"), (SECOND, "1.0"))
+            for valve, fall_percent, assumed in ((FIRST, "2.2", ""), (SECOND, "1.0", f"; {DROP_ASSUMED}"))
         ),
         note="The numbers: the printed thresholds taken for the true ones, a floor of 0.6 L/min, and flow that grows "
         "with the root of the pressure drop.",

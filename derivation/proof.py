@@ -39,6 +39,8 @@ class CaseProof:
         The statement's symbol and the eliminated ones, solved for.
     reached : sympy.Expr
         The form in which a derivation states the result: as published, or as derived where the two differ.
+    published : sympy.Expr
+        The last member's branch of this case, in the symbols of the statement.
     """
 
     statement: Statement
@@ -48,6 +50,7 @@ class CaseProof:
     relations: tuple[Relation, ...]
     solution: Mapping[Name, sympy.Expr]
     reached: sympy.Expr
+    published: sympy.Expr
 
     @cached_property
     def steps(self) -> tuple[Step, ...]:
@@ -265,9 +268,10 @@ def _proofs(statement: Statement, earlier: Mapping[str, Statement]) -> tuple[Cas
         solution = found.values
         needed |= {one for one, here in zip(statement.provided, provided, strict=True) if here in found.needed}
         derived = solution[statement.symbol]
-        members = [_branch(member, replacements, solution, chosen) for member in statement.members]
-        if None in members:
+        branches = [_branch(member, replacements, solution, chosen) for member in statement.members]
+        if None in branches:
             return f"a case does not decide between the branches of {statement.number} itself"
+        members = [branch.xreplace(replacements) for branch in branches]
         published = [member.xreplace(solution) for member in members]
         differences = tuple(sympy.S.Zero if agree(derived, member) else derived - member for member in published)
         reached = derived if any(differences) else members[-1]
@@ -280,6 +284,7 @@ def _proofs(statement: Statement, earlier: Mapping[str, Statement]) -> tuple[Cas
                 relations=relations,
                 solution=solution,
                 reached=reached,
+                published=branches[-1],
             )
         )
     idle = [sympy.sstr(one) for member in statement.members for one in _conditions(member) if one not in chosen]
@@ -314,14 +319,14 @@ def _meets_all_branches(statement: Statement, earlier: Mapping[str, Statement]) 
 def _branch(
     member: sympy.Expr, case: Mapping[Name, sympy.Expr], solution: Mapping[Name, sympy.Expr], chosen: set[sympy.Basic]
 ) -> sympy.Expr | None:
-    """Return a member at a case; of a piecewise one the branch that holds there, whose condition joins `chosen`."""
+    """Return a member, of a piecewise one the branch that holds in a case, whose condition joins `chosen`."""
     if not isinstance(member, sympy.Piecewise):
-        return member.xreplace(case)
+        return member
     for value, condition in member.args:
         decided = condition.xreplace(case).xreplace(solution)
         if decided == sympy.true:
             chosen.add(condition)
-            return value.xreplace(case)
+            return value
         if decided != sympy.false:
             return None
     return None

@@ -66,6 +66,8 @@ class PublishedValve:
         )
 
 
+#: Where a number of the second valve depends on it.
+DROP_ASSUMED = "at 5 MPa, which the paper does not say of this valve"
 SIMULATION = PublishedValve(
     name="simulation",
     where="section 2.2",

@@ -2,17 +2,21 @@
 
 from collections.abc import Callable, Sequence
 
+from sympy.core.function import AppliedUndef
+
 from dzdesign.core.errors import InputError, RequirementError, nearest
 from dzdesign.derivation.account import PAPER_NUMBERS
+from dzdesign.derivation.glossary import MEANINGS
 from dzdesign.derivation.proof import Verdict
-from dzdesign.derivation.prose import Words, parse_prose
-from dzdesign.derivation.report_content import SOURCE, Content, Entry
+from dzdesign.derivation.prose import Formula, Words, parse_prose
+from dzdesign.derivation.report_content import SOURCE, Content, Entry, Term
 from dzdesign.derivation.report_html import write_html
 from dzdesign.derivation.report_json import write_json
 from dzdesign.derivation.report_latex import write_latex
 from dzdesign.derivation.report_text import write_text
 from dzdesign.derivation.report_wording import describe, refer
 from dzdesign.derivation.statement import Outcome, Statement
+from dzdesign.derivation.units import print_unit
 
 _WRITERS: dict[str, Callable[[Content], str]] = {
     "text": write_text,
@@ -154,7 +158,21 @@ def _compose(verdicts: Sequence[Verdict], shown: Sequence[str]) -> Content:
             if entry.verdict.outcome is Outcome.FOLLOWS_IF
         ),
         table=table,
+        glossary=_glossary([entry.verdict.statement for entry in entries.values()]),
         sections=tuple((section, tuple(members)) for section, members in sections.items()),
+    )
+
+
+def _glossary(statements: Sequence[Statement]) -> tuple[Term, ...]:
+    """Explain the symbols that occur, in the order of the account."""
+    replaced = [pair for one in statements for ground in one.grounds for pair in ground.at]
+    replaced += [pair for one in statements for case in one.cases for pair in case.at]
+    sides = [side for one in statements for side in (one.symbol, *one.members)] + [value for _, value in replaced]
+    used = set().union(*(side.free_symbols | {part.func for part in side.atoms(AppliedUndef)} for side in sides))
+    return tuple(
+        Term(Formula((name,)), parse_prose(meaning), print_unit(name))
+        for name, meaning in MEANINGS.items()
+        if name in used or name.func in used
     )
 
 

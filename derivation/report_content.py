@@ -17,7 +17,8 @@ GIVEN_AS = {
     Kind.DEFINITION: "definition",
     Kind.CHOICE: "our choice",
 }
-WRONG, CONDITIONAL, TABLE = "What does not hold", "What holds on a condition only", "The paper's equations"
+WRONG, CONDITIONAL = "What does not hold", "What holds on a condition only"
+TABLE, GLOSSARY = "The paper's equations", "Symbols"
 SOURCE = "The paper: Wu et al. 2022, doi 10.11916/j.issn.1005-9113.20063."
 #: What the marks mean, for the reader of the report.
 LEGEND = (
@@ -50,7 +51,7 @@ class Derivation:
     steps : tuple of Step
         Empty if the premises could only be solved all at once.
     lines : tuple of Line
-        One per step, or a single one.
+        One per step, then the published form where a case has changed it; or a single one.
     """
 
     where: Words
@@ -83,6 +84,8 @@ class Entry:
         The statement as published.
     judgement : Words
         The outcome with its condition or reason; empty where `mark` says it all.
+    scope : Words
+        Where it is proved, if not everywhere.
     premises : tuple of Words
     derivations : tuple of Derivation
     differences : tuple of Line
@@ -102,6 +105,7 @@ class Entry:
     mark: str
     chain: Formula
     judgement: Words
+    scope: Words
     premises: tuple[Words, ...]
     derivations: tuple[Derivation, ...]
     differences: tuple[Line, ...]
@@ -125,6 +129,15 @@ class Entry:
         return (*words, ".") if words else ()
 
 
+@dataclass(frozen=True, slots=True)
+class Term:
+    """A symbol with its meaning and its unit."""
+
+    symbol: Formula
+    meaning: Words
+    unit: str
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Content:
     """The whole report.
@@ -140,6 +153,8 @@ class Content:
         What does not follow or should read otherwise; what follows on a condition only.
     table : tuple of Entry
         The paper's equations, in the paper's order.
+    glossary : tuple of Term
+        The symbols that occur.
     sections : tuple of (str, tuple of Entry)
     """
 
@@ -149,4 +164,5 @@ class Content:
     wrong: tuple[Words, ...]
     conditional: tuple[Words, ...]
     table: tuple[Entry, ...]
+    glossary: tuple[Term, ...]
     sections: tuple[tuple[str, tuple[Entry, ...]], ...]

@@ -53,6 +53,7 @@ def write_html(content: Content) -> str:
         lists=((report_content.WRONG, content.wrong), (report_content.CONDITIONAL, content.conditional)),
         legend=report_content.LEGEND,
         table_heading=report_content.TABLE,
+        glossary_heading=report_content.GLOSSARY,
         outcomes=Outcome,
     )
 

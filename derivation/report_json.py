@@ -9,6 +9,7 @@ from sympy.core.function import AppliedUndef
 
 from dzdesign.core.artefacts import TOOL, to_json
 from dzdesign.derivation import symbols
+from dzdesign.derivation.glossary import MEANINGS
 from dzdesign.derivation.report_content import Content, Derivation, Entry
 from dzdesign.derivation.report_text import plain
 from dzdesign.derivation.statement import Condition, Ground, Replacements
@@ -175,7 +176,12 @@ def _symbols(entries: list[Entry]) -> dict[str, dict[str, str]]:
     """Return the unit and the sign of every symbol, and that a name stands for a function."""
     signs = {name: sign for entry in entries for sign, names in entry.signs.items() for name in names}
     table = {
-        _identifier(name): {"latex": typeset(name, LATEX), "unit": unit_table().get(name, ""), "sign": sign}
+        _identifier(name): {
+            "latex": typeset(name, LATEX),
+            "meaning": MEANINGS.get(name, ""),
+            "unit": unit_table().get(name, ""),
+            "sign": sign,
+        }
         for name, sign in sorted(signs.items(), key=lambda item: item[0].name)
     }
     members = [side for entry in entries for side in (entry.verdict.statement.symbol, *entry.verdict.statement.members)]
@@ -183,6 +189,7 @@ def _symbols(entries: list[Entry]) -> dict[str, dict[str, str]]:
     for function in sorted(functions, key=str):
         table[_function(function)] = {
             "latex": typeset(function, LATEX),
+            "meaning": MEANINGS.get(function, ""),
             "unit": unit_table().get(function, ""),
             "sign": "function",
         }

@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterator
 from dzdesign.derivation.prose import Code, Formula, Quantity, Raised, Reference, Words
 from dzdesign.derivation.report_content import (
     CONDITIONAL,
+    GLOSSARY,
     LEGEND,
     TABLE,
     WRONG,
@@ -85,6 +86,11 @@ class _Document:
         yield from _list("Verdicts", [rf"\textbf{{{mark}}}: {_escape(words)}" for mark, words in LEGEND])
         if content.table:
             yield from self.table()
+        yield rf"\subsection*{{{GLOSSARY}}}"
+        yield r"\begin{longtable}{@{}lp{95mm}l@{}}"
+        for term in content.glossary:
+            yield f"{self.part(term.symbol)} & {self.words(term.meaning)} & {_escape(term.unit)}" + r" \\"
+        yield r"\end{longtable}"
         for section, entries in content.sections:
             yield rf"\section*{{{_escape(section)}}}"
             for entry in entries:
@@ -113,6 +119,8 @@ class _Document:
         yield rf"\textbf{{{_escape(entry.mark)}}}{_display(entry.chain)}"
         if entry.judgement:
             yield self.words(entry.judgement) + r"\par"
+        if entry.scope:
+            yield self.words(entry.scope) + r"\par"
         if entry.premises:
             yield r"\emph{From:} " + "; ".join(map(self.words, entry.premises)) + r".\par"
         for derivation in entry.derivations:

@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Iterator
 
 from dzdesign.derivation.prose import Code, Formula, Quantity, Raised, Reference, Words
-from dzdesign.derivation.report_content import CONDITIONAL, LEGEND, TABLE, WRONG, Content, Entry, Figure, Line
+from dzdesign.derivation.report_content import CONDITIONAL, GLOSSARY, LEGEND, TABLE, WRONG, Content, Entry, Figure, Line
 from dzdesign.derivation.typeset import TEXT, typeset
 
 _WIDTH = 100  # columns
@@ -34,24 +34,28 @@ def write_text(content: Content) -> str:
 def _lines(content: Content) -> Iterator[str]:
     yield from (content.title, "=" * len(content.title), content.source, "")
     for words in content.summary:
-        yield from _wrapped(plain(words))
+        yield from _wrapped(_tied(words))
     for heading, items in ((WRONG, content.wrong), (CONDITIONAL, content.conditional)):
         if items:
             yield from ("", f"{heading}:")
             for words in items:
-                yield from _wrapped("- " + plain(words), "  ", "    ")
+                yield from _wrapped("- " + _tied(words), "  ", "    ")
     yield from ("", "Verdicts:")
     for mark, words in LEGEND:
         yield from _wrapped(f"{mark:<16}{words.translate(_KEYBOARD)}", "  ", " " * 18)
     if content.table:
         yield from ("", TABLE, "-" * len(TABLE), *_table(content.table))
+    yield from ("", GLOSSARY, "-" * len(GLOSSARY))
+    for term in content.glossary:
+        name = plain((term.symbol,))
+        yield from _wrapped(f"{name:<12}{_tied(term.meaning)} [{term.unit}]", "  ", " " * 14)
     for section, entries in content.sections:
         yield from ("", "", section, "-" * len(section))
         for entry in entries:
             yield from ("", *_entry(entry))
     yield ""
     for words in content.summary:
-        yield from _wrapped(plain(words))
+        yield from _wrapped(_tied(words))
 
 
 def _table(entries: tuple[Entry, ...]) -> Iterator[str]:
@@ -70,29 +74,31 @@ def _entry(entry: Entry) -> Iterator[str]:
     if len(plain(entry.title)) <= room:
         yield f"{entry.number}  {plain(entry.title):<{room}}  [{entry.mark}]"
     else:
-        yield from _wrapped(f"{entry.number}  {plain(entry.title)}  [{entry.mark}]")
+        yield from _wrapped(f"{entry.number}  {_tied(entry.title)}  [{entry.mark}]")
     yield from _formula(entry.chain, _INDENT)
     if entry.judgement:
-        yield from _wrapped(plain(entry.judgement), _INDENT)
+        yield from _wrapped(_tied(entry.judgement), _INDENT)
+    if entry.scope:
+        yield from _wrapped(_tied(entry.scope), _INDENT)
     if entry.premises:
-        yield from _labelled("from", "; ".join(map(plain, entry.premises)))
+        yield from _labelled("from", "; ".join(map(_tied, entry.premises)))
     for derivation in entry.derivations:
         if derivation.where:
-            yield from _wrapped(plain(derivation.where).strip() + ":", _INDENT)
+            yield from _wrapped(_tied(derivation.where).strip() + ":", _INDENT)
         for line in derivation.lines:
             yield from _line(line)
     for line in (*entry.differences, *([entry.correction] if entry.correction else [])):
         yield from _line(line)
     yield from _figures(entry.figures)
-    for label, text in (("signs", plain(entry.sign_words)), ("note", plain(entry.note))):
+    for label, text in (("signs", _tied(entry.sign_words)), ("note", _tied(entry.note))):
         if text:
             yield from _labelled(label, text)
     if entry.see:
-        yield from _labelled("see", ", ".join(plain((reference,)) for reference in entry.see))
+        yield from _labelled("see", ", ".join(_tied((reference,)) for reference in entry.see))
 
 
 def _line(line: Line) -> Iterator[str]:
-    yield from _wrapped(plain(line.words), _INDENT)
+    yield from _wrapped(_tied(line.words), _INDENT)
     if line.display is not None:
         yield from _formula(line.display, _INDENT * 2)
 
@@ -103,7 +109,7 @@ def _figures(figures: tuple[Figure, ...]) -> Iterator[str]:
     rows = [("number", "ours", "paper")]
     rows += [(plain(figure.label), figure.ours, figure.paper.translate(_KEYBOARD) or "-") for figure in figures]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    remarks = ["", *(plain(figure.remark) for figure in figures)]
+    remarks = ["", *(_tied(figure.remark) for figure in figures)]
     for row, remark in zip(rows, remarks, strict=True):
         cells = (f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True))
         yield (_INDENT + "  ".join(cells)).rstrip()
@@ -122,6 +128,11 @@ def plain(words: Words) -> str:
     -------
     str
     """
+    return _tied(words).replace(_FIXED, " ")
+
+
+def _tied(words: Words) -> str:
+    """Return words as ASCII text whose formulas are not broken between lines."""
     return "".join(map(_plain, words))
 
 
@@ -132,7 +143,7 @@ def _plain(part: object) -> str:
         case Formula(sides):
             return _fixed(" = ".join(typeset(side, TEXT) for side in sides))
         case Reference(number, words):
-            return plain(words) or number
+            return _tied(words) or number
         case Code(text):
             return f"`{text}`"
         case Raised(text):

@@ -36,8 +36,10 @@ def describe(verdict: Verdict, book: Mapping[str, Verdict]) -> Entry:
         name=parse_prose(statement.number),
         title=parse_prose(statement.title, book),
         mark=_mark(verdict),
-        chain=Formula((statement.symbol, *statement.members)),
+        # Members that differ in the order of their terms only look alike.
+        chain=Formula((statement.symbol, *{_looks(member): member for member in statement.members}.values())),
         judgement=_judgement(verdict, book),
+        scope=_scope(verdict, book),
         premises=tuple(_premise(ground, book) for ground in statement.grounds),
         derivations=tuple(_derivation(proof, index, book) for index, proof in enumerate(verdict.proofs)),
         differences=tuple(_differences(verdict, book)),
@@ -120,13 +122,6 @@ def _sentences(verdict: Verdict, book: Mapping[str, Verdict]) -> Iterator[Words]
         yield ("Follows, and is positive exactly if ", Formula((statement.positive_if,)), ".")
     elif verdict.words not in (verdict.outcome.value, statement.kind.value) and not verdict.inherited:
         yield (*parse_prose(verdict.words[0].upper() + verdict.words[1:], book), ".")
-    if statement.scope or statement.provided:
-        unequal = [part for one in statement.provided for part in (" and ", Formula((one,)))][1:]
-        scope = parse_prose(statement.scope, book)
-        yield ("Proved for ", *scope, *([" and " if scope else "", *unequal] if unequal else []), ".")
-    if verdict.limited_by:
-        names = [part for number in verdict.limited_by for part in (", ", refer(book[number].statement))]
-        yield ("Within what is proved of ", *names[1:], ".")
     if verdict.inherited:
         names = [part for number in verdict.inherited for part in (", ", refer(book[number].statement))]
         yield ("Rests on the condition of ", *names[1:], ".")
@@ -134,6 +129,20 @@ def _sentences(verdict: Verdict, book: Mapping[str, Verdict]) -> Iterator[Words]
         yield (f"Its units do not agree: {verdict.unit_error}.",)
     if not verdict.as_expected:
         yield (f"A correct account finds otherwise: {statement.expected.value}.",)
+
+
+def _scope(verdict: Verdict, book: Mapping[str, Verdict]) -> Words:
+    """Say where a statement is proved, if not everywhere."""
+    statement = verdict.statement
+    limits = [parse_prose(statement.scope, book)] if statement.scope else []
+    limits += [(Formula((one,)),) for one in statement.provided]
+    words = [part for limit in limits for part in (" and ", *limit)]
+    if words:
+        words = ["Proved for", " ", *words[1:], "."]
+    if verdict.limited_by:
+        names = [part for number in verdict.limited_by for part in (", ", refer(book[number].statement))]
+        words += [" " if words else "", "As far as is proved of ", *names[1:], "."]
+    return tuple(words)
 
 
 def _condition(verdict: Verdict, condition: Condition) -> Iterator:
@@ -243,6 +252,8 @@ def _derivation(proof: CaseProof, index: int, book: Mapping[str, Verdict]) -> De
         Line(words=tuple(_step(step, before, proof, book)), display=Formula((symbol, step.result)))
         for before, step in steps
     )
+    if lines and cases and not any(proof.discrepancies) and _looks(proof.published) != _looks(steps[-1][1].result):
+        lines += (Line(words=("In the form stated:",), display=Formula((symbol, proof.published))),)
     at_once = Line(words=("The premises, solved together, give:",), display=Formula((symbol, proof.derived)))
     return Derivation(where=where, proof=proof, steps=tuple(step for _, step in steps), lines=lines or (at_once,))
 
@@ -251,9 +262,13 @@ def _visible(proof: CaseProof) -> Iterator[tuple[Step | None, Step]]:
     """Yield each step with the one before, but for rearrangements that look as before."""
     before: Step | None = None
     for step in proof.steps:
-        if step.used or before is None or typeset(step.result, TEXT) != typeset(before.result, TEXT):
+        if step.used or before is None or _looks(step.result) != _looks(before.result):
             yield before, step
         before = step
+
+
+def _looks(expression: sympy.Expr) -> str:
+    return typeset(expression, TEXT)
 
 
 def _step(step: Step, before: Step | None, proof: CaseProof, book: Mapping[str, Verdict]) -> Iterator:

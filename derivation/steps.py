@@ -82,7 +82,7 @@ def derive_in_steps(
             if found is None:
                 return ()
             used, gives = (found[0],), found[1]
-            result = result.xreplace({unknown: gives})
+            result = _shorter(result.xreplace({unknown: gives}))
         steps.append(Step(used=used, name=unknown, gives=gives, result=result))
         unknown = _next_unknown(result, symbol, statement.eliminate)
     if not agree(result, solution[symbol]):
@@ -91,6 +91,19 @@ def derive_in_steps(
         used = tuple(relation.ground for relation in remaining)
         steps.append(Step(used=used, name=symbol, gives=reached, result=reached))
     return tuple(steps)
+
+
+def _shorter(result: sympy.Expr) -> sympy.Expr:
+    """Return a result with a factor cancelled that is also the denominator of a term: a (b + c/a) is a b + c."""
+    cancels = any(
+        sympy.denom(term) in product.args
+        for product in result.atoms(sympy.Mul)
+        for factor in product.args
+        if factor.is_Add
+        for term in factor.args
+    )
+    flat = sympy.cancel(result) if cancels else result
+    return flat if flat.count_ops() < result.count_ops() else result
 
 
 def _next_unknown(result: sympy.Expr, symbol: Name, eliminate: Sequence[Name]) -> Name | None:

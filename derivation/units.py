@@ -70,6 +70,28 @@ def unit_table() -> dict[Name, str]:
     return {getattr(symbols, name): unit for unit, names in _UNITS_OF.items() for name in names.split()}
 
 
+def print_unit(name: Name) -> str:
+    """Return the unit of a symbol as a person writes it.
+
+    Parameters
+    ----------
+    name : symbol or applied function
+        One of `symbols.py`; ``f(dP)`` is a threshold.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> print_unit(symbols.Q), print_unit(symbols.beta)
+    ('m^3/s', '1')
+    """
+    known = symbols.u_min if name.func == symbols.f else name
+    unit = _plain(_registry().Unit(unit_table()[known])).replace("code", "counts").replace("Ω", "ohm")
+    return "1" if unit == "a number" else unit
+
+
 def find_unit_error(statement: Statement) -> str:
     """Say what is wrong with the units of a statement.
 

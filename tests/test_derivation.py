@@ -227,6 +227,47 @@ def test_a_piecewise_claim_needs_a_case_for_every_branch():
     assert verdict.words == "does not follow: the case of a piecewise premise is not decided"
 
 
+def test_nothing_is_divided_by_what_may_be_zero():
+    ratio = s.u_1 / s.u_2
+    one, two = given("one", s.Q_1, s.Q * ratio), given("two", s.Q_1, s.Q_2 * ratio)
+    # At u_1 = 0 both hold, whatever Q and Q_2 are.
+    equal = claim(s.Q, s.Q_2, "one", "two", eliminate=(s.Q_1,))
+    assert last_words(one, two, equal) == "does not follow: u_1, by which the derivation divides, may be zero"
+    assert last_words(one, two, replace(equal, provided=(sympy.Ne(s.u_1, 0),))) == "follows"
+    idle = replace(equal, provided=(sympy.Ne(s.u_1, 0), sympy.Ne(s.Q_2, 0)))
+    assert last_words(one, two, idle) == "does not follow: the derivation does not need Ne(Q_2, 0)"
+    # Nor inside an equation that is not linear in what is wanted.
+    root = given("root", s.Q_1, s.Q_1.func("r", real=True) * (sympy.sqrt(s.dP) - 1) + s.Q_1.func("q", real=True))
+    words = last_words(
+        root, given("q", s.Q_1, s.Q_1.func("q", real=True)), claim(s.dP, 1, "root", "q", eliminate=(s.Q_1,))
+    )
+    assert words == "does not follow: r, by which the derivation divides, may be zero"
+
+
+def test_cases_must_leave_nothing_out():
+    selector = given("selector", s.u_no, sympy.Piecewise((s.u_0, s.dP1 <= s.dP0), (s.beta * s.u_0, True)))
+    at, up, down = (Case(at=((s.dP1, value),), where="") for value in (s.dP0, s.dP0 + s.above, s.dP0 - s.below))
+    same = claim(s.u_no, s.u_0, "selector")
+    assert last_words(selector, replace(same, cases=(at,))) == "does not follow: the cases leave something out"
+    assert last_words(selector, replace(same, cases=(down,))) == "does not follow: the cases leave something out"
+    limited = replace(same, cases=(down,), within=s.dP1 <= s.dP0)
+    assert last_words(selector, limited) == "does not follow: it does not say where it is proved"
+    assert last_words(selector, replace(limited, scope="dP1 <= dP0")) == "follows"
+    assert last_words(selector, replace(limited, within=s.dP1 < 2 * s.dP0, scope="dP1 < 2 dP0")).endswith(
+        "something out"
+    )
+    branches = sympy.Piecewise((s.u_0, s.dP1 <= s.dP0), (s.beta * s.u_0, True))
+    both = replace(same, kind=Kind.LAW, members=(branches,), cases=(down, up))
+    assert last_words(selector, both) == "follows"
+    words = last_words(selector, replace(both, scope="dP1 <= dP0"))
+    assert words == "does not follow: it is proved everywhere, and says where"
+
+
+def test_a_limit_is_handed_on(verdicts):
+    assert {"Q_max", "(10)"} == set(verdicts["(18)"].limited_by)
+    assert verdicts["T8e"].limited_by == ("straight part", "T8d")
+
+
 @pytest.mark.parametrize("claim", [s.beta < 2, s.beta > s.kappa, s.beta * (1 - s.k * s.x_max / s.u_max) < 2])
 def test_a_wrong_sign_claim_is_seen(claim):
     verdict = {v.number: v for v in verify_statements(changed("T4a", positive_if=claim))}["T4a"]

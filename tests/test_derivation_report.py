@@ -468,7 +468,7 @@ def test_a_wrong_equation_makes_derive_fail_and_is_named(derive, wrong_verdicts)
     assert '(13) should be found to be "follows", but: does not follow.' in printed.out
     assert '(18) should be found to be "follows", but: rests on (17), which does not follow.' in printed.out
     assert "these are not:" in " ".join(printed.out.split())
-    entry = entry_of(printed.out, "(13)")
+    entry = " ".join(entry_of(printed.out, "(13)").split())
     assert "A correct account finds otherwise: follows." in entry
     assert "Derived minus published" in entry
     status, printed = derive("--format", "html", found=wrong_verdicts)
@@ -547,3 +547,19 @@ def test_examples_in_the_docstrings_run(module):
     outcome = doctest.testmod(module)
     assert outcome.attempted > 0
     assert outcome.failed == 0
+
+
+def test_every_symbol_is_explained(rendered):
+    table = json.loads(rendered["json"])["symbols"]
+    assert [name for name, row in table.items() if not row["meaning"] and name != "f"] == []
+    for words in ("headroom", "K_et", "transform of i", "m^3/s/V"):
+        assert words in rendered["text"].split("\nSymbols\n")[1].split("\n\n\n")[0]
+    assert "\0" not in rendered["text"] and "\\u0000" not in rendered["json"]
+
+
+def test_where_a_statement_is_proved_is_said_in_every_format(rendered):
+    assert "Proved for u_1 != u_2." in entry_of(rendered["text"], "T8d")
+    assert r"u_{1} \ne u_{2}" in rendered["latex"] or r"u_1 \ne u_2" in rendered["latex"]
+    row = next(row for row in json.loads(rendered["json"])["statements"] if row["number"] == "T8d")
+    assert (row["provided"], row["limited_by"]) == (["u_1 != u_2"], ["straight part"])
+    assert rendered["html"].count('class="scope"') > 20
