@@ -1,18 +1,19 @@
 """Ramp tests made comparable: zero error out, branches apart, at the nominal pressure drop, in order, described."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.branches import Branch
-from dzdesign.identify.characteristic import BranchShape, describe_branch, find_meter_floor, flow_at_top, smooth_profile
-from dzdesign.identify.noise import shared_correlation
+from dzdesign.identify.characteristic import BranchShape, describe_branches, find_meter_floor
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.pooling import PooledTest, pool_ramps
+from dzdesign.identify.profile import flow_at_top, smooth_profile
 from dzdesign.identify.ramp_files import RampTest
 from dzdesign.identify.ramp_splitting import Ramp, despiked, nominal_dp, split_ramps
+from dzdesign.identify.straight_part import ReadBranch, read_branch
 
 MPA = 1e6
 L_MIN = 1e-3 / 60
@@ -85,12 +86,9 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
     pooled = pool_ramps(_split_all(tests, options))
     _refuse_what_shows_no_dead_zone(pooled, options)
     floor = options.meter_floor if options.meter_floor is not None else _found_floor(pooled, options)
-    # The noise is the meter's, so all branches tell its colour; the straight part that they show depends on it.
-    correlation = 0.0
-    for _ in range(2):
-        described = [_describe(item, floor=floor, options=options, correlation=correlation) for item in pooled]
-        correlation = shared_correlation([shape.roughness for item in described for shape in item.shapes if shape])
-    described = [_describe(item, floor=floor, options=options, correlation=correlation) for item in pooled]
+    reads = [read for item in pooled for read in _read(item, floor, options.u_max)]
+    shapes = iter(describe_branches(reads, u_max=options.u_max, window=options.knee_window))
+    described = [_describe(item, shapes, options.u_max) for item in pooled]
     described = _in_order_of_pressure(described)
     _refuse_mixed_branches(described)
     return DescribedTests(
@@ -203,35 +201,24 @@ def _found_floor(pooled: list[PooledTest], options: IdentifyOptions) -> float:
     )
 
 
-def _describe(item: PooledTest, *, floor: float, options: IdentifyOptions, correlation: float) -> DescribedTest:
-    """Bring a test's flows to its nominal pressure drop and describe its branches."""
-    test, branches = item.test, item.branches
-    dp = nominal_dp(test)
-    shapes = []
-    q_max = 0.0
-    for branch in branches:
-        if branch is None:
-            shapes.append(None)
-            continue
+def _read(item: PooledTest, floor: float, u_max: float) -> Iterator[ReadBranch]:
+    """Bring the flows of a test's branches to its nominal pressure drop."""
+    dp = nominal_dp(item.test)
+    for branch in filter(None, item.branches):
         # Eq. (1): Q grows as sqrt(dP); below a tenth of the nominal pressure the ratio would only carry noise.
         y = branch.q if dp is None else branch.q * np.sqrt(dp / np.maximum(branch.dp, 0.1 * dp))
-        shapes.append(
-            describe_branch(
-                branch,
-                y,
-                u_max=options.u_max,
-                floor=floor,
-                window=options.knee_window,
-                source=test.source,
-                correlation=correlation,
-            )
-        )
-        q_max = max(q_max, flow_at_top(*smooth_profile(branch.u, branch.q, options.u_max)))
+        yield read_branch(branch, y, u_max=u_max, floor=floor, source=item.test.source)
+
+
+def _describe(item: PooledTest, shapes: Iterator[BranchShape], u_max: float) -> DescribedTest:
+    """Put a test together; `shapes` gives those of its branches next."""
+    mine = tuple(next(shapes) if branch else None for branch in item.branches)
+    q_max = max(flow_at_top(*smooth_profile(branch.u, branch.q, u_max)) for branch in item.branches if branch)
     return DescribedTest(
-        test=test,
-        dp=dp,
-        branches=branches,
-        shapes=(shapes[0], shapes[1]),
+        test=item.test,
+        dp=nominal_dp(item.test),
+        branches=item.branches,
+        shapes=mine,
         q_max=q_max,
         ramps=item.ramps,
         files=item.files,

@@ -1,0 +1,46 @@
+"""The course of the flow over the command, smoothed: where it crosses a level, and what it is at full command."""
+
+import numpy as np
+
+from dzdesign.identify.branches import BIN_WIDTH
+
+#: Share of the command's range, from the top, over which the largest flow is read.
+TOP = 0.05
+
+
+def smooth_profile(u: np.ndarray, y: np.ndarray, u_max: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return command and flow averaged over bins of u and freed of single spikes (medians of five bins)."""
+    used, index = np.unique(np.floor(u / (BIN_WIDTH * u_max)).astype(int), return_inverse=True)
+    n = np.bincount(index, minlength=used.size)
+    u_mean = np.bincount(index, weights=u) / n
+    y_mean = np.bincount(index, weights=y) / n
+    if used.size < 200:  # one level a step, as a staircase test gives: nothing to smooth over
+        return u_mean, y_mean
+    padded = np.pad(y_mean, 2, mode="edge")
+    return u_mean, np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)
+
+
+def crossing(u: np.ndarray, y: np.ndarray, level: float) -> float:
+    """Return the command that best parts the profile below `level` from that above it (linear between its points).
+
+    Fewest points are on the wrong side of it, so a few drop-outs far above it do not move it.
+    """
+    below = y < level
+    wrong = np.concatenate(([0], np.cumsum(~below))) + np.concatenate((np.cumsum(below[::-1])[::-1], [0]))
+    last = u.size - 1 - int(np.argmin(wrong[::-1]))
+    if last < 0:
+        return float(u[0])
+    if last + 1 == u.size:
+        return float(u[-1])
+    share = (level - y[last]) / (y[last + 1] - y[last])
+    return float(u[last] + share * (u[last + 1] - u[last]))
+
+
+def flow_at_top(u_profile: np.ndarray, y_profile: np.ndarray) -> float:
+    """Return the flow at the largest command: the line through the top `TOP` of its range, read at the end."""
+    top = u_profile >= u_profile[-1] - TOP * np.ptp(u_profile)
+    u, y = u_profile[top], y_profile[top]
+    if u.size < 5:
+        return float(np.median(y))
+    slope = np.sum((u - u.mean()) * (y - y.mean())) / np.sum((u - u.mean()) ** 2)
+    return float(y.mean() + slope * (u_profile[-1] - u.mean()))

@@ -1,0 +1,250 @@
+"""The straight part of the characteristic: a line through it that outliers do not move, and how far it reaches.
+
+On a straight characteristic more samples make the line's zero up to three times sharper; on a bent one they would move
+it. One valve has made all branches and one meter has read them, so how far the straight part reaches is asked of all of
+them together: a bend too slight to be seen in one branch stands out of twelve, and what noise does to one branch alone
+does not count.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dzdesign.core.errors import InputError
+from dzdesign.identify.branches import Branch
+from dzdesign.identify.noise import Roughness, colour_factor, measure_roughness
+from dzdesign.identify.profile import crossing, flow_at_top, smooth_profile
+
+#: A sample further than this many robust standard deviations from the line is an outlier.
+GATE = 6.0
+#: Noise below this share of the largest flow is not believed: no meter is that fine.
+FINEST_NOISE = 1e-5
+#: Blocks into which the residuals in time order are cut, to see how coloured the noise is.
+BLOCKS = 16
+#: Upper ends to which the window is widened while the characteristic goes on straight, over the largest flow. Not 1:
+#: where the ramp turns, the meter lags behind in a curve.
+WIDER = (0.65, 0.8, 0.9, 0.98)
+#: Standard errors by which the zeros of wider windows' lines may together depart from narrower ones', and one alone.
+STRAIGHT, ALONE = 2.5, 3.5
+#: Share of u_max beyond which no departure is put down to noise: slow noise and a slight bend look alike.
+LARGEST_SHIFT = 3e-3
+
+
+def fit_line(u: np.ndarray, y: np.ndarray) -> tuple[float, float]:
+    """Return slope and zero of the least-squares line."""
+    centre = u.mean()
+    slope = float(np.sum((u - centre) * (y - y.mean())) / np.sum((u - centre) ** 2))
+    return slope, float(centre - y.mean() / slope)
+
+
+def colour_of_blocks(residual: np.ndarray, sigma: float) -> float:
+    """Return the long-run variance factor from the means of `BLOCKS` blocks in time order."""
+    blocks = np.array_split(residual, min(BLOCKS, residual.size // 2))
+    if len(blocks) < 4:
+        return 1.0
+    spread = sum(block.size * block.mean() ** 2 for block in blocks) / (len(blocks) - 2)
+    return max(1.0, spread / sigma**2)
+
+
+def _refuse_no_line(u: np.ndarray, window: tuple[float, float], floor: float, source: str) -> None:
+    """Refuse samples that hold no straight line: too few above the meter's floor, or all at one command."""
+    levels = np.unique(u).size
+    if u.size < 5 or levels < 2:
+        raise InputError(
+            f"'{source}': {u.size} samples at {levels} levels of the command lie between {window[0]:.0%} and "
+            f"{window[1]:.0%} of the largest flow and above half the meter's floor of {floor * 6e4:.3g} L/min, "
+            "expected at least 5 at 2 levels; record a slower ramp or more levels, or correct --meter-floor"
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadBranch:
+    """A branch with its flow at the nominal pressure drop (m³/s), ready for lines to be laid through it.
+
+    `profile` is the smoothed course of the flow, `y_max` its value at the largest command, `floor` the meter's.
+    """
+
+    branch: Branch
+    y: np.ndarray
+    profile: tuple[np.ndarray, np.ndarray]
+    y_max: float
+    floor: float
+    source: str
+
+
+def read_branch(branch: Branch, y: np.ndarray, *, u_max: float, floor: float, source: str) -> ReadBranch:
+    """Return a branch ready for lines to be laid through it; `floor` in m³/s, `source` for messages."""
+    profile = smooth_profile(branch.u, y, u_max)
+    return ReadBranch(branch=branch, y=y, profile=profile, y_max=flow_at_top(*profile), floor=floor, source=source)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GatedLine:
+    """Straight line through the samples between two flows, outliers left out.
+
+    Attributes
+    ----------
+    window : tuple of float
+        The two flows over the largest.
+    slope, knee : float
+        Of the line, m³/(s V), and its zero, V.
+    lever : float
+        Variance of the line's value at its zero, for independent samples of unit variance.
+    sigma : float
+        Standard deviation of one sample about the line, m³/s.
+    block_colour, colour : float
+        Long-run variance over variance of one sample: as the residuals show it, and with what is known of the noise.
+    kept, censored : (N,) bool array
+        Samples of the branch that the line rests on, and those of them that read below the meter's floor.
+    roughness : Roughness
+        Of the residuals.
+    outliers : int
+        Samples gated out.
+    """
+
+    window: tuple[float, float]
+    slope: float
+    knee: float
+    lever: float
+    sigma: float
+    block_colour: float
+    colour: float
+    kept: np.ndarray
+    censored: np.ndarray
+    roughness: Roughness
+    outliers: int
+
+    @property
+    def knee_se(self) -> float:
+        """Standard error of the zero, V."""
+        return self.sigma * math.sqrt(self.lever * self.colour) / self.slope
+
+    def coloured(self, correlation: float) -> "GatedLine":
+        """Return the same line with errors for noise of this correlation between neighbouring samples."""
+        known = colour_factor(correlation, self.roughness, self.sigma)
+        return replace(self, colour=max(self.block_colour, known))
+
+
+def lay_line(read: ReadBranch, window: tuple[float, float], correlation: float = 0.0) -> GatedLine:
+    """Lay a line through the samples between two shares of the largest flow.
+
+    Parameters
+    ----------
+    read : ReadBranch
+    window : tuple of float
+        Shares of the largest flow.
+    correlation : float
+        Of the noise in neighbouring samples.
+
+    Raises
+    ------
+    InputError
+        Where there are too few samples for a line.
+    """
+    branch, y, floor = read.branch, read.y, read.floor
+    u_low, u_high = (crossing(*read.profile, share * read.y_max) for share in window)
+    inside = (branch.u >= u_low) & (branch.u <= u_high)
+    if inside.sum() < 5 or not u_high > u_low:
+        raise InputError(
+            f"'{read.source}': only {inside.sum()} samples lie between {window[0]:.0%} and {window[1]:.0%} of the "
+            "largest flow, expected at least 5; record a slower ramp or more levels"
+        )
+    censored = inside & (branch.q < 0.5 * floor)
+    seen = inside & ~censored
+    _refuse_no_line(branch.u[seen], window, floor, read.source)
+    slope, knee = fit_line(branch.u[seen], y[seen])
+    finest = FINEST_NOISE * read.y_max
+    for _ in range(3):
+        miss = y - slope * (branch.u - knee)
+        sigma = max(1.4826 * float(np.median(np.abs(miss[inside & ~censored]))), finest)
+        # A zero reading is a censored sample only where flow below the floor is credible.
+        credible = slope * (branch.u - knee) < floor + GATE * sigma
+        kept = inside & np.where(censored, credible, np.abs(miss) < GATE * sigma)
+        seen = kept & ~censored
+        _refuse_no_line(branch.u[seen], window, floor, read.source)
+        slope, knee = fit_line(branch.u[seen], y[seen])
+    u_seen = branch.u[seen]
+    residual = y[seen] - slope * (u_seen - knee)
+    sigma = max(float(np.sqrt(np.sum(residual**2) / max(u_seen.size - 2, 1))), finest)
+    block_colour = colour_of_blocks(residual, sigma)
+    line = GatedLine(
+        window=window,
+        slope=slope,
+        knee=knee,
+        lever=1 / u_seen.size + (u_seen.mean() - knee) ** 2 / np.sum((u_seen - u_seen.mean()) ** 2),
+        sigma=sigma,
+        block_colour=block_colour,
+        colour=block_colour,
+        kept=kept,
+        censored=censored,
+        roughness=measure_roughness(u_seen, residual),
+        outliers=int((inside & ~kept).sum()),
+    )
+    return line.coloured(correlation)
+
+
+def widest_straight(
+    reads: Sequence[ReadBranch],
+    narrow: Sequence[GatedLine],
+    lowest: Sequence[float],
+    correlation: float,
+    largest_shift: float,
+) -> list[GatedLine]:
+    """Widen the windows of all branches, upwards and then down, as far as the characteristic goes on straight.
+
+    Parameters
+    ----------
+    reads, narrow : sequence
+        All branches of a valve, and the line through each in the narrow window.
+    lowest : sequence of float
+        Share of the largest flow to which each branch's window may reach down.
+    correlation : float
+        Of the noise in neighbouring samples.
+    largest_shift : float
+        Departure of a zero beyond which a branch stops, whatever its errors, V.
+    """
+    accepted = [[line] for line in narrow]
+    open_ = set(range(len(reads)))
+    ends = [[(line.window[0], high) for line in narrow] for high in WIDER if high > narrow[0].window[1]]
+    for windows in [*ends, None]:
+        if windows is None:  # down, from wherever the upper end has come to
+            open_ = {index for index, line in enumerate(narrow) if lowest[index] < line.window[0]}
+            windows = [(low, lines[-1].window[1]) for low, lines in zip(lowest, accepted, strict=True)]
+        wider = {index: lay_line(reads[index], windows[index], correlation) for index in open_}
+        open_ = _going_on(accepted, wider, largest_shift)
+        for index in open_:
+            accepted[index].append(wider[index])
+    return [lines[-1] for lines in accepted]
+
+
+def _going_on(accepted: Sequence[Sequence[GatedLine]], wider: dict[int, GatedLine], largest_shift: float) -> set[int]:
+    """Return the branches in which a wider window's line has its zero where every narrower one has it.
+
+    A branch stops by itself where its zero departs too far; all stop where together their zeros depart one way.
+    """
+    going_on = set()
+    departures: dict[int, list[tuple[float, float]]] = {}
+    for index, line in wider.items():
+        pairs = [(line.knee - other.knee, _error_of_difference(other, line)) for other in accepted[index]]
+        if all(abs(shift) <= min(ALONE * error, largest_shift) for shift, error in pairs):
+            going_on.add(index)
+            departures[index] = pairs
+    for age in range(max(map(len, departures.values()), default=0)):
+        pairs = [pairs[age] for pairs in departures.values() if age < len(pairs)]
+        weight = np.array([error**-2 for _, error in pairs])
+        common = float(np.dot(weight, [shift for shift, _ in pairs]) / weight.sum())
+        if abs(common) > STRAIGHT / math.sqrt(weight.sum()):
+            return set()
+    return going_on
+
+
+def _error_of_difference(narrow: GatedLine, wide: GatedLine) -> float:
+    """Return the standard error of the difference of two zeros, V: for nested samples, variances subtract.
+
+    Both are of one noise; which of the two says it better is not known, so the louder is taken.
+    """
+    loudest = max(narrow.sigma**2 * narrow.colour, wide.sigma**2 * wide.colour)
+    difference = narrow.lever / narrow.slope**2 - wide.lever / wide.slope**2
+    return max(math.sqrt(loudest * max(difference, 0.0)), 0.1 * narrow.knee_se)
