@@ -76,11 +76,17 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
             _given("--dp0", metavar="P", help='reference pressure drop (default: the test nearest to "1 MPa")'),
             _given("--u-max", default="10 V", metavar="U", help="full command"),
             _given("--meter-floor", metavar="Q", help="flow below which the meter reads zero (default: found)"),
-            _given("--meter-lag", default="0 s", metavar="T", help="lag of the flow meter"),
+            _given("--meter-lag", metavar="T", help="lag of the flow meter (default: found from ramps of two rates)"),
             _given("--meter-zero", default="0 L/min", metavar="Q", help="bound of the meter's zero error"),
             _given("--x-max", metavar="X", help='stroke, such as "1.8 mm": gives k in V/mm'),
             _given("--confidence", default="0.99", metavar="C", help="of all lower bounds together"),
             _given("--knee-window", default="12-50", metavar="A-B", help="per cent of the largest flow, straight"),
+            _given(
+                "--flat-below",
+                default="0.1",
+                metavar="C",
+                help="per cent of full command: a threshold that changes by less over the tests is flat, beta is 1",
+            ),
         ),
     ),
     "design": (

@@ -108,11 +108,12 @@ def run_identify(args: argparse.Namespace) -> int:
         u_max=u_max,
         dp0=_optional(args.dp0, "pressure", "--dp0"),
         meter_floor=_optional(args.meter_floor, "flow", "--meter-floor"),
-        meter_lag=parse_quantity(args.meter_lag, "time", "--meter-lag"),
+        meter_lag=_optional(args.meter_lag, "time", "--meter-lag"),
         meter_zero=parse_quantity(args.meter_zero, "flow", "--meter-zero"),
         x_max=_optional(args.x_max, "length", "--x-max"),
         confidence=_number(args.confidence, "--confidence", "0.99"),
         knee_window=_window(args.knee_window),
+        flat_change=_number(args.flat_below, "--flat-below", "0.1") / 100,
     )
     check_file_may_be_written(Path(args.output), SCHEMA)
     columns = parse_columns(args.columns) if args.columns else {}

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     from dzdesign.codegen.project import Firmware
     from dzdesign.design.compensator import Compensator
-    from dzdesign.identify.model import ValveModel
+    from dzdesign.identify.model import SideModel, ValveModel
     from dzdesign.verify.verification import Verification
 
 #: Columns of a page when stdout is a file or a pipe.
@@ -48,9 +48,29 @@ def _percent(share: float) -> str:
 
 def print_valve(valve: "ValveModel") -> None:
     """Print thresholds per ramp test, the law's parameters and every warning."""
-    side = valve.positive
+    console = _console()
+    for name, side in valve.sides.items():
+        title = "Thresholds (V)" if len(valve.sides) == 1 else f"Thresholds (V), {name} side"
+        console.print(_thresholds(side, title))
+        for line in _side_lines(side):
+            console.print(line, markup=False, soft_wrap=True)
+    if "positive" not in valve.sides:
+        console.print("positive commands: not tested")
+    how = {"declared": "declared", "identified": "from ramps of two rates", "unknown": "none declared"}
+    console.print(
+        f"meter floor: {valve.meter_floor_L_min:.2f} L/min; lag taken as {valve.meter_lag_s:.3g} s "
+        f"({how.get(valve.meter_lag_is, valve.meter_lag_is)})",
+        markup=False,
+        soft_wrap=True,
+    )
+    for warning in valve.warnings:
+        source = f"{warning.source}: " if warning.source else ""
+        console.print(f"warning [{warning.code}] {source}{warning.text}", markup=False, soft_wrap=True)
+
+
+def _thresholds(side: "SideModel", title: str) -> "Table":
     table = _table(
-        "Thresholds (V)", "ramp test", "dP (MPa)", "knee opening", "knee closing", "s.e. of knee", "onset closing",
+        title, "ramp test", "dP (MPa)", "knee opening", "knee closing", "s.e. of knee", "onset closing",
          "bound", "beta", "Q max (L/min)",
     )  # fmt: skip
     betas = side.beta or ("-",)
@@ -66,10 +86,12 @@ def print_valve(valve: "ValveModel") -> None:
             beta if isinstance(beta, str) else f"{beta:.4f}",
             f"{test.q_max_L_min:.2f}",
         )
-    console = _console()
-    console.print(table)
+    return table
+
+
+def _side_lines(side: "SideModel") -> tuple[str, ...]:
     at = "" if side.reference_dp_MPa is None else f" at dP0 = {side.reference_dp_MPa:.3f} MPa"
-    lines = [
+    return (
         f"bound: {side.confidence:.0%} lower bound, for all tests together, of the {side.guard} threshold (the lower "
         f"of knee and onset); flow below {side.level_L_min:.2f} L/min (meter's floor, its noise, or 0.5 % of the "
         "largest flow) counts as none",
@@ -79,15 +101,9 @@ def print_valve(valve: "ValveModel") -> None:
         + (f", k = {side.k_V_mm:.4f} V/mm" if side.k_V_mm is not None else ""),
         "trend with dP: can't be said from one ramp test"
         if side.trend is None
-        else f"trend with dP: {side.trend} "
-        f"({1e3 * side.trend_change_V:+.1f} ± {1e3 * side.trend_change_se_V:.1f} mV over the tested range)",
-        f"meter floor: {valve.meter_floor_L_min:.2f} L/min; lag taken as {valve.meter_lag_s:g} s",
-    ]  # fmt: skip
-    for line in lines:
-        console.print(line, markup=False, soft_wrap=True)
-    for warning in valve.warnings:
-        source = f"{warning.source}: " if warning.source else ""
-        console.print(f"warning [{warning.code}] {source}{warning.text}", markup=False, soft_wrap=True)
+        else f"trend with dP: {side.trend} ({1e3 * side.trend_change_V:+.1f} ± {1e3 * side.trend_change_se_V:.1f} mV "
+        f"over the tested range, p = {side.trend_p:.2g})",
+    )
 
 
 def print_compensator(compensator: "Compensator") -> None:

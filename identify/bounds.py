@@ -1,19 +1,39 @@
 """From thresholds with errors to what can be certified: trend, simultaneous lower bounds, staircase."""
 
+import math
+from dataclasses import dataclass
+
 import numpy as np
 
-#: Change of the threshold over the tested range, as a share of u_max, below which the trend counts as flat.
-FLAT_CHANGE = 1e-3
-#: Standard errors that a change must exceed to count as a trend.
-TREND_SIGNIFICANCE = 3.0
+#: Probability, of a flat valve, of a change as large as the one found: a trend is called only below this.
+TREND_SIGNIFICANCE = 0.01
 #: Standard errors by which a knee must depart from the trend to contradict it.
 DEPARTURE_SIGNIFICANCE = 5.0
 #: Blocks of residuals behind a standard error, less the line's two parameters.
 DEGREES_OF_FREEDOM = 14
 
 
-def find_trend(dp: np.ndarray, threshold: np.ndarray, se: np.ndarray, u_max: float) -> tuple[str, float, float]:
-    """Tell in which direction the threshold runs with the pressure drop.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trend:
+    """How the threshold runs with the pressure drop.
+
+    Attributes
+    ----------
+    direction : {"decreasing", "increasing", "flat"}
+    change, change_se : float
+        Over the tested range, by a weighted straight line, and the standard error, V; NaN from one test.
+    p_value : float
+        Probability of so large a change, either way, if the threshold were flat (Student); NaN from one test.
+    """
+
+    direction: str
+    change: float
+    change_se: float
+    p_value: float
+
+
+def find_trend(dp: np.ndarray, threshold: np.ndarray, se: np.ndarray, u_max: float, budget: float) -> Trend:
+    """Test in which direction the threshold runs with the pressure drop.
 
     Parameters
     ----------
@@ -23,36 +43,35 @@ def find_trend(dp: np.ndarray, threshold: np.ndarray, se: np.ndarray, u_max: flo
         Thresholds and standard errors, V.
     u_max : float
         Full command, V.
-
-    Returns
-    -------
-    tuple
-        ``"decreasing"``, ``"increasing"`` or ``"flat"``; the change over the tested range in V (weighted straight
-        line); its standard error.
+    budget : float
+        Change that systematic errors may make, V: a smaller one is flat, however significant.
     """
+    from scipy.special import stdtr
+
     if dp.size < 2:
-        return "flat", 0.0, float("nan")
+        return Trend(direction="flat", change=math.nan, change_se=math.nan, p_value=math.nan)
     weight = 1 / np.maximum(se, 1e-5 * u_max) ** 2
     centre = np.average(dp, weights=weight)
     spread = np.sum(weight * (dp - centre) ** 2)
-    slope = np.sum(weight * (dp - centre) * threshold) / spread
-    change, change_se = slope * np.ptp(dp), np.ptp(dp) / np.sqrt(spread)
-    if abs(change) < max(FLAT_CHANGE * u_max, TREND_SIGNIFICANCE * change_se):
-        return "flat", float(change), float(change_se)
-    return ("decreasing" if change < 0 else "increasing"), float(change), float(change_se)
+    change = float(np.ptp(dp) * np.sum(weight * (dp - centre) * threshold) / spread)
+    change_se = float(np.ptp(dp) / np.sqrt(spread))
+    p_value = float(2 * stdtr(DEGREES_OF_FREEDOM, -abs(change) / change_se))
+    flat = abs(change) < budget or p_value > TREND_SIGNIFICANCE
+    direction = "flat" if flat else "decreasing" if change < 0 else "increasing"
+    return Trend(direction=direction, change=change, change_se=change_se, p_value=p_value)
 
 
-def excess_departure(departure: np.ndarray, se: np.ndarray, u_max: float) -> np.ndarray:
+def excess_departure(departure: np.ndarray, se: np.ndarray, budget: float) -> np.ndarray:
     """Return by how much each knee departs from one direction with the pressure drop, V; zero within its errors.
 
     Parameters
     ----------
     departure, se : (T,) array
         Distance of each knee from the fit under the trend, and its standard error, V.
-    u_max : float
-        Full command, V; a departure below `FLAT_CHANGE` of it is the budget of systematic errors.
+    budget : float
+        Departure that systematic errors may make, V.
     """
-    real = departure > np.maximum(DEPARTURE_SIGNIFICANCE * se, FLAT_CHANGE * u_max)
+    real = departure > np.maximum(DEPARTURE_SIGNIFICANCE * se, budget)
     return np.where(real, departure, 0.0)
 
 

@@ -1,5 +1,6 @@
 """A branch of a ramp test: the samples of one direction of the command, gathered in bins."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,12 +11,23 @@ BIN_WIDTH = 1e-3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Branch:
-    """Samples of one direction, on one side of zero: command u in V, dp in Pa or None, flow q in m³/s, all (N,)."""
+    """Samples of one direction, on one side of zero: command u in V, dp in Pa or None, flow q in m³/s, all (N,).
+
+    `rate` is the pace of the command, V/s, always positive; of several ramps
+    the fastest; NaN if it is not known.
+    """
 
     rising: bool
     u: np.ndarray
     q: np.ndarray
     dp: np.ndarray | None
+    rate: float = math.nan
+
+
+def at_nominal_pressure(branch: Branch, dp: float | None) -> np.ndarray:
+    """Return a branch's flow brought to one pressure drop (Pa), m³/s; as it is where the pressure is not known."""
+    # Eq. (1): Q grows as sqrt(dP); below a tenth of the nominal pressure the ratio would only carry noise.
+    return branch.q if dp is None else branch.q * np.sqrt(dp / np.maximum(branch.dp, 0.1 * dp))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -34,6 +34,27 @@ TAIL_LEVELS = 3
 ABOVE_LEVEL = 1.5
 
 
+@dataclass(frozen=True, slots=True)
+class Tail:
+    """What the meter sees of the edge: a line through the first flows.
+
+    Attributes
+    ----------
+    onset, onset_se : float
+        Its zero and the standard error, V.
+    slope : float
+        m³/(s V).
+    at_level, at_level_se : float
+        Command at which it reaches the flow that counts as flow, and the standard error, V.
+    """
+
+    onset: float
+    onset_se: float
+    slope: float
+    at_level: float
+    at_level_se: float
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BranchShape:
     """One branch of one ramp test, described.
@@ -56,8 +77,8 @@ class BranchShape:
         Flows between which the characteristic was found straight, over the largest flow.
     level : float
         Flow that counts as flow, m³/s: the meter's floor, its noise or `USEFUL_FLOW`, whichever is largest.
-    onset, onset_se, onset_slope : float
-        Zero of the straight line through the tail, V, its standard error, and the line's slope, m³/(s V).
+    tail : Tail
+        The first flows seen.
     saturates : bool
         True if the flow at full command lies clearly below the straight line.
     outliers : int
@@ -73,9 +94,7 @@ class BranchShape:
     colour: float
     window: tuple[float, float]
     level: float
-    onset: float
-    onset_se: float
-    onset_slope: float
+    tail: Tail
     saturates: bool
     outliers: int
 
@@ -119,7 +138,6 @@ def _describe(
     read: ReadBranch, line: GatedLine, level: float, noise: float, correlation: float, u_max: float
 ) -> BranchShape:
     branch = read.branch
-    onset, onset_se, onset_slope = _tail_onset(read, level, line.slope, noise, correlation)
     return BranchShape(
         rising=branch.rising,
         bins=bin_branch(branch.u[line.kept], read.y[line.kept], line.censored[line.kept], u_max),
@@ -130,9 +148,7 @@ def _describe(
         colour=line.colour,
         window=line.window,
         level=level,
-        onset=onset,
-        onset_se=onset_se,
-        onset_slope=onset_slope,
+        tail=_find_tail(read, level, line.slope, noise, correlation),
         saturates=read.y_max < 0.93 * line.slope * (branch.u.max() - line.knee),
         outliers=line.outliers,
     )
@@ -183,18 +199,11 @@ def _quiet_noise(branch: Branch, y: np.ndarray, knee: float) -> float:
     return 1.4826 * float(np.median(np.abs(shut - np.median(shut)))) if shut.size >= 5 else 0.0
 
 
-def _tail_onset(
-    read: ReadBranch, level: float, slope: float, noise: float, correlation: float
-) -> tuple[float, float, float]:
+def _find_tail(read: ReadBranch, level: float, slope: float, noise: float, correlation: float) -> Tail:
     """Extrapolate the first flow seen to zero: the valve opens (or closes) no later than this, as far as can be seen.
 
     A soft edge passes flow below the knee. What the meter sees of it is the tail from `level` to `TAIL` times it; the
     line through the tail crosses zero at or below the knee's. What happens below `level` stays hidden.
-
-    Returns
-    -------
-    tuple of float
-        The zero and its standard error, V; the tail's slope, m³/(s V).
     """
     u, y, profile = read.branch.u, read.y, read.profile
     first, last = crossing(*profile, level), crossing(*profile, TAIL * level)
@@ -205,13 +214,19 @@ def _tail_onset(
         if tail_slope > 0.1 * slope:  # else a notch or a leak: no line, so the chord below
             residual = y_tail - tail_slope * (u_tail - onset)
             sigma = math.sqrt(np.sum(residual**2) / (u_tail.size - 2))
-            lever = 1 / u_tail.size + (u_tail.mean() - onset) ** 2 / np.sum((u_tail - u_tail.mean()) ** 2)
             roughness = measure_roughness(u_tail, residual)
             colour = max(colour_of_blocks(residual, max(sigma, 1e-12)), colour_factor(correlation, roughness, sigma))
-            return onset, sigma * math.sqrt(lever * colour) / tail_slope, tail_slope
+            spread = np.sum((u_tail - u_tail.mean()) ** 2)
+            at_level = onset + level / tail_slope
+            errors = [
+                sigma * math.sqrt((1 / u_tail.size + (u_tail.mean() - at) ** 2 / spread) * colour) / tail_slope
+                for at in (onset, at_level)
+            ]
+            return Tail(onset, errors[0], tail_slope, at_level, errors[1])
     # Too few samples for a line, as in a staircase test: the chord, its ends known to one level of the command.
     at = int(np.clip(np.searchsorted(profile[0], first), 1, profile[0].size - 1))
     gap = float(profile[0][at] - profile[0][at - 1])
     width = max(last - first, gap)
     chord = (TAIL - 1) * level / width
-    return first - level / chord, gap + noise / chord, chord
+    error = gap + noise / chord
+    return Tail(first - level / chord, error, chord, first, error)

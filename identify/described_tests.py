@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.branches import Branch
+from dzdesign.identify.branches import Branch, at_nominal_pressure
 from dzdesign.identify.characteristic import BranchShape, describe_branches, find_meter_floor
+from dzdesign.identify.lag import MeterLag, find_lag
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.pooling import PooledTest, pool_ramps
 from dzdesign.identify.profile import flow_at_top, smooth_profile
@@ -55,12 +56,15 @@ class DescribedTests:
         All with the same branches.
     floor : float
         Meter floor, given or found, m³/s.
+    lag : MeterLag
+        Of the meter, declared or found.
     zero_L_min : dict
         Source -> flow read at zero command, where it is not zero; it has been subtracted.
     """
 
     tests: tuple[DescribedTest, ...]
     floor: float
+    lag: MeterLag
     zero_L_min: dict[str, float]
 
 
@@ -83,7 +87,9 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
         raise InputError("no ramp tests were given; expected at least one file")
     zeros = [_reading_at_zero(test, options.u_max) for test in tests]
     tests = [replace(test, q=test.q - zero) for test, zero in zip(tests, zeros, strict=True)]
-    pooled = pool_ramps(_split_all(tests, options))
+    ramps = _split_all(tests, options, options.meter_lag or 0.0)
+    lag = find_lag(ramps, options)
+    pooled = pool_ramps(ramps if lag.origin != "identified" else _split_all(tests, options, lag.seconds))
     _refuse_what_shows_no_dead_zone(pooled, options)
     floor = options.meter_floor if options.meter_floor is not None else _found_floor(pooled, options)
     reads = [read for item in pooled for read in _read(item, floor, options.u_max)]
@@ -94,6 +100,7 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
     return DescribedTests(
         tests=tuple(described),
         floor=floor,
+        lag=lag,
         zero_L_min={test.source: zero / L_MIN for test, zero in zip(tests, zeros, strict=True) if zero},
     )
 
@@ -121,7 +128,7 @@ def _error_of_median(values: np.ndarray) -> float:
     return 1.4826 * float(np.median(np.abs(values - np.median(values)))) / np.sqrt(values.size)
 
 
-def _split_all(tests: Sequence[RampTest], options: IdentifyOptions) -> list[Ramp]:
+def _split_all(tests: Sequence[RampTest], options: IdentifyOptions, lag: float) -> list[Ramp]:
     """Split every recording into ramps; refuse what has no ramp, too large a command, a wrong pressure, or no flow."""
     ramps = []
     highest = max(float(despiked(test.u).max()) for test in tests)
@@ -136,7 +143,7 @@ def _split_all(tests: Sequence[RampTest], options: IdentifyOptions) -> list[Ramp
                 f"'{test.source}' has no column of dP (or pA and pB); several ramp tests can only be told apart by it: "
                 "record it, or declare it by --dp or [dp]"
             )
-        mine = split_ramps(test, options.meter_lag)
+        mine = split_ramps(test, lag)
         if np.ptp(test.u) < SMALLEST_SWEEP * options.u_max or not any(ramp.branches for ramp in mine):
             raise _no_ramp(test.source)
         for ramp in mine:
@@ -205,8 +212,7 @@ def _read(item: PooledTest, floor: float, u_max: float) -> Iterator[ReadBranch]:
     """Bring the flows of a test's branches to its nominal pressure drop."""
     dp = nominal_dp(item.test)
     for branch in filter(None, item.branches):
-        # Eq. (1): Q grows as sqrt(dP); below a tenth of the nominal pressure the ratio would only carry noise.
-        y = branch.q if dp is None else branch.q * np.sqrt(dp / np.maximum(branch.dp, 0.1 * dp))
+        y = at_nominal_pressure(branch, dp)
         yield read_branch(branch, y, u_max=u_max, floor=floor, source=item.test.source)
 
 

@@ -1,6 +1,7 @@
 """`ValveModel`: what identification found, as the artefact valve.json (schema dzdesign.valve/1)."""
 
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from types import NoneType
 from typing import Any
 
@@ -12,19 +13,29 @@ from dzdesign.core.shape import Exactly, Number, check_shape
 from dzdesign.identify.bounds import staircase
 
 SCHEMA = "dzdesign.valve/1"
+#: Both sides, and the sign of the command that opens each.
+SIDES = {"positive": 1, "negative": -1}
 TRENDS = ("decreasing", "flat", "increasing")
 #: Numbers of the file are right to seven decimals; a comparison of two allows ten times that.
 ROUNDING_V = 1e-6
 REMEDY = "make it again with `dzdesign identify`"
 #: What valve.json must hold; the ends are far beyond any valve, and keep the exact arithmetic from overflowing.
 VOLTAGE, PRESSURE, FLOW = Number(-1e4, 1e4), Number(1e-6, 1e3), Number(0, 1e6)
+#: Of a branch: the thresholds with their standard errors.
+MEASURES = ("knee", "level", "onset")
+DIRECTIONS = ("rising", "falling")
 TEST_SHAPE = {
     "source": str,
     "dp_MPa": (PRESSURE, NoneType),
-    **dict.fromkeys(
-        ("u_knee_rising_V", "u_knee_falling_V", "u_onset_rising_V", "u_onset_falling_V"), (VOLTAGE, NoneType)
-    ),
+    **{
+        f"u_{measure}_{direction}_{unit}": (VOLTAGE, NoneType)
+        for direction in DIRECTIONS
+        for measure in MEASURES
+        for unit in ("V", "se_V")
+    },
+    **{f"straight_{direction}": (Exactly(2, Number(0, 2)), NoneType) for direction in DIRECTIONS},
     **dict.fromkeys(("u_knee_se_V", "u_guard_V", "u_guard_lower_V"), VOLTAGE),
+    "not_observable": dict,
     **dict.fromkeys(("slope_L_min_V", "q_max_L_min", "noise_L_min", "noise_colour"), FLOW),
     "saturates": bool,
     "outliers": Number(0, 1e12, whole=True),
@@ -37,6 +48,7 @@ SIDE_SHAPE = {
     "trend": (str, NoneType),
     "trend_change_V": (VOLTAGE, NoneType),
     "trend_change_se_V": (VOLTAGE, NoneType),
+    "trend_p": (Number(0, 1), NoneType),
     "beta": {"dp_MPa": [PRESSURE], "beta": [Number(0, 2)]},
     "certificate": {"confidence": Number(0.5, 1), "guard": str, "level_L_min": FLOW, "steps_V": [VOLTAGE]},
     "active_constraints": [str],
@@ -44,31 +56,54 @@ SIDE_SHAPE = {
 SHAPE = {
     "made_from": [{"source": str, "sha256": str}],
     "u_max_V": Number(1e-3, 1e4),
-    "meter": {"floor_L_min": FLOW, "lag_s": Number(0, 1e6), "zero_L_min": FLOW},
+    "meter": {"floor_L_min": FLOW, "lag_s": Number(0, 1e6), "lag_is": str, "zero_L_min": FLOW},
     "knee_window": Exactly(2, Number(0, 1)),
-    "sides": {"positive": SIDE_SHAPE},
+    "sides": dict,
     "warnings": [{"code": str, "text": str, "source": (str, NoneType)}],
 }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TestResult:
-    """One ramp test: thresholds in V, flows in L/min, pressure drop in MPa; None where a branch or dP is missing.
+class BranchResult:
+    """Thresholds of one branch of a ramp test and their standard errors, V.
 
-    ``u_knee_*`` are the straight part of Q/sqrt(dP) extrapolated to zero; ``u_onset_*`` the tail above the meter's
-    floor extrapolated to zero. ``u_guard_V`` is the threshold that the certificate protects (the lower of knee and
-    onset on the guarded branch), ``u_guard_lower_V`` its lower confidence bound. ``ramps`` names each ramp in it.
+    Attributes
+    ----------
+    knee_V, knee_se_V : float
+        The straight part of Q/sqrt(dP) extrapolated to zero.
+    level_V, level_se_V : float
+        Where the flow passes what counts as flow.
+    onset_V, onset_se_V : float
+        The tail above that flow extrapolated to zero.
+    straight : tuple of float
+        Flows between which the characteristic was found straight, over the largest flow.
+    """
+
+    knee_V: float
+    knee_se_V: float
+    level_V: float
+    level_se_V: float
+    onset_V: float
+    onset_se_V: float
+    straight: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TestResult:
+    """One ramp test: flows in L/min, pressure drop in MPa, None where it is not known.
+
+    ``rising`` and ``falling`` are its branches, None where there is none; ``not_observable`` says of thresholds, by
+    their key, why the meter can't show them. ``u_guard_V`` is the threshold that the certificate protects (the lower of
+    knee and onset on the guarded branch), ``u_guard_lower_V`` its lower confidence bound. ``ramps`` names each ramp.
     """
 
     __test__ = False  # not a test case, whatever its name
 
     source: str
     dp_MPa: float | None
-    u_knee_rising_V: float | None
-    u_knee_falling_V: float | None
-    u_knee_se_V: float
-    u_onset_rising_V: float | None
-    u_onset_falling_V: float | None
+    rising: BranchResult | None
+    falling: BranchResult | None
+    not_observable: Mapping[str, str]
     u_guard_V: float
     u_guard_lower_V: float
     slope_L_min_V: float
@@ -79,16 +114,81 @@ class TestResult:
     outliers: int
     ramps: tuple[str, ...] = ()
 
+    @property
+    def u_knee_rising_V(self) -> float | None:
+        """Opening threshold, V."""
+        return self.rising and self.rising.knee_V
+
+    @property
+    def u_knee_falling_V(self) -> float | None:
+        """Closing threshold, V."""
+        return self.falling and self.falling.knee_V
+
+    @property
+    def u_onset_rising_V(self) -> float | None:
+        """First flow on opening, V."""
+        return self.rising and self.rising.onset_V
+
+    @property
+    def u_onset_falling_V(self) -> float | None:
+        """Last flow on closing, V."""
+        return self.falling and self.falling.onset_V
+
+    @property
+    def u_knee_se_V(self) -> float:
+        """The larger of the knees' standard errors, V."""
+        return max(branch.knee_se_V for branch in (self.rising, self.falling) if branch)
+
     def to_document(self) -> dict[str, Any]:
         """Return the entry of valve.json; of the ramps, how many and which."""
-        return {**asdict(self), "ramps": {"count": len(self.ramps), "sources": list(self.ramps)}}
+        document: dict[str, Any] = {"source": self.source, "dp_MPa": self.dp_MPa}
+        for direction, branch in zip(DIRECTIONS, (self.rising, self.falling), strict=True):
+            for measure in MEASURES:
+                for unit in ("V", "se_V"):
+                    document[f"u_{measure}_{direction}_{unit}"] = branch and getattr(branch, f"{measure}_{unit}")
+            document[f"straight_{direction}"] = branch and list(branch.straight)
+        return {
+            **document,
+            "not_observable": dict(self.not_observable),
+            "u_knee_se_V": self.u_knee_se_V,
+            **{name: getattr(self, name) for name in PLAIN},
+            "ramps": {"count": len(self.ramps), "sources": list(self.ramps)},
+        }
+
+
+#: Fields of a test that valve.json has under their own names.
+PLAIN = (
+    *("u_guard_V", "u_guard_lower_V", "slope_L_min_V", "q_max_L_min"),
+    *("saturates", "noise_L_min", "noise_colour", "outliers"),
+)
 
 
 def _test_from_document(test: dict[str, Any]) -> TestResult:
     """Read an entry of valve.json; one made before ramps were pooled is one ramp."""
-    keys = {field.name for field in fields(TestResult)} - {"ramps"}
     ramps = test["ramps"]["sources"] if "ramps" in test else [test["source"]]
-    return TestResult(**{key: test[key] for key in keys}, ramps=tuple(ramps))
+    rising, falling = (_branch_from_document(test, direction) for direction in DIRECTIONS)
+    return TestResult(
+        source=test["source"],
+        dp_MPa=test["dp_MPa"],
+        rising=rising,
+        falling=falling,
+        not_observable=test["not_observable"],
+        **{name: test[name] for name in PLAIN},
+        ramps=tuple(ramps),
+    )
+
+
+def _branch_from_document(test: dict[str, Any], direction: str) -> BranchResult | None:
+    """Read a branch of a test; a missing branch has no threshold at all."""
+    values = {
+        f"{measure}_{unit}": test[f"u_{measure}_{direction}_{unit}"] for measure in MEASURES for unit in ("V", "se_V")
+    }
+    straight = test[f"straight_{direction}"]
+    if straight is None and set(values.values()) == {None}:
+        return None
+    if straight is None or None in values.values():
+        raise InputError(f"'{test['source']}' has some thresholds of its {direction} branch and lacks others")
+    return BranchResult(**values, straight=tuple(straight))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,6 +211,8 @@ class SideModel:
         How the threshold runs with the pressure drop; None where fewer than two were tested.
     trend_change_V, trend_change_se_V : float or None
         Its change over the tested range, and the standard error.
+    trend_p : float or None
+        Probability of so large a change if the threshold were flat.
     beta_dp_MPa, beta : tuple of float
         Nodes of the piecewise linear beta(dP); empty where dP is unknown.
     confidence : float
@@ -133,6 +235,7 @@ class SideModel:
     trend: str | None
     trend_change_V: float | None
     trend_change_se_V: float | None
+    trend_p: float | None
     beta_dp_MPa: tuple[float, ...]
     beta: tuple[float, ...]
     confidence: float
@@ -156,7 +259,7 @@ class SideModel:
             raise InputError(f"{len(self.certified_steps_V)} steps bound {len(self.tests)} tests, expected one fewer")
         if self.beta_dp_MPa and (self.reference_dp_MPa is None or any(test.dp_MPa is None for test in self.tests)):
             raise InputError("a pressure drop is missing beside the nodes of beta; expected one per test and dP0")
-        if any(test.u_knee_rising_V is None and test.u_knee_falling_V is None for test in self.tests):
+        if any(test.rising is None and test.falling is None for test in self.tests):
             raise InputError("a test has no knee, neither rising nor falling; expected at least one")
         if any(test.u_guard_lower_V > test.u_guard_V + ROUNDING_V for test in self.tests):
             raise InputError("a lower bound lies above the threshold that it bounds")
@@ -169,6 +272,29 @@ class SideModel:
             raise InputError("the certified steps do not follow from the tests' lower bounds")
         if not self.u_min0_V > 0:
             raise InputError(f"u_min0 is {self.u_min0_V} V, expected a positive threshold")
+
+    def to_document(self) -> dict[str, Any]:
+        """Return the entry of valve.json."""
+        valid = self.valid_dp_MPa
+        return {
+            "tests": [test.to_document() for test in self.tests],
+            "reference": {"dp_MPa": self.reference_dp_MPa, "u_min_V": self.u_min0_V},
+            "k_x_max_over_u_max": self.k_x_max_over_u_max,
+            "k_V_mm": self.k_V_mm,
+            "trend": self.trend,
+            "trend_change_V": self.trend_change_V,
+            "trend_change_se_V": self.trend_change_se_V,
+            "trend_p": self.trend_p,
+            "beta": {"dp_MPa": list(self.beta_dp_MPa), "beta": list(self.beta)},
+            "valid_dp_MPa": list(valid) if valid else None,
+            "certificate": {
+                "confidence": self.confidence,
+                "guard": self.guard,
+                "level_L_min": self.level_L_min,
+                "steps_V": list(self.certified_steps_V),
+            },
+            "active_constraints": list(self.active_constraints),
+        }
 
     @property
     def valid_dp_MPa(self) -> tuple[float, float] | None:
@@ -195,10 +321,12 @@ class ValveModel:
         Full command.
     meter_floor_L_min, meter_lag_s, meter_zero_L_min : float
         What was taken of the flow meter: floor (given or found), lag, bound of its zero error.
+    meter_lag_is : str
+        "declared", "identified" or "unknown": then it was taken as zero.
     knee_window : tuple of float
         Shares of the largest flow between which the characteristic was taken as straight.
-    positive : SideModel
-        The side of positive commands.
+    sides : mapping of str to SideModel
+        "positive", "negative" or both: what was tested. On the negative side commands and flows count from zero down.
     warnings : tuple of Warning_
         In the order in which they matter.
     made_from : tuple of (str, str)
@@ -208,16 +336,32 @@ class ValveModel:
     u_max_V: float
     meter_floor_L_min: float
     meter_lag_s: float
+    meter_lag_is: str
     meter_zero_L_min: float
     knee_window: tuple[float, float]
-    positive: SideModel
+    sides: Mapping[str, SideModel]
     warnings: tuple[Warning_, ...]
     made_from: tuple[tuple[str, str], ...]
 
+    def __post_init__(self) -> None:
+        if not self.sides or not set(self.sides) <= set(SIDES):
+            raise InputError(f"the sides are {', '.join(self.sides) or 'none'}, expected {' or '.join(SIDES)}")
+
+    @property
+    def positive(self) -> SideModel:
+        """The side of positive commands.
+
+        Raises
+        ------
+        InputError
+            If it was not tested.
+        """
+        if "positive" not in self.sides:
+            raise InputError("the valve was tested with negative commands only; record ramp tests with positive ones")
+        return self.sides["positive"]
+
     def to_document(self) -> dict[str, Any]:
         """Return the JSON document of schema dzdesign.valve/1; numbers rounded to a microvolt's worth."""
-        side = self.positive
-        valid = side.valid_dp_MPa
         document = {
             "schema": SCHEMA,
             "tool": TOOL,
@@ -226,29 +370,12 @@ class ValveModel:
             "meter": {
                 "floor_L_min": self.meter_floor_L_min,
                 "lag_s": self.meter_lag_s,
+                "lag_is": self.meter_lag_is,
                 "zero_L_min": self.meter_zero_L_min,
             },
             "knee_window": list(self.knee_window),
-            "sides": {
-                "positive": {
-                    "tests": [test.to_document() for test in side.tests],
-                    "reference": {"dp_MPa": side.reference_dp_MPa, "u_min_V": side.u_min0_V},
-                    "k_x_max_over_u_max": side.k_x_max_over_u_max,
-                    "k_V_mm": side.k_V_mm,
-                    "trend": side.trend,
-                    "trend_change_V": side.trend_change_V,
-                    "trend_change_se_V": side.trend_change_se_V,
-                    "beta": {"dp_MPa": list(side.beta_dp_MPa), "beta": list(side.beta)},
-                    "valid_dp_MPa": list(valid) if valid else None,
-                    "certificate": {
-                        "confidence": side.confidence,
-                        "guard": side.guard,
-                        "level_L_min": side.level_L_min,
-                        "steps_V": list(side.certified_steps_V),
-                    },
-                    "active_constraints": list(side.active_constraints),
-                }
-            },
+            "sides": {name: side.to_document() for name, side in self.sides.items()},
+            "untested_sides": [name for name in SIDES if name not in self.sides],
             "warnings": [asdict(warning) for warning in self.warnings],
         }
         return _rounded(document)
@@ -263,6 +390,28 @@ def _rounded(value: Any) -> Any:
     return [_rounded(item) for item in value] if isinstance(value, list | tuple) else value
 
 
+def _side_from_document(side: dict[str, Any]) -> SideModel:
+    certificate = side["certificate"]
+    return SideModel(
+        tests=tuple(_test_from_document(test) for test in side["tests"]),
+        reference_dp_MPa=side["reference"]["dp_MPa"],
+        u_min0_V=side["reference"]["u_min_V"],
+        k_x_max_over_u_max=side["k_x_max_over_u_max"],
+        k_V_mm=side["k_V_mm"],
+        trend=side["trend"],
+        trend_change_V=side["trend_change_V"],
+        trend_change_se_V=side["trend_change_se_V"],
+        trend_p=side["trend_p"],
+        beta_dp_MPa=tuple(side["beta"]["dp_MPa"]),
+        beta=tuple(side["beta"]["beta"]),
+        confidence=certificate["confidence"],
+        guard=certificate["guard"],
+        level_L_min=certificate["level_L_min"],
+        certified_steps_V=tuple(certificate["steps_V"]),
+        active_constraints=tuple(side["active_constraints"]),
+    )
+
+
 def valve_from_document(content: bytes, source: str) -> ValveModel:
     """Read valve.json; a missing or misshapen key is named.
 
@@ -273,33 +422,18 @@ def valve_from_document(content: bytes, source: str) -> ValveModel:
     """
     document = parse_document(content, source, (SCHEMA,))
     check_shape(document, SHAPE, source, REMEDY)
+    for name in SIDES:
+        if name in document["sides"]:
+            check_shape(document, {"sides": {name: SIDE_SHAPE}}, source, REMEDY)
     try:
-        side = document["sides"]["positive"]
-        certificate = side["certificate"]
-        positive = SideModel(
-            tests=tuple(_test_from_document(test) for test in side["tests"]),
-            reference_dp_MPa=side["reference"]["dp_MPa"],
-            u_min0_V=side["reference"]["u_min_V"],
-            k_x_max_over_u_max=side["k_x_max_over_u_max"],
-            k_V_mm=side["k_V_mm"],
-            trend=side["trend"],
-            trend_change_V=side["trend_change_V"],
-            trend_change_se_V=side["trend_change_se_V"],
-            beta_dp_MPa=tuple(side["beta"]["dp_MPa"]),
-            beta=tuple(side["beta"]["beta"]),
-            confidence=certificate["confidence"],
-            guard=certificate["guard"],
-            level_L_min=certificate["level_L_min"],
-            certified_steps_V=tuple(certificate["steps_V"]),
-            active_constraints=tuple(side["active_constraints"]),
-        )
         return ValveModel(
             u_max_V=document["u_max_V"],
             meter_floor_L_min=document["meter"]["floor_L_min"],
             meter_lag_s=document["meter"]["lag_s"],
+            meter_lag_is=document["meter"]["lag_is"],
             meter_zero_L_min=document["meter"]["zero_L_min"],
             knee_window=tuple(document["knee_window"]),
-            positive=positive,
+            sides={name: _side_from_document(side) for name, side in document["sides"].items() if name in SIDES},
             warnings=tuple(
                 Warning_(**{key: item[key] for key in ("code", "text", "source")}) for item in document["warnings"]
             ),

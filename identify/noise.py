@@ -16,6 +16,8 @@ import numpy as np
 TERMS = 3
 #: Points on which the share of the noise that a parabola takes along is computed; a longer recording is scaled to them.
 POINTS = 400
+#: Lengths of the noise's memory that a recording must hold for its ends not to matter.
+SHORT_MEMORY = 100.0
 #: Steps of the bisection for the correlation, in the logarithm of 1 - r.
 BISECTIONS = 60
 #: Nearest to 1 that a correlation is followed.
@@ -104,11 +106,13 @@ def colour_factor(correlation: float, roughness: Roughness, sigma: float) -> flo
 
 def taken_by_parabola(correlation: float, n: int) -> float:
     """Return how many samples' worth of noise a parabola takes along: 3 of white noise, nearly n of slow."""
-    if correlation < 1 - 10 / POINTS:  # short memory: each parameter takes one sample's worth of the long-run variance
-        return min(TERMS * (1 + correlation) / (1 - correlation), n - 1.0)
+    if (1 - correlation) * n > SHORT_MEMORY:  # each parameter takes one sample's worth of the long-run variance
+        return TERMS * (1 + correlation) / (1 - correlation)
+    if correlation <= 0:
+        return float(min(TERMS, n))
     points = min(n, POINTS)
     rate = -float(np.log(correlation)) * n / points
-    return min(_taken(round(rate, 9), points) * n / points, n - 1.0)
+    return _taken(round(rate, 9), points) * n / points
 
 
 @lru_cache(maxsize=4096)

@@ -17,8 +17,8 @@ class IdentifyOptions:
         Reference pressure drop, Pa; None takes the test nearest to 1 MPa.
     meter_floor : float or None
         Flow below which the meter reads zero, m³/s; None finds it in the data.
-    meter_lag : float
-        Lag of the flow meter, s.
+    meter_lag : float or None
+        Lag of the flow meter, s; None finds it where ramps of two rates were recorded, and takes none otherwise.
     meter_zero : float
         Bound of the meter's zero error, m³/s, against which the certificate guards.
     x_max : float or None
@@ -28,16 +28,20 @@ class IdentifyOptions:
     knee_window : tuple of float
         Shares of the largest flow between which the characteristic is taken as straight. The lower edge is 12 %: on a
         bent characteristic the knee moves with it, on a straight one it does not matter.
+    flat_change : float
+        Change of the threshold over the tested range, as a share of u_max, that systematic errors may make: a smaller
+        one is no trend, however significant.
     """
 
     u_max: float = 10.0
     dp0: float | None = None
     meter_floor: float | None = None
-    meter_lag: float = 0.0
+    meter_lag: float | None = None
     meter_zero: float = 0.0
     x_max: float | None = None
     confidence: float = 0.99
     knee_window: tuple[float, float] = (0.12, 0.5)
+    flat_change: float = 1e-3
 
     def __post_init__(self) -> None:
         if not self.u_max > 0:
@@ -46,6 +50,8 @@ class IdentifyOptions:
             raise InputError(f"the confidence is {self.confidence}, expected 0.5 to below 1, such as 0.99")
         if not 0 < self.knee_window[0] < self.knee_window[1] <= 1:
             raise InputError(f"the knee window is {self.knee_window}, expected two rising shares such as '12-50 %'")
+        if not 0 <= self.flat_change < 1:
+            raise InputError(f"the change that counts as flat is {self.flat_change}, expected a share of u_max")
         for name in ("meter_floor", "meter_lag", "meter_zero"):
             if (getattr(self, name) or 0) < 0:
                 raise InputError(f"{name} is negative, expected zero or more")

@@ -1,5 +1,6 @@
 """Ramps at one pressure drop are one test, with more data: from one recording or from several, in any order."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -45,6 +46,11 @@ def pool_ramps(ramps: Sequence[Ramp]) -> list[PooledTest]:
     ramps : sequence of Ramp
         Of all recordings; where a pressure drop is unknown they are one test.
     """
+    return [_pooled(group) for group in group_by_pressure(ramps)]
+
+
+def group_by_pressure(ramps: Sequence[Ramp]) -> list[list[Ramp]]:
+    """Return ramps in groups of one pressure drop each, in the order of rising pressure drop."""
     groups: list[list[Ramp]] = []
     for ramp in sorted(ramps, key=lambda ramp: (ramp.dp or 0.0, ramp.test.source, ramp.number, ramp.test.sha256)):
         known = [other.dp or 0.0 for other in groups[-1]] if groups else []
@@ -52,9 +58,7 @@ def pool_ramps(ramps: Sequence[Ramp]) -> list[PooledTest]:
             groups[-1].append(ramp)
         else:
             groups.append([ramp])
-    return [
-        _pooled(sorted(group, key=lambda ramp: (ramp.test.source, ramp.test.sha256, ramp.number))) for group in groups
-    ]
+    return [sorted(group, key=lambda ramp: (ramp.test.source, ramp.test.sha256, ramp.number)) for group in groups]
 
 
 def _pooled(group: list[Ramp]) -> PooledTest:
@@ -87,7 +91,9 @@ def _joined(group: list[Ramp], rising: bool) -> Branch | None:
     if np.ptp(u) < 0.5 * max(branch.u.max() for ramp in group for branch in ramp.branches):
         return None
     dp = None if parts[0].dp is None else np.concatenate([part.dp for part in parts])
-    return Branch(rising=rising, u=u, q=q, dp=dp)
+    rates = np.array([part.rate for part in parts])
+    rate = float(np.nanmax(rates)) if np.isfinite(rates).any() else math.nan
+    return Branch(rising=rising, u=u, q=q, dp=dp, rate=rate)
 
 
 def _name(group: list[Ramp], every: bool = False) -> str:

@@ -1,24 +1,29 @@
 """The quality gate that speaks: what is weak in the data, with the numbers and what to do."""
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 
-from dzdesign.identify.model import SideModel, Warning_
+import numpy as np
+
+from dzdesign.identify.described_tests import L_MIN, DescribedTest, DescribedTests
+from dzdesign.identify.model import SideModel, TestResult, Warning_
+from dzdesign.identify.options import IdentifyOptions
 
 #: A softer edge than this share of u_max between knee and onset is said.
 SOFT_EDGE = 5e-3
+#: Shift of the knees by the meter's lag, over u_max, above which a tenth of it matters.
+LARGE_LAG = 1e-2
+#: Lag that a flow meter without a word about it may well have, s.
+LIKELY_LAG = 0.1
+#: Standard error of a knee, over u_max, above which the noise decides what the compensator gives up.
+NOISY = 2.5e-3
+#: Shares of the guarded threshold between which a leak inside the overlap is looked for, and its standard errors.
+OVERLAP, LEAK_SIGNIFICANCE = (0.6, 0.85), 5.0
+#: A leak below this share of the largest flow is not worth a word.
+LEAK_SHARE = 1e-3
 
 
 def find_warnings(
-    side: SideModel,
-    *,
-    floor_L_min: float,
-    u_max: float,
-    sag: Mapping[str, float],
-    u_top: Mapping[str, float],
-    u_bottom: Mapping[str, float],
-    zero_L_min: Mapping[str, float],
-    departure_V: Mapping[str, float],
-    declared: Collection[str] = (),
+    side: SideModel, group: DescribedTests, departure: np.ndarray, options: IdentifyOptions
 ) -> tuple[Warning_, ...]:
     """Return the warnings about one side.
 
@@ -26,29 +31,63 @@ def find_warnings(
     ----------
     side : SideModel
         What was identified.
-    floor_L_min : float
-        Meter floor.
-    u_max : float
-        Full command, V.
-    sag : mapping
-        Source -> share of the pressure drop lost at full command.
-    u_top, u_bottom : mapping
-        Source -> largest and smallest command, V.
-    zero_L_min : mapping
-        Source -> flow read at zero command, where it is not zero.
-    departure_V : mapping
-        Source -> departure of the knees from one direction with the pressure drop, where it is beyond their error.
-    declared : collection of str
-        Sources whose pressure drop is the engineer's word.
+    group : DescribedTests
+        What it was identified from.
+    departure : (T,) array
+        By how much each test's knees depart from one direction with the pressure drop, V; zero within their error.
+    options : IdentifyOptions
+        Choices of the engineer.
     """
     return (
-        *_about_the_meter(zero_L_min),
-        *_about_order(departure_V),
-        *_about_pressure(side, sag),
-        *_about_declarations(declared),
-        *_about_branches(side, u_max, u_top, u_bottom),
-        *_about_the_edge(side, floor_L_min, u_max),
+        *_about_the_meter(group.zero_L_min),
+        *_about_the_lag(group, options),
+        *_about_order(side, departure),
+        *_about_pressure(side, group.tests),
+        *_about_declarations(group.tests),
+        *_about_branches(side, group.tests, options.u_max),
+        *_about_noise(side, options.u_max),
+        *_about_the_edge(side, group, options.u_max),
     )
+
+
+def _about_the_lag(group: DescribedTests, options: IdentifyOptions) -> Iterator[Warning_]:
+    rates = [branch.rate for item in group.tests for branch in item.branches if branch and branch.rate > 0]
+    if not rates:
+        return
+    fastest, lag = max(rates), group.lag
+    if lag.origin == "unknown":
+        yield Warning_(
+            code="lag-unknown",
+            text=(
+                f"the flow meter's lag is not declared: {LIKELY_LAG:g} s of it moves the opening knee up and the "
+                f"closing knee down by {1e3 * fastest * LIKELY_LAG:.0f} mV at {fastest:.3g} V/s. Give --meter-lag, or "
+                "record one more ramp at another rate: two rates tell it"
+            ),
+            source=None,
+        )
+    elif fastest * lag.seconds > LARGE_LAG * options.u_max:
+        yield Warning_(
+            code="lag-large",
+            text=(
+                f"the meter's lag of {lag.seconds:.3g} s moves the knees by {1e3 * fastest * lag.seconds:.0f} mV at "
+                f"{fastest:.3g} V/s; a tenth of it wrong is {1e2 * fastest * lag.seconds:.0f} mV. Record slower ramps"
+            ),
+            source=None,
+        )
+
+
+def _about_noise(side: SideModel, u_max: float) -> Iterator[Warning_]:
+    for test in side.tests:
+        if test.u_knee_se_V > NOISY * u_max:
+            yield Warning_(
+                code="noise",
+                text=(
+                    f"a knee is known to {1e3 * test.u_knee_se_V:.0f} mV only (one standard error; noise "
+                    f"{test.noise_L_min:.3g} L/min, {test.noise_colour:.0f} times as harmful as white noise): its "
+                    "bound lies several times that lower. Record slower ramps, or repeat them"
+                ),
+                source=test.source,
+            )
 
 
 def _about_the_meter(zero_L_min: Mapping[str, float]) -> Iterator[Warning_]:
@@ -64,20 +103,25 @@ def _about_the_meter(zero_L_min: Mapping[str, float]) -> Iterator[Warning_]:
         )
 
 
-def _about_order(departure_V: Mapping[str, float]) -> Iterator[Warning_]:
-    for source, gap in departure_V.items():
-        yield Warning_(
-            code="not-monotone",
-            text=(
-                f"its knee departs by {1e3 * gap:.0f} mV from a threshold that runs one way with the pressure drop, on "
-                "which the certificate rests; all bounds are lowered by the departure. Repeat this test and its "
-                "neighbours"
-            ),
-            source=source,
-        )
+def _about_order(side: SideModel, departure: np.ndarray) -> Iterator[Warning_]:
+    for test, gap in zip(side.tests, departure, strict=True):
+        if gap > 0:
+            yield _not_monotone(test, float(gap))
 
 
-def _about_pressure(side: SideModel, sag: Mapping[str, float]) -> Iterator[Warning_]:
+def _not_monotone(test: TestResult, gap: float) -> Warning_:
+    return Warning_(
+        code="not-monotone",
+        text=(
+            f"its knee departs by {1e3 * gap:.0f} mV from a threshold that runs one way with the pressure drop, on "
+            "which the certificate rests; all bounds are lowered by the departure. Repeat this test and its "
+            "neighbours"
+        ),
+        source=test.source,
+    )
+
+
+def _about_pressure(side: SideModel, tests: tuple[DescribedTest, ...]) -> Iterator[Warning_]:
     if side.reference_dp_MPa is None:
         yield Warning_(
             code="no-pressure",
@@ -102,35 +146,44 @@ def _about_pressure(side: SideModel, sag: Mapping[str, float]) -> Iterator[Warni
             code="flat-trend",
             text=(
                 f"the threshold changes by {1e3 * side.trend_change_V:.1f} mV over the tested range (standard error "
-                f"{1e3 * side.trend_change_se_V:.1f} mV): too little to be called a trend, so beta is 1"
+                f"{1e3 * side.trend_change_se_V:.1f} mV, p = {side.trend_p:.2g}): too little to be called a trend, so "
+                "beta is 1. What systematic errors may make is set by --flat-below"
             ),
             source=None,
         )
-    for source, share in sag.items():
+    for item in tests:
+        share = _sag(item)
         if share > 1 / 3:
             yield Warning_(
                 code="pressure-sag",
                 text=f"the pressure drop sags by {share:.0%} at full command; a larger pump or accumulator would help",
-                source=source,
+                source=item.test.source,
             )
 
 
-def _about_declarations(declared: Collection[str]) -> Iterator[Warning_]:
-    for source in declared:
+def _sag(item: DescribedTest) -> float:
+    """Return the share of the pressure drop that is lost at full command."""
+    if item.dp is None:
+        return 0.0
+    return 1 - float(np.median(item.test.dp[item.test.u >= 0.97 * item.test.u.max()])) / item.dp
+
+
+def _about_declarations(tests: tuple[DescribedTest, ...]) -> Iterator[Warning_]:
+    for item in tests:
+        if not item.test.dp_is_declared:
+            continue
         yield Warning_(
             code="declared-pressure",
             text=(
                 "the pressure drop is declared, not recorded: if it sags under flow, the knee is found too low (21 mV "
                 "for 5 % on a 10 V valve like the example's). Record dP (or pA and pB)"
             ),
-            source=source,
+            source=item.test.source,
         )
 
 
-def _about_branches(
-    side: SideModel, u_max: float, u_top: Mapping[str, float], u_bottom: Mapping[str, float]
-) -> Iterator[Warning_]:
-    for test in side.tests:
+def _about_branches(side: SideModel, tests: tuple[DescribedTest, ...], u_max: float) -> Iterator[Warning_]:
+    for test, item in zip(side.tests, tests, strict=True):
         if test.u_knee_falling_V is None:
             yield Warning_(
                 code="one-branch",
@@ -155,19 +208,11 @@ def _about_branches(
                 ),
                 source=test.source,
             )
-        if u_top[test.source] < 0.97 * u_max:
+        top = float(item.test.u.max())
+        if top < 0.97 * u_max:
             yield Warning_(
                 code="not-full-command",
-                text=f"the command reaches {u_top[test.source]:.2f} V of {u_max:g} V, so k x_max is too small",
-                source=test.source,
-            )
-        if u_bottom[test.source] < -0.05 * u_max:
-            yield Warning_(
-                code="negative-side",
-                text=(
-                    f"the command goes down to {u_bottom[test.source]:.2f} V; this version identifies the positive "
-                    "side only, the negative side is missing from the result"
-                ),
+                text=f"the command reaches {top:.2f} V of {u_max:g} V, so k x_max is too small",
                 source=test.source,
             )
     if not any(test.saturates for test in side.tests):
@@ -181,17 +226,18 @@ def _about_branches(
         )
 
 
-def _about_the_edge(side: SideModel, floor_L_min: float, u_max: float) -> Iterator[Warning_]:
-    if floor_L_min > 0:
+def _about_the_edge(side: SideModel, group: DescribedTests, u_max: float) -> Iterator[Warning_]:
+    floor = group.floor / L_MIN
+    if floor > 0:
         yield Warning_(
             code="onset-hidden",
             text=(
-                f"the flow meter starts at {floor_L_min:.2f} L/min: a leak or a soft edge below that flow can't be "
-                "observed, and the certificate says nothing about it"
+                f"the flow meter starts at {floor:.2f} L/min: a leak or a soft edge below that flow can't be observed, "
+                "and the certificate says nothing about it"
             ),
             source=None,
         )
-    for test in side.tests:
+    for test, item in zip(side.tests, group.tests, strict=True):
         knee = test.u_knee_falling_V if test.u_knee_falling_V is not None else test.u_knee_rising_V
         if knee - test.u_guard_V > SOFT_EDGE * u_max:
             yield Warning_(
@@ -202,3 +248,26 @@ def _about_the_edge(side: SideModel, floor_L_min: float, u_max: float) -> Iterat
                 ),
                 source=test.source,
             )
+        leak = _leak_in_overlap(item, test.u_guard_V)
+        if leak > max(LEAK_SHARE * item.q_max, group.floor):
+            yield Warning_(
+                code="leak",
+                text=(
+                    f"{leak / L_MIN:.3g} L/min more flows at {OVERLAP[1]:.0%} of the threshold than near zero: a leak "
+                    "inside the overlap, which the compensator's offset lets through at zero command"
+                ),
+                source=test.source,
+            )
+
+
+def _leak_in_overlap(item: DescribedTest, threshold: float) -> float:
+    """Return by how much the flow inside the overlap exceeds that near zero, m³/s; zero within its error."""
+    branch = item.branches[1] or item.branches[0]
+    near_zero = branch.q[branch.u < 0.3 * threshold]
+    inside = branch.q[(branch.u > OVERLAP[0] * threshold) & (branch.u < OVERLAP[1] * threshold)]
+    if min(near_zero.size, inside.size) < 20:
+        return 0.0
+    blocks = [np.array([block.mean() for block in np.array_split(part, 8)]) for part in (near_zero, inside)]
+    gap = float(np.median(blocks[1]) - np.median(blocks[0]))
+    error = float(np.sqrt(sum(np.var(means, ddof=1) / means.size for means in blocks)))
+    return gap if gap > LEAK_SIGNIFICANCE * error else 0.0

@@ -7,6 +7,7 @@ more than `TWO_PRESSURES` apart is two ramps. A sweep of a few samples, or much 
 the jump back of a saw-tooth and no branch. Which ramps are one test is said by their pressure drops: see `pooling`.
 """
 
+import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -150,7 +151,17 @@ def _branch(test: RampTest, u: np.ndarray, known: np.ndarray, rows: slice, direc
     mine = np.zeros(u.size, dtype=bool)
     mine[rows] = True
     mine &= known & (u >= 0)
-    return Branch(rising=direction > 0, u=u[mine], q=test.q[mine], dp=None if test.dp is None else test.dp[mine])
+    dp = None if test.dp is None else test.dp[mine]
+    return Branch(rising=direction > 0, u=u[mine], q=test.q[mine], dp=dp, rate=_rate(test.time[mine], u[mine]))
+
+
+def _rate(time: np.ndarray, u: np.ndarray) -> float:
+    """Return the pace of the command between the holds of a sweep, V/s; NaN if it can't be told."""
+    if u.size < SWEEP_SAMPLES:
+        return math.nan
+    middle = (u > u.min() + 0.1 * np.ptp(u)) & (u < u.max() - 0.1 * np.ptp(u))
+    seconds = float(np.ptp(time[middle])) if middle.sum() > 1 else 0.0
+    return float(np.ptp(u[middle])) / seconds if seconds > 0 else math.nan
 
 
 def _cut(u: np.ndarray, dp: np.ndarray | None, turn: int, direction: np.ndarray) -> int:

@@ -98,7 +98,8 @@ def test_generated_files_carry_the_hash_of_their_compensator_and_no_date(example
 
 def test_names_from_users_do_not_reach_the_c(example_valve):
     tests = tuple(dataclasses.replace(test, source='*/ #error "x" \n.csv') for test in example_valve.positive.tests)
-    hostile = dataclasses.replace(example_valve, positive=dataclasses.replace(example_valve.positive, tests=tests))
+    side = dataclasses.replace(example_valve.positive, tests=tests)
+    hostile = dataclasses.replace(example_valve, sides={"positive": side})
     firmware = generate(design(hostile), "f28335")
     for name, text in firmware.files.items():
         assert name == "compensator.json" or '#error "x"' not in text

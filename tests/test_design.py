@@ -101,7 +101,7 @@ def test_a_valve_file_that_contradicts_itself_is_refused(example_valve):
     side = example_valve.positive
     greedy = dataclasses.replace(side, u_min0_V=side.u_min0_V + 0.02)
     with pytest.raises(RequirementError, match="above the threshold's lower bound"):
-        design(dataclasses.replace(example_valve, positive=greedy))
+        design(dataclasses.replace(example_valve, sides={"positive": greedy}))
 
 
 def test_span_must_reach_the_tested_pressures(example_valve):
@@ -112,7 +112,7 @@ def test_span_must_reach_the_tested_pressures(example_valve):
 def test_a_law_that_would_fall_with_command_is_refused(example_valve):
     side = dataclasses.replace(example_valve.positive, k_x_max_over_u_max=1e-4, beta=(1.5, 1.5, 1.4, 1.4, 1.4, 1.4))
     with pytest.raises((InputError, RequirementError)):
-        design(dataclasses.replace(example_valve, positive=side))
+        design(dataclasses.replace(example_valve, sides={"positive": side}))
 
 
 def test_loss_against_the_certified_curve_is_small(example_valve, example_compensator):

@@ -228,9 +228,25 @@ class TestParts:
         assert np.all(np.interp(dense, dp, ceiling) <= 5 + sign * 0.1 * shape(dense) + 1e-12)
 
     def test_a_small_change_is_flat_however_significant(self):
+        dp, small = np.array([1.0, 2.0, 3.0]) * MPA, np.array([5.0, 4.997, 4.994])
+        trend = find_trend(dp, small, np.full(3, 1e-5), 10.0, 0.01)
+        assert trend.direction == "flat" and trend.p_value < 1e-9
+        assert find_trend(dp, small, np.full(3, 1e-5), 10.0, 0.005).direction == "decreasing"
+        assert find_trend(dp, np.array([5.0, 4.98, 4.96]), np.full(3, 1e-3), 10.0, 0.01).direction == "decreasing"
+
+    def test_a_change_within_the_noise_is_flat_however_large(self):
         dp = np.array([1.0, 2.0, 3.0]) * MPA
-        assert find_trend(dp, np.array([5.0, 4.997, 4.994]), np.full(3, 1e-5), 10.0)[0] == "flat"
-        assert find_trend(dp, np.array([5.0, 4.98, 4.96]), np.full(3, 1e-3), 10.0)[0] == "decreasing"
+        trend = find_trend(dp, np.array([5.0, 5.02, 5.06]), np.full(3, 0.03), 10.0, 0.01)
+        assert trend.direction == "flat" and 0.05 < trend.p_value < 0.5
+
+    def test_flat_valves_are_rarely_given_a_trend(self):
+        rng = np.random.default_rng(20261121)
+        dp = np.linspace(0.5, 5, 6) * MPA
+        found = [
+            find_trend(dp, 5 + 0.02 * rng.standard_normal(6), np.full(6, 0.02), 10.0, 0.0).direction != "flat"
+            for _ in range(2000)
+        ]
+        assert sum(found) <= 20 + 4 * 20**0.5
 
     def test_refusals_say_why(self):
         shut = synthetic_ramp(1.0, Truth(knee_rising=20.0))
