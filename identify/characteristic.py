@@ -24,6 +24,8 @@ from dzdesign.identify.straight_part import (
 USEFUL_FLOW = 0.005
 #: Standard deviations of a shut reading above which a single reading is flow.
 NOISE_LEVEL = 3.0
+#: Standard deviations of a shut reading above which the mean of a bin is flow.
+FIRST_SEEN = 5.0
 #: The tail runs from the first flow seen to this multiple of it.
 TAIL = 3.0
 #: Fewest samples in the tail for a line.
@@ -36,11 +38,11 @@ ABOVE_LEVEL = 1.5
 
 @dataclass(frozen=True, slots=True)
 class Tail:
-    """What the meter sees of the edge: a line through the first flows.
+    """What the meter sees of the edge: a line through the first flows that count.
 
     Attributes
     ----------
-    onset, onset_se : float
+    zero, zero_se : float
         Its zero and the standard error, V.
     slope : float
         m³/(s V).
@@ -48,8 +50,8 @@ class Tail:
         Command at which it reaches the flow that counts as flow, and the standard error, V.
     """
 
-    onset: float
-    onset_se: float
+    zero: float
+    zero_se: float
     slope: float
     at_level: float
     at_level_se: float
@@ -78,7 +80,9 @@ class BranchShape:
     level : float
         Flow that counts as flow, m³/s: the meter's floor, its noise or `USEFUL_FLOW`, whichever is largest.
     tail : Tail
-        The first flows seen.
+        The first flows that count.
+    onset, onset_se : float
+        Where the valve opens (or closes), as far as the meter shows it, and the standard error, V.
     saturates : bool
         True if the flow at full command lies clearly below the straight line.
     outliers : int
@@ -95,6 +99,8 @@ class BranchShape:
     window: tuple[float, float]
     level: float
     tail: Tail
+    onset: float
+    onset_se: float
     saturates: bool
     outliers: int
 
@@ -138,6 +144,8 @@ def _describe(
     read: ReadBranch, line: GatedLine, level: float, noise: float, correlation: float, u_max: float
 ) -> BranchShape:
     branch = read.branch
+    tail = _find_tail(read, level, line.slope, noise, correlation)
+    onset, onset_se = _find_onset(read, tail, level, noise)
     return BranchShape(
         rising=branch.rising,
         bins=bin_branch(branch.u[line.kept], read.y[line.kept], line.censored[line.kept], u_max),
@@ -148,7 +156,9 @@ def _describe(
         colour=line.colour,
         window=line.window,
         level=level,
-        tail=_find_tail(read, level, line.slope, noise, correlation),
+        tail=tail,
+        onset=onset,
+        onset_se=onset_se,
         saturates=read.y_max < 0.93 * line.slope * (branch.u.max() - line.knee),
         outliers=line.outliers,
     )
@@ -199,6 +209,21 @@ def _quiet_noise(branch: Branch, y: np.ndarray, knee: float) -> float:
     return 1.4826 * float(np.median(np.abs(shut - np.median(shut)))) if shut.size >= 5 else 0.0
 
 
+def _find_onset(read: ReadBranch, tail: Tail, level: float, noise: float) -> tuple[float, float]:
+    """Return where flow starts and the standard error, V: the first flow seen, or the tail's zero if that is lower.
+
+    Of a noisy meter the first flow seen comes late, and the tail tells more; a quiet one shows flows far too small to
+    count, below the tail. Of a meter whose noise is not seen, as in a table, nothing less than what counts is flow.
+    """
+    least = max(read.floor, FIRST_SEEN * noise) if noise > 0 else level
+    u, y = read.profile
+    first = crossing(u, y, least)
+    if first >= tail.zero:
+        return tail.zero, tail.zero_se
+    at = int(np.clip(np.searchsorted(u, first), 1, u.size - 1))
+    return first, float(u[at] - u[at - 1])
+
+
 def _find_tail(read: ReadBranch, level: float, slope: float, noise: float, correlation: float) -> Tail:
     """Extrapolate the first flow seen to zero: the valve opens (or closes) no later than this, as far as can be seen.
 
@@ -229,4 +254,5 @@ def _find_tail(read: ReadBranch, level: float, slope: float, noise: float, corre
     width = max(last - first, gap)
     chord = (TAIL - 1) * level / width
     error = gap + noise / chord
-    return Tail(first - level / chord, error, chord, first, error)
+    # At the level before, less flows than counts, so the zero is not below it.
+    return Tail(max(first - level / chord, float(profile[0][at - 1])), error, chord, first, error)

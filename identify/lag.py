@@ -21,6 +21,10 @@ from dzdesign.identify.straight_part import lay_line, read_branch
 TWO_RATES = 1.5
 #: Standard errors that a lag must exceed to be believed.
 LAG_SIGNIFICANCE = 3.0
+#: A lag known no better than this, s, is not known.
+USELESS = 0.1
+#: A sweep that comes to this share of the largest command shows the knee.
+FULL_SWEEP = 0.95
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,9 +62,10 @@ def find_lag(ramps: Sequence[Ramp], options: IdentifyOptions) -> MeterLag:
             pace = (rates - np.average(rates, weights=weight)) * (1 if rising else -1)
             total += float(np.sum(weight * pace**2))
             weighted += float(np.sum(weight * pace * knees))
-    if total == 0:
+    se = 1 / math.sqrt(total) if total > 0 else math.inf
+    if se > USELESS:
         return MeterLag(0.0, math.nan, "unknown")
-    seconds, se = weighted / total, 1 / math.sqrt(total)
+    seconds = weighted / total
     # Below its error there may be none; the error counts in the bounds either way.
     return MeterLag(seconds if seconds > LAG_SIGNIFICANCE * se else 0.0, se, "identified")
 
@@ -69,9 +74,11 @@ def _knees(group: Sequence[Ramp], rising: bool, options: IdentifyOptions) -> tup
     """Return rate (V/s), knee and its standard error (V) of each ramp's branch of one direction; without those that
     show no knee by themselves."""
     found = []
+    highest = max((branch.u.max() for ramp in group for branch in ramp.branches), default=0.0)
     for ramp in group:
         for branch in ramp.branches:
-            if branch.rising is not rising or not math.isfinite(branch.rate):
+            whole = branch.u.max() >= FULL_SWEEP * highest and np.ptp(branch.u) >= FULL_SWEEP * highest
+            if branch.rising is not rising or not math.isfinite(branch.rate) or not whole:
                 continue
             y = at_nominal_pressure(branch, nominal_dp(ramp.test))
             floor = options.meter_floor or 0.0

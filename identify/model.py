@@ -74,7 +74,8 @@ class BranchResult:
     level_V, level_se_V : float
         Where the flow passes what counts as flow.
     onset_V, onset_se_V : float
-        The tail above that flow extrapolated to zero.
+        Where the valve opens (or closes) as far as the meter shows it: the first flow that stands out of its noise, or
+        the tail (the first flow that counts, to three times it) extrapolated to zero, whichever is lower.
     straight : tuple of float
         Flows between which the characteristic was found straight, over the largest flow.
     """
@@ -93,8 +94,8 @@ class TestResult:
     """One ramp test: flows in L/min, pressure drop in MPa, None where it is not known.
 
     ``rising`` and ``falling`` are its branches, None where there is none; ``not_observable`` says of thresholds, by
-    their key, why the meter can't show them. ``u_guard_V`` is the threshold that the certificate protects (the lower of
-    knee and onset on the guarded branch), ``u_guard_lower_V`` its lower confidence bound. ``ramps`` names each ramp.
+    their key, why the meter can't show them. ``u_guard_V`` is the threshold that the certificate protects (on the
+    guarded branch the knee, or the tail's zero where the edge is soft), ``u_guard_lower_V`` its lower confidence bound. ``ramps`` names each ramp.
     """
 
     __test__ = False  # not a test case, whatever its name

@@ -20,8 +20,8 @@ POINTS = 400
 SHORT_MEMORY = 100.0
 #: Steps of the bisection for the correlation, in the logarithm of 1 - r.
 BISECTIONS = 60
-#: Nearest to 1 that a correlation is followed.
-SMALLEST_RATE = 1e-6
+#: Noise is followed up to a memory of the longest recording over this: slower, it can't be told from a bend.
+LONGEST_MEMORY = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,9 +74,10 @@ def shared_correlation(roughness: Sequence[Roughness]) -> float:
 
     if excess(1.0) <= 0:
         return 0.0
-    low, high = np.log(SMALLEST_RATE), 0.0
-    if excess(SMALLEST_RATE) >= 0:
-        return 1 - SMALLEST_RATE
+    slowest = LONGEST_MEMORY / max(item.n for item in measured)
+    if excess(slowest) >= 0:
+        return 1 - slowest
+    low, high = np.log(slowest), 0.0
     for _ in range(BISECTIONS):
         middle = (low + high) / 2
         low, high = (low, middle) if excess(float(np.exp(middle))) > 0 else (middle, high)

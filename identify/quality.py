@@ -8,7 +8,7 @@ from dzdesign.identify.described_tests import L_MIN, DescribedTest, DescribedTes
 from dzdesign.identify.model import SideModel, TestResult, Warning_
 from dzdesign.identify.options import IdentifyOptions
 
-#: A softer edge than this share of u_max between knee and onset is said.
+#: A softer edge than this share of u_max between knee and the tail's zero is said.
 SOFT_EDGE = 5e-3
 #: Shift of the knees by the meter's lag, over u_max, above which a tenth of it matters.
 LARGE_LAG = 1e-2
@@ -244,7 +244,7 @@ def _about_the_edge(side: SideModel, group: DescribedTests, u_max: float) -> Ite
                 code="soft-edge",
                 text=(
                     f"flow is seen {1e3 * (knee - test.u_guard_V):.0f} mV below the knee: the edge is soft, and the "
-                    "onset is guarded instead of the knee, at the price of that much residual dead zone"
+                    "tail's zero is guarded instead of the knee, at the price of that much residual dead zone"
                 ),
                 source=test.source,
             )

@@ -17,7 +17,7 @@ from dzdesign.identify.ramp_files import RampTest
 
 #: dP0 names the tested pressure drop within this share of it.
 REFERENCE_TOLERANCE = 0.1
-#: Standard errors by which the onset must lie below the knee to be taken for a soft edge.
+#: Standard errors by which the tail's zero must lie below the knee to be taken for a soft edge.
 SOFT_SIGNIFICANCE = 2.0
 #: Standard errors of a lag that was found, against which the bounds guard.
 LAG_ERRORS = 3.0
@@ -103,26 +103,26 @@ class _Guarded:
 
 
 def _guard(group: DescribedTests, knees: KneeFit, departure: np.ndarray, options: IdentifyOptions) -> _Guarded:
-    """Bound the knee, or the onset where that lies below the knee by more than its error: a soft edge."""
+    """Bound the knee, or the tail's zero where that lies below the knee by more than its error: a soft edge."""
     described = group.tests
     column = _guarded_column(described)
     shapes = [item.shapes[column] for item in described]
     knee, knee_se = knees.knee[:, column], knees.knee_se[:, column]
-    onset = np.array([shape.tail.onset for shape in shapes])
-    onset_se = np.array([shape.tail.onset_se for shape in shapes])
+    zero = np.array([shape.tail.zero for shape in shapes])
+    zero_se = np.array([shape.tail.zero_se for shape in shapes])
     shared = departure.max() + _lag_budget(group, column)
     # A zero error of the meter moves each zero by the error over the slope of the line that was extrapolated.
     knee_budget = shared + np.array([options.meter_zero / shape.slope for shape in shapes])
-    onset_budget = shared + np.array([options.meter_zero / shape.tail.slope for shape in shapes])
+    zero_budget = shared + np.array([options.meter_zero / shape.tail.slope for shape in shapes])
     # A soft edge passes flow below the knee. Where the tail agrees with the knee's line, that line is all there is.
-    soft = knee - onset > SOFT_SIGNIFICANCE * np.hypot(knee_se, onset_se)
+    soft = knee - zero > SOFT_SIGNIFICANCE * np.hypot(knee_se, zero_se)
     knee_bound = lower_bounds(knee, knee_se, options.confidence, knee_budget)
-    onset_bound = lower_bounds(onset, onset_se, options.confidence, onset_budget)
+    zero_bound = lower_bounds(zero, zero_se, options.confidence, zero_budget)
     return _Guarded(
         "closing" if column else "opening",
-        np.where(soft, onset, knee),
-        np.where(soft, onset_se, knee_se),
-        np.where(soft, np.minimum(knee_bound, onset_bound), knee_bound),
+        np.where(soft, zero, knee),
+        np.where(soft, zero_se, knee_se),
+        np.where(soft, np.minimum(knee_bound, zero_bound), knee_bound),
     )
 
 
@@ -216,8 +216,8 @@ def _branch_result(group: DescribedTests, knees: KneeFit, row: int, column: int)
         knee_se_V=float(knees.knee_se[row, column]),
         level_V=shape.tail.at_level,
         level_se_V=shape.tail.at_level_se,
-        onset_V=shape.tail.onset,
-        onset_se_V=shape.tail.onset_se,
+        onset_V=shape.onset,
+        onset_se_V=shape.onset_se,
         straight=shape.window,
     )
 

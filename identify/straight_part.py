@@ -19,6 +19,8 @@ from dzdesign.identify.profile import crossing, flow_at_top, smooth_profile
 
 #: A sample further than this many robust standard deviations from the line is an outlier.
 GATE = 6.0
+#: Fewest samples for a line through noise; with fewer it goes from level to level.
+FEWEST = 5
 #: Noise below this share of the largest flow is not believed: no meter is that fine.
 FINEST_NOISE = 1e-5
 #: Blocks into which the residuals in time order are cut, to see how coloured the noise is.
@@ -146,7 +148,11 @@ def lay_line(read: ReadBranch, window: tuple[float, float], correlation: float =
     branch, y, floor = read.branch, read.y, read.floor
     u_low, u_high = (crossing(*read.profile, share * read.y_max) for share in window)
     inside = (branch.u >= u_low) & (branch.u <= u_high)
-    if inside.sum() < 5 or not u_high > u_low:
+    if inside.sum() < FEWEST and u_high > u_low:
+        chord = _chord(read, window)
+        if chord is not None:
+            return chord
+    if inside.sum() < FEWEST or not u_high > u_low:
         raise InputError(
             f"'{read.source}': only {inside.sum()} samples lie between {window[0]:.0%} and {window[1]:.0%} of the "
             "largest flow, expected at least 5; record a slower ramp or more levels"
@@ -183,6 +189,45 @@ def lay_line(read: ReadBranch, window: tuple[float, float], correlation: float =
         outliers=int((inside & ~kept).sum()),
     )
     return line.coloured(correlation)
+
+
+def _chord(read: ReadBranch, window: tuple[float, float]) -> GatedLine | None:
+    """Return the line from the last level below a window to the first above it: all that a table of few levels tells.
+
+    The zero is known to one level of the command, and its error is said to be that.
+    """
+    u, y = read.profile
+    order = np.argsort(u)
+    u, y = u[order], y[order]
+    above = int(np.searchsorted(u, crossing(u, y, window[0] * read.y_max)))
+    beyond = int(np.searchsorted(u, crossing(u, y, window[1] * read.y_max)))
+    if not 0 < above <= beyond < u.size:
+        return None
+    levels = slice(above - 1, beyond + 1)
+    slope, knee = fit_line(u[levels], y[levels])
+    step = float(np.diff(u[levels]).max())
+    if slope <= 0 or not u[above - 1] - step <= knee <= u[beyond]:
+        return None
+    kept = (read.branch.u >= u[above - 1]) & (read.branch.u <= u[beyond])
+    censored = kept & (read.branch.q < 0.5 * read.floor)
+    seen = kept & ~censored
+    u_seen = read.branch.u[seen]
+    if u_seen.size < 2 or np.ptp(u_seen) == 0:
+        return None
+    lever = 1 / u_seen.size + (u_seen.mean() - knee) ** 2 / np.sum((u_seen - u_seen.mean()) ** 2)
+    return GatedLine(
+        window=window,
+        slope=slope,
+        knee=knee,
+        lever=lever,
+        sigma=slope * step / math.sqrt(lever),
+        block_colour=1.0,
+        colour=1.0,
+        kept=kept,
+        censored=censored,
+        roughness=Roughness(0, 0.0, 0.0),
+        outliers=0,
+    )
 
 
 def widest_straight(
