@@ -95,7 +95,8 @@ class TestResult:
 
     ``rising`` and ``falling`` are its branches, None where there is none; ``not_observable`` says of thresholds, by
     their key, why the meter can't show them. ``u_guard_V`` is the threshold that the certificate protects (on the
-    guarded branch the knee, or the tail's zero where the edge is soft), ``u_guard_lower_V`` its lower confidence bound. ``ramps`` names each ramp.
+    guarded branch the knee, or the tail's zero where the edge is soft), ``u_guard_lower_V`` its lower confidence bound.
+    ``ramps`` names each ramp.
     """
 
     __test__ = False  # not a test case, whatever its name
