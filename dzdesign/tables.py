@@ -93,8 +93,8 @@ def _side_lines(side: "SideModel") -> tuple[str, ...]:
     at = "" if side.reference_dp_MPa is None else f" at dP0 = {side.reference_dp_MPa:.3f} MPa"
     return (
         f"bound: {side.confidence:.0%} lower bound, for all tests together, of the {side.guard} threshold (the knee, "
-        f"or the tail's zero where the edge is soft); flow below {side.level_L_min:.2f} L/min (meter's floor, its noise, or 0.5 % of the "
-        "largest flow) counts as none",
+        f"or the tail's zero where the edge is soft); flow below {side.level_L_min:.2f} L/min (meter's floor, its "
+        "noise, or 0.5 % of the largest flow) counts as none",
         f"u_min0 = {side.u_min0_V:.4f} V{at}: the law's offset. Between two tests only the lower of their bounds is "
         "certain, so each offset stays under the neighbour's; more tests raise it",
         f"k x_max/u_max = {side.k_x_max_over_u_max:.4f}"
