@@ -14,7 +14,8 @@ if TYPE_CHECKING:
 #: A constraint is active when its slack is below this share of u_max.
 ACTIVE = 1e-7
 IPOPT = {"ipopt.print_level": 0, "print_time": False, "ipopt.sb": "yes", "ipopt.tol": 1e-8, "ipopt.max_iter": 300}
-QRQP = {"print_iter": False, "print_header": False, "print_time": False, "error_on_fail": False}
+#: For a convex problem of a few unknowns in mV: to a millionth of a microvolt, and no bound overstepped.
+EXACT = {"ipopt.tol": 1e-12, "ipopt.bound_relax_factor": 0.0, "ipopt.mu_strategy": "adaptive"}
 #: No test outweighs another by more than this, however quiet its meter was.
 LARGEST_WEIGHT = 1e4
 
@@ -90,7 +91,8 @@ def fit_knees(
     constraints, names = [], []
     for row, column in where:
         if trend != "flat" and column == ordered and (row + 1, column) in position:
-            step = knee_of[row + 1, column] - knee_of[row, column]
+            # In mV: the solver may overstep a constraint by a hundred-millionth of its unit.
+            step = (knee_of[row + 1, column] - knee_of[row, column]) * u_max * 1e3
             constraints.append(step if trend == "increasing" else -step)
             names.append(f"{'falling' if column else 'rising'} knee of test {row + 1} to {row + 2}")
     variables = ca.vertcat(slopes, knees)
@@ -115,7 +117,7 @@ def fit_knees(
         knee=knee,
         knee_se=knee_se,
         slope=slope,
-        active=tuple(name for name, gap in zip(names, slack, strict=True) if gap < ACTIVE),
+        active=tuple(name for name, gap in zip(names, slack, strict=True) if gap < ACTIVE * u_max * 1e3),
         iterations=int(solver.stats()["iter_count"]),
     )
 
@@ -140,7 +142,7 @@ def _branch_cost(shape: BranchShape, slope: "ca.MX", knee: "ca.MX", floor: float
     cost = (ca.sum1(ca.DM(bins.n) * miss**2) - 2 * line * c_uy + line**2 * c_uu) / 2
     cut = bins.censored > 0
     if cut.any():
-        depth = floor / shape.sigma - line * (ca.DM(bins.u_all[cut] / u_max) - knee)
+        depth = floor / shape.sigma - line * (ca.DM(bins.u_censored[cut] / u_max) - knee)
         below = (1 + ca.erf(depth / np.sqrt(2))) / 2
         cost -= ca.sum1(ca.DM(bins.censored[cut]) * ca.log(ca.fmax(below, 1e-300)))
     return cost
@@ -192,20 +194,24 @@ def fit_offset(
         )
     size = guard.size
     # In the offset itself, o = beta u_min0, the problem is a convex quadratic programme; beta(dP0) = 1 then makes
-    # u_min0 the offset at the reference. The unknown is what the offset gives up under its ceiling, in units of u_max.
+    # u_min0 the offset at the reference. The unknown is what the offset gives up under its ceiling, in mV.
+    lowest = float(ceiling.min())
     given_up = ca.MX.sym("given_up", size)
-    offset = ca.DM(ceiling / u_max) - given_up
+    offset = ca.DM((ceiling - lowest) * 1e3) - given_up
     weight = np.clip((guard_se.max() / guard_se) ** 2, 1, LARGEST_WEIGHT)
-    cost = ca.sum1(ca.DM(weight) * (ca.DM(guard / u_max) - offset) ** 2)
+    cost = ca.sum1(ca.DM(weight / weight.max()) * (ca.DM((guard - lowest) * 1e3) - offset) ** 2)
     step = offset[1:] - offset[:-1] if size > 1 else ca.MX(0, 1)
     low, high = {"decreasing": (-np.inf, 0.0), "increasing": (0.0, np.inf), "flat": (0.0, 0.0)}[trend]
-    solver = ca.qpsol("offset", "qrqp", {"x": given_up, "f": cost, "g": step}, QRQP)
-    solution = solver(x0=0.0, lbx=0.0, lbg=low, ubg=high)
-    if not solver.stats()["success"]:
+    # Not CasADi's qrqp: where ceilings are equal, it may call a curve solved that runs both ways.
+    solver = ca.nlpsol("offset", "ipopt", {"x": given_up, "f": cost, "g": step}, IPOPT | EXACT)
+    solution = solver(x0=0.1, lbx=0.0, lbg=low, ubg=high)
+    slack = np.asarray(solution["x"]).ravel() / 1e3
+    slack = np.where(slack < ACTIVE * u_max, 0.0, slack)
+    found = ceiling - slack
+    wrong_way = {"decreasing": np.diff(found), "increasing": -np.diff(found), "flat": np.abs(np.diff(found))}[trend]
+    if not solver.stats()["success"] or np.any(wrong_way > 2 * ACTIVE * u_max):
         raise InputError(
             f"beta(dP) could not be fitted under its bounds ({solver.stats()['return_status']}); "
             "check that the ramp tests belong to one valve"
         )
-    slack = np.maximum(np.asarray(solution["x"]).ravel(), 0.0)
-    found = ceiling - slack * u_max
-    return OffsetFit(u_min0=float(found[reference]), beta=found / found[reference], active=slack < ACTIVE)
+    return OffsetFit(u_min0=float(found[reference]), beta=found / found[reference], active=slack == 0)
