@@ -140,7 +140,7 @@ def _design(valve_path: Path, content: bytes, args: argparse.Namespace) -> "Comp
 
     from dzdesign.design.designing import DesignOptions, design
     from dzdesign.design.signals import Signals
-    from dzdesign.identify.model import valve_from_document
+    from dzdesign.identify.valve_file import valve_from_document
 
     span_MPa = Fraction(round(parse_quantity(args.pressure_span or "20 MPa", "pressure", "--pressure-span")), 10**6)
     signals = Signals(pressure_span_MPa=span_MPa)
