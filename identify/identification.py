@@ -55,7 +55,7 @@ def identify(tests: Sequence[RampTest], options: IdentifyOptions | None = None) 
         meter_zero_L_min=options.meter_zero / L_MIN,
         knee_window=options.knee_window,
         positive=side,
-        warnings=_warnings(described, side, departure, group.zero_L_min, floor, options),
+        warnings=_warnings(tests, described, side, departure, group.zero_L_min, floor, options),
         made_from=tuple(dict.fromkeys(file for item in described for file in item.files)),
     )
 
@@ -201,6 +201,7 @@ def _test_result(item: DescribedTest, knees: KneeFit, row: int, guard: float, bo
 
 
 def _warnings(
+    tests: Sequence[RampTest],
     described: tuple[DescribedTest, ...],
     side: SideModel,
     departure: np.ndarray,
@@ -224,5 +225,6 @@ def _warnings(
         u_bottom=bottom,
         zero_L_min=zero_of,
         declared=[item.test.source for item in described if item.test.dp_is_declared],
+        thinned=[test for test in tests if test.run > 1],
         departure_V={item.test.source: float(gap) for item, gap in zip(described, departure, strict=True) if gap > 0},
     )

@@ -3,6 +3,7 @@
 from collections.abc import Collection, Iterator, Mapping
 
 from dzdesign.identify.model import SideModel, Warning_
+from dzdesign.identify.ramp_files import RampTest
 
 #: A softer edge than this share of u_max between knee and onset is said.
 SOFT_EDGE = 5e-3
@@ -19,6 +20,7 @@ def find_warnings(
     zero_L_min: Mapping[str, float],
     departure_V: Mapping[str, float],
     declared: Collection[str] = (),
+    thinned: Collection[RampTest] = (),
 ) -> tuple[Warning_, ...]:
     """Return the warnings about one side.
 
@@ -40,8 +42,11 @@ def find_warnings(
         Source -> departure of the knees from one direction with the pressure drop, where it is beyond their error.
     declared : collection of str
         Sources whose pressure drop is the engineer's word.
+    thinned : collection of RampTest
+        Recordings that were too long to be kept row by row.
     """
     return (
+        *_about_length(thinned),
         *_about_the_meter(zero_L_min),
         *_about_order(departure_V),
         *_about_pressure(side, sag),
@@ -49,6 +54,19 @@ def find_warnings(
         *_about_branches(side, u_max, u_top, u_bottom),
         *_about_the_edge(side, floor_L_min, u_max),
     )
+
+
+def _about_length(thinned: Collection[RampTest]) -> Iterator[Warning_]:
+    for test in thinned:
+        yield Warning_(
+            code="thinned",
+            text=(
+                f"of {test.rows_read} rows every {test.run} in a row were averaged, without their spikes, to "
+                f"{test.time.size} samples, to which noise and outliers refer. The next one may be recorded at a lower "
+                "rate"
+            ),
+            source=test.source,
+        )
 
 
 def _about_the_meter(zero_L_min: Mapping[str, float]) -> Iterator[Warning_]:
