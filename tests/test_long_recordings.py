@@ -108,6 +108,14 @@ def test_no_flow_between_zero_and_the_floor_is_made_up(noise, monkeypatch):
     assert not between.any() and (test.q == 0).any()
 
 
+def test_means_of_all_rows_would_make_one_up(monkeypatch):
+    """The check above, checked."""
+    monkeypatch.setattr(thinning, "MOST_ROWS", LIMIT)
+    monkeypatch.setattr(thinning, "_typical", lambda windows, *_: np.ones(windows.shape, dtype=bool))
+    test = thinned(with_true_floor(long_ramp(noise=0.02)))
+    assert np.any((test.q > 1e-3 * L_MIN) & (test.q < (1.2 - 1e-9) * L_MIN))
+
+
 def test_a_sweep_faster_than_its_runs_is_not_smeared(monkeypatch):
     monkeypatch.setattr(thinning, "MOST_ROWS", 500)
     up = np.linspace(0, 10, 1000)
