@@ -2,13 +2,14 @@
 
 import contextlib
 import hashlib
+import io
 import json
 import os
 import shutil
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from dzdesign import __version__
 from dzdesign.core.errors import InputError
@@ -23,10 +24,39 @@ def sha256_of(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
+def sha256_of_file(file: BinaryIO) -> str:
+    """Return the SHA-256 of a whole file in hex, read piece by piece; the file is at its beginning again then."""
+    file.seek(0)
+    digest = hashlib.file_digest(file, "sha256").hexdigest()
+    file.seek(0)
+    return digest
+
+
 def read_bytes(path: Path, what: str) -> bytes:
     """Read a whole file, or say in one sentence why it can't be read."""
-    try:
+    with _refusing(path, what):
         return Path(path).read_bytes()
+
+
+@contextlib.contextmanager
+def open_bytes(path: Path, what: str) -> Iterator[BinaryIO]:
+    """Open a file that may be larger than memory; or say in one sentence why it can't be read.
+
+    What is no regular file, such as a pipe, can be read only once, and is held in memory.
+    """
+    with _refusing(path, what):
+        file = open(path, "rb") if os.path.isfile(path) else io.BytesIO(Path(path).read_bytes())  # noqa: SIM115
+    with file:
+        try:
+            yield file
+        except OSError as error:  # a disk that fails, a share that is gone
+            raise InputError(f"{what} '{path}' can't be read: {error.strerror or error}") from error
+
+
+@contextlib.contextmanager
+def _refusing(path: Path, what: str) -> Iterator[None]:
+    try:
+        yield
     except (FileNotFoundError, NotADirectoryError) as error:
         raise InputError(f"{what} '{path}' does not exist; check the name and the folder") from error
     except OSError as error:
