@@ -62,6 +62,8 @@ class BranchShape:
         True if the flow at full command lies clearly below the straight line.
     outliers : int
         Samples gated out of the window.
+    read, line : ReadBranch, GatedLine
+        The samples that all this was read from, and which of them the line rests on.
     """
 
     rising: bool
@@ -78,6 +80,8 @@ class BranchShape:
     onset_slope: float
     saturates: bool
     outliers: int
+    read: ReadBranch
+    line: GatedLine
 
 
 def describe_branches(reads: Sequence[ReadBranch], *, u_max: float, window: tuple[float, float]) -> list[BranchShape]:
@@ -135,6 +139,8 @@ def _describe(
         onset_slope=onset_slope,
         saturates=read.y_max < 0.93 * line.slope * (branch.u.max() - line.knee),
         outliers=line.outliers,
+        read=read,
+        line=line,
     )
 
 

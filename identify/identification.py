@@ -1,6 +1,7 @@
 """`identify`: ramp tests in, `ValveModel` out. Reads as the pipeline: describe, fit, bound, the law's offset."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,6 +20,15 @@ REFERENCE_TOLERANCE = 0.1
 SOFT_SIGNIFICANCE = 2.0
 #: dP0 of the paper, taken where the user names none: the test nearest to it.
 PAPER_DP0 = 1 * MPA
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Identification:
+    """A valve, and what it was identified from: `described` and the rows of `knees` are in the order of its tests."""
+
+    valve: ValveModel
+    described: tuple[DescribedTest, ...]
+    knees: KneeFit
 
 
 def identify(tests: Sequence[RampTest], options: IdentifyOptions | None = None) -> ValveModel:
@@ -42,13 +52,31 @@ def identify(tests: Sequence[RampTest], options: IdentifyOptions | None = None) 
     InputError
         Where no threshold can be given, with the reason.
     """
+    return identify_traceably(tests, options).valve
+
+
+def identify_traceably(tests: Sequence[RampTest], options: IdentifyOptions | None = None) -> Identification:
+    """Identify a valve as `identify` does, and return beside it the described tests and the fit of their knees.
+
+    Parameters
+    ----------
+    tests : sequence of RampTest
+        Recordings, in any order.
+    options : IdentifyOptions, optional
+        Choices of the engineer.
+
+    Raises
+    ------
+    InputError
+        Where no threshold can be given, with the reason.
+    """
     options = options or IdentifyOptions()
     group = describe_tests(tests, options)
     described, floor = group.tests, group.floor
     trend, change, change_se, knees, departure = _fit_with_trend(described, floor, options)
     side = _side_model(described, knees, departure, (trend, change, change_se), options)
     u_max = options.u_max
-    return ValveModel(
+    valve = ValveModel(
         u_max_V=u_max,
         meter_floor_L_min=floor / L_MIN,
         meter_lag_s=options.meter_lag,
@@ -58,6 +86,7 @@ def identify(tests: Sequence[RampTest], options: IdentifyOptions | None = None) 
         warnings=_warnings(described, side, departure, group.zero_L_min, floor, options),
         made_from=tuple(dict.fromkeys(file for item in described for file in item.files)),
     )
+    return Identification(valve=valve, described=described, knees=knees)
 
 
 def _fit_with_trend(

@@ -96,8 +96,9 @@ class GatedLine:
         Standard deviation of one sample about the line, m³/s.
     block_colour, colour : float
         Long-run variance over variance of one sample: as the residuals show it, and with what is known of the noise.
-    kept, censored : (N,) bool array
-        Samples of the branch that the line rests on, and those of them that read below the meter's floor.
+    inside, kept, censored : (N,) bool array
+        Samples of the branch between the two flows, those of them that the line rests on, and those of them that read
+        below the meter's floor.
     roughness : Roughness
         Of the residuals.
     outliers : int
@@ -111,6 +112,7 @@ class GatedLine:
     sigma: float
     block_colour: float
     colour: float
+    inside: np.ndarray
     kept: np.ndarray
     censored: np.ndarray
     roughness: Roughness
@@ -177,6 +179,7 @@ def lay_line(read: ReadBranch, window: tuple[float, float], correlation: float =
         sigma=sigma,
         block_colour=block_colour,
         colour=block_colour,
+        inside=inside,
         kept=kept,
         censored=censored,
         roughness=measure_roughness(u_seen, residual),
