@@ -42,11 +42,12 @@ def identify(tests: Sequence[RampTest], options: IdentifyOptions | None = None) 
     InputError
         Where no threshold can be given, with the reason.
     """
-    return identify_sides(tests, options or IdentifyOptions()).model
+    return identify_sides(tests, options).model
 
 
-def identify_sides(tests: Sequence[RampTest], options: IdentifyOptions) -> Identified:
-    """Identify a valve, and keep what it was found from; see `identify`."""
+def identify_sides(tests: Sequence[RampTest], options: IdentifyOptions | None = None) -> Identified:
+    """Identify a valve as `identify` does, and return beside it what each side was found from."""
+    options = options or IdentifyOptions()
     if not tests:
         raise InputError("no ramp tests were given; expected at least one file")
     sides: dict[str, IdentifiedSide] = {}
