@@ -127,21 +127,29 @@ def describe_branches(reads: Sequence[ReadBranch], *, u_max: float, window: tupl
         If a window holds too few samples for a line.
     """
     narrow = [lay_line(read, window) for read in reads]
-    correlation = shared_correlation([line.roughness for line in narrow])
-    narrow = [line.coloured(correlation) for line in narrow]
+    correlation, blocks = _shared_noise(narrow)
+    narrow = [line.coloured(correlation, blocks) for line in narrow]
     noises = [_quiet_noise(read.branch, read.y, line.knee) for read, line in zip(reads, narrow, strict=True)]
     levels = [
         max(read.floor, USEFUL_FLOW * read.y_max, NOISE_LEVEL * noise)
         for read, noise in zip(reads, noises, strict=True)
     ]
     lowest = [ABOVE_LEVEL * level / read.y_max for read, level in zip(reads, levels, strict=True)]
-    lines = widest_straight(reads, narrow, lowest, correlation, LARGEST_SHIFT * u_max)
+    lines = widest_straight(reads, narrow, lowest, correlation, blocks, LARGEST_SHIFT * u_max)
     # The wider windows know the noise better.
-    correlation = shared_correlation([line.roughness for line in lines])
+    correlation, blocks = _shared_noise(lines)
     return [
-        _describe(read, line.coloured(correlation), level, noise, correlation, u_max)
+        _describe(read, line.coloured(correlation, blocks), level, noise, correlation, u_max)
         for read, line, level, noise in zip(reads, lines, levels, noises, strict=True)
     ]
+
+
+def _shared_noise(lines: Sequence[GatedLine]) -> tuple[float, float]:
+    """Return the correlation of neighbouring samples and the mean colour of blocks, by all branches together."""
+    correlation = shared_correlation([line.roughness for line in lines])
+    # A branch that stands out has a bend in it; the middle half is of the noise.
+    colours = np.sort([line.block_colour for line in lines])
+    return correlation, float(colours[colours.size // 4 : colours.size - colours.size // 4].mean())
 
 
 def _describe(

@@ -17,8 +17,9 @@ from dzdesign.identify.ramp_files import RampTest
 
 #: dP0 names the tested pressure drop within this share of it.
 REFERENCE_TOLERANCE = 0.1
-#: Standard errors by which the tail's zero must lie below the knee to be taken for a soft edge.
-SOFT_SIGNIFICANCE = 2.0
+#: Standard errors by which the tail's zero must lie below the knee, in one test or in all together, to be taken for a
+#: soft edge.
+SOFT_SIGNIFICANCE = 3.0
 #: Standard errors of a lag that was found, against which the bounds guard.
 LAG_ERRORS = 3.0
 #: dP0 of the paper, taken where the user names none: the test nearest to it.
@@ -115,7 +116,10 @@ def _guard(group: DescribedTests, knees: KneeFit, departure: np.ndarray, options
     knee_budget = shared + np.array([options.meter_zero / shape.slope for shape in shapes])
     zero_budget = shared + np.array([options.meter_zero / shape.tail.slope for shape in shapes])
     # A soft edge passes flow below the knee. Where the tail agrees with the knee's line, that line is all there is.
-    soft = knee - zero > SOFT_SIGNIFICANCE * np.hypot(knee_se, zero_se)
+    gap, error = knee - zero, np.hypot(knee_se, zero_se)
+    # One edge has passed the flow of all tests, so together they show a softness that none shows alone.
+    together = np.sum(gap / error**2) > SOFT_SIGNIFICANCE * math.sqrt(np.sum(error**-2))
+    soft = (gap > SOFT_SIGNIFICANCE * error) | (together & (gap > 0))
     knee_bound = lower_bounds(knee, knee_se, options.confidence, knee_budget)
     zero_bound = lower_bounds(zero, zero_se, options.confidence, zero_budget)
     return _Guarded(

@@ -25,6 +25,8 @@ FEWEST = 5
 FINEST_NOISE = 1e-5
 #: Blocks into which the residuals in time order are cut, to see how coloured the noise is.
 BLOCKS = 16
+#: A branch's own colour counts if it is so many times the mean of all: 99.9 % of those of one noise are below it.
+STANDS_OUT = 2.6
 #: Upper ends to which the window is widened while the characteristic goes on straight, over the largest flow. Not 1:
 #: where the ramp turns, the meter lags behind in a curve.
 WIDER = (0.65, 0.8, 0.9, 0.98)
@@ -125,13 +127,23 @@ class GatedLine:
         """Standard error of the zero, V."""
         return self.sigma * math.sqrt(self.lever * self.colour) / self.slope
 
-    def coloured(self, correlation: float) -> "GatedLine":
-        """Return the same line with errors for noise of this correlation between neighbouring samples."""
+    def coloured(self, correlation: float, blocks: float) -> "GatedLine":
+        """Return the same line with errors for the noise that all branches share.
+
+        Parameters
+        ----------
+        correlation : float
+            Between neighbouring samples.
+        blocks : float
+            Mean of all branches' `block_colour`. A branch's own, from few blocks, counts where it stands out of that:
+            then it has more than noise in it.
+        """
         known = colour_factor(correlation, self.roughness, self.sigma)
-        return replace(self, colour=max(self.block_colour, known))
+        own = self.block_colour if self.block_colour > STANDS_OUT * blocks else 1.0
+        return replace(self, colour=max(own, blocks, known))
 
 
-def lay_line(read: ReadBranch, window: tuple[float, float], correlation: float = 0.0) -> GatedLine:
+def lay_line(read: ReadBranch, window: tuple[float, float]) -> GatedLine:
     """Lay a line through the samples between two shares of the largest flow.
 
     Parameters
@@ -139,8 +151,6 @@ def lay_line(read: ReadBranch, window: tuple[float, float], correlation: float =
     read : ReadBranch
     window : tuple of float
         Shares of the largest flow.
-    correlation : float
-        Of the noise in neighbouring samples.
 
     Raises
     ------
@@ -177,7 +187,7 @@ def lay_line(read: ReadBranch, window: tuple[float, float], correlation: float =
     residual = y[seen] - slope * (u_seen - knee)
     sigma = max(float(np.sqrt(np.sum(residual**2) / max(u_seen.size - 2, 1))), finest)
     block_colour = colour_of_blocks(residual, sigma)
-    line = GatedLine(
+    return GatedLine(
         window=window,
         slope=slope,
         knee=knee,
@@ -191,7 +201,6 @@ def lay_line(read: ReadBranch, window: tuple[float, float], correlation: float =
         roughness=measure_roughness(u_seen, residual),
         outliers=int((inside & ~kept).sum()),
     )
-    return line.coloured(correlation)
 
 
 def _chord(read: ReadBranch, window: tuple[float, float]) -> GatedLine | None:
@@ -239,6 +248,7 @@ def widest_straight(
     narrow: Sequence[GatedLine],
     lowest: Sequence[float],
     correlation: float,
+    blocks: float,
     largest_shift: float,
 ) -> list[GatedLine]:
     """Widen the windows of all branches, upwards and then down, as far as the characteristic goes on straight.
@@ -246,11 +256,11 @@ def widest_straight(
     Parameters
     ----------
     reads, narrow : sequence
-        All branches of a valve, and the line through each in the narrow window.
+        All branches of a valve, and the line through each in the narrow window, its errors as `coloured` gives them.
     lowest : sequence of float
         Share of the largest flow to which each branch's window may reach down.
-    correlation : float
-        Of the noise in neighbouring samples.
+    correlation, blocks : float
+        What all branches share of the noise: see `GatedLine.coloured`.
     largest_shift : float
         Departure of a zero beyond which a branch stops, whatever its errors, V.
     """
@@ -261,7 +271,7 @@ def widest_straight(
         if windows is None:  # down, from wherever the upper end has come to
             open_ = {index for index, line in enumerate(narrow) if lowest[index] < line.window[0]}
             windows = [(low, lines[-1].window[1]) for low, lines in zip(lowest, accepted, strict=True)]
-        wider = {index: lay_line(reads[index], windows[index], correlation) for index in open_}
+        wider = {index: lay_line(reads[index], windows[index]).coloured(correlation, blocks) for index in open_}
         open_ = _going_on(accepted, wider, largest_shift)
         for index in open_:
             accepted[index].append(wider[index])
