@@ -195,7 +195,8 @@ def fit_offset(
     # u_min0 the offset at the reference. The unknown is what the offset gives up under its ceiling, in units of u_max.
     given_up = ca.MX.sym("given_up", size)
     offset = ca.DM(ceiling / u_max) - given_up
-    weight = np.clip((guard_se.max() / guard_se) ** 2, 1, LARGEST_WEIGHT)
+    largest = max(float(guard_se.max()), np.finfo(float).tiny)  # an exact table has no errors
+    weight = (largest / np.maximum(guard_se, largest / np.sqrt(LARGEST_WEIGHT))) ** 2
     cost = ca.sum1(ca.DM(weight) * (ca.DM(guard / u_max) - offset) ** 2)
     step = offset[1:] - offset[:-1] if size > 1 else ca.MX(0, 1)
     low, high = {"decreasing": (-np.inf, 0.0), "increasing": (0.0, np.inf), "flat": (0.0, 0.0)}[trend]
