@@ -44,8 +44,8 @@ class Bins:
         Sums of squares and products about the means.
     censored : (B,) array
         Samples in the bin that read below the meter's floor; they are not in the other sums.
-    u_all : (B,) array
-        Mean command of all samples, the censored ones too.
+    u_censored : (B,) array
+        Mean command of those: they are the lower ones of a bin through which the flow comes to the floor.
     """
 
     n: np.ndarray
@@ -55,7 +55,7 @@ class Bins:
     c_uy: np.ndarray
     c_yy: np.ndarray
     censored: np.ndarray
-    u_all: np.ndarray
+    u_censored: np.ndarray
 
 
 def bin_branch(u: np.ndarray, y: np.ndarray, censored: np.ndarray, u_max: float) -> Bins:
@@ -78,9 +78,7 @@ def bin_branch(u: np.ndarray, y: np.ndarray, censored: np.ndarray, u_max: float)
         return np.bincount(index[where], weights=weight[where], minlength=size)
 
     seen = ~censored
-    everything = np.ones_like(seen)
-    n = total(np.ones_like(u), seen)
-    n_all = total(np.ones_like(u), everything)
+    n, n_censored = (total(np.ones_like(u), where) for where in (seen, censored))
     safe = np.maximum(n, 1)
     u_mean, y_mean = total(u, seen) / safe, total(y, seen) / safe
     du, dy = u - u_mean[index], y - y_mean[index]
@@ -91,6 +89,6 @@ def bin_branch(u: np.ndarray, y: np.ndarray, censored: np.ndarray, u_max: float)
         c_uu=total(du * du, seen),
         c_uy=total(du * dy, seen),
         c_yy=total(dy * dy, seen),
-        censored=n_all - n,
-        u_all=total(u, everything) / n_all,
+        censored=n_censored,
+        u_censored=total(u, censored) / np.maximum(n_censored, 1),
     )
