@@ -16,7 +16,7 @@ test: lint
 lint: $(STAMP)
 	$(BIN)/ruff check .
 
-# Under an hour on one core; `make bench-identify BENCH=--quick` takes three minutes.
+# Some three hours of one core, on all that there are; `make bench-identify BENCH=--quick` takes minutes.
 bench-identify: $(VENV)/.bench
 	$(BIN)/python benchmarks/identify/run.py $(BENCH)
 

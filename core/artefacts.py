@@ -2,13 +2,14 @@
 
 import contextlib
 import hashlib
+import io
 import json
 import os
 import shutil
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from dzdesign import __version__
 from dzdesign.core.errors import InputError
@@ -23,10 +24,39 @@ def sha256_of(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
+def sha256_of_file(file: BinaryIO) -> str:
+    """Return the SHA-256 of a whole file in hex, read piece by piece; the file is at its beginning again then."""
+    file.seek(0)
+    digest = hashlib.file_digest(file, "sha256").hexdigest()
+    file.seek(0)
+    return digest
+
+
 def read_bytes(path: Path, what: str) -> bytes:
     """Read a whole file, or say in one sentence why it can't be read."""
-    try:
+    with _refusing(path, what):
         return Path(path).read_bytes()
+
+
+@contextlib.contextmanager
+def open_bytes(path: Path, what: str) -> Iterator[BinaryIO]:
+    """Open a file that may be larger than memory; or say in one sentence why it can't be read.
+
+    What is no regular file, such as a pipe, can be read only once, and is held in memory.
+    """
+    with _refusing(path, what):
+        file = open(path, "rb") if os.path.isfile(path) else io.BytesIO(Path(path).read_bytes())  # noqa: SIM115
+    with file:
+        try:
+            yield file
+        except OSError as error:  # a disk that fails, a share that is gone
+            raise InputError(f"{what} '{path}' can't be read: {error.strerror or error}") from error
+
+
+@contextlib.contextmanager
+def _refusing(path: Path, what: str) -> Iterator[None]:
+    try:
+        yield
     except (FileNotFoundError, NotADirectoryError) as error:
         raise InputError(f"{what} '{path}' does not exist; check the name and the folder") from error
     except OSError as error:
@@ -73,29 +103,81 @@ def _family(schema: object) -> str:
     return str(schema).partition("/")[0]
 
 
-def check_file_may_be_written(path: Path, schema: str | None = None) -> None:
+def check_place_of_files(folder: Path, option: str) -> None:
+    """Refuse a folder in which files can't be made, before the work whose results they are.
+
+    Parameters
+    ----------
+    folder : Path
+        Where files are to be added to whatever is there; it may still be missing.
+    option : str
+        By which the folder was named, for the message.
+    """
+    folder = Path(folder)
+    try:
+        with contextlib.suppress(FileNotFoundError, NotADirectoryError):
+            os.lstat(folder)  # a name that can't be one, or too long
+        nearest = next(one for one in (folder, *folder.absolute().parents) if os.path.lexists(one))
+        reason = None if nearest.is_dir() else "is no folder"
+        if reason is None and not os.access(nearest, os.W_OK | os.X_OK):
+            reason = "is a folder that can't be written into"
+    except (OSError, ValueError) as error:
+        raise InputError(f"'{folder}' can't be written into: {_reason(error)}; choose another {option}") from error
+    if reason:
+        raise InputError(f"'{nearest}' {reason}, expected a folder for files; choose another {option}")
+
+
+def write_files(folder: Path, files: Mapping[str, bytes], option: str) -> None:
+    """Add files to a folder, which is made if missing; each is written whole or not at all, over one of its name.
+
+    Parameters
+    ----------
+    folder : Path
+        Where they go.
+    files : mapping
+        Name to content.
+    option : str
+        By which the folder was named, for the message.
+    """
+    check_place_of_files(folder, option)
+    try:
+        Path(folder).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"'{folder}' can't be made: {_reason(error)}; choose another {option}") from error
+    for name, content in files.items():
+        write_file(Path(folder) / name, content, option=option)
+
+
+def check_file_may_be_written(path: Path, schema: str | None = None, option: str = "-o") -> None:
     """Refuse to write over what is no regular file or, where the schema is given, no earlier artefact of its kind.
 
-    `identify -o *.csv` names a measurement as its output; a measurement is not to be had again.
+    `identify -o *.csv` names a measurement as its output; a measurement is not to be had again. `option` is the one by
+    which the place was named, for the message.
     """
     path = Path(path)
     try:
         if path.is_dir():
-            raise InputError(f"'{path}' is a folder, expected the name of a file to write; choose another with -o")
+            raise InputError(
+                f"'{path}' is a folder, expected the name of a file to write; choose another with {option}"
+            )
         if not path.exists():
             if not path.absolute().parent.is_dir():
-                raise InputError(f"'{path}' can't be written: its folder does not exist; make it, or choose another -o")
+                raise InputError(
+                    f"'{path}' can't be written: its folder does not exist; make it, or choose another {option}"
+                )
             return
         if not path.is_file():
-            raise InputError(f"'{path}' is a device or a pipe, expected a file to write; choose another name with -o")
+            raise InputError(
+                f"'{path}' is a device or a pipe, expected a file to write; choose another name with {option}"
+            )
         if schema is None or path.stat().st_size == 0:
             return
         document = _json_object(path)
     except (OSError, ValueError) as error:
-        raise InputError(f"'{path}' can't be written: {_reason(error)}; choose another place with -o") from error
+        raise InputError(f"'{path}' can't be written: {_reason(error)}; choose another place with {option}") from error
     if document is None or _family(document.get("schema")) != _family(schema):
         raise InputError(
-            f"'{path}' exists and is no {schema} of dzdesign, so it is left alone; choose another name with -o"
+            f"'{path}' exists and is no {schema} of dzdesign, so it is left alone; choose another name with {option}"
         )
 
 
@@ -103,7 +185,7 @@ def _reason(error: OSError | ValueError) -> str:
     return getattr(error, "strerror", None) or str(error)
 
 
-def write_file(path: Path, content: str | bytes, schema: str | None = None) -> None:
+def write_file(path: Path, content: str | bytes, schema: str | None = None, option: str = "-o") -> None:
     """Write a file whole or not at all: a temporary file beside it, then one rename.
 
     Parameters
@@ -114,6 +196,8 @@ def write_file(path: Path, content: str | bytes, schema: str | None = None) -> N
         Text is written in UTF-8.
     schema : str, optional
         Of a JSON artefact: an existing file of another kind is left alone.
+    option : str
+        By which the place was named, for the message.
 
     Raises
     ------
@@ -122,7 +206,7 @@ def write_file(path: Path, content: str | bytes, schema: str | None = None) -> N
     """
     path = Path(path)
     data = content.encode() if isinstance(content, str) else content
-    check_file_may_be_written(path, schema)
+    check_file_may_be_written(path, schema, option)
     temporary = None
     try:
         with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as handle:
@@ -134,7 +218,7 @@ def write_file(path: Path, content: str | bytes, schema: str | None = None) -> N
         os.replace(temporary, path)
         temporary = None
     except (OSError, ValueError) as error:
-        raise InputError(f"'{path}' can't be written: {_reason(error)}; choose another place with -o") from error
+        raise InputError(f"'{path}' can't be written: {_reason(error)}; choose another place with {option}") from error
     finally:  # an interrupt, too, leaves no half-written file behind
         if temporary:
             Path(temporary).unlink(missing_ok=True)

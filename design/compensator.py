@@ -12,7 +12,7 @@ from dzdesign.core.shape import Exactly, Number, check_shape
 from dzdesign.derivation.law import law
 from dzdesign.derivation.scaling import drive, evaluate_line
 from dzdesign.design.signals import Signals
-from dzdesign.identify.model import valve_from_document
+from dzdesign.identify.valve_file import valve_from_document
 
 SCHEMA = "dzdesign.compensator/1"
 REMEDY = "make it again with `dzdesign design`"

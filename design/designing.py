@@ -15,7 +15,8 @@ from dzdesign.design.beta_table import (
 )
 from dzdesign.design.compensator import Certificate, Compensator
 from dzdesign.design.signals import Signals
-from dzdesign.identify.model import SideModel, ValveModel, valve_from_document
+from dzdesign.identify.model import SideModel, ValveModel
+from dzdesign.identify.valve_file import valve_from_document
 
 #: k x_max/u_max and u_min0/u_max are integers over this: finer than half a PWM count of 60 000.
 COEFFICIENT_DENOMINATOR = 1 << 16

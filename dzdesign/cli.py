@@ -80,6 +80,12 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
             _given("--meter-zero", default="0 L/min", metavar="Q", help="bound of the meter's zero error"),
             _given("--x-max", metavar="X", help='stroke, such as "1.8 mm": gives k in V/mm'),
             _given("--confidence", default="0.99", metavar="C", help="of all lower bounds together"),
+            _given(
+                "--plots",
+                metavar="DIR",
+                help="also draw, as SVG and PNG in this folder: each pressure drop's flow with its knees, onsets and "
+                "residuals; thresholds, bounds and beta over dP",
+            ),
             _given("--knee-window", default="12-50", metavar="A-B", help="per cent of the largest flow, straight"),
             _given(
                 "--flat-below",

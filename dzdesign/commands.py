@@ -12,10 +12,12 @@ from dzdesign.core.artefacts import (
     TOOL,
     check_file_may_be_written,
     check_folder_may_be_written,
+    check_place_of_files,
     parse_document,
     read_bytes,
     to_json,
     write_file,
+    write_files,
     write_folder,
 )
 from dzdesign.core.errors import InputError, nearest
@@ -94,10 +96,21 @@ def _refuse_copies(tests: list["RampTest"]) -> None:  # noqa: F821
         known[test.sha256] = test.source
 
 
+def _check_plots(folder: str | None, output: Path) -> None:
+    """Refuse a folder for plots that can't be one, or in whose place the output goes."""
+    if folder is None:
+        return
+    if not folder:
+        raise InputError("--plots is empty, expected the name of a folder, such as plots")
+    check_place_of_files(Path(folder), "--plots")
+    if output.absolute() in (Path(folder).absolute(), *Path(folder).absolute().parents):
+        raise InputError(f"--plots '{folder}' lies at '{output}', where -o puts a file; choose another --plots")
+
+
 def run_identify(args: argparse.Namespace) -> int:
     """Identify a valve from ramp tests."""
     from dzdesign.identify.column_labels import parse_columns
-    from dzdesign.identify.identification import identify
+    from dzdesign.identify.identification import identify_sides
     from dzdesign.identify.model import SCHEMA
     from dzdesign.identify.options import IdentifyOptions
     from dzdesign.identify.ramp_files import read_ramp_file
@@ -116,6 +129,7 @@ def run_identify(args: argparse.Namespace) -> int:
         flat_change=_number(args.flat_below, "--flat-below", "0.1") / 100,
     )
     check_file_may_be_written(Path(args.output), SCHEMA)
+    _check_plots(args.plots, Path(args.output))
     columns = parse_columns(args.columns) if args.columns else {}
     tests = [
         read_ramp_file(path, u_max, columns=columns, dp=_declared_dp(path, args.dp))
@@ -124,14 +138,19 @@ def run_identify(args: argparse.Namespace) -> int:
     _refuse_copies(tests)
     _refuse_unnamed(tests, args.dp)
     say(f"fitting {len(tests)} recording{'s' if len(tests) > 1 else ''}")
-    valve = identify(tests, options)
-    document = valve.to_document()
+    found = identify_sides(tests, options)
+    document = found.model.to_document()
     write_file(Path(args.output), to_json(document), SCHEMA)
+    if args.plots:
+        from dzdesign.identify.plots import plot_files
+
+        say("drawing")
+        write_files(Path(args.plots), plot_files(found), "--plots")
     if args.json:
         print(to_json(document), end="")
     else:
-        print_valve(valve)
-        print(f"Written: {args.output}")
+        print_valve(found.model)
+        print(f"Written: {args.output}" + (f", plots in {args.plots}" if args.plots else ""))
     return 0
 
 
@@ -140,7 +159,7 @@ def _design(valve_path: Path, content: bytes, args: argparse.Namespace) -> "Comp
 
     from dzdesign.design.designing import DesignOptions, design
     from dzdesign.design.signals import Signals
-    from dzdesign.identify.model import valve_from_document
+    from dzdesign.identify.valve_file import valve_from_document
 
     span_MPa = Fraction(round(parse_quantity(args.pressure_span or "20 MPa", "pressure", "--pressure-span")), 10**6)
     signals = Signals(pressure_span_MPa=span_MPa)

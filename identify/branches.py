@@ -45,7 +45,7 @@ class Bins:
     censored : (B,) array
         Samples in the bin that read below the meter's floor; they are not in the other sums.
     u_censored : (B,) array
-        Mean command of those: they are the lower ones of a bin through which the flow comes to the floor.
+        Mean command of the censored samples; 0 where there are none.
     """
 
     n: np.ndarray
@@ -78,7 +78,7 @@ def bin_branch(u: np.ndarray, y: np.ndarray, censored: np.ndarray, u_max: float)
         return np.bincount(index[where], weights=weight[where], minlength=size)
 
     seen = ~censored
-    n, n_censored = (total(np.ones_like(u), where) for where in (seen, censored))
+    n, cut = total(np.ones_like(u), seen), total(np.ones_like(u), censored)
     safe = np.maximum(n, 1)
     u_mean, y_mean = total(u, seen) / safe, total(y, seen) / safe
     du, dy = u - u_mean[index], y - y_mean[index]
@@ -89,6 +89,6 @@ def bin_branch(u: np.ndarray, y: np.ndarray, censored: np.ndarray, u_max: float)
         c_uu=total(du * du, seen),
         c_uy=total(du * dy, seen),
         c_yy=total(dy * dy, seen),
-        censored=n_censored,
-        u_censored=total(u, censored) / np.maximum(n_censored, 1),
+        censored=cut,
+        u_censored=total(u, censored) / np.maximum(cut, 1),
     )

@@ -87,6 +87,8 @@ class BranchShape:
         True if the flow at full command lies clearly below the straight line.
     outliers : int
         Samples gated out of the window.
+    read, line : ReadBranch, GatedLine
+        The samples that all this was read from, and which of them the line rests on.
     """
 
     rising: bool
@@ -103,6 +105,8 @@ class BranchShape:
     onset_se: float
     saturates: bool
     outliers: int
+    read: ReadBranch
+    line: GatedLine
 
 
 def describe_branches(reads: Sequence[ReadBranch], *, u_max: float, window: tuple[float, float]) -> list[BranchShape]:
@@ -161,6 +165,8 @@ def _describe(
         onset_se=onset_se,
         saturates=read.y_max < 0.93 * line.slope * (branch.u.max() - line.knee),
         outliers=line.outliers,
+        read=read,
+        line=line,
     )
 
 

@@ -7,6 +7,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.identify.described_tests import L_MIN
 from dzdesign.identify.model import SIDES, ValveModel, Warning_
 from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.quality import about_thinning
 from dzdesign.identify.ramp_files import RampTest
 from dzdesign.identify.side import IdentifiedSide, identify_side
 from dzdesign.identify.sides import tests_of_side
@@ -41,15 +42,16 @@ def identify(tests: Sequence[RampTest], options: IdentifyOptions | None = None) 
     InputError
         Where no threshold can be given, with the reason.
     """
-    return identify_sides(tests, options or IdentifyOptions()).model
+    return identify_sides(tests, options).model
 
 
-def identify_sides(tests: Sequence[RampTest], options: IdentifyOptions) -> Identified:
-    """Identify a valve, and keep what it was found from; see `identify`."""
+def identify_sides(tests: Sequence[RampTest], options: IdentifyOptions | None = None) -> Identified:
+    """Identify a valve as `identify` does, and return beside it what each side was found from."""
+    options = options or IdentifyOptions()
     if not tests:
         raise InputError("no ramp tests were given; expected at least one file")
     sides: dict[str, IdentifiedSide] = {}
-    warnings: list[Warning_] = []
+    warnings: list[Warning_] = list(about_thinning(tests))
     for name, sign in SIDES.items():
         mine = tests_of_side(tests, sign, options.u_max)
         if not mine:

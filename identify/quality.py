@@ -1,12 +1,13 @@
 """The quality gate that speaks: what is weak in the data, with the numbers and what to do."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from dzdesign.identify.described_tests import L_MIN, DescribedTest, DescribedTests
 from dzdesign.identify.model import SideModel, TestResult, Warning_
 from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.ramp_files import RampTest
 
 #: A softer edge than this share of u_max between knee and the tail's zero is said.
 SOFT_EDGE = 5e-3
@@ -48,6 +49,21 @@ def find_warnings(
         *_about_noise(side, options.u_max),
         *_about_the_edge(side, group, options.u_max),
     )
+
+
+def about_thinning(tests: Sequence[RampTest]) -> Iterator[Warning_]:
+    """Yield a warning for each recording that was too long to be kept row by row."""
+    for test in tests:
+        if test.run > 1:
+            yield Warning_(
+                code="thinned",
+                text=(
+                    f"of {test.rows_read} rows every {test.run} in a row were averaged, without their spikes, to "
+                    f"{test.time.size} samples, to which noise and outliers refer. The next one may be recorded at a "
+                    "lower rate"
+                ),
+                source=test.source,
+            )
 
 
 def _about_the_lag(group: DescribedTests, options: IdentifyOptions) -> Iterator[Warning_]:

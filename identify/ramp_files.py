@@ -1,20 +1,25 @@
-"""Ramp files: a recorded table whose columns are a quantity and its unit; read into SI, or written."""
+"""Ramp files: a recorded table whose columns are a quantity and its unit; read into SI, or written.
+
+A file is read block by block, and a long one thinned on the way: see `thinning`.
+"""
 
 import gzip
 import io
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO, final
 
 import numpy as np
 
-from dzdesign.core.artefacts import read_bytes, sha256_of
+from dzdesign.core.artefacts import open_bytes, sha256_of_file
 from dzdesign.core.errors import InputError
 from dzdesign.core.units import si_factor
 from dzdesign.identify.binary_tables import binary_reader
 from dzdesign.identify.column_labels import EXAMPLE_LABELS, PER_CENT, QUANTITY_OF_COLUMN, Column, find_columns
 from dzdesign.identify.table import QUOTED_CHARACTERS, Table
-from dzdesign.identify.text_tables import text_table
+from dzdesign.identify.text_tables import text_tables
+from dzdesign.identify.thinning import Thinner
 
 #: Fewest complete rows in which two branches with a threshold could stand.
 MIN_ROWS = 20
@@ -36,6 +41,8 @@ class RampTest:
         Pressure drop in Pa, or None if it is unknown.
     dp_is_declared : bool
         True if the pressure drop is the engineer's word (one constant) and not a recording.
+    rows_read, run : int
+        Complete rows in the file, and how many of them in a row were averaged to one sample (1: none were).
     """
 
     source: str
@@ -45,6 +52,8 @@ class RampTest:
     q: np.ndarray
     dp: np.ndarray | None
     dp_is_declared: bool = False
+    rows_read: int = 0
+    run: int = 1
 
     def __post_init__(self) -> None:
         for array in (self.time, self.u, self.q, self.dp):
@@ -79,38 +88,38 @@ def read_ramp_file(
         Naming file, and row and column where there is one.
     """
     path = Path(path)
-    content = read_bytes(path, "ramp file")
-    table = read_table(content, path)
-    found = find_columns(table, columns or {})
-    _refuse_two_pressures(table, found, dp)
-    data = {quantity: _si_numbers(table, quantity, column, u_max) for quantity, column in found.items()}
-    _refuse_unequal_lengths(table, found, data)
-    measured = data["dP"] if "dP" in data else data["pA"] - data["pB"] if "pA" in data else None
-    complete = np.isfinite(data["time"]) & np.isfinite(data["u"]) & np.isfinite(data["Q"])
-    if measured is not None:
-        complete &= np.isfinite(measured)
-    if complete.sum() < MIN_ROWS:
-        raise InputError(f"'{path}' has {complete.sum()} complete rows, expected at least {MIN_ROWS} of a ramp test")
-    time = _clock(table, data["time"], complete)
-    if measured is None and dp is not None:
-        measured = np.full(complete.size, dp)
+    thinner, clock = Thinner(u_max), _Clock()
+    found: dict[str, Column] = {}
+    with open_bytes(path, "ramp file") as file:
+        sha256 = sha256_of_file(file)
+        for table in read_tables(file, path):
+            if not found:
+                found = find_columns(table, columns or {})
+                _refuse_two_pressures(table, found, dp)
+                _refuse_unequal_lengths(table, found)
+            thinner.add(_complete_rows(table, found, clock, u_max, dp))
+    if thinner.read < MIN_ROWS:
+        raise InputError(f"'{path}' has {thinner.read} complete rows, expected at least {MIN_ROWS} of a ramp test")
+    time, u, q, *measured = (column.copy() for column in thinner.rows())
     return RampTest(
         source=path.name.encode(errors="replace").decode(),
-        sha256=sha256_of(content),
+        sha256=sha256,
         time=time,
-        u=data["u"][complete],
-        q=data["Q"][complete],
-        dp=None if measured is None else measured[complete],
+        u=u,
+        q=q,
+        dp=measured[0] if measured else None,
         dp_is_declared=dp is not None,
+        rows_read=thinner.read,
+        run=thinner.run,
     )
 
 
-def read_table(content: bytes, path: Path) -> Table:
-    """Read a table of any known format; its first bytes tell which, not its name.
+def read_tables(file: BinaryIO, path: Path) -> Iterator[Table]:
+    """Read a table of any known format, block by block; its first bytes tell which, not its name.
 
     Parameters
     ----------
-    content : bytes
+    file : binary file
         CSV (plain or gzip), TDMS, MAT, HDF5, Parquet or Feather.
     path : Path
         For messages.
@@ -120,8 +129,25 @@ def read_table(content: bytes, path: Path) -> Table:
     InputError
         If it is none of these, or not a whole one.
     """
-    read = binary_reader(content, path) or text_table
-    return read(content, path)
+    start = file.read(32)
+    file.seek(0)
+    read = binary_reader(start, path) or text_tables
+    return read(file, path)
+
+
+def _complete_rows(
+    table: Table, found: Mapping[str, Column], clock: "_Clock", u_max: float, dp: float | None
+) -> np.ndarray:
+    """Return time, command, flow and, if it is known, pressure drop of the rows of a block that lack none of them."""
+    data = {quantity: _si_numbers(table, quantity, column, u_max) for quantity, column in found.items()}
+    measured = data["dP"] if "dP" in data else data["pA"] - data["pB"] if "pA" in data else None
+    if measured is None and dp is not None:
+        measured = np.full(data["time"].size, dp)
+    rows = np.stack([data["time"], data["u"], data["Q"], *([] if measured is None else [measured])])
+    complete = np.isfinite(rows).all(axis=0)
+    rows = rows[:, complete]
+    rows[0] = clock.steady(table, rows[0], complete)
+    return rows
 
 
 def _refuse_two_pressures(table: Table, found: Mapping[str, Column], dp: float | None) -> None:
@@ -136,29 +162,40 @@ def _refuse_two_pressures(table: Table, found: Mapping[str, Column], dp: float |
         raise InputError(f"'{table.path}': the declared pressure drop is {dp / 1e6:g} MPa, expected a positive one")
 
 
-def _refuse_unequal_lengths(table: Table, found: Mapping[str, Column], data: Mapping[str, np.ndarray]) -> None:
+def _refuse_unequal_lengths(table: Table, found: Mapping[str, Column]) -> None:
     """Refuse columns that are not samples of one clock."""
-    for quantity, array in data.items():
-        if array.size != data["time"].size:
+    expected = table.length(found["time"].label)
+    for column in found.values():
+        if table.length(column.label) != expected:
             raise InputError(
-                f"'{table.path}' column '{found[quantity].label}' has {array.size} samples, but "
-                f"'{found['time'].label}' has {data['time'].size}; expected one clock, so resample it before"
+                f"'{table.path}' column '{column.label}' has {table.length(column.label)} samples, but "
+                f"'{found['time'].label}' has {expected}; expected one clock, so resample it before"
             )
 
 
-def _clock(table: Table, time: np.ndarray, complete: np.ndarray) -> np.ndarray:
-    """Return the times of the complete rows; a clock that jitters back by less than a sample stands still instead."""
-    time = time[complete]
-    latest = np.maximum.accumulate(time)
-    steps = np.diff(time)
-    usual = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
-    backwards = np.flatnonzero(latest - time > usual)
-    if backwards.size:
-        row = int(np.flatnonzero(complete)[backwards[0]])
-        raise InputError(
-            f"'{table.path}' {table.place(row)}: the time goes back; expected one recording in the order it was taken"
-        )
-    return latest
+@final
+class _Clock:
+    """The clock of a recording from block to block: where it jitters back by less than a sample it stands still."""
+
+    def __init__(self) -> None:
+        self._latest = np.empty(0)  # the last time of the block before, if there was one
+        self._usual = 0.0
+
+    def steady(self, table: Table, time: np.ndarray, complete: np.ndarray) -> np.ndarray:
+        """Return the times of the complete rows of a block, never going back; refuse a clock that was set back."""
+        time = np.concatenate([self._latest, time])
+        latest = np.maximum.accumulate(time)
+        steps = np.diff(time)
+        self._usual = float(np.median(steps[steps > 0])) if np.any(steps > 0) else self._usual
+        backwards = np.flatnonzero(latest - time > self._usual)
+        if backwards.size:
+            row = int(np.flatnonzero(complete)[backwards[0] - self._latest.size])
+            raise InputError(
+                f"'{table.path}' {table.place(row)}: the time goes back; expected one recording in the order it was "
+                "taken"
+            )
+        carried, self._latest = self._latest.size, latest[-1:]
+        return latest[carried:]
 
 
 def _si_numbers(table: Table, quantity: str, column: Column, u_max: float) -> np.ndarray:

@@ -98,8 +98,9 @@ class GatedLine:
         Standard deviation of one sample about the line, m³/s.
     block_colour, colour : float
         Long-run variance over variance of one sample: as the residuals show it, and with what is known of the noise.
-    kept, censored : (N,) bool array
-        Samples of the branch that the line rests on, and those of them that read below the meter's floor.
+    inside, kept, censored : (N,) bool array
+        Samples of the branch between the two flows, those of them that the line rests on, and those of them that read
+        below the meter's floor.
     roughness : Roughness
         Of the residuals.
     outliers : int
@@ -113,6 +114,7 @@ class GatedLine:
     sigma: float
     block_colour: float
     colour: float
+    inside: np.ndarray
     kept: np.ndarray
     censored: np.ndarray
     roughness: Roughness
@@ -183,6 +185,7 @@ def lay_line(read: ReadBranch, window: tuple[float, float], correlation: float =
         sigma=sigma,
         block_colour=block_colour,
         colour=block_colour,
+        inside=inside,
         kept=kept,
         censored=censored,
         roughness=measure_roughness(u_seen, residual),
@@ -223,6 +226,7 @@ def _chord(read: ReadBranch, window: tuple[float, float]) -> GatedLine | None:
         sigma=slope * step / math.sqrt(lever),
         block_colour=1.0,
         colour=1.0,
+        inside=kept,
         kept=kept,
         censored=censored,
         roughness=Roughness(0, 0.0, 0.0),

@@ -1,7 +1,10 @@
-"""A table as recorded: labelled columns of numbers, from whatever file; what the readers give to `ramp_files`."""
+"""A table as recorded: labelled columns of numbers, from whatever file; what the readers give to `ramp_files`.
+
+A reader gives a file as several tables, one after the other: some hundred thousand rows each, with the same labels.
+"""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import final
@@ -16,7 +19,7 @@ QUOTED_CHARACTERS, QUOTED_COLUMNS = 40, 12
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Table(ABC):
-    """Labelled columns.
+    """Labelled columns: the next rows of a file.
 
     Attributes
     ----------
@@ -35,6 +38,10 @@ class Table(ABC):
     @abstractmethod
     def numbers(self, label: str) -> np.ndarray:
         """Return a column as float64, NaN where a sample is missing; InputError where a cell is no number."""
+
+    @abstractmethod
+    def length(self, label: str) -> int:
+        """Return how many samples a column has, as far as the reader knows."""
 
     @abstractmethod
     def place(self, row: int) -> str:
@@ -64,27 +71,72 @@ class Table(ABC):
 
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Samples:
+    """A column that is read where it is needed: its type, its length, and what gives the samples [start, stop)."""
+
+    dtype: np.dtype
+    size: int
+    read: Callable[[int, int], np.ndarray]
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ArrayTable(Table):
-    """A table whose columns came as arrays: from TDMS, MAT, HDF5, Parquet, Feather.
+    """A table whose columns are arrays: from TDMS, MAT, HDF5, Parquet, Feather.
 
     Attributes
     ----------
-    arrays : mapping
-        Label -> (N,) array.
+    columns : mapping
+        Label -> samples of the whole file.
+    start, stop : int
+        Rows of the file that are in this table.
+    format : str
+        Of the file, for messages.
     """
 
-    arrays: Mapping[str, np.ndarray]
+    columns: Mapping[str, Samples]
+    start: int
+    stop: int
+    format: str
+
+    def length(self, label: str) -> int:
+        """Return how many samples a column has in the whole file."""
+        return self.columns[label].size
 
     def numbers(self, label: str) -> np.ndarray:
         """Return a column as float64."""
-        array = np.asarray(self.arrays[label])
-        if array.dtype.kind not in "fiub":
+        column = self.columns[label]
+        if column.dtype.kind not in "fiub":
+            first = np.asarray(self._read(label, 0, 1))
             raise InputError(
-                f"'{self.path}' column '{label}' holds no numbers (first: '{str(array[:1])[:QUOTED_CHARACTERS]}'); "
+                f"'{self.path}' column '{label}' holds no numbers (first: '{str(first)[:QUOTED_CHARACTERS]}'); "
                 "give another column by --columns, or save it as numbers"
             )
-        return array.astype(np.float64)
+        start, stop = (min(row, column.size) for row in (self.start, self.stop))
+        return np.asarray(self._read(label, start, stop)).astype(np.float64)
 
     def place(self, row: int) -> str:
         """Return ``sample 8``: such files have no rows that an editor would count."""
-        return f"sample {row + 1}"
+        return f"sample {self.start + row + 1}"
+
+    def _read(self, label: str, start: int, stop: int) -> np.ndarray:
+        try:
+            return self.columns[label].read(start, stop)
+        except Exception as error:  # each library raises kinds of its own
+            raise unreadable(self.path, self.format, error) from error
+
+
+def unreadable(path: Path, name: str, error: Exception) -> InputError:
+    """Return the error for a file that a library can't read.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    name : str
+        Of its format.
+    error : Exception
+        The library's own.
+    """
+    reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+    return InputError(f"'{path}' is not a {name} file that can be read ({reason}); save it again, or export it as CSV")

@@ -1,13 +1,16 @@
-"""Text tables: CSV of any delimiter, plain or gzip, with decimal point or comma; bytes in, a `Table` out."""
+"""Text tables: CSV of any delimiter, plain or gzip, with decimal point or comma; an open file in, `TextTable`s out.
+
+A file is read `BLOCK_BYTES` at a time, cut at an end of line: one longer than memory is a table like any other.
+"""
 
 import csv
 import gzip
 import re
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING, BinaryIO, final
 
 import numpy as np
 
@@ -20,48 +23,84 @@ if TYPE_CHECKING:
 #: The number of a line in its file (1 is the first), and the line.
 Lines = list[tuple[int, str]]
 
+#: Bytes of text that are read at a time.
+BLOCK_BYTES = 1 << 23
 #: Joins the cells of a line inside: no cell of a text file holds it.
 CELL_END = "\x1f"
 #: What may stand between cells; where none of them is in the header, blanks do.
 SEPARATORS, BLANKS = ",;\t|", " "
-#: Lines before the header that are looked at for the fast way.
-MOST_COMMENTS = 1000
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Header:
+    """The header row: its number in the file, the labels, and what stands between two cells."""
+
+    line: int
+    labels: tuple[str, ...]
+    separator: str
 
 
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TextTable(Table):
-    """A table of text: `cells` holds every column as strings, `lines` the numbers of its lines, the header first."""
+    """A table of text: every column as strings or as numbers, and where it stands in the file.
+
+    Attributes
+    ----------
+    cells : DataFrame
+        A column is of numbers only where each of its cells is one, or blank.
+    header_line : int
+        Number of the header's line.
+    lines : sequence of int
+        Numbers of the rows' lines.
+    plain : bytes
+        The rows as they stand in the file, where they were read without a look at each.
+    separator : str
+        Between two cells.
+    """
 
     cells: "pl.DataFrame"
+    header_line: int
     lines: Sequence[int]
+    plain: bytes
+    separator: str
 
     @property
     def header(self) -> str:
         """Where the labels stand."""
-        return f" row {self.lines[0]}"
+        return f" row {self.header_line}"
+
+    def length(self, label: str) -> int:
+        """Return how many rows this table has, whatever the column."""
+        return self.cells.height
 
     def place(self, row: int) -> str:
         """Return ``row 8``, as an editor counts."""
-        return f"row {self.lines[row + 1]}"
+        return f"row {self.lines[row]}"
 
     def cell(self, label: str, row: int) -> str:
         """Return a cell as it stands in the file."""
+        if self.plain:
+            line = self.plain.split(b"\n")[row].decode()
+            return clean_label(line.split(self.separator)[self.labels.index(label)])
         return self._texts(label)[row]
 
     def numbers(self, label: str) -> np.ndarray:
         """Return a column as float64, NaN where the cell is blank."""
         import polars as pl
 
-        column = self._texts(label)
-        numbers = column.cast(pl.Float64, strict=False)
-        bad = (~(column.is_null() | (column == "")) & numbers.is_null()).arg_true()
-        if len(bad):
-            row = int(bad[0])
-            raise InputError(
-                f"'{self.path}' {self.place(row)}, column '{label}': '{column[row][:QUOTED_CHARACTERS]}' is not a "
-                "number; correct it, or leave the cell blank if the sample is missing"
-            )
+        numbers = self.cells.to_series(self.labels.index(label))
+        if numbers.dtype != pl.Float64:
+            column = self._texts(label)
+            numbers = column.cast(pl.Float64, strict=False)
+            bad = (~(column.is_null() | (column == "")) & numbers.is_null()).arg_true()
+            if len(bad):
+                row = int(bad[0])
+                raise InputError(
+                    f"'{self.path}' {self.place(row)}, column '{label}': '{column[row][:QUOTED_CHARACTERS]}' is not a "
+                    "number; correct it, or leave the cell blank if the sample is missing"
+                )
         return numbers.fill_null(np.nan).to_numpy().copy()
 
     def _texts(self, label: str) -> "pl.Series":
@@ -70,12 +109,12 @@ class TextTable(Table):
         return column.str.replace(",", ".", literal=True)
 
 
-def text_table(content: bytes, path: Path) -> TextTable:
-    """Read a table of text.
+def text_tables(file: BinaryIO, path: Path) -> Iterator[TextTable]:
+    """Read a table of text, block by block.
 
     Parameters
     ----------
-    content : bytes
+    file : binary file
         UTF-8, plain or gzip: a header row, then samples; lines that start with ``#`` are comments. Cells are parted
         by comma, semicolon, tab or ``|``, or by blanks where the header has none of these.
     path : Path
@@ -86,84 +125,150 @@ def text_table(content: bytes, path: Path) -> TextTable:
     InputError
         If it is no such text, or a row has not as many cells as the header.
     """
-    text = _decode(content, path)
-    start, lines = _plain_rows(text)
-    if not lines:
-        lines = _table_lines(text)
-    if not lines:
+    header, number = None, 1
+    for block in _blocks(file, path):
+        if header is None:
+            header, rows = _find_header(block, number, path)
+        else:
+            rows = block
+        if header is not None:
+            first = number + block.count(b"\n", 0, len(block) - len(rows))
+            yield _table(rows, first, header, path)
+        number += _count(block, "\n")
+    if header is None:
         raise InputError(f"'{path}' is empty; expected a header row such as time_s,u_V,dP_MPa,Q_Lmin and samples")
-    number, header = lines[0]
-    separator = max(SEPARATORS, key=header.count)
-    separator = separator if separator in header else BLANKS
-    labels = tuple(clean_label(label) for label in _labels(header, separator))
+
+
+def _blocks(file: BinaryIO, path: Path) -> Iterator[bytes]:
+    """Return whole lines that end in a line feed, some `BLOCK_BYTES` at a time, without a byte order mark."""
+    packed = file.read(2) == b"\x1f\x8b"
+    file.seek(0)
+    stream = gzip.GzipFile(fileobj=file) if packed else file
+    rest, offset = b"", 0
+    while True:
+        try:
+            data = stream.read(BLOCK_BYTES)
+        except (gzip.BadGzipFile, EOFError, zlib.error) as error:
+            raise InputError(f"'{path}' is not a whole gzip file ({error}); copy it again") from error
+        block, last = rest + data, len(data) < BLOCK_BYTES
+        # The last end of line may be half of one: a carriage return whose line feed is still to come.
+        end = len(block) if last else max(block.rfind(b"\n"), block.rfind(b"\r", 0, -1)) + 1
+        _refuse_no_text(block[:end] if end else block, offset, path)
+        if not end and not last:
+            raise InputError(f"'{path}' has a line of more than {len(block)} bytes; expected a table of numbers")
+        bare = block[:end] if offset else block[:end].removeprefix(b"\xef\xbb\xbf")
+        # Not splitlines(): to an editor, whose line numbers the messages give, a form feed or U+0085 ends no line.
+        yield bare.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in bare else bare
+        if last:
+            return
+        rest, offset = block[end:], offset + end
+
+
+def _refuse_no_text(data: bytes, offset: int, path: Path) -> None:
+    """Refuse what is no text in UTF-8; `offset` bytes stand before it in the file."""
+    try:
+        if not data.isascii():
+            data.decode()
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"'{path}' is not a text file in UTF-8 (byte {offset + error.start + 1}); save the table as 'CSV UTF-8'"
+        ) from error
+    if b"\0" in data:
+        raise InputError(f"'{path}' is UTF-16 or no text at all, expected UTF-8; save the table as 'CSV UTF-8'")
+
+
+def _find_header(block: bytes, number: int, path: Path) -> tuple[Header | None, bytes]:
+    """Return the first line that is neither a comment nor blank, read as the header, and what follows it."""
+    start = 0
+    while start < len(block):
+        end = (block.find(b"\n", start) + 1) or len(block)
+        lines = _table_lines(block[start:end].decode().removesuffix("\n"), number)
+        if lines:
+            return _header(*lines[0], path), block[end:]
+        start, number = end, number + 1
+    return None, b""
+
+
+def _header(number: int, line: str, path: Path) -> Header:
+    """Return the header that a line holds; refuse a line of numbers."""
+    separator = max(SEPARATORS, key=line.count)
+    separator = separator if separator in line else BLANKS
+    labels = tuple(clean_label(label) for label in _labels(line, separator))
     if all(re.fullmatch(r"[-+\d.,eE\s]*", label) for label in labels):
         raise InputError(
-            f"'{path}' has no header row (row {number} is '{header[:QUOTED_CHARACTERS]}'); "
+            f"'{path}' has no header row (row {number} is '{line[:QUOTED_CHARACTERS]}'); "
             "expected names with units such as time_s,u_V,dP_MPa,Q_Lmin"
         )
-    if start and (cells := _plain_cells(text[start:], separator, len(labels))) is not None:
-        return TextTable(path=path, labels=labels, cells=cells, lines=range(number, number + 1 + cells.height))
-    lines = _table_lines(text)
-    cells = _read_cells(lines[1:], separator, len(labels), path)
-    return TextTable(path=path, labels=labels, cells=cells, lines=tuple(number for number, _ in lines))
+    return Header(line=number, labels=labels, separator=separator)
 
 
-def _plain_rows(text: str) -> tuple[int, Lines]:
-    """Return where the rows begin and the header, if nothing but rows follows it: no comment, quote or old line end."""
-    start = 0
-    for number in range(1, MOST_COMMENTS):
-        end = text.find("\n", start)
-        if end < 0:
-            break
-        header = _table_lines(text[start:end].removesuffix("\r"))
-        start = end + 1
-        if header:
-            plain = not any(text.find(mark, start) >= 0 for mark in '#"\r')
-            return (start, [(number, header[0][1])]) if plain and "\r" not in header[0][1] else (0, [])
-    return 0, []
+def _table(rows: bytes, number: int, header: Header, path: Path) -> TextTable:
+    """Return the table of rows; `number` is that of their first line in the file."""
+    cells = _plain_cells(rows, header.separator, len(header.labels))
+    if cells is not None:
+        lines: Sequence[int] = range(number, number + cells.height)
+    else:
+        kept = _table_lines(rows.decode(), number)
+        cells = _read_cells(kept, header.separator, len(header.labels), path)
+        lines, rows = [number for number, _ in kept], b""
+    return TextTable(
+        path=path,
+        labels=header.labels,
+        cells=cells,
+        header_line=header.line,
+        lines=lines,
+        plain=rows,
+        separator=header.separator,
+    )
 
 
-def _plain_cells(rows: str, separator: str, width: int) -> "pl.DataFrame | None":
+def _plain_cells(rows: bytes, separator: str, width: int) -> "pl.DataFrame | None":
     """Return the cells of rows that all have as many as the header, without a look at each; None if one has not."""
     import polars as pl
 
-    rows = rows.rstrip("\n")
-    if separator == BLANKS or not rows or width < 2:
+    rows = rows.rstrip(b"\n")
+    if separator == BLANKS or not rows or width < 2 or b"#" in rows or b'"' in rows:
         return None
-    data = rows.encode()
-    characters = np.frombuffer(data, np.uint8)
+    height = _count(rows, "\n") + 1
+    if _count(rows, separator) != (width - 1) * height:
+        return None
+    # A column whose first cell is a number holds numbers, unless reading it as such fails.
+    first = rows.split(b"\n", 1)[0].decode().split(separator)
+    numbers = {f"c{index}": pl.Float64 if _is_number(cell) else pl.String for index, cell in enumerate(first)}
+    for schema in (numbers, dict.fromkeys(numbers, pl.String)) if len(first) == width else ():
+        try:
+            cells = pl.read_csv(rows, separator=separator, has_header=False, schema=schema, quote_char=None)
+        except pl.exceptions.PolarsError:  # a cell is no number, or a row has too many cells
+            continue
+        # As many cells in all, and no row with too many: none has too few. A blank one at the end may be one too many.
+        exact = not cells.to_series(-1).null_count() or _every_row_has(rows, separator, width)
+        return cells if cells.height == height and exact else None
+    return None
+
+
+def _count(data: bytes, character: str) -> int:
+    # bytes.count stops at every one of them, and takes several times as long.
+    return int(np.count_nonzero(np.frombuffer(data, np.uint8) == ord(character)))
+
+
+def _is_number(cell: str) -> bool:
+    return re.fullmatch(r"\s*[-+]?[\d.]+([eE][-+]?\d+)?", cell) is not None
+
+
+def _every_row_has(rows: bytes, separator: str, width: int) -> bool:
+    characters = np.frombuffer(rows, np.uint8)
     starts = np.concatenate([[0], np.flatnonzero(characters == ord("\n")) + 1])
-    if np.any(np.add.reduceat(characters == ord(separator), starts, dtype=np.int32) != width - 1):
-        return None
-    schema = {f"c{index}": pl.String for index in range(width)}
-    return pl.read_csv(data, separator=separator, has_header=False, schema=schema, quote_char=None)
+    return not np.any(np.add.reduceat(characters == ord(separator), starts, dtype=np.int32) != width - 1)
 
 
-def _decode(content: bytes, path: Path) -> str:
-    try:
-        plain = gzip.decompress(content) if content[:2] == b"\x1f\x8b" else content
-        text = plain.decode("utf-8-sig")
-    except (OSError, EOFError, zlib.error) as error:
-        raise InputError(f"'{path}' is not a whole gzip file ({error}); copy it again") from error
-    except UnicodeDecodeError as error:
-        raise InputError(
-            f"'{path}' is not a text file in UTF-8 (byte {error.start + 1}); save the table as 'CSV UTF-8'"
-        ) from error
-    if "\0" in text:
-        raise InputError(f"'{path}' is UTF-16 or no text at all, expected UTF-8; save the table as 'CSV UTF-8'")
-    return text
-
-
-def _table_lines(text: str) -> Lines:
-    """Return every line that is neither a comment nor blank; the first is the header.
+def _table_lines(text: str, first: int) -> Lines:
+    """Return every line that is neither a comment nor blank; `first` is the number of the first line.
 
     A spreadsheet that has saved a file again leaves comments in quotes, and blank lines as a row of separators.
     """
-    # Not splitlines(): to an editor, whose line numbers the messages give, a form feed or U+0085 ends no line.
-    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     return [
         (number, line)
-        for number, line in enumerate(lines, start=1)
+        for number, line in enumerate(text.split("\n"), start=first)
         if line.strip(' \t,;"') and not line.lstrip(' \t"').startswith("#")
     ]
 

@@ -12,9 +12,9 @@ from dzdesign.identify.bounds import find_trend, lower_bounds, staircase
 from dzdesign.identify.branches import bin_branch
 from dzdesign.identify.characteristic import find_meter_floor
 from dzdesign.identify.identification import identify
-from dzdesign.identify.model import valve_from_document
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramp_splitting import split_ramps, sweep_direction
+from dzdesign.identify.valve_file import valve_from_document
 
 PRESSURES = (0.5, 1.0, 2.0, 3.0, 5.0)
 

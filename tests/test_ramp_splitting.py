@@ -11,10 +11,10 @@ from synthetic import MPA, Truth, synthetic_ramp
 from dzdesign.core.artefacts import to_json
 from dzdesign.core.errors import InputError
 from dzdesign.identify.identification import identify
-from dzdesign.identify.model import valve_from_document
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramp_files import RampTest, ramp_file_bytes, read_ramp_file
 from dzdesign.identify.ramp_splitting import split_ramps
+from dzdesign.identify.valve_file import valve_from_document
 
 laws = settings(
     max_examples=8, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]

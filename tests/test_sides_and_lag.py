@@ -12,9 +12,9 @@ from dzdesign.core.artefacts import to_json
 from dzdesign.core.errors import InputError
 from dzdesign.design.designing import design
 from dzdesign.identify.identification import identify
-from dzdesign.identify.model import valve_from_document
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramp_files import ramp_file_bytes
+from dzdesign.identify.valve_file import valve_from_document
 from tests.synthetic import L_MIN, MPA, Truth, synthetic_ramp
 
 PRESSURES = (1.0, 2.0, 4.0)

@@ -12,7 +12,7 @@ from dzdesign.core.artefacts import MANIFEST_NAME, TOOL, parse_document, read_by
 from dzdesign.core.errors import RequirementError
 from dzdesign.core.shape import check_shape
 from dzdesign.design.compensator import compensator_from_document
-from dzdesign.identify.model import valve_from_document
+from dzdesign.identify.valve_file import valve_from_document
 from dzdesign.verify.all_inputs import InputCheck, check_all_inputs
 from dzdesign.verify.closed_loop import ClosedLoop, LoopComparison, RampSequence, compare_at_pressure
 from dzdesign.verify.host_compiler import check_strictly, find_compilers, host_compiler

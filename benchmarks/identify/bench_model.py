@@ -95,7 +95,7 @@ class Bench:
         return replace(self, **changes)
 
 
-def readings(bench: Bench, count: int, seed: int) -> Iterator[list[RampTest]]:
+def readings(bench: Bench, count: int, seed: int, first: int = 0) -> Iterator[list[RampTest]]:
     """Yield `count` replicates of all ramp tests; the true flow is computed once, the noise anew.
 
     Parameters
@@ -106,6 +106,8 @@ def readings(bench: Bench, count: int, seed: int) -> Iterator[list[RampTest]]:
         Replicates.
     seed : int
         Of the random numbers; replicate r draws from ``default_rng([seed, r])``, whatever `count` is.
+    first : int
+        The replicate to begin with.
     """
     quarter = np.linspace(0.0, U_MAX_V, round(bench.ramp_s * bench.rate_Hz))
     up_down = [quarter[::-1], quarter] if bench.top_first else [quarter, quarter[::-1]]
@@ -113,7 +115,7 @@ def readings(bench: Bench, count: int, seed: int) -> Iterator[list[RampTest]]:
     rising = np.repeat([not bench.top_first, bench.top_first], quarter.size)
     time = np.arange(u.size) / bench.rate_Hz
     truth = np.array([_delayed(_true_flow(bench, dp, u, rising), bench) for dp in bench.pressures_MPa])
-    for replicate in range(count):
+    for replicate in range(first, first + count):
         rng = np.random.default_rng([seed, replicate])
         q = truth + bench.zero_L_min + bench.noise_L_min * _noise(rng, truth.shape, bench.ar)
         q[q < bench.floor_L_min] = 0.0 if bench.floor_L_min > 0 else q[q < bench.floor_L_min]

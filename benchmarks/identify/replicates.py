@@ -1,5 +1,8 @@
 """Monte Carlo through the product: what each replicate gives, beside the truth."""
 
+import multiprocessing
+import os
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +16,10 @@ from dzdesign.identify.options import IdentifyOptions
 
 #: Points of the pressure drop at which the offset is held against the truth.
 GRID = 451
+#: Replicates that a process takes at a time.
+CHUNK = 10
+#: Bench, seed, options and estimator of the replicates in work: a process that is forked off has them.
+_work: dict = {}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,22 +80,47 @@ def run_replicates(bench: Bench, count: int, seed: int, options: IdentifyOptions
     estimator : callable
         Ramp tests and options to a `ValveModel`; the product's unless a test seeds a wrong one.
     """
-    dp = np.array(bench.pressures_MPa)
+    _work.update(bench=bench, seed=seed, options=options, estimator=estimator)  # what the processes inherit
     rows: list[dict] = []
     trends: dict[str, int] = {}
     refusals: list[str] = []
-    for number, tests in enumerate(readings(bench, count, seed)):
-        if number and number % 500 == 0:
-            say(f"  {number} of {count}")
+    chunks = [(first, min(CHUNK, count - first)) for first in range(0, count, CHUNK)]
+    for done, (found, refused) in enumerate(_in_parallel(chunks), start=1):
+        if done * CHUNK % 500 == 0:
+            say(f"  {done * CHUNK} of {count}")
+        refusals += refused
+        for row in found:
+            trend = row.pop("trend")
+            trends[trend] = trends.get(trend, 0) + 1
+            rows.append(row)
+    columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    return Outcomes(**columns, trends=trends, refusals=tuple(refusals))
+
+
+def _in_parallel(chunks: list[tuple[int, int]]) -> Iterator[tuple[list[dict], list[str]]]:
+    """Yield what each chunk of replicates gives, in order, from as many processes as there are processors."""
+    jobs = min(os.cpu_count() or 1, len(chunks))
+    if jobs < 2 or "fork" not in multiprocessing.get_all_start_methods():
+        yield from map(_replicates, chunks)
+        return
+    with multiprocessing.get_context("fork").Pool(jobs) as pool:
+        yield from pool.imap(_replicates, chunks)
+
+
+def _replicates(chunk: tuple[int, int]) -> tuple[list[dict], list[str]]:
+    """Identify some replicates of the work at hand: what each gives beside the truth, and the refusals."""
+    first, count = chunk
+    bench, options, estimator = _work["bench"], _work["options"], _work["estimator"]
+    dp = np.array(bench.pressures_MPa)
+    rows, refusals = [], []
+    for tests in readings(bench, count, _work["seed"], first):
         try:
             valve = estimator(tests, options)
         except InputError as error:
             refusals.append(str(error))
             continue
-        trends[valve.positive.trend] = trends.get(valve.positive.trend, 0) + 1
-        rows.append(_held_against_truth(valve, bench, dp))
-    columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-    return Outcomes(**columns, trends=trends, refusals=tuple(refusals))
+        rows.append(_held_against_truth(valve, bench, dp) | {"trend": valve.positive.trend})
+    return rows, refusals
 
 
 def _held_against_truth(valve: ValveModel, bench: Bench, dp: np.ndarray) -> dict:

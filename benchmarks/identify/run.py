@@ -17,6 +17,7 @@ from accuracy import print_accuracy  # noqa: E402
 from coverage import print_coverage, print_residual  # noqa: E402
 from measured import print_measured  # noqa: E402
 from random_valves import print_random_valves  # noqa: E402
+from reading import print_reading  # noqa: E402
 from scoreboard import print_rows  # noqa: E402
 from timing import print_timing  # noqa: E402
 
@@ -27,6 +28,7 @@ PARTS = {
     "random": (print_random_valves, 404),
     "measured": (print_measured, 0),
     "timing": (print_timing, 0),
+    "reading": (print_reading, 707),
 }
 
 

@@ -1,0 +1,104 @@
+"""What all plots share: style, title above, one legend below, and bytes that depend on nothing but what is drawn."""
+
+import io
+import textwrap
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: No text below 8 pt, on a page as wide as the figure.
+STYLE = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9,
+    "axes.labelsize": 9,
+    "axes.titlesize": 9,
+    "figure.titlesize": 10,
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+    "legend.fontsize": 8,
+    "axes.grid": True,
+    "grid.alpha": 0.3,
+    "svg.fonttype": "path",
+    "svg.hashsalt": "dzdesign",  # ids in the file follow from its content: same input, same bytes
+}
+#: Of a figure, inches; of a line of its title, characters.
+WIDTH, TITLE_WIDTH = 9, 105
+DPI = 150
+#: Neither the day nor the version of a library: the same valve gives the same bytes.
+METADATA = {"svg": {"Date": None, "Creator": None}, "png": {"Software": None}}
+
+
+@contextmanager
+def plot_style() -> Iterator[None]:
+    """Draw alike on every machine, whatever its matplotlibrc says."""
+    from matplotlib import style
+
+    with style.context(["default", STYLE]), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph .* missing from font")  # of a file's name
+        yield
+
+
+def new_figure(height: float, *title: str) -> "Figure":
+    """Return an empty figure under its title; a file's name in it is no mathematics, whatever signs it has.
+
+    Parameters
+    ----------
+    height : float
+        Inches.
+    title : str
+        Its lines; one that is too long is wrapped, and cut after two.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    figure.get_layout_engine().set(w_pad=0.08, h_pad=0.06)
+    lines = [part for line in title for part in textwrap.wrap(line, TITLE_WIDTH, max_lines=2, placeholder=" ...")]
+    figure.suptitle("\n".join(lines), parse_math=False)
+    return figure
+
+
+def finish(figure: "Figure", rows: int) -> "Figure":
+    """Put one legend of all panels under them, where it covers no data, and lay everything out, once.
+
+    Parameters
+    ----------
+    figure : Figure
+        With everything drawn.
+    rows : int
+        Of the legend.
+    """
+    entries: dict[str, object] = {}
+    for axes in figure.axes:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            entries.setdefault(label, handle)
+    columns = -(-len(entries) // rows)
+    legend = figure.legend(
+        entries.values(), entries.keys(), loc="outside lower center", ncols=columns, columnspacing=1.2
+    )
+    for handle, label in zip(legend.legend_handles, entries, strict=True):
+        if label.startswith("samples"):  # as small and light as in the panels nobody would tell them apart
+            handle.set(markersize=5, alpha=1)
+    figure.get_layout_engine().execute(figure)
+    figure.set_layout_engine(None)  # SVG and PNG are then laid out alike
+    return figure
+
+
+def saved(figure: "Figure", suffix: str) -> bytes:
+    """Return the figure as a file's content.
+
+    Parameters
+    ----------
+    figure : Figure
+        Finished.
+    suffix : {"svg", "png"}
+        Format.
+    """
+    out = io.BytesIO()
+    figure.savefig(out, format=suffix, dpi=DPI, metadata=METADATA[suffix])
+    return out.getvalue()
