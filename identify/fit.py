@@ -1,6 +1,7 @@
 """The constrained fits in CasADi: knees and slopes of all ramp tests jointly; the offset curve under its bounds."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,9 +14,23 @@ if TYPE_CHECKING:
 
 #: A constraint is active when its slack is below this share of u_max.
 ACTIVE = 1e-7
-IPOPT = {"ipopt.print_level": 0, "print_time": False, "ipopt.sb": "yes", "ipopt.tol": 1e-8, "ipopt.max_iter": 300}
+#: Unknowns and constraints are in standard errors, so nothing is left to scale. Bounds are not relaxed, or knees would
+#: run the wrong way. Slack times multiplier is met as tightly as the rest: IPOPT's own 1e-4 leaves knees 1e-5 V off.
+IPOPT = {
+    "print_time": False,
+    "ipopt.print_level": 0,
+    "ipopt.sb": "yes",
+    "ipopt.max_iter": 300,
+    "ipopt.tol": 1e-10,
+    "ipopt.compl_inf_tol": 1e-10,
+    "ipopt.bound_relax_factor": 0.0,
+    "ipopt.nlp_scaling_method": "none",
+}
 #: For a convex problem of a few unknowns in mV: to a millionth of a microvolt, and no bound overstepped.
 EXACT = {"ipopt.tol": 1e-12, "ipopt.bound_relax_factor": 0.0, "ipopt.mu_strategy": "adaptive"}
+#: Standard deviations from which the normal distribution's tail is a continued fraction, exact to 1e-13 with this many
+#: terms.
+TAIL_FROM, TAIL_TERMS = 3.0, 30
 #: No test outweighs another by more than this, however quiet its meter was.
 LARGEST_WEIGHT = 1e4
 
@@ -80,30 +95,31 @@ def fit_knees(
     position = {place: index for index, place in enumerate(where)}
     slopes, knees = ca.MX.sym("slope", len(where)), ca.MX.sym("knee", len(where))
     scales = [_expected_errors(shapes[row][column]) for row, column in where]
-    knee_of = {
-        place: shapes[place[0]][place[1]].knee / u_max + knees[index] * scales[index][1] / u_max
-        for place, index in position.items()
-    }
     cost = 0
     for (row, column), index in position.items():
-        slope = 1 + slopes[index] * scales[index][0]
-        cost += _branch_cost(shapes[row][column], slope, knee_of[row, column], floor, u_max)
-    constraints, names = [], []
-    for row, column in where:
-        if trend != "flat" and column == ordered and (row + 1, column) in position:
-            # In mV: the solver may overstep a constraint by a hundred-millionth of its unit.
-            step = (knee_of[row + 1, column] - knee_of[row, column]) * u_max * 1e3
-            constraints.append(step if trend == "increasing" else -step)
-            names.append(f"{'falling' if column else 'rising'} knee of test {row + 1} to {row + 2}")
+        steeper, later = slopes[index] * scales[index][0], knees[index] * scales[index][1] / u_max
+        cost += _branch_cost(shapes[row][column], steeper, later, floor, u_max)
+    # Those whose knees must run one way, and in standard errors how far each lies from the next.
+    chain = [index for place, index in position.items() if place[1] == ordered and trend != "flat"]
+    start, order, unit = np.zeros(2 * len(where)), ca.MX(0, 1), np.zeros(0)
+    if len(chain) > 1:
+        mine = [shapes[where[index][0]][ordered] for index in chain]
+        slope_scale, knee_scale = np.array([scales[index] for index in chain]).T
+        steeper, later = _ordered_start(mine, increasing=trend == "increasing")
+        start[chain], start[len(where) + np.array(chain)] = steeper / slope_scale, later / knee_scale
+        unit = np.maximum(knee_scale[1:], knee_scale[:-1])
+        order = ca.DM(np.diff([shape.knee for shape in mine]) / unit)
+        order += ca.DM(knee_scale[1:] / unit) * knees[chain[1:]] - ca.DM(knee_scale[:-1] / unit) * knees[chain[:-1]]
+        order = order if trend == "increasing" else -order
     variables = ca.vertcat(slopes, knees)
-    solver = ca.nlpsol("knees", "ipopt", {"x": variables, "f": cost, "g": ca.vertcat(*constraints)}, IPOPT)
-    solution = solver(x0=0.0, lbg=0.0, ubg=ca.inf)
+    solver = ca.nlpsol("knees", "ipopt", {"x": variables, "f": cost, "g": order}, IPOPT)
+    solution = solver(x0=start, lbg=0.0, ubg=ca.inf)
     if not solver.stats()["success"]:
         raise InputError(
             f"the joint fit did not converge ({solver.stats()['return_status']}); "
             "look at the ramp tests, and leave out the one that is unlike the others"
         )
-    best, slack = np.asarray(solution["x"]).ravel(), np.asarray(solution["g"]).ravel()
+    best, slack = np.asarray(solution["x"]).ravel(), np.asarray(solution["g"]).ravel() * unit
     hessian = np.asarray(ca.Function("h", [variables], [ca.hessian(cost, variables)[0]])(best))
     variance = np.diag(np.linalg.inv(hessian))
     knee, knee_se, slope = (np.full((len(shapes), 2), np.nan) for _ in range(3))
@@ -117,7 +133,11 @@ def fit_knees(
         knee=knee,
         knee_se=knee_se,
         slope=slope,
-        active=tuple(name for name, gap in zip(names, slack, strict=True) if gap < ACTIVE * u_max * 1e3),
+        active=tuple(
+            f"{'falling' if ordered else 'rising'} knee of test {where[index][0] + 1} to {where[following][0] + 1}"
+            for (index, following), gap in zip(pairwise(chain), slack, strict=True)
+            if gap < ACTIVE * u_max
+        ),
         iterations=int(solver.stats()["iter_count"]),
     )
 
@@ -129,23 +149,79 @@ def _expected_errors(shape: BranchShape) -> tuple[float, float]:
     return knee * shape.slope / shape.y_max, knee
 
 
-def _branch_cost(shape: BranchShape, slope: "ca.MX", knee: "ca.MX", floor: float, u_max: float) -> "ca.MX":
-    """Return the negative log-likelihood of one branch; slope in units of the start value, knee over u_max."""
+def _ordered_start(shapes: list[BranchShape], *, increasing: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Return relative changes of slopes, and changes of knees in V, after which the knees run one way.
+
+    The zeros of the lines are brought in order by their errors, and each line is turned about its new zero. From a
+    start that breaks the order by thousands of standard errors, as a quiet meter gives it, IPOPT finds no way back and
+    reports an infeasible problem.
+    """
+    from scipy.optimize import isotonic_regression
+
+    weights = []
+    for shape in shapes:
+        bins, centre = shape.bins, np.average(shape.bins.u, weights=shape.bins.n)
+        spread = np.sum(bins.n * (bins.u - centre) ** 2 + bins.c_uu)
+        lever = 1 / bins.n.sum() + (centre - shape.knee) ** 2 / spread
+        weights.append((shape.slope / shape.sigma) ** 2 / lever)
+    knees = np.array([shape.knee for shape in shapes])
+    ordered = isotonic_regression(knees, weights=weights, increasing=increasing).x
+    steeper = []
+    for shape, knee in zip(shapes, ordered, strict=True):
+        bins = shape.bins
+        rise = np.sum(bins.n * bins.y * (bins.u - knee) + bins.c_uy)
+        steeper.append(rise / np.sum(bins.n * (bins.u - knee) ** 2 + bins.c_uu) / shape.slope - 1)
+    return np.array(steeper), ordered - knees
+
+
+def _branch_cost(shape: BranchShape, steeper: "ca.MX", later: "ca.MX", floor: float, u_max: float) -> "ca.MX":
+    """Return the negative log-likelihood of one branch.
+
+    `steeper` is the slope's relative change from its start value, `later` the knee's over u_max. In changes, a quiet
+    meter's flow, 1e5 standard deviations large, is not subtracted from itself at every step.
+    """
     import casadi as ca
 
     bins, per_sigma = shape.bins, shape.slope * u_max / shape.sigma
-    line = per_sigma * slope
-    miss = ca.DM(bins.y / shape.sigma) - line * (ca.DM(bins.u / u_max) - knee)
+
+    def rise(u: np.ndarray) -> "ca.MX":
+        return per_sigma * (steeper * (ca.DM((u - shape.knee) / u_max) - later) - later)
+
+    miss = ca.DM((bins.y - shape.slope * (bins.u - shape.knee)) / shape.sigma) - rise(bins.u)
+    line = per_sigma * (1 + steeper)
     # Inside a bin the sum of squares has a closed form: sum (dy - line du)^2 about the bin's means.
     c_uy = float(bins.c_uy.sum()) / (u_max * shape.sigma)
     c_uu = float(bins.c_uu.sum()) / u_max**2
     cost = (ca.sum1(ca.DM(bins.n) * miss**2) - 2 * line * c_uy + line**2 * c_uu) / 2
     cut = bins.censored > 0
     if cut.any():
-        depth = floor / shape.sigma - line * (ca.DM(bins.u_censored[cut] / u_max) - knee)
-        below = (1 + ca.erf(depth / np.sqrt(2))) / 2
-        cost -= ca.sum1(ca.DM(bins.censored[cut]) * ca.log(ca.fmax(below, 1e-300)))
+        u = bins.u_censored[cut]
+        depth = ca.DM((floor - shape.slope * (u - shape.knee)) / shape.sigma) - rise(u)
+        cost -= ca.sum1(ca.DM(bins.censored[cut]) * _log_below(depth))
     return cost
+
+
+def _log_below(depth: "ca.MX") -> "ca.MX":
+    """Return the logarithm of the normal distribution function.
+
+    ``1 + erf`` has lost half of its digits at -6, where a drop-out may lie, and all of them at -8.3; the tail is the
+    continued fraction of Mills' ratio (Abramowitz and Stegun 26.2.14).
+    """
+    import casadi as ca
+
+    middle = ca.log((1 + ca.erf(ca.fmax(depth, -TAIL_FROM) / np.sqrt(2))) / 2)
+    away = ca.fmax(-depth, TAIL_FROM)
+    return middle + _log_tail(away) - _log_tail(TAIL_FROM)
+
+
+def _log_tail(away: "ca.MX | float") -> "ca.MX | float":
+    """Return the logarithm of the probability beyond `away` standard deviations, but for a constant."""
+    import casadi as ca
+
+    fraction = away
+    for term in range(TAIL_TERMS, 0, -1):
+        fraction = away + term / fraction
+    return -(away**2) / 2 - ca.log(fraction)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -198,15 +274,15 @@ def fit_offset(
     lowest = float(ceiling.min())
     given_up = ca.MX.sym("given_up", size)
     offset = ca.DM((ceiling - lowest) * 1e3) - given_up
-    weight = np.clip((guard_se.max() / guard_se) ** 2, 1, LARGEST_WEIGHT)
+    largest = max(float(guard_se.max()), np.finfo(float).tiny)  # an exact table has no errors
+    weight = (largest / np.maximum(guard_se, largest / np.sqrt(LARGEST_WEIGHT))) ** 2
     cost = ca.sum1(ca.DM(weight / weight.max()) * (ca.DM((guard - lowest) * 1e3) - offset) ** 2)
     step = offset[1:] - offset[:-1] if size > 1 else ca.MX(0, 1)
     low, high = {"decreasing": (-np.inf, 0.0), "increasing": (0.0, np.inf), "flat": (0.0, 0.0)}[trend]
     # Not CasADi's qrqp: where ceilings are equal, it may call a curve solved that runs both ways.
     solver = ca.nlpsol("offset", "ipopt", {"x": given_up, "f": cost, "g": step}, IPOPT | EXACT)
     solution = solver(x0=0.1, lbx=0.0, lbg=low, ubg=high)
-    slack = np.asarray(solution["x"]).ravel() / 1e3
-    slack = np.where(slack < ACTIVE * u_max, 0.0, slack)
+    slack = np.maximum(np.asarray(solution["x"]).ravel(), 0.0) / 1e3
     found = ceiling - slack
     wrong_way = {"decreasing": np.diff(found), "increasing": -np.diff(found), "flat": np.abs(np.diff(found))}[trend]
     if not solver.stats()["success"] or np.any(wrong_way > 2 * ACTIVE * u_max):
@@ -214,4 +290,4 @@ def fit_offset(
             f"beta(dP) could not be fitted under its bounds ({solver.stats()['return_status']}); "
             "check that the ramp tests belong to one valve"
         )
-    return OffsetFit(u_min0=float(found[reference]), beta=found / found[reference], active=slack == 0)
+    return OffsetFit(u_min0=float(found[reference]), beta=found / found[reference], active=slack < ACTIVE * u_max)

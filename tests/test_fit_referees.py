@@ -75,7 +75,7 @@ def worst_offset_error(count, seed):
 def test_the_offset_is_cvxpys():
     # Among them are problems that CasADi's own active-set solver calls solved with a curve that runs both ways.
     worst, above = worst_offset_error(60, SEED)
-    assert worst < 1e-8 and above <= 0
+    assert worst < 1e-8 and above < 1e-12
 
 
 def test_the_referee_sees_other_weights(monkeypatch):

@@ -322,6 +322,15 @@ class TestHonesty:
         with pytest.raises(InputError, match="has no falling branch while other"):
             identify(tests)
 
+    @pytest.mark.parametrize("noise", [1e-3, 0.0])
+    def test_a_quiet_meter_whose_knees_break_the_trend_by_thousands_of_errors(self, noise):
+        scatter = dict(zip(PRESSURES, (0.01, -0.06, 0.05, -0.03, 0.02), strict=True))
+        valve = valve_of(lambda dp: falling_threshold(dp) + scatter[dp], noise=noise)
+        assert valve.positive.trend == "decreasing"
+        assert "not-monotone" in {warning.code for warning in valve.warnings}
+        for test in valve.positive.tests:
+            assert test.u_guard_lower_V < falling_threshold(test.dp_MPa) + scatter[test.dp_MPa] - 0.1
+
     @pytest.mark.parametrize("zero", [-0.3, 0.2])
     def test_a_zero_error_that_shows_at_rest_is_taken_out_and_said(self, zero):
         tests = [synthetic_ramp(dp, Truth(knee_rising=falling_threshold(dp))) for dp in PRESSURES]
