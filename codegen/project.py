@@ -2,16 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from fractions import Fraction
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from dzdesign.codegen.integer_form import IntegerForm, integer_form
+from dzdesign.codegen.core_plan import core_plan, drive_plan, header_plan
 from dzdesign.codegen.target import Target
 from dzdesign.core.artefacts import TOOL, sha256_of, to_json
 from dzdesign.core.errors import InputError, nearest
-from dzdesign.derivation.law import law
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.compensator_file import compensator_document
 
 if TYPE_CHECKING:
     import jinja2
@@ -19,8 +18,8 @@ if TYPE_CHECKING:
 SCHEMA = "dzdesign.firmware/1"
 #: One folder a target; each has `target.py` with a `TARGET` and its templates.
 TARGET_NAMES = ("f28335",)
-CORE_FILES = {"core/dz_comp.c": "dz_comp.c.jinja", "core/dz_comp.h": "dz_comp.h.jinja"}
-NODES_IN_A_ROW = 5
+#: One file a sign of command, all from one template.
+CORE_SOURCES = {1: "dz_comp.c", -1: "dz_comp_negative.c"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,19 +64,24 @@ def generate(compensator: Compensator, target_name: str, compensator_bytes: byte
     signals = compensator.signals
     for what, asked, has in (
         ("compare value", signals.compare_max, target.compare_max),
-        ("command code", signals.command_code_max, target.adc_code_max),
-        ("pressure code", signals.pressure_code_max, target.adc_code_max),
+        ("converter code", signals.code_max, target.adc_code_max),
     ):
         if asked != has:
             raise InputError(
                 f"the compensator's largest {what} is {asked}, but target {target.name} has {has}; "
                 "design it again for that target"
             )
-    document = compensator_bytes or to_json(compensator.to_document()).encode()
+    document = compensator_bytes or to_json(compensator_document(compensator)).encode()
     digest = sha256_of(document)
-    context = core_context(compensator, integer_form(compensator))
-    files = {path: _render("dzdesign.codegen", template, digest, context) for path, template in CORE_FILES.items()}
-    hardware = {**target.context, **{key: context[key] for key in ("u_max_V", "pressure_span_MPa")}}
+    header = header_plan(compensator)
+    files = {"core/dz_comp.h": _render("dzdesign.codegen", "dz_comp.h.jinja", digest, header)}
+    for sign, name in CORE_SOURCES.items():
+        if sign in signals.signs:
+            plan = core_plan(compensator, sign, target.arithmetic)
+            files[f"core/{name}"] = _render("dzdesign.codegen", "dz_comp.c.jinja", digest, plan)
+    for name in ("dz_drive.c", "dz_drive.h"):
+        files[f"core/{name}"] = _render("dzdesign.codegen", f"{name}.jinja", digest, drive_plan(compensator))
+    hardware = {**target.context, "u_max_V": header["u_max_V"], "pressure_span_MPa": header["a_span_MPa"]}
     for path, template in target.templates.items():
         files[path] = _render(f"dzdesign.codegen.{target.name}", template, digest, hardware)
     files["compensator.json"] = document.decode()
@@ -87,79 +91,9 @@ def generate(compensator: Compensator, target_name: str, compensator_bytes: byte
         "made_from": [{"source": "compensator.json", "sha256": digest}],
         "target": target.name,
         "law": compensator.law_name,
-        "core": list(CORE_FILES),
+        "core": sorted(path for path in files if path.startswith("core/")),
     }
     return Firmware(files=files, manifest=manifest)
-
-
-def core_context(compensator: Compensator, form: IntegerForm) -> dict[str, str | list[str]]:
-    """Return the flat plan of printed strings for the core's templates."""
-    chosen, signals = law(compensator.law_name), compensator.signals
-    scale = form.table[0] // compensator.beta_numerators[0] * compensator.beta_denominator
-    reverse = signals.dp_MPa(compensator.reverse_codes)
-    largest = ((1 << form.reciprocal_shift) - 1) // max(
-        1, form.reciprocal * form.divisor - (1 << form.reciprocal_shift)
-    )
-    zero_command = [compensator.compare(0, node * compensator.beta_step_codes) for node in range(len(form.table) - 1)]
-    return {
-        "certificate_text": certificate_text(compensator),
-        "zero_command_low": str(min(zero_command)),
-        "zero_command_high": str(max(zero_command)),
-        "law_text": str(chosen.output).replace("**", "^"),
-        "law_equation": chosen.equation,
-        "kappa_text": _rational(compensator.k_x_max_over_u_max),
-        "u_min0_text": _rational(compensator.u_min0_over_u_max),
-        "u_max_V": f"{float(compensator.u_max_V):g}",
-        "compare_max": str(signals.compare_max),
-        "adc_code_max": str(max(signals.command_code_max, signals.pressure_code_max)),
-        "command_code_max": str(signals.command_code_max),
-        "pressure_code_max": str(signals.pressure_code_max),
-        "pressure_span_MPa": f"{float(signals.pressure_span_MPa):g}",
-        "reverse_codes": str(compensator.reverse_codes),
-        "reverse_text": f"-{float(reverse):.3f} MPa",
-        "table_length": str(len(form.table)),
-        "table_rows": [
-            " ".join(f"UINT32_C({value})," for value in form.table[start : start + NODES_IN_A_ROW])
-            for start in range(0, len(form.table), NODES_IN_A_ROW)
-        ],
-        "beta_scale": str(scale),
-        "step_codes": str(compensator.beta_step_codes),
-        "step_MPa": f"{float(signals.dp_MPa(compensator.beta_step_codes)):.4f}",
-        "step_shift": str(form.step_shift),
-        "step_mask": str(compensator.beta_step_codes - 1),
-        "fallback": str(form.fallback),
-        "slope": str(form.slope),
-        "slope_c": _int32(form.slope),
-        "offset": str(form.offset),
-        "offset_c": _int32(form.offset),
-        "linear": str(form.linear),
-        "linear_shift": str(form.linear_shift),
-        "half": str(form.half),
-        "shift": str(form.shift),
-        "divisor": str(form.divisor),
-        "reciprocal": str(form.reciprocal),
-        "reciprocal_shift": str(form.reciprocal_shift),
-        "largest": str(largest),
-    }
-
-
-def certificate_text(compensator: Compensator) -> str:
-    """Say in one comment line what the offset is certified for."""
-    certificate = compensator.certificate
-    low, high = (float(end) for end in certificate.dp_MPa)
-    return (
-        f"Certified for {low:.2f} to {high:.2f} MPa: below the {certificate.confidence:.0%} bound of the "
-        f"{certificate.guard} threshold; flow below {certificate.level_L_min:.2f} L/min counts as none."
-    )
-
-
-def _rational(value: Fraction) -> str:
-    return f"{value.numerator}/{value.denominator} = {float(value):.6f}"
-
-
-def _int32(value: int) -> str:
-    """Print a 32-bit constant that is one on every compiler, whatever its `long` is."""
-    return f"{'-' if value < 0 else ''}INT32_C({abs(value)})"
 
 
 def environment(package: str) -> "jinja2.Environment":
@@ -183,6 +117,6 @@ def banner(template: str, digest: str) -> tuple[str, ...]:
     )
 
 
-def _render(package: str, template: str, digest: str, context: Mapping[str, str | list[str]]) -> str:
+def _render(package: str, template: str, digest: str, context: Mapping[str, object]) -> str:
     page = environment(package).get_template(template)
     return page.render(banner=banner(template, digest), project="dzdesign", **context)

@@ -25,6 +25,8 @@ class Target:
         Compare value of 100 % duty; the core's ``DZ_COMPARE_MAX``. Fits an unsigned 16-bit register.
     adc_code_max
         Largest code of the converter, right-justified; the core's ``DZ_ADC_CODE_MAX``.
+    arithmetic
+        ``wide`` where the processor multiplies 32 by 32 to 64 bits, ``narrow`` where 32-bit arithmetic is all there is.
     templates
         Output path, relative to the firmware folder, to the template's file name in ``templates/``.
     context
@@ -40,6 +42,7 @@ class Target:
     description: str
     compare_max: int
     adc_code_max: int
+    arithmetic: str = "wide"
     templates: Mapping[str, str]
     context: Mapping[str, str]
 
@@ -49,6 +52,8 @@ class Target:
         for label, value in (("compare_max", self.compare_max), ("adc_code_max", self.adc_code_max)):
             if not 0 < value <= 0xFFFF:
                 raise DzdesignError(f"target {self.name}: {label} must fit 16 bits unsigned, got {value}")
+        if self.arithmetic not in ("wide", "narrow"):
+            raise DzdesignError(f"target {self.name}: arithmetic is {self.arithmetic!r}, expected wide or narrow")
         for path in self.templates:
             parts = PurePosixPath(path)
             if parts.is_absolute() or ".." in parts.parts or "\\" in path:
