@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from fractions import Fraction
-from math import gcd, lcm
 
 from dzdesign.core.artefacts import sha256_of, to_json
 from dzdesign.core.errors import InputError, RequirementError
@@ -12,15 +11,10 @@ from dzdesign.design.compensator import Certificate, Compensator, SideLaw
 from dzdesign.design.costs import costs_of
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.signals import Signals
+from dzdesign.design.units import Units, finest_units
 from dzdesign.identify.model import SideModel, ValveModel
 from dzdesign.identify.valve_file import valve_from_document
 
-#: k x_max/u_max and u_min0/u_max are integers over this: finer than half a PWM count of 60 000.
-COEFFICIENT_DENOMINATOR = 1 << 16
-#: Finest and coarsest unit of beta's nodes; beta stays below 2, so a node fits 16 bits.
-BETA_DENOMINATORS = tuple(1 << bits for bits in range(15, 10, -1))
-#: The firmware's sum has 63 bits, and beta may come up to 2.
-SUM_BITS = 62
 #: Share of the sensor's span by which the difference may read negative before it counts as a failed sensor.
 REVERSE_SHARE = Fraction(1, 100)
 
@@ -52,7 +46,7 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
     law(options.law_name)
     u_max = Fraction(repr(valve.u_max_V))
     edge_codes = options.edge_codes()
-    denominator = _beta_denominator(signals, edge_codes)
+    units = finest_units(signals, edge_codes)
     laws = {}
     for sign in signals.signs:
         name = "positive" if sign > 0 else "negative"
@@ -61,7 +55,7 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
                 f"the command has both signs, but the valve's {name} side was not tested; record its ramps, or give a "
                 "command of one sign"
             )
-        laws[name] = _side_law(valve.sides[name], options, u_max, sign, denominator)
+        laws[name] = _side_law(valve.sides[name], options, u_max, sign, units)
     compensator = Compensator(
         law_name=options.law_name,
         below_reference=options.below_reference,
@@ -69,7 +63,7 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
         u_max_V=u_max,
         positive=laws["positive"],
         negative=laws.get("negative"),
-        beta_denominator=denominator,
+        beta_denominator=units.beta,
         beta_step_codes=STEP_CODES,
         reverse_codes=int(REVERSE_SHARE * (signals.pressure_a.full_code - signals.pressure_a.zero_code)),
         edge_codes=edge_codes,
@@ -83,7 +77,7 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
     return replace(compensator, costs=costs_of(compensator, valve))
 
 
-def _side_law(side: SideModel, options: DesignOptions, u_max: Fraction, sign: int, denominator: int) -> SideLaw:
+def _side_law(side: SideModel, options: DesignOptions, u_max: Fraction, sign: int, units: Units) -> SideLaw:
     """Choose the coefficients and tables of one side, and prove its certificate."""
     signals = options.signals
     certified = _guarded_curve(side, options)
@@ -91,7 +85,7 @@ def _side_law(side: SideModel, options: DesignOptions, u_max: Fraction, sign: in
     reference = Fraction(repr(side.reference_dp_MPa))
     top = (opening or certified).at(reference)
     # Half a count less, because the compare value of the offset may be rounded up.
-    u_min0 = _over(top / u_max - Fraction(1, 2 * signals.compare_max), "down")
+    u_min0 = _over(top / u_max - Fraction(1, 2 * signals.compare_max), "down", units.coefficient)
     if u_min0 <= 0:
         raise InputError(f"u_min0 is {float(top):.4f} V, less than one count of the PWM: no dead zone")
     above_one = side.trend == "increasing" or options.below_reference == "extend"
@@ -101,7 +95,7 @@ def _side_law(side: SideModel, options: DesignOptions, u_max: Fraction, sign: in
         raise InputError("the dither's height leaves no offset under the certified one; make it smaller")
 
     def table(under: OffsetCeiling) -> tuple[int, ...]:
-        return choose_beta_table(under, u_min0, side.trend, denominator=denominator, above_one=above_one)
+        return choose_beta_table(under, u_min0, side.trend, denominator=units.beta, above_one=above_one)
 
     beta = table(ceiling)
     edge_beta = None
@@ -109,7 +103,7 @@ def _side_law(side: SideModel, options: DesignOptions, u_max: Fraction, sign: in
         upper = table(_opening_ceiling(opening, signals, u_max, sign))
         edge_beta = tuple(map(max, upper, beta))
     return SideLaw(
-        k_x_max_over_u_max=_over(_travel(side, u_max, top), "nearest"),
+        k_x_max_over_u_max=_over(_travel(side, u_max, top), "nearest", units.coefficient),
         u_min0_over_u_max=u_min0,
         beta_numerators=beta,
         edge_numerators=edge_beta,
@@ -118,7 +112,7 @@ def _side_law(side: SideModel, options: DesignOptions, u_max: Fraction, sign: in
             guard=options.guard,
             level_L_min=side.level_L_min,
             dp_MPa=(certified.dp_MPa[0], certified.dp_MPa[-1]),
-            smallest_margin_V=_smallest_margin(ceiling, beta, u_min0, denominator) * u_max,
+            smallest_margin_V=_smallest_margin(ceiling, beta, u_min0, units.beta) * u_max,
         ),
     )
 
@@ -151,7 +145,15 @@ def _guarded_curve(side: SideModel, options: DesignOptions) -> OffsetCurve:
 
 def _opening_curve(side: SideModel, options: DesignOptions) -> OffsetCurve:
     """Return the best estimate of the opening threshold: where the edge ends and the law goes on."""
-    raise InputError("no opening curve yet")
+    reference = Fraction(repr(side.reference_dp_MPa))
+    values = [Fraction(repr(t.u_knee_rising_V)) for t in side.tests]
+    from itertools import accumulate
+    values = list(accumulate(values, min))
+    return OffsetCurve(
+        dp_MPa=tuple(Fraction(repr(value)) for value in side.beta_dp_MPa),
+        offset_V=tuple(values), steps_V=(), lowest_V=min(values),
+        hold_below_MPa=_hold_below(side, options),
+    )
 
 
 def _hold_below(side: SideModel, options: DesignOptions) -> Fraction | None:
@@ -177,28 +179,11 @@ def _travel(side: SideModel, u_max: Fraction, offset_V: Fraction) -> Fraction:
     return min(travel, 1 - offset_V / u_max)  # beyond full drive there is nothing
 
 
-def _over(value: Fraction, rounding: str) -> Fraction:
-    """Return `value` as an integer over `COEFFICIENT_DENOMINATOR`, rounded to nearest or down."""
-    scaled = value * COEFFICIENT_DENOMINATOR
+def _over(value: Fraction, rounding: str, unit: int) -> Fraction:
+    """Return `value` as an integer over `unit`, rounded to nearest or down."""
+    scaled = value * unit
     numerator = scaled.numerator // scaled.denominator if rounding == "down" else round(scaled)
-    return Fraction(numerator, COEFFICIENT_DENOMINATOR)
-
-
-def _beta_denominator(signals: Signals, edge_codes: int) -> int:
-    """Return the finest unit of beta's nodes with which the law's numerator still fits the firmware's sum.
-
-    The common denominator of the law in counts divides D S 2^16 C E / gcd with the compare value's range.
-    """
-    for denominator in BETA_DENOMINATORS:
-        powers = denominator * STEP_CODES * COEFFICIENT_DENOMINATOR * max(edge_codes, 1)
-        spans = lcm(*(signals.command.span(sign) for sign in signals.signs))
-        common = powers * spans // gcd(powers * spans, signals.compare_max)
-        if (2 * common * signals.compare_max).bit_length() <= SUM_BITS:
-            return denominator
-    raise InputError(
-        "the command's codes and the PWM's counts need more than 64-bit arithmetic; choose an attenuator whose full "
-        f"command has fewer prime factors than {spans} codes"
-    )
+    return Fraction(numerator, unit)
 
 
 def _smallest_margin(ceiling: OffsetCeiling, table: tuple[int, ...], u_min0: Fraction, denominator: int) -> Fraction:

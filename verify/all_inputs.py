@@ -17,6 +17,8 @@ CUBE_COMMANDS = (0, 0.5, 1)
 OUTSIDE = 65535
 #: The law's own change from one pressure code to the next counts as a direction from this on, in counts.
 DIRECTION = 1e-9
+#: More than a pressure of doubles is wrong by; widens the pressures that a code may stand for.
+FLOAT_ERROR_MPA = 1e-12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -231,22 +233,21 @@ def _margins(document: dict[str, Any], exact: ExactLaw, core: CompiledCore, plac
 
 
 def _pressure_drops(exact: ExactLaw, places: Places) -> tuple[list[Fraction], list[Fraction]]:
-    """Return the least and the largest pressure drop, MPa, that may have made each difference."""
-    ends = []
+    """Return the least and the largest pressure drop, MPa, that may have made each difference: over all its pairs."""
+    pressures, errors = [], []
     for sensor in (exact.a, exact.b):
         unit = Fraction(*sensor["span_MPa"]) / (sensor["full_code"] - sensor["zero_code"])
-        ends.append((unit, sensor["zero_code"], [Fraction(*end) for end in sensor["error_MPa"]]))
-    (unit_a, zero_a, error_a), (unit_b, zero_b, error_b) = ends
-    # Two pairs of one difference are less than a code apart; exactly none where the sensors count alike.
-    slack = 0 if unit_a == unit_b else unit_a
-    low, high = [], []
-    for pairs in zip(*places.low, *places.high, strict=True):
-        a_low, b_low, a_high, b_high = map(int, pairs)
-        drops = [exact.turn * ((a - zero_a) * unit_a - (b - zero_b) * unit_b) for a, b in ((a_low, b_low), (a_high, b_high))]
-        errors = [exact.turn * (error_a[0] - error_b[1]), exact.turn * (error_a[1] - error_b[0])]
-        low.append(min(drops) + min(errors) - slack)
-        high.append(max(drops) + max(errors) + slack)
-    return low, high
+        pressures.append(np.array([float((code - sensor["zero_code"]) * unit) for code in range(exact.code_max + 1)]))
+        errors.append([Fraction(*end) for end in sensor["error_MPa"]])
+    drop = exact.turn * (pressures[0][:, None] - pressures[1][None, :])
+    least, most = np.full(places.differences.size + 1, np.inf), np.full(places.differences.size + 1, -np.inf)
+    np.minimum.at(least, places.of_pair.ravel(), drop.ravel())
+    np.maximum.at(most, places.of_pair.ravel(), drop.ravel())
+    ends = sorted(exact.turn * error for error in (errors[0][0] - errors[1][1], errors[0][1] - errors[1][0]))
+    return (
+        [Fraction(float(value) - FLOAT_ERROR_MPA) + ends[0] for value in least[:-1]],
+        [Fraction(float(value) + FLOAT_ERROR_MPA) + ends[1] for value in most[:-1]],
+    )
 
 
 def _bad_fallbacks(core: CompiledCore, exact: ExactLaw) -> int:
