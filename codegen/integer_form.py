@@ -41,8 +41,8 @@ class IntegerForm:
 
     ``total = B_law * (slope * c + offset) + (linear * c << linear_shift) + half - gap * (edge * max(E - c, 0))`` with
     B_law and gap = B_law - B the tables interpolated without rounding;
-    ``compare = min((total >> shift) / divisor, limit)``; the division is ``(quotient * reciprocal) >> reciprocal_shift``
-    or the `estimate`.
+    ``compare = min(total >> shift, largest) / divisor``, so that no compare value exceeds the limit; the division is
+    ``(quotient * reciprocal) >> reciprocal_shift`` or the `estimate`.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class IntegerForm:
     half, shift, divisor : int
         Rounding and denominator.
     largest : int
-        Largest ``total >> shift``.
+        Largest quotient that is divided: the one whose compare value is the limit.
     reciprocal, reciprocal_shift : int
         Of the divisor.
     estimate : Estimate
@@ -143,7 +143,9 @@ def integer_form(compensator: Compensator, sign: int = 1) -> IntegerForm:
     linear_shift = 0
     while linear and linear % 2 == 0:
         linear, linear_shift = linear // 2, linear_shift + 1
-    largest = _largest_quotient(compensator, sign, divisor)
+    if _largest_quotient(compensator, sign, divisor) >= 1 << 32:
+        raise InputError(f"the law's quotient by {divisor} needs more than 32 bits; choose other scalings")
+    largest = (c.amplifier.compare_limit + 1) * divisor - 1
     reciprocal, reciprocal_shift = _exact_reciprocal(divisor, largest)
     fallback = (min(side.law_numerators),) * 2
     nodes = side.law_numerators + fallback
@@ -237,7 +239,6 @@ def _prove_widths(form: IntegerForm, compensator: Compensator, sign: int) -> Non
         "the edge's factor": (form.edge * compensator.edge_codes, INT32_MAX),
         "the 64-bit sum": (beta * inner + straight + form.half + gap * form.edge * compensator.edge_codes, INT64_MAX),
         "the command's own term": (form.linear, 2**32 - 1),
-        "the quotient": (form.largest, 2**32 - 1),
     }
     for what, (value, limit) in checks.items():
         if value > limit:
