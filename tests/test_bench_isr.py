@@ -84,9 +84,11 @@ def test_our_core_gives_the_exact_law_on_every_counted_input(machine, example_co
 @pytest.mark.xfail(reason="the core branches on impossible pressures and commands", strict=True)
 @on_every_machine
 def test_our_core_takes_the_same_for_every_input(machine, example_compensator, inputs, tmp_path):
-    for index, form in enumerate(our_forms(example_compensator)):
-        found = machine.count(form, inputs, tmp_path / str(index))
-        assert found.least == found.most, form.name
+    """Every form on machines with products of 32 bits; on AVR, whose library has branches, the one that is chosen."""
+    forms = our_forms(example_compensator)
+    found = [machine.count(form, inputs, tmp_path / str(index)) for index, form in enumerate(forms)]
+    judged = [min(found, key=lambda each: each.most)] if machine is on_avr else found
+    assert all(each.least == each.most for each in judged)
 
 
 def test_the_expected_values_are_those_of_the_compensator(example_compensator, inputs, expected):
@@ -109,22 +111,26 @@ def test_rivals_do_the_same_job(example_compensator, inputs, expected, tmp_path)
         assert (wrong > 0) == rival.name.endswith("unchecked"), rival.name
 
 
-@needs(on_x86.X86)
-def test_a_core_that_is_wrong_once_is_seen(example_compensator, tmp_path):
-    """Seeded: one count more at one command and one pair of pressures, out of all inputs."""
+@pytest.mark.parametrize(
+    "machine",
+    [
+        pytest.param(on_x86, marks=needs(on_x86.X86), id="x86-64"),
+        pytest.param(on_cortex_m4, marks=needs(on_cortex_m4.CORTEX_M4), id="Cortex-M4"),
+    ],
+)
+def test_a_core_that_is_wrong_once_is_seen(machine, example_compensator, tmp_path):
+    """Seeded: three counts more at one command and one pair of pressures, out of all inputs."""
     (form, *_) = our_forms(example_compensator)
     rows = exact_rows_header(example_compensator)
-    header = form.sources["dz_comp.h"]
     core = form.sources["dz_comp.c"].replace("uint16_t dz_comp(", "uint16_t right_comp(")
     fault = (
         "uint16_t dz_comp(uint16_t u, uint16_t a, uint16_t b)\n"
         "{ return (uint16_t)(right_comp(u, a, b) + 3 * (u == 1234 && a == 700 && b == 0)); }\n"
     )
     prototype = "#include <stdint.h>\nuint16_t right_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);\n"
-    sources = {"dz_comp.h": header, "dz_comp.c": prototype + core + fault}
-    wrong = Contender(name="wrong", made="", sources=sources)
-    assert on_x86.check_all(form, rows, tmp_path / "right") == (33550336, 0, 0)
-    assert on_x86.check_all(wrong, rows, tmp_path / "wrong") == (33550336, 1, 3)
+    sources = {**form.sources, "dz_comp.c": prototype + core + fault}
+    wrong = Contender(name="wrong", made="seeded", sources=sources)
+    assert machine.check_all(wrong, rows, tmp_path) == (33550336, 1, 3)
 
 
 def measured(name, counts, *, ours=False, wrong=0):
@@ -147,3 +153,16 @@ def test_the_goals_are_judged(counts, wrong, missed):
     ]
     verdicts = [row.verdict for row in goals([measured("ours", counts, ours=True, wrong=wrong), *others])]
     assert verdicts.count("MISSES") == missed and len(verdicts) == 6
+
+
+def test_each_machine_judges_the_form_that_is_fastest_there():
+    """A second form that is slow on the Cortex-M4 costs nothing there; wrong or uneven it may not be."""
+    others = [
+        measured("float32 slope table", (40,)),
+        measured("float32 slope table, unchecked", (30,)),
+        measured("casadi pw_lin", (10, 4100)),
+    ]
+    fast = measured("fast", (40, 40), ours=True)
+    for slow, missed in (((900, 900), 0), ((900, 901), 1)):
+        rows = goals([fast, measured("slow", slow, ours=True), *others])
+        assert [row.verdict for row in rows].count("MISSES") == missed

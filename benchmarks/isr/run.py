@@ -1,4 +1,4 @@
-"""Benchmark of the generated core against what others would flash: ``run.py [--valve compensator.json]``.
+"""Benchmark of the generated core against what others would flash: ``run.py [--compensator compensator.json]``.
 
 One run, one Markdown table: instructions a call on x86-64 (callgrind) and on a Cortex-M4F (QEMU), cycles on AVR
 (simavr), bytes of code and constants, wrong compare values of all inputs and the largest error; then the goals.
@@ -32,14 +32,14 @@ KNOWN_LENGTHS = (0, 7, 300)
 def main(arguments: list[str] | None = None) -> int:
     """Measure all contenders, print the table and the goals."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--valve", type=Path, help="compensator.json; without it the bundled example is designed")
+    parser.add_argument("--compensator", type=Path, help="compensator.json; without it the bundled example is designed")
     chosen = parser.parse_args(arguments)
     for machine in (on_x86.X86, on_cortex_m4.CORTEX_M4, on_avr.AVR):
         if missing := machine.missing():
             print(f"benchmark: {machine.compiler}: {missing}; apt-get install it", file=sys.stderr)
             return 2
     start = perf_counter()
-    compensator = _compensator(chosen.valve)
+    compensator = _compensator(chosen.compensator)
     inputs = tried_inputs(compensator)
     expected = expected_compares(compensator, inputs)
     contenders = our_forms(compensator) + rivals(compensator)
