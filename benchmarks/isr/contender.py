@@ -33,20 +33,16 @@ class Contender:
 
 
 def our_forms(compensator: Compensator) -> list[Contender]:
-    """Return the product's core in every form that the generator has."""
-    forms = {"wide": "32x32->64 bit products"}
+    """Return the product's core in every form that the generator has; a new form is one line of `forms`."""
+    forms = {
+        "wide": ("32x32->64 bit products", generate(compensator, "f28335").files),
+    }
     return [
         Contender(
             name=f"ours, {form}",
             made=f"`dzdesign codegen`, {text}.",
-            sources=_core_of(compensator, form),
+            sources={path.removeprefix("core/"): c for path, c in files.items() if path.startswith("core/")},
             ours=True,
         )
-        for form, text in forms.items()
+        for form, (text, files) in forms.items()
     ]
-
-
-def _core_of(compensator: Compensator, form: str) -> Mapping[str, str]:
-    """Return the core's files in one form; until the generator has a choice there is one."""
-    files = {"wide": lambda: generate(compensator, "f28335").files}[form]()
-    return {path.removeprefix("core/"): text for path, text in files.items() if path.startswith("core/")}
