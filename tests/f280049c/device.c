@@ -43,7 +43,7 @@ static void record(const char *function, int count, ...)
     for (; count > 0; count--)
     {
         const uint32_t value = va_arg(arguments, uint32_t);
-        const char *name = (value >= 50000u) ? name_of(value) : NULL;
+        const char *name = (value >= 30000u) ? name_of(value) : NULL;
         (name != NULL) ? printf(" %s", name) : printf(" %u", (unsigned)value);
     }
     va_end(arguments);

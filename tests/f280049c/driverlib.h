@@ -8,45 +8,45 @@
 
 #define __interrupt
 
-/* Lists of constants: X(name, value). Numbers below 50000 stay free for counts and pins. */
+/* Lists of constants: X(name, value). All fit a 16-bit int, and no count is among them. */
 #define PLAIN_WORDS                                                                                                    \
-    X(EPWM1_BASE, 50001) X(ADCA_BASE, 50002) X(ADCARESULT_BASE, 50003) X(INT_EPWM1, 50004)                             \
-    X(INTERRUPT_ACK_GROUP3, 50005) X(EPWM_TZ_SIGNAL_OSHT1, 50006) X(EPWM_TZ_FORCE_EVENT_OST, 50007)                    \
-    X(EPWM_TZ_FLAG_OST, 50008) X(EPWM_INT_TBCTR_U_CMPB, 50009) X(EPWM_INT_TBCTR_ZERO, 50010)                           \
-    X(GPIO_PIN_TYPE_STD, 50011) X(GPIO_PIN_TYPE_PULLUP, 50012) X(GPIO_0_EPWM1_A, 50013) X(GPIO_12_GPIO12, 50014)       \
-    X(SYSCTL_CAUSE_WDRS, 50015)
+    X(EPWM1_BASE, 30001) X(ADCA_BASE, 30002) X(ADCARESULT_BASE, 30003) X(INT_EPWM1, 30004)                             \
+    X(INTERRUPT_ACK_GROUP3, 30005) X(EPWM_TZ_SIGNAL_OSHT1, 30006) X(EPWM_TZ_FORCE_EVENT_OST, 30007)                    \
+    X(EPWM_TZ_FLAG_OST, 30008) X(EPWM_INT_TBCTR_U_CMPB, 30009) X(EPWM_INT_TBCTR_ZERO, 30010)                           \
+    X(GPIO_PIN_TYPE_STD, 30011) X(GPIO_PIN_TYPE_PULLUP, 30012) X(GPIO_0_EPWM1_A, 30013) X(GPIO_12_GPIO12, 30014)       \
+    X(SYSCTL_CAUSE_WDRS, 30015)
 #define TYPED_WORDS                                                                                                    \
-    T(EPWM_ClockDivider, X(EPWM_CLOCK_DIVIDER_1, 50101))                                                               \
-    T(EPWM_HSClockDivider, X(EPWM_HSCLOCK_DIVIDER_1, 50111))                                                           \
-    T(EPWM_PeriodLoadMode, X(EPWM_PERIOD_SHADOW_LOAD, 50121))                                                          \
-    T(EPWM_TimeBaseCountMode, X(EPWM_COUNTER_MODE_UP, 50131) X(EPWM_COUNTER_MODE_UP_DOWN, 50132))                      \
-    T(EPWM_CounterCompareModule, X(EPWM_COUNTER_COMPARE_A, 50141) X(EPWM_COUNTER_COMPARE_B, 50142))                    \
-    T(EPWM_CounterCompareLoadMode, X(EPWM_COMP_LOAD_ON_CNTR_ZERO, 50151))                                              \
-    T(EPWM_ActionQualifierOutputModule, X(EPWM_AQ_OUTPUT_A, 50161))                                                    \
-    T(EPWM_ActionQualifierOutput, X(EPWM_AQ_OUTPUT_LOW, 50171) X(EPWM_AQ_OUTPUT_HIGH, 50172))                          \
+    T(EPWM_ClockDivider, X(EPWM_CLOCK_DIVIDER_1, 30101))                                                               \
+    T(EPWM_HSClockDivider, X(EPWM_HSCLOCK_DIVIDER_1, 30111))                                                           \
+    T(EPWM_PeriodLoadMode, X(EPWM_PERIOD_SHADOW_LOAD, 30121))                                                          \
+    T(EPWM_TimeBaseCountMode, X(EPWM_COUNTER_MODE_UP, 30131) X(EPWM_COUNTER_MODE_UP_DOWN, 30132))                      \
+    T(EPWM_CounterCompareModule, X(EPWM_COUNTER_COMPARE_A, 30141) X(EPWM_COUNTER_COMPARE_B, 30142))                    \
+    T(EPWM_CounterCompareLoadMode, X(EPWM_COMP_LOAD_ON_CNTR_ZERO, 30151))                                              \
+    T(EPWM_ActionQualifierOutputModule, X(EPWM_AQ_OUTPUT_A, 30161))                                                    \
+    T(EPWM_ActionQualifierOutput, X(EPWM_AQ_OUTPUT_LOW, 30171) X(EPWM_AQ_OUTPUT_HIGH, 30172))                          \
     T(EPWM_ActionQualifierOutputEvent,                                                                                 \
-      X(EPWM_AQ_OUTPUT_ON_TIMEBASE_ZERO, 50181) X(EPWM_AQ_OUTPUT_ON_TIMEBASE_UP_CMPA, 50182))                          \
-    T(EPWM_ActionQualifierSWOutput, X(EPWM_AQ_SW_DISABLED, 50191) X(EPWM_AQ_SW_OUTPUT_LOW, 50192))                     \
-    T(EPWM_ActionQualifierContForce, X(EPWM_AQ_SW_SH_LOAD_ON_CNTR_ZERO, 50201))                                        \
-    T(EPWM_ADCStartOfConversionType, X(EPWM_SOC_A, 50211))                                                             \
-    T(EPWM_ADCStartOfConversionSource, X(EPWM_SOC_TBCTR_ZERO, 50221))                                                  \
-    T(EPWM_TripZoneEvent, X(EPWM_TZ_ACTION_EVENT_TZA, 50231))                                                          \
-    T(EPWM_TripZoneAction, X(EPWM_TZ_ACTION_LOW, 50241) X(EPWM_TZ_ACTION_HIGH, 50242))                                 \
-    T(XBAR_InputNum, X(XBAR_INPUT1, 50251))                                                                            \
-    T(ADC_ReferenceMode, X(ADC_REFERENCE_INTERNAL, 50261))                                                             \
-    T(ADC_ReferenceVoltage, X(ADC_REFERENCE_3_3V, 50271))                                                              \
-    T(ADC_ClkPrescale, X(ADC_CLK_DIV_2_0, 50281))                                                                      \
-    T(ADC_PulseMode, X(ADC_PULSE_END_OF_CONV, 50291))                                                                  \
-    T(ADC_Trigger, X(ADC_TRIGGER_EPWM1_SOCA, 50301))                                                                   \
-    T(ADC_Channel, X(ADC_CH_ADCIN0, 50311) X(ADC_CH_ADCIN1, 50312) X(ADC_CH_ADCIN2, 50313))                            \
-    T(ADC_IntNumber, X(ADC_INT_NUMBER1, 50321))                                                                        \
+      X(EPWM_AQ_OUTPUT_ON_TIMEBASE_ZERO, 30181) X(EPWM_AQ_OUTPUT_ON_TIMEBASE_UP_CMPA, 30182))                          \
+    T(EPWM_ActionQualifierSWOutput, X(EPWM_AQ_SW_DISABLED, 30191) X(EPWM_AQ_SW_OUTPUT_LOW, 30192))                     \
+    T(EPWM_ActionQualifierContForce, X(EPWM_AQ_SW_SH_LOAD_ON_CNTR_ZERO, 30201))                                        \
+    T(EPWM_ADCStartOfConversionType, X(EPWM_SOC_A, 30211))                                                             \
+    T(EPWM_ADCStartOfConversionSource, X(EPWM_SOC_TBCTR_ZERO, 30221))                                                  \
+    T(EPWM_TripZoneEvent, X(EPWM_TZ_ACTION_EVENT_TZA, 30231))                                                          \
+    T(EPWM_TripZoneAction, X(EPWM_TZ_ACTION_LOW, 30241) X(EPWM_TZ_ACTION_HIGH, 30242))                                 \
+    T(XBAR_InputNum, X(XBAR_INPUT1, 30251))                                                                            \
+    T(ADC_ReferenceMode, X(ADC_REFERENCE_INTERNAL, 30261))                                                             \
+    T(ADC_ReferenceVoltage, X(ADC_REFERENCE_3_3V, 30271))                                                              \
+    T(ADC_ClkPrescale, X(ADC_CLK_DIV_2_0, 30281))                                                                      \
+    T(ADC_PulseMode, X(ADC_PULSE_END_OF_CONV, 30291))                                                                  \
+    T(ADC_Trigger, X(ADC_TRIGGER_EPWM1_SOCA, 30301))                                                                   \
+    T(ADC_Channel, X(ADC_CH_ADCIN0, 30311) X(ADC_CH_ADCIN1, 30312) X(ADC_CH_ADCIN2, 30313))                            \
+    T(ADC_IntNumber, X(ADC_INT_NUMBER1, 30321))                                                                        \
     T(ADC_SOCNumber, X(ADC_SOC_NUMBER0, 0) X(ADC_SOC_NUMBER1, 1) X(ADC_SOC_NUMBER2, 2)) /* also plain numbers */        \
-    T(GPIO_Direction, X(GPIO_DIR_MODE_IN, 50341))                                                                      \
-    T(GPIO_QualificationMode, X(GPIO_QUAL_ASYNC, 50351))                                                               \
-    T(SysCtl_PeripheralPCLOCKCR, X(SYSCTL_PERIPH_CLK_TBCLKSYNC, 50361))                                                \
-    T(SysCtl_WDMode, X(SYSCTL_WD_MODE_RESET, 50371))                                                                   \
-    T(SysCtl_WDPredivider, X(SYSCTL_WD_PREDIV_512, 50381))                                                             \
-    T(SysCtl_WDPrescaler, X(SYSCTL_WD_PRESCALE_1, 50391))
+    T(GPIO_Direction, X(GPIO_DIR_MODE_IN, 30341))                                                                      \
+    T(GPIO_QualificationMode, X(GPIO_QUAL_ASYNC, 30351))                                                               \
+    T(SysCtl_PeripheralPCLOCKCR, X(SYSCTL_PERIPH_CLK_TBCLKSYNC, 30361))                                                \
+    T(SysCtl_WDMode, X(SYSCTL_WD_MODE_RESET, 30371))                                                                   \
+    T(SysCtl_WDPredivider, X(SYSCTL_WD_PREDIV_512, 30381))                                                             \
+    T(SysCtl_WDPrescaler, X(SYSCTL_WD_PRESCALE_1, 30391))
 
 #define X(name, value) name = (value),
 #define T(type, names) typedef enum { names } type;
