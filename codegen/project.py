@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from importlib import import_module
-from importlib.resources import files
+from importlib.resources import files as files_of
 from typing import TYPE_CHECKING, Any
 
 from dzdesign.codegen.integer_form import IntegerForm, integer_form
@@ -27,7 +27,7 @@ NODES_IN_A_ROW = 5
 
 def _found_targets() -> tuple[str, ...]:
     """Return the names of the folders that have a `target.py`, so that a new one needs no entry here."""
-    folders = (entry for entry in files(PACKAGE).iterdir() if entry.is_dir())
+    folders = (entry for entry in files_of(PACKAGE).iterdir() if entry.is_dir())
     return tuple(sorted(entry.name.replace("_", "-") for entry in folders if (entry / "target.py").is_file()))
 
 

@@ -16,6 +16,7 @@ import pytest
 from golden_firmware import GOLDENS, golden_compensator
 from hypothesis import given
 from hypothesis import strategies as st
+from synthetic import needs_compiler
 
 from dzdesign.cli import main
 from dzdesign.codegen import project
@@ -24,6 +25,7 @@ from dzdesign.codegen.target import folder_of
 from dzdesign.codegen.user_names import LONGEST, printable_list, printable_name
 from dzdesign.core.artefacts import to_json, write_folder
 from dzdesign.core.errors import DzdesignError, InputError
+from dzdesign.verify.all_inputs import check_all_inputs
 
 ROOT = Path(__file__).parents[1]
 VALVE = GOLDENS / "valve.json"
@@ -54,7 +56,7 @@ def test_targets_are_the_folders_with_a_target_py(tmp_path, monkeypatch):
         (tmp_path / name).mkdir()
         if has_target:
             (tmp_path / name / "target.py").touch()
-    monkeypatch.setattr(project, "files", lambda _: tmp_path)
+    monkeypatch.setattr(project, "files_of", lambda _: tmp_path)
     assert project._found_targets() == ("new-one", "zeta")
 
 
@@ -153,6 +155,14 @@ def test_a_compensator_of_another_target_is_refused_with_the_way_out():
         generate(golden_compensator("f28335"), "f280049c")
     for name in ("host", "avr", "cortex-m4"):  # these have no converter and timer of their own
         assert "DZ_COMPARE_MAX 40000u" in generate(golden_compensator("f280049c"), name).files["core/dz_comp.h"]
+
+
+@needs_compiler
+def test_the_core_is_exact_on_every_input_for_another_pwm(tmp_path):
+    firmware = generate(golden_compensator("f280049c"), "f280049c")
+    write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
+    result = check_all_inputs(tmp_path / "fw")
+    assert result.holds and result.wrong == 0 and result.inputs == 33_550_336
 
 
 @pytest.mark.parametrize(

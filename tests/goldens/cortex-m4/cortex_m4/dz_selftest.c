@@ -94,17 +94,30 @@ static char *put_text(char *end, const char *text)
     return end;
 }
 
-/* By hand, because not every target has printf. */
-static char *put_number(char *end, uint32_t value, uint32_t base, uint16_t least_digits)
+/* Numbers by hand, because not every target has printf. */
+static char *put_hexadecimal(char *end, uint32_t value)
+{
+    uint16_t shift = 32u;
+
+    while (shift != 0u)
+    {
+        shift = (uint16_t)(shift - 4u);
+        *end = "0123456789ABCDEF"[(value >> shift) & 0xFu];
+        end++;
+    }
+    return end;
+}
+
+static char *put_decimal(char *end, uint32_t value)
 {
     char digits[10];
     uint16_t count = 0u;
 
-    while ((value != 0u) || (count < least_digits))
+    while ((value != 0u) || (count == 0u))
     {
-        digits[count] = "0123456789ABCDEF"[value % base];
+        digits[count] = "0123456789"[value % 10u];
         count++;
-        value /= base;
+        value /= 10u;
     }
     while (count != 0u)
     {
@@ -122,9 +135,9 @@ void dz_selftest_line(const struct dz_selftest_grid *grid, char line[DZ_SELFTEST
 
     end = put_text(end, grid->name);
     end = put_text(end, " FNV-1a-32 ");
-    end = put_number(end, result.hash, 16u, 8u);
+    end = put_hexadecimal(end, result.hash);
     end = put_text(end, " over ");
-    end = put_number(end, result.calls, 10u, 1u);
+    end = put_decimal(end, result.calls);
     end = put_text(end, " compare values\n");
     *end = '\0';
 }
