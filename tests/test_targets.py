@@ -20,6 +20,8 @@ from synthetic import needs_compiler
 
 from dzdesign.cli import main
 from dzdesign.codegen import project
+from dzdesign.codegen.avr import target as avr
+from dzdesign.codegen.cortex_m4 import target as cortex_m4
 from dzdesign.codegen.project import TARGET_NAMES, generate, target_named
 from dzdesign.codegen.target import folder_of
 from dzdesign.codegen.user_names import LONGEST, printable_list, printable_name
@@ -173,6 +175,20 @@ def test_a_target_with_a_wrong_name_or_arithmetic_is_refused(change):
         replace(target_named("cortex-m4"), **change)
 
 
+@pytest.mark.parametrize(
+    ("module", "name", "value", "derived", "said"),
+    [
+        (avr, "BAUD", 115_200, "baud_divider", "off at 16000000 Hz"),
+        (cortex_m4, "CLOCK_HZ", 25_000_001, "systick_counts", "SysTick"),
+        (cortex_m4, "CLOCK_HZ", 2_500 * (2**24 + 1), "systick_counts", "SysTick"),
+    ],
+)
+def test_a_clock_that_does_not_divide_is_refused(monkeypatch, module, name, value, derived, said):
+    monkeypatch.setattr(module, name, value)
+    with pytest.raises(DzdesignError, match=said):
+        getattr(module, derived)()
+
+
 def test_the_avr_asks_for_narrow_arithmetic_and_the_others_do_not():
     assert [name for name in TARGET_NAMES if target_named(name).arithmetic == "narrow"] == ["avr"]
 
@@ -223,7 +239,7 @@ def test_a_hostile_name_changes_nothing_but_a_harmless_comment(target, name):
 
 def test_hostile_names_build_in_a_hostile_folder(tmp_path):
     make = shutil.which("make") or pytest.skip("no make on the path; apt install make")
-    folder = tmp_path / "it's a $(x) `touch owned`; #*% folder"
+    folder = tmp_path / "it's a $(x) `touch owned`; #% folder"
     firmware = generate(hostile_compensator("host", HOSTILE[:4]), "host")
     write_folder(folder, firmware.files, firmware.manifest)
     done = subprocess.run([make, "all", "check"], cwd=folder / "host", capture_output=True, text=True, check=False)
