@@ -42,7 +42,9 @@ def core_plan(compensator: Compensator, sign: int, arithmetic: str) -> Plan:
         "edge": bool(compensator.edge_codes),
         "edge_codes": str(compensator.edge_codes),
         "edge_text": f"{compensator.edge_codes / compensator.signals.command.span(sign):.2%}",
-        "edge_sum_text": f"\n *           - gap * {form.edge} * max({compensator.edge_codes} - c, 0)" if form.edge else "",
+        "edge_sum_text": f"\n *           - gap * {form.edge} * max({compensator.edge_codes} - c, 0)"
+        if form.edge
+        else "",
         "beta_scale": str(form.scale_beta * compensator.beta_denominator),
         "table_length": str(len(form.table)),
         "table_rows": _rows(form.table),

@@ -1,12 +1,15 @@
 """`generate`: a `Compensator` and a target in, the files of a C project out."""
 
-from collections.abc import Mapping
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
+from importlib.resources import files as files_of
 from typing import TYPE_CHECKING, Any
 
-from dzdesign.codegen.core_plan import core_plan, drive_plan, header_plan
-from dzdesign.codegen.target import Target
+from dzdesign.codegen.core_plan import Plan, core_plan, drive_plan, header_plan
+from dzdesign.codegen.target import Target, folder_of
+from dzdesign.codegen.user_names import printable_list
 from dzdesign.core.artefacts import TOOL, sha256_of, to_json
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.design.compensator import Compensator
@@ -16,10 +19,19 @@ if TYPE_CHECKING:
     import jinja2
 
 SCHEMA = "dzdesign.firmware/1"
-#: One folder a target; each has `target.py` with a `TARGET` and its templates.
-TARGET_NAMES = ("f28335",)
+PACKAGE = "dzdesign.codegen"
 #: One file a sign of command, all from one template.
 CORE_SOURCES = {1: "dz_comp.c", -1: "dz_comp_negative.c"}
+
+
+def _found_targets() -> tuple[str, ...]:
+    """Return the names of the folders that have a `target.py`, so that a new one needs no entry here."""
+    folders = (entry for entry in files_of(PACKAGE).iterdir() if entry.is_dir())
+    return tuple(sorted(entry.name.replace("_", "-") for entry in folders if (entry / "target.py").is_file()))
+
+
+#: One folder a target; each has `target.py` with a `TARGET` and its templates.
+TARGET_NAMES = _found_targets()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,7 +52,12 @@ def target_named(name: str) -> Target:
     """
     if name not in TARGET_NAMES:
         raise InputError(f"there is no target '{name}'{nearest(name, TARGET_NAMES)}; known: {', '.join(TARGET_NAMES)}")
-    return import_module(f"dzdesign.codegen.{name}.target").TARGET
+    return import_module(f"{PACKAGE}.{folder_of(name)}.target").TARGET
+
+
+def targets() -> tuple[Target, ...]:
+    """Return every target, in the order of the names."""
+    return tuple(target_named(name) for name in TARGET_NAMES)
 
 
 def generate(compensator: Compensator, target_name: str, compensator_bytes: bytes | None = None) -> Firmware:
@@ -61,29 +78,20 @@ def generate(compensator: Compensator, target_name: str, compensator_bytes: byte
         If the target is unknown, or its converter or PWM differs from the compensator's signals.
     """
     target = target_named(target_name)
-    signals = compensator.signals
-    for what, asked, has in (
-        ("compare value", signals.compare_max, target.compare_max),
-        ("converter code", signals.code_max, target.adc_code_max),
-    ):
-        if asked != has:
-            raise InputError(
-                f"the compensator's largest {what} is {asked}, but target {target.name} has {has}; "
-                "design it again for that target"
-            )
+    target.check_signals(compensator.signals)
     document = compensator_bytes or to_json(compensator_document(compensator)).encode()
     digest = sha256_of(document)
+    recordings = ramp_tests_of(compensator)
     header = header_plan(compensator)
-    files = {"core/dz_comp.h": _render("dzdesign.codegen", "dz_comp.h.jinja", digest, header)}
-    for sign, name in CORE_SOURCES.items():
-        if sign in signals.signs:
-            plan = core_plan(compensator, sign, target.arithmetic)
-            files[f"core/{name}"] = _render("dzdesign.codegen", "dz_comp.c.jinja", digest, plan)
-    for name in ("dz_drive.c", "dz_drive.h"):
-        files[f"core/{name}"] = _render("dzdesign.codegen", f"{name}.jinja", digest, drive_plan(compensator))
     hardware = {**target.context, "u_max_V": header["u_max_V"], "pressure_span_MPa": header["a_span_MPa"]}
-    for path, template in target.templates.items():
-        files[path] = _render(f"dzdesign.codegen.{target.name}", template, digest, hardware)
+    shared = environment(PACKAGE)
+    plans = [(path, shared, template, plan) for path, template, plan in _core_files(compensator, target, header)]
+    own = environment(f"{PACKAGE}.{target.folder}")
+    plans += [(path, own, template, hardware) for path, template in target.templates.items()]
+    files = {
+        path: _render(renderer, template, banner(template, digest, recordings), plan)
+        for path, renderer, template, plan in plans
+    }
     files["compensator.json"] = document.decode()
     manifest = {
         "schema": SCHEMA,
@@ -96,12 +104,34 @@ def generate(compensator: Compensator, target_name: str, compensator_bytes: byte
     return Firmware(files=files, manifest=manifest)
 
 
+def _core_files(compensator: Compensator, target: Target, header: Plan) -> list[tuple[str, str, Plan]]:
+    """Return path, template and plan of every file of the core."""
+    sides = [
+        (f"core/{name}", "dz_comp.c.jinja", core_plan(compensator, sign, target.arithmetic))
+        for sign, name in CORE_SOURCES.items()
+        if sign in compensator.signals.signs
+    ]
+    drive = drive_plan(compensator)
+    return [
+        *sides,
+        ("core/dz_comp.h", "dz_comp.h.jinja", header),
+        *((f"core/{name}", f"{name}.jinja", drive) for name in ("dz_drive.c", "dz_drive.h")),
+    ]
+
+
+def ramp_tests_of(compensator: Compensator) -> tuple[str, ...]:
+    """Return the names of the recordings that the valve was identified from, as their users gave them."""
+    made_from = json.loads(compensator.valve_document).get("made_from", ())
+    return tuple(str(entry["source"]) for entry in made_from)
+
+
 def environment(package: str) -> "jinja2.Environment":
-    """Return the renderer of a package's templates: strict, so that a name without a value is an error."""
+    """Return the renderer of a package's templates, then of the shared ones: strict, a name without a value fails."""
     import jinja2
 
+    packages = dict.fromkeys((package, PACKAGE))
     return jinja2.Environment(
-        loader=jinja2.PackageLoader(package, "templates"),
+        loader=jinja2.ChoiceLoader([jinja2.PackageLoader(name, "templates") for name in packages]),
         undefined=jinja2.StrictUndefined,
         keep_trailing_newline=True,
         trim_blocks=True,
@@ -109,14 +139,26 @@ def environment(package: str) -> "jinja2.Environment":
     )
 
 
-def banner(template: str, digest: str) -> tuple[str, ...]:
-    """Return the lines that open every generated file: tool, template, hash of the compensator; no date."""
-    return (
+def banner(template: str, digest: str, recordings: Sequence[str] = ()) -> tuple[str, ...]:
+    """Return the lines that open every generated file: tool, template, hash and recordings; no date.
+
+    Parameters
+    ----------
+    template : str
+        File name of the template.
+    digest : str
+        SHA-256 of compensator.json.
+    recordings : sequence of str
+        Names from users; whatever could act in a comment is replaced.
+    """
+    lines = (
         f"Generated by dzdesign {TOOL['version']} from template {template}. Do not edit: generate it again.",
         f"Compensator SHA-256: {digest}",
     )
+    return (*lines, f"Valve identified from: {printable_list(recordings)}") if recordings else lines
 
 
-def _render(package: str, template: str, digest: str, context: Mapping[str, object]) -> str:
-    page = environment(package).get_template(template)
-    return page.render(banner=banner(template, digest), project="dzdesign", **context)
+def _render(
+    renderer: "jinja2.Environment", template: str, opening: tuple[str, ...], values: Mapping[str, object]
+) -> str:
+    return renderer.get_template(template).render(banner=opening, project="dzdesign", **values)

@@ -24,7 +24,9 @@ share = sympy.Symbol("share", nonnegative=True)  # u_i/u_e
 LOWERED_BY = (beta_o - beta) * u_min0 * (1 - share)
 
 
-def evaluate_edge(*, beta_opening: Any, beta_closing: Any, u_min0_over_u_max: Any, share_of_edge: Any, n_full: Any) -> Any:
+def evaluate_edge(
+    *, beta_opening: Any, beta_closing: Any, u_min0_over_u_max: Any, share_of_edge: Any, n_full: Any
+) -> Any:
     """Return by how many counts the edge lowers the opening law, for numbers of any kind.
 
     Parameters

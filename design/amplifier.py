@@ -18,7 +18,7 @@ class Amplifier:
         Of a command of both signs: codes by which it must pass zero before the other solenoid is driven. Until then the
         solenoid that was driven stays at its offset, so that noise about zero does not throw the spool from side to side.
     ramp_up, ramp_down : tuple of int
-        Largest change of the command away from zero, and back to it, a sample, in codes over `RAMP_UNIT`: of positive,
+        Largest change of the command a sample, away from zero and back to it, in codes over `RAMP_UNIT`: of positive,
         then of negative command. 0: none.
     dither_counts : int
         Half the height of a square wave on the compare value; the certificate counts it as offset. 0: none.

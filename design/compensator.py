@@ -152,7 +152,9 @@ class Compensator:
         nodes = self.nodes(sign)
         if len(side.beta_numerators) != nodes:
             raise InputError(f"beta has {len(side.beta_numerators)} nodes, expected {nodes} for every code")
-        if not all(0 < numerator < 2 * self.beta_denominator for numerator in side.law_numerators + side.beta_numerators):
+        if not all(
+            0 < numerator < 2 * self.beta_denominator for numerator in side.law_numerators + side.beta_numerators
+        ):
             raise InputError("every beta must lie between 0 and 2, exclusive")
         if bool(self.edge_codes) != (side.edge_numerators is not None):
             raise InputError("an edge needs the opening threshold's beta, and its codes of command")

@@ -148,10 +148,13 @@ def _opening_curve(side: SideModel, options: DesignOptions) -> OffsetCurve:
     reference = Fraction(repr(side.reference_dp_MPa))
     values = [Fraction(repr(t.u_knee_rising_V)) for t in side.tests]
     from itertools import accumulate
+
     values = list(accumulate(values, min))
     return OffsetCurve(
         dp_MPa=tuple(Fraction(repr(value)) for value in side.beta_dp_MPa),
-        offset_V=tuple(values), steps_V=(), lowest_V=min(values),
+        offset_V=tuple(values),
+        steps_V=(),
+        lowest_V=min(values),
         hold_below_MPa=_hold_below(side, options),
     )
 

@@ -6,7 +6,7 @@ from fractions import Fraction
 from math import floor
 
 from dzdesign.core.errors import InputError
-from dzdesign.core.units import SI_UNIT, parse_quantity, si_factor
+from dzdesign.core.units import parse_quantity, si_factor
 from dzdesign.design.signals import CommandSignal, PressureSignal
 
 #: A sound signal may pass its ends by as much as the field's 3.6 mA and 21 mA pass those of 4-20 mA.
@@ -127,7 +127,9 @@ def parse_signal(text: str, option: str) -> PinSignal:
     per_unit = Fraction(match["gain"] or 1)
     if current:
         per_unit *= Fraction(match["shunt"]) * Fraction(repr(si_factor(match["ohm"].replace("Ω", "ohm"), "resistance")))
-    offset = Fraction(match["offset"] or 0) * (Fraction(repr(si_factor(match["volt"], "voltage"))) if match["volt"] else 1)
+    offset = Fraction(match["offset"] or 0) * (
+        Fraction(repr(si_factor(match["volt"], "voltage"))) if match["volt"] else 1
+    )
     if per_unit == 0:
         raise InputError(f"{option}: '{text}' has gain 0")
     span = None

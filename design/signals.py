@@ -143,8 +143,12 @@ class Signals:
         for name in ("command", "pressure_a", "pressure_b"):
             low, high = getattr(self, name).valid_codes
             if not 0 <= low < high <= self.code_max:
-                raise InputError(f"{name}: sound codes {low} to {high} are outside the converter's 0 to {self.code_max}")
-        if self.largest_difference(1) > LARGEST_DIFFERENCE or (self.swapped and self.largest_difference(-1) > LARGEST_DIFFERENCE):
+                raise InputError(
+                    f"{name}: sound codes {low} to {high} are outside the converter's 0 to {self.code_max}"
+                )
+        if self.largest_difference(1) > LARGEST_DIFFERENCE or (
+            self.swapped and self.largest_difference(-1) > LARGEST_DIFFERENCE
+        ):
             raise InputError(
                 f"the sensors' spans of {float(self.pressure_a.span_MPa):g} and {float(self.pressure_b.span_MPa):g} MPa "
                 "are too unlike; choose sensors within a factor of seven"

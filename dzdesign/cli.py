@@ -67,11 +67,16 @@ DESIGN = (
         metavar="C",
         help='of both signs: pass zero by this before the other solenoid is driven (default: "1 %%")',
     ),
-    _given("--ramp-up", metavar="T", help='time from zero to full command, such as "0.5 s" or "0.5 s / 0.8 s" (default: none)'),
+    _given(
+        "--ramp-up",
+        metavar="T",
+        help='time from zero to full command, such as "0.5 s" or "0.5 s / 0.8 s" (default: none)',
+    ),
     _given("--ramp-down", metavar="T", help="time from full command to zero (default: none)"),
     _given("--dither", metavar="D", help='square wave on the output, such as "150 Hz 1 %%" (default: off)'),
     _given("--output-max", metavar="C", help='largest drive (default: "100 %%")'),
 )
+TARGET = _given("--target", default="f28335", metavar="NAME", help="microcontroller, see codegen --list-targets")
 PLANT = _given("--plant", metavar="PLANT.toml", help="plant, like examples/paper_valve/plant.toml")
 
 COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
@@ -141,6 +146,7 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
         (
             _given("valve", metavar="VALVE.json", help="made by `dzdesign identify`"),
             _given(*OUTPUT, default="compensator.json", metavar="FILE", help="file to write"),
+            TARGET,
             *DESIGN,
         ),
     ),
@@ -149,10 +155,14 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
         "dzdesign.commands:run_codegen",
         (
             _given(
-                "source", metavar="COMPENSATOR.json", help="or a VALVE.json: designed first, with the options below"
+                "source",
+                nargs="?",
+                metavar="COMPENSATOR.json",
+                help="or a VALVE.json: designed first, for the target, with the options below",
             ),
             _given(*OUTPUT, default="firmware", metavar="DIR", help="folder to write"),
-            _given("--target", default="f28335", metavar="NAME", help="microcontroller"),
+            TARGET,
+            _given("--list-targets", action="store_true", help="print name and description of every target"),
             *DESIGN,
         ),
     ),

@@ -155,19 +155,23 @@ def run_identify(args: argparse.Namespace) -> int:
 
 
 def _design(valve_path: Path, content: bytes, args: argparse.Namespace) -> "Compensator":  # noqa: F821
+    from dzdesign.codegen.project import target_named
     from dzdesign.design.designing import design
     from dzdesign.design_options import design_options
     from dzdesign.identify.valve_file import valve_from_document
 
-    return design(valve_from_document(content, str(valve_path)), design_options(args), content)
+    options = design_options(args, target_named(args.target).inputs())
+    return design(valve_from_document(content, str(valve_path)), options, content)
 
 
 def run_design(args: argparse.Namespace) -> int:
     """Design the compensator of a valve."""
+    from dzdesign.codegen.project import target_named
     from dzdesign.design.compensator_file import SCHEMA, compensator_document
     from dzdesign.tables import print_compensator
 
     path = Path(args.valve)
+    target_named(args.target)
     check_file_may_be_written(Path(args.output), SCHEMA)
     compensator = _design(path, read_bytes(path, "valve file"), args)
     document = compensator_document(compensator)
@@ -189,6 +193,10 @@ def run_codegen(args: argparse.Namespace) -> int:
     from dzdesign.identify.model import SCHEMA as VALVE_SCHEMA
     from dzdesign.tables import print_firmware
 
+    if args.list_targets:
+        return _list_targets(args)
+    if args.source is None:
+        raise InputError("codegen needs a COMPENSATOR.json or a VALVE.json; see `dzdesign codegen --help`")
     target_named(args.target)
     check_folder_may_be_written(Path(args.output), SCHEMA)
     path = Path(args.source)
@@ -205,6 +213,20 @@ def run_codegen(args: argparse.Namespace) -> int:
         print(to_json(firmware.manifest), end="")
     else:
         print_firmware(firmware, args.output)
+    return 0
+
+
+def _list_targets(args: argparse.Namespace) -> int:
+    """Print name and description of every target."""
+    from dzdesign.codegen.project import targets
+
+    if args.json:
+        listing = [{"name": target.name, "description": target.description} for target in targets()]
+        print(to_json({"targets": listing}), end="")
+        return 0
+    width = max(len(target.name) for target in targets())
+    for target in targets():
+        print(f"{target.name:{width}}  {target.description}")
     return 0
 
 

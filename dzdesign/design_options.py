@@ -12,9 +12,9 @@ DEFAULTS = {
     "pressure_span": "20 MPa",
     "guard": "closing",
     "below_dp0": "hold",
-    "command_signal": "0..10 V x 0.3",
-    "pressure_a": "0..3 V",
-    "pressure_b": "0..3 V",
+    "command_signal": "",  # 0..10 V and 0 to full pressure over the target's whole converter
+    "pressure_a": "",
+    "pressure_b": "",
     "negative_dp": "same",
     "polarity": "normal",
     "edge": "0 %",
@@ -32,8 +32,15 @@ def given_design_options(args: argparse.Namespace) -> list[str]:
     return [f"--{name.replace('_', '-')}" for name in DEFAULTS if getattr(args, name) is not None]
 
 
-def design_options(args: argparse.Namespace) -> "DesignOptions":  # noqa: F821
+def design_options(args: argparse.Namespace, target: "TargetInputs") -> "DesignOptions":  # noqa: F821
     """Return the engineer's choices.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Of `design` or `codegen`.
+    target : TargetInputs
+        Converter and timer of the target that is designed for.
 
     Raises
     ------
@@ -41,7 +48,7 @@ def design_options(args: argparse.Namespace) -> "DesignOptions":  # noqa: F821
         If an option can't be read; it is named.
     """
     from dzdesign.design.options import DesignOptions
-    from dzdesign.design.signal_text import Converter, command_signal, parse_signal, pressure_signal
+    from dzdesign.design.signal_text import command_signal, parse_signal, pressure_signal
     from dzdesign.design.signals import Signals
 
     text = {name: getattr(args, name) or default for name, default in DEFAULTS.items()}
@@ -49,7 +56,11 @@ def design_options(args: argparse.Namespace) -> "DesignOptions":  # noqa: F821
         if text[name] not in known:
             option = f"--{name.replace('_', '-')}"
             raise InputError(f"{option} is '{text[name]}'{nearest(text[name], known)}, expected {' or '.join(known)}")
-    converter = Converter()
+    converter = target.converter
+    full_V = float(converter.full_V)
+    text["command_signal"] = text["command_signal"] or f"0..10 V x {full_V / 10:.12g}"
+    for name in ("pressure_a", "pressure_b"):
+        text[name] = text[name] or f"0..{full_V:.12g} V"
     span = Fraction(round(parse_quantity(text["pressure_span"], "pressure", "--pressure-span")), 10**6)
     if span <= 0:
         raise InputError(f"--pressure-span is '{text['pressure_span']}', expected more than zero")
@@ -64,7 +75,13 @@ def design_options(args: argparse.Namespace) -> "DesignOptions":  # noqa: F821
     return DesignOptions(
         law_name=text["law"],
         signals=Signals(
-            code_max=converter.code_max, command=command, swapped=text["negative_dp"] == "swapped", **sensors
+            code_max=converter.code_max,
+            compare_max=target.compare_max,
+            sample_Hz=target.sample_Hz,
+            tick_Hz=target.tick_Hz,
+            command=command,
+            swapped=text["negative_dp"] == "swapped",
+            **sensors,
         ),
         guard=text["guard"],
         below_reference=text["below_dp0"],

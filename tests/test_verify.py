@@ -1,6 +1,5 @@
 """The checkers are checked: faults seeded in the C, in the law and in the design must be seen."""
 
-import dataclasses
 import json
 import re
 from fractions import Fraction

@@ -274,7 +274,7 @@ def _bad_fallbacks(core: CompiledCore, exact: ExactLaw) -> int:
 
 
 def _bad_status(core: CompiledCore, exact: ExactLaw) -> int:
-    """Count status words that do not say what is wrong, along every code of each input with the others at their ends."""
+    """Count wrong status words, along every code of each input with the others at the ends of their sound codes."""
     everything = np.arange(OUTSIDE + 1)
     sound_u, sound_a, sound_b = (
         (low, high)

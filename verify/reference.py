@@ -87,7 +87,7 @@ class ExactLaw:
         return (p_a >= a_low) & (p_a <= a_high) & (p_b >= b_low) & (p_b <= b_high)
 
     def betas(self, dp_code: int | None) -> Betas:
-        """Return both betas at a difference; None, and one below ``-reverse``, stand for a signal that can't be right."""
+        """Return both betas at a difference; None, and one below ``-reverse``: the signal can't be right."""
         return Betas(self._at(self._law_nodes, dp_code), self._at(self._zero_nodes, dp_code))
 
     def _at(self, nodes: list[int], dp_code: int | None) -> Fraction:

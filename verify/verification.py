@@ -97,7 +97,9 @@ def verify(
     folder = Path(folder)
     manifest_bytes = read_bytes(folder / MANIFEST_NAME, "firmware manifest")
     manifest = parse_document(manifest_bytes, str(folder / MANIFEST_NAME), (FIRMWARE_SCHEMA,))
-    check_shape(manifest, {"files": dict, "core": [str]}, str(folder / MANIFEST_NAME), "make it again with `dzdesign codegen`")
+    check_shape(
+        manifest, {"files": dict, "core": [str]}, str(folder / MANIFEST_NAME), "make it again with `dzdesign codegen`"
+    )
     content = read_bytes(folder / "compensator.json", "compensator")
     compensator_from_document(content, str(folder / "compensator.json"))  # every key that is read below
     document = json.loads(content)

@@ -36,12 +36,13 @@ def our_forms(compensator: Compensator) -> list[Contender]:
     """Return the product's core in every form that the generator has; a new form is one line of `forms`."""
     forms = {
         "wide": ("32x32->64 bit products", generate(compensator, "f28335").files),
+        "narrow": ("32-bit arithmetic only", generate(compensator, "avr").files),
     }
     return [
         Contender(
             name=f"ours, {form}",
             made=f"`dzdesign codegen`, {text}.",
-            sources={path.removeprefix("core/"): c for path, c in files.items() if path.startswith("core/")},
+            sources={path.removeprefix("core/"): c for path, c in files.items() if path.startswith("core/dz_comp.")},
             ours=True,
         )
         for form, (text, files) in forms.items()

@@ -37,9 +37,9 @@ def _line_terms(compensator: Compensator) -> tuple[Fraction, Fraction, Fraction]
         evaluate_line(
             law(compensator.law_name),
             beta=beta,
-            kappa=compensator.k_x_max_over_u_max,
-            u_min0_over_u_max=compensator.u_min0_over_u_max,
-            n_adc=compensator.signals.command_code_max,
+            kappa=compensator.positive.k_x_max_over_u_max,
+            u_min0_over_u_max=compensator.positive.u_min0_over_u_max,
+            n_adc=compensator.signals.code_max,
             n_full=compensator.signals.compare_max,
         )
         for beta in (0, 1)
@@ -48,7 +48,7 @@ def _line_terms(compensator: Compensator) -> tuple[Fraction, Fraction, Fraction]
 
 
 def _betas(compensator: Compensator) -> list[Fraction]:
-    return [Fraction(value, compensator.beta_denominator) for value in compensator.beta_numerators]
+    return [Fraction(value, compensator.beta_denominator) for value in compensator.positive.beta_numerators]
 
 
 def _double(value: Fraction) -> str:
@@ -79,16 +79,16 @@ static const double beta_node[{len(betas)}] = {{
 
 {PROTOTYPE}
 {{
-    const double u_i = u_adc * {_double(u_max)} / {signals.command_code_max}.0;
-    const double p_a = p_a_adc * {_double(signals.pressure_span_MPa)} / {signals.pressure_code_max}.0;
-    const double p_b = p_b_adc * {_double(signals.pressure_span_MPa)} / {signals.pressure_code_max}.0;
+    const double u_i = u_adc * {_double(u_max)} / {signals.code_max}.0;
+    const double p_a = p_a_adc * {_double(signals.pressure_a.span_MPa)} / {signals.code_max}.0;
+    const double p_b = p_b_adc * {_double(signals.pressure_a.span_MPa)} / {signals.code_max}.0;
     const double dp = p_a - p_b;
     double beta = {_double(c.fallback_beta)}, u_o, compare;
 
-    if (u_adc > {signals.command_code_max}u) {{
+    if (u_adc > {signals.code_max}u) {{
         return 0;
     }}
-    if (p_a_adc <= {signals.pressure_code_max}u && p_b_adc <= {signals.pressure_code_max}u
+    if (p_a_adc <= {signals.code_max}u && p_b_adc <= {signals.code_max}u
         && dp > {_double(signals.dp_MPa(-c.reverse_codes) - signals.dp_MPa(1) / 2)}) {{
         int i = 0;
 
@@ -122,7 +122,7 @@ static const double beta_node[{len(betas)}] = {{
 
 
 def _naive_law(c: Compensator) -> str:
-    kappa, u_min0 = _double(c.k_x_max_over_u_max), _double(c.u_min0_over_u_max * c.u_max_V)
+    kappa, u_min0 = _double(c.positive.k_x_max_over_u_max), _double(c.positive.u_min0_over_u_max * c.u_max_V)
     return {
         "paper": f"(beta * ({kappa} - 1.0) + 1.0) * u_i + beta * {u_min0}",
         "target": f"{kappa} * u_i + beta * {u_min0}",
@@ -139,11 +139,11 @@ def _slope_table(c: Compensator, *, checked: bool) -> Contender:
     starts = [left - slope * index * step for index, (left, slope) in enumerate(zip(betas, slopes, strict=False))]
     pairs = [f"{{{_single(start)}, {_single(slope)}}}" for start, slope in zip(starts, slopes, strict=True)]
     command_check = f"""\
-    if (u_adc > {signals.command_code_max}u) {{
+    if (u_adc > {signals.code_max}u) {{
         return 0;
     }}
 """
-    pressure_check = f"p_a_adc <= {signals.pressure_code_max}u && p_b_adc <= {signals.pressure_code_max}u && "
+    pressure_check = f"p_a_adc <= {signals.code_max}u && p_b_adc <= {signals.code_max}u && "
     text = f"""\
 #include <stdint.h>
 
@@ -194,11 +194,11 @@ def _wrapped(c: Compensator, declaration: str, call: str) -> str:
 {{
     double u = u_adc, dp = (double)((int32_t)p_a_adc - (int32_t)p_b_adc), counts;
 
-    if (u_adc > {signals.command_code_max}u) {{
+    if (u_adc > {signals.code_max}u) {{
         return 0;
     }}
-    if (p_a_adc > {signals.pressure_code_max}u || p_b_adc > {signals.pressure_code_max}u) {{
-        dp = -{signals.pressure_code_max}.0;
+    if (p_a_adc > {signals.code_max}u || p_b_adc > {signals.code_max}u) {{
+        dp = -{signals.code_max}.0;
     }}
 {call}
     counts += 0.5;

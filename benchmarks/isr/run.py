@@ -24,7 +24,8 @@ from rival_cores import rivals
 from scoreboard import markdown, markdown_rows, say
 from tried_inputs import RANDOM_INPUTS, SEED, Codes, expected_compares, tried_inputs
 
-from dzdesign.design.compensator import Compensator, compensator_from_document
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.compensator_file import compensator_from_document
 
 KNOWN_LENGTHS = (0, 7, 300)
 
@@ -49,7 +50,7 @@ def main(arguments: list[str] | None = None) -> int:
         for index, contender in enumerate(contenders):
             say(f"{contender.name} ...")
             results.append(measure(contender, compensator, inputs, expected, Path(folder) / str(index)))
-    nodes, compare_max = len(compensator.beta_numerators), compensator.signals.compare_max
+    nodes, compare_max = len(compensator.positive.beta_numerators), compensator.signals.compare_max
     print(
         f"\nLaw `{compensator.law_name}`, {nodes} nodes of beta, compare 0..{compare_max}. Counts from its first "
         f"instruction to its return, least-most over {len(inputs)} inputs: corners, edges of nodes, impossible codes, "

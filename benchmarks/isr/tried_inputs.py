@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.compensator_file import compensator_document
 from dzdesign.verify.reference import ExactLaw
 
 SEED = 7
@@ -22,7 +23,7 @@ def tried_inputs(compensator: Compensator) -> list[Codes]:
     codes just outside and at 65535; `RANDOM_INPUTS` more with seed `SEED`.
     """
     signals, step, reverse = compensator.signals, compensator.beta_step_codes, compensator.reverse_codes
-    u_max, p_max = signals.command_code_max, signals.pressure_code_max
+    u_max, p_max = signals.code_max, signals.code_max
     last = p_max // step * step
     nodes = (step, 2 * step, p_max // 2 // step * step, last)
     differences = {-p_max, -p_max // 2, -reverse - 1, -reverse, -1, 0, 1, p_max - 1, p_max}
@@ -42,14 +43,14 @@ def tried_inputs(compensator: Compensator) -> list[Codes]:
 
 def expected_compares(compensator: Compensator, inputs: Sequence[Codes]) -> list[int]:
     """Return the exactly rounded law at `inputs`, by the reference of `dzdesign.verify`."""
-    exact = ExactLaw(compensator.to_document())
+    exact = ExactLaw(compensator_document(compensator))
     betas = []
     for _, p_a, p_b in inputs:
-        possible = max(p_a, p_b) <= exact.pressure_max
-        betas.append(exact.beta(p_a - p_b if possible else -exact.pressure_max))
+        possible = max(p_a, p_b) <= exact.code_max
+        betas.append(exact.betas(p_a - p_b if possible else None))
     table = np.array(list(exact.rows(betas)))
     return [
-        int(table[u, at]) if u <= exact.command_max else 0  # an impossible command lets the valve go
+        int(table[u, at]) if u <= exact.code_max else 0  # an impossible command lets the valve go
         for at, (u, _, _) in enumerate(inputs)
     ]
 
@@ -71,12 +72,12 @@ def exact_rows_header(compensator: Compensator) -> str:
     from fractions import Fraction
     from math import lcm
 
-    exact = ExactLaw(compensator.to_document())
+    exact = ExactLaw(compensator_document(compensator))
     # Half a count more, so that the floor rounds to nearest, a half up.
     lines = {}
-    for dp in range(-exact.pressure_max, exact.pressure_max + 1):
-        slope, start = exact.line(exact.beta(dp))
-        lines[dp] = (start + Fraction(1, 2), slope)
+    for dp in range(-exact.code_max, exact.code_max + 1):
+        (_, start), (full, end) = exact.corners(exact.betas(dp))
+        lines[dp] = (start + Fraction(1, 2), (end - start) / full)
     denominator = lcm(*(value.denominator for line in lines.values() for value in line))
     if denominator >= 2**62:
         raise ValueError(f"the rows' common denominator needs {denominator.bit_length()} bits, expected at most 62")
@@ -87,8 +88,8 @@ def exact_rows_header(compensator: Compensator) -> str:
     return f"""\
 #include <stdint.h>
 #define DENOMINATOR INT64_C({denominator})
-#define PRESSURE_MAX {exact.pressure_max}
-#define COMMAND_MAX {exact.command_max}
+#define PRESSURE_MAX {exact.code_max}
+#define COMMAND_MAX {exact.code_max}
 #define COMPARE_MAX {exact.compare_max}
 struct exact_row {{
     int32_t start_quotient;
