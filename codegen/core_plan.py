@@ -3,13 +3,14 @@
 from fractions import Fraction
 from typing import Any
 
-from dzdesign.codegen.integer_form import IntegerForm, integer_form
+from dzdesign.codegen.integer_form import IntegerForm, integer_form, segments_of
 from dzdesign.derivation.law import law
 from dzdesign.design.amplifier import RAMP_UNIT
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.signals import WEIGHT_SHIFT, PressureSignal
 
-NODES_IN_A_ROW = 5
+#: Codes up to half of this leave the top bit of 16 for the sign of a difference.
+SHORT_MAX = 2**15 - 1
 
 Plan = dict[str, Any]
 
@@ -31,7 +32,9 @@ def core_plan(compensator: Compensator, sign: int, arithmetic: str) -> Plan:
     return {
         **_signal_plan(compensator, sign),
         **_arithmetic_plan(form),
-        "arithmetic": arithmetic,
+        **_table_plan(form, compensator.beta_step_codes, arithmetic),
+        **_word_plan(compensator, arithmetic),
+        "narrow": arithmetic == "narrow",
         "function": "dz_comp" if sign > 0 else "dz_comp_negative",
         "status_function": "dz_status" if sign > 0 else "dz_status_negative",
         "side_text": "" if compensator.negative is None else f", {'positive' if sign > 0 else 'negative'} commands",
@@ -46,14 +49,9 @@ def core_plan(compensator: Compensator, sign: int, arithmetic: str) -> Plan:
         if form.edge
         else "",
         "beta_scale": str(form.scale_beta * compensator.beta_denominator),
-        "table_length": str(len(form.table)),
-        "table_rows": _rows(form.table),
-        "gap_rows": _rows(form.gap),
-        "fallback_index": str((len(form.table) - 2) * compensator.beta_step_codes),
         "step_codes": str(compensator.beta_step_codes),
         "step_MPa": f"{float(compensator.signals.dp_MPa(compensator.beta_step_codes)):.4f}",
         "step_shift": str(compensator.beta_step_codes.bit_length() - 1),
-        "step_mask": str(compensator.beta_step_codes - 1),
     }
 
 
@@ -135,6 +133,7 @@ def _signal_plan(compensator: Compensator, sign: int) -> Plan:
     rises = command.direction(sign) > 0
     swapped = sign < 0 and signals.swapped
     weight = 2**WEIGHT_SHIFT
+    towards = sorted(command.direction(sign) * (code - command.zero_code) for code in command.valid_codes)
     reverse = compensator.reverse_codes if signals.like_sensors else compensator.reverse_codes * weight
     return {
         "command_zero": str(command.zero_code),
@@ -142,9 +141,10 @@ def _signal_plan(compensator: Compensator, sign: int) -> Plan:
         "command_span": str(command.span(sign)),
         "command_low": str(command.valid_codes[0]),
         "command_high": str(command.valid_codes[1]),
-        "command_sound": str(command.valid_codes[1] - command.valid_codes[0]),
-        "command_end": f"code {full}",
-        "command_difference": "(int32_t)u_adc - COMMAND_ZERO" if rises else "COMMAND_ZERO - (int32_t)u_adc",
+        "command_difference": "u - COMMAND_ZERO" if rises else "COMMAND_ZERO - u",
+        "clip_low": towards[0] < 0,
+        "clip_high": towards[1] > command.span(sign),
+        "unclipped": "towards" if towards[0] < 0 else "from_zero",
         **_sensor_plan("a", a),
         **_sensor_plan("b", b),
         "like_sensors": signals.like_sensors,
@@ -152,9 +152,9 @@ def _signal_plan(compensator: Compensator, sign: int) -> Plan:
         "b_weight": str(signals.weight_b),
         "b_weight_text": f"{float(b.per_code_MPa):.6g} MPa over {float(a.per_code_MPa):.6g} MPa, rounded to nearest",
         "weight_shift": str(WEIGHT_SHIFT),
-        "pressure_turn": "p_b - p_a" if swapped else "p_a - p_b",
+        "pressure_turn": "b - a" if swapped else "a - b",
         "code_MPa": f"{float(a.per_code_MPa):.6g}",
-        "reverse_limit": str(-reverse),
+        "reverse": str(reverse),
         "reverse_text": f"{-float(signals.dp_MPa(compensator.reverse_codes)):.3f} MPa",
     }
 
@@ -166,43 +166,91 @@ def _sensor_plan(name: str, sensor: PressureSignal) -> Plan:
         f"{name}_full": str(sensor.full_code),
         f"{name}_low": str(low),
         f"{name}_high": str(high),
-        f"{name}_sound": str(high - low),
         f"{name}_span_MPa": f"{float(sensor.span_MPa):g}",
+    }
+
+
+def _word_plan(compensator: Compensator, arithmetic: str) -> Plan:
+    """Return the type of codes and their differences: 16 bits where a word of 32 costs more and they fit."""
+    signals = compensator.signals
+    short = arithmetic == "narrow" and signals.like_sensors and 2 * signals.code_max <= SHORT_MAX
+    return {"word": "uint16_t" if short else "uint32_t", "top_bit": "15" if short else "31"}
+
+
+def _table_plan(form: IntegerForm, step: int, arithmetic: str) -> Plan:
+    """Return the rows of the tables: signed where products of 32 bits are cheap, of one direction in 16 bits else."""
+    tables = [segments_of(table, step) for table in (form.table, form.zero_table)]
+    changes = [change for table in tables for _, change in table]
+    falls = max(changes) <= 0
+    short = (falls or min(changes) >= 0) and max(map(abs, changes)) < 1 << 16
+    plan: Plan = {"change_sign": "+", "start_type": "int32_t", "change_type": "int32_t", "change_product": ""}
+    turn = 1
+    if arithmetic == "narrow":
+        plan["start_type"] = "uint32_t"
+        if short:
+            turn = -1 if falls else 1
+            plan |= {"change_sign": "-" if falls else "+", "change_type": "uint16_t"}
+            plan["change_product"] = "short_product({}[place].change, (uint16_t)dp)"
+        else:
+            plan |= {"change_type": "int32_t", "change_product": "((uint32_t){}[place].change * dp)"}
+    rows = [[f"{{{start % 2**32}u, {turn * change}}}," for start, change in table] for table in tables]
+    if plan["start_type"] == "int32_t":
+        rows = [[f"{{{start}, {change}}}," for start, change in table] for table in tables]
+    law_rows, zero_rows = ([" ".join(row[at : at + 4]) for at in range(0, len(row), 4)] for row in rows)
+    return {
+        **plan,
+        "law_rows": law_rows,
+        "zero_rows": zero_rows,
+        "segment_count": str(len(tables[0]) - 1),
+        "segment_count_all": str(len(tables[0])),
     }
 
 
 def _arithmetic_plan(form: IntegerForm) -> Plan:
     high, low = divmod(form.half, 1 << 32)
     straight_high, straight_low = divmod(form.linear << form.linear_shift, 1 << 32)
-    if form.shift >= 32:
-        quotient = f"sum.high >> {form.shift - 32}" if form.shift > 32 else "sum.high"
-    else:
-        quotient = f"(sum.high << {32 - form.shift}) | (sum.low >> {form.shift})"
-    estimate = form.estimate
+    estimate, rest = form.estimate, form.divisor * (form.estimate.corrections + 1)
+    rest_short = rest < 1 << 15
+    short_estimate = estimate.factor < 1 << 16
     return {
-        "slope": str(form.slope),
         "slope_c": _int32(form.slope),
-        "offset": str(form.offset),
         "offset_c": _int32(form.offset),
+        "slope": str(form.slope),
+        "offset": str(form.offset),
+        "offset_modulo": str(form.offset % 2**32),
+        "slope_sign": "-" if form.slope < 0 else "+",
+        "slope_size": str(abs(form.slope)),
         "edge_factor": str(form.edge),
         "linear": str(form.linear),
         "linear_shift": str(form.linear_shift),
         "straight_high": str(straight_high),
         "straight_low": str(straight_low),
+        "straight_product": f"short_product((uint16_t)command, {straight_high}u)"
+        if straight_high < 1 << 16
+        else f"UINT32_C({straight_high}) * command",
         "half": str(form.half),
         "half_high": str(high),
         "half_low": str(low),
+        # One half alone in the low word: it carries where the other has its top bit, and the sum then lacks it.
+        "half_carry": "(law.low >> 31)"
+        if low == 1 << 31
+        else f"(((law.low & UINT32_C({low})) | ((law.low | UINT32_C({low})) & ~low)) >> 31)",
         "shift": str(form.shift),
+        "high_shift": f" >> {form.shift - 32}" if form.shift > 32 else "",
         "divisor": str(form.divisor),
         "largest": str(form.largest),
+        "exceeds": form.exceeds,
         "reciprocal": str(form.reciprocal),
         "reciprocal_shift": str(form.reciprocal_shift),
-        "narrow_quotient": quotient,
-        "estimate_shift": str(estimate.shift),
-        "estimate_factor": str(estimate.factor),
-        "corrections": [str(step) for step in range(estimate.corrections)],
-        "correction_count": str(estimate.corrections),
-        "compare_name": "compare" if form.divisor != 1 else "quotient",
+        "estimate_product": (
+            f"short_product((uint16_t)(quotient >> {estimate.shift}), {estimate.factor}u)"
+            if short_estimate
+            else f"((quotient >> {estimate.shift}) * UINT32_C({estimate.factor}))"
+        ),
+        "corrections": str(estimate.corrections),
+        "correction_bounds": [str(form.divisor * (step + 1)) for step in range(estimate.corrections)],
+        "rest_type": "uint16_t" if rest_short else "uint32_t",
+        "rest_top": "15" if rest_short else "31",
     }
 
 
@@ -212,13 +260,6 @@ def _zero_command(compensator: Compensator, sign: int) -> tuple[int, int]:
     nodes = [node * compensator.beta_step_codes for node in range(compensator.nodes(sign) - 1)]
     values = [compensator.compare(zero, code, sign) for code in nodes]
     return min(values), max(values)
-
-
-def _rows(values: tuple[int, ...]) -> list[str]:
-    return [
-        " ".join(f"UINT32_C({value})," for value in values[start : start + NODES_IN_A_ROW])
-        for start in range(0, len(values), NODES_IN_A_ROW)
-    ]
 
 
 def _rational(value: Fraction) -> str:

@@ -12,6 +12,7 @@ can occur; where the target has 32-bit arithmetic only, it is an estimate and a 
 """
 
 from dataclasses import dataclass
+from fractions import Fraction
 from math import ceil, lcm
 
 from dzdesign.core.errors import InputError
@@ -24,6 +25,7 @@ INT32_MAX = 2**31 - 1
 INT64_MAX = 2**63 - 1
 #: Bits of the estimate's dividend and of its fraction.
 ESTIMATE_BITS = 16
+WORD_BITS = 32
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,17 +41,17 @@ class Estimate:
 class IntegerForm:
     """Constants of the core; see the module's text for the algebra.
 
-    ``total = B_law * (slope * c + offset) + (linear * c << linear_shift) + half - gap * (edge * max(E - c, 0))`` with
-    B_law and gap = B_law - B the tables interpolated without rounding;
+    ``total = B_law * (slope * c + offset) + (linear * c << linear_shift) + half - (B_law - B) * (edge * max(E - c, 0))``
+    with B_law and B the tables interpolated without rounding;
     ``compare = min(total >> shift, largest) / divisor``, so that no compare value exceeds the limit; the division is
     ``(quotient * reciprocal) >> reciprocal_shift`` or the `estimate`.
 
     Attributes
     ----------
     table : tuple of int
-        scale_beta times the numerators of the law's beta: 32-bit values.
-    gap : tuple of int
-        The same of what the certified beta lies below it; empty without an edge.
+        scale_beta times the numerators of the law's beta, then twice the smallest of them.
+    zero_table : tuple of int
+        The same of the certified beta at zero command; empty without an edge.
     scale_beta : int
         Factor of the tables.
     slope, offset : int
@@ -62,6 +64,8 @@ class IntegerForm:
         Rounding and denominator.
     largest : int
         Largest quotient that is divided: the one whose compare value is the limit.
+    exceeds : bool
+        Whether the law asks for more than the limit anywhere.
     reciprocal, reciprocal_shift : int
         Of the divisor.
     estimate : Estimate
@@ -69,7 +73,7 @@ class IntegerForm:
     """
 
     table: tuple[int, ...]
-    gap: tuple[int, ...]
+    zero_table: tuple[int, ...]
     scale_beta: int
     slope: int
     offset: int
@@ -80,6 +84,7 @@ class IntegerForm:
     shift: int
     divisor: int
     largest: int
+    exceeds: bool
     reciprocal: int
     reciprocal_shift: int
     estimate: Estimate
@@ -135,16 +140,17 @@ def integer_form(compensator: Compensator, sign: int = 1) -> IntegerForm:
     divisor, shift = common, 0
     while divisor % 2 == 0:
         divisor, shift = divisor // 2, shift + 1
-    if shift == 0:  # rounding to nearest needs half a unit, so the denominator is made even
-        shift, common = 1, 2 * common
+    # Rounding to nearest needs half a unit, and a shift by a whole word of 32 bits costs nothing.
+    shift, common = max(shift, WORD_BITS), common << max(WORD_BITS - shift, 0)
     slope, offset, linear, edge = (int(value * common) for value in (per_command, constant, plain, per_edge_code))
     scale_beta = _share((slope, offset, edge), (abs(slope) * span + abs(offset), edge * c.edge_codes))
     slope, offset, edge = slope // scale_beta, offset // scale_beta, edge // scale_beta
     linear_shift = 0
     while linear and linear % 2 == 0:
         linear, linear_shift = linear // 2, linear_shift + 1
-    if _largest_quotient(compensator, sign, divisor) >= 1 << 32:
-        raise InputError(f"the law's quotient by {divisor} needs more than 32 bits; choose other scalings")
+    asked = _largest_quotient(compensator, sign, divisor)
+    if asked > INT32_MAX:
+        raise InputError(f"the law's quotient by {divisor} needs more than 31 bits; choose other scalings")
     largest = (c.amplifier.compare_limit + 1) * divisor - 1
     reciprocal, reciprocal_shift = _exact_reciprocal(divisor, largest)
     fallback = (min(side.law_numerators),) * 2
@@ -152,7 +158,7 @@ def integer_form(compensator: Compensator, sign: int = 1) -> IntegerForm:
     lower = side.beta_numerators + (min(side.beta_numerators),) * 2
     form = IntegerForm(
         table=tuple(scale_beta * numerator for numerator in nodes),
-        gap=tuple(scale_beta * (up - low) for up, low in zip(nodes, lower, strict=True)) if c.edge_codes else (),
+        zero_table=tuple(scale_beta * numerator for numerator in lower) if c.edge_codes else (),
         scale_beta=scale_beta,
         slope=slope,
         offset=offset,
@@ -163,6 +169,7 @@ def integer_form(compensator: Compensator, sign: int = 1) -> IntegerForm:
         shift=shift,
         divisor=divisor,
         largest=largest,
+        exceeds=asked > largest,
         reciprocal=reciprocal,
         reciprocal_shift=reciprocal_shift,
         estimate=_estimate(divisor, largest),
@@ -179,7 +186,7 @@ def _share(coefficients: tuple[int, ...], sizes: tuple[int, ...]) -> int:
 
 
 def _largest_quotient(compensator: Compensator, sign: int, divisor: int) -> int:
-    """Return a bound of ``total >> shift``: the law's largest value at any node, times divisor."""
+    """Return the largest ``total >> shift``: the law's largest value at any node, and the half that rounds it."""
     c, command = compensator, compensator.signals.command
     # Every node that a code reaches, and the fallback's smallest beta: along dP the law is straight between them.
     codes = [index * c.beta_step_codes for index in range(c.nodes(sign) - 1)]
@@ -190,9 +197,7 @@ def _largest_quotient(compensator: Compensator, sign: int, divisor: int) -> int:
     values = [c.drive(code, dp_code, sign) for dp_code in codes for code in commands]
     if min(values) < 0:
         raise InputError("the law asks for a negative drive somewhere; check k x_max/u_max and u_min0")
-    # One count more for rounding.
-    largest = max(values) * c.signals.compare_max + 2
-    return int(largest * divisor) + divisor
+    return int((max(values) * c.signals.compare_max + Fraction(1, 2)) * divisor)
 
 
 def _exact_reciprocal(divisor: int, largest: int) -> tuple[int, int]:
@@ -203,13 +208,21 @@ def _exact_reciprocal(divisor: int, largest: int) -> tuple[int, int]:
     """
     if divisor == 1:
         return 1, 0
+    exact = []
     for shift in range(32, 64):
         reciprocal = -(-(1 << shift) // divisor)
-        if largest * (reciprocal * divisor - (1 << shift)) < 1 << shift:
-            if reciprocal * largest >= 1 << 64 or reciprocal >= 1 << 32:
-                break
-            return reciprocal, shift
-    raise InputError(f"no 32-bit reciprocal divides by {divisor} exactly up to {largest}")
+        error = reciprocal * divisor - (1 << shift)
+        if reciprocal * largest < 1 << 64 and reciprocal < 1 << 32 and largest * error < 1 << shift:
+            exact.append((reciprocal, shift))
+    if not exact:
+        raise InputError(f"no 32-bit reciprocal divides by {divisor} exactly up to {largest}")
+    # A multiplier of few ones tempts compilers to shifts and additions, which take longer than one long product.
+    return max(exact, key=lambda pair: _signed_digits(pair[0]))
+
+
+def _signed_digits(value: int) -> int:
+    """Return how many digits of a number are not zero in the signed binary form that has fewest of them."""
+    return (value ^ 3 * value).bit_count()
 
 
 def _estimate(divisor: int, largest: int) -> Estimate:
@@ -225,15 +238,34 @@ def _estimate(divisor: int, largest: int) -> Estimate:
     return Estimate(shift=shift, factor=factor, corrections=ceil((1 << shift) / divisor + 2) - 1)
 
 
+def segments_of(table: tuple[int, ...], step: int) -> list[tuple[int, int]]:
+    """Return (start, slope) of each segment, ``start + slope * dp``: the fallback first, then one a node.
+
+    Between nodes n and n + 1 the table times `step` is ``T[n] step + (T[n+1] - T[n]) (dp - n step)``.
+    """
+    if not table:
+        return []
+    pairs = zip(table[:-2], table[1:-2], strict=False)
+    return [
+        (table[-1] * step, 0),
+        *((left * step - (right - left) * node * step, right - left) for node, (left, right) in enumerate(pairs)),
+    ]
+
+
 def _prove_widths(form: IntegerForm, compensator: Compensator, sign: int) -> None:
     """Prove that every intermediate value fits the type that the template gives it."""
     span = compensator.signals.command.span(sign)
     step = compensator.beta_step_codes
-    beta, gap = max(form.table) * step, max(form.gap, default=0) * step
+    beta = max(form.table) * step
+    gap = beta if form.zero_table else 0
+    reach = compensator.signals.largest_difference(sign)
+    segments = segments_of(form.table, step) + segments_of(form.zero_table, step)
     inner = max(abs(form.offset), abs(form.slope * span + form.offset))
     straight = form.linear * span << form.linear_shift
     checks = {
-        "the interpolated table": (max(beta, gap), INT32_MAX),
+        "the interpolated table": (beta, INT32_MAX),
+        "a segment's start": (max(abs(start) for start, _ in segments), INT32_MAX),
+        "a segment's slope times the pressure code": (max(abs(slope) for _, slope in segments) * reach, INT32_MAX),
         "slope times command": (abs(form.slope) * span, INT32_MAX),
         "the command-dependent factor": (inner, INT32_MAX),
         "the edge's factor": (form.edge * compensator.edge_codes, INT32_MAX),

@@ -83,7 +83,7 @@ static const double beta_node[{len(betas)}] = {{
     const double p_a = p_a_adc * {_double(signals.pressure_a.span_MPa)} / {signals.code_max}.0;
     const double p_b = p_b_adc * {_double(signals.pressure_a.span_MPa)} / {signals.code_max}.0;
     const double dp = p_a - p_b;
-    double beta = {_double(c.fallback_beta)}, u_o, compare;
+    double beta = {_double(c.beta(-c.reverse_codes - 1))}, u_o, compare;
 
     if (u_adc > {signals.code_max}u) {{
         return 0;
@@ -155,7 +155,7 @@ static const struct {{ float start, slope; }} segment[{len(pairs)}] = {{
 {{
     const int32_t dp = (int32_t)p_a_adc - (int32_t)p_b_adc;
     const float u = (float)u_adc;
-    float beta = {_single(c.fallback_beta)}, compare;
+    float beta = {_single(c.beta(-c.reverse_codes - 1))}, compare;
 
 {command_check if checked else ""}\
     if ({pressure_check if checked else ""}dp >= -{c.reverse_codes}) {{
@@ -226,7 +226,7 @@ def _casadi(c: Compensator, lookup: str) -> Contender:
         beta = casadi.pw_lin(inside, casadi.DM(nodes), casadi.DM(betas))
     else:
         beta = casadi.interpolant("beta", "linear", [nodes], betas, {"lookup_mode": ["exact"]})(inside)
-    beta = casadi.if_else(dp < -c.reverse_codes, float(c.fallback_beta), beta)
+    beta = casadi.if_else(dp < -c.reverse_codes, float(c.beta(-c.reverse_codes - 1)), beta)
     p, q, r = (float(value) for value in _line_terms(c))
     function = casadi.Function("law", [u, dp], [beta * (p * u + r) + q * u])
     with tempfile.TemporaryDirectory() as folder:
@@ -266,7 +266,7 @@ def _sympy(c: Compensator) -> Contender:
         return sympy.Rational(value.numerator, value.denominator)
 
     betas, step = [exact(value) for value in _betas(c)], c.beta_step_codes
-    branches = [(exact(c.fallback_beta), dp < -c.reverse_codes), (betas[0], dp < 0)]
+    branches = [(exact(c.beta(-c.reverse_codes - 1)), dp < -c.reverse_codes), (betas[0], dp < 0)]
     for index, (left, right) in enumerate(pairwise(betas)):
         piece = left + (right - left) / step * (dp - index * step)
         branches.append((sympy.expand(piece), True if index == len(betas) - 2 else dp < (index + 1) * step))
