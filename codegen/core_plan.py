@@ -209,6 +209,12 @@ def _table_plan(form: IntegerForm, step: int, arithmetic: str) -> Plan:
 def _arithmetic_plan(form: IntegerForm) -> Plan:
     high, low = divmod(form.half, 1 << 32)
     straight_high, straight_low = divmod(form.linear << form.linear_shift, 1 << 32)
+    if not form.linear:
+        straight_text = ""
+    elif straight_low == 0:  # a product of one word, that stands in the high one
+        straight_text = f" + ((uint64_t)(UINT32_C({straight_high}) * command) << 32)"
+    else:
+        straight_text = f" + ((UINT64_C({form.linear}) * command) << {form.linear_shift})"
     estimate, rest = form.estimate, form.divisor * (form.estimate.corrections + 1)
     rest_short = rest < 1 << 15
     short_estimate = estimate.factor < 1 << 16
@@ -223,6 +229,7 @@ def _arithmetic_plan(form: IntegerForm) -> Plan:
         "edge_factor": str(form.edge),
         "linear": str(form.linear),
         "linear_shift": str(form.linear_shift),
+        "straight_text": straight_text,
         "straight_high": str(straight_high),
         "straight_low": str(straight_low),
         "straight_product": f"short_product((uint16_t)command, {straight_high}u)"

@@ -13,6 +13,7 @@ can occur; where the target has 32-bit arithmetic only, it is an estimate and a 
 
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
 from math import ceil, lcm
 
 from dzdesign.core.errors import InputError
@@ -26,6 +27,7 @@ INT64_MAX = 2**63 - 1
 #: Bits of the estimate's dividend and of its fraction.
 ESTIMATE_BITS = 16
 WORD_BITS = 32
+RECIPROCALS_TRIED = 128
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,7 +43,7 @@ class Estimate:
 class IntegerForm:
     """Constants of the core; see the module's text for the algebra.
 
-    ``total = B_law * (slope * c + offset) + (linear * c << linear_shift) + half - (B_law - B) * (edge * max(E - c, 0))``
+    ``total = B_law * (slope * c + offset) + (linear * c << linear_shift) + half - (B_law - B) * edge * max(E - c, 0)``
     with B_law and B the tables interpolated without rounding;
     ``compare = min(total >> shift, largest) / divisor``, so that no compare value exceeds the limit; the division is
     ``(quotient * reciprocal) >> reciprocal_shift`` or the `estimate`.
@@ -203,17 +205,21 @@ def _largest_quotient(compensator: Compensator, sign: int, divisor: int) -> int:
 def _exact_reciprocal(divisor: int, largest: int) -> tuple[int, int]:
     """Return (m, s) with ``n // divisor == n * m >> s`` for every n up to `largest`.
 
-    With m = ceil(2^s / d) and e = m d - 2^s the quotient is exact as long as ``n e < 2^s`` (for n = q d + r the error
-    n e / (d 2^s) must stay below 1/d).
+    With m at or above 2^s / d and e = m d - 2^s the quotient is exact as long as ``n e < 2^s`` (for n = q d + r the
+    error n e / (d 2^s) must stay below 1/d).
     """
     if divisor == 1:
         return 1, 0
     exact = []
     for shift in range(32, 64):
-        reciprocal = -(-(1 << shift) // divisor)
-        error = reciprocal * divisor - (1 << shift)
-        if reciprocal * largest < 1 << 64 and reciprocal < 1 << 32 and largest * error < 1 << shift:
-            exact.append((reciprocal, shift))
+        least = -(-(1 << shift) // divisor)
+        exact += [
+            (reciprocal, shift)
+            for reciprocal in range(least, least + RECIPROCALS_TRIED)
+            if reciprocal * largest < 1 << 64
+            and reciprocal < 1 << 32
+            and largest * (reciprocal * divisor - (1 << shift)) < 1 << shift
+        ]
     if not exact:
         raise InputError(f"no 32-bit reciprocal divides by {divisor} exactly up to {largest}")
     # A multiplier of few ones tempts compilers to shifts and additions, which take longer than one long product.
@@ -245,7 +251,7 @@ def segments_of(table: tuple[int, ...], step: int) -> list[tuple[int, int]]:
     """
     if not table:
         return []
-    pairs = zip(table[:-2], table[1:-2], strict=False)
+    pairs = pairwise(table[:-2])
     return [
         (table[-1] * step, 0),
         *((left * step - (right - left) * node * step, right - left) for node, (left, right) in enumerate(pairs)),
