@@ -9,6 +9,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.signals import Signals
+from dzdesign.identify.guard_curve import GuardCurve
 from dzdesign.identify.model import SideModel
 
 #: Two floors of a converter each lose up to one code, so a difference of codes is right to within one.
@@ -44,17 +45,19 @@ class CertifiedOffset:
 
     Parameters
     ----------
-    side : SideModel
-        One side of the valve, tested at one pressure drop or more.
+    curve : GuardCurve
+        Of the threshold to be guarded, on one side of the valve, tested at one pressure drop or more.
+    dp0_MPa : float
+        Reference dP0.
     """
 
-    def __init__(self, side: SideModel) -> None:
-        self._nodes = [Fraction(repr(value)) for value in side.beta_dp_MPa]
-        self._beta = [Fraction(repr(value)) for value in side.beta]
-        self._u_min0 = Fraction(repr(side.u_min0_V))
-        self._dp0 = Fraction(repr(side.reference_dp_MPa))
-        self._steps = [Fraction(repr(step)) for step in side.certified_steps_V]
-        self._lowest = min(Fraction(repr(test.u_guard_lower_V)) for test in side.tests)
+    def __init__(self, curve: GuardCurve, dp0_MPa: float) -> None:
+        self._nodes = [Fraction(repr(value)) for value in curve.beta_dp_MPa]
+        self._beta = [Fraction(repr(value)) for value in curve.beta]
+        self._u_min0 = Fraction(repr(curve.u_min0_V))
+        self._dp0 = Fraction(repr(dp0_MPa))
+        self._steps = [Fraction(repr(step)) for step in curve.certified_steps_V]
+        self._lowest = min(Fraction(repr(bound)) for bound in curve.u_lower_V)
 
     def curve(self, dp_MPa: Fraction) -> Fraction:
         """Return beta(dP) u_min0 in V by the selector of Eq. (7).
@@ -85,8 +88,19 @@ class CertifiedOffset:
         return min(touching)
 
 
-def offset_ceiling(side: SideModel, signals: Signals, u_max_V: Fraction) -> OffsetCeiling:
+def offset_ceiling(side: SideModel, guard: str, signals: Signals, u_max_V: Fraction) -> OffsetCeiling:
     """Return the limit of the offset at every pressure code, the converter's error and the rounding counted.
+
+    Parameters
+    ----------
+    side : SideModel
+        One side of the valve, tested at one pressure drop or more.
+    guard : str
+        The threshold to be guarded, one of `side.guards`.
+    signals : Signals
+        Scalings of the converter and the PWM.
+    u_max_V : Fraction
+        Full command, V.
 
     Raises
     ------
@@ -100,7 +114,7 @@ def offset_ceiling(side: SideModel, signals: Signals, u_max_V: Fraction) -> Offs
             f"{side.beta_dp_MPa[-1]:g} MPa; give the real span with --pressure-span"
         )
     half_count = Fraction(1, 2 * signals.compare_max)
-    certified = CertifiedOffset(side)
+    certified = CertifiedOffset(side.guards[guard], side.reference_dp_MPa)
     values = []
     for code in range(-DP_CODE_ERROR, signals.pressure_code_max + DP_CODE_ERROR + 1):
         dp_MPa = signals.dp_MPa(code)

@@ -15,12 +15,12 @@ from dzdesign.design.beta_table import (
 )
 from dzdesign.design.compensator import Certificate, Compensator
 from dzdesign.design.signals import Signals
+from dzdesign.identify.guard_curve import GUARDS, GuardCurve
 from dzdesign.identify.model import SideModel, ValveModel
 from dzdesign.identify.valve_file import valve_from_document
 
 #: k x_max/u_max and u_min0/u_max are integers over this: finer than half a PWM count of 60 000.
 COEFFICIENT_DENOMINATOR = 1 << 16
-GUARDS = ("closing", "opening")
 #: Share of the sensor's span by which the difference may read negative before it counts as a failed sensor.
 REVERSE_SHARE = Fraction(1, 100)
 
@@ -35,9 +35,10 @@ class DesignOptions:
         ``paper`` (Eq. 18) or ``target`` (meets Eq. 16).
     signals : Signals
         Scalings of the converter and the PWM.
-    guard : {"closing", "opening"}
+    guard : {"closing", "mean", "opening"}
         The threshold that the certificate must protect. Zero command comes after closing, so a valve of which no
-        falling branch was recorded is refused unless "opening" is asked for.
+        falling branch was recorded is refused unless "opening" is asked for; under "mean" and "opening" the valve may
+        pass flow at zero command after closing, and what remains of the dead zone on opening is smaller.
     """
 
     law_name: str = "paper"
@@ -47,7 +48,8 @@ class DesignOptions:
     def __post_init__(self) -> None:
         if self.guard not in GUARDS:
             raise InputError(
-                f"the guard is '{self.guard}'{nearest(self.guard, GUARDS)}, expected {' or '.join(GUARDS)}"
+                f"the guard is '{self.guard}'{nearest(self.guard, GUARDS)}, "
+                f"expected {', '.join(GUARDS[:-1])} or {GUARDS[-1]}"
             )
 
 
@@ -81,22 +83,14 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
             "the valve was identified without a pressure drop, so no offset can be certified at any pressure; "
             "record the ramp test again with a column of dP (or pA and pB)"
         )
-    if side.guard != options.guard:
-        raise InputError(
-            f"the ramp tests bound the {side.guard} threshold, but the {options.guard} one is to be guarded; "
-            + (
-                "record the falling branch too, or accept flow at zero command after closing with --guard opening"
-                if side.guard == "opening"
-                else "leave out --guard opening, the closing threshold is the safer one"
-            )
-        )
+    curve = _curve_of(side, options.guard)
     u_max = Fraction(repr(valve.u_max_V))
-    kappa = _over(_travel(side, u_max), "nearest")
+    kappa = _over(_travel(side, curve, u_max), "nearest")
     # Half a count less, because the compare value of the offset may be rounded up.
-    u_min0 = _over(Fraction(repr(side.u_min0_V)) / u_max - Fraction(1, 2 * signals.compare_max), "down")
+    u_min0 = _over(Fraction(repr(curve.u_min0_V)) / u_max - Fraction(1, 2 * signals.compare_max), "down")
     if u_min0 <= 0:
-        raise InputError(f"u_min0 is {side.u_min0_V:.4f} V, less than one count of the PWM: no dead zone")
-    ceiling = offset_ceiling(side, signals, u_max)
+        raise InputError(f"u_min0 is {curve.u_min0_V:.4f} V, less than one count of the PWM: no dead zone")
+    ceiling = offset_ceiling(side, options.guard, signals, u_max)
     table = choose_beta_table(ceiling, u_min0, side.trend, signals.pressure_code_max)
     compensator = Compensator(
         law_name=chosen.name,
@@ -110,7 +104,7 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
         reverse_codes=int(REVERSE_SHARE * signals.pressure_code_max),
         certificate=Certificate(
             confidence=side.confidence,
-            guard=side.guard,
+            guard=options.guard,
             level_L_min=side.level_L_min,
             dp_MPa=(Fraction(repr(side.beta_dp_MPa[0])), Fraction(repr(side.beta_dp_MPa[-1]))),
             smallest_margin_V=_smallest_margin(ceiling, table, u_min0) * u_max,
@@ -123,7 +117,27 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
     return _with_costs(compensator, side)
 
 
-def _travel(side: SideModel, u_max: Fraction) -> Fraction:
+def _curve_of(side: SideModel, guard: str) -> GuardCurve:
+    """Return the curve that certifies a threshold; refuse one that valve.json does not have, and say why."""
+    if guard in side.guards:
+        return side.guards[guard]
+    has_rising, has_falling = side.tests[0].rising is not None, side.tests[0].falling is not None
+    if guard != "opening" and not has_falling:
+        remedy = "record the falling branch too, or accept flow at zero command after closing with --guard opening"
+    elif guard != "closing" and not has_rising:
+        remedy = "record the rising branch too, or take --guard closing, the safer one"
+    else:
+        remedy = (
+            "make valve.json again with `dzdesign identify`; if it is still missing, no offset lies under that "
+            "threshold's bounds: take one that is there"
+        )
+    raise InputError(
+        f"the ramp tests bound the {' and the '.join(side.guards)} threshold, but the {guard} one is to be guarded; "
+        + remedy
+    )
+
+
+def _travel(side: SideModel, curve: GuardCurve, u_max: Fraction) -> Fraction:
     """Return k x_max/u_max for a law whose offset is u_min0: from there to the command of full flow on opening.
 
     Identification gives k x_max from the knee on. The law starts lower, at the guarded offset; without the difference
@@ -131,9 +145,9 @@ def _travel(side: SideModel, u_max: Fraction) -> Fraction:
     """
     reference = min(side.tests, key=lambda test: abs(test.dp_MPa - side.reference_dp_MPa))
     knee = reference.u_knee_rising_V if reference.u_knee_rising_V is not None else reference.u_knee_falling_V
-    below_knee = max(Fraction(repr(knee)) - Fraction(repr(side.u_min0_V)), Fraction(0))
+    below_knee = max(Fraction(repr(knee)) - Fraction(repr(curve.u_min0_V)), Fraction(0))
     travel = Fraction(repr(side.k_x_max_over_u_max)) + below_knee / u_max
-    return min(travel, 1 - Fraction(repr(side.u_min0_V)) / u_max)  # beyond full drive there is nothing
+    return min(travel, 1 - Fraction(repr(curve.u_min0_V)) / u_max)  # beyond full drive there is nothing
 
 
 def _over(value: Fraction, rounding: str) -> Fraction:
@@ -183,8 +197,11 @@ def _with_costs(compensator: Compensator, side: SideModel) -> Compensator:
         gain = float(compensator.drive(signals.command_code_max, code)) - offset
         parts = [f"{test.dp_MPa:.2f} MPa: offset {offset * u_max:.3f} V"]
         for name, knee in (("opening", test.u_knee_rising_V), ("closing", test.u_knee_falling_V)):
-            if knee is not None:
+            if knee is not None and knee >= offset * u_max:
                 parts.append(f"dead zone that remains on {name} {(knee / u_max - offset) / gain:.2%} of command (knee)")
+            elif knee is not None:
+                above = offset * u_max - knee
+                parts.append(f"flow at zero command on {name}: the offset lies {above:.3f} V above the knee")
         parts.append(f"drive at full command {offset + gain:.2%}")
         lines.append(", ".join(parts))
     low, high = (float(end) for end in compensator.certificate.dp_MPa)

@@ -31,7 +31,7 @@ def _given(*names: str, **keywords: object) -> Option:
 OUTPUT = ("-o", "--output")
 LAW = _given("--law", metavar="LAW", help="paper: Eq. (18); target: meets Eq. (16) (default: paper)")
 SPAN = _given("--pressure-span", metavar="P", help='span of both pressure sensors (default: "20 MPa")')
-GUARD = _given("--guard", metavar="G", help="threshold to protect: closing or opening (default: closing)")
+GUARD = _given("--guard", metavar="G", help="threshold to protect: closing, mean or opening (default: closing)")
 PLANT = _given("--plant", metavar="PLANT.toml", help="plant, like examples/paper_valve/plant.toml")
 
 COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {

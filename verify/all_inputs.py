@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from dzdesign.core.artefacts import sha256_of
+from dzdesign.core.errors import InputError
 from dzdesign.verify.host_compiler import load_library
 from dzdesign.verify.reference import ExactLaw
 
@@ -194,7 +195,11 @@ def _margins(document: dict[str, Any], zero_command: np.ndarray) -> list[Fractio
     side = document["valve"]["sides"]["positive"]
     signals = document["signals"]
     code_MPa = Fraction(*signals["pressure_span_MPa"]) / signals["pressure_code_max"]
-    tests = [(Fraction(repr(test["dp_MPa"])), Fraction(repr(test["u_guard_lower_V"]))) for test in side["tests"]]
+    bounds = _bounds_of(side, document["certificate"]["guard"])
+    tests = [
+        (Fraction(repr(test["dp_MPa"])), Fraction(repr(bound)))
+        for test, bound in zip(side["tests"], bounds, strict=True)
+    ]
     first, last = min(tests)[0], max(tests)[0]
     u_max = Fraction(*document["u_max_V"])
     margins = []
@@ -210,6 +215,18 @@ def _margins(document: dict[str, Any], zero_command: np.ndarray) -> list[Fractio
             bound = min(value for _, value in tests)
         margins.append(bound - u_max * int(compare) / signals["compare_max"])
     return margins
+
+
+def _bounds_of(side: dict[str, Any], guard: str) -> list[float]:
+    """Return the lower bounds of the threshold that the compensator was certified for, V."""
+    if guard == side["certificate"]["guard"]:
+        return [test["u_guard_lower_V"] for test in side["tests"]]
+    if guard not in side.get("guards", {}):
+        raise InputError(
+            f"the certificate guards the {guard} threshold, of which its valve has no bounds; make the compensator "
+            "again with `dzdesign design`"
+        )
+    return side["guards"][guard]["u_lower_V"]
 
 
 def _bad_fallbacks(core: CompiledCore, exact: ExactLaw) -> int:
