@@ -15,8 +15,8 @@ class Amplifier:
     Attributes
     ----------
     window_codes : int
-        Of a command of both signs: codes by which it must pass zero before the other solenoid is driven. Until then the
-        solenoid that was driven stays at its offset, so that noise about zero does not throw the spool from side to side.
+        Of a command of both signs: codes by which it must pass zero before the other solenoid is driven. Until then
+        the one that was driven stays at its offset: noise about zero does not throw the spool from side to side.
     ramp_up, ramp_down : tuple of int
         Largest change of the command a sample, away from zero and back to it, in codes over `RAMP_UNIT`: of positive,
         then of negative command. 0: none.

@@ -128,8 +128,8 @@ def offset_ceiling(
         offset, bound = curve.at(dp_MPa), curve.bound(dp_MPa)
         if bound is not None and offset > bound + DECIMALS:
             raise RequirementError(
-                f"beta u_min0 is {float(offset):.4f} V at {float(dp_MPa):.3f} MPa, above the threshold's lower bound of "
-                f"{float(bound):.4f} V; make valve.json again with `dzdesign identify`"
+                f"beta u_min0 is {float(offset):.4f} V at {float(dp_MPa):.3f} MPa, above the threshold's lower bound "
+                f"of {float(bound):.4f} V; make valve.json again with `dzdesign identify`"
             )
         values.append((offset if bound is None else min(offset, bound)) / u_max_V - kept)
     span = high - low + 1

@@ -36,10 +36,12 @@ def _cost_of_test(compensator: Compensator, test: TestResult, sign: int) -> str:
     offset, at_edge, full = drive_at(0), drive_at(edge), drive_at(span)
     parts = [f"{test.dp_MPa:.2f} MPa: offset {offset * u_max:.3f} V"]
     for name, knee in (("opening", test.u_knee_rising_V), ("closing", test.u_knee_falling_V)):
-        if knee is not None:
-            parts.append(
-                f"dead zone that remains on {name} {_residual(knee / u_max, offset, at_edge, full, edge / span):.2%} of command (knee)"
-            )
+        if knee is not None and knee >= offset * u_max:
+            left = _residual(knee / u_max, offset, at_edge, full, edge / span)
+            parts.append(f"dead zone that remains on {name} {left:.2%} of command (knee)")
+        elif knee is not None:
+            above = offset * u_max - knee
+            parts.append(f"flow at zero command on {name}: the offset lies {above:.3f} V above the knee")
     if edge and test.u_knee_falling_V is not None:
         flow = test.slope_L_min_V * max(at_edge * u_max - test.u_knee_falling_V, 0.0)
         parts.append(f"flow on closing at the edge's end {flow:.2f} L/min")

@@ -12,11 +12,14 @@ from dzdesign.design.costs import costs_of
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.signals import Signals
 from dzdesign.design.units import Units, finest_units
+from dzdesign.identify.guard_curve import GuardCurve
 from dzdesign.identify.model import SideModel, ValveModel
 from dzdesign.identify.valve_file import valve_from_document
 
 #: Share of the sensor's span by which the difference may read negative before it counts as a failed sensor.
 REVERSE_SHARE = Fraction(1, 100)
+#: Standard errors by which the edge's end stands above the opening threshold.
+EDGE_ERRORS = 3
 
 
 def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes: bytes | None = None) -> Compensator:
@@ -124,37 +127,55 @@ def _guarded_curve(side: SideModel, options: DesignOptions) -> OffsetCurve:
             "the valve was identified without a pressure drop, so no offset can be certified at any pressure; "
             "record the ramp test again with a column of dP (or pA and pB)"
         )
-    if side.guard != options.guard:
-        raise InputError(
-            f"the ramp tests bound the {side.guard} threshold, but the {options.guard} one is to be guarded; "
-            + (
-                "record the falling branch too, or accept flow at zero command after closing with --guard opening"
-                if side.guard == "opening"
-                else "leave out --guard opening, the closing threshold is the safer one"
-            )
-        )
-    u_min0 = Fraction(repr(side.u_min0_V))
+    curve = _curve_of(side, options.guard)
+    u_min0 = Fraction(repr(curve.u_min0_V))
     return OffsetCurve(
-        dp_MPa=tuple(Fraction(repr(value)) for value in side.beta_dp_MPa),
-        offset_V=tuple(Fraction(repr(value)) * u_min0 for value in side.beta),
-        steps_V=tuple(Fraction(repr(step)) for step in side.certified_steps_V),
-        lowest_V=min(Fraction(repr(test.u_guard_lower_V)) for test in side.tests),
+        dp_MPa=tuple(Fraction(repr(value)) for value in curve.beta_dp_MPa),
+        offset_V=tuple(Fraction(repr(value)) * u_min0 for value in curve.beta),
+        steps_V=tuple(Fraction(repr(step)) for step in curve.certified_steps_V),
+        lowest_V=min(Fraction(repr(bound)) for bound in curve.u_lower_V),
         hold_below_MPa=_hold_below(side, options),
     )
 
 
-def _opening_curve(side: SideModel, options: DesignOptions) -> OffsetCurve:
-    """Return the best estimate of the opening threshold: where the edge ends and the law goes on."""
-    reference = Fraction(repr(side.reference_dp_MPa))
-    values = [Fraction(repr(t.u_knee_rising_V)) for t in side.tests]
-    from itertools import accumulate
+def _curve_of(side: SideModel, guard: str) -> GuardCurve:
+    """Return the curve that certifies a threshold; refuse one that valve.json does not have, and say why."""
+    if guard in side.guards:
+        return side.guards[guard]
+    has_rising, has_falling = side.tests[0].rising is not None, side.tests[0].falling is not None
+    if guard != "opening" and not has_falling:
+        remedy = "record the falling branch too, or accept flow at zero command after closing with --guard opening"
+    elif guard != "closing" and not has_rising:
+        remedy = "record the rising branch too, or take --guard closing, the safer one"
+    else:
+        remedy = (
+            "make valve.json again with `dzdesign identify`; if it is still missing, no offset lies under that "
+            "threshold's bounds: take one that is there"
+        )
+    raise InputError(
+        f"the ramp tests bound the {' and the '.join(side.guards)} threshold, but the {guard} one is to be guarded; "
+        + remedy
+    )
 
-    values = list(accumulate(values, min))
+
+def _opening_curve(side: SideModel, options: DesignOptions) -> OffsetCurve:
+    """Return where the edge ends and the law goes on: the opening threshold, and its error on top.
+
+    A law that starts above the threshold only shortens the dead zone that is left; one that starts below lengthens it.
+    """
+    opening = side.opening_curve
+    if opening is None:
+        raise InputError(
+            "an edge ends at the opening threshold, of which valve.json has no curve; record the rising branch with a "
+            "column of dP, make valve.json again, or leave out --edge"
+        )
+    error = max(opening.u_se_V)
+    offset = [Fraction(repr(value)) + EDGE_ERRORS * Fraction(repr(error)) for value in opening.u_V]
     return OffsetCurve(
-        dp_MPa=tuple(Fraction(repr(value)) for value in side.beta_dp_MPa),
-        offset_V=tuple(values),
+        dp_MPa=tuple(Fraction(repr(value)) for value in opening.dp_MPa),
+        offset_V=tuple(offset),
         steps_V=(),
-        lowest_V=min(values),
+        lowest_V=min(offset),
         hold_below_MPa=_hold_below(side, options),
     )
 

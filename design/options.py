@@ -7,8 +7,8 @@ from dzdesign.core.errors import InputError, nearest
 from dzdesign.design.amplifier import RAMP_UNIT, Amplifier
 from dzdesign.design.compensator import BELOW_REFERENCE
 from dzdesign.design.signals import Signals
+from dzdesign.identify.guard_curve import GUARDS
 
-GUARDS = ("closing", "mean", "opening")
 #: Largest edge, dither and window, of full command or drive.
 LARGEST_EDGE = Fraction(1, 10)
 LARGEST_DITHER = Fraction(1, 10)

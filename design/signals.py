@@ -150,8 +150,8 @@ class Signals:
             self.swapped and self.largest_difference(-1) > LARGEST_DIFFERENCE
         ):
             raise InputError(
-                f"the sensors' spans of {float(self.pressure_a.span_MPa):g} and {float(self.pressure_b.span_MPa):g} MPa "
-                "are too unlike; choose sensors within a factor of seven"
+                f"the sensors' spans of {float(self.pressure_a.span_MPa):g} and {float(self.pressure_b.span_MPa):g} "
+                "MPa are too unlike; choose sensors within a factor of seven"
             )
 
     @property

@@ -4,18 +4,14 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-import numpy as np
-
 from dzdesign.core.artefacts import TOOL
 from dzdesign.core.errors import InputError
-from dzdesign.identify.bounds import staircase
+from dzdesign.identify.guard_curve import GUARDS, ROUNDING_V, GuardCurve, OpeningCurve
 
 SCHEMA = "dzdesign.valve/1"
 #: Both sides, and the sign of the command that opens each.
 SIDES = {"positive": 1, "negative": -1}
 TRENDS = ("decreasing", "flat", "increasing")
-#: Numbers of the file are right to seven decimals; a comparison of two allows ten times that.
-ROUNDING_V = 1e-6
 #: Of a branch: the thresholds with their standard errors.
 MEASURES = ("knee", "level", "onset")
 DIRECTIONS = ("rising", "falling")
@@ -133,8 +129,6 @@ class SideModel:
         In the order of rising pressure drop.
     reference_dp_MPa : float or None
         dP0; None where the ramp test has no pressure.
-    u_min0_V : float
-        The law's offset at dP0: the largest that the certificate allows, V.
     k_x_max_over_u_max : float
         Command that full stroke takes beyond the threshold, over u_max.
     k_V_mm : float or None
@@ -145,65 +139,87 @@ class SideModel:
         Its change over the tested range, and the standard error.
     trend_p : float or None
         Probability of so large a change if the threshold were flat.
-    beta_dp_MPa, beta : tuple of float
-        Nodes of the piecewise linear beta(dP); empty where dP is unknown.
     confidence : float
-        With which all lower bounds hold together.
-    guard : {"closing", "opening"}
-        The threshold that the certificate protects.
+        With which all lower bounds of a guard hold together.
+    guard : {"closing", "mean", "opening"}
+        The threshold that a certificate protects unless another is asked for: the safest that was recorded. The tests'
+        ``u_guard_V`` and ``u_guard_lower_V`` are of it, and so are `u_min0_V`, `beta` and `certified_steps_V`.
+    guards : mapping of str to GuardCurve
+        What may be certified of each threshold that the tests show; in a file made before there were several, of
+        `guard` alone. "mean" is the mean of both branches' thresholds, its error taken as large as their covariance
+        could make it.
+    opening_curve : OpeningCurve or None
+        Where useful flow begins on opening; None without a rising branch or a pressure drop, and in such a file.
     level_L_min : float
         Flow that counts as flow: the largest of the meter's floor, its noise and half a per cent of the largest flow.
-    certified_steps_V : tuple of float
-        Staircase: lower bound of the guarded threshold between neighbouring beta nodes.
     active_constraints : tuple of str
         Constraints of the two fits that hold with equality.
     """
 
     tests: tuple[TestResult, ...]
     reference_dp_MPa: float | None
-    u_min0_V: float
     k_x_max_over_u_max: float
     k_V_mm: float | None
     trend: str | None
     trend_change_V: float | None
     trend_change_se_V: float | None
     trend_p: float | None
-    beta_dp_MPa: tuple[float, ...]
-    beta: tuple[float, ...]
     confidence: float
     guard: str
+    guards: Mapping[str, GuardCurve]
+    opening_curve: OpeningCurve | None
     level_L_min: float
-    certified_steps_V: tuple[float, ...]
     active_constraints: tuple[str, ...]
 
     def __post_init__(self) -> None:
         if self.trend not in TRENDS and not (self.trend is None and len(self.tests) == 1):
             raise InputError(f"trend is '{self.trend}', expected one of {', '.join(TRENDS)}")
-        if len(self.beta) != len(self.beta_dp_MPa) or any(
-            right <= left for left, right in zip(self.beta_dp_MPa, self.beta_dp_MPa[1:], strict=False)
-        ):
-            raise InputError("the nodes of beta must be as many as their pressure drops, which must rise")
-        if not self.tests or (self.beta_dp_MPa and len(self.tests) != len(self.beta_dp_MPa)):
+        if self.guard not in self.guards or not set(self.guards) <= set(GUARDS):
             raise InputError(
-                f"{len(self.tests)} tests stand beside {len(self.beta_dp_MPa)} nodes of beta, expected one each"
+                f"the guard is '{self.guard}' and there are curves of {', '.join(self.guards) or 'none'}, expected the "
+                f"guard among them, and no others than {', '.join(GUARDS)}"
             )
-        if len(self.certified_steps_V) != len(self.tests) - 1:
-            raise InputError(f"{len(self.certified_steps_V)} steps bound {len(self.tests)} tests, expected one fewer")
         if self.beta_dp_MPa and (self.reference_dp_MPa is None or any(test.dp_MPa is None for test in self.tests)):
             raise InputError("a pressure drop is missing beside the nodes of beta; expected one per test and dP0")
         if any(test.rising is None and test.falling is None for test in self.tests):
             raise InputError("a test has no knee, neither rising nor falling; expected at least one")
-        if any(test.u_guard_lower_V > test.u_guard_V + ROUNDING_V for test in self.tests):
-            raise InputError("a lower bound lies above the threshold that it bounds")
-        if self.beta_dp_MPa and any(
-            abs(test.dp_MPa - node) > ROUNDING_V for test, node in zip(self.tests, self.beta_dp_MPa, strict=True)
-        ):
+        for guard in self.guards.values():
+            self._check_nodes(guard.beta_dp_MPa, len(guard.u_lower_V))
+            guard.check_staircase(self.trend or "flat")
+        own = self.guards[self.guard]
+        for test, threshold, bound in zip(self.tests, own.u_threshold_V, own.u_lower_V, strict=True):
+            if abs(test.u_guard_V - threshold) > ROUNDING_V or abs(test.u_guard_lower_V - bound) > ROUNDING_V:
+                raise InputError(f"the tests' guarded thresholds and bounds are not those of the {self.guard} curve")
+        if self.opening_curve is not None:
+            self._check_nodes(self.opening_curve.dp_MPa, len(self.opening_curve.u_V))
+            self.opening_curve.check_order(self.trend or "flat", tuple(self.guards.values()))
+
+    def _check_nodes(self, nodes: tuple[float, ...], count: int) -> None:
+        """Check that a curve has one node a test, at its pressure drop; where that is unknown, none."""
+        if count != len(self.tests) or len(nodes) != len(self.beta_dp_MPa):
+            raise InputError(f"a curve has {count} thresholds for {len(self.tests)} tests, expected one each")
+        if nodes and any(abs(test.dp_MPa - node) > ROUNDING_V for test, node in zip(self.tests, nodes, strict=True)):
             raise InputError("the nodes of beta must stand at the tests' pressure drops")
-        steps, _ = staircase(np.array([test.u_guard_lower_V for test in self.tests]), self.trend or "flat")
-        if any(abs(step - known) > ROUNDING_V for step, known in zip(steps, self.certified_steps_V, strict=True)):
-            raise InputError("the certified steps do not follow from the tests' lower bounds")
-        if not self.u_min0_V > 0:
-            raise InputError(f"u_min0 is {self.u_min0_V} V, expected a positive threshold")
+
+    @property
+    def u_min0_V(self) -> float:
+        """The law's offset at dP0: the largest that the certificate of `guard` allows, V."""
+        return self.guards[self.guard].u_min0_V
+
+    @property
+    def beta_dp_MPa(self) -> tuple[float, ...]:
+        """Pressure drops of the nodes of `beta`, MPa; empty where dP is unknown."""
+        return self.guards[self.guard].beta_dp_MPa
+
+    @property
+    def beta(self) -> tuple[float, ...]:
+        """Nodes of the piecewise linear beta(dP) of `guard`; empty where dP is unknown."""
+        return self.guards[self.guard].beta
+
+    @property
+    def certified_steps_V(self) -> tuple[float, ...]:
+        """Staircase: lower bound of the threshold of `guard` between neighbouring nodes of beta, V."""
+        return self.guards[self.guard].certified_steps_V
 
     def to_document(self) -> dict[str, Any]:
         """Return the entry of valve.json."""
@@ -226,6 +242,8 @@ class SideModel:
                 "steps_V": list(self.certified_steps_V),
             },
             "active_constraints": list(self.active_constraints),
+            "guards": {name: curve.to_document() for name, curve in self.guards.items()},
+            "opening_curve": self.opening_curve and self.opening_curve.to_document(),
         }
 
     @property

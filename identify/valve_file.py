@@ -6,6 +6,7 @@ from typing import Any
 from dzdesign.core.artefacts import parse_document
 from dzdesign.core.errors import InputError
 from dzdesign.core.shape import Exactly, Number, check_shape
+from dzdesign.identify.guard_curve import CURVE_LISTS, GUARDS, ROUNDING_V, GuardCurve, OpeningCurve
 from dzdesign.identify.model import (
     DIRECTIONS,
     MEASURES,
@@ -51,6 +52,14 @@ SIDE_SHAPE = {
     "certificate": {"confidence": Number(0.5, 1), "guard": str, "level_L_min": FLOW, "steps_V": [VOLTAGE]},
     "active_constraints": [str],
 }
+#: One guard's curve, and the curve of opening: they came later, so a file may lack them.
+CURVE_SHAPE = {
+    "u_min0_V": VOLTAGE,
+    "beta_dp_MPa": [PRESSURE],
+    "beta": [Number(0, 2)],
+    **{key: [VOLTAGE] for key in ("certified_steps_V", "u_lower_V", "u_threshold_V")},
+}
+OPENING_SHAPE = {"dp_MPa": [PRESSURE], "u_V": [VOLTAGE], "u_se_V": [Number(0, 1e4)]}
 SHAPE = {
     "made_from": [{"source": str, "sha256": str}],
     "u_max_V": Number(1e-3, 1e4),
@@ -89,26 +98,73 @@ def _branch_from_document(test: dict[str, Any], direction: str) -> BranchResult 
     return BranchResult(**values, straight=tuple(straight))
 
 
+def _guards_from_document(side: dict[str, Any], tests: tuple[TestResult, ...]) -> dict[str, GuardCurve]:
+    """Read the curves of all guards; of a file made before there were several, the one that it has."""
+    guard = side["certificate"]["guard"]
+    own = GuardCurve(
+        u_min0_V=side["reference"]["u_min_V"],
+        beta_dp_MPa=tuple(side["beta"]["dp_MPa"]),
+        beta=tuple(side["beta"]["beta"]),
+        certified_steps_V=tuple(side["certificate"]["steps_V"]),
+        u_lower_V=tuple(test.u_guard_lower_V for test in tests),
+        u_threshold_V=tuple(test.u_guard_V for test in tests),
+    )
+    curves = {guard: own}
+    for name, curve in side.get("guards", {}).items():
+        if name not in GUARDS:
+            continue
+        try:
+            lists = {key: tuple(curve[key]) for key in CURVE_LISTS}
+            curves[name] = GuardCurve(u_min0_V=curve["u_min0_V"], **lists)
+        except InputError as error:
+            raise InputError(f"'guards.{name}': {error}") from error
+    if not _agree(curves[guard], own):
+        raise InputError(f"'guards.{guard}' is not the curve of 'reference', 'beta', 'certificate' and 'tests'")
+    return {name: curves[name] for name in (*GUARDS, guard) if name in curves}
+
+
+def _agree(one: GuardCurve, other: GuardCurve) -> bool:
+    """Tell whether two curves are the same but for rounding."""
+    if abs(one.u_min0_V - other.u_min0_V) > ROUNDING_V:
+        return False
+    pairs = [(getattr(one, name), getattr(other, name)) for name in CURVE_LISTS]
+    return all(
+        len(left) == len(right) and all(abs(a - b) <= ROUNDING_V for a, b in zip(left, right, strict=True))
+        for left, right in pairs
+    )
+
+
 def _side_from_document(side: dict[str, Any]) -> SideModel:
     certificate = side["certificate"]
+    tests = tuple(_test_from_document(test) for test in side["tests"])
+    opening = side.get("opening_curve")
     return SideModel(
-        tests=tuple(_test_from_document(test) for test in side["tests"]),
+        tests=tests,
         reference_dp_MPa=side["reference"]["dp_MPa"],
-        u_min0_V=side["reference"]["u_min_V"],
         k_x_max_over_u_max=side["k_x_max_over_u_max"],
         k_V_mm=side["k_V_mm"],
         trend=side["trend"],
         trend_change_V=side["trend_change_V"],
         trend_change_se_V=side["trend_change_se_V"],
         trend_p=side["trend_p"],
-        beta_dp_MPa=tuple(side["beta"]["dp_MPa"]),
-        beta=tuple(side["beta"]["beta"]),
         confidence=certificate["confidence"],
         guard=certificate["guard"],
+        guards=_guards_from_document(side, tests),
+        opening_curve=opening and OpeningCurve(**{key: tuple(opening[key]) for key in OPENING_SHAPE}),
         level_L_min=certificate["level_L_min"],
-        certified_steps_V=tuple(certificate["steps_V"]),
         active_constraints=tuple(side["active_constraints"]),
     )
+
+
+def _later_shape(side: dict[str, Any]) -> dict[str, Any]:
+    """Return the shape of those keys of a side that a file may lack and this one has."""
+    shape: dict[str, Any] = {}
+    if "guards" in side:
+        present = side["guards"] if isinstance(side["guards"], dict) else {}
+        shape["guards"] = {name: CURVE_SHAPE for name in GUARDS if name in present}
+    if "opening_curve" in side:
+        shape["opening_curve"] = (OPENING_SHAPE, NoneType)
+    return shape
 
 
 def valve_from_document(content: bytes, source: str) -> ValveModel:
@@ -124,6 +180,7 @@ def valve_from_document(content: bytes, source: str) -> ValveModel:
     for name in SIDES:
         if name in document["sides"]:
             check_shape(document, {"sides": {name: SIDE_SHAPE}}, source, REMEDY)
+            check_shape(document, {"sides": {name: _later_shape(document["sides"][name])}}, source, REMEDY)
     try:
         return ValveModel(
             u_max_V=document["u_max_V"],

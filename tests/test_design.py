@@ -99,9 +99,15 @@ def test_document_round_trip(example_compensator):
     assert compensator_from_document(text.encode(), "compensator.json") == example_compensator
 
 
+def with_curve(side, **changes):
+    """Return a side whose closing curve is changed."""
+    curve = dataclasses.replace(side.guards["closing"], **changes)
+    return dataclasses.replace(side, guards={**side.guards, "closing": curve})
+
+
 def test_a_valve_file_that_contradicts_itself_is_refused(example_valve):
     side = example_valve.positive
-    greedy = dataclasses.replace(side, u_min0_V=side.u_min0_V + 0.02)
+    greedy = with_curve(side, u_min0_V=side.u_min0_V + 0.02)
     with pytest.raises(RequirementError, match="above the threshold's lower bound"):
         design(dataclasses.replace(example_valve, sides={"positive": greedy}))
 
@@ -112,7 +118,8 @@ def test_span_must_reach_the_tested_pressures(example_valve):
 
 
 def test_a_law_that_would_fall_with_command_is_refused(example_valve):
-    side = dataclasses.replace(example_valve.positive, k_x_max_over_u_max=1e-4, beta=(1.5, 1.5, 1.4, 1.4, 1.4, 1.4))
+    side = dataclasses.replace(example_valve.positive, k_x_max_over_u_max=1e-4, opening_curve=None)
+    side = with_curve(side, beta=(1.5, 1.5, 1.4, 1.4, 1.4, 1.4))
     with pytest.raises((InputError, RequirementError)):
         design(dataclasses.replace(example_valve, sides={"positive": side}))
 

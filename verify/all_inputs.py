@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from dzdesign.core.errors import InputError
 from dzdesign.verify.compiled_core import CompiledCore
 from dzdesign.verify.reference import ExactLaw
 
@@ -213,7 +214,11 @@ def _margins(document: dict[str, Any], exact: ExactLaw, core: CompiledCore, plac
     lowest bound is known. A code stands for all pressures that may have made it; a dither's peak counts as drive.
     """
     side = document["valve"]["sides"][exact.side]
-    tests = [(Fraction(repr(test["dp_MPa"])), Fraction(repr(test["u_guard_lower_V"]))) for test in side["tests"]]
+    bounds = _bounds_of(side, document["sides"][exact.side]["certificate"]["guard"])
+    tests = [
+        (Fraction(repr(test["dp_MPa"])), Fraction(repr(bound)))
+        for test, bound in zip(side["tests"], bounds, strict=True)
+    ]
     first, last = min(tests)[0], max(tests)[0]
     u_max, peak = Fraction(*document["u_max_V"]), document["amplifier"]["dither_counts"]
     lowest, highest = _pressure_drops(exact, places)
@@ -230,6 +235,18 @@ def _margins(document: dict[str, Any], exact: ExactLaw, core: CompiledCore, plac
             bound = min(value for _, value in tests)
         margins.append(bound - u_max * (int(compare) + peak) / exact.compare_max)
     return margins
+
+
+def _bounds_of(side: dict[str, Any], guard: str) -> list[float]:
+    """Return the lower bounds of the threshold that the compensator was certified for, V."""
+    if guard == side["certificate"]["guard"]:
+        return [test["u_guard_lower_V"] for test in side["tests"]]
+    if guard not in side.get("guards", {}):
+        raise InputError(
+            f"the certificate guards the {guard} threshold, of which its valve has no bounds; make the compensator "
+            "again with `dzdesign design`"
+        )
+    return side["guards"][guard]["u_lower_V"]
 
 
 def _pressure_drops(exact: ExactLaw, places: Places) -> tuple[list[Fraction], list[Fraction]]:

@@ -243,14 +243,28 @@ def _plant_opens(loops: tuple[LoopComparison, ...]) -> Check:
 
 def _no_flow_at_zero(loops: tuple[LoopComparison, ...], document: dict[str, Any], plant: Plant | None) -> Check:
     name = "no flow at zero command in the closed loop"
-    if plant is None and any(side and side["certificate"]["guard"] == "opening" for side in document["sides"].values()):
+    worst = max(loops, key=lambda loop: loop.result.q_zero_L_min).result
+    designed = {side_name: side["certificate"]["guard"] for side_name, side in document["sides"].items() if side}
+    chosen = [
+        guard
+        for side_name, guard in designed.items()
+        if guard != document["valve"]["sides"][side_name]["certificate"]["guard"]
+    ]
+    if chosen:
+        return Check(
+            name=name,
+            holds=None,
+            text=f"the {chosen[0]} threshold was chosen to be guarded, above the one at which the valve closes: "
+            f"{worst.q_zero_L_min:.4g} L/min after closing (at {worst.dp_MPa:.2f} MPa) is the price of that choice. "
+            "Design with --guard closing to have none",
+        )
+    if plant is None and "opening" in designed.values():
         return Check(
             name=name,
             holds=None,
             text="no falling branch was recorded, so where the valve closes is not known; valves close below where "
             "they open, and flow at zero command after closing is to be expected. Record the falling branch",
         )
-    worst = max(loops, key=lambda loop: loop.result.q_zero_L_min).result
     return Check(
         name=name,
         holds=worst.q_zero_L_min <= NO_FLOW_L_MIN,
