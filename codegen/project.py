@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from dzdesign.codegen.integer_form import IntegerForm, integer_form
 from dzdesign.codegen.target import Target
+from dzdesign.codegen.telemetry import beta_factor
 from dzdesign.core.artefacts import TOOL, sha256_of, to_json
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.derivation.law import law
@@ -78,6 +79,7 @@ def generate(compensator: Compensator, target_name: str, compensator_bytes: byte
     context = core_context(compensator, integer_form(compensator))
     files = {path: _render("dzdesign.codegen", template, digest, context) for path, template in CORE_FILES.items()}
     hardware = {**target.context, **{key: context[key] for key in ("u_max_V", "pressure_span_MPa")}}
+    hardware["firmware_origin"] = f"0x{digest[:4].upper()}"
     for path, template in target.templates.items():
         files[path] = _render(f"dzdesign.codegen.{target.name}", template, digest, hardware)
     files["compensator.json"] = document.decode()
@@ -100,6 +102,8 @@ def core_context(compensator: Compensator, form: IntegerForm) -> dict[str, str |
     largest = ((1 << form.reciprocal_shift) - 1) // max(
         1, form.reciprocal * form.divisor - (1 << form.reciprocal_shift)
     )
+    step = compensator.beta_step_codes
+    factor, factor_shift = beta_factor(scale * step, max(form.table) * step)
     zero_command = [compensator.compare(0, node * compensator.beta_step_codes) for node in range(len(form.table) - 1)]
     return {
         "certificate_text": certificate_text(compensator),
@@ -123,6 +127,8 @@ def core_context(compensator: Compensator, form: IntegerForm) -> dict[str, str |
             for start in range(0, len(form.table), NODES_IN_A_ROW)
         ],
         "beta_scale": str(scale),
+        "beta_factor": str(factor),
+        "beta_shift": str(factor_shift),
         "step_codes": str(compensator.beta_step_codes),
         "step_MPa": f"{float(signals.dp_MPa(compensator.beta_step_codes)):.4f}",
         "step_shift": str(form.step_shift),

@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 from dzdesign.core.errors import DzdesignError
 
-RENDERER_NAMES = frozenset({"banner", "project", "u_max_V", "pressure_span_MPa"})
+RENDERER_NAMES = frozenset({"banner", "project", "u_max_V", "pressure_span_MPa", "firmware_origin"})
 """Names that the renderer itself passes to every template; a target's context may not use them."""
 
 
