@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import PurePosixPath
 from types import MappingProxyType
 
+from dzdesign.codegen.telemetry import Link
 from dzdesign.core.errors import DzdesignError
 
 RENDERER_NAMES = frozenset({"banner", "project", "u_max_V", "pressure_span_MPa", "firmware_origin"})
@@ -29,6 +30,8 @@ class Target:
         Output path, relative to the firmware folder, to the template's file name in ``templates/``.
     context
         Every value that a template prints, already a string.
+    link
+        The serial line of its telemetry, or None if it sends none.
 
     Raises
     ------
@@ -42,6 +45,7 @@ class Target:
     adc_code_max: int
     templates: Mapping[str, str]
     context: Mapping[str, str]
+    link: Link | None = None
 
     def __post_init__(self) -> None:
         if not self.name.isidentifier():

@@ -129,6 +129,17 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
             PLANT,
         ),
     ),
+    "monitor": (
+        "the telemetry of a running firmware in, a ramp file out",
+        "dzdesign.monitor:run_monitor",
+        (
+            _given("port", metavar="PORT", help="serial port, such as COM5 or /dev/ttyUSB0"),
+            _given("--firmware", default="firmware", metavar="DIR", help="made by `dzdesign codegen`: the scalings"),
+            _given("--baud", metavar="N", help="bits in a second (default: what the firmware sends)"),
+            _given("--seconds", metavar="S", help="to record from the first frame on (default: until Ctrl-C)"),
+            _given(*OUTPUT, default="ramp.csv", metavar="FILE", help="file to write"),
+        ),
+    ),
     "simulate": (
         "ramp tests of a simulated valve, marked as such",
         "dzdesign.commands:run_simulate",

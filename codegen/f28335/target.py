@@ -241,4 +241,5 @@ TARGET = Target(
     adc_code_max=int(CONTEXT["adc_code_max"]),
     templates={f"{FOLDER}/{file}": f"{file}.jinja" for file in FILES},
     context=CONTEXT,
+    link=LINK,
 )
