@@ -127,6 +127,7 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
             _given("firmware", metavar="DIR", help="made by `dzdesign codegen`"),
             _given(*OUTPUT, default="evidence", metavar="DIR", help="folder to write"),
             PLANT,
+            _given("--c2000ware", metavar="DIR", help="also compile f28335 firmware against your C2000Ware's headers"),
         ),
     ),
     "monitor": (

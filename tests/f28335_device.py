@@ -3,6 +3,7 @@
 import shutil
 import subprocess
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
@@ -69,3 +70,39 @@ def periods(program: Path, events: str, *start: str) -> list[dict]:
 
 def column(ticks: list[dict], key: str) -> list:
     return [tick[key] for tick in ticks]
+
+
+def c2000ware_stand_in(ware: Path, projectspec: Path) -> Path:
+    """Lay out the header of the device model as C2000Ware does, in the C28x compiler's own words, and return `ware`.
+
+    It stands for TI's headers in what a check against them must cope with: `cregister`, `interrupt`, `asm()`, types
+    that are 16 bits wide only on the device, and warnings.
+    """
+    device = ware / "device_support" / "f2833x"
+    include, common = device / "headers" / "include", device / "common" / "include"
+    for folder in (include, common):
+        folder.mkdir(parents=True)
+    text = (HERE / "DSP28x_Project.h").read_text(encoding="utf-8")
+    for old, new in (
+        ("#define interrupt\n", "typedef interrupt void (*PINT)(void);\n"),
+        ("typedef uint16_t Uint16;", "typedef unsigned int Uint16;"),
+        ("#define SciaRegs (*device_scia())\nvolatile struct SCI_REGS *device_scia(void);",
+         "extern volatile struct SCI_REGS SciaRegs;"),
+        ("extern volatile unsigned int IER, IFR;", "extern cregister volatile unsigned int IER, IFR;"),
+        ("    void (*EPWM1_INT)(void);", "    PINT EPWM1_INT;"),
+        ("#define EALLOW device_eallow()", '#define EALLOW asm(" EALLOW")'),
+        ("#define EDIS device_edis()", '#define EDIS asm(" EDIS")'),
+        ("#define EINT device_eint()", '#define EINT asm(" clrc INTM")'),
+        ("#define DINT device_dint()", '#define DINT asm(" setc INTM")'),
+        ("void ServiceDog(void);",
+         "void ServiceDog(void);\nstatic int unused(float32 x, far int *y) { return x > *y; }"),
+    ):  # fmt: skip
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    (include / "DSP2833x_Device.h").write_text(text, encoding="utf-8")
+    (common / "DSP28x_Project.h").write_text('#include "DSP2833x_Device.h"\n', encoding="utf-8")
+    for entry in ElementTree.parse(projectspec).iter("file"):
+        if (path := entry.get("path")).startswith("C2000WARE_ROOT/"):
+            (ware / path.partition("/")[2]).parent.mkdir(parents=True, exist_ok=True)
+            (ware / path.partition("/")[2]).touch()
+    return ware
