@@ -5,6 +5,7 @@ C2000Ware's F2833x examples; of the zero-duty case: SPRAAI1.
 """
 
 import itertools
+import re
 import shutil
 import subprocess
 from dataclasses import replace
@@ -189,14 +190,43 @@ def test_projectspec_and_makefile_name_the_same_files(firmware):
     core.mkdir()
     for name in ("dz_comp.c", "dz_comp.h"):
         (core / name).touch()
-    linked = set()
-    for build_kind in ("RAM", "FLASH"):
-        command = [make, "-n", "CGT=cgt", "C2000WARE=ware", f"BUILD={build_kind}"]
+    our_sources = {path for path in files if path.endswith(".c") and not path.startswith("C2000WARE_ROOT/")}
+    for configuration in project.findall("configuration"):
+        kind = configuration.get("name")
+        command = [make, "-n", "CGT=cgt", "C2000WARE=ware", f"BUILD={kind}"]
         done = subprocess.run(command, cwd=core.parent / "f28335", capture_output=True, text=True, check=True)
-        assert ("--define=_FLASH" in done.stdout) == (build_kind == "FLASH")
-        linked |= {word for word in done.stdout.split() if word.startswith("ware/")}
-    in_ccs = {path.replace("C2000WARE_ROOT", "ware") for path in files if path.startswith("C2000WARE_ROOT/")}
-    assert linked == {path for path in in_ccs if not path.endswith(".ccxml")}
+        call = next(line for line in done.stdout.splitlines() if line.startswith("cgt/bin/cl2000"))
+        compiling, linking = (half.split() for half in call.split("--run_linker"))
+        assert {word for word in compiling if word.endswith(".c") and not word.startswith("ware/")} == our_sources
+        in_ccs = {
+            entry.get("path").replace("C2000WARE_ROOT", "ware")
+            for entry in project.findall("file")
+            if entry.get("path").startswith("C2000WARE_ROOT/") and entry.get("applicableConfigurations", kind) == kind
+        }
+        linked = {word for word in (*compiling, *linking) if word.startswith("ware/")}
+        assert linked == {path for path in in_ccs if not path.endswith(".ccxml")}, kind
+        options = {word for word in compiling if word.startswith("-") and not re.match("-I|--include|--obj", word)}
+        assert options == {w for w in configuration.get("compilerBuildOptions").split() if not w.startswith("-I")}
+        assert ("--define=_FLASH" in options) == (kind == "FLASH")
+        assert set(configuration.get("linkerBuildOptions").split()) <= set(linking)
+
+
+def test_the_interrupt_has_no_part_in_the_telemetry_and_is_never_held_off(firmware):
+    code = {
+        Path(path).name: re.sub(r"/\*.*?\*/", "", file.read_text(encoding="utf-8"), flags=re.DOTALL)
+        for path, file in firmware.items()
+        if path.endswith((".c", ".h"))
+    }
+    assert [name for name, text in code.items() if "SciaRegs" in text] == ["dz_telemetry.c"]
+    assert [name for name, text in code.items() if "dz_telemetry_" in text] == [
+        "main.c",
+        "dz_telemetry.c",
+        "dz_telemetry.h",
+    ]
+    assert [name for name, text in code.items() if re.search(r"\bDINT\b", text)] == ["main.c"]
+    assert code["main.c"].index("DINT") < code["main.c"].index("EINT") < code["main.c"].index("for (;;)")
+    for name, text in code.items():  # a byte of the C28x has 16 bits, and its double 32 or 64
+        assert not re.search(r"\b(u?int8_t|char|float|double|long)\b", text), name
 
 
 def test_makefile_says_what_is_missing(firmware):
@@ -276,6 +306,7 @@ def test_start_up_order_and_watchdog(firmware):
         ("dz_hardware.c", "SOCAPRD = ET_2ND", "SOCAPRD = ET_1ST", check_delays),
         ("dz_isr.c", "    write_compare(dz_state.compare);", "", check_delays),
         ("dz_telemetry.c", "LOSPCP.all = DZ_SCI_LOSPCP", "LOSPCP.all = 2u", check_registers),
+        ("dz_telemetry.c", "    EALLOW;\n    SysCtrlRegs", "    SysCtrlRegs", check_registers),
         ("dz_telemetry.c", "GPAMUX2.bit.GPIO29 = 1u", "GPAMUX2.bit.GPIO29 = 2u", check_registers),
         ("dz_isr.c", "(compare == 0u) ? DZ_FORCE_LOW : DZ_FORCE_NONE", "DZ_FORCE_NONE", check_zero_command),
     ],

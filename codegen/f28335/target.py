@@ -132,6 +132,8 @@ def timing() -> dict[str, str]:
         "tbprd": str(period - 1),
         "cmpb": str(delay),
         "isr_delay_us": printed(ISR_DELAY_S * 10**6),
+        "isr_rest_us": printed(Fraction(10**6, PWM_HZ) - ISR_DELAY_S * 10**6),
+        "isr_rest_cycles": str(period - delay),
         "ticks_per_sample": str(ticks_per_sample),
         "soca_prescale": EVENT_PRESCALE[ticks_per_sample],
         "sample_timeout_ticks": str(timeout),
