@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 DOCS   := docs/derivation
 
-.PHONY: demo test lint docs lock clean bench-identify
+.PHONY: demo test lint docs goldens lock clean bench-identify
 
 demo: $(STAMP)
 	$(BIN)/dzdesign demo demo
@@ -15,6 +15,10 @@ test: lint
 
 lint: $(STAMP)
 	$(BIN)/ruff check .
+
+# After a change of what codegen writes: tests/goldens anew, then the tests that compile and run them. Read the diff.
+goldens: $(STAMP)
+	$(BIN)/pytest tests/test_goldens.py --update-goldens
 
 # Some three hours of one core, on all that there are; `make bench-identify BENCH=--quick` takes minutes.
 bench-identify: $(VENV)/.bench

@@ -1,14 +1,17 @@
 """`generate`: a `Compensator` and a target in, the files of a C project out."""
 
-from collections.abc import Mapping
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from importlib import import_module
+from importlib.resources import files as files_of
 from typing import TYPE_CHECKING, Any
 
 from dzdesign.codegen.integer_form import IntegerForm, integer_form
-from dzdesign.codegen.target import Target
+from dzdesign.codegen.target import Target, folder_of
 from dzdesign.codegen.telemetry import beta_factor
+from dzdesign.codegen.user_names import printable_list
 from dzdesign.core.artefacts import TOOL, sha256_of, to_json
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.derivation.law import law
@@ -18,10 +21,19 @@ if TYPE_CHECKING:
     import jinja2
 
 SCHEMA = "dzdesign.firmware/1"
-#: One folder a target; each has `target.py` with a `TARGET` and its templates.
-TARGET_NAMES = ("f28335",)
+PACKAGE = "dzdesign.codegen"
 CORE_FILES = {"core/dz_comp.c": "dz_comp.c.jinja", "core/dz_comp.h": "dz_comp.h.jinja"}
 NODES_IN_A_ROW = 5
+
+
+def _found_targets() -> tuple[str, ...]:
+    """Return the names of the folders that have a `target.py`, so that a new one needs no entry here."""
+    folders = (entry for entry in files_of(PACKAGE).iterdir() if entry.is_dir())
+    return tuple(sorted(entry.name.replace("_", "-") for entry in folders if (entry / "target.py").is_file()))
+
+
+#: One folder a target; each has `target.py` with a `TARGET` and its templates.
+TARGET_NAMES = _found_targets()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,7 +54,12 @@ def target_named(name: str) -> Target:
     """
     if name not in TARGET_NAMES:
         raise InputError(f"there is no target '{name}'{nearest(name, TARGET_NAMES)}; known: {', '.join(TARGET_NAMES)}")
-    return import_module(f"dzdesign.codegen.{name}.target").TARGET
+    return import_module(f"{PACKAGE}.{folder_of(name)}.target").TARGET
+
+
+def targets() -> tuple[Target, ...]:
+    """Return every target, in the order of the names."""
+    return tuple(target_named(name) for name in TARGET_NAMES)
 
 
 def generate(compensator: Compensator, target_name: str, compensator_bytes: bytes | None = None) -> Firmware:
@@ -63,25 +80,20 @@ def generate(compensator: Compensator, target_name: str, compensator_bytes: byte
         If the target is unknown, or its converter or PWM differs from the compensator's signals.
     """
     target = target_named(target_name)
-    signals = compensator.signals
-    for what, asked, has in (
-        ("compare value", signals.compare_max, target.compare_max),
-        ("command code", signals.command_code_max, target.adc_code_max),
-        ("pressure code", signals.pressure_code_max, target.adc_code_max),
-    ):
-        if asked != has:
-            raise InputError(
-                f"the compensator's largest {what} is {asked}, but target {target.name} has {has}; "
-                "design it again for that target"
-            )
+    target.check_signals(compensator.signals)
     document = compensator_bytes or to_json(compensator.to_document()).encode()
     digest = sha256_of(document)
+    recordings = ramp_tests_of(compensator)
     context = core_context(compensator, integer_form(compensator))
-    files = {path: _render("dzdesign.codegen", template, digest, context) for path, template in CORE_FILES.items()}
     hardware = {**target.context, **{key: context[key] for key in ("u_max_V", "pressure_span_MPa")}}
     hardware["firmware_origin"] = f"0x{digest[:4].upper()}"
-    for path, template in target.templates.items():
-        files[path] = _render(f"dzdesign.codegen.{target.name}", template, digest, hardware)
+    plans = [(CORE_FILES, environment(PACKAGE), context)]
+    plans.append((target.templates, environment(f"{PACKAGE}.{target.folder}"), hardware))
+    files = {
+        path: _render(renderer, template, banner(template, digest, recordings), values)
+        for templates, renderer, values in plans
+        for path, template in templates.items()
+    }
     files["compensator.json"] = document.decode()
     manifest = {
         "schema": SCHEMA,
@@ -168,12 +180,19 @@ def _int32(value: int) -> str:
     return f"{'-' if value < 0 else ''}INT32_C({abs(value)})"
 
 
+def ramp_tests_of(compensator: Compensator) -> tuple[str, ...]:
+    """Return the names of the recordings that the valve was identified from, as their users gave them."""
+    made_from = json.loads(compensator.valve_document).get("made_from", ())
+    return tuple(str(entry["source"]) for entry in made_from)
+
+
 def environment(package: str) -> "jinja2.Environment":
-    """Return the renderer of a package's templates: strict, so that a name without a value is an error."""
+    """Return the renderer of a package's templates, then of the shared ones: strict, a name without a value fails."""
     import jinja2
 
+    packages = dict.fromkeys((package, PACKAGE))
     return jinja2.Environment(
-        loader=jinja2.PackageLoader(package, "templates"),
+        loader=jinja2.ChoiceLoader([jinja2.PackageLoader(name, "templates") for name in packages]),
         undefined=jinja2.StrictUndefined,
         keep_trailing_newline=True,
         trim_blocks=True,
@@ -181,14 +200,26 @@ def environment(package: str) -> "jinja2.Environment":
     )
 
 
-def banner(template: str, digest: str) -> tuple[str, ...]:
-    """Return the lines that open every generated file: tool, template, hash of the compensator; no date."""
-    return (
+def banner(template: str, digest: str, recordings: Sequence[str] = ()) -> tuple[str, ...]:
+    """Return the lines that open every generated file: tool, template, hash and recordings; no date.
+
+    Parameters
+    ----------
+    template : str
+        File name of the template.
+    digest : str
+        SHA-256 of compensator.json.
+    recordings : sequence of str
+        Names from users; whatever could act in a comment is replaced.
+    """
+    lines = (
         f"Generated by dzdesign {TOOL['version']} from template {template}. Do not edit: generate it again.",
         f"Compensator SHA-256: {digest}",
     )
+    return (*lines, f"Valve identified from: {printable_list(recordings)}") if recordings else lines
 
 
-def _render(package: str, template: str, digest: str, context: Mapping[str, str | list[str]]) -> str:
-    page = environment(package).get_template(template)
-    return page.render(banner=banner(template, digest), project="dzdesign", **context)
+def _render(
+    renderer: "jinja2.Environment", template: str, opening: tuple[str, ...], values: Mapping[str, str | list[str]]
+) -> str:
+    return renderer.get_template(template).render(banner=opening, project="dzdesign", **values)

@@ -1,12 +1,18 @@
 """What a target folder hands to the renderer: one flat, frozen plan of printed strings."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import PurePosixPath
 from types import MappingProxyType
 
 from dzdesign.codegen.telemetry import Link
-from dzdesign.core.errors import DzdesignError
+from dzdesign.core.errors import DzdesignError, InputError
+from dzdesign.design.signals import Signals
+
+#: Products that the core may use: 32x32->64 bits, or none longer than 32 bits.
+ARITHMETICS = ("wide", "narrow")
 
 RENDERER_NAMES = frozenset({"banner", "project", "u_max_V", "pressure_span_MPa", "firmware_origin"})
 """Names that the renderer itself passes to every template; a target's context may not use them."""
@@ -19,7 +25,7 @@ class Target:
     Parameters
     ----------
     name
-        Name on the command line and of the folder, for example ``"f28335"``.
+        Name on the command line, for example ``"cortex-m4"``; its folder is the same with underscores.
     description
         One line for ``--list-targets``.
     compare_max
@@ -27,11 +33,17 @@ class Target:
     adc_code_max
         Largest code of the converter, right-justified; the core's ``DZ_ADC_CODE_MAX``.
     templates
-        Output path, relative to the firmware folder, to the template's file name in ``templates/``.
+        Output path, relative to the firmware folder, to the template's file name in the target's ``templates/`` or in
+        those that the targets share.
     context
         Every value that a template prints, already a string.
     link
         The serial line of its telemetry, or None if it sends none.
+    arithmetic
+        ``"wide"``: the core multiplies 32x32->64 bits; ``"narrow"``: nothing is longer than 32 bits.
+    takes_any_signals
+        True for a target without a converter and timer of its own, such as a library: it takes the scalings of any
+        compensator, and ``compare_max`` and ``adc_code_max`` are only what `design` uses if nobody says otherwise.
 
     Raises
     ------
@@ -45,11 +57,15 @@ class Target:
     adc_code_max: int
     templates: Mapping[str, str]
     context: Mapping[str, str]
+    arithmetic: str = "wide"
+    takes_any_signals: bool = False
     link: Link | None = None
 
     def __post_init__(self) -> None:
-        if not self.name.isidentifier():
-            raise DzdesignError(f"target name: expected an identifier, got {self.name!r}")
+        if not re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", self.name):
+            raise DzdesignError(f"target name: expected words of a-z and 0-9 with hyphens, got {self.name!r}")
+        if self.arithmetic not in ARITHMETICS:
+            raise DzdesignError(f"target {self.name}: arithmetic must be one of {ARITHMETICS}, got {self.arithmetic!r}")
         for label, value in (("compare_max", self.compare_max), ("adc_code_max", self.adc_code_max)):
             if not 0 < value <= 0xFFFF:
                 raise DzdesignError(f"target {self.name}: {label} must fit 16 bits unsigned, got {value}")
@@ -68,3 +84,60 @@ class Target:
             raise DzdesignError(f"target {self.name}: context names {taken} belong to the renderer")
         object.__setattr__(self, "templates", MappingProxyType(dict(self.templates)))
         object.__setattr__(self, "context", MappingProxyType(dict(self.context)))
+
+    @property
+    def folder(self) -> str:
+        """Name of the target's folder: an identifier, because it is a package."""
+        return folder_of(self.name)
+
+    def signals(self, pressure_span_MPa: Fraction) -> Signals:
+        """Return the scalings that a compensator for this target must have.
+
+        Parameters
+        ----------
+        pressure_span_MPa : Fraction
+            Span of both pressure sensors; the one thing that the target doesn't know.
+        """
+        return Signals(
+            command_code_max=self.adc_code_max,
+            pressure_code_max=self.adc_code_max,
+            pressure_span_MPa=pressure_span_MPa,
+            compare_max=self.compare_max,
+        )
+
+    def check_signals(self, signals: Signals) -> None:
+        """Refuse a compensator that was designed for another converter or PWM.
+
+        Parameters
+        ----------
+        signals : Signals
+            Of the compensator.
+
+        Raises
+        ------
+        InputError
+            With the first scaling that differs.
+        """
+        if self.takes_any_signals:
+            return
+        for what, asked, has in (
+            ("compare value", signals.compare_max, self.compare_max),
+            ("command code", signals.command_code_max, self.adc_code_max),
+            ("pressure code", signals.pressure_code_max, self.adc_code_max),
+        ):
+            if asked != has:
+                raise InputError(
+                    f"the compensator's largest {what} is {asked}, but target {self.name} has {has}; "
+                    f"design it again with `dzdesign design --target {self.name}`"
+                )
+
+
+def folder_of(name: str) -> str:
+    """Return the folder of a target's name.
+
+    Examples
+    --------
+    >>> folder_of("cortex-m4")
+    'cortex_m4'
+    """
+    return name.replace("-", "_")

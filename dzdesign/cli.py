@@ -32,6 +32,7 @@ OUTPUT = ("-o", "--output")
 LAW = _given("--law", metavar="LAW", help="paper: Eq. (18); target: meets Eq. (16) (default: paper)")
 SPAN = _given("--pressure-span", metavar="P", help='span of both pressure sensors (default: "20 MPa")')
 GUARD = _given("--guard", metavar="G", help="threshold to protect: closing or opening (default: closing)")
+TARGET = _given("--target", default="f28335", metavar="NAME", help="microcontroller, see codegen --list-targets")
 PLANT = _given("--plant", metavar="PLANT.toml", help="plant, like examples/paper_valve/plant.toml")
 
 COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
@@ -101,6 +102,7 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
         (
             _given("valve", metavar="VALVE.json", help="made by `dzdesign identify`"),
             _given(*OUTPUT, default="compensator.json", metavar="FILE", help="file to write"),
+            TARGET,
             LAW,
             SPAN,
             GUARD,
@@ -111,10 +113,14 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
         "dzdesign.commands:run_codegen",
         (
             _given(
-                "source", metavar="COMPENSATOR.json", help="or a VALVE.json: designed first, with the options below"
+                "source",
+                nargs="?",
+                metavar="COMPENSATOR.json",
+                help="or a VALVE.json: designed first, for the target, with the options below",
             ),
             _given(*OUTPUT, default="firmware", metavar="DIR", help="folder to write"),
-            _given("--target", default="f28335", metavar="NAME", help="microcontroller"),
+            TARGET,
+            _given("--list-targets", action="store_true", help="print name and description of every target"),
             LAW,
             SPAN,
             GUARD,

@@ -157,22 +157,24 @@ def run_identify(args: argparse.Namespace) -> int:
 def _design(valve_path: Path, content: bytes, args: argparse.Namespace) -> "Compensator":  # noqa: F821
     from fractions import Fraction
 
+    from dzdesign.codegen.project import target_named
     from dzdesign.design.designing import DesignOptions, design
-    from dzdesign.design.signals import Signals
     from dzdesign.identify.valve_file import valve_from_document
 
     span_MPa = Fraction(round(parse_quantity(args.pressure_span or "20 MPa", "pressure", "--pressure-span")), 10**6)
-    signals = Signals(pressure_span_MPa=span_MPa)
+    signals = target_named(args.target).signals(span_MPa)
     options = DesignOptions(law_name=args.law or "paper", signals=signals, guard=args.guard or "closing")
     return design(valve_from_document(content, str(valve_path)), options, content)
 
 
 def run_design(args: argparse.Namespace) -> int:
     """Design the compensator of a valve."""
+    from dzdesign.codegen.project import target_named
     from dzdesign.design.compensator import SCHEMA
     from dzdesign.tables import print_compensator
 
     path = Path(args.valve)
+    target_named(args.target)
     check_file_may_be_written(Path(args.output), SCHEMA)
     compensator = _design(path, read_bytes(path, "valve file"), args)
     document = compensator.to_document()
@@ -193,6 +195,10 @@ def run_codegen(args: argparse.Namespace) -> int:
     from dzdesign.identify.model import SCHEMA as VALVE_SCHEMA
     from dzdesign.tables import print_firmware
 
+    if args.list_targets:
+        return _list_targets(args)
+    if args.source is None:
+        raise InputError("codegen needs a COMPENSATOR.json or a VALVE.json; see `dzdesign codegen --help`")
     target_named(args.target)
     check_folder_may_be_written(Path(args.output), SCHEMA)
     path = Path(args.source)
@@ -212,6 +218,20 @@ def run_codegen(args: argparse.Namespace) -> int:
         print(to_json(firmware.manifest), end="")
     else:
         print_firmware(firmware, args.output)
+    return 0
+
+
+def _list_targets(args: argparse.Namespace) -> int:
+    """Print name and description of every target."""
+    from dzdesign.codegen.project import targets
+
+    if args.json:
+        listing = [{"name": target.name, "description": target.description} for target in targets()]
+        print(to_json({"targets": listing}), end="")
+        return 0
+    width = max(len(target.name) for target in targets())
+    for target in targets():
+        print(f"{target.name:{width}}  {target.description}")
     return 0
 
 

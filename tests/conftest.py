@@ -9,6 +9,10 @@ from dzdesign.core.artefacts import to_json, write_folder
 from dzdesign.identify.ramp_files import read_ramp_file
 
 
+def pytest_addoption(parser):
+    parser.addoption("--update-goldens", action="store_true", help="write tests/goldens anew, from its valve.json")
+
+
 @pytest.fixture(scope="session")
 def example_folder() -> Path:
     return Path(str(files("dzdesign.example")))

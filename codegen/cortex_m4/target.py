@@ -1,0 +1,52 @@
+"""An example for the Cortex-M4 that needs nothing but a compiler: vector table, start-up, SysTick, three functions.
+
+SysTick and the vector table: ARMv7-M architecture reference manual (DDI 0403), B1.5.3 and B3.3. Memory and clock are
+those of ARM's image AN386 for the MPS2 board, which QEMU models; a user's chip has its own, and three functions too.
+"""
+
+from fractions import Fraction
+
+from dzdesign.codegen.target import Target
+from dzdesign.core.errors import DzdesignError
+
+FOLDER = "cortex_m4"
+CLOCK_HZ = 25_000_000
+PWM_HZ = 2_500  # section 3 of the paper
+SYSTICK_MAX = 2**24  # SYST_RVR has 24 bits
+SELFTEST_TICKS = 25
+
+
+def systick_counts() -> int:
+    """Return the clock cycles between two interrupts.
+
+    Raises
+    ------
+    DzdesignError
+        If they are no integer that SysTick holds.
+    """
+    counts = Fraction(CLOCK_HZ, PWM_HZ)
+    if counts.denominator != 1 or not 1 < counts <= SYSTICK_MAX:
+        raise DzdesignError(f"cortex-m4: SysTick must count an integer from 2 to {SYSTICK_MAX}, got {counts}")
+    return counts.numerator
+
+
+OWN_FILES = ("main.c", "dz_tick.c", "dz_tick.h", "dz_board.c", "dz_board.h", "startup.c", "selftest.c")
+OTHER_FILES = ("dz_selftest.c", "dz_selftest.h", "mps2_an386.ld", "Makefile", "README.md")
+
+TARGET = Target(
+    name="cortex-m4",
+    description="ARM Cortex-M4 without CMSIS: start-up, SysTick at 2.5 kHz, three functions to fill in; runs in QEMU",
+    # The PWM is the user's: full drive may be any 16-bit compare value.
+    compare_max=60_000,
+    adc_code_max=4_095,
+    takes_any_signals=True,
+    templates={f"{FOLDER}/{file}": f"{file}.jinja" for file in OWN_FILES + OTHER_FILES},
+    context={
+        "clock_hz": str(CLOCK_HZ),
+        "clock_mhz": str(CLOCK_HZ // 10**6),
+        "pwm_hz": str(PWM_HZ),
+        "systick_counts": str(systick_counts()),
+        "systick_reload": str(systick_counts() - 1),
+        "selftest_ticks": str(SELFTEST_TICKS),
+    },
+)

@@ -1,0 +1,252 @@
+/* A model of what the firmware uses of the F280049C, behind the DriverLib stand-in. Every call is printed while
+ * `device_verbose` is set; device_period() is one PWM period: CTR = 0, conversions, then the interrupt at CMPB. */
+#include "device.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+
+#include "driverlib.h"
+#include "model.h"
+
+int device_verbose;
+void (*device_on_eint)(void);
+void (*device_on_service)(void);
+struct model model;
+
+static const char *name_of(uint32_t value)
+{
+    switch (value)
+    {
+#define X(name, number)                                                                                                \
+    case number:                                                                                                       \
+        return #name;
+#define T(type, names) names
+        PLAIN_WORDS
+        TYPED_WORDS
+#undef X
+#undef T
+    default:
+        return NULL;
+    }
+}
+
+static void record(const char *function, int count, ...)
+{
+    va_list arguments;
+
+    if (!device_verbose)
+    {
+        return;
+    }
+    printf("%s", function);
+    va_start(arguments, count);
+    for (; count > 0; count--)
+    {
+        const uint32_t value = va_arg(arguments, uint32_t);
+        const char *name = (value >= 30000u) ? name_of(value) : NULL;
+        (name != NULL) ? printf(" %s", name) : printf(" %u", (unsigned)value);
+    }
+    va_end(arguments);
+    printf("\n");
+}
+
+#define U(value) ((uint32_t)(value))
+#define RECORD0() record(__func__, 0)
+#define RECORD1(a) record(__func__, 1, U(a))
+#define RECORD2(a, b) record(__func__, 2, U(a), U(b))
+#define RECORD3(a, b, c) record(__func__, 3, U(a), U(b), U(c))
+
+void EPWM_setClockPrescaler(uint32_t base, EPWM_ClockDivider a, EPWM_HSClockDivider b) { RECORD3(base, a, b); }
+void EPWM_setPeriodLoadMode(uint32_t base, EPWM_PeriodLoadMode mode) { RECORD2(base, mode); }
+void EPWM_setTimeBasePeriod(uint32_t base, uint16_t count) { RECORD2(base, count); model.period = count; }
+void EPWM_setTimeBaseCounter(uint32_t base, uint16_t count) { RECORD2(base, count); }
+void EPWM_disablePhaseShiftLoad(uint32_t base) { RECORD1(base); }
+void EPWM_setTimeBaseCounterMode(uint32_t base, EPWM_TimeBaseCountMode mode) { RECORD2(base, mode); model.mode = mode; }
+void EPWM_setCounterCompareShadowLoadMode(uint32_t base, EPWM_CounterCompareModule a, EPWM_CounterCompareLoadMode b)
+{
+    RECORD3(base, a, b);
+}
+void EPWM_setCounterCompareValue(uint32_t base, EPWM_CounterCompareModule module, uint16_t count)
+{
+    RECORD3(base, module, count);
+    if (module == EPWM_COUNTER_COMPARE_A)
+    {
+        model.cmpa = count;
+    }
+    else
+    {
+        model.cmpb = count;
+    }
+}
+void EPWM_setActionQualifierAction(uint32_t base, EPWM_ActionQualifierOutputModule module,
+                                   EPWM_ActionQualifierOutput output, EPWM_ActionQualifierOutputEvent event)
+{
+    record(__func__, 4, U(base), U(module), U(output), U(event));
+    if (event == EPWM_AQ_OUTPUT_ON_TIMEBASE_ZERO)
+    {
+        model.at_zero = output;
+    }
+    else
+    {
+        model.at_cmpa = output;
+    }
+}
+void EPWM_setActionQualifierContSWForceShadowMode(uint32_t base, EPWM_ActionQualifierContForce mode) { RECORD2(base, mode); }
+void EPWM_setActionQualifierContSWForceAction(uint32_t base, EPWM_ActionQualifierOutputModule module,
+                                              EPWM_ActionQualifierSWOutput output)
+{
+    RECORD3(base, module, output);
+    model.force = output;
+}
+void EPWM_setADCTriggerSource(uint32_t base, EPWM_ADCStartOfConversionType a, EPWM_ADCStartOfConversionSource b)
+{
+    RECORD3(base, a, b);
+}
+void EPWM_setADCTriggerEventPrescale(uint32_t base, EPWM_ADCStartOfConversionType type, uint16_t count)
+{
+    RECORD3(base, type, count);
+    model.soca_prescale = count;
+}
+void EPWM_enableADCTrigger(uint32_t base, EPWM_ADCStartOfConversionType type) { RECORD2(base, type); model.soca = true; }
+void EPWM_setInterruptSource(uint32_t base, uint16_t source) { RECORD2(base, source); model.interrupt_source = source; }
+void EPWM_setInterruptEventCount(uint32_t base, uint16_t count) { RECORD2(base, count); }
+void EPWM_enableInterrupt(uint32_t base) { RECORD1(base); model.interrupt = true; }
+void EPWM_clearEventTriggerInterruptFlag(uint32_t base) { RECORD1(base); model.interrupt_flag = false; }
+void EPWM_setTripZoneAction(uint32_t base, EPWM_TripZoneEvent event, EPWM_TripZoneAction action)
+{
+    RECORD3(base, event, action);
+    model.trip_action = action;
+}
+void EPWM_enableTripZoneSignals(uint32_t base, uint16_t signals) { RECORD2(base, signals); model.trip_signals = signals; }
+void EPWM_forceTripZoneEvent(uint32_t base, uint16_t event) { RECORD2(base, event); model.tripped = true; }
+void EPWM_clearTripZoneFlag(uint32_t base, uint16_t flags)
+{
+    RECORD2(base, flags);
+    model.tripped = model.trip_pin_low; /* a level that is still there trips again */
+}
+uint16_t EPWM_getTripZoneFlagStatus(uint32_t base)
+{
+    (void)base;
+    return model.tripped ? (uint16_t)EPWM_TZ_FLAG_OST : (uint16_t)0;
+}
+
+void ADC_setVREF(uint32_t base, ADC_ReferenceMode a, ADC_ReferenceVoltage b) { RECORD3(base, a, b); }
+void ADC_setPrescaler(uint32_t base, ADC_ClkPrescale prescale) { RECORD2(base, prescale); }
+void ADC_setInterruptPulseMode(uint32_t base, ADC_PulseMode mode) { RECORD2(base, mode); }
+void ADC_enableConverter(uint32_t base) { RECORD1(base); model.powered_us = 0u; model.converter = true; }
+void ADC_setupSOC(uint32_t base, ADC_SOCNumber number, ADC_Trigger trigger, ADC_Channel channel, uint32_t window)
+{
+    record(__func__, 5, U(base), U(number), U(trigger), U(channel), window);
+    model.channel[number] = channel;
+}
+void ADC_setInterruptSource(uint32_t base, ADC_IntNumber number, uint16_t trigger)
+{
+    RECORD3(base, number, trigger);
+    model.last_conversion = trigger;
+}
+void ADC_disableContinuousMode(uint32_t base, ADC_IntNumber number) { RECORD2(base, number); }
+void ADC_enableInterrupt(uint32_t base, ADC_IntNumber number) { RECORD2(base, number); }
+void ADC_clearInterruptStatus(uint32_t base, ADC_IntNumber number) { RECORD2(base, number); model.adc_flag = false; }
+bool ADC_getInterruptStatus(uint32_t base, ADC_IntNumber number) { (void)base; (void)number; return model.adc_flag; }
+bool ADC_getInterruptOverflowStatus(uint32_t base, ADC_IntNumber number) { (void)base; (void)number; return model.adc_overflow; }
+void ADC_clearInterruptOverflowStatus(uint32_t base, ADC_IntNumber number) { RECORD2(base, number); model.adc_overflow = false; }
+bool ADC_isBusy(uint32_t base) { (void)base; return model.adc_busy; }
+uint16_t ADC_readResult(uint32_t base, ADC_SOCNumber number) { (void)base; return model.result[number]; }
+
+void GPIO_setDirectionMode(uint32_t pin, GPIO_Direction direction) { RECORD2(pin, direction); }
+void GPIO_setPadConfig(uint32_t pin, uint32_t type) { RECORD2(pin, type); }
+void GPIO_setQualificationMode(uint32_t pin, GPIO_QualificationMode mode) { RECORD2(pin, mode); }
+void GPIO_setPinConfig(uint32_t config) { RECORD1(config); }
+uint32_t GPIO_readPin(uint32_t pin) { return ((pin == 12u) && model.trip_pin_low) ? 0u : 1u; }
+void XBAR_setInputPin(XBAR_InputNum input, uint16_t pin) { RECORD2(input, pin); }
+
+void Interrupt_initModule(void) { RECORD0(); }
+void Interrupt_initVectorTable(void) { RECORD0(); }
+void Interrupt_register(uint32_t number, void (*handler)(void)) { RECORD1(number); model.isr = handler; }
+void Interrupt_enable(uint32_t number) { RECORD1(number); model.pie = true; }
+void Interrupt_clearACKGroup(uint16_t group) { RECORD1(group); model.pie_blocked = false; }
+
+void SysCtl_disablePeripheral(SysCtl_PeripheralPCLOCKCR peripheral) { RECORD1(peripheral); }
+void SysCtl_enablePeripheral(SysCtl_PeripheralPCLOCKCR peripheral) { RECORD1(peripheral); }
+uint32_t SysCtl_getResetCause(void) { return model.reset_by_watchdog ? (uint32_t)SYSCTL_CAUSE_WDRS : 0u; }
+bool SysCtl_isMCDClockFailureDetected(void) { return model.no_crystal; }
+uint32_t SysCtl_getClock(uint32_t oscillator_hz) { return oscillator_hz * 5u; }
+void SysCtl_setWatchdogMode(SysCtl_WDMode mode) { RECORD1(mode); }
+void SysCtl_setWatchdogPredivider(SysCtl_WDPredivider predivider) { RECORD1(predivider); }
+void SysCtl_setWatchdogPrescaler(SysCtl_WDPrescaler prescaler) { RECORD1(prescaler); }
+void SysCtl_enableWatchdog(void) { RECORD0(); }
+void SysCtl_serviceWatchdog(void)
+{
+    RECORD0();
+    if (device_on_service != NULL)
+    {
+        device_on_service();
+    }
+}
+void device_delay(uint32_t us) { RECORD1(us); model.powered_us += us; }
+void Device_init(void) { RECORD0(); }
+void Device_initGPIO(void) { RECORD0(); }
+void device_dint(void) { RECORD0(); }
+void device_eint(void)
+{
+    RECORD0();
+    if (device_on_eint != NULL)
+    {
+        device_on_eint();
+    }
+}
+
+/* The n-th sample has the codes 100 n, 1, 2 at the channels 0, 1, 2; events are those of driver.c. */
+static void convert(char event)
+{
+    const uint16_t inputs[3] = {
+        (uint16_t)((event == 'h') ? 5000u : (model.zero ? 0u : 100u * ++model.samples)), 1u, 2u};
+    unsigned number;
+
+    for (number = 0u; number < 3u; number++)
+    {
+        model.result[number] = inputs[model.channel[number] - ADC_CH_ADCIN0];
+    }
+    model.adc_flag = (model.last_conversion == 2u); /* else the flag came before the results */
+}
+
+struct tick device_period(char event)
+{
+    struct tick tick = {"low", 0u, 0u};
+
+    model.zero = (event == 'z') || (model.zero && (event != 'n'));
+    model.trip_pin_low = (event == 'T') || (model.trip_pin_low && (event != 't'));
+    model.tripped = model.tripped || (model.trip_pin_low && (model.trip_signals == EPWM_TZ_SIGNAL_OSHT1));
+    /* CTR = 0: the shadows are loaded, and every so many periods the converter is started. */
+    if (model.tripped && (model.trip_action == EPWM_TZ_ACTION_HIGH))
+    {
+        tick.output = "high";
+    }
+    else if (!model.tripped && (model.force != EPWM_AQ_SW_OUTPUT_LOW) && (model.at_zero == EPWM_AQ_OUTPUT_HIGH) &&
+             (model.at_cmpa == EPWM_AQ_OUTPUT_LOW))
+    {
+        /* A compare value of 0 that is loaded here misses its own event: SPRAAI1. */
+        tick.output = (model.cmpa == 0u) ? "full" : "pwm";
+        tick.duty = model.cmpa;
+    }
+    else
+    {
+        /* low */
+    }
+    if (model.soca && model.converter && (model.powered_us >= 1000u) && (++model.periods % model.soca_prescale == 0u) &&
+        (event != 'x'))
+    {
+        convert(event);
+    }
+    model.adc_busy = (event == 'b');
+    /* CTR = CMPB: the interrupt, if the last one was acknowledged in both places. */
+    if (model.interrupt && model.pie && !model.interrupt_flag && !model.pie_blocked &&
+        (model.interrupt_source == EPWM_INT_TBCTR_U_CMPB) && (model.cmpb <= model.period))
+    {
+        model.interrupt_flag = true;
+        model.pie_blocked = true;
+        tick.served = 1u;
+        model.isr();
+    }
+    return tick;
+}
