@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 DOCS   := docs/derivation
 
-.PHONY: demo test lint docs goldens lock clean bench-identify
+.PHONY: demo test lint docs goldens lock clean bench-identify bench-isr
 
 demo: $(STAMP)
 	$(BIN)/dzdesign demo demo
@@ -27,6 +27,10 @@ bench-identify: $(VENV)/.bench
 $(VENV)/.bench: $(STAMP)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation -e '.[bench]'
 	touch $@
+
+# A minute or two; needs the simulators that .ci/run installs.
+bench-isr: $(STAMP)
+	$(BIN)/python benchmarks/isr/run.py
 
 # The account of the paper as a page, for LaTeX and for machines; built, never committed.
 docs: $(STAMP)

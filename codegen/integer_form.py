@@ -1,85 +1,117 @@
-"""The law of a `Compensator` lowered to integers that the firmware can multiply, shift and compare, with proofs.
+"""The law of one side of a `Compensator` lowered to integers that the firmware can multiply, shift and compare, proved.
 
-With beta = B / (D S), k x_max/u_max and u_min0/u_max over 2^16 and x = command code / C, the law (18) in counts is
+With beta = B / (D S), k x_max/u_max and u_min0/u_max over 2^16 and x = c / C, c being the codes of command from zero
+on, the law (18) in counts, lowered inside the edge of E codes, is
 
-    compare = (M B (p1 c + p0) / (D S 2^16 C)) + (M g0 c / C),        M = compare_max.
+    compare = B_law (p c + o) + l c - (B_law - B) e max(E - c, 0),
 
-Cancelling the powers of two and the common factors of M and C leaves ``total / (divisor 2^shift)`` with an integer
-`total` of 64 bits, so one shift and one division by a small constant give the exactly rounded law. The division is a
-multiplication by a reciprocal that is proved exact for every dividend that can occur.
+p, o, l and e rational. Times the common denominator every term is an integer; cancelling powers of two leaves
+``total / (divisor 2^shift)`` with an integer `total` of 64 bits, so one shift and one division by a small constant give
+the exactly rounded law. The division is a multiplication by a reciprocal that is proved exact for every dividend that
+can occur; where the target has 32-bit arithmetic only, it is an estimate and a proved number of corrections.
 """
 
 from dataclasses import dataclass
-from math import lcm
+from math import ceil, lcm
 
 from dzdesign.core.errors import InputError
+from dzdesign.derivation.edge import evaluate_edge
 from dzdesign.derivation.law import law
 from dzdesign.derivation.scaling import Line, evaluate_line
 from dzdesign.design.compensator import Compensator
 
 INT32_MAX = 2**31 - 1
 INT64_MAX = 2**63 - 1
+#: Bits of the estimate's dividend and of its fraction.
+ESTIMATE_BITS = 16
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Estimate:
+    """Division without 64-bit arithmetic: ``((n >> shift) * factor) >> 16``, never too large, then `corrections`."""
+
+    shift: int
+    factor: int
+    corrections: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class IntegerForm:
     """Constants of the core; see the module's text for the algebra.
 
-    ``total = scale_beta * B(dp) * (slope * c + offset) + (linear * c << linear_shift) + half``, with B the table
-    interpolated without rounding; ``compare = min((total >> shift) / divisor, compare_max)``; the division is
-    ``(quotient_scaled * reciprocal) >> reciprocal_shift``.
+    ``total = B_law * (slope * c + offset) + (linear * c << linear_shift) + half - gap * (edge * max(E - c, 0))`` with
+    B_law and gap = B_law - B the tables interpolated without rounding;
+    ``compare = min(total >> shift, largest) / divisor``, so that no compare value exceeds the limit; the division is
+    ``(quotient * reciprocal) >> reciprocal_shift`` or the `estimate`.
 
     Attributes
     ----------
     table : tuple of int
-        scale_beta times the beta numerators: 32-bit values.
-    step_shift : int
-        log2 of the pressure codes between nodes.
+        scale_beta times the numerators of the law's beta: 32-bit values.
+    gap : tuple of int
+        The same of what the certified beta lies below it; empty without an edge.
+    scale_beta : int
+        Factor of the tables.
     slope, offset : int
         32-bit signed.
+    edge : int
+        32 bits; 0 without an edge.
     linear, linear_shift : int
         Command term that beta does not touch.
     half, shift, divisor : int
         Rounding and denominator.
+    largest : int
+        Largest quotient that is divided: the one whose compare value is the limit.
     reciprocal, reciprocal_shift : int
         Of the divisor.
-    fallback : int
-        scale_beta times the smallest beta numerator: for a pressure signal that can't be right.
+    estimate : Estimate
+        Of the division.
     """
 
     table: tuple[int, ...]
-    step_shift: int
+    gap: tuple[int, ...]
+    scale_beta: int
     slope: int
     offset: int
+    edge: int
     linear: int
     linear_shift: int
     half: int
     shift: int
     divisor: int
+    largest: int
     reciprocal: int
     reciprocal_shift: int
-    fallback: int
+    estimate: Estimate
 
 
-def integer_form(compensator: Compensator) -> IntegerForm:
-    """Lower the law to integers and prove that nothing overflows and every division is exact.
+def integer_form(compensator: Compensator, sign: int = 1) -> IntegerForm:
+    """Lower the law of one side to integers and prove that nothing overflows and every division is exact.
+
+    Parameters
+    ----------
+    compensator : Compensator
+        The law in rationals.
+    sign : {1, -1}
+        Sign of the command.
 
     Raises
     ------
     InputError
         If the coefficients need more than 64-bit arithmetic.
     """
-    c = compensator
-    command_max, compare_max = c.signals.command_code_max, c.signals.compare_max
+    c, side = compensator, compensator.side(sign)
+    compare_max = c.signals.compare_max
     chosen = law(c.law_name)
+    span = c.signals.command.span(sign)
 
     def line(beta: int) -> Line:
         return evaluate_line(
             chosen,
             beta=beta,
-            kappa=c.k_x_max_over_u_max,
-            u_min0_over_u_max=c.u_min0_over_u_max,
-            n_adc=command_max,
+            kappa=side.k_x_max_over_u_max,
+            u_min0_over_u_max=side.u_min0_over_u_max,
+            n_adc=span,
             n_full=compare_max,
         )
 
@@ -89,59 +121,77 @@ def integer_form(compensator: Compensator) -> IntegerForm:
     per_command = (whole.slope - without.slope) / beta_unit
     constant = (whole.start - without.start) / beta_unit
     plain = without.slope
-    common = lcm(per_command.denominator, constant.denominator, plain.denominator)
-    divisor = common
-    shift = 0
+    per_edge_code = 0 * constant
+    if c.edge_codes:  # what one unit of the gap lowers at zero command, over the edge's codes
+        lowered = evaluate_edge(
+            beta_opening=1,
+            beta_closing=0,
+            u_min0_over_u_max=side.u_min0_over_u_max,
+            share_of_edge=0,
+            n_full=compare_max,
+        )
+        per_edge_code = lowered / beta_unit / c.edge_codes
+    common = lcm(*(value.denominator for value in (per_command, constant, plain, per_edge_code)))
+    divisor, shift = common, 0
     while divisor % 2 == 0:
         divisor, shift = divisor // 2, shift + 1
     if shift == 0:  # rounding to nearest needs half a unit, so the denominator is made even
         shift, common = 1, 2 * common
-    slope, offset, linear = (int(value * common) for value in (per_command, constant, plain))
-    scale_beta = _share(slope, offset, command_max)
-    slope, offset = slope // scale_beta, offset // scale_beta
+    slope, offset, linear, edge = (int(value * common) for value in (per_command, constant, plain, per_edge_code))
+    scale_beta = _share((slope, offset, edge), (abs(slope) * span + abs(offset), edge * c.edge_codes))
+    slope, offset, edge = slope // scale_beta, offset // scale_beta, edge // scale_beta
     linear_shift = 0
     while linear and linear % 2 == 0:
         linear, linear_shift = linear // 2, linear_shift + 1
-    half = common // 2
-    largest = _largest_quotient(compensator, common, divisor)
+    if _largest_quotient(compensator, sign, divisor) >= 1 << 32:
+        raise InputError(f"the law's quotient by {divisor} needs more than 32 bits; choose other scalings")
+    largest = (c.amplifier.compare_limit + 1) * divisor - 1
     reciprocal, reciprocal_shift = _exact_reciprocal(divisor, largest)
+    fallback = (min(side.law_numerators),) * 2
+    nodes = side.law_numerators + fallback
+    lower = side.beta_numerators + (min(side.beta_numerators),) * 2
     form = IntegerForm(
-        table=tuple(scale_beta * numerator for numerator in c.beta_numerators),
-        step_shift=c.beta_step_codes.bit_length() - 1,
+        table=tuple(scale_beta * numerator for numerator in nodes),
+        gap=tuple(scale_beta * (up - low) for up, low in zip(nodes, lower, strict=True)) if c.edge_codes else (),
+        scale_beta=scale_beta,
         slope=slope,
         offset=offset,
+        edge=edge,
         linear=linear,
         linear_shift=linear_shift,
-        half=half,
+        half=common // 2,
         shift=shift,
         divisor=divisor,
+        largest=largest,
         reciprocal=reciprocal,
         reciprocal_shift=reciprocal_shift,
-        fallback=scale_beta * min(c.beta_numerators),
+        estimate=_estimate(divisor, largest),
     )
-    _prove_widths(form, compensator)
+    _prove_widths(form, compensator, sign)
     return form
 
 
-def _share(slope: int, offset: int, command_max: int) -> int:
-    """Return the smallest common factor of slope and offset that, moved into the table, leaves them 32 bits."""
-    needed = max(abs(offset), abs(slope * command_max + offset), abs(slope) * command_max)
-    smallest = max(1, -(-needed // INT32_MAX))
-    return next((factor for factor in range(smallest, 2**16) if slope % factor == 0 and offset % factor == 0), 1)
+def _share(coefficients: tuple[int, ...], sizes: tuple[int, ...]) -> int:
+    """Return the smallest common factor of the coefficients that, moved into the tables, leaves `sizes` 32 bits."""
+    smallest = max(1, -(-max(sizes) // INT32_MAX))
+    factors = range(smallest, 2**16)
+    return next((factor for factor in factors if all(value % factor == 0 for value in coefficients)), 1)
 
 
-def _largest_quotient(compensator: Compensator, common: int, divisor: int) -> int:
+def _largest_quotient(compensator: Compensator, sign: int, divisor: int) -> int:
     """Return a bound of ``total >> shift``: the law's largest value at any node, times divisor."""
-    command_max, pressure_max = compensator.signals.command_code_max, compensator.signals.pressure_code_max
+    c, command = compensator, compensator.signals.command
     # Every node that a code reaches, and the fallback's smallest beta: along dP the law is straight between them.
-    codes = [index * compensator.beta_step_codes for index in range(len(compensator.beta_numerators) - 1)]
-    codes += [pressure_max, -pressure_max]
-    ends = [compensator.drive(command_max, code) for code in codes]
-    starts = [compensator.drive(0, code) for code in codes]
-    if min(ends + starts) < 0:
+    codes = [index * c.beta_step_codes for index in range(c.nodes(sign) - 1)]
+    codes += [c.signals.largest_difference(sign), -c.reverse_codes - 1]
+    # Along the command it is straight but for the edge's end.
+    corners = {0, min(c.edge_codes, command.span(sign)), command.span(sign)}
+    commands = [command.zero_code + command.direction(sign) * corner for corner in corners]
+    values = [c.drive(code, dp_code, sign) for dp_code in codes for code in commands]
+    if min(values) < 0:
         raise InputError("the law asks for a negative drive somewhere; check k x_max/u_max and u_min0")
     # One count more for rounding.
-    largest = max(ends + starts) * compensator.signals.compare_max + 2
+    largest = max(values) * c.signals.compare_max + 2
     return int(largest * divisor) + divisor
 
 
@@ -162,18 +212,32 @@ def _exact_reciprocal(divisor: int, largest: int) -> tuple[int, int]:
     raise InputError(f"no 32-bit reciprocal divides by {divisor} exactly up to {largest}")
 
 
-def _prove_widths(form: IntegerForm, compensator: Compensator) -> None:
+def _estimate(divisor: int, largest: int) -> Estimate:
+    """Return the division by products of 32 bits.
+
+    With h = n >> s and m = floor(2^(16+s) / d), h m >> 16 is at most n/d, and less than it by under 2^s/d for the bits
+    of n that are dropped, h/2^16 < 1 for those of m, and 1 for the last shift.
+    """
+    shift = max(0, largest.bit_length() - ESTIMATE_BITS)
+    factor = (1 << (ESTIMATE_BITS + shift)) // divisor
+    if (largest >> shift) * factor >= 1 << 32:
+        raise InputError(f"a quotient of {largest} by {divisor} needs more than 32-bit arithmetic")
+    return Estimate(shift=shift, factor=factor, corrections=ceil((1 << shift) / divisor + 2) - 1)
+
+
+def _prove_widths(form: IntegerForm, compensator: Compensator, sign: int) -> None:
     """Prove that every intermediate value fits the type that the template gives it."""
-    command = compensator.signals.command_code_max
+    span = compensator.signals.command.span(sign)
     step = compensator.beta_step_codes
-    beta = max(form.table) * step
-    inner = max(abs(form.offset), abs(form.slope * command + form.offset))
-    straight = form.linear * command << form.linear_shift
+    beta, gap = max(form.table) * step, max(form.gap, default=0) * step
+    inner = max(abs(form.offset), abs(form.slope * span + form.offset))
+    straight = form.linear * span << form.linear_shift
     checks = {
-        "the interpolated table": (beta, INT32_MAX),
-        "slope times command": (abs(form.slope) * command, INT32_MAX),
+        "the interpolated table": (max(beta, gap), INT32_MAX),
+        "slope times command": (abs(form.slope) * span, INT32_MAX),
         "the command-dependent factor": (inner, INT32_MAX),
-        "the 64-bit sum": (beta * inner + straight + form.half, INT64_MAX),
+        "the edge's factor": (form.edge * compensator.edge_codes, INT32_MAX),
+        "the 64-bit sum": (beta * inner + straight + form.half + gap * form.edge * compensator.edge_codes, INT64_MAX),
         "the command's own term": (form.linear, 2**32 - 1),
     }
     for what, (value, limit) in checks.items():

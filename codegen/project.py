@@ -3,27 +3,25 @@
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from importlib import import_module
 from importlib.resources import files as files_of
 from typing import TYPE_CHECKING, Any
 
-from dzdesign.codegen.integer_form import IntegerForm, integer_form
+from dzdesign.codegen.core_plan import Plan, core_plan, drive_plan, header_plan
 from dzdesign.codegen.target import Target, folder_of
-from dzdesign.codegen.telemetry import beta_factor
 from dzdesign.codegen.user_names import printable_list
 from dzdesign.core.artefacts import TOOL, sha256_of, to_json
 from dzdesign.core.errors import InputError, nearest
-from dzdesign.derivation.law import law
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.compensator_file import compensator_document
 
 if TYPE_CHECKING:
     import jinja2
 
 SCHEMA = "dzdesign.firmware/1"
 PACKAGE = "dzdesign.codegen"
-CORE_FILES = {"core/dz_comp.c": "dz_comp.c.jinja", "core/dz_comp.h": "dz_comp.h.jinja"}
-NODES_IN_A_ROW = 5
+#: One file a sign of command, all from one template.
+CORE_SOURCES = {1: "dz_comp.c", -1: "dz_comp_negative.c"}
 
 
 def _found_targets() -> tuple[str, ...]:
@@ -81,18 +79,19 @@ def generate(compensator: Compensator, target_name: str, compensator_bytes: byte
     """
     target = target_named(target_name)
     target.check_signals(compensator.signals)
-    document = compensator_bytes or to_json(compensator.to_document()).encode()
+    document = compensator_bytes or to_json(compensator_document(compensator)).encode()
     digest = sha256_of(document)
     recordings = ramp_tests_of(compensator)
-    context = core_context(compensator, integer_form(compensator))
-    hardware = {**target.context, **{key: context[key] for key in ("u_max_V", "pressure_span_MPa")}}
+    header = header_plan(compensator)
+    hardware = {**target.context, "u_max_V": header["u_max_V"], "pressure_span_MPa": header["a_span_MPa"]}
     hardware["firmware_origin"] = f"0x{digest[:4].upper()}"
-    plans = [(CORE_FILES, environment(PACKAGE), context)]
-    plans.append((target.templates, environment(f"{PACKAGE}.{target.folder}"), hardware))
+    shared = environment(PACKAGE)
+    plans = [(path, shared, template, plan) for path, template, plan in _core_files(compensator, target, header)]
+    own = environment(f"{PACKAGE}.{target.folder}")
+    plans += [(path, own, template, hardware) for path, template in target.templates.items()]
     files = {
-        path: _render(renderer, template, banner(template, digest, recordings), values)
-        for templates, renderer, values in plans
-        for path, template in templates.items()
+        path: _render(renderer, template, banner(template, digest, recordings), plan)
+        for path, renderer, template, plan in plans
     }
     files["compensator.json"] = document.decode()
     manifest = {
@@ -101,83 +100,24 @@ def generate(compensator: Compensator, target_name: str, compensator_bytes: byte
         "made_from": [{"source": "compensator.json", "sha256": digest}],
         "target": target.name,
         "law": compensator.law_name,
-        "core": list(CORE_FILES),
+        "core": sorted(path for path in files if path.startswith("core/")),
     }
     return Firmware(files=files, manifest=manifest)
 
 
-def core_context(compensator: Compensator, form: IntegerForm) -> dict[str, str | list[str]]:
-    """Return the flat plan of printed strings for the core's templates."""
-    chosen, signals = law(compensator.law_name), compensator.signals
-    scale = form.table[0] // compensator.beta_numerators[0] * compensator.beta_denominator
-    reverse = signals.dp_MPa(compensator.reverse_codes)
-    largest = ((1 << form.reciprocal_shift) - 1) // max(
-        1, form.reciprocal * form.divisor - (1 << form.reciprocal_shift)
-    )
-    step = compensator.beta_step_codes
-    factor, factor_shift = beta_factor(scale * step, max(form.table) * step)
-    zero_command = [compensator.compare(0, node * compensator.beta_step_codes) for node in range(len(form.table) - 1)]
-    return {
-        "certificate_text": certificate_text(compensator),
-        "zero_command_low": str(min(zero_command)),
-        "zero_command_high": str(max(zero_command)),
-        "law_text": str(chosen.output).replace("**", "^"),
-        "law_equation": chosen.equation,
-        "kappa_text": _rational(compensator.k_x_max_over_u_max),
-        "u_min0_text": _rational(compensator.u_min0_over_u_max),
-        "u_max_V": f"{float(compensator.u_max_V):g}",
-        "compare_max": str(signals.compare_max),
-        "adc_code_max": str(max(signals.command_code_max, signals.pressure_code_max)),
-        "command_code_max": str(signals.command_code_max),
-        "pressure_code_max": str(signals.pressure_code_max),
-        "pressure_span_MPa": f"{float(signals.pressure_span_MPa):g}",
-        "reverse_codes": str(compensator.reverse_codes),
-        "reverse_text": f"-{float(reverse):.3f} MPa",
-        "table_length": str(len(form.table)),
-        "table_rows": [
-            " ".join(f"UINT32_C({value})," for value in form.table[start : start + NODES_IN_A_ROW])
-            for start in range(0, len(form.table), NODES_IN_A_ROW)
-        ],
-        "beta_scale": str(scale),
-        "beta_factor": str(factor),
-        "beta_shift": str(factor_shift),
-        "step_codes": str(compensator.beta_step_codes),
-        "step_MPa": f"{float(signals.dp_MPa(compensator.beta_step_codes)):.4f}",
-        "step_shift": str(form.step_shift),
-        "step_mask": str(compensator.beta_step_codes - 1),
-        "fallback": str(form.fallback),
-        "slope": str(form.slope),
-        "slope_c": _int32(form.slope),
-        "offset": str(form.offset),
-        "offset_c": _int32(form.offset),
-        "linear": str(form.linear),
-        "linear_shift": str(form.linear_shift),
-        "half": str(form.half),
-        "shift": str(form.shift),
-        "divisor": str(form.divisor),
-        "reciprocal": str(form.reciprocal),
-        "reciprocal_shift": str(form.reciprocal_shift),
-        "largest": str(largest),
-    }
-
-
-def certificate_text(compensator: Compensator) -> str:
-    """Say in one comment line what the offset is certified for."""
-    certificate = compensator.certificate
-    low, high = (float(end) for end in certificate.dp_MPa)
-    return (
-        f"Certified for {low:.2f} to {high:.2f} MPa: below the {certificate.confidence:.0%} bound of the "
-        f"{certificate.guard} threshold; flow below {certificate.level_L_min:.2f} L/min counts as none."
-    )
-
-
-def _rational(value: Fraction) -> str:
-    return f"{value.numerator}/{value.denominator} = {float(value):.6f}"
-
-
-def _int32(value: int) -> str:
-    """Print a 32-bit constant that is one on every compiler, whatever its `long` is."""
-    return f"{'-' if value < 0 else ''}INT32_C({abs(value)})"
+def _core_files(compensator: Compensator, target: Target, header: Plan) -> list[tuple[str, str, Plan]]:
+    """Return path, template and plan of every file of the core."""
+    sides = [
+        (f"core/{name}", "dz_comp.c.jinja", core_plan(compensator, sign, target.arithmetic))
+        for sign, name in CORE_SOURCES.items()
+        if sign in compensator.signals.signs
+    ]
+    drive = drive_plan(compensator)
+    return [
+        *sides,
+        ("core/dz_comp.h", "dz_comp.h.jinja", header),
+        *((f"core/{name}", f"{name}.jinja", drive) for name in ("dz_drive.c", "dz_drive.h")),
+    ]
 
 
 def ramp_tests_of(compensator: Compensator) -> tuple[str, ...]:
@@ -220,6 +160,6 @@ def banner(template: str, digest: str, recordings: Sequence[str] = ()) -> tuple[
 
 
 def _render(
-    renderer: "jinja2.Environment", template: str, opening: tuple[str, ...], values: Mapping[str, str | list[str]]
+    renderer: "jinja2.Environment", template: str, opening: tuple[str, ...], values: Mapping[str, object]
 ) -> str:
     return renderer.get_template(template).render(banner=opening, project="dzdesign", **values)

@@ -9,6 +9,7 @@ from types import MappingProxyType
 
 from dzdesign.codegen.telemetry import Link
 from dzdesign.core.errors import DzdesignError, InputError
+from dzdesign.design.signal_text import Converter
 from dzdesign.design.signals import Signals
 
 #: Products that the core may use: 32x32->64 bits, or none longer than 32 bits.
@@ -16,6 +17,16 @@ ARITHMETICS = ("wide", "narrow")
 
 RENDERER_NAMES = frozenset({"banner", "project", "u_max_V", "pressure_span_MPa", "firmware_origin"})
 """Names that the renderer itself passes to every template; a target's context may not use them."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TargetInputs:
+    """What `design` needs to know of a target: its converter, its timer's counts, samples and PWM periods a second."""
+
+    converter: Converter
+    compare_max: int
+    sample_Hz: int
+    tick_Hz: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,6 +43,10 @@ class Target:
         Compare value of 100 % duty; the core's ``DZ_COMPARE_MAX``. Fits an unsigned 16-bit register.
     adc_code_max
         Largest code of the converter, right-justified; the core's ``DZ_ADC_CODE_MAX``.
+    adc_full_V
+        Voltage at the pin that would be the code after the largest.
+    sample_Hz, tick_Hz
+        Samples and PWM periods in a second.
     templates
         Output path, relative to the firmware folder, to the template's file name in the target's ``templates/`` or in
         those that the targets share.
@@ -55,6 +70,9 @@ class Target:
     description: str
     compare_max: int
     adc_code_max: int
+    adc_full_V: Fraction = Fraction(3)
+    sample_Hz: int = 1250
+    tick_Hz: int = 2500
     templates: Mapping[str, str]
     context: Mapping[str, str]
     arithmetic: str = "wide"
@@ -90,19 +108,13 @@ class Target:
         """Name of the target's folder: an identifier, because it is a package."""
         return folder_of(self.name)
 
-    def signals(self, pressure_span_MPa: Fraction) -> Signals:
-        """Return the scalings that a compensator for this target must have.
-
-        Parameters
-        ----------
-        pressure_span_MPa : Fraction
-            Span of both pressure sensors; the one thing that the target doesn't know.
-        """
-        return Signals(
-            command_code_max=self.adc_code_max,
-            pressure_code_max=self.adc_code_max,
-            pressure_span_MPa=pressure_span_MPa,
+    def inputs(self) -> "TargetInputs":
+        """Return the converter and timer that a compensator for this target is designed for."""
+        return TargetInputs(
+            converter=Converter(full_V=self.adc_full_V, levels=self.adc_code_max + 1),
             compare_max=self.compare_max,
+            sample_Hz=self.sample_Hz,
+            tick_Hz=self.tick_Hz,
         )
 
     def check_signals(self, signals: Signals) -> None:
@@ -122,8 +134,7 @@ class Target:
             return
         for what, asked, has in (
             ("compare value", signals.compare_max, self.compare_max),
-            ("command code", signals.command_code_max, self.adc_code_max),
-            ("pressure code", signals.pressure_code_max, self.adc_code_max),
+            ("converter code", signals.code_max, self.adc_code_max),
         ):
             if asked != has:
                 raise InputError(

@@ -46,12 +46,16 @@ FIELDS = (
     Field(name="compare", bits=16, text="PWM compare value"),
     Field(name="status", bits=16, text="bits of the status word"),
 )
-#: The status word: what the hardware reports, in its low octet. The high octet is for what the core finds wrong.
+#: The status word: what the hardware reports, in its low octet, and in the high one what dz_status() finds wrong.
 STATUS_BITS = {
     0x0001: "no usable sample in time",
     0x0002: "trip input went low",
     0x0004: "watchdog reset",
     0x0008: "crystal or PLL not as expected",
+    0x0100: "command not sound",
+    0x0200: "pressure A not sound",
+    0x0400: "pressure B not sound",
+    0x0800: "pressure drop not plausible",
 }
 #: The output is in use; without it the trip zone holds the pin low, whatever the compare value.
 STATUS_RELEASED = 0x0080

@@ -19,10 +19,19 @@ from dzdesign.codegen.telemetry import (
 )
 from dzdesign.core.artefacts import MANIFEST_NAME, TOOL, parse_document, read_bytes, sha256_of
 from dzdesign.core.errors import InputError
-from dzdesign.design.compensator import compensator_from_document
+from dzdesign.design.compensator_file import compensator_from_document
+from dzdesign.design.signals import PressureSignal
 
 COLUMNS = ("time_s", "u_V", "pA_MPa", "pB_MPa", "uO_V", "beta", "compare", "status")
 _ROW = struct.Struct("<8I")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Channel:
+    """One signal: its code of zero, and what one code more stands for."""
+
+    zero_code: int
+    per_code: Fraction
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,16 +44,17 @@ class Scalings:
         Of the firmware's target.
     sha256 : str
         Of its compensator.json.
-    volts, megapascals : Fraction
-        Of one code of command and of pressure.
+    command, pressure_a, pressure_b : Channel
+        In V and MPa.
     volts_out : Fraction
         u_O of one count of the compare value.
     """
 
     link: Link
     sha256: str
-    volts: Fraction
-    megapascals: Fraction
+    command: Channel
+    pressure_a: Channel
+    pressure_b: Channel
     volts_out: Fraction
 
     @property
@@ -72,10 +82,18 @@ def scalings_of(folder: Path) -> Scalings:
     return Scalings(
         link=target.link,
         sha256=sha256_of(content),
-        volts=compensator.u_max_V / signals.command_code_max,
-        megapascals=signals.dp_MPa(1),
+        command=Channel(
+            zero_code=signals.command.zero_code,
+            per_code=signals.command.direction(1) * compensator.u_max_V / signals.command.span(1),
+        ),
+        pressure_a=_pressure(signals.pressure_a),
+        pressure_b=_pressure(signals.pressure_b),
         volts_out=compensator.u_max_V / signals.compare_max,
     )
+
+
+def _pressure(sensor: PressureSignal) -> Channel:
+    return Channel(zero_code=sensor.zero_code, per_code=sensor.per_code_MPa)
 
 
 class Recording:
@@ -129,13 +147,16 @@ class Recording:
     def rows(self) -> Iterator[str]:
         """Yield the lines of the table."""
         scale = self.scalings
-        volts, megapascals, volts_out = float(scale.volts), float(scale.megapascals), float(scale.volts_out)
+        channels = (scale.command, scale.pressure_a, scale.pressure_b)
+        (u_zero, volts), (a_zero, a_MPa), (b_zero, b_MPa) = ((one.zero_code, float(one.per_code)) for one in channels)
+        volts_out = float(scale.volts_out)
         for periods, row in zip(self._periods, _ROW.iter_unpack(self._rows), strict=True):
             _, _, u_adc, p_a_adc, p_b_adc, beta, compare, status = row
             out = compare * volts_out if status & STATUS_RELEASED else 0.0
+            volts_in, a_now, b_now = (u_adc - u_zero) * volts, (p_a_adc - a_zero) * a_MPa, (p_b_adc - b_zero) * b_MPa
             yield (
-                f"{periods / scale.link.tick_Hz:.4f},{u_adc * volts:.5f},{p_a_adc * megapascals:.5f},"
-                f"{p_b_adc * megapascals:.5f},{out:.5f},{beta / (1 << BETA_BITS):.5f},{compare},{status}\n"
+                f"{periods / scale.link.tick_Hz:.4f},{volts_in:.5f},{a_now:.5f},{b_now:.5f},"
+                f"{out:.5f},{beta / (1 << BETA_BITS):.5f},{compare},{status}\n"
             )
 
     def to_csv(self, reader: FrameReader) -> str:

@@ -11,7 +11,9 @@ if TYPE_CHECKING:
     import pint
 
 #: The SI unit in which each quantity is kept inside, and the units to name when one is not understood.
-SI_UNIT = {"time": "s", "voltage": "V", "pressure": "Pa", "flow": "m**3/s", "length": "m", "ratio": ""}
+SI_UNIT = {"time": "s", "voltage": "V", "pressure": "Pa", "flow": "m**3/s", "length": "m", "ratio": "",
+    "current": "A", "resistance": "ohm",
+}
 EXAMPLES = {
     "time": "s, ms, min",
     "voltage": "V, mV",
@@ -19,6 +21,8 @@ EXAMPLES = {
     "flow": "L/min, Lmin, m3/s, gpm",
     "length": "mm, m, in",
     "ratio": "%",
+    "current": "mA, A",
+    "resistance": "ohm, kohm",
 }
 #: Spellings of data-acquisition programs that pint does not read.
 SPELLINGS = {

@@ -9,14 +9,9 @@ import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.signals import Signals
-from dzdesign.identify.model import SideModel
 
-#: Two floors of a converter each lose up to one code, so a difference of codes is right to within one.
-DP_CODE_ERROR = 1
 #: Pressure codes between neighbouring nodes: a power of two, so that the firmware finds a node by a shift.
 STEP_CODES = 64
-#: Nodes are integers over this; beta stays below 2, so a node fits 16 bits.
-DENOMINATOR = 1 << 15
 #: valve.json has seven decimals, so a sum of two of its numbers is right to this, in V.
 DECIMALS = Fraction(1, 10**6)
 #: Distance kept from the bounds for the LP solver's tolerance; the exact proof below does not rely on it.
@@ -39,84 +34,112 @@ class OffsetCeiling:
     certified: range
 
 
-class CertifiedOffset:
-    """The offset curve and its bounds, exactly from the decimal numbers of valve.json.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OffsetCurve:
+    """An offset over the pressure drop and the bounds that hold it, exactly from the decimal numbers of valve.json.
 
-    Parameters
+    Attributes
     ----------
-    side : SideModel
-        One side of the valve, tested at one pressure drop or more.
+    dp_MPa : tuple of Fraction
+        Tested pressure drops, rising.
+    offset_V : tuple of Fraction
+        Offset at each; straight between them.
+    steps_V : tuple of Fraction
+        Lower bounds of the guarded threshold between neighbouring tests (one fewer); empty from one test.
+    lowest_V : Fraction
+        The lowest bound of all tests.
+    hold_below_MPa : Fraction or None
+        Up to this dP0 the offset is at most the one there, as Eq. (7) holds beta = 1; None follows the tests.
     """
 
-    def __init__(self, side: SideModel) -> None:
-        self._nodes = [Fraction(repr(value)) for value in side.beta_dp_MPa]
-        self._beta = [Fraction(repr(value)) for value in side.beta]
-        self._u_min0 = Fraction(repr(side.u_min0_V))
-        self._dp0 = Fraction(repr(side.reference_dp_MPa))
-        self._steps = [Fraction(repr(step)) for step in side.certified_steps_V]
-        self._lowest = min(Fraction(repr(test.u_guard_lower_V)) for test in side.tests)
+    dp_MPa: tuple[Fraction, ...]
+    offset_V: tuple[Fraction, ...]
+    steps_V: tuple[Fraction, ...]
+    lowest_V: Fraction
+    hold_below_MPa: Fraction | None
 
-    def curve(self, dp_MPa: Fraction) -> Fraction:
-        """Return beta(dP) u_min0 in V by the selector of Eq. (7).
+    def at(self, dp_MPa: Fraction) -> Fraction:
+        """Return the offset in V by the selector of Eq. (7).
 
         For dP <= dP0 the paper holds beta = 1; where the threshold grows with dP that would over-compensate, so there
         the smaller of the two is taken. Outside the tested interval the nearest node is held.
         """
-        nodes, beta = self._nodes, self._beta
+        value = self._straight(dp_MPa)
+        if self.hold_below_MPa is not None and dp_MPa <= self.hold_below_MPa:
+            value = min(value, self._straight(self.hold_below_MPa))
+        return value
+
+    def _straight(self, dp_MPa: Fraction) -> Fraction:
+        nodes, offset = self.dp_MPa, self.offset_V
         at = min(max(dp_MPa, nodes[0]), nodes[-1])
         right = bisect_left(nodes, at)
-        value = beta[right]
-        if right and nodes[right] != at:
-            share = (at - nodes[right - 1]) / (nodes[right] - nodes[right - 1])
-            value = beta[right - 1] + share * (beta[right] - beta[right - 1])
-        if dp_MPa <= self._dp0:
-            value = min(value, Fraction(1))
-        return value * self._u_min0
+        if right == 0 or nodes[right] == at:
+            return offset[right]
+        share = (at - nodes[right - 1]) / (nodes[right] - nodes[right - 1])
+        return offset[right - 1] + share * (offset[right] - offset[right - 1])
 
     def bound(self, dp_MPa: Fraction) -> Fraction | None:
         """Return the lower bound of the guarded threshold at dP in V, or None outside the tested interval."""
-        nodes = self._nodes
+        nodes = self.dp_MPa
         if not nodes[0] <= dp_MPa <= nodes[-1]:
             return None
-        if not self._steps:
-            return self._lowest
+        if not self.steps_V:
+            return self.lowest_V
         right = bisect_left(nodes, dp_MPa)
-        touching = self._steps[max(right - 1, 0) : right + (nodes[right] == dp_MPa)]
+        touching = self.steps_V[max(right - 1, 0) : right + (nodes[right] == dp_MPa)]
         return min(touching)
 
 
-def offset_ceiling(side: SideModel, signals: Signals, u_max_V: Fraction) -> OffsetCeiling:
+def offset_ceiling(
+    curve: OffsetCurve, signals: Signals, u_max_V: Fraction, *, sign: int = 1, reserve: Fraction = Fraction(0)
+) -> OffsetCeiling:
     """Return the limit of the offset at every pressure code, the converter's error and the rounding counted.
+
+    Parameters
+    ----------
+    curve : OffsetCurve
+        Certified offset and bounds.
+    signals : Signals
+        Scalings.
+    u_max_V : Fraction
+        Full command.
+    sign : {1, -1}
+        Sign of the command.
+    reserve : Fraction
+        Of u_max, to keep free beside the rounding: the dither's peak.
 
     Raises
     ------
     RequirementError
         If the identified curve itself lies above the staircase somewhere: valve.json contradicts itself.
     """
-    first, last = (signals.dp_code(Fraction(repr(end))) for end in (side.beta_dp_MPa[0], side.beta_dp_MPa[-1]))
-    if last > signals.pressure_code_max:
+    first, last = (signals.dp_code(end) for end in (curve.dp_MPa[0], curve.dp_MPa[-1]))
+    code_max = signals.largest_difference(sign)
+    if last > code_max:
         raise InputError(
-            f"the sensor's span of {float(signals.pressure_span_MPa):g} MPa ends below the tested pressure drop of "
-            f"{side.beta_dp_MPa[-1]:g} MPa; give the real span with --pressure-span"
+            f"the sensor's span of {float(signals.pressure_a.span_MPa):g} MPa ends below the tested pressure drop of "
+            f"{float(curve.dp_MPa[-1]):g} MPa; give the real span with --pressure-span"
         )
-    half_count = Fraction(1, 2 * signals.compare_max)
-    certified = CertifiedOffset(side)
+    low, high = signals.difference_error(sign)
+    kept = Fraction(1, 2 * signals.compare_max) + reserve
     values = []
-    for code in range(-DP_CODE_ERROR, signals.pressure_code_max + DP_CODE_ERROR + 1):
+    for code in range(low, code_max + high + 1):
         dp_MPa = signals.dp_MPa(code)
-        curve, bound = certified.curve(dp_MPa), certified.bound(dp_MPa)
-        if bound is not None and curve > bound + DECIMALS:
+        offset, bound = curve.at(dp_MPa), curve.bound(dp_MPa)
+        if bound is not None and offset > bound + DECIMALS:
             raise RequirementError(
-                f"beta u_min0 is {float(curve):.4f} V at {float(dp_MPa):.3f} MPa, above the threshold's lower bound of "
+                f"beta u_min0 is {float(offset):.4f} V at {float(dp_MPa):.3f} MPa, above the threshold's lower bound of "
                 f"{float(bound):.4f} V; make valve.json again with `dzdesign identify`"
             )
-        values.append((curve if bound is None else min(curve, bound)) / u_max_V - half_count)
-    span = 2 * DP_CODE_ERROR + 1
-    limit = tuple(min(values[code : code + span]) for code in range(signals.pressure_code_max + 1))
+        values.append((offset if bound is None else min(offset, bound)) / u_max_V - kept)
+    span = high - low + 1
+    limit = tuple(min(values[code : code + span]) for code in range(code_max + 1))
     return OffsetCeiling(limit=limit, certified=range(ceil(first), floor(last) + 1))
 
 
-def choose_beta_table(ceiling: OffsetCeiling, u_min0: Fraction, trend: str | None, code_max: int) -> tuple[int, ...]:
+def choose_beta_table(
+    ceiling: OffsetCeiling, u_min0: Fraction, trend: str | None, *, denominator: int, above_one: bool
+) -> tuple[int, ...]:
     """Choose the nodes of beta that give the largest offset under the ceiling: a linear programme, then integers.
 
     Parameters
@@ -127,18 +150,20 @@ def choose_beta_table(ceiling: OffsetCeiling, u_min0: Fraction, trend: str | Non
         Reference offset over u_max.
     trend : {"decreasing", "flat", "increasing"} or None
         Direction in which beta must run; flat, or unknown, it is constant.
-    code_max : int
-        Largest pressure code.
+    denominator : int
+        Of the nodes.
+    above_one : bool
+        Whether beta may exceed 1: where the threshold grows with dP, or the tests below dP0 are followed.
 
     Returns
     -------
     tuple of int
-        Numerators over `DENOMINATOR`, one node every `STEP_CODES` codes; proved exactly to lie under the ceiling.
+        Numerators, one node every `STEP_CODES` codes; proved exactly to lie under the ceiling.
     """
     import cvxpy as cp
     from scipy.sparse import csr_array
 
-    codes = np.arange(code_max + 1)
+    codes = np.arange(len(ceiling.limit))
     index, share = codes // STEP_CODES, (codes % STEP_CODES) / STEP_CODES
     size = int(index[-1]) + 2
     weights = csr_array(
@@ -147,8 +172,7 @@ def choose_beta_table(ceiling: OffsetCeiling, u_min0: Fraction, trend: str | Non
     )
     limit = np.array([float(value / u_min0) for value in ceiling.limit]) - SOLVER_MARGIN
     beta = cp.Variable(size)
-    # Only a threshold that grows with the pressure drop needs a beta above 1 (Eq. 7).
-    constraints = [weights @ beta <= limit, beta <= (2 - 2 / DENOMINATOR if trend == "increasing" else 1)]
+    constraints = [weights @ beta <= limit, beta <= (2 - 2 / denominator if above_one else 1)]
     if trend == "decreasing":
         constraints.append(cp.diff(beta) <= 0)
     elif trend == "increasing":
@@ -160,19 +184,19 @@ def choose_beta_table(ceiling: OffsetCeiling, u_min0: Fraction, trend: str | Non
     if problem.status != cp.OPTIMAL:
         raise RequirementError(f"no table of beta lies under the certified offset (solver: {problem.status})")
     # A thousandth of a count, so that a beta of 1 to within the solver's error stays 1.
-    nodes = [int(np.floor(value * DENOMINATOR + 1e-3)) for value in beta.value]
+    nodes = [int(np.floor(value * denominator + 1e-3)) for value in beta.value]
     # Rounding down keeps the direction; a last node above its neighbour by the solver's error is put right.
     for position in range(1, size):
         if trend != "increasing":
             nodes[position] = min(nodes[position], nodes[position - 1])
-    return _lower_until_proved(nodes, ceiling, u_min0, trend)
+    return _lower_until_proved(nodes, ceiling, u_min0, trend, denominator)
 
 
 def _lower_until_proved(
-    nodes: list[int], ceiling: OffsetCeiling, u_min0: Fraction, trend: str | None
+    nodes: list[int], ceiling: OffsetCeiling, u_min0: Fraction, trend: str | None, denominator: int
 ) -> tuple[int, ...]:
     """Lower nodes by single counts until every code is proved, in exact arithmetic, to lie under the ceiling."""
-    scale = DENOMINATOR * STEP_CODES
+    scale = denominator * STEP_CODES
     for code, limit in enumerate(ceiling.limit):
         index, share = divmod(code, STEP_CODES)
         while (nodes[index] * (STEP_CODES - share) + nodes[index + 1] * share) * u_min0 > limit * scale:

@@ -1,54 +1,22 @@
 """`design`: a `ValveModel` and an engineer's choices in, a proved `Compensator` out."""
 
-from dataclasses import dataclass, field
+from dataclasses import replace
 from fractions import Fraction
 
 from dzdesign.core.artefacts import sha256_of, to_json
-from dzdesign.core.errors import InputError, RequirementError, nearest
+from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.derivation.law import law
-from dzdesign.design.beta_table import (
-    DENOMINATOR,
-    STEP_CODES,
-    OffsetCeiling,
-    choose_beta_table,
-    offset_ceiling,
-)
-from dzdesign.design.compensator import Certificate, Compensator
+from dzdesign.design.beta_table import STEP_CODES, OffsetCeiling, OffsetCurve, choose_beta_table, offset_ceiling
+from dzdesign.design.compensator import Certificate, Compensator, SideLaw
+from dzdesign.design.costs import costs_of
+from dzdesign.design.options import DesignOptions
 from dzdesign.design.signals import Signals
+from dzdesign.design.units import Units, finest_units
 from dzdesign.identify.model import SideModel, ValveModel
 from dzdesign.identify.valve_file import valve_from_document
 
-#: k x_max/u_max and u_min0/u_max are integers over this: finer than half a PWM count of 60 000.
-COEFFICIENT_DENOMINATOR = 1 << 16
-GUARDS = ("closing", "opening")
 #: Share of the sensor's span by which the difference may read negative before it counts as a failed sensor.
 REVERSE_SHARE = Fraction(1, 100)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DesignOptions:
-    """Choices of the engineer.
-
-    Attributes
-    ----------
-    law_name : str
-        ``paper`` (Eq. 18) or ``target`` (meets Eq. 16).
-    signals : Signals
-        Scalings of the converter and the PWM.
-    guard : {"closing", "opening"}
-        The threshold that the certificate must protect. Zero command comes after closing, so a valve of which no
-        falling branch was recorded is refused unless "opening" is asked for.
-    """
-
-    law_name: str = "paper"
-    signals: Signals = field(default_factory=Signals)
-    guard: str = "closing"
-
-    def __post_init__(self) -> None:
-        if self.guard not in GUARDS:
-            raise InputError(
-                f"the guard is '{self.guard}'{nearest(self.guard, GUARDS)}, expected {' or '.join(GUARDS)}"
-            )
 
 
 def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes: bytes | None = None) -> Compensator:
@@ -74,8 +42,83 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
     document = valve_bytes.decode() if valve_bytes is not None else to_json(valve.to_document())
     # The file's rounded numbers, so that the same valve gives the same firmware by whichever way it comes here.
     valve = valve_from_document(document.encode(), "valve.json")
-    signals, side = options.signals, valve.positive
-    chosen = law(options.law_name)
+    signals = options.signals
+    law(options.law_name)
+    u_max = Fraction(repr(valve.u_max_V))
+    edge_codes = options.edge_codes()
+    units = finest_units(signals, edge_codes)
+    laws = {}
+    for sign in signals.signs:
+        name = "positive" if sign > 0 else "negative"
+        if name not in valve.sides:
+            raise InputError(
+                f"the command has both signs, but the valve's {name} side was not tested; record its ramps, or give a "
+                "command of one sign"
+            )
+        laws[name] = _side_law(valve.sides[name], options, u_max, sign, units)
+    compensator = Compensator(
+        law_name=options.law_name,
+        below_reference=options.below_reference,
+        signals=signals,
+        u_max_V=u_max,
+        positive=laws["positive"],
+        negative=laws.get("negative"),
+        beta_denominator=units.beta,
+        beta_step_codes=STEP_CODES,
+        reverse_codes=int(REVERSE_SHARE * (signals.pressure_a.full_code - signals.pressure_a.zero_code)),
+        edge_codes=edge_codes,
+        amplifier=options.amplifier(),
+        costs=(),
+        valve_document=document,
+        valve_sha256=sha256_of(document.encode()),
+    )
+    for sign in signals.signs:
+        _prove_monotone(compensator, sign)
+    return replace(compensator, costs=costs_of(compensator, valve))
+
+
+def _side_law(side: SideModel, options: DesignOptions, u_max: Fraction, sign: int, units: Units) -> SideLaw:
+    """Choose the coefficients and tables of one side, and prove its certificate."""
+    signals = options.signals
+    certified = _guarded_curve(side, options)
+    opening = _opening_curve(side, options) if options.edge else None
+    reference = Fraction(repr(side.reference_dp_MPa))
+    top = (opening or certified).at(reference)
+    # Half a count less, because the compare value of the offset may be rounded up.
+    u_min0 = _over(top / u_max - Fraction(1, 2 * signals.compare_max), "down", units.coefficient)
+    if u_min0 <= 0:
+        raise InputError(f"u_min0 is {float(top):.4f} V, less than one count of the PWM: no dead zone")
+    above_one = side.trend == "increasing" or options.below_reference == "extend"
+    dither = Fraction(options.amplifier().dither_counts, signals.compare_max)
+    ceiling = offset_ceiling(certified, signals, u_max, sign=sign, reserve=dither)
+    if min(ceiling.limit) <= 0:
+        raise InputError("the dither's height leaves no offset under the certified one; make it smaller")
+
+    def table(under: OffsetCeiling) -> tuple[int, ...]:
+        return choose_beta_table(under, u_min0, side.trend, denominator=units.beta, above_one=above_one)
+
+    beta = table(ceiling)
+    edge_beta = None
+    if opening is not None:
+        upper = table(_opening_ceiling(opening, signals, u_max, sign))
+        edge_beta = tuple(map(max, upper, beta))
+    return SideLaw(
+        k_x_max_over_u_max=_over(_travel(side, u_max, top), "nearest", units.coefficient),
+        u_min0_over_u_max=u_min0,
+        beta_numerators=beta,
+        edge_numerators=edge_beta,
+        certificate=Certificate(
+            confidence=side.confidence,
+            guard=options.guard,
+            level_L_min=side.level_L_min,
+            dp_MPa=(certified.dp_MPa[0], certified.dp_MPa[-1]),
+            smallest_margin_V=_smallest_margin(ceiling, beta, u_min0, units.beta) * u_max,
+        ),
+    )
+
+
+def _guarded_curve(side: SideModel, options: DesignOptions) -> OffsetCurve:
+    """Return the certified offset of the threshold that is to be guarded."""
     if not side.beta_dp_MPa:
         raise InputError(
             "the valve was identified without a pressure drop, so no offset can be certified at any pressure; "
@@ -90,40 +133,43 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
                 else "leave out --guard opening, the closing threshold is the safer one"
             )
         )
-    u_max = Fraction(repr(valve.u_max_V))
-    kappa = _over(_travel(side, u_max), "nearest")
-    # Half a count less, because the compare value of the offset may be rounded up.
-    u_min0 = _over(Fraction(repr(side.u_min0_V)) / u_max - Fraction(1, 2 * signals.compare_max), "down")
-    if u_min0 <= 0:
-        raise InputError(f"u_min0 is {side.u_min0_V:.4f} V, less than one count of the PWM: no dead zone")
-    ceiling = offset_ceiling(side, signals, u_max)
-    table = choose_beta_table(ceiling, u_min0, side.trend, signals.pressure_code_max)
-    compensator = Compensator(
-        law_name=chosen.name,
-        signals=signals,
-        u_max_V=u_max,
-        k_x_max_over_u_max=kappa,
-        u_min0_over_u_max=u_min0,
-        beta_numerators=table,
-        beta_denominator=DENOMINATOR,
-        beta_step_codes=STEP_CODES,
-        reverse_codes=int(REVERSE_SHARE * signals.pressure_code_max),
-        certificate=Certificate(
-            confidence=side.confidence,
-            guard=side.guard,
-            level_L_min=side.level_L_min,
-            dp_MPa=(Fraction(repr(side.beta_dp_MPa[0])), Fraction(repr(side.beta_dp_MPa[-1]))),
-            smallest_margin_V=_smallest_margin(ceiling, table, u_min0) * u_max,
-        ),
-        costs=(),
-        valve_document=document,
-        valve_sha256=sha256_of(document.encode()),
+    u_min0 = Fraction(repr(side.u_min0_V))
+    return OffsetCurve(
+        dp_MPa=tuple(Fraction(repr(value)) for value in side.beta_dp_MPa),
+        offset_V=tuple(Fraction(repr(value)) * u_min0 for value in side.beta),
+        steps_V=tuple(Fraction(repr(step)) for step in side.certified_steps_V),
+        lowest_V=min(Fraction(repr(test.u_guard_lower_V)) for test in side.tests),
+        hold_below_MPa=_hold_below(side, options),
     )
-    _prove_monotone(compensator)
-    return _with_costs(compensator, side)
 
 
-def _travel(side: SideModel, u_max: Fraction) -> Fraction:
+def _opening_curve(side: SideModel, options: DesignOptions) -> OffsetCurve:
+    """Return the best estimate of the opening threshold: where the edge ends and the law goes on."""
+    reference = Fraction(repr(side.reference_dp_MPa))
+    values = [Fraction(repr(t.u_knee_rising_V)) for t in side.tests]
+    from itertools import accumulate
+
+    values = list(accumulate(values, min))
+    return OffsetCurve(
+        dp_MPa=tuple(Fraction(repr(value)) for value in side.beta_dp_MPa),
+        offset_V=tuple(values),
+        steps_V=(),
+        lowest_V=min(values),
+        hold_below_MPa=_hold_below(side, options),
+    )
+
+
+def _hold_below(side: SideModel, options: DesignOptions) -> Fraction | None:
+    return Fraction(repr(side.reference_dp_MPa)) if options.below_reference == "hold" else None
+
+
+def _opening_ceiling(opening: OffsetCurve, signals: Signals, u_max: Fraction, sign: int) -> OffsetCeiling:
+    """Return the opening threshold at every pressure code: no bound, so neither the converter's error counts."""
+    codes = range(signals.largest_difference(sign) + 1)
+    return OffsetCeiling(limit=tuple(opening.at(signals.dp_MPa(code)) / u_max for code in codes), certified=range(0))
+
+
+def _travel(side: SideModel, u_max: Fraction, offset_V: Fraction) -> Fraction:
     """Return k x_max/u_max for a law whose offset is u_min0: from there to the command of full flow on opening.
 
     Identification gives k x_max from the knee on. The law starts lower, at the guarded offset; without the difference
@@ -131,21 +177,21 @@ def _travel(side: SideModel, u_max: Fraction) -> Fraction:
     """
     reference = min(side.tests, key=lambda test: abs(test.dp_MPa - side.reference_dp_MPa))
     knee = reference.u_knee_rising_V if reference.u_knee_rising_V is not None else reference.u_knee_falling_V
-    below_knee = max(Fraction(repr(knee)) - Fraction(repr(side.u_min0_V)), Fraction(0))
+    below_knee = max(Fraction(repr(knee)) - offset_V, Fraction(0))
     travel = Fraction(repr(side.k_x_max_over_u_max)) + below_knee / u_max
-    return min(travel, 1 - Fraction(repr(side.u_min0_V)) / u_max)  # beyond full drive there is nothing
+    return min(travel, 1 - offset_V / u_max)  # beyond full drive there is nothing
 
 
-def _over(value: Fraction, rounding: str) -> Fraction:
-    """Return `value` as an integer over `COEFFICIENT_DENOMINATOR`, rounded to nearest or down."""
-    scaled = value * COEFFICIENT_DENOMINATOR
+def _over(value: Fraction, rounding: str, unit: int) -> Fraction:
+    """Return `value` as an integer over `unit`, rounded to nearest or down."""
+    scaled = value * unit
     numerator = scaled.numerator // scaled.denominator if rounding == "down" else round(scaled)
-    return Fraction(numerator, COEFFICIENT_DENOMINATOR)
+    return Fraction(numerator, unit)
 
 
-def _smallest_margin(ceiling: OffsetCeiling, table: tuple[int, ...], u_min0: Fraction) -> Fraction:
+def _smallest_margin(ceiling: OffsetCeiling, table: tuple[int, ...], u_min0: Fraction, denominator: int) -> Fraction:
     """Return the least distance over u_max between ceiling and offset on the certified codes; never negative."""
-    scale = DENOMINATOR * STEP_CODES
+    scale = denominator * STEP_CODES
     margins = []
     for code in ceiling.certified or range(len(ceiling.limit)):
         index, share = divmod(code, STEP_CODES)
@@ -157,44 +203,16 @@ def _smallest_margin(ceiling: OffsetCeiling, table: tuple[int, ...], u_min0: Fra
     return smallest
 
 
-def _prove_monotone(compensator: Compensator) -> None:
-    """Prove that more command gives more drive, at every pressure: the gain is affine in beta, so its ends decide."""
-    chosen = law(compensator.law_name)
-    betas = (
-        Fraction(min(compensator.beta_numerators), DENOMINATOR),
-        Fraction(max(compensator.beta_numerators), DENOMINATOR),
-    )
-    if min(chosen.evaluate_gain(beta, compensator.k_x_max_over_u_max) for beta in betas) <= 0:
+def _prove_monotone(compensator: Compensator, sign: int) -> None:
+    """Prove that more command gives more drive, at every pressure: the gain is affine in beta, so its ends decide.
+
+    Inside the edge the drive rises faster still: what the edge takes away falls with the command.
+    """
+    chosen, side = law(compensator.law_name), compensator.side(sign)
+    numerators = side.law_numerators
+    betas = [Fraction(end, compensator.beta_denominator) for end in (min(numerators), max(numerators))]
+    if min(chosen.evaluate_gain(beta, side.k_x_max_over_u_max) for beta in betas) <= 0:
         raise InputError(
             f"law '{chosen.name}' would fall with rising command: beta (1 - k x_max/u_max) must stay below 1, but "
-            f"k x_max/u_max = {float(compensator.k_x_max_over_u_max):.3f}; use --law target"
+            f"k x_max/u_max = {float(side.k_x_max_over_u_max):.3f}; use --law target"
         )
-
-
-def _with_costs(compensator: Compensator, side: SideModel) -> Compensator:
-    """Add what the choices cost: the residual dead zone per test and the drive at full command."""
-    from dataclasses import replace
-
-    signals, u_max = compensator.signals, float(compensator.u_max_V)
-    lines = []
-    for test in side.tests:
-        code = round(signals.dp_code(Fraction(repr(test.dp_MPa))))
-        offset = float(compensator.drive(0, code))
-        gain = float(compensator.drive(signals.command_code_max, code)) - offset
-        parts = [f"{test.dp_MPa:.2f} MPa: offset {offset * u_max:.3f} V"]
-        for name, knee in (("opening", test.u_knee_rising_V), ("closing", test.u_knee_falling_V)):
-            if knee is not None:
-                parts.append(f"dead zone that remains on {name} {(knee / u_max - offset) / gain:.2%} of command (knee)")
-        parts.append(f"drive at full command {offset + gain:.2%}")
-        lines.append(", ".join(parts))
-    low, high = (float(end) for end in compensator.certificate.dp_MPa)
-    if side.trend == "increasing":
-        lines.append(
-            "the threshold grows with the pressure drop, so a pressure signal that reads too high raises the offset: a "
-            "broken wire of sensor B is not recognised; monitor the sensors outside the compensator"
-        )
-    lines.append(
-        f"outside {low:.2f} to {high:.2f} MPa the nearest tested beta is held and nothing is certified; "
-        f"a pressure difference below -{compensator.reverse_codes} codes is taken as a failed sensor: smallest beta"
-    )
-    return replace(compensator, costs=tuple(lines))

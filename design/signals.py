@@ -1,10 +1,110 @@
 """The signals at the compensator's ends: what one code of command, pressure and compare value stands for."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
+from math import ceil, floor
 
 from dzdesign.core.errors import InputError
 from dzdesign.derivation.scaling import pressure_drop, pressure_drop_code
+
+CODE_LIMIT = 65535
+#: Sensors of unlike scaling are brought to sensor A's counts by an integer weight over this power of two.
+WEIGHT_SHIFT = 12
+#: Differences of pressure codes fit 16 bits of the firmware, sign apart.
+LARGEST_DIFFERENCE = 32767
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CommandSignal:
+    """Converter codes of the command (Eq. (29) with its 0-3 V taken as the attenuated 0-10 V).
+
+    Attributes
+    ----------
+    zero_code, full_code : int
+        Codes of zero and of full positive command; the full one is the lower where the signal is reversed.
+    negative_full_code : int or None
+        Code of full negative command, on the other side of zero; None for a command of one sign.
+    valid_codes : tuple of int
+        First and last code of a sound signal: outside them the valve is de-energised.
+    """
+
+    zero_code: int = 0
+    full_code: int = 4095
+    negative_full_code: int | None = None
+    valid_codes: tuple[int, int] = (0, 4095)
+
+    def __post_init__(self) -> None:
+        if self.full_code == self.zero_code:
+            raise InputError(f"zero and full command have the same code, {self.zero_code}")
+        low, high = self.valid_codes
+        for name in ("zero_code", "full_code", "negative_full_code"):
+            code = getattr(self, name)
+            if code is not None and not low <= code <= high:
+                raise InputError(f"the command's {name} is {code}, outside the sound codes {low} to {high}")
+        if self.negative_full_code is not None and self.direction(-1) != -self.direction(1):
+            raise InputError(
+                f"full negative command has code {self.negative_full_code}, expected the other side of zero "
+                f"({self.zero_code}) than full positive command ({self.full_code})"
+            )
+
+    def direction(self, sign: int) -> int:
+        """Return 1 if codes rise from zero to full command of that sign, -1 if they fall."""
+        return 1 if self._full(sign) > self.zero_code else -1
+
+    def span(self, sign: int) -> int:
+        """Return the codes between zero and full command of that sign."""
+        return abs(self._full(sign) - self.zero_code)
+
+    def from_zero(self, code: int, sign: int) -> int:
+        """Return how many codes of command a code is, counted towards that sign and limited to zero and full."""
+        return min(max(self.direction(sign) * (code - self.zero_code), 0), self.span(sign))
+
+    def _full(self, sign: int) -> int:
+        if sign > 0:
+            return self.full_code
+        if self.negative_full_code is None:
+            raise InputError("the command has one sign only; give a signal of both, such as -10..10 V")
+        return self.negative_full_code
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PressureSignal:
+    """Converter codes of one pressure sensor.
+
+    Attributes
+    ----------
+    span_MPa : Fraction
+        Pressure at `full_code`; `zero_code` is no pressure.
+    zero_code, full_code : int
+        Codes of the ends of the span.
+    valid_codes : tuple of int
+        First and last code of a sound signal: outside them the smallest beta is used.
+    error_MPa : tuple of Fraction
+        Least and largest distance from the pressure that a code is taken for to one that may have made it.
+    """
+
+    span_MPa: Fraction = Fraction(20)
+    zero_code: int = 0
+    full_code: int = 4095
+    valid_codes: tuple[int, int] = (0, 4095)
+    error_MPa: tuple[Fraction, Fraction] = (-Fraction(20, 4096), Fraction(20, 4096))
+
+    def __post_init__(self) -> None:
+        if self.span_MPa <= 0:
+            raise InputError(f"the sensor's span is {float(self.span_MPa):g} MPa, expected more than zero")
+        low, high = self.valid_codes
+        if not low <= self.zero_code < self.full_code <= high:
+            raise InputError(
+                f"a pressure sensor has codes {self.zero_code} to {self.full_code}, expected them to rise inside the "
+                f"sound codes {low} to {high}"
+            )
+        if not self.error_MPa[0] <= 0 <= self.error_MPa[1]:
+            raise InputError("the error of a pressure's code must span zero")
+
+    @property
+    def per_code_MPa(self) -> Fraction:
+        """Pressure that one code stands for."""
+        return self.span_MPa / (self.full_code - self.zero_code)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -13,32 +113,93 @@ class Signals:
 
     Attributes
     ----------
-    command_code_max : int
-        Converter code of full command; code 0 is zero command (Eq. (29) with its 0-3 V taken as the attenuated 0-10 V).
-    pressure_code_max : int
-        Converter code of a sensor's full span; code 0 is no pressure.
-    pressure_span_MPa : Fraction
-        Sensor span, the same for both sensors.
+    code_max : int
+        Largest code of the converter.
     compare_max : int
         PWM compare value of full drive, u_O = u_max.
+    command : CommandSignal
+        The command.
+    pressure_a, pressure_b : PressureSignal
+        Pressures ahead of the metering edge and behind it, for positive command.
+    swapped : bool
+        True if the pressure drop of negative commands is the other way round, B less A.
+    sample_Hz, tick_Hz : int
+        Samples and PWM periods in a second.
     """
 
-    command_code_max: int = 4095
-    pressure_code_max: int = 4095
-    pressure_span_MPa: Fraction = Fraction(20)
+    code_max: int = 4095
     compare_max: int = 60000
+    command: CommandSignal = field(default_factory=CommandSignal)
+    pressure_a: PressureSignal = field(default_factory=PressureSignal)
+    pressure_b: PressureSignal = field(default_factory=PressureSignal)
+    swapped: bool = False
+    sample_Hz: int = 1250
+    tick_Hz: int = 2500
 
     def __post_init__(self) -> None:
-        for name in ("command_code_max", "pressure_code_max", "compare_max"):
-            if not 1 <= getattr(self, name) <= 65535:
-                raise InputError(f"{name} is {getattr(self, name)}, expected 1 to 65535 (16 bits)")
-        if self.pressure_span_MPa <= 0:
-            raise InputError(f"the sensor's span is {float(self.pressure_span_MPa):g} MPa, expected more than zero")
+        for name in ("code_max", "compare_max", "sample_Hz", "tick_Hz"):
+            if not 1 <= getattr(self, name) <= CODE_LIMIT:
+                raise InputError(f"{name} is {getattr(self, name)}, expected 1 to {CODE_LIMIT} (16 bits)")
+        for name in ("command", "pressure_a", "pressure_b"):
+            low, high = getattr(self, name).valid_codes
+            if not 0 <= low < high <= self.code_max:
+                raise InputError(
+                    f"{name}: sound codes {low} to {high} are outside the converter's 0 to {self.code_max}"
+                )
+        if self.largest_difference(1) > LARGEST_DIFFERENCE or (
+            self.swapped and self.largest_difference(-1) > LARGEST_DIFFERENCE
+        ):
+            raise InputError(
+                f"the sensors' spans of {float(self.pressure_a.span_MPa):g} and {float(self.pressure_b.span_MPa):g} MPa "
+                "are too unlike; choose sensors within a factor of seven"
+            )
+
+    @property
+    def signs(self) -> tuple[int, ...]:
+        """1 for positive command and, where the signal has both, -1."""
+        return (1,) if self.command.negative_full_code is None else (1, -1)
+
+    @property
+    def weight_b(self) -> int:
+        """Weight of sensor B's codes over 2^`WEIGHT_SHIFT`, in codes of sensor A; exactly one for like sensors."""
+        return max(1, round(self.pressure_b.per_code_MPa / self.pressure_a.per_code_MPa * 2**WEIGHT_SHIFT))
+
+    @property
+    def like_sensors(self) -> bool:
+        """True if both sensors count alike, so that the firmware needs no weight."""
+        return self.weight_b == 2**WEIGHT_SHIFT
+
+    def difference(self, p_a_code: int, p_b_code: int, sign: int = 1) -> int:
+        """Return the difference of two pressure codes, in codes of sensor A, as the firmware counts it."""
+        a, b = p_a_code - self.pressure_a.zero_code, p_b_code - self.pressure_b.zero_code
+        turn = -1 if sign < 0 and self.swapped else 1
+        return turn * (a * 2**WEIGHT_SHIFT - b * self.weight_b) >> WEIGHT_SHIFT
+
+    def largest_difference(self, sign: int) -> int:
+        """Return the largest difference that sound codes make."""
+        a, b = self.pressure_a.valid_codes, self.pressure_b.valid_codes
+        reversed_ = sign < 0 and self.swapped
+        return max(self.difference(a[0], b[1], sign) if reversed_ else self.difference(a[1], b[0], sign), 1)
+
+    def difference_error(self, sign: int) -> tuple[int, int]:
+        """Return how many codes a difference may read too high (as a negative number) and too low, rounded outwards."""
+        a, b = self.pressure_a, self.pressure_b
+        low, high = a.error_MPa[0] - b.error_MPa[1], a.error_MPa[1] - b.error_MPa[0]
+        # What the weight is off, at the sensor's largest code, and the shift that rounds down.
+        unlike = abs(b.per_code_MPa - a.per_code_MPa * self.weight_b / 2**WEIGHT_SHIFT) * self.code_max
+        if sign < 0 and self.swapped:
+            low, high = -high, -low
+        shift = 0 if self.like_sensors else a.per_code_MPa
+        return floor((low - unlike) / a.per_code_MPa), ceil((high + unlike + shift) / a.per_code_MPa)
 
     def dp_MPa(self, dp_code: int) -> Fraction:
         """Return the pressure drop that a difference of pressure codes stands for, exactly."""
-        return pressure_drop(dp_code, span=self.pressure_span_MPa, code_max=self.pressure_code_max)
+        return pressure_drop(dp_code, span=self.pressure_a.span_MPa, code_max=self._span_codes)
 
     def dp_code(self, dp_MPa: Fraction) -> Fraction:
         """Return the difference of pressure codes that a pressure drop makes, exactly (not rounded)."""
-        return pressure_drop_code(dp_MPa, span=self.pressure_span_MPa, code_max=self.pressure_code_max)
+        return pressure_drop_code(dp_MPa, span=self.pressure_a.span_MPa, code_max=self._span_codes)
+
+    @property
+    def _span_codes(self) -> int:
+        return self.pressure_a.full_code - self.pressure_a.zero_code

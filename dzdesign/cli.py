@@ -29,9 +29,53 @@ def _given(*names: str, **keywords: object) -> Option:
 
 
 OUTPUT = ("-o", "--output")
-LAW = _given("--law", metavar="LAW", help="paper: Eq. (18); target: meets Eq. (16) (default: paper)")
-SPAN = _given("--pressure-span", metavar="P", help='span of both pressure sensors (default: "20 MPa")')
-GUARD = _given("--guard", metavar="G", help="threshold to protect: closing or opening (default: closing)")
+#: Of `design`, and of `codegen` where it designs first; their defaults stand in `dzdesign.design_options`.
+DESIGN = (
+    _given("--law", metavar="LAW", help="paper: Eq. (18); target: meets Eq. (16) (default: paper)"),
+    _given("--guard", metavar="G", help="threshold to protect: closing, mean or opening (default: closing)"),
+    _given(
+        "--edge",
+        metavar="C",
+        help='over the first "1 %%" of command run from the closing threshold to the opening one (default: off)',
+    ),
+    _given(
+        "--below-dp0",
+        metavar="B",
+        help="below dP0 hold beta = 1 as the paper does, or extend it to the tests there (default: hold)",
+    ),
+    _given(
+        "--command-signal",
+        metavar="S",
+        help='command at the converter: range, attenuator, offset, such as "-10..10 V x 0.15 + 1.5 V", which has both '
+        'signs (default: "0..10 V x 0.3")',
+    ),
+    _given("--polarity", metavar="P", help="normal, or inverted: the command counts the other way (default: normal)"),
+    _given("--pressure-span", metavar="P", help='span of both pressure sensors (default: "20 MPa")'),
+    _given(
+        "--pressure-a",
+        metavar="S",
+        help='sensor ahead of the edge, such as "4..20 mA on 150 ohm = 25 MPa" (default: "0..3 V")',
+    ),
+    _given("--pressure-b", metavar="S", help='sensor behind the edge (default: "0..3 V")'),
+    _given(
+        "--negative-dp",
+        metavar="D",
+        help="pressure drop of negative commands: same, or swapped, B less A (default: same)",
+    ),
+    _given(
+        "--zero-window",
+        metavar="C",
+        help='of both signs: pass zero by this before the other solenoid is driven (default: "1 %%")',
+    ),
+    _given(
+        "--ramp-up",
+        metavar="T",
+        help='time from zero to full command, such as "0.5 s" or "0.5 s / 0.8 s" (default: none)',
+    ),
+    _given("--ramp-down", metavar="T", help="time from full command to zero (default: none)"),
+    _given("--dither", metavar="D", help='square wave on the output, such as "150 Hz 1 %%" (default: off)'),
+    _given("--output-max", metavar="C", help='largest drive (default: "100 %%")'),
+)
 TARGET = _given("--target", default="f28335", metavar="NAME", help="microcontroller, see codegen --list-targets")
 PLANT = _given("--plant", metavar="PLANT.toml", help="plant, like examples/paper_valve/plant.toml")
 
@@ -103,9 +147,7 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
             _given("valve", metavar="VALVE.json", help="made by `dzdesign identify`"),
             _given(*OUTPUT, default="compensator.json", metavar="FILE", help="file to write"),
             TARGET,
-            LAW,
-            SPAN,
-            GUARD,
+            *DESIGN,
         ),
     ),
     "codegen": (
@@ -121,9 +163,7 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
             _given(*OUTPUT, default="firmware", metavar="DIR", help="folder to write"),
             TARGET,
             _given("--list-targets", action="store_true", help="print name and description of every target"),
-            LAW,
-            SPAN,
-            GUARD,
+            *DESIGN,
         ),
     ),
     "verify": (

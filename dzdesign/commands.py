@@ -155,29 +155,26 @@ def run_identify(args: argparse.Namespace) -> int:
 
 
 def _design(valve_path: Path, content: bytes, args: argparse.Namespace) -> "Compensator":  # noqa: F821
-    from fractions import Fraction
-
     from dzdesign.codegen.project import target_named
-    from dzdesign.design.designing import DesignOptions, design
+    from dzdesign.design.designing import design
+    from dzdesign.design_options import design_options
     from dzdesign.identify.valve_file import valve_from_document
 
-    span_MPa = Fraction(round(parse_quantity(args.pressure_span or "20 MPa", "pressure", "--pressure-span")), 10**6)
-    signals = target_named(args.target).signals(span_MPa)
-    options = DesignOptions(law_name=args.law or "paper", signals=signals, guard=args.guard or "closing")
+    options = design_options(args, target_named(args.target).inputs())
     return design(valve_from_document(content, str(valve_path)), options, content)
 
 
 def run_design(args: argparse.Namespace) -> int:
     """Design the compensator of a valve."""
     from dzdesign.codegen.project import target_named
-    from dzdesign.design.compensator import SCHEMA
+    from dzdesign.design.compensator_file import SCHEMA, compensator_document
     from dzdesign.tables import print_compensator
 
     path = Path(args.valve)
     target_named(args.target)
     check_file_may_be_written(Path(args.output), SCHEMA)
     compensator = _design(path, read_bytes(path, "valve file"), args)
-    document = compensator.to_document()
+    document = compensator_document(compensator)
     write_file(Path(args.output), to_json(document), SCHEMA)
     if args.json:
         print(to_json(document), end="")
@@ -190,8 +187,9 @@ def run_design(args: argparse.Namespace) -> int:
 def run_codegen(args: argparse.Namespace) -> int:
     """Generate the firmware of a compensator."""
     from dzdesign.codegen.project import SCHEMA, generate, target_named
-    from dzdesign.design.compensator import SCHEMA as COMPENSATOR_SCHEMA
-    from dzdesign.design.compensator import compensator_from_document
+    from dzdesign.design.compensator_file import SCHEMA as COMPENSATOR_SCHEMA
+    from dzdesign.design.compensator_file import compensator_from_document
+    from dzdesign.design_options import given_design_options
     from dzdesign.identify.model import SCHEMA as VALVE_SCHEMA
     from dzdesign.tables import print_firmware
 
@@ -207,11 +205,8 @@ def run_codegen(args: argparse.Namespace) -> int:
     if document["schema"] == VALVE_SCHEMA:
         firmware = generate(_design(path, content, args), args.target)
     else:
-        for option, value in (("--law", args.law), ("--pressure-span", args.pressure_span), ("--guard", args.guard)):
-            if value is not None:
-                raise InputError(
-                    f"{option} is an option of the design, and '{path}' is designed; use `dzdesign design`"
-                )
+        for option in given_design_options(args):
+            raise InputError(f"{option} is an option of the design, and '{path}' is designed; use `dzdesign design`")
         firmware = generate(compensator_from_document(content, str(path)), args.target, content)
     write_folder(Path(args.output), firmware.files, firmware.manifest)
     if args.json:

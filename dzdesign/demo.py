@@ -13,6 +13,7 @@ def run_demo(args: argparse.Namespace) -> int:
     """Run the pipeline on the bundled ramp tests and print the closing table."""
     from dzdesign.codegen.project import generate
     from dzdesign.derivation.account import verify_statements
+    from dzdesign.design.compensator_file import compensator_document
     from dzdesign.design.designing import design
     from dzdesign.identify.identification import identify
     from dzdesign.identify.ramp_files import read_ramp_file
@@ -39,7 +40,7 @@ def run_demo(args: argparse.Namespace) -> int:
     write_file(folder / "valve.json", valve_json)
     say("designing the compensator")
     compensator = design(valve, valve_bytes=valve_json.encode())
-    compensator_json = to_json(compensator.to_document())
+    compensator_json = to_json(compensator_document(compensator))
     write_file(folder / "compensator.json", compensator_json)
     firmware = generate(compensator, "f28335", compensator_json.encode())
     write_folder(folder / "firmware", firmware.files, firmware.manifest)

@@ -110,19 +110,27 @@ def print_compensator(compensator: "Compensator") -> None:
     """Print the law, the certificate and what the choices cost."""
     from dzdesign.derivation.law import law
 
-    chosen, certificate = law(compensator.law_name), compensator.certificate
-    low, high = (float(end) for end in certificate.dp_MPa)
+    chosen = law(compensator.law_name)
+    lines = [f"law {chosen.name} {chosen.equation}: u_O = {chosen.output}"]
+    for sign in compensator.signals.signs:
+        side = compensator.side(sign)
+        certificate = side.certificate
+        low, high = (float(end) for end in certificate.dp_MPa)
+        label = "" if compensator.negative is None else "positive: " if sign > 0 else "negative: "
+        lines += [
+            f"{label}k x_max/u_max = {_rational(side.k_x_max_over_u_max)} (from the offset to full flow), "
+            f"u_min0/u_max = {_rational(side.u_min0_over_u_max)}, "
+            f"beta: {len(side.beta_numerators)} nodes over {compensator.beta_denominator}",
+            f"{label}certificate: the offset stays below the {certificate.confidence:.0%} lower bound of the "
+            f"{certificate.guard} threshold from {low:.3f} to {high:.3f} MPa, at every pressure code; flow below "
+            f"{certificate.level_L_min:.2f} L/min (meter's floor, its noise, or 0.5 % of the largest flow) counts as "
+            "none",
+        ]
+    if compensator.edge_codes:
+        share = compensator.edge_codes / compensator.signals.command.span(1)
+        lines.append(f"edge: from the closing to the opening threshold over the first {share:.2%} of command")
     console = _console()
-    for line in (
-        f"law {chosen.name} {chosen.equation}: u_O = {chosen.output}",
-        f"k x_max/u_max = {_rational(compensator.k_x_max_over_u_max)} (from the offset to full flow), "
-        f"u_min0/u_max = {_rational(compensator.u_min0_over_u_max)}, "
-        f"beta: {len(compensator.beta_numerators)} nodes over {compensator.beta_denominator}",
-        f"certificate: the offset stays below the {certificate.confidence:.0%} lower bound of the {certificate.guard} "
-        f"threshold from {low:.3f} to {high:.3f} MPa, at every pressure code; flow below "
-        f"{certificate.level_L_min:.2f} L/min (meter's floor, its noise, or 0.5 % of the largest flow) counts as none",
-        *(f"cost: {line}" for line in compensator.costs),
-    ):
+    for line in (*lines, *(f"cost: {line}" for line in compensator.costs)):
         console.print(line, markup=False, soft_wrap=True)
 
 
@@ -184,8 +192,8 @@ def print_demo(valve: "ValveModel", verification: "Verification", folder: str) -
         )
     console = _console()
     console.print(table)
-    inputs = verification.inputs
-    console.print(f"Inputs checked: {inputs.inputs}, wrong: {inputs.wrong}", markup=False, soft_wrap=True)
+    checked, wrong = (sum(getattr(each, name) for each in verification.inputs) for name in ("inputs", "wrong"))
+    console.print(f"Inputs checked: {checked}, wrong: {wrong}", markup=False, soft_wrap=True)
     failed = [check.name for check in verification.checks if not check.holds]
     verdict = f"DOES NOT HOLD: {', '.join(failed)}" if failed else "Every requirement holds."
     console.print(verdict, markup=False, soft_wrap=True)

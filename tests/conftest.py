@@ -40,8 +40,9 @@ def example_compensator(example_valve):
 @pytest.fixture(scope="session")
 def example_firmware(example_compensator):
     from dzdesign.codegen.project import generate
+    from dzdesign.design.compensator_file import compensator_document
 
-    return generate(example_compensator, "f28335", to_json(example_compensator.to_document()).encode())
+    return generate(example_compensator, "f28335", to_json(compensator_document(example_compensator)).encode())
 
 
 @pytest.fixture

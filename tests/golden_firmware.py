@@ -8,7 +8,8 @@ from pathlib import Path
 
 from dzdesign.codegen.project import generate, target_named, targets
 from dzdesign.core.artefacts import to_json
-from dzdesign.design.compensator import Compensator, compensator_from_document
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.compensator_file import compensator_document, compensator_from_document
 from dzdesign.design.designing import design
 from dzdesign.identify.valve_file import valve_from_document
 
@@ -24,13 +25,17 @@ def golden_compensator(target_name: str) -> Compensator:
     compensator = compensator_from_document((GOLDENS / INPUT).read_bytes(), INPUT)
     if target.takes_any_signals:
         return compensator
-    return replace(compensator, signals=target.signals(compensator.signals.pressure_span_MPa))
+    return replace(
+        compensator,
+        signals=replace(compensator.signals, compare_max=target.compare_max),
+        amplifier=replace(compensator.amplifier, compare_limit=target.compare_max),
+    )
 
 
 def golden_files(target_name: str) -> dict[str, str]:
     """Generate a target's files from the fixed compensator."""
     compensator = golden_compensator(target_name)
-    files = dict(generate(compensator, target_name, to_json(compensator.to_document()).encode()).files)
+    files = dict(generate(compensator, target_name, to_json(compensator_document(compensator)).encode()).files)
     del files[INPUT]
     return files
 
@@ -55,7 +60,7 @@ def differences(folder: Path, files: Mapping[str, str]) -> str:
 def update() -> None:
     """Design the compensator anew from goldens/valve.json, and write every target's files."""
     content = (GOLDENS / "valve.json").read_bytes()
-    document = design(valve_from_document(content, "valve.json"), None, content).to_document()
+    document = compensator_document(design(valve_from_document(content, "valve.json"), None, content))
     (GOLDENS / INPUT).write_text(to_json(document), encoding="utf-8", newline="\n")
     for folder in GOLDENS.iterdir():
         if folder.is_dir():

@@ -25,13 +25,13 @@ def exact_line(compensator: Compensator, grid: tuple[str, int, int]) -> str:
         return compensator.compare(command, dp_code)
 
     value, calls = FNV_OFFSET, 0
-    pressures = codes(pressure_step, signals.pressure_code_max)
-    for command in codes(command_step, signals.command_code_max):
+    pressures = codes(pressure_step, signals.code_max)
+    for command in codes(command_step, signals.code_max):
         for p_a in pressures:
             for p_b in pressures:
-                possible = max(p_a, p_b) <= signals.pressure_code_max
+                possible = max(p_a, p_b) <= signals.code_max
                 answer = compare(command, max(p_a - p_b, failed) if possible else failed)
-                if command > signals.command_code_max:
+                if command > signals.code_max:
                     answer = 0
                 for byte in (answer & 0xFF, answer >> 8):
                     value = (value ^ byte) * FNV_PRIME & 0xFFFFFFFF

@@ -2,12 +2,14 @@
 
 import os
 import shutil
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from dzdesign.design.signals import PressureSignal, Signals
 from dzdesign.identify.ramp_files import RampTest
 
 L_MIN, MPA = 1e-3 / 60, 1e6
@@ -59,3 +61,15 @@ def synthetic_ramp(
         q=read * L_MIN,
         dp=dp * MPA,
     )
+
+
+def with_side(compensator, **changes):
+    """Return the compensator with other fields of its positive side."""
+    return replace(compensator, positive=replace(compensator.positive, **changes))
+
+
+def signals_with_span(span_MPa: Fraction) -> Signals:
+    """Return the default signals with both sensors of another span."""
+    error = span_MPa / 4096
+    sensor = PressureSignal(span_MPa=span_MPa, error_MPa=(-error, error))
+    return Signals(pressure_a=sensor, pressure_b=sensor)

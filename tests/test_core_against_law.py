@@ -39,14 +39,14 @@ def test_the_scaling_is_anchored_at_numbers():
 def stated_compare(compensator, command: int, dp_code: int) -> int:
     """Go the way of the signal in volts: code -> u_i -> law -> u_O -> compare value, nearest count, limited."""
     signals = compensator.signals
-    volts = U_MAX_V * command / signals.command_code_max
+    volts = U_MAX_V * command / signals.code_max
     values = {
         u_i: volts,
         beta: rational(compensator.beta(dp_code)),
-        k: rational(compensator.k_x_max_over_u_max) * U_MAX_V / X_MAX_M,
+        k: rational(compensator.positive.k_x_max_over_u_max) * U_MAX_V / X_MAX_M,
         x_max: X_MAX_M,
         u_max: U_MAX_V,
-        u_min0: rational(compensator.u_min0_over_u_max) * U_MAX_V,
+        u_min0: rational(compensator.positive.u_min0_over_u_max) * U_MAX_V,
     }
     output = sympy.N(law(compensator.law_name).output.subs(values), DIGITS)
     counts = sympy.N(COMPARE_VALUE.subs({u_O: output, u_max: U_MAX_V, n_full: signals.compare_max}), DIGITS)
@@ -57,11 +57,11 @@ def stated_compare(compensator, command: int, dp_code: int) -> int:
 def wrong_codes(compensator, folder, seed: int) -> int:
     """Count where the compiled core differs from `stated_compare`, of 300 random pairs of codes and the corners."""
     from dzdesign.codegen.project import generate
-    from dzdesign.verify.all_inputs import CompiledCore
+    from dzdesign.verify.compiled_core import CompiledCore
 
     firmware = generate(compensator, "f28335")
     write_folder(folder, firmware.files, firmware.manifest)
-    core = CompiledCore(folder, compensator.signals.pressure_code_max)
+    core = CompiledCore(folder)
     draw = random.Random(seed)
     pairs = CORNERS + [(draw.randint(0, 4095), draw.randint(-200, 4095)) for _ in range(300)]
     wrong = 0
@@ -75,7 +75,8 @@ def wrong_codes(compensator, folder, seed: int) -> int:
 
 @pytest.fixture(params=LAW_NAMES)
 def compensator(request, example_valve):
-    from dzdesign.design.designing import DesignOptions, design
+    from dzdesign.design.designing import design
+    from dzdesign.design.options import DesignOptions
 
     return design(example_valve, DesignOptions(law_name=request.param))
 

@@ -5,13 +5,15 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from synthetic import Truth, synthetic_ramp
+from synthetic import Truth, signals_with_span, synthetic_ramp, with_side
 
 from dzdesign.core.artefacts import to_json
 from dzdesign.core.errors import InputError, RequirementError
-from dzdesign.design.compensator import compensator_from_document
-from dzdesign.design.designing import DesignOptions, design
-from dzdesign.design.signals import Signals
+from dzdesign.design.amplifier import Amplifier
+from dzdesign.design.compensator_file import compensator_document, compensator_from_document
+from dzdesign.design.designing import design
+from dzdesign.design.options import DesignOptions
+from dzdesign.design.signals import CommandSignal, Signals
 from dzdesign.identify.identification import identify
 
 
@@ -53,8 +55,8 @@ def test_beta_never_exceeds_one_up_to_the_reference(designed):
 
 def test_single_pressure_gives_a_constant_offset():
     _, compensator = compensator_of(lambda dp: 5.0, pressures=(1.0,))
-    assert len(set(compensator.beta_numerators)) == 1
-    assert compensator.certificate.dp_MPa[0] == compensator.certificate.dp_MPa[1]
+    assert len(set(compensator.positive.beta_numerators)) == 1
+    assert compensator.positive.certificate.dp_MPa[0] == compensator.positive.certificate.dp_MPa[1]
 
 
 def test_law_paper_is_equation_18(example_compensator):
@@ -62,28 +64,28 @@ def test_law_paper_is_equation_18(example_compensator):
     c = example_compensator
     for dp_code in (0, 205, 600, 1023, 4095):
         beta, share = c.beta(dp_code), Fraction(1234, 4095)
-        expected = (beta * c.k_x_max_over_u_max - beta + 1) * share + beta * c.u_min0_over_u_max
+        side = c.positive
+        expected = (beta * side.k_x_max_over_u_max - beta + 1) * share + beta * side.u_min0_over_u_max
         assert c.drive(1234, dp_code) == expected
 
 
 def test_law_target_keeps_the_gain(example_valve):
     c = design(example_valve, DesignOptions(law_name="target"))
     rises = {c.drive(4095, code) - c.drive(0, code) for code in (0, 300, 1000)}
-    assert rises == {c.k_x_max_over_u_max}
+    assert rises == {c.positive.k_x_max_over_u_max}
 
 
 def test_halves_round_up():
-    signals = Signals(command_code_max=2, compare_max=1)
+    signals = Signals(command=CommandSignal(full_code=2), compare_max=1)
     _, compensator = compensator_of(lambda dp: 5.0, pressures=(1.0,))
-    exact = dataclasses.replace(
-        compensator,
-        signals=dataclasses.replace(signals, pressure_code_max=4095),
-        k_x_max_over_u_max=Fraction(1),
+    exact = with_side(
+        dataclasses.replace(compensator, signals=signals, amplifier=Amplifier(compare_limit=1)),
+        k_x_max_over_u_max=Fraction(1, 2),
         u_min0_over_u_max=Fraction(1, 4),
-        beta_numerators=tuple(1 << 15 for _ in compensator.beta_numerators),
+        beta_numerators=tuple(1 << 15 for _ in compensator.positive.beta_numerators),
     )
     # 1/4 + 1/4 = 1/2 of one count.
-    assert dataclasses.replace(exact, k_x_max_over_u_max=Fraction(1, 2)).compare(1, 0) == 1
+    assert exact.compare(1, 0) == 1
 
 
 def test_failed_sensor_takes_the_smallest_beta(example_compensator):
@@ -93,7 +95,7 @@ def test_failed_sensor_takes_the_smallest_beta(example_compensator):
 
 
 def test_document_round_trip(example_compensator):
-    text = to_json(example_compensator.to_document())
+    text = to_json(compensator_document(example_compensator))
     assert compensator_from_document(text.encode(), "compensator.json") == example_compensator
 
 
@@ -106,7 +108,7 @@ def test_a_valve_file_that_contradicts_itself_is_refused(example_valve):
 
 def test_span_must_reach_the_tested_pressures(example_valve):
     with pytest.raises(InputError, match="pressure-span"):
-        design(example_valve, DesignOptions(signals=Signals(pressure_span_MPa=Fraction(4))))
+        design(example_valve, DesignOptions(signals=signals_with_span(Fraction(4))))
 
 
 def test_a_law_that_would_fall_with_command_is_refused(example_valve):
@@ -138,4 +140,4 @@ def test_a_valve_without_its_falling_branch_needs_a_word():
     valve = identify([synthetic_ramp(dp, Truth(), falling=False) for dp in (1.0,)])
     with pytest.raises(InputError, match="--guard opening"):
         design(valve)
-    assert design(valve, DesignOptions(guard="opening")).certificate.guard == "opening"
+    assert design(valve, DesignOptions(guard="opening")).positive.certificate.guard == "opening"

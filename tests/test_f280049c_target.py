@@ -59,10 +59,7 @@ def periods(program: Path, events: str, *start: str) -> dict[str, list]:
     """The driver's facts, one list a fact with one value a period."""
     ticks = [dict(word.split("=", 1) for word in line.split()[1:]) for line in run(program, "run", events, *start)]
     assert len(ticks) == len(events)
-    return {
-        key: [int(tick[key]) if tick[key].isdigit() else tick[key] for tick in ticks]
-        for key in ticks[0]
-    }
+    return {key: [int(tick[key]) if tick[key].isdigit() else tick[key] for tick in ticks] for key in ticks[0]}
 
 
 def check_set_up(program: Path) -> None:

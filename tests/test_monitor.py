@@ -156,10 +156,10 @@ def test_the_count_of_periods_wraps_and_a_reset_is_told(bench):
 
 def test_an_output_that_is_held_low_is_zero_and_faults_are_named(bench):
     bench.listen()
-    bench.send([bench.frame(500), bench.frame(501, status=0), bench.frame(502, status=0x0003)])
+    bench.send([bench.frame(500), bench.frame(501, status=0), bench.frame(502, status=0x0103)])
     _, result, _ = bench.stop()
     assert list(table(bench.output)[:, 4] > 0) == [True, False, False]
-    assert result["faults"] == ["no usable sample in time", "trip input went low"]
+    assert result["faults"] == ["no usable sample in time", "trip input went low", "command not sound"]
 
 
 def test_identify_reads_the_recording_with_the_flow_meters_column(bench):

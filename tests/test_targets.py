@@ -95,10 +95,12 @@ def test_the_wheel_generates_for_every_target(tmp_path):
         wheel.extractall(tmp_path / "installed")
     code = (
         "import sys, json, dzdesign; from dzdesign.codegen.project import generate, targets;"
-        "from dzdesign.design.compensator import compensator_from_document as read; from dataclasses import replace;"
+        "from dzdesign.design.compensator_file import compensator_from_document as read;"
+        "from dataclasses import replace;"
         "c = read(open(sys.argv[1], 'rb').read(), 'c');"
-        "s = c.signals.pressure_span_MPa;"
-        "print(json.dumps([dzdesign.__path__[0]] + [sorted(generate(replace(c, signals=t.signals(s)), t.name).files)"
+        "fit = lambda m: replace(c, signals=replace(c.signals, compare_max=m),"
+        " amplifier=replace(c.amplifier, compare_limit=m));"
+        "print(json.dumps([dzdesign.__path__[0]] + [sorted(generate(fit(t.compare_max), t.name).files)"
         " for t in targets()]))"
     )
     environment = {**os.environ, "PYTHONPATH": str(tmp_path / "installed")}
@@ -144,7 +146,7 @@ def test_design_and_codegen_fit_the_target(name, tmp_path, capsys):
     assert main(["design", str(VALVE), "--target", name, "-o", str(compensator)]) == 0
     signals = json.loads(compensator.read_text())["signals"]
     assert signals["compare_max"] == target.compare_max
-    assert signals["command_code_max"] == signals["pressure_code_max"] == target.adc_code_max
+    assert signals["code_max"] == signals["command"]["full_code"] == target.adc_code_max
     assert main(["codegen", str(compensator), "--target", name, "-o", str(one)]) == 0
     assert main(["codegen", str(VALVE), "--target", name, "-o", str(two)]) == 0
     files = {path.relative_to(one): path.read_bytes() for path in one.rglob("*") if path.is_file()}

@@ -136,7 +136,7 @@ def check_stream(program: Path) -> None:
         assert (frame.u_adc, frame.p_a_adc, frame.p_b_adc) == (100 * (sample % 41), 1, 2)
         assert frame.compare == frame.u_adc + 10 * frame.p_a_adc + 100 * frame.p_b_adc, "of one moment"
         assert frame.beta == 3 * frame.p_a_adc + 7 * frame.p_b_adc and frame.origin == ORIGIN
-    assert frames[0].status == STATUS_RELEASED
+    assert frames[0].status == STATUS_RELEASED | 0x0500, "with the stand-in's status of a command and these pressures"
 
 
 def check_blocked_line(program: Path) -> None:
@@ -223,10 +223,11 @@ def test_beta_of_the_frame_is_the_compensators_at_every_difference(example_compe
     wrong = [
         difference
         for difference in range(-4095, 4096)
-        if core.dz_beta(max(difference, 0), max(-difference, 0)) != int(example_compensator.beta(difference) * 2**15)
+        if core.dz_beta(max(difference, 0), max(-difference, 0))
+        != int(example_compensator.law_beta(difference) * 2**15)
     ]
     assert wrong == []
-    fallback = int(example_compensator.fallback_beta * 2**15)
+    fallback = int(example_compensator.law_beta(-4095) * 2**15)
     assert core.dz_beta(4096, 0) == core.dz_beta(0, 0xFFFF) == fallback
 
 

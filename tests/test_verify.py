@@ -1,15 +1,15 @@
 """The checkers are checked: faults seeded in the C, in the law and in the design must be seen."""
 
-import dataclasses
 import json
 import re
 from fractions import Fraction
 
 import numpy as np
 import pytest
-from synthetic import needs_compiler
+from synthetic import needs_compiler, signals_with_span, with_side
 
 from dzdesign.core.artefacts import to_json, write_folder
+from dzdesign.design.compensator_file import compensator_document
 from dzdesign.verify.all_inputs import check_all_inputs
 from dzdesign.verify.closed_loop import ClosedLoop, RampSequence, dead_zone
 from dzdesign.verify.plant import PWM_PERIOD_S, STATES, Plant, derivatives, period_step, plants_from_tests
@@ -48,16 +48,18 @@ FAULTS = {
     "reciprocal": (r"(quotient \* UINT32_C\()(\d+)(\))", lambda m: m.group(1) + str(int(m.group(2)) - 1) + m.group(3)),
     "shift": (r"sum >> 32", "sum >> 31"),
     "table": (r"(UINT32_C\()(\d+)(\), UINT32_C)", one_more),
-    "mask": (r"dp_code & 63u", "dp_code & 31u"),
-    "fallback": (r"(BETA_FALLBACK UINT32_C\()(\d+)(\))", one_more),
-    "reverse >= becomes >": (r"dp_code >= -REVERSE_CODES", "dp_code > -REVERSE_CODES"),
-    "command <= becomes <": (r"u_adc <= COMMAND_CODE_MAX", "u_adc < COMMAND_CODE_MAX"),
-    "pressure <= becomes <": (r"p_a_adc <= PRESSURE_CODE_MAX", "p_a_adc < PRESSURE_CODE_MAX"),
-    "p_b not looked at": (r" && \(p_b_adc <= PRESSURE_CODE_MAX\)", ""),
-    "depends on one pressure": (
-        r"\(int32_t\)p_a_adc - \(int32_t\)p_b_adc",
-        "(int32_t)p_a_adc - (int32_t)(p_b_adc & 4094u)",
+    "mask": (r"place & 63u", "place & 31u"),
+    "fallback": (r"(NODE_FALLBACK )(\d+)(u)", one_more),
+    "reverse >= becomes >": (r"difference >= REVERSE_LIMIT", "difference > REVERSE_LIMIT"),
+    "command <= becomes <": (r"\(u_adc - COMMAND_LOW\) <= COMMAND_SOUND", "(u_adc - COMMAND_LOW) < COMMAND_SOUND"),
+    "pressure <= becomes <": (
+        r"\(p_a_adc - PRESSURE_A_LOW\) <= PRESSURE_A_SOUND",
+        "(p_a_adc - PRESSURE_A_LOW) < PRESSURE_A_SOUND",
     ),
+    "p_b not looked at": (r"\(p_b_adc - PRESSURE_B_LOW\) <= PRESSURE_B_SOUND", "(0u) <= PRESSURE_B_SOUND"),
+    "depends on one pressure": (r"\(int32_t\)p_b_adc - ", "(int32_t)(p_b_adc & 4094u) - "),
+    "status": (r"\(u_adc - COMMAND_LOW\) > COMMAND_SOUND", "(u_adc - COMMAND_LOW) >= COMMAND_SOUND"),
+    "status's difference": (r"< REVERSE_LIMIT", "<= REVERSE_LIMIT"),
 }
 
 
@@ -70,11 +72,11 @@ def test_a_seeded_fault_in_the_c_is_found(firmware_folder, fault):
 def test_a_missing_limit_is_found_where_the_law_reaches_full_drive(example_compensator, tmp_path):
     from dzdesign.codegen.project import generate
 
-    long_stroke = dataclasses.replace(example_compensator, k_x_max_over_u_max=Fraction(3, 4))
+    long_stroke = with_side(example_compensator, k_x_max_over_u_max=Fraction(3, 4))
     firmware = generate(long_stroke, "f28335")
     write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
     assert check_all_inputs(tmp_path / "fw").holds
-    mutate(tmp_path / "fw", r"compare = DZ_COMPARE_MAX;", "compare += 0u;")
+    mutate(tmp_path / "fw", r"\(unlimited < QUOTIENT_LIMIT\)", "(1 > 0)")
     assert not check_all_inputs(tmp_path / "fw").holds
 
 
@@ -82,8 +84,8 @@ def test_an_offset_above_the_bound_is_over_compensation(example_compensator, tmp
     """A wrong design, rightly coded: the C equals its law, and the law is refused."""
     from dzdesign.codegen.project import generate
 
-    raised = tuple(min(numerator + 60, 32768) for numerator in example_compensator.beta_numerators)
-    greedy = dataclasses.replace(example_compensator, beta_numerators=raised)
+    raised = tuple(min(numerator + 60, 32768) for numerator in example_compensator.positive.beta_numerators)
+    greedy = with_side(example_compensator, beta_numerators=raised)
     firmware = generate(greedy, "f28335")
     write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
     result = check_all_inputs(tmp_path / "fw")
@@ -99,16 +101,16 @@ def test_a_changed_file_fails_the_verification(firmware_folder):
 
 
 def test_a_core_that_does_not_compile_fails_the_verification(firmware_folder):
-    mutate(firmware_folder, r"return beta;", "return bet;")
+    mutate(firmware_folder, r"return place;", "return plac;")
     result = verify(firmware_folder, sequence=QUICK)
-    assert not result.holds and result.inputs is None
+    assert not result.holds and result.inputs == ()
 
 
 def test_reference_agrees_with_the_compensator_at_random(example_compensator):
-    exact = ExactLaw(json.loads(to_json(example_compensator.to_document())))
+    exact = ExactLaw(json.loads(to_json(compensator_document(example_compensator))))
     rng = np.random.default_rng(3)
     codes = [int(code) for code in rng.integers(-4095, 4096, 40)]
-    for command, row in enumerate(exact.rows([exact.beta(code) for code in codes])):
+    for command, row in enumerate(exact.rows([exact.betas(code) for code in codes])):
         if command % 97 == 0 or command == 4095:
             assert row.tolist() == [example_compensator.compare(command, code) for code in codes]
 
@@ -195,7 +197,7 @@ def test_a_law_without_its_guard_leaks_in_the_loop(example_compensator, example_
     from dzdesign.codegen.project import generate
     from dzdesign.verify.plant import read_plant
 
-    leaky = dataclasses.replace(example_compensator, u_min0_over_u_max=Fraction(55, 100))
+    leaky = with_side(example_compensator, u_min0_over_u_max=Fraction(55, 100))
     firmware = generate(leaky, "f28335")
     write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
     result = verify(tmp_path / "fw", read_plant(example_folder / "plant.toml"), sequence=QUICK)
@@ -208,7 +210,8 @@ def test_what_could_not_be_checked_is_not_passed(tmp_path):
     from synthetic import Truth, synthetic_ramp
 
     from dzdesign.codegen.project import generate
-    from dzdesign.design.designing import DesignOptions, design
+    from dzdesign.design.designing import design
+    from dzdesign.design.options import DesignOptions
     from dzdesign.identify.identification import identify
 
     valve = identify([synthetic_ramp(1.0, Truth(), falling=False)])
@@ -221,10 +224,10 @@ def test_what_could_not_be_checked_is_not_passed(tmp_path):
 
 def test_a_span_that_ends_at_the_tested_pressure_can_be_verified(example_valve, tmp_path):
     from dzdesign.codegen.project import generate
-    from dzdesign.design.designing import DesignOptions, design
-    from dzdesign.design.signals import Signals
+    from dzdesign.design.designing import design
+    from dzdesign.design.options import DesignOptions
 
-    options = DesignOptions(signals=Signals(pressure_span_MPa=Fraction(51, 10)))
+    options = DesignOptions(signals=signals_with_span(Fraction(51, 10)))
     firmware = generate(design(example_valve, options), "f28335")
     write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
     assert verify(tmp_path / "fw", sequence=QUICK).holds

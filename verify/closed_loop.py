@@ -4,6 +4,7 @@ import ctypes
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -56,6 +57,7 @@ class PressureResult:
     end, after closing; `without_beta` with the pressures frozen at dP0.
     """
 
+    side: str
     dp_MPa: float
     dead_zone_opening: float
     dead_zone_closing: float
@@ -76,6 +78,44 @@ class LoopComparison:
     compensated: LoopRun
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scalings:
+    """Converter codes of command, pressure A and B at zero and at their spans (1, MPa, MPa); all (3,)."""
+
+    zeros: np.ndarray
+    fulls: np.ndarray
+    spans: np.ndarray
+    code_max: int
+    compare_max: int
+    negative: bool = False
+    swapped: bool = False
+
+
+#: Of the direct drive: without a compensator no code is read.
+DIRECT = Scalings(
+    zeros=np.zeros(3, dtype=np.int32),
+    fulls=np.full(3, 4095, dtype=np.int32),
+    spans=np.array([1.0, 20.0, 20.0]),
+    code_max=4095,
+    compare_max=60000,
+)
+
+
+def _scalings(document: dict[str, Any], sign: int) -> Scalings:
+    signals = document["signals"]
+    command, sensors = signals["command"], (signals["pressure_a"], signals["pressure_b"])
+    full = command["full_code" if sign > 0 else "negative_full_code"]
+    return Scalings(
+        zeros=np.array([command["zero_code"], *(sensor["zero_code"] for sensor in sensors)], dtype=np.int32),
+        fulls=np.array([full, *(sensor["full_code"] for sensor in sensors)], dtype=np.int32),
+        spans=np.array([1.0, *(sensor["span_MPa"][0] / sensor["span_MPa"][1] for sensor in sensors)]),
+        code_max=signals["code_max"],
+        compare_max=signals["compare_max"],
+        negative=sign < 0,
+        swapped=sign < 0 and signals["swapped"],
+    )
+
+
 class ClosedLoop:
     """One plant and, where given, one generated core, compiled into one native loop.
 
@@ -85,18 +125,14 @@ class ClosedLoop:
         Parameters.
     firmware : Path or None
         Firmware folder; None leaves only the direct drive.
-    pressure_span_MPa, code_max, compare_max : float, int, int
-        Scalings of the core's inputs and output.
+    document : dict
+        compensator.json of the firmware: scalings of its inputs and output.
+    sign : {1, -1}
+        Side of the valve: the sign of the command that opens it.
     """
 
     def __init__(
-        self,
-        plant: Plant,
-        firmware: Path | None = None,
-        *,
-        pressure_span_MPa: float = 20.0,
-        code_max: int = 4095,
-        compare_max: int = 60000,
+        self, plant: Plant, firmware: Path | None = None, document: dict[str, Any] | None = None, sign: int = 1
     ) -> None:
         import casadi as ca
 
@@ -104,18 +140,16 @@ class ClosedLoop:
         generator = ca.CodeGenerator("plant_step.c")
         generator.add(step)
         sources = {"plant_step.c": generator.dump()}
-        sources["loop.c"] = files("dzdesign.verify").joinpath("loop.c").read_text(encoding="utf-8")
+        driver = files("dzdesign.verify")
+        sources["loop.c"] = driver.joinpath("loop.c").read_text(encoding="utf-8")
         if firmware is None:
-            sources["direct.c"] = (
-                "#include <stdint.h>\n"
-                "uint16_t dz_comp(uint16_t u, uint16_t a, uint16_t b) { (void)a; (void)b; return u; }\n"
-            )
+            sources["dz_drive.h"] = driver.joinpath("no_drive.h").read_text(encoding="utf-8")
         else:
-            for name in ("dz_comp.c", "dz_comp.h"):
-                sources[name] = (firmware / "core" / name).read_text(encoding="utf-8")
+            for path in sorted((firmware / "core").glob("*.[ch]")):
+                sources[path.name] = path.read_text(encoding="utf-8")
         self._library = load_library(sources, "the closed loop")
         self._work_sizes = max(step.sz_w(), 1), max(step.sz_iw(), 1)
-        self._scalings = (float(pressure_span_MPa), int(code_max), float(compare_max))
+        self._scalings = _scalings(document, sign) if document else DIRECT
         self._has_core = firmware is not None
 
     def run(self, command: np.ndarray, supply_MPa: float, mode: str = "direct", dp_frozen_MPa: float = 0.0) -> LoopRun:
@@ -138,20 +172,23 @@ class ClosedLoop:
         record, state = np.empty((command.size, 3)), np.zeros(STATES)
         # Of this run alone, so that runs may go on side by side (ctypes lets go of the interpreter's lock).
         work = np.zeros(self._work_sizes[0]), np.zeros(self._work_sizes[1], dtype=np.int64)
-        span, code_max, compare_max = self._scalings
+        scalings = self._scalings
+        span = float(scalings.spans[1:].min())
         back_MPa = min(BACK_PRESSURE_MPA, span - supply_MPa)
         if back_MPa < 0:
             raise InputError(f"a pressure drop of {supply_MPa:g} MPa exceeds the sensors' span of {span:g} MPa")
-        pointer = [array.ctypes.data_as(ctypes.c_void_p) for array in (command, *work, state, record)]
+        arrays = (scalings.zeros, scalings.fulls, scalings.spans, command, *work, state, record)
+        zeros, fulls, spans, *rest = (array.ctypes.data_as(ctypes.c_void_p) for array in arrays)
         self._library.dz_loop(
-            ctypes.c_int32(command.size),
-            ctypes.c_int32(PERIODS_PER_RECORD),
-            ctypes.c_int32(MODES[mode]),
-            pointer[0],
-            *(ctypes.c_double(value) for value in (supply_MPa, back_MPa, dp_frozen_MPa, span)),
-            ctypes.c_int32(code_max),
-            ctypes.c_double(compare_max),
-            *pointer[1:],
+            *map(ctypes.c_int32, (command.size, PERIODS_PER_RECORD, MODES[mode], scalings.negative, scalings.swapped)),
+            rest[0],
+            *map(ctypes.c_double, (supply_MPa, back_MPa, dp_frozen_MPa)),
+            zeros,
+            fulls,
+            spans,
+            ctypes.c_int32(scalings.code_max),
+            ctypes.c_double(scalings.compare_max),
+            *rest[1:],
         )
         return LoopRun(
             time=np.arange(command.size) * RECORD_S,
@@ -162,7 +199,9 @@ class ClosedLoop:
         )
 
 
-def compare_at_pressure(loop: ClosedLoop, dp_MPa: float, dp0_MPa: float, sequence: RampSequence) -> LoopComparison:
+def compare_at_pressure(
+    loop: ClosedLoop, dp_MPa: float, dp0_MPa: float, sequence: RampSequence, side: str = "positive"
+) -> LoopComparison:
     """Run the ramp without and with the compensator at one pressure drop, and read dead zones and flows."""
     command = sequence.command()
     direct = loop.run(command, dp_MPa)
@@ -172,6 +211,7 @@ def compare_at_pressure(loop: ClosedLoop, dp_MPa: float, dp0_MPa: float, sequenc
     without_beta = loop.run(quick, dp_MPa, "without beta", dp_frozen_MPa=dp0_MPa)
     level = FLOW_SHARE * direct.q_L_min.max()
     result = PressureResult(
+        side=side,
         dp_MPa=dp_MPa,
         dead_zone_opening=dead_zone(direct, level, rising=True),
         dead_zone_closing=dead_zone(direct, level, rising=False),

@@ -10,7 +10,8 @@
 #define casadi_int long long int
 #endif
 
-uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
+#include "dz_drive.h"
+
 int plant_step(const casadi_real **arg, casadi_real **res, casadi_int *iw, casadi_real *w, int mem);
 
 #ifdef _WIN32
@@ -19,35 +20,56 @@ int plant_step(const casadi_real **arg, casadi_real **res, casadi_int *iw, casad
 #define EXPORT
 #endif
 
-/* The converter of the F28335: floor(codes * volts / span), limited. */
-static uint16_t convert(double share, int32_t code_max)
+/* One channel of the converter: codes of zero and full signal, and what the full one stands for. */
+struct channel
 {
-    const double code = share * (double)(code_max + 1);
+    int32_t zero;
+    int32_t full;
+    double span;
+};
+
+/* The code of a value: rounded down as converters do, limited to the converter's range. */
+static uint16_t convert(const struct channel *channel, double value, int32_t code_max)
+{
+    const double codes = (double)(channel->full - channel->zero);
+    const double code = (double)channel->zero + value / channel->span * (codes + (codes > 0.0 ? 1.0 : -1.0));
     return (uint16_t)(code < 0.0 ? 0.0 : (code > (double)code_max ? (double)code_max : code));
 }
 
-/* mode 0: the command goes to the PWM as it is. mode 1: through the core. mode 2: through the core with the pressure
- * codes frozen at dp_frozen, that is without beta.
- * command[n]: share of u_max, each held for `every` periods. record[n][3]: compare value, dP in MPa, Q in L/min. */
-EXPORT void dz_loop(int32_t n, int32_t every, int32_t mode, const double *command, double supply_MPa,
-                    double back_MPa, double dp_frozen_MPa, double span_MPa, int32_t code_max, double compare_max,
+/* mode 0: the command goes to the PWM as it is. mode 1: through the amplifier. mode 2: through the amplifier with the
+ * pressure codes frozen at dp_frozen, that is without beta.
+ * command[n]: share of u_max, each held for `every` periods; sign -1 drives solenoid B. channels: command, pressures.
+ * record[n][3]: compare value, dP in MPa, Q in L/min. */
+EXPORT void dz_loop(int32_t n, int32_t every, int32_t mode, int32_t negative, int32_t swapped, const double *command,
+                    double supply_MPa, double back_MPa, double dp_frozen_MPa, const int32_t *zeros,
+                    const int32_t *fulls, const double *spans, int32_t code_max, double compare_max,
                     casadi_real *w, casadi_int *iw, double *state, double *record)
 {
+    const struct channel u = {zeros[0], fulls[0], spans[0]};
+    const struct channel a = {zeros[1], fulls[1], spans[1]};
+    const struct channel b = {zeros[2], fulls[2], spans[2]};
+    struct dz_drive drive;
     double duty = 0.0;
     double dp_MPa = supply_MPa;
     double flow = 0.0;
     double next[STATES];
     uint16_t compare = 0u;
 
+    dz_drive_init(&drive);
     for (int32_t k = 0; k < n; k++) {
         for (int32_t j = 0; j < every; j++) {
             const double shadow = (double)compare / compare_max; /* written in the last period, in force in this one */
             if (((k * every + j) % 2) == 0) {
                 const double dp = mode == 2 ? dp_frozen_MPa : dp_MPa;
-                const uint16_t p_a = convert((back_MPa + dp) / span_MPa, code_max);
-                const uint16_t p_b = convert(back_MPa / span_MPa, code_max);
-                const uint16_t u = convert(command[k], code_max);
-                compare = mode == 0 ? (uint16_t)(command[k] * compare_max + 0.5) : dz_comp(u, p_a, p_b);
+                const double ahead = back_MPa + dp;
+                dz_drive_sample(&drive, convert(&u, command[k], code_max),
+                                convert(&a, swapped ? back_MPa : ahead, code_max),
+                                convert(&b, swapped ? ahead : back_MPa, code_max));
+            }
+            dz_drive_tick(&drive);
+            compare = negative ? drive.compare_b : drive.compare_a;
+            if (mode == 0) {
+                compare = (uint16_t)(command[k] * compare_max + 0.5);
             }
             duty = shadow;
             const casadi_real *arg[8] = {state, &duty, &supply_MPa};

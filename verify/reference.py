@@ -1,79 +1,140 @@
 """The exactly rounded law at every code pair, computed without the firmware's arithmetic.
 
 Starts from the rationals in compensator.json and the law of `dzdesign.derivation`; along a row of constant pressure the
-law is a straight line in the command code, so its rounded values come from exact addition with carry: quotient and
-remainder advance by the quotient and remainder of the slope. No multiplication, shift or reciprocal is shared with the
-generated C.
+law is straight in the command code up to the edge's end and beyond it, so its rounded values come from exact addition
+with carry: quotient and remainder advance by the quotient and remainder of the slope. No multiplication, shift or
+reciprocal is shared with the generated C.
 """
 
 from collections.abc import Iterator
 from fractions import Fraction
 from math import lcm
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.derivation.law import law
-from dzdesign.derivation.scaling import Line, evaluate_line
+from dzdesign.derivation.scaling import evaluate_line
+
+#: What sensor B's weight is stated over, where the two sensors count unlike (DESIGN: codes of A over 2^12).
+WEIGHT_UNIT = 4096
+
+
+class Betas(NamedTuple):
+    """The two betas at one pressure drop: of the law, and the certified one at zero command."""
+
+    law: Fraction
+    zero: Fraction
 
 
 class ExactLaw:
-    """The law of a compensator document on integer codes.
+    """The law of one side of a compensator document on integer codes.
 
     Parameters
     ----------
     document : dict
         compensator.json, parsed and checked.
+    sign : {1, -1}
+        Sign of the command.
     """
 
-    def __init__(self, document: dict[str, Any]) -> None:
-        signals, table = document["signals"], document["beta"]
-        self.command_max: int = signals["command_code_max"]
-        self.pressure_max: int = signals["pressure_code_max"]
+    def __init__(self, document: dict[str, Any], sign: int = 1) -> None:
+        signals = document["signals"]
+        self.side = "positive" if sign > 0 else "negative"
+        side = document["sides"][self.side]
+        command = signals["command"]
+        self.code_max: int = signals["code_max"]
         self.compare_max: int = signals["compare_max"]
+        self.compare_limit: int = document["amplifier"]["compare_limit"]
+        self.zero: int = command["zero_code"]
+        self.full: int = command["full_code" if sign > 0 else "negative_full_code"]
+        self.sound_commands = range(command["valid_codes"][0], command["valid_codes"][1] + 1)
+        self.a, self.b = signals["pressure_a"], signals["pressure_b"]
         self.reverse: int = document["reverse_codes"]
+        self.turn = -1 if sign < 0 and signals["swapped"] else 1
         self._law = law(document["law"])
-        self._kappa = Fraction(*document["k_x_max_over_u_max"])
-        self._u_min0 = Fraction(*document["u_min0_over_u_max"])
-        self._nodes: list[int] = table["numerators"]
-        self._denominator: int = table["denominator"]
-        self._step: int = table["step_codes"]
+        self._kappa = Fraction(*side["k_x_max_over_u_max"])
+        self._u_min0 = Fraction(*side["u_min0_over_u_max"])
+        self._zero_nodes: list[int] = side["beta"]
+        self._law_nodes: list[int] = side["edge_beta"] or side["beta"]
+        self._denominator: int = document["beta_denominator"]
+        self._step: int = document["beta_step_codes"]
+        self._edge: int = document["edge_codes"]
 
-    def beta(self, dp_code: int) -> Fraction:
-        """Return beta at a difference of pressure codes; below ``-reverse`` the smallest one."""
-        if dp_code < -self.reverse:
-            return Fraction(min(self._nodes), self._denominator)
+    @property
+    def span(self) -> int:
+        """Codes of command from zero to full."""
+        return abs(self.full - self.zero)
+
+    def from_zero(self, code: int) -> int:
+        """Return how far a command is from zero towards full, in codes, limited to both."""
+        away = code - self.zero if self.full > self.zero else self.zero - code
+        return min(max(away, 0), self.span)
+
+    def difference(self, p_a: np.ndarray, p_b: np.ndarray) -> np.ndarray:
+        """Return the differences of pressure codes, in codes of sensor A, that pairs of codes make (rounded down)."""
+        a_MPa, b_MPa = (
+            Fraction(*sensor["span_MPa"]) / (sensor["full_code"] - sensor["zero_code"]) for sensor in (self.a, self.b)
+        )
+        weight = max(1, round(b_MPa / a_MPa * WEIGHT_UNIT))
+        a, b = (np.asarray(p, dtype=np.int64) - sensor["zero_code"] for p, sensor in ((p_a, self.a), (p_b, self.b)))
+        return np.floor_divide(self.turn * (a * WEIGHT_UNIT - b * weight), WEIGHT_UNIT)
+
+    def sound_pressures(self, p_a: np.ndarray, p_b: np.ndarray) -> np.ndarray:
+        """Tell which pairs of pressure codes both sensors can give."""
+        (a_low, a_high), (b_low, b_high) = self.a["valid_codes"], self.b["valid_codes"]
+        return (p_a >= a_low) & (p_a <= a_high) & (p_b >= b_low) & (p_b <= b_high)
+
+    def betas(self, dp_code: int | None) -> Betas:
+        """Return both betas at a difference; None, and one below ``-reverse``: the signal can't be right."""
+        return Betas(self._at(self._law_nodes, dp_code), self._at(self._zero_nodes, dp_code))
+
+    def _at(self, nodes: list[int], dp_code: int | None) -> Fraction:
+        if dp_code is None or dp_code < -self.reverse:
+            return Fraction(min(nodes), self._denominator)
         left, past = divmod(max(dp_code, 0), self._step)
-        rise = self._nodes[left + 1] - self._nodes[left]
-        return Fraction(self._nodes[left] * self._step + rise * past, self._denominator * self._step)
+        rise = nodes[left + 1] - nodes[left]
+        return Fraction(nodes[left] * self._step + rise * past, self._denominator * self._step)
 
-    def line(self, beta: Fraction) -> Line:
-        """Return the law at one beta in counts: slope per command code, and value at code 0."""
-        return evaluate_line(
+    def corners(self, betas: Betas) -> list[tuple[int, Fraction]]:
+        """Return the law in counts at the ends of its straight parts: zero command, the edge's end, full command."""
+        line = evaluate_line(
             self._law,
-            beta=beta,
+            beta=betas.law,
             kappa=self._kappa,
             u_min0_over_u_max=self._u_min0,
-            n_adc=self.command_max,
+            n_adc=self.span,
             n_full=self.compare_max,
         )
+        corners = [(0, betas.zero * self._u_min0 * self.compare_max)]
+        if self._edge:
+            corners.append((self._edge, line.slope * self._edge + line.start))
+        return [*corners, (self.span, line.slope * self.span + line.start)]
 
-    def rows(self, betas: list[Fraction]) -> Iterator[np.ndarray]:
-        """Yield, for command codes 0, 1, ..., the rounded and limited compare values at all `betas`."""
-        at = {beta: self.line(beta) for beta in set(betas)}
-        lines = [at[beta] for beta in betas]
+    def rows(self, betas: list[Betas]) -> Iterator[np.ndarray]:
+        """Yield, for command codes 0, 1, ... from zero on, the rounded and limited compare values at all `betas`."""
+        at = {pair: self.corners(pair) for pair in set(betas)}
+        parts = [at[pair] for pair in betas]
+        for part in range(len(parts[0]) - 1):
+            first, last = parts[0][part][0], parts[0][part + 1][0]
+            starts = [corners[part][1] for corners in parts]
+            slopes = [(corners[part + 1][1] - corners[part][1]) / (last - first) for corners in parts]
+            # Neighbouring parts share a corner; the last one has its end too.
+            yield from self._straight(starts, slopes, last - first + (part == len(parts[0]) - 2))
+
+    def _straight(self, starts: list[Fraction], slopes: list[Fraction], count: int) -> Iterator[np.ndarray]:
         half = Fraction(1, 2)
-        scale = lcm(*(value.denominator for slope, start in lines for value in (slope, start + half)))
+        scale = lcm(*(value.denominator for value in {*slopes, *(start + half for start in starts)}))
         if scale >= 2**62:
             raise RequirementError(f"the law's common denominator needs {scale.bit_length()} bits, expected at most 62")
         # floor(value + 1/2) rounds to nearest, a half up.
-        starts = [divmod(int((start + half) * scale), scale) for _, start in lines]
-        slopes = [divmod(int(slope * scale), scale) for slope, _ in lines]
-        quotient, remainder = (np.array(column, dtype=np.int64) for column in zip(*starts, strict=True))
-        step, carry = (np.array(column, dtype=np.int64) for column in zip(*slopes, strict=True))
-        for _ in range(self.command_max + 1):
-            yield np.clip(quotient, 0, self.compare_max)
+        split = [divmod(int((start + half) * scale), scale) for start in starts]
+        steps = [divmod(int(slope * scale), scale) for slope in slopes]
+        quotient, remainder = (np.array(column, dtype=np.int64) for column in zip(*split, strict=True))
+        step, carry = (np.array(column, dtype=np.int64) for column in zip(*steps, strict=True))
+        for _ in range(count):
+            yield np.clip(quotient, 0, self.compare_limit)
             remainder = remainder + carry
             over = remainder >= scale
             remainder = np.where(over, remainder - scale, remainder)

@@ -4,14 +4,14 @@ import io
 import json
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from dzdesign.core.artefacts import MANIFEST_NAME, TOOL, parse_document, read_bytes, sha256_of, to_json
 from dzdesign.core.errors import RequirementError
 from dzdesign.core.shape import check_shape
-from dzdesign.design.compensator import compensator_from_document
+from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.identify.valve_file import valve_from_document
 from dzdesign.verify.all_inputs import InputCheck, check_all_inputs
 from dzdesign.verify.closed_loop import ClosedLoop, LoopComparison, RampSequence, compare_at_pressure
@@ -45,8 +45,8 @@ class Verification:
     ----------
     checks : tuple of Check
         Every requirement that was tried; the firmware holds if all of them do.
-    inputs : InputCheck or None
-        Figures of the input check; None if the core did not compile.
+    inputs : tuple of InputCheck
+        Figures of the input check, one a sign of command; empty if the core did not compile.
     loops : tuple of LoopComparison
         Closed loop, one a tested pressure drop.
     plant_source : str
@@ -56,7 +56,7 @@ class Verification:
     """
 
     checks: tuple[Check, ...]
-    inputs: InputCheck | None
+    inputs: tuple[InputCheck, ...]
     loops: tuple[LoopComparison, ...]
     plant_source: str
     document: dict[str, Any]
@@ -97,22 +97,27 @@ def verify(
     folder = Path(folder)
     manifest_bytes = read_bytes(folder / MANIFEST_NAME, "firmware manifest")
     manifest = parse_document(manifest_bytes, str(folder / MANIFEST_NAME), (FIRMWARE_SCHEMA,))
-    check_shape(manifest, {"files": dict}, str(folder / MANIFEST_NAME), "make it again with `dzdesign codegen`")
+    check_shape(
+        manifest, {"files": dict, "core": [str]}, str(folder / MANIFEST_NAME), "make it again with `dzdesign codegen`"
+    )
     content = read_bytes(folder / "compensator.json", "compensator")
     compensator_from_document(content, str(folder / "compensator.json"))  # every key that is read below
     document = json.loads(content)
     host_compiler()
     say("compiling the core with every warning an error")
-    checks = [_files_unchanged(folder, manifest), _compiles_strictly(folder)]
-    inputs, loops = None, ()
+    checks = [_files_unchanged(folder, manifest), _compiles_strictly(folder, manifest)]
+    inputs: tuple[InputCheck, ...] = ()
+    loops: tuple[LoopComparison, ...] = ()
+    signs = (1, -1) if document["sides"]["negative"] else (1,)
     if checks[1].holds:
         say("comparing every input with the exact law")
         try:
-            inputs = check_all_inputs(folder)
+            inputs = tuple(check_all_inputs(folder, sign) for sign in signs)
         except RequirementError as error:
             checks.append(Check(name="equals the exactly rounded law", holds=False, text=str(error)))
     if inputs:
-        checks += _input_checks(inputs)
+        for each in inputs:
+            checks += _input_checks(each, len(inputs) > 1)
         say("running the closed loop")
         loops = _run_loops(folder, document, plant, sequence or RampSequence())
         checks += [_plant_opens(loops), _no_flow_at_zero(loops, document, plant)]
@@ -128,7 +133,7 @@ def verify(
             "made_from": [{"source": f"{folder.name}/{MANIFEST_NAME}", "sha256": sha256_of(manifest_bytes)}],
             "holds": all(check.holds for check in checks),
             "checks": [asdict(check) for check in checks],
-            "inputs": asdict(inputs) if inputs else None,
+            "inputs": [asdict(each) for each in inputs],
             "closed_loop": {
                 "plant": plant_document(plant) if plant else None,
                 "plant_source": source,
@@ -149,11 +154,13 @@ def _files_unchanged(folder: Path, manifest: dict[str, Any]) -> Check:
     return Check(name="files as generated", holds=not changed, text=text)
 
 
-def _compiles_strictly(folder: Path) -> Check:
+def _compiles_strictly(folder: Path, manifest: dict[str, Any]) -> Check:
     compilers = find_compilers()
     try:
         for compiler in compilers:
-            check_strictly(folder / "core" / "dz_comp.c", compiler)
+            for name in manifest["core"]:
+                if name.endswith(".c"):
+                    check_strictly(folder / name, compiler)
     except RequirementError as error:
         return Check(name="compiles without a warning", holds=False, text=str(error))
     names = ", ".join(sorted({Path(compiler).name for compiler in compilers}))
@@ -164,10 +171,10 @@ def _compiles_strictly(folder: Path) -> Check:
     )
 
 
-def _input_checks(inputs: InputCheck) -> list[Check]:
-    """Return one requirement per property of the input check."""
+def _input_checks(inputs: InputCheck, both: bool) -> list[Check]:
+    """Return one requirement per property of the input check; of two sides each says which."""
     found = inputs.first_wrong or ""
-    return [
+    checks = [
         Check(
             name="equals the exactly rounded law",
             holds=inputs.wrong == 0,
@@ -192,11 +199,14 @@ def _input_checks(inputs: InputCheck) -> list[Check]:
             "of each difference; at zero, half and full command all pairs)",
         ),
         Check(
-            name="impossible codes fall back",
-            holds=inputs.bad_fallbacks == 0,
-            text=f"{inputs.bad_fallbacks} codes beyond the converter's range without the safe value",
+            name="codes that are not sound fall back",
+            holds=not (inputs.bad_fallbacks or inputs.bad_status),
+            text=f"{inputs.bad_fallbacks} codes outside the sound ones without the safe value, {inputs.bad_status} "
+            "status words that say otherwise",
         ),
     ]
+    label = ("positive" if inputs.sign > 0 else "negative") + " commands: " if both else ""
+    return [replace(check, name=label + check.name) for check in checks]
 
 
 def _run_loops(
@@ -204,22 +214,19 @@ def _run_loops(
 ) -> tuple[LoopComparison, ...]:
     """Run the closed loop at every tested pressure drop, two at a time."""
     valve = valve_from_document(to_json(document["valve"]).encode(), "compensator.json")
-    side, signals = valve.positive, document["signals"]
-    span = signals["pressure_span_MPa"][0] / signals["pressure_span_MPa"][1]
-    scalings = {
-        "pressure_span_MPa": span,
-        "code_max": signals["pressure_code_max"],
-        "compare_max": signals["compare_max"],
-    }
-    if plant is None:
-        plants = plants_from_tests(side, valve.u_max_V)
-        loops = {dp: ClosedLoop(one, folder, **scalings) for dp, one in plants.items()}
-    else:
-        loops = dict.fromkeys(side.beta_dp_MPa, ClosedLoop(plant, folder, **scalings))
+    loops: list[tuple[float, ClosedLoop, float, str]] = []
+    for name, sign in (("positive", 1), ("negative", -1)):
+        if not document["sides"][name]:
+            continue
+        side = valve.sides[name]
+        if plant is None:
+            plants = plants_from_tests(side, valve.u_max_V)
+            found = {dp: ClosedLoop(one, folder, document, sign) for dp, one in plants.items()}
+        else:
+            found = dict.fromkeys(side.beta_dp_MPa, ClosedLoop(plant, folder, document, sign))
+        loops += [(dp, loop, side.reference_dp_MPa, name) for dp, loop in found.items()]
     with ThreadPoolExecutor(WORKERS) as pool:
-        runs = pool.map(
-            lambda item: compare_at_pressure(item[1], item[0], side.reference_dp_MPa, sequence), loops.items()
-        )
+        runs = pool.map(lambda item: compare_at_pressure(item[1], item[0], item[2], sequence, item[3]), loops)
         return tuple(runs)
 
 
@@ -236,7 +243,7 @@ def _plant_opens(loops: tuple[LoopComparison, ...]) -> Check:
 
 def _no_flow_at_zero(loops: tuple[LoopComparison, ...], document: dict[str, Any], plant: Plant | None) -> Check:
     name = "no flow at zero command in the closed loop"
-    if plant is None and document["certificate"]["guard"] == "opening":
+    if plant is None and any(side and side["certificate"]["guard"] == "opening" for side in document["sides"].values()):
         return Check(
             name=name,
             holds=None,

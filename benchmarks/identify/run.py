@@ -8,10 +8,12 @@ Exit status 1 if a limit is missed.
 import argparse
 import os
 import sys
+from pathlib import Path
 from time import perf_counter
 
 for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "POLARS_MAX_THREADS"):
     os.environ.setdefault(_threads, "1")  # before NumPy is imported: ratios of one core
+sys.path.insert(0, str(Path(__file__).parents[1]))  # for the scoreboard that all benchmarks share
 
 from accuracy import print_accuracy  # noqa: E402
 from coverage import print_coverage, print_residual  # noqa: E402

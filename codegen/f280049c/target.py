@@ -152,6 +152,9 @@ TARGET = Target(
     description="TI TMS320F280049C at 100 MHz: DriverLib, ePWM1 at 2.5 kHz, ADC at 1.25 kHz, CCS project and makefile",
     compare_max=int(CONTEXT["compare_max"]),
     adc_code_max=int(CONTEXT["adc_code_max"]),
+    adc_full_V=ADC_SPAN_V,
+    sample_Hz=SAMPLE_HZ,
+    tick_Hz=PWM_HZ,
     templates={f"{FOLDER}/{file}": f"{file}.jinja" for file in FILES},
     context=CONTEXT,
 )

@@ -230,6 +230,11 @@ uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
     return (uint16_t)(u_adc + 10u * p_a_adc + 100u * p_b_adc);
 }
 
+uint16_t dz_status(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
+{
+    return (uint16_t)((u_adc != 0u ? 1u : 0u) + (p_a_adc != 1u ? 2u : 0u) + (p_b_adc == 2u ? 4u : 0u));
+}
+
 uint16_t dz_beta(uint16_t p_a_adc, uint16_t p_b_adc) { return (uint16_t)(3u * p_a_adc + 7u * p_b_adc); }
 
 /* Codes of ADCINA0, A1, A2 in the n-th sample: 100 (n modulo 41), 1, 2; other channels give nonsense. */

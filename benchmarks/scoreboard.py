@@ -1,7 +1,7 @@
 """Rows of results with their limits, as tables."""
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 WIDTH = 150
@@ -44,6 +44,24 @@ def print_rows(title: str, rows: Iterable[Row]) -> None:
         limit = "" if row.limit is None else f"{row.limit:g} {row.unit}".strip()
         table.add_row(row.what, f"{row.value:.4g} {row.unit}".strip(), limit, row.verdict, row.note)
     console().print(table)
+
+
+def markdown(headings: Sequence[str], cells: Iterable[Sequence[str]]) -> str:
+    """Return a Markdown table, its columns padded."""
+    table = [list(headings), *map(list, cells)]
+    widths = [max(len(row[column]) for row in table) for column in range(len(headings))]
+    table.insert(1, ["-" * width for width in widths])
+    lines = (" | ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in table)
+    return "\n".join(f"| {line} |" for line in lines)
+
+
+def markdown_rows(rows: Iterable[Row]) -> str:
+    """Return rows as a Markdown table."""
+    cells = []
+    for row in rows:
+        limit = "" if row.limit is None else f"{row.limit:g} {row.unit}".strip()
+        cells.append((row.what, f"{row.value:.4g} {row.unit}".strip(), limit, row.verdict, row.note))
+    return markdown(("goal", "measured", "limit", "verdict", "note"), cells)
 
 
 def say(text: str) -> None:

@@ -1,0 +1,49 @@
+"""A `Contender`: one implementation of the law as C sources with the entry ``dz_comp``, and how it was made."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from dzdesign.codegen.project import generate
+from dzdesign.design.compensator import Compensator
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contender:
+    """One row of the table.
+
+    Attributes
+    ----------
+    name : str
+        In the table.
+    made : str
+        How, in a sentence.
+    sources : mapping
+        File name to text; together they define ``uint16_t dz_comp(uint16_t, uint16_t, uint16_t)``.
+    ours : bool
+        True for the product's own.
+    fast : bool
+        False for soft floating point in doubles, with which all inputs on an emulated Cortex-M4 take hours.
+    """
+
+    name: str
+    made: str
+    sources: Mapping[str, str]
+    ours: bool = False
+    fast: bool = True
+
+
+def our_forms(compensator: Compensator) -> list[Contender]:
+    """Return the product's core in every form that the generator has; a new form is one line of `forms`."""
+    forms = {
+        "wide": ("32x32->64 bit products", generate(compensator, "f28335").files),
+        "narrow": ("32-bit arithmetic only", generate(compensator, "avr").files),
+    }
+    return [
+        Contender(
+            name=f"ours, {form}",
+            made=f"`dzdesign codegen`, {text}.",
+            sources={path.removeprefix("core/"): c for path, c in files.items() if path.startswith("core/dz_comp.")},
+            ours=True,
+        )
+        for form, (text, files) in forms.items()
+    ]

@@ -1,0 +1,97 @@
+"""Benchmark of the generated core against what others would flash: ``run.py [--compensator compensator.json]``.
+
+One run, one Markdown table: instructions a call on x86-64 (callgrind) and on a Cortex-M4F (QEMU), cycles on AVR
+(simavr), bytes of code and constants, wrong compare values of all inputs and the largest error; then the goals.
+Counts are from the core's first instruction to its return. Exit status 1 if a goal is missed.
+"""
+
+import argparse
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from time import perf_counter
+
+sys.path.insert(0, str(Path(__file__).parents[1]))  # for the scoreboard that all benchmarks share
+
+import on_avr
+import on_cortex_m4
+import on_x86
+from contender import our_forms
+from goals import goals
+from measuring import Measured, measure
+from rival_cores import rivals
+from scoreboard import markdown, markdown_rows, say
+from tried_inputs import RANDOM_INPUTS, SEED, Codes, expected_compares, tried_inputs
+
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.compensator_file import compensator_from_document
+
+KNOWN_LENGTHS = (0, 7, 300)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Measure all contenders, print the table and the goals."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--compensator", type=Path, help="compensator.json; without it the bundled example is designed")
+    chosen = parser.parse_args(arguments)
+    for machine in (on_x86.X86, on_cortex_m4.CORTEX_M4, on_avr.AVR):
+        if missing := machine.missing():
+            print(f"benchmark: {machine.compiler}: {missing}; apt-get install it", file=sys.stderr)
+            return 2
+    start = perf_counter()
+    compensator = _compensator(chosen.compensator)
+    inputs = tried_inputs(compensator)
+    expected = expected_compares(compensator, inputs)
+    contenders = our_forms(compensator) + rivals(compensator)
+    with tempfile.TemporaryDirectory(prefix="bench-isr-") as folder:
+        _validate(inputs[:3], Path(folder))
+        results = []
+        for index, contender in enumerate(contenders):
+            say(f"{contender.name} ...")
+            results.append(measure(contender, compensator, inputs, expected, Path(folder) / str(index)))
+    nodes, compare_max = len(compensator.positive.beta_numerators), compensator.signals.compare_max
+    print(
+        f"\nLaw `{compensator.law_name}`, {nodes} nodes of beta, compare 0..{compare_max}. Counts from its first "
+        f"instruction to its return, least-most over {len(inputs)} inputs: corners, edges of nodes, impossible codes, "
+        f"{RANDOM_INPUTS} random (seed {SEED}). All compiled with -std=c99 -O2.\n"
+    )
+    print(markdown(Measured.HEADINGS, [result.cells() for result in results]))
+    print("\nHow each was made:\n")
+    print("\n".join(f"- {contender.name}: {contender.made}" for contender in contenders))
+    rows = goals(results)
+    print("\n" + markdown_rows(rows))
+    missed = sum(row.verdict == "MISSES" for row in rows)
+    print(f"\n{missed} of {len(rows)} goals missed; {perf_counter() - start:.0f} s", flush=True)
+    return 1 if missed else 0
+
+
+def _compensator(path: Path | None) -> Compensator:
+    if path:
+        return compensator_from_document(path.read_bytes(), str(path))
+    from importlib.resources import files
+
+    from dzdesign.design.designing import design
+    from dzdesign.identify.identification import identify
+    from dzdesign.identify.ramp_files import read_ramp_file
+
+    ramps = Path(str(files("dzdesign.example"))) / "ramps"
+    return design(identify([read_ramp_file(ramp) for ramp in sorted(ramps.glob("*.csv.gz"))]))
+
+
+def _validate(inputs: Sequence[Codes], folder: Path) -> None:
+    """Count cores of known length; a count that is off ends the benchmark."""
+    for machine, unit in (
+        (on_x86, "instructions, x86-64"),
+        (on_cortex_m4, "instructions, M4"),
+        (on_avr, "cycles, AVR"),
+    ):
+        for length in KNOWN_LENGTHS:
+            found = set(machine.count(machine.known(length), inputs, folder / f"known{length}").counts)
+            if found != {length + machine.RETURN}:
+                raise RuntimeError(f"{unit}: {length} no-operations and a return were counted as {sorted(found)}")
+        say(f"{unit}: right for {KNOWN_LENGTHS} no-operations and a return")
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

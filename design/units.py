@@ -1,0 +1,72 @@
+"""The units of beta and of the law's coefficients: as fine as the firmware's 64-bit arithmetic takes them."""
+
+from dataclasses import dataclass
+from math import gcd
+
+from dzdesign.core.errors import InputError
+from dzdesign.design.beta_table import STEP_CODES
+from dzdesign.design.signals import Signals
+
+#: Finest and coarsest, as powers of two. Beta stays below 2, so a node fits 16 bits; a coefficient over 2^16 is finer
+#: than half a count of a PWM of 60 000.
+BETA_BITS = (15, 11)
+COEFFICIENT_BITS = (16, 12)
+#: What either factor of the firmware's product may take: 31 bits, and half of it for the sum of two terms.
+TABLE_LIMIT = 2**31
+FACTOR_LIMIT = 2**30
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Units:
+    """Denominators, powers of two: of beta's nodes, and of k x_max/u_max and u_min0/u_max."""
+
+    beta: int
+    coefficient: int
+
+
+def finest_units(signals: Signals, edge_codes: int) -> Units:
+    """Return the finest units with which the law in counts fits the firmware's arithmetic.
+
+    In counts the law is ``B (p c + o) / (D S K C E) * M``; what the PWM's range M has in common with the denominator
+    cancels, and what remains of M goes with the table B or with the factor in c, each of which has 31 bits.
+
+    Parameters
+    ----------
+    signals : Signals
+        Scalings: C codes of command, M counts of the PWM.
+    edge_codes : int
+        E, codes of the edge; 0 without one.
+
+    Raises
+    ------
+    InputError
+        If even the coarsest do not fit.
+    """
+    spans = [signals.command.span(sign) for sign in signals.signs]
+    finest, coarsest = sum((BETA_BITS[0], COEFFICIENT_BITS[0])), sum((BETA_BITS[1], COEFFICIENT_BITS[1]))
+    for total in range(finest, coarsest - 1, -1):
+        for coefficient in range(COEFFICIENT_BITS[0], COEFFICIENT_BITS[1] - 1, -1):
+            beta = total - coefficient
+            if BETA_BITS[1] <= beta <= BETA_BITS[0] and all(
+                _fits(span, signals.compare_max, edge_codes, beta, coefficient) for span in spans
+            ):
+                return Units(beta=1 << beta, coefficient=1 << coefficient)
+    raise InputError(
+        f"a full command of {' and '.join(map(str, spans))} codes over {signals.compare_max} counts of the PWM needs more "
+        "than 64-bit arithmetic; choose an attenuator whose full command has more factors in common with the counts"
+    )
+
+
+def _fits(span: int, compare_max: int, edge_codes: int, beta_bits: int, coefficient_bits: int) -> bool:
+    """Tell whether table and factor fit with some divisor of what remains of the PWM's range moved to the table."""
+    edge = max(edge_codes, 1)
+    powers = STEP_CODES << (beta_bits + coefficient_bits)
+    shared = gcd(compare_max, powers * span * edge)
+    remains = compare_max // shared
+    table = STEP_CODES << (beta_bits + 1)
+    factor = (span // gcd(span, compare_max)) * edge << coefficient_bits
+    return any(
+        table * moved < TABLE_LIMIT and factor * (remains // moved) < FACTOR_LIMIT
+        for moved in range(1, remains + 1)
+        if remains % moved == 0
+    )

@@ -1,0 +1,168 @@
+"""The ISR benchmark's own machinery: counts of code of known length, its exact rows, and that it sees wrong cores."""
+
+import on_avr
+import on_cortex_m4
+import on_x86
+import pytest
+from building import Counts
+from contender import Contender, our_forms
+from goals import goals
+from measuring import Measured
+from rival_cores import rivals
+from tried_inputs import exact_rows_header, expected_compares, tried_inputs
+
+MACHINES = {
+    "x86-64": (on_x86, on_x86.X86),
+    "Cortex-M4": (on_cortex_m4, on_cortex_m4.CORTEX_M4),
+    "AVR": (on_avr, on_avr.AVR),
+}
+
+
+def needs(toolchain):
+    return pytest.mark.skipif(bool(toolchain.missing()), reason=f"{toolchain.compiler}: {toolchain.missing()}")
+
+
+on_every_machine = pytest.mark.parametrize(
+    "machine", [pytest.param(module, marks=needs(chain), id=name) for name, (module, chain) in MACHINES.items()]
+)
+
+
+@pytest.fixture(scope="module")
+def inputs(example_compensator):
+    return tried_inputs(example_compensator)
+
+
+@pytest.fixture(scope="module")
+def expected(example_compensator, inputs):
+    return expected_compares(example_compensator, inputs)
+
+
+@on_every_machine
+@pytest.mark.parametrize("length", [0, 41])
+def test_code_of_known_length_is_counted_right(machine, length, tmp_path):
+    found = machine.count(machine.known(length), [(0, 0, 0), (5, 6, 7)], tmp_path)
+    assert found.counts == (length + machine.RETURN,) * 2
+
+
+#: A loop of four cycles, its last turn three, the two loads of its counter and the return.
+AVR_LOOP = """\
+.global dz_comp
+.type dz_comp, STT_FUNC
+dz_comp: ldi r24, 0x00
+ldi r25, 0xC0
+1: sbiw r24, 1
+brne 1b
+ret
+"""
+
+
+@needs(on_avr.AVR)
+def test_cycles_beyond_the_16_bits_of_the_timer_are_counted(tmp_path):
+    core = Contender(name="loop", made="", sources={"loop.S": AVR_LOOP})
+    assert on_avr.count(core, [(0, 0, 0)], tmp_path).counts == (2 + 4 * 0xC000 - 1 + on_avr.RETURN,)
+
+
+@on_every_machine
+def test_what_depends_on_the_input_is_seen(machine, tmp_path):
+    text = (
+        "#include <stdint.h>\nuint16_t dz_comp(uint16_t u, uint16_t a, uint16_t b)"
+        "{ for (volatile uint16_t i = 0; i < u; i++) {} return (uint16_t)(a + b); }\n"
+    )
+    core = Contender(name="loop", made="", sources={"dz_comp.c": text})
+    found = machine.count(core, [(0, 1, 2), (10, 3, 4)], tmp_path)
+    assert found.most > found.least + 20 and found.compares == (3, 7)
+
+
+@on_every_machine
+def test_our_core_gives_the_exact_law_on_every_counted_input(machine, example_compensator, inputs, expected, tmp_path):
+    for index, form in enumerate(our_forms(example_compensator)):
+        found = machine.count(form, inputs, tmp_path / str(index))
+        assert found.compares == tuple(expected), form.name
+        assert found.least > 0
+
+
+@pytest.mark.xfail(reason="the core branches on impossible pressures and commands", strict=True)
+@on_every_machine
+def test_our_core_takes_the_same_for_every_input(machine, example_compensator, inputs, tmp_path):
+    """Every form on machines with products of 32 bits; on AVR, whose library has branches, the one that is chosen."""
+    forms = our_forms(example_compensator)
+    found = [machine.count(form, inputs, tmp_path / str(index)) for index, form in enumerate(forms)]
+    judged = [min(found, key=lambda each: each.most)] if machine is on_avr else found
+    assert all(each.least == each.most for each in judged)
+
+
+def test_the_expected_values_are_those_of_the_compensator(example_compensator, inputs, expected):
+    """Two ways to the same numbers: addition with carry, and one exact product."""
+    c = example_compensator
+    for (u, p_a, p_b), value in zip(inputs, expected, strict=True):
+        if u > c.signals.code_max:
+            assert value == 0
+        else:
+            possible = max(p_a, p_b) <= c.signals.code_max
+            assert value == c.compare(u, p_a - p_b if possible else -c.signals.code_max)
+
+
+@needs(on_x86.X86)
+def test_rivals_do_the_same_job(example_compensator, inputs, expected, tmp_path):
+    """Within a count, impossible codes included; only the unchecked table leaves those out."""
+    for index, rival in enumerate(rivals(example_compensator)):
+        found = on_x86.count(rival, inputs, tmp_path / str(index))
+        wrong = sum(abs(a - b) > 1 for a, b in zip(found.compares, expected, strict=True))
+        assert (wrong > 0) == rival.name.endswith("unchecked"), rival.name
+
+
+@pytest.mark.parametrize(
+    "machine",
+    [
+        pytest.param(on_x86, marks=needs(on_x86.X86), id="x86-64"),
+        pytest.param(on_cortex_m4, marks=needs(on_cortex_m4.CORTEX_M4), id="Cortex-M4"),
+    ],
+)
+def test_a_core_that_is_wrong_once_is_seen(machine, example_compensator, tmp_path):
+    """Seeded: three counts more at one command and one pair of pressures, out of all inputs."""
+    (form, *_) = our_forms(example_compensator)
+    rows = exact_rows_header(example_compensator)
+    core = form.sources["dz_comp.c"].replace("uint16_t dz_comp(", "uint16_t right_comp(")
+    fault = (
+        "uint16_t dz_comp(uint16_t u, uint16_t a, uint16_t b)\n"
+        "{ return (uint16_t)(right_comp(u, a, b) + 3 * (u == 1234 && a == 700 && b == 0)); }\n"
+    )
+    prototype = "#include <stdint.h>\nuint16_t right_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);\n"
+    sources = {**form.sources, "dz_comp.c": prototype + core + fault}
+    wrong = Contender(name="wrong", made="seeded", sources=sources)
+    assert machine.check_all(wrong, rows, tmp_path) == (33550336, 1, 3)
+
+
+def measured(name, counts, *, ours=False, wrong=0):
+    each = Counts(counts=counts, compares=(0,) * len(counts))
+    return Measured(
+        contender=Contender(name=name, made="", sources={}, ours=ours), x86=each, cortex_m4=each, avr=each,
+        code_bytes=(1, 1, 1), inputs=9, wrong_host=wrong, largest_error=wrong, wrong_cortex_m4=0, wrong_tried=(0, 0, 0),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("counts", "wrong", "missed"),
+    [((40, 40), 0, 0), ((40, 40), 1, 1), ((39, 40), 0, 2), ((42, 42), 0, 1), ((51, 51), 0, 2), ((961, 961), 0, 3)],
+)
+def test_the_goals_are_judged(counts, wrong, missed):
+    others = [
+        measured("float32 slope table", (40,)),
+        measured("float32 slope table, unchecked", (30,)),
+        measured("casadi pw_lin", (10, 4100)),
+    ]
+    verdicts = [row.verdict for row in goals([measured("ours", counts, ours=True, wrong=wrong), *others])]
+    assert verdicts.count("MISSES") == missed and len(verdicts) == 6
+
+
+def test_each_machine_judges_the_form_that_is_fastest_there():
+    """A second form that is slow on the Cortex-M4 costs nothing there; wrong or uneven it may not be."""
+    others = [
+        measured("float32 slope table", (40,)),
+        measured("float32 slope table, unchecked", (30,)),
+        measured("casadi pw_lin", (10, 4100)),
+    ]
+    fast = measured("fast", (40, 40), ours=True)
+    for slow, missed in (((900, 900), 0), ((900, 901), 1)):
+        rows = goals([fast, measured("slow", slow, ours=True), *others])
+        assert [row.verdict for row in rows].count("MISSES") == missed

@@ -1,0 +1,32 @@
+/* Stands in for the firmware where the valve is driven directly. */
+#ifndef DZ_DRIVE_H
+#define DZ_DRIVE_H
+
+#include <stdint.h>
+
+struct dz_drive
+{
+    uint16_t compare_a;
+    uint16_t compare_b;
+};
+
+static void dz_drive_init(struct dz_drive *drive)
+{
+    drive->compare_a = 0u;
+    drive->compare_b = 0u;
+}
+
+static void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
+{
+    (void)drive;
+    (void)u_adc;
+    (void)p_a_adc;
+    (void)p_b_adc;
+}
+
+static void dz_drive_tick(struct dz_drive *drive)
+{
+    (void)drive;
+}
+
+#endif
