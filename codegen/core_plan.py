@@ -4,6 +4,7 @@ from fractions import Fraction
 from typing import Any
 
 from dzdesign.codegen.integer_form import IntegerForm, integer_form, segments_of
+from dzdesign.codegen.telemetry import beta_factor
 from dzdesign.derivation.law import law
 from dzdesign.design.amplifier import RAMP_UNIT
 from dzdesign.design.compensator import Compensator
@@ -45,14 +46,26 @@ def core_plan(compensator: Compensator, sign: int, arithmetic: str) -> Plan:
         "edge": bool(compensator.edge_codes),
         "edge_codes": str(compensator.edge_codes),
         "edge_text": f"{compensator.edge_codes / compensator.signals.command.span(sign):.2%}",
-        "edge_sum_text": f"\n *           - gap * {form.edge} * max({compensator.edge_codes} - c, 0)"
+        "edge_sum_text": f"\n *           - (beta - beta_closing) * {form.edge} * max({compensator.edge_codes} - c, 0)"
         if form.edge
         else "",
+        **_beta_plan(compensator, form),
         "beta_scale": str(form.scale_beta * compensator.beta_denominator),
         "step_codes": str(compensator.beta_step_codes),
         "step_MPa": f"{float(compensator.signals.dp_MPa(compensator.beta_step_codes)):.4f}",
         "step_shift": str(compensator.beta_step_codes.bit_length() - 1),
     }
+
+
+def _beta_plan(compensator: Compensator, form: IntegerForm) -> Plan:
+    """Return what brings the table's beta to the 2^-15 of dz_beta()."""
+    step = compensator.beta_step_codes
+    factor, shift = beta_factor(form.scale_beta * compensator.beta_denominator * step, max(form.table) * step)
+    if shift >= 32:
+        narrow = f"scaled.high >> {shift - 32}" if shift > 32 else "scaled.high"
+    else:
+        narrow = f"(scaled.high << {32 - shift}) | (scaled.low >> {shift})" if shift else "scaled.low"
+    return {"beta_factor": str(factor), "beta_shift": str(shift), "beta_narrow": narrow}
 
 
 def header_plan(compensator: Compensator) -> Plan:

@@ -84,6 +84,7 @@ def generate(compensator: Compensator, target_name: str, compensator_bytes: byte
     recordings = ramp_tests_of(compensator)
     header = header_plan(compensator)
     hardware = {**target.context, "u_max_V": header["u_max_V"], "pressure_span_MPa": header["a_span_MPa"]}
+    hardware["firmware_origin"] = f"0x{digest[:4].upper()}"
     shared = environment(PACKAGE)
     plans = [(path, shared, template, plan) for path, template, plan in _core_files(compensator, target, header)]
     own = environment(f"{PACKAGE}.{target.folder}")

@@ -7,6 +7,7 @@ from fractions import Fraction
 from pathlib import PurePosixPath
 from types import MappingProxyType
 
+from dzdesign.codegen.telemetry import Link
 from dzdesign.core.errors import DzdesignError, InputError
 from dzdesign.design.signal_text import Converter
 from dzdesign.design.signals import Signals
@@ -14,7 +15,7 @@ from dzdesign.design.signals import Signals
 #: Products that the core may use: 32x32->64 bits, or none longer than 32 bits.
 ARITHMETICS = ("wide", "narrow")
 
-RENDERER_NAMES = frozenset({"banner", "project", "u_max_V", "pressure_span_MPa"})
+RENDERER_NAMES = frozenset({"banner", "project", "u_max_V", "pressure_span_MPa", "firmware_origin"})
 """Names that the renderer itself passes to every template; a target's context may not use them."""
 
 
@@ -51,6 +52,8 @@ class Target:
         those that the targets share.
     context
         Every value that a template prints, already a string.
+    link
+        The serial line of its telemetry, or None if it sends none.
     arithmetic
         ``"wide"``: the core multiplies 32x32->64 bits; ``"narrow"``: nothing is longer than 32 bits.
     takes_any_signals
@@ -74,6 +77,7 @@ class Target:
     context: Mapping[str, str]
     arithmetic: str = "wide"
     takes_any_signals: bool = False
+    link: Link | None = None
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", self.name):

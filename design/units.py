@@ -52,8 +52,8 @@ def finest_units(signals: Signals, edge_codes: int) -> Units:
             ):
                 return Units(beta=1 << beta, coefficient=1 << coefficient)
     raise InputError(
-        f"a full command of {' and '.join(map(str, spans))} codes over {signals.compare_max} counts of the PWM needs "
-        "more than 64-bit arithmetic; choose an attenuator whose full command has more factors in common with the counts"
+        f"a full command of {' and '.join(map(str, spans))} codes over {signals.compare_max} counts needs more than "
+        "64-bit arithmetic; choose an attenuator whose full command has more factors in common with the counts"
     )
 
 

@@ -173,6 +173,18 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
             _given("firmware", metavar="DIR", help="made by `dzdesign codegen`"),
             _given(*OUTPUT, default="evidence", metavar="DIR", help="folder to write"),
             PLANT,
+            _given("--c2000ware", metavar="DIR", help="also compile f28335 firmware against your C2000Ware's headers"),
+        ),
+    ),
+    "monitor": (
+        "the telemetry of a running firmware in, a ramp file out",
+        "dzdesign.monitor:run_monitor",
+        (
+            _given("port", metavar="PORT", help="serial port, such as COM5 or /dev/ttyUSB0"),
+            _given("--firmware", default="firmware", metavar="DIR", help="made by `dzdesign codegen`: the scalings"),
+            _given("--baud", metavar="N", help="bits in a second (default: what the firmware sends)"),
+            _given("--seconds", metavar="S", help="to record from the first frame on (default: until Ctrl-C)"),
+            _given(*OUTPUT, default="ramp.csv", metavar="FILE", help="file to write"),
         ),
     ),
     "simulate": (

@@ -233,6 +233,7 @@ def _list_targets(args: argparse.Namespace) -> int:
 def run_verify(args: argparse.Namespace) -> int:
     """Verify a firmware folder and write the evidence."""
     from dzdesign.tables import print_verification
+    from dzdesign.verify.c2000ware import check_against_c2000ware, with_check
     from dzdesign.verify.plant import read_plant
     from dzdesign.verify.verification import SCHEMA, evidence_files, verify
 
@@ -240,7 +241,10 @@ def run_verify(args: argparse.Namespace) -> int:
     check_folder_may_be_written(output, SCHEMA)
     plant = read_plant(Path(args.plant)) if args.plant else None
     source = Path(args.plant).name if args.plant else ""
-    verification = verify(Path(args.firmware), plant, source, say=say)
+    firmware = Path(args.firmware)
+    ware = check_against_c2000ware(firmware, Path(args.c2000ware), say) if args.c2000ware else None
+    verification = verify(firmware, plant, source, say=say)
+    verification = with_check(verification, ware) if ware else verification
     manifest = {"schema": SCHEMA, "tool": TOOL, "made_from": verification.document["made_from"]}
     write_folder(output, evidence_files(verification), manifest)
     if args.json:

@@ -4,6 +4,8 @@ Oracle of the register values: technical reference manual of the TMS320x2833x (S
 C2000Ware's F2833x examples; of the zero-duty case: SPRAAI1.
 """
 
+import itertools
+import re
 import shutil
 import subprocess
 from dataclasses import replace
@@ -12,82 +14,26 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from f28335_device import build, column, needs_compiler, periods, registers, render_firmware, run
 
 from dzdesign.codegen.f28335 import target as f28335
 from dzdesign.codegen.f28335.target import TARGET
-from dzdesign.codegen.project import banner, environment
 from dzdesign.core.errors import DzdesignError
 
-HERE = Path(__file__).parent / "f28335"
-COMPILER = next((path for name in ("cc", "gcc", "clang") if (path := shutil.which(name))), None)
-needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no C compiler (cc, gcc or clang) on the path")
 START_VALUES = {
     "TBCTL": 0x0000, "TBPRD": 0xEA5F, "CMPCTL": 0x0000, "CMPB": 0x0BB8, "AQCTLA": 0x0012, "ETSEL": 0x090E,
     "ETPS": 0x0201, "TZSEL": 0x0100, "TZCTL": 0x0002, "ADCTRL1": 0x0F10, "ADCTRL2": 0x4100, "ADCTRL3": 0x00E2,
     "ADCMAXCONV": 0x0002, "ADCCHSELSEQ1": 0x0210, "HISPCP": 0x0003, "PLLCR": 0x000A,
+    "LOSPCP": 0x0001, "SCICCR": 0x0007, "SCICTL1": 0x0022, "SCICTL2": 0x0000, "SCIHBAUD": 0x0000, "SCILBAUD": 0x0050,
+    "SCIFFTX": 0xE000, "SCIFFRX": 0x0000, "SCIFFCT": 0x0000, "GPIO28_MUX": 1, "GPIO28_QUALIFIER": 3, "GPIO29_MUX": 1,
     "TBCLKSYNC": 1, "WDCR": 0x0028, "SCSR": 0, "GPIO0_MUX": 1, "GPIO0_PULLUP_OFF": 1, "GPIO12_MUX": 1,
     "PIEIER3": 1, "IER": 0x0004, "OST": 1, "CMPA": 0, "VECTOR_SET": 1,
 }  # fmt: skip
 
 
-def render_firmware(folder: Path) -> dict[str, Path]:
-    """Write the target's files below `folder`, by the real renderer; output path to file."""
-    renderer = environment("dzdesign.codegen.f28335")
-    written = {}
-    for path, template in TARGET.templates.items():
-        text = renderer.get_template(template).render(
-            **TARGET.context,
-            banner=banner(template, "0123456789abcdef"),
-            project="paper_valve",
-            u_max_V="10",
-            pressure_span_MPa="20",
-        )
-        written[path] = folder / path
-        written[path].parent.mkdir(parents=True, exist_ok=True)
-        written[path].write_text(text, encoding="utf-8", newline="\n")
-    return written
-
-
 @pytest.fixture
 def firmware(tmp_path):
     return render_firmware(tmp_path)
-
-
-def build(firmware: dict[str, Path], *options: str) -> Path:
-    """Compile the generated C with the device model; the warnings are errors."""
-    folder = firmware["f28335/main.c"].parent
-    program = folder / "driver"
-    sources = [folder / "dz_hardware.c", folder / "dz_isr.c", HERE / "device.c", HERE / "driver.c"]
-    command = [COMPILER, "-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Werror", *options]
-    command += [f"-I{folder}", f"-I{HERE}", *map(str, sources), "-o", str(program)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    return program
-
-
-def run(program: Path, *words: str) -> list[str]:
-    done = subprocess.run([program, *words], capture_output=True, text=True, check=True, timeout=20)
-    return done.stdout.splitlines()
-
-
-def registers(program: Path) -> dict[str, int]:
-    lines = (line.split() for line in run(program, "registers"))
-    return {words[0]: int(words[1], 16) for words in lines if len(words) == 2}
-
-
-def periods(program: Path, events: str, *start: str) -> list[dict]:
-    """One dictionary a PWM period, numbers as integers."""
-    ticks = []
-    for line in run(program, "run", events, *start):
-        if line.startswith("tick "):
-            facts = dict(word.split("=", 1) for word in line.split()[1:])
-            ticks.append({key: int(value) if value.isdigit() else value for key, value in facts.items()})
-    assert len(ticks) == len(events)
-    return ticks
-
-
-def column(ticks: list[dict], key: str) -> list:
-    return [tick[key] for tick in ticks]
 
 
 def compare_of_sample(n: int) -> int:
@@ -133,12 +79,44 @@ def check_zero_command(program: Path) -> None:
     assert ticks[-1]["output"] == "pwm"
 
 
+def worst_delays_us(program: Path) -> dict[str, float]:
+    """From each sample to what its value moves at the pin, with the latest falling edge there is, 59999."""
+    counts_in_us = int(TARGET.context["sysclkout_mhz"])
+    ticks = periods(program, "f" * 12)
+    assert set(column(ticks, "duty")[2:]) == {59_999}, "from the second sample on every period uses a sample's value"
+    held = [tick["held"] for tick in ticks if tick["held"]]
+    to_period, to_edge, to_last_edge = [], [], []
+    for index, sample in enumerate(held[:-1]):
+        uses = [tick for tick in ticks if tick["falls"] and held[index] < tick["begins"] <= held[index + 1]]
+        assert len(uses) == 2, "a value stands for two periods"
+        to_period.append(uses[0]["begins"] - sample)
+        to_edge.append(uses[0]["falls"] - sample)
+        to_last_edge.append(uses[1]["falls"] - sample)
+    rate = {later - earlier for earlier, later in itertools.pairwise(held)}
+    assert rate == {2 * 60_000}, "1.25 kHz"
+    worst = {"period": max(to_period), "edge": max(to_edge), "last_edge": max(to_last_edge)}
+    return {key: counts / counts_in_us for key, counts in worst.items()}
+
+
+def check_delays(program: Path) -> None:
+    """What the model measures is what target.py derives and the README states, to a count of SYSCLKOUT."""
+    measured = worst_delays_us(program)
+    print(f"worst delay from the command's sample, in us: {measured}")
+    for key, value in measured.items():
+        assert value == pytest.approx(float(TARGET.context[f"delay_to_{key}_us"]), abs=0.001), key
+
+
 def test_numbers_follow_from_the_engineering_quantities():
     context = TARGET.context
     assert int(context["tbprd"]) == 150_000_000 // 2_500 - 1 == 59_999
     assert int(context["cmpb"]) == 150 * 20 == 3_000
     assert TARGET.compare_max == 60_000 and TARGET.adc_code_max == 4_095
     assert (context["adcclk_mhz"], context["sequence_us"]) == ("12.5", "4.52")
+    assert context["held_us"] == "1.48", "2.5 + 16 periods of 80 ns"
+    # 400 - 1.48; 400 more less one count of 1/150 us; 400 more
+    delays = [context[f"delay_to_{key}_us"] for key in ("period", "edge", "last_edge")]
+    assert delays == ["398.52", "798.513", "1198.513"]
+    assert (context["brr"], context["baud_real"], context["baud_error"]) == ("80", "115741", "+0.47")
     assert context["soca_prescale"] == "ET_2ND"
 
 
@@ -151,6 +129,12 @@ def test_numbers_follow_from_the_engineering_quantities():
         ("SAMPLE_TIMEOUT_S", Fraction(1, 2_500), "one late sample"),
         ("ADCCLK_MAX_HZ", 20_000_000, "HSPCLK"),
         ("ISR_DELAY_S", Fraction(6, 10**6), "sequence of three"),
+        ("LOSPCP", 7, "error of the baud rate"),
+        ("LSPCLK_MAX_HZ", 70_000_000, "LSPCLK"),
+        ("LINK", replace(f28335.LINK, frame_ticks=5), "load of the line"),
+        ("LINK", replace(f28335.LINK, frame_ticks=24), "frames a second"),
+        ("LINK", replace(f28335.LINK, baud=1_000_000), "error of the baud rate"),
+        ("FRAME_CYCLES", 16_000, "making of a frame"),
     ],
 )
 def test_a_quantity_that_does_not_fit_is_refused(monkeypatch, name, value, said):
@@ -158,6 +142,7 @@ def test_a_quantity_that_does_not_fit_is_refused(monkeypatch, name, value, said)
     with pytest.raises(DzdesignError, match=said):
         f28335.timing()
         f28335.converter()
+        f28335.serial_line()
 
 
 @pytest.mark.parametrize(
@@ -205,14 +190,43 @@ def test_projectspec_and_makefile_name_the_same_files(firmware):
     core.mkdir()
     for name in ("dz_comp.c", "dz_comp.h"):
         (core / name).touch()
-    linked = set()
-    for build_kind in ("RAM", "FLASH"):
-        command = [make, "-n", "CGT=cgt", "C2000WARE=ware", f"BUILD={build_kind}"]
+    our_sources = {path for path in files if path.endswith(".c") and not path.startswith("C2000WARE_ROOT/")}
+    for configuration in project.findall("configuration"):
+        kind = configuration.get("name")
+        command = [make, "-n", "CGT=cgt", "C2000WARE=ware", f"BUILD={kind}"]
         done = subprocess.run(command, cwd=core.parent / "f28335", capture_output=True, text=True, check=True)
-        assert ("--define=_FLASH" in done.stdout) == (build_kind == "FLASH")
-        linked |= {word for word in done.stdout.split() if word.startswith("ware/")}
-    in_ccs = {path.replace("C2000WARE_ROOT", "ware") for path in files if path.startswith("C2000WARE_ROOT/")}
-    assert linked == {path for path in in_ccs if not path.endswith(".ccxml")}
+        call = next(line for line in done.stdout.splitlines() if line.startswith("cgt/bin/cl2000"))
+        compiling, linking = (half.split() for half in call.split("--run_linker"))
+        assert {word for word in compiling if word.endswith(".c") and not word.startswith("ware/")} == our_sources
+        in_ccs = {
+            entry.get("path").replace("C2000WARE_ROOT", "ware")
+            for entry in project.findall("file")
+            if entry.get("path").startswith("C2000WARE_ROOT/") and entry.get("applicableConfigurations", kind) == kind
+        }
+        linked = {word for word in (*compiling, *linking) if word.startswith("ware/")}
+        assert linked == {path for path in in_ccs if not path.endswith(".ccxml")}, kind
+        options = {word for word in compiling if word.startswith("-") and not re.match("-I|--include|--obj", word)}
+        assert options == {w for w in configuration.get("compilerBuildOptions").split() if not w.startswith("-I")}
+        assert ("--define=_FLASH" in options) == (kind == "FLASH")
+        assert set(configuration.get("linkerBuildOptions").split()) <= set(linking)
+
+
+def test_the_interrupt_has_no_part_in_the_telemetry_and_is_never_held_off(firmware):
+    code = {
+        Path(path).name: re.sub(r"/\*.*?\*/", "", file.read_text(encoding="utf-8"), flags=re.DOTALL)
+        for path, file in firmware.items()
+        if path.endswith((".c", ".h"))
+    }
+    assert [name for name, text in code.items() if "SciaRegs" in text] == ["dz_telemetry.c"]
+    assert [name for name, text in code.items() if "dz_telemetry_" in text] == [
+        "main.c",
+        "dz_telemetry.c",
+        "dz_telemetry.h",
+    ]
+    assert [name for name, text in code.items() if re.search(r"\bDINT\b", text)] == ["main.c"]
+    assert code["main.c"].index("DINT") < code["main.c"].index("EINT") < code["main.c"].index("for (;;)")
+    for name, text in code.items():  # a byte of the C28x has 16 bits, and its double 32 or 64
+        assert not re.search(r"\b(u?int8_t|char|float|double|long)\b", text), name
 
 
 def test_makefile_says_what_is_missing(firmware):
@@ -223,7 +237,7 @@ def test_makefile_says_what_is_missing(firmware):
         assert done.returncode != 0 and said in done.stderr
 
 
-CHECKS = [check_registers, check_normal_running, check_trip_on_missing_samples, check_zero_command]
+CHECKS = [check_registers, check_normal_running, check_trip_on_missing_samples, check_zero_command, check_delays]
 
 
 @needs_compiler
@@ -284,6 +298,16 @@ def test_start_up_order_and_watchdog(firmware):
         ("dz_isr.c", "ADCRESULT1", "ADCRESULT2", check_normal_running),
         ("dz_isr.c", "dz_state.fault |= DZ_FAULT_NO_SAMPLE;", "", check_trip_on_missing_samples),
         ("dz_isr.c", "if (fresh != 0u)", "if (fresh > 1u)", check_normal_running),
+        ("dz_hardware.c", "CMPB = DZ_ISR_CMPB", "CMPB = 0u", check_normal_running),
+        ("dz_hardware.c", "CMPB = DZ_ISR_CMPB", "CMPB = 0u", check_delays),
+        ("dz_hardware.c", "INTPRD = ET_1ST", "INTPRD = ET_2ND", check_normal_running),
+        ("dz_hardware.c", "INTPRD = ET_1ST", "INTPRD = 0u", check_normal_running),
+        ("dz_hardware.c", "ACQ_PS = DZ_ADC_ACQ_PS", "ACQ_PS = 0u", check_delays),
+        ("dz_hardware.c", "SOCAPRD = ET_2ND", "SOCAPRD = ET_1ST", check_delays),
+        ("dz_isr.c", "    write_compare(dz_state.compare);", "", check_delays),
+        ("dz_telemetry.c", "LOSPCP.all = DZ_SCI_LOSPCP", "LOSPCP.all = 2u", check_registers),
+        ("dz_telemetry.c", "    EALLOW;\n    SysCtrlRegs", "    SysCtrlRegs", check_registers),
+        ("dz_telemetry.c", "GPAMUX2.bit.GPIO29 = 1u", "GPAMUX2.bit.GPIO29 = 2u", check_registers),
         ("dz_isr.c", "(compare == 0u) ? DZ_FORCE_LOW : DZ_FORCE_NONE", "DZ_FORCE_NONE", check_zero_command),
     ],
 )

@@ -6,7 +6,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -57,8 +57,8 @@ def _run(command: list[str], what: str) -> None:
         raise RequirementError(f"{what} does not compile: {first}")
 
 
-def check_strictly(source: Path, compiler: str) -> None:
-    """Compile one file with every warning an error.
+def check_strictly(source: Path, compiler: str, options: Sequence[str] = ()) -> None:
+    """Compile one file with every warning an error, and with further options.
 
     Raises
     ------
@@ -66,7 +66,8 @@ def check_strictly(source: Path, compiler: str) -> None:
         With the compiler's first complaint.
     """
     target = Path(_build_folder().name) / "strict.o"
-    _run([compiler, *STRICT, "-O2", "-c", str(source), "-o", str(target)], f"{source.name} ({Path(compiler).name})")
+    command = [compiler, *STRICT, "-O2", *options, "-c", str(source), "-o", str(target)]
+    _run(command, f"{source.name} ({Path(compiler).name})")
 
 
 def load_library(sources: Mapping[str, str], what: str) -> ctypes.CDLL:

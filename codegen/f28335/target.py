@@ -6,6 +6,14 @@ Register fields and limits: SPRUI07 (technical reference manual of the TMS320x28
 from fractions import Fraction
 
 from dzdesign.codegen.target import Target
+from dzdesign.codegen.telemetry import (
+    CRC_OCTETS,
+    FRAME_BITS,
+    FRAME_OCTETS,
+    Link,
+    frame_context,
+    line_load,
+)
 from dzdesign.core.errors import DzdesignError
 
 CRYSTAL_HZ = 30_000_000
@@ -16,10 +24,18 @@ SAMPLE_HZ = 1_250  # section 4.1 of the paper
 ISR_DELAY_S = Fraction(20, 10**6)  # from the start of conversion to the interrupt
 HISPCP, ADCCLKPS, ACQ_PS = 3, 1, 15
 ADCCLK_MAX_HZ = 25_000_000
-SEQUENCE_ADCCLKS = Fraction(113, 2)  # three channels with ACQ_PS = 15, cascaded
+# SPRS439, sequential sampling mode: from the trigger to the sample window, and to the first result after it; ADCCLKs.
+ADC_TRIGGER_ADCCLKS, ADC_RESULT_ADCCLKS, ADC_CHANNELS = Fraction(5, 2), 4, 3
 SAMPLE_TIMEOUT_S = Fraction(32, 10**4)  # four sample periods
 WATCHDOG_COUNTS = 512 * 256  # OSCCLK / 512 into eight bits, WDPS = /1
 ADC_BITS, ADC_SPAN_V = 12, 3
+LOSPCP, LSPCLK_MAX_HZ = 1, 75_000_000
+LINK = Link(tick_Hz=PWM_HZ, frame_ticks=25, baud=115_200)  # section 4.1 of the paper records at 100 Hz
+BAUD_ERROR_MAX = Fraction(2, 100)  # what a receiver bears, with as much again for its own clock
+LINE_LOAD_MAX = Fraction(1, 2)
+# Bound of what the main loop spends on one frame: tests/test_telemetry.py holds it on an AVR, whose 8 bits take several
+# instructions where the C28x takes one.
+FRAME_CYCLES = 5_000
 EVENT_PRESCALE = {1: "ET_1ST", 2: "ET_2ND", 3: "ET_3RD"}
 
 
@@ -81,6 +97,17 @@ def printed(quantity: Fraction) -> str:
     return str(quantity.numerator) if quantity.denominator == 1 else f"{float(quantity):.3g}"
 
 
+def in_us(time_s: Fraction) -> str:
+    """Print a time in microseconds, to the nanosecond.
+
+    Examples
+    --------
+    >>> in_us(Fraction(37, 25 * 10**6))
+    '1.48'
+    """
+    return f"{float(time_s * 10**6):.3f}".rstrip("0").rstrip(".")
+
+
 def timing() -> dict[str, str]:
     """Clock, PWM, interrupt and time-out figures."""
     sysclkout_hz = at_most(Fraction(CRYSTAL_HZ * PLL_DIV, PLL_DIVSEL), SYSCLKOUT_MAX_HZ, "SYSCLKOUT in Hz")
@@ -105,6 +132,8 @@ def timing() -> dict[str, str]:
         "tbprd": str(period - 1),
         "cmpb": str(delay),
         "isr_delay_us": printed(ISR_DELAY_S * 10**6),
+        "isr_rest_us": printed(Fraction(10**6, PWM_HZ) - ISR_DELAY_S * 10**6),
+        "isr_rest_cycles": str(period - delay),
         "ticks_per_sample": str(ticks_per_sample),
         "soca_prescale": EVENT_PRESCALE[ticks_per_sample],
         "sample_timeout_ticks": str(timeout),
@@ -118,7 +147,16 @@ def converter() -> dict[str, str]:
     sysclkout_hz = Fraction(CRYSTAL_HZ * PLL_DIV, PLL_DIVSEL)
     hspclk_hz = at_most(sysclkout_hz / (2 * HISPCP), ADCCLK_MAX_HZ, "HSPCLK in Hz")
     adcclk_hz = at_most(hspclk_hz / (2 * ADCCLKPS), ADCCLK_MAX_HZ, "ADCCLK in Hz")
-    sequence_s = at_most(SEQUENCE_ADCCLKS / adcclk_hz, ISR_DELAY_S / 2, "the sequence of three, in s,")
+    next_channel = ACQ_PS + 2
+    held_s = (ADC_TRIGGER_ADCCLKS + ACQ_PS + 1) / adcclk_hz  # the first channel, the command: end of its window
+    results = ADC_RESULT_ADCCLKS + (ADC_CHANNELS - 1) * next_channel
+    sequence_s = at_most(held_s + results / adcclk_hz, ISR_DELAY_S / 2, "the sequence of three, in s,")
+    period_s = Fraction(1, PWM_HZ)
+    # The value is written before the period ends and loaded at its end; the latest falling edge is one count before
+    # the next end. Between two samples the value is used once more.
+    to_period_s = period_s - held_s
+    to_edge_s = to_period_s + period_s - 1 / sysclkout_hz
+    held_periods = Fraction(PWM_HZ, SAMPLE_HZ)
     return {
         "hispcp": str(HISPCP),
         "adcclkps": str(ADCCLKPS),
@@ -127,12 +165,49 @@ def converter() -> dict[str, str]:
         "adcclk_mhz": printed(adcclk_hz / 10**6),
         "window_us": printed((ACQ_PS + 1) / adcclk_hz * 10**6),
         "sequence_us": printed(sequence_s * 10**6),
+        "held_us": in_us(held_s),
+        "delay_to_period_us": in_us(to_period_s),
+        "delay_to_edge_us": in_us(to_edge_s),
+        "delay_to_last_edge_us": in_us(to_edge_s + (held_periods - 1) * period_s),
         "adc_codes": str(2**ADC_BITS),
         "adc_code_max": str(2**ADC_BITS - 1),
         "adc_span_v": str(ADC_SPAN_V),
         "adcclk_max_mhz": printed(Fraction(ADCCLK_MAX_HZ, 10**6)),
         "code_at_tenth": str(2**ADC_BITS // 10),
         "code_at_half": str(2**ADC_BITS // 2),
+    }
+
+
+def serial_line() -> dict[str, str]:
+    """Clock and rate of SCI-A, and what the frames cost."""
+    sysclkout_hz = Fraction(CRYSTAL_HZ * PLL_DIV, PLL_DIVSEL)
+    lspclk_hz = at_most(sysclkout_hz / (2 * LOSPCP), LSPCLK_MAX_HZ, "LSPCLK in Hz")
+    brr = exact(Fraction(round(lspclk_hz / (8 * LINK.baud)) - 1), "the baud register", 0xFFFF)
+    baud = lspclk_hz / (8 * (brr + 1))
+    error = baud / LINK.baud - 1
+    at_most(abs(error), BAUD_ERROR_MAX, "the error of the baud rate")
+    frame_hz = exact(Fraction(LINK.tick_Hz, LINK.frame_ticks), "frames a second", LINK.tick_Hz)
+    load = at_most(line_load(baud, frame_hz), LINE_LOAD_MAX, "the load of the line")
+    # A turn of the main loop makes one frame at most; with the interrupt's share off it must fit in a PWM period,
+    # of which the watchdog allows several.
+    frame_s = at_most(FRAME_CYCLES / sysclkout_hz, Fraction(1, 4 * PWM_HZ), "the making of a frame, in s,")
+    return {
+        "lospcp": str(LOSPCP),
+        "lspclk_mhz": printed(lspclk_hz / 10**6),
+        "lspclk_max_mhz": printed(Fraction(LSPCLK_MAX_HZ, 10**6)),
+        "baud": str(LINK.baud),
+        "brr": str(brr),
+        "baud_real": str(round(baud)),
+        "baud_error": f"{float(100 * error):+.2f}",
+        "frame_ticks": str(LINK.frame_ticks),
+        "frame_hz": str(frame_hz),
+        "frame_ms": printed(FRAME_BITS / baud * 1000),
+        "frame_crc_octets": str(FRAME_OCTETS - 2 - CRC_OCTETS),
+        "line_load": f"{float(100 * load):.1f}",
+        "frame_cycles": str(FRAME_CYCLES),
+        "frame_us": printed(frame_s * 10**6),
+        "cpu_load": f"{float(100 * frame_s * frame_hz):.2f}",
+        "ticks_wrap_s": printed(Fraction(2**16, PWM_HZ)),
     }
 
 
@@ -143,6 +218,10 @@ FILES = (
     "dz_hardware.h",
     "dz_isr.c",
     "dz_isr.h",
+    "dz_telemetry.c",
+    "dz_telemetry.h",
+    "dz_frame.c",
+    "dz_frame.h",
     "dzdesign.projectspec",
     "Makefile",
     "README.md",
@@ -150,6 +229,8 @@ FILES = (
 CONTEXT = {
     **timing(),
     **converter(),
+    **serial_line(),
+    **frame_context(),
     "cgt_version": "22.6.3.LTS",
     # Where TI's Windows installer puts C2000Ware; the user changes this one line of the projectspec.
     "c2000ware_default": "C:/ti/c2000/C2000Ware_26_01_00_00",
@@ -164,4 +245,5 @@ TARGET = Target(
     tick_Hz=PWM_HZ,
     templates={f"{FOLDER}/{file}": f"{file}.jinja" for file in FILES},
     context=CONTEXT,
+    link=LINK,
 )

@@ -7,7 +7,10 @@
 
 #define interrupt
 
+#ifndef DSP28_DATA_TYPES
+#define DSP28_DATA_TYPES
 typedef uint16_t Uint16;
+#endif
 
 #define REGISTER(name, ...)                                                                                          \
     union name                                                                                                       \
@@ -97,12 +100,33 @@ struct ADC_RESULT_MIRROR_REGS
     uint16_t ADCRESULT8, ADCRESULT9, ADCRESULT10, ADCRESULT11, ADCRESULT12, ADCRESULT13, ADCRESULT14, ADCRESULT15;
 };
 
+struct SCI_REGS
+{
+    REGISTER(SCICCR_REG, uint16_t SCICHAR : 3; uint16_t ADDRIDLE_MODE : 1; uint16_t LOOPBKENA : 1;
+             uint16_t PARITYENA : 1; uint16_t PARITY : 1; uint16_t STOPBITS : 1;) SCICCR;
+    REGISTER(SCICTL1_REG, uint16_t RXENA : 1; uint16_t TXENA : 1; uint16_t SLEEP : 1; uint16_t TXWAKE : 1;
+             uint16_t rsvd1 : 1; uint16_t SWRESET : 1; uint16_t RXERRINTENA : 1;) SCICTL1;
+    uint16_t SCIHBAUD;
+    uint16_t SCILBAUD;
+    REGISTER(SCICTL2_REG, uint16_t TXINTENA : 1; uint16_t RXBKINTENA : 1; uint16_t rsvd1 : 4; uint16_t TXEMPTY : 1;
+             uint16_t TXRDY : 1;) SCICTL2;
+    uint16_t SCITXBUF;
+    REGISTER(SCIFFTX_REG, uint16_t TXFFIL : 5; uint16_t TXFFIENA : 1; uint16_t TXFFINTCLR : 1; uint16_t TXFFINT : 1;
+             uint16_t TXFFST : 5; uint16_t TXFIFOXRESET : 1; uint16_t SCIFFENA : 1; uint16_t SCIRST : 1;) SCIFFTX;
+    REGISTER(SCIFFRX_REG, uint16_t RXFFIL : 5; uint16_t RXFFIENA : 1; uint16_t RXFFINTCLR : 1; uint16_t RXFFINT : 1;
+             uint16_t RXFFST : 5; uint16_t RXFIFORESET : 1; uint16_t RXFFOVRCLR : 1; uint16_t RXFFOVF : 1;) SCIFFRX;
+    REGISTER(SCIFFCT_REG, uint16_t FFTXDLY : 8; uint16_t rsvd1 : 5; uint16_t CDC : 1; uint16_t ABDCLR : 1;
+             uint16_t ABD : 1;) SCIFFCT;
+};
+
 struct SYS_CTRL_REGS
 {
     REGISTER(PLLSTS_REG, uint16_t PLLLOCKS : 1; uint16_t rsvd1 : 1; uint16_t PLLOFF : 1; uint16_t MCLKSTS : 1;
              uint16_t MCLKCLR : 1; uint16_t OSCOFF : 1; uint16_t MCLKOFF : 1; uint16_t DIVSEL : 2;) PLLSTS;
     REGISTER(HISPCP_REG, uint16_t HSPCLK : 3;) HISPCP;
-    REGISTER(PCLKCR0_REG, uint16_t rsvd1 : 2; uint16_t TBCLKSYNC : 1; uint16_t ADCENCLK : 1;) PCLKCR0;
+    REGISTER(LOSPCP_REG, uint16_t LSPCLK : 3;) LOSPCP;
+    REGISTER(PCLKCR0_REG, uint16_t rsvd1 : 2; uint16_t TBCLKSYNC : 1; uint16_t ADCENCLK : 1; uint16_t rsvd2 : 6;
+             uint16_t SCIAENCLK : 1;) PCLKCR0;
     REGISTER(PLLCR_REG, uint16_t DIV : 4;) PLLCR;
     uint16_t SCSR;
     uint16_t WDCR;
@@ -113,9 +137,15 @@ struct GPIO_PAIRS
     uint16_t GPIO0 : 2, GPIO1_5 : 10, GPIO6_7 : 4, GPIO8_11 : 8, GPIO12 : 2, GPIO13_15 : 6;
 };
 
+struct GPIO_PAIRS_2
+{
+    uint16_t GPIO16_23 : 16, GPIO24_27 : 8, GPIO28 : 2, GPIO29 : 2, GPIO30_31 : 4;
+};
+
 struct GPIO_BITS
 {
     uint16_t GPIO0 : 1, GPIO1_11 : 11, GPIO12 : 1, GPIO13_15 : 3;
+    uint16_t GPIO16_27 : 12, GPIO28 : 1, GPIO29 : 1, GPIO30_31 : 2;
 };
 
 struct GPIO_CTRL_REGS
@@ -127,7 +157,12 @@ struct GPIO_CTRL_REGS
     } GPAQSEL1, GPAMUX1;
     union
     {
-        uint16_t all;
+        uint16_t all[2];
+        struct GPIO_PAIRS_2 bit;
+    } GPAQSEL2, GPAMUX2;
+    union
+    {
+        uint16_t all[2];
         struct GPIO_BITS bit;
     } GPAPUD;
 };
@@ -136,7 +171,7 @@ struct GPIO_DATA_REGS
 {
     union
     {
-        uint16_t all;
+        uint16_t all[2];
         struct GPIO_BITS bit;
     } GPADAT;
 };
@@ -161,6 +196,9 @@ extern volatile struct GPIO_DATA_REGS GpioDataRegs;
 extern volatile struct PIE_CTRL_REGS PieCtrlRegs;
 extern volatile struct PIE_VECT_TABLE PieVectTable;
 extern volatile unsigned int IER, IFR;
+/* Every access goes through the model: a write to SCITXBUF moves an octet, TXFFST counts those that wait. */
+#define SciaRegs (*device_scia())
+volatile struct SCI_REGS *device_scia(void);
 extern Uint16 RamfuncsLoadStart, RamfuncsLoadEnd, RamfuncsRunStart;
 
 #define EALLOW device_eallow()

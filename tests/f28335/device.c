@@ -6,7 +6,8 @@
 #include "device.h"
 #include "dz_comp.h"
 
-#define SEQUENCE_COUNTS 678u /* 56.5 ADCCLK of 12.5 MHz at 150 MHz */
+#define FIFO_OCTETS 16u
+#define NOT_WRITTEN 0xFFFFu /* in SCITXBUF: no octet since the last look */
 
 volatile struct EPWM_REGS EPwm1Regs;
 volatile struct ADC_REGS AdcRegs;
@@ -18,6 +19,9 @@ volatile struct PIE_CTRL_REGS PieCtrlRegs;
 volatile struct PIE_VECT_TABLE PieVectTable;
 volatile unsigned int IER, IFR;
 Uint16 RamfuncsLoadStart, RamfuncsLoadEnd, RamfuncsRunStart;
+
+uint8_t device_line[DEVICE_LINE_OCTETS];
+unsigned device_line_count, device_line_lost, device_line_blocked;
 
 void (*device_on_eint)(void);
 void (*device_on_service)(void);
@@ -33,7 +37,10 @@ struct protected_registers
 
 static struct protected_registers kept;
 static uint16_t unlocked, active_cmpa, active_force, etflg_int, pie_blocked, command_zero;
-static unsigned soca_count, sequencer, samples;
+static unsigned soca_count, int_count, sequencer, samples, period_begins;
+static volatile struct SCI_REGS scia;
+static uint8_t fifo[FIFO_OCTETS];
+static unsigned fifo_count, shifted_counts;
 
 static struct protected_registers protected_now(void)
 {
@@ -106,8 +113,66 @@ void device_eint(void)
 
 void device_dint(void) { puts("DINT"); }
 
+/* An octet that was written since the last look enters the FIFO, as far as SCI-A is set up for it. */
+static void take_octet(void)
+{
+    const int runs = (scia.SCICTL1.bit.SWRESET != 0u) && (scia.SCICTL1.bit.TXENA != 0u)
+                     && (scia.SCIFFTX.bit.SCIRST != 0u) && (scia.SCIFFTX.bit.SCIFFENA != 0u)
+                     && (scia.SCIFFTX.bit.TXFIFOXRESET != 0u) && (SysCtrlRegs.PCLKCR0.bit.SCIAENCLK != 0u);
+
+    if ((scia.SCITXBUF != NOT_WRITTEN) && runs && (fifo_count < FIFO_OCTETS))
+    {
+        fifo[fifo_count] = (uint8_t)scia.SCITXBUF;
+        fifo_count++;
+    }
+    else if (scia.SCITXBUF != NOT_WRITTEN)
+    {
+        device_line_lost++;
+    }
+    scia.SCITXBUF = NOT_WRITTEN;
+    scia.SCIFFTX.bit.TXFFST = (uint16_t)(fifo_count & 0x1Fu);
+}
+
+volatile struct SCI_REGS *device_scia(void)
+{
+    take_octet();
+    return &scia;
+}
+
+static unsigned counts_of_octet(void)
+{
+    const unsigned lspclk_counts = (SysCtrlRegs.LOSPCP.all == 0u) ? 1u : 2u * SysCtrlRegs.LOSPCP.all;
+    const unsigned brr = ((unsigned)scia.SCIHBAUD << 8) | scia.SCILBAUD;
+    const unsigned bits = 1u + (scia.SCICCR.bit.SCICHAR + 1u) + scia.SCICCR.bit.PARITYENA + 1u + scia.SCICCR.bit.STOPBITS;
+
+    return lspclk_counts * 8u * (brr + 1u) * bits;
+}
+
+void device_transmit(unsigned counts)
+{
+    take_octet();
+    shifted_counts += counts;
+    while ((fifo_count > 0u) && (device_line_blocked == 0u) && (shifted_counts >= counts_of_octet()))
+    {
+        shifted_counts -= counts_of_octet();
+        if (device_line_count < DEVICE_LINE_OCTETS)
+        {
+            device_line[device_line_count] = fifo[0];
+            device_line_count++;
+        }
+        fifo_count--;
+        memmove(fifo, fifo + 1, fifo_count);
+    }
+    if ((fifo_count == 0u) || (device_line_blocked != 0u))
+    {
+        shifted_counts = 0u;
+    }
+    take_octet();
+}
+
 void device_power_up(void)
 {
+    scia.SCITXBUF = NOT_WRITTEN;
     EPwm1Regs.TBCTL.all = 0x0083u; /* HSPCLKDIV = 1, counter frozen */
     GpioDataRegs.GPADAT.bit.GPIO12 = 1u;
     SysCtrlRegs.SCSR = 0x0005u;
@@ -125,6 +190,8 @@ void InitSysCtrl(void)
     }
     SysCtrlRegs.PLLSTS.bit.DIVSEL = 2u;
     SysCtrlRegs.HISPCP.all = 1u;
+    SysCtrlRegs.LOSPCP.all = 2u;
+    SysCtrlRegs.PCLKCR0.bit.SCIAENCLK = 1u;
     SysCtrlRegs.PCLKCR0.bit.ADCENCLK = 1u;
     SysCtrlRegs.PCLKCR0.bit.TBCLKSYNC = 1u;
     EDIS;
@@ -163,18 +230,31 @@ uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
     return (uint16_t)(u_adc + 10u * p_a_adc + 100u * p_b_adc);
 }
 
-/* Codes of ADCINA0, A1, A2 in the n-th sample: 100 n, 1, 2; other channels give nonsense. */
+uint16_t dz_status(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
+{
+    return (uint16_t)((u_adc != 0u ? 1u : 0u) + (p_a_adc != 1u ? 2u : 0u) + (p_b_adc == 2u ? 4u : 0u));
+}
+
+uint16_t dz_beta(uint16_t p_a_adc, uint16_t p_b_adc) { return (uint16_t)(3u * p_a_adc + 7u * p_b_adc); }
+
+/* Codes of ADCINA0, A1, A2 in the n-th sample: 100 (n modulo 41), 1, 2; other channels give nonsense. */
 static uint16_t code_of(unsigned channel, char event)
 {
+    static const uint16_t of_59999[3] = {999u, 900u, 500u};
+
     if (event == 'h')
     {
         return 0xFFFFu;
+    }
+    if ((event == 'f') && (channel <= 2u))
+    {
+        return of_59999[channel];
     }
     if ((command_zero != 0u) || (channel > 2u))
     {
         return (channel > 2u) ? 4000u : 0u;
     }
-    return (uint16_t)((channel == 0u) ? 100u * samples : channel);
+    return (uint16_t)((channel == 0u) ? 100u * (samples % 41u) : channel);
 }
 
 static void convert(char event)
@@ -207,6 +287,44 @@ static int conversion_is_due(void)
         return 0;
     }
     soca_count = 0u;
+    return 1;
+}
+
+/* Half counts of ADCCLK, from the divisors as they are set. */
+static unsigned adcclk_half_counts(void)
+{
+    const unsigned hspclk = (SysCtrlRegs.HISPCP.all == 0u) ? 1u : 2u * SysCtrlRegs.HISPCP.all;
+    const unsigned divisor = (AdcRegs.ADCTRL3.bit.ADCCLKPS == 0u) ? 1u : 2u * AdcRegs.ADCTRL3.bit.ADCCLKPS;
+
+    return hspclk * divisor * (AdcRegs.ADCTRL1.bit.CPS + 1u) / 2u;
+}
+
+/* SPRS439, sequential sampling: 2.5 ADCCLK from the trigger, then the window of ACQ_PS + 1. */
+static unsigned counts_to_hold(void)
+{
+    return adcclk_half_counts() * (5u + 2u * (AdcRegs.ADCTRL1.bit.ACQ_PS + 1u));
+}
+
+/* SPRS439: the first result 4 ADCCLK later, each further one after ACQ_PS + 2. */
+static unsigned counts_of_sequence(void)
+{
+    return counts_to_hold()
+           + adcclk_half_counts() * (8u + 2u * (AdcRegs.ADCTRL1.bit.ACQ_PS + 2u) * AdcRegs.ADCMAXCONV.bit.MAX_CONV1);
+}
+
+/* The event prescaler: INTPRD events make one interrupt, 0 makes none. */
+static int interrupt_is_due(void)
+{
+    if ((EPwm1Regs.ETSEL.bit.INTEN == 0u) || (EPwm1Regs.ETPS.bit.INTPRD == 0u) || (etflg_int != 0u))
+    {
+        return 0;
+    }
+    int_count++;
+    if (int_count < EPwm1Regs.ETPS.bit.INTPRD)
+    {
+        return 0;
+    }
+    int_count = 0u;
     return 1;
 }
 
@@ -253,17 +371,19 @@ static void drive_pin(struct tick *tick)
             tick->duty = period;
         }
     }
+    tick->begins = period_begins;
+    tick->falls = ((tick->duty > 0u) && (tick->duty < period)) ? period_begins + tick->duty : 0u;
     tick->output = (tick->duty == 0u) ? "low" : (tick->duty == period) ? "high" : "pwm";
 }
 
 /* Events: '.' none; 'x' no conversion; 'l' conversion still busy at the interrupt; 'h' codes above 12 bits;
- * 'T' / 't' trip input low / high; 'z' / 'n' command zero / normal. */
+ * 'f' codes that make 59999 of the stand-in core; 'T' / 't' trip input low / high; 'z' / 'n' command zero / normal. */
 struct tick device_period(char event)
 {
-    struct tick tick = {"", 0u, 0u, 0u, 0u, 0u};
+    struct tick tick = {"", 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u};
     const int due = conversion_is_due() && (event != 'x');
     const unsigned at = (EPwm1Regs.ETSEL.bit.INTSEL == ET_CTRU_CMPB) ? EPwm1Regs.CMPB : 0u;
-    const int busy = due && ((event == 'l') || (at < SEQUENCE_COUNTS));
+    const int busy = due && ((event == 'l') || (at < counts_of_sequence()));
 
     GpioDataRegs.GPADAT.bit.GPIO12 = (event == 'T') ? 0u : (event == 't') ? 1u : GpioDataRegs.GPADAT.bit.GPIO12;
     command_zero = (uint16_t)((event == 'z') ? 1u : (event == 'n') ? 0u : command_zero);
@@ -271,12 +391,12 @@ struct tick device_period(char event)
     active_force = EPwm1Regs.AQCSFRC.bit.CSFA;
     latch_trip_input();
     drive_pin(&tick);
+    tick.held = due ? period_begins + counts_to_hold() : 0u;
     if (due && !busy)
     {
         convert(event);
     }
-    if ((EPwm1Regs.ETSEL.bit.INTEN != 0u) && (PieCtrlRegs.PIEIER3.bit.INTx1 != 0u) && ((IER & M_INT3) != 0u)
-        && (etflg_int == 0u) && (pie_blocked == 0u))
+    if (interrupt_is_due() && (PieCtrlRegs.PIEIER3.bit.INTx1 != 0u) && ((IER & M_INT3) != 0u) && (pie_blocked == 0u))
     {
         serve_interrupt(&tick, busy);
     }
@@ -285,5 +405,6 @@ struct tick device_period(char event)
         convert(event);
     }
     AdcRegs.ADCST.bit.SEQ1_BSY = 0u;
+    period_begins += EPwm1Regs.TBPRD + 1u;
     return tick;
 }

@@ -1,4 +1,5 @@
-/* The part of the F28335 around the registers: EALLOW, write-1 bits, ADC sequencer, PWM pin, interrupt path. */
+/* The part of the F28335 around the registers: EALLOW, write-1 bits, ADC sequencer, PWM pin, interrupt path, SCI-A.
+ * Times are counts of SYSCLKOUT since the first period began; 0 stands for none. */
 #ifndef DEVICE_H
 #define DEVICE_H
 
@@ -12,12 +13,23 @@ struct tick
     unsigned reset_busy; /* 1 if RST_SEQ1 was written during a running sequence */
     unsigned resets;    /* RST_SEQ1 writes */
     unsigned acknowledged; /* PIEACK as written */
+    unsigned held;      /* when the command's sample was held, if one was taken */
+    unsigned begins;    /* when the period began */
+    unsigned falls;     /* when the pin fell in it, if it did */
 };
 
 extern void (*device_on_eint)(void);
 extern void (*device_on_service)(void);
 
+/* Octets that have left the transmitter, with the count of those that found its FIFO full, or SCI-A not ready. */
+#define DEVICE_LINE_OCTETS 120000u
+extern uint8_t device_line[DEVICE_LINE_OCTETS];
+extern unsigned device_line_count, device_line_lost;
+extern unsigned device_line_blocked; /* 1: the transmitter stands still */
+
 void device_power_up(void);
+/* SCI-A after so many counts more. */
+void device_transmit(unsigned counts);
 void device_settle(void);
 struct tick device_period(char event);
 

@@ -2,10 +2,15 @@
  *
  *   driver registers              start up, then the registers in hexadecimal
  *   driver run EVENTS [W|C]       start up (after a watchdog reset, or without crystal), then one period an event
+ *   driver telemetry PERIODS [B]  start up, so many periods with the main loop between them (B: the line stands still
+ *                                 from one half on), then the octets of the line in hexadecimal, and the counts
+ *   driver preempt LOOK           start up, three samples; then the main loop packs a frame, and the interrupt comes just
+ *                                 before its LOOK-th look at the state (0: not at all); prints what was read
  *   driver main                   main() itself until its first watchdog service, then one look without an interrupt
  */
 #include <setjmp.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "device.h"
@@ -43,6 +48,18 @@ static void show_registers(void)
     SHOW("GPIO0_MUX", GpioCtrlRegs.GPAMUX1.bit.GPIO0);
     SHOW("GPIO0_PULLUP_OFF", GpioCtrlRegs.GPAPUD.bit.GPIO0);
     SHOW("GPIO12_MUX", GpioCtrlRegs.GPAMUX1.bit.GPIO12);
+    SHOW("LOSPCP", SysCtrlRegs.LOSPCP.all);
+    SHOW("SCICCR", SciaRegs.SCICCR.all);
+    SHOW("SCICTL1", SciaRegs.SCICTL1.all);
+    SHOW("SCICTL2", SciaRegs.SCICTL2.all);
+    SHOW("SCIHBAUD", SciaRegs.SCIHBAUD);
+    SHOW("SCILBAUD", SciaRegs.SCILBAUD);
+    SHOW("SCIFFTX", SciaRegs.SCIFFTX.all);
+    SHOW("SCIFFRX", SciaRegs.SCIFFRX.all);
+    SHOW("SCIFFCT", SciaRegs.SCIFFCT.all);
+    SHOW("GPIO28_MUX", GpioCtrlRegs.GPAMUX2.bit.GPIO28);
+    SHOW("GPIO28_QUALIFIER", GpioCtrlRegs.GPAQSEL2.bit.GPIO28);
+    SHOW("GPIO29_MUX", GpioCtrlRegs.GPAMUX2.bit.GPIO29);
     SHOW("PIEIER3", PieCtrlRegs.PIEIER3.all);
     SHOW("IER", IER);
     SHOW("OST", EPwm1Regs.TZFLG.bit.OST);
@@ -76,11 +93,75 @@ static void run(const char *events)
     {
         const struct tick tick = device_period(*events);
         printf("tick event=%c output=%s duty=%u served=%u resets=%u reset_busy=%u pieack=%u cmpa=%u forced=%u "
-               "without=%u released=%u fault=%u\n",
+               "without=%u released=%u fault=%u held=%u begins=%u falls=%u\n",
                *events, tick.output, tick.duty, tick.served, tick.resets, tick.reset_busy, tick.acknowledged,
                EPwm1Regs.CMPA.half.CMPA, EPwm1Regs.TZFLG.bit.OST, dz_state.ticks_without_sample, dz_state.released,
-               dz_state.fault);
+               dz_state.fault, tick.held, tick.begins, tick.falls);
     }
+}
+
+/* Eight turns of the main loop a period: each is far longer than it takes on the device. */
+static void run_telemetry(unsigned periods, int block)
+{
+    unsigned period;
+    unsigned turn;
+    unsigned i;
+
+    for (period = 0u; period < periods; period++)
+    {
+        device_line_blocked = (block && (2u * period >= periods)) ? 1u : 0u;
+        (void)device_period('.');
+        for (turn = 0u; turn < 8u; turn++)
+        {
+            service_watchdog_if_isr_ran();
+            dz_telemetry_poll();
+            device_transmit((EPwm1Regs.TBPRD + 1u) / 8u);
+        }
+    }
+    printf("sent %u\ndropped %u\nlost %u\nticks %u\nline ", dz_telemetry.sent, dz_telemetry.dropped,
+           device_line_lost, dz_state.ticks);
+    for (i = 0u; i < device_line_count; i++)
+    {
+        printf("%02X", device_line[i]);
+    }
+    puts("");
+}
+
+static unsigned looks_left;
+
+/* Takes the place of `dz_state` in a copy of dz_telemetry.c that the test makes. */
+volatile struct dz_state *device_state(void)
+{
+    if (looks_left == 1u)
+    {
+        (void)device_period('.');
+        (void)device_period('.'); /* a new sample at any rate */
+    }
+    looks_left -= (looks_left > 0u) ? 1u : 0u;
+    return &dz_state;
+}
+
+static void run_preempted(unsigned look)
+{
+    unsigned i;
+
+    for (i = 0u; i < DZ_FRAME_TICKS; i++)
+    {
+        (void)device_period('.');
+    }
+    looks_left = look;
+    dz_telemetry_poll();
+    looks_left = 0u;
+    dz_telemetry_poll();
+    device_transmit(1000000000u);
+    dz_telemetry_poll();
+    device_transmit(1000000000u);
+    printf("line ");
+    for (i = 0u; i < device_line_count; i++)
+    {
+        printf("%02X", device_line[i]);
+    }
+    puts("");
 }
 
 static void run_main(void)
@@ -122,6 +203,16 @@ int main(int count, char **words)
     if ((count > 2) && (strcmp(words[1], "run") == 0))
     {
         run(words[2]);
+        return 0;
+    }
+    if ((count > 2) && (strcmp(words[1], "telemetry") == 0))
+    {
+        run_telemetry((unsigned)strtoul(words[2], NULL, 10), count > 3);
+        return 0;
+    }
+    if ((count > 2) && (strcmp(words[1], "preempt") == 0))
+    {
+        run_preempted((unsigned)strtoul(words[2], NULL, 10));
         return 0;
     }
     show_registers();

@@ -8,5 +8,7 @@
 #define DZ_ADC_CODE_MAX 4095u
 
 uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
+uint16_t dz_status(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
+uint16_t dz_beta(uint16_t p_a_adc, uint16_t p_b_adc);
 
 #endif

@@ -7,98 +7,109 @@
 /* u_O = beta*u_min0 + u_i*(beta*(k*x_max/u_max - 1) + 1)   (18)
  * k x_max/u_max = 15917/32768 = 0.485748, rounded to nearest
  * u_min0/u_max  = 33701/65536 = 0.514236, rounded down with half a count to spare
- * beta(dP): 67 nodes, one every 64 codes of the pressure difference (0.3126 MPa), straight between.
+ * beta(dP): straight over 64 segments of 64 codes of the pressure difference (0.3126 MPa) each.
  *
  * In counts of the PWM this is sum / (273 * 2^32) with the 64-bit integer
  *     sum = beta * (-168510 * c + 690027975) + 125 * 2^37 * c + 586263035904,
- * c being the codes of command from zero on and beta the table's value times 64. Nothing is rounded before the
- * one shift and the one division. Each input takes the same way through the code.
+ * c being the codes of command from zero on and beta the table's value. Nothing is rounded before the
+ * one shift and the one division. There is no branch: each input takes the same way through the code.
  */
 
 /* Eq. (29): zero command is code 0, full command 4095; sound codes 0 to 4095. Exact. */
-#define COMMAND_ZERO 0
-#define COMMAND_SPAN 4095
+#define COMMAND_ZERO 0u
 #define COMMAND_LOW 0u
-#define COMMAND_SOUND 4095u /* codes above the lowest sound one */
+#define COMMAND_HIGH 4095u
 
 /* Below Eq. (29): codes of no pressure, and sound codes. One code of sensor A is 0.004884 MPa. Exact. */
-#define PRESSURE_A_ZERO 0
+#define PRESSURE_A_ZERO 0u
 #define PRESSURE_A_LOW 0u
-#define PRESSURE_A_SOUND 4095u
-#define PRESSURE_B_ZERO 0
+#define PRESSURE_A_HIGH 4095u
+#define PRESSURE_B_ZERO 0u
 #define PRESSURE_B_LOW 0u
-#define PRESSURE_B_SOUND 4095u
-#define REVERSE_LIMIT (-40) /* -0.195 MPa: below it a sensor has failed */
+#define PRESSURE_B_HIGH 4095u
+#define REVERSE 40u /* -0.195 MPa: below it a sensor has failed */
 
-/* Eq. (7): beta at the nodes, times 819200; the last two are the smallest beta, the safe one when the pressure
- * can't be right. Rounded down, so that the certificate holds. */
-#define NODE_FALLBACK 4160u
-static const uint32_t beta_node[67] = {
-    UINT32_C(819200), UINT32_C(819200), UINT32_C(819200), UINT32_C(819200), UINT32_C(817225),
-    UINT32_C(814875), UINT32_C(812525), UINT32_C(810150), UINT32_C(807800), UINT32_C(804125),
-    UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125),
-    UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125),
-    UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125),
-    UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125),
-    UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125),
-    UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125),
-    UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125),
-    UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125),
-    UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125),
-    UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125),
-    UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125),
-    UINT32_C(804125), UINT32_C(804125),
+/* Eq. (7): beta = start - change * dP, times 819200, in each segment; dP in codes of sensor A. The first
+ * entry is the smallest beta, the safe one when the pressure can't be right. Nodes rounded down, so that the
+ * certificate holds. */
+struct segment
+{
+    uint32_t start;
+    uint16_t change;
 };
 
-/* The quotient whose compare value is DZ_COMPARE_LIMIT: (DZ_COMPARE_LIMIT + 1) * 273 - 1. */
-#define QUOTIENT_LIMIT UINT32_C(16380272)
+static const struct segment law_segment[65] = {
+    {51464000u, 0}, {52428800u, 0}, {52428800u, 0}, {52428800u, 0},
+    {52808000u, 1975}, {52904000u, 2350}, {52904000u, 2350}, {52913600u, 2375},
+    {52902400u, 2350}, {53580800u, 3675}, {51464000u, 0}, {51464000u, 0},
+    {51464000u, 0}, {51464000u, 0}, {51464000u, 0}, {51464000u, 0},
+    {51464000u, 0}, {51464000u, 0}, {51464000u, 0}, {51464000u, 0},
+    {51464000u, 0}, {51464000u, 0}, {51464000u, 0}, {51464000u, 0},
+    {51464000u, 0}, {51464000u, 0}, {51464000u, 0}, {51464000u, 0},
+    {51464000u, 0}, {51464000u, 0}, {51464000u, 0}, {51464000u, 0},
+    {51464000u, 0}, {51464000u, 0}, {51464000u, 0}, {51464000u, 0},
+    {51464000u, 0}, {51464000u, 0}, {51464000u, 0}, {51464000u, 0},
+    {51464000u, 0}, {51464000u, 0}, {51464000u, 0}, {51464000u, 0},
+    {51464000u, 0}, {51464000u, 0}, {51464000u, 0}, {51464000u, 0},
+    {51464000u, 0}, {51464000u, 0}, {51464000u, 0}, {51464000u, 0},
+    {51464000u, 0}, {51464000u, 0}, {51464000u, 0}, {51464000u, 0},
+    {51464000u, 0}, {51464000u, 0}, {51464000u, 0}, {51464000u, 0},
+    {51464000u, 0}, {51464000u, 0}, {51464000u, 0}, {51464000u, 0},
+    {51464000u, 0},
+};
 
-/* Codes of command from zero on, towards code 4095. */
-static int32_t command_from_zero(uint16_t u_adc)
+/* All ones if the subtraction that gave x went below zero, else 0. */
+static uint16_t below_zero(uint16_t x)
 {
-    const int32_t signed_code = (int32_t)u_adc - COMMAND_ZERO;
-    const int32_t code = (signed_code > 0) ? signed_code : 0;
-
-    return (code < COMMAND_SPAN) ? code : COMMAND_SPAN;
+    return (uint16_t)(0u - (uint16_t)(x >> 15));
 }
 
-/* Difference of the pressures, in codes of sensor A. */
-static int32_t pressure_difference(uint16_t p_a_adc, uint16_t p_b_adc)
+/* All ones if the command can't come from a sound signal. */
+static uint16_t unsound_command(uint16_t u)
 {
-    const int32_t p_a = (int32_t)p_a_adc - PRESSURE_A_ZERO;
-    const int32_t p_b = (int32_t)p_b_adc - PRESSURE_B_ZERO;
-
-    return p_a - p_b;
+    return below_zero((uint16_t)((uint16_t)(u - COMMAND_LOW) | (uint16_t)(COMMAND_HIGH - u)));
 }
 
-/* Place in the tables: the difference of the pressures, or the fallback's. */
-static uint16_t place_of(uint16_t p_a_adc, uint16_t p_b_adc)
+/* Difference of the pressures, modulo the word. */
+static uint16_t pressure_difference(uint16_t p_a, uint16_t p_b)
 {
-    const int32_t difference = pressure_difference(p_a_adc, p_b_adc);
-    const uint32_t from_zero = (difference > 0) ? (uint32_t)difference : 0u;
-    uint16_t place = (uint16_t)(from_zero);
+    const uint16_t a = (uint16_t)(p_a - PRESSURE_A_ZERO);
+    const uint16_t b = (uint16_t)(p_b - PRESSURE_B_ZERO);
 
-    place = (difference >= REVERSE_LIMIT) ? place : NODE_FALLBACK;
-    place = ((uint16_t)(p_a_adc - PRESSURE_A_LOW) <= PRESSURE_A_SOUND) ? place : NODE_FALLBACK;
-    place = ((uint16_t)(p_b_adc - PRESSURE_B_LOW) <= PRESSURE_B_SOUND) ? place : NODE_FALLBACK;
-    return place;
+    return (uint16_t)(a - b);
 }
 
-/* A table at a place, times 64; at most 31 bits. */
-static uint32_t interpolate(const uint32_t *node, uint16_t place)
+/* All ones if the pressures can't be right: one is not sound, or the drop is below -REVERSE. */
+static uint16_t failed_pressures(uint16_t p_a, uint16_t p_b, uint16_t difference)
 {
-    const uint16_t left = (uint16_t)(place >> 6);
-    const uint32_t past = (uint32_t)place & 63u;
-
-    return (node[left] * (64u - past)) + (node[left + 1u] * past);
+    return below_zero((uint16_t)((uint16_t)(p_a - PRESSURE_A_LOW) | (uint16_t)(PRESSURE_A_HIGH - p_a) |
+                                 (uint16_t)(p_b - PRESSURE_B_LOW) | (uint16_t)(PRESSURE_B_HIGH - p_b) |
+                                 (uint16_t)(difference + REVERSE)));
 }
 
-/* An integer of 64 bits in two halves: this processor multiplies 16 by 16 bits, or the compiler's 64-bit product is slow. */
+/* Pressure drop in codes of sensor A; 0 below zero, and where the pressures can't be right. */
+static uint16_t pressure_drop(uint16_t difference, uint16_t failed)
+{
+    return (uint16_t)((difference & (uint16_t)~(below_zero(difference) | failed)));
+}
+
+/* Place in the tables: one more than the segment's number, 0 where the pressures can't be right. */
+static uint16_t segment_of(uint16_t dp, uint16_t failed)
+{
+    return (uint16_t)(((uint16_t)(dp + 64u) >> 6) & (uint16_t)~failed);
+}
+
+/* An integer of 64 bits in two halves: the longest product is 16 by 16 to 32 bits, and no carry needs a branch. */
 struct wide
 {
     uint32_t high;
     uint32_t low;
 };
+
+static uint32_t short_product(uint16_t left, uint16_t right)
+{
+    return (uint32_t)left * right;
+}
 
 static struct wide product(uint32_t left, uint32_t right)
 {
@@ -106,78 +117,70 @@ static struct wide product(uint32_t left, uint32_t right)
     const uint16_t left_low = (uint16_t)(left & 0xFFFFu);
     const uint16_t right_high = (uint16_t)(right >> 16);
     const uint16_t right_low = (uint16_t)(right & 0xFFFFu);
-    const uint32_t low = (uint32_t)left_low * right_low;
-    const uint32_t cross_left = (uint32_t)left_high * right_low;
-    const uint32_t cross_right = (uint32_t)left_low * right_high;
-    const uint32_t middle = (low >> 16) + (cross_left & 0xFFFFu) + (cross_right & 0xFFFFu);
+    const uint32_t low = short_product(left_low, right_low);
+    const uint32_t first = short_product(left_high, right_low) + (low >> 16);          /* below 2^32 - 2^16 */
+    const uint32_t second = short_product(left_low, right_high) + (first & 0xFFFFu); /* likewise */
     struct wide result;
 
-    result.low = (middle << 16) | (low & 0xFFFFu);
-    result.high = ((uint32_t)left_high * right_high) + (cross_left >> 16) + (cross_right >> 16) + (middle >> 16);
-    return result;
-}
-
-static struct wide add(struct wide left, struct wide right)
-{
-    struct wide result;
-
-    result.low = left.low + right.low;
-    result.high = left.high + right.high + ((result.low < left.low) ? 1u : 0u);
+    result.low = (second << 16) | (low & 0xFFFFu);
+    result.high = short_product(left_high, right_high) + (first >> 16) + (second >> 16);
     return result;
 }
 
 uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
 {
-    const int32_t command = command_from_zero(u_adc);
-    const uint16_t place = place_of(p_a_adc, p_b_adc);
-    const uint32_t beta = interpolate(beta_node, place);
-    /* Casts come before products: an int has 16 bits on some targets. */
-    const int32_t factor = (-INT32_C(168510) * command) + INT32_C(690027975);
-    const struct wide half = { UINT32_C(136), UINT32_C(2147483648) };
-    struct wide sum = product(beta, (uint32_t)factor);
-    uint32_t quotient;
-    uint32_t compare;
-    uint32_t rest;
-    uint32_t over0;
-    uint32_t over1;
-    struct wide straight = product(UINT32_C(0), (uint32_t)command);
+    const uint16_t u = u_adc;
+    const uint16_t p_a = p_a_adc;
+    const uint16_t p_b = p_b_adc;
+    const uint16_t let_go = unsound_command(u);
+    const uint16_t from_zero = (uint16_t)((uint16_t)(u - COMMAND_ZERO) & (uint16_t)~let_go);
+    const uint16_t command = from_zero;
+    const uint16_t difference = pressure_difference(p_a, p_b);
+    const uint16_t failed = failed_pressures(p_a, p_b, difference);
+    const uint16_t dp = pressure_drop(difference, failed);
+    const uint16_t place = segment_of(dp, failed);
+    const uint32_t beta = law_segment[place].start - short_product(law_segment[place].change, (uint16_t)dp);
+    const uint32_t factor = UINT32_C(690027975) - (UINT32_C(168510) * command);
+    const struct wide law = product(beta, factor);
+    /* A factor below zero stands 2^32 too high; all modulo 2^64. */
+    uint32_t high = law.high - (beta & (0u - (factor >> 31))) + UINT32_C(136);
+    uint32_t low = law.low + UINT32_C(2147483648);
+    uint32_t unlimited;
 
-    straight.high += UINT32_C(4000) * (uint32_t)command;
-    sum = add(sum, straight);
-    sum.high -= (factor < 0) ? beta : 0u; /* the factor's sign: modulo 2^64 */
-    sum = add(sum, half);
-    /* Modulo 2^64, and never negative (proved over the tables' nodes). */
-    quotient = sum.high;
-    quotient = (quotient < QUOTIENT_LIMIT) ? quotient : QUOTIENT_LIMIT;
+    high += (law.low >> 31);
+    high += short_product((uint16_t)command, 4000u);
+    (void)low; /* only its carry counts */
+    unlimited = high;
+    const uint32_t quotient = unlimited; /* never above the one of DZ_COMPARE_LIMIT */
+    /* quotient / 273: an estimate that is never too large, and at most 2 too small up to 16380272. */
+    const uint16_t estimate = (uint16_t)(short_product((uint16_t)(quotient >> 8), 61455u) >> 16);
+    const uint16_t rest = (uint16_t)((uint16_t)quotient - (uint16_t)(estimate * 273u));
+    const uint16_t compare = (uint16_t)(estimate + 2u - ((uint16_t)(rest - 273u) >> 15) - ((uint16_t)(rest - 546u) >> 15));
 
-    /* quotient / 273: an estimate that is never too large, and at most 2 too small for every quotient up to
-     * 16380272. */
-    compare = ((quotient >> 8) * UINT32_C(61455)) >> 16;
-    rest = quotient - (compare * 273u);
-    over0 = (rest >= 273u) ? 1u : 0u;
-    compare += over0;
-    rest -= over0 * 273u;
-    over1 = (rest >= 273u) ? 1u : 0u;
-    compare += over1;
-
-    return ((uint16_t)(u_adc - COMMAND_LOW) <= COMMAND_SOUND) ? (uint16_t)compare : 0u;
+    return (uint16_t)((uint16_t)compare & (uint16_t)~let_go);
 }
 
 uint16_t dz_status(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
 {
-    uint16_t status = 0u;
+    const uint16_t p_a = p_a_adc;
+    const uint16_t p_b = p_b_adc;
+    const uint16_t a = below_zero((uint16_t)((uint16_t)(p_a - PRESSURE_A_LOW) | (uint16_t)(PRESSURE_A_HIGH - p_a)));
+    const uint16_t b = below_zero((uint16_t)((uint16_t)(p_b - PRESSURE_B_LOW) | (uint16_t)(PRESSURE_B_HIGH - p_b)));
+    /* Of a pressure that is not sound the difference says nothing. */
+    const uint16_t reversed = (uint16_t)(below_zero((uint16_t)(pressure_difference(p_a, p_b) + REVERSE)) & (uint16_t)~(a | b));
 
-    if ((uint16_t)(u_adc - COMMAND_LOW) > COMMAND_SOUND) {
-        status = DZ_STATUS_COMMAND;
-    }
-    if ((uint16_t)(p_a_adc - PRESSURE_A_LOW) > PRESSURE_A_SOUND) {
-        status = (uint16_t)(status | DZ_STATUS_PRESSURE_A);
-    }
-    if ((uint16_t)(p_b_adc - PRESSURE_B_LOW) > PRESSURE_B_SOUND) {
-        status = (uint16_t)(status | DZ_STATUS_PRESSURE_B);
-    }
-    if (pressure_difference(p_a_adc, p_b_adc) < REVERSE_LIMIT) {
-        status = (uint16_t)(status | DZ_STATUS_DIFFERENCE);
-    }
-    return status;
+    return (uint16_t)((unsound_command(u_adc) & DZ_STATUS_COMMAND) | (a & DZ_STATUS_PRESSURE_A) |
+                      (b & DZ_STATUS_PRESSURE_B) | (reversed & DZ_STATUS_DIFFERENCE));
+}
+
+uint16_t dz_beta(uint16_t p_a_adc, uint16_t p_b_adc)
+{
+    const uint16_t difference = pressure_difference(p_a_adc, p_b_adc);
+    const uint16_t failed = failed_pressures(p_a_adc, p_b_adc, difference);
+    const uint16_t dp = pressure_drop(difference, failed);
+    const uint16_t place = segment_of(dp, failed);
+    const uint32_t beta = law_segment[place].start - short_product(law_segment[place].change, (uint16_t)dp);
+    const struct wide scaled = product(beta, UINT32_C(42949673));
+
+    return (uint16_t)(scaled.high >> 4); /* exact for the whole table */
 }

@@ -14,7 +14,7 @@
 #define DZ_STATUS_COMMAND 0x0001u    /* command outside its sound codes: the valve is let go */
 #define DZ_STATUS_PRESSURE_A 0x0002u /* pressure A outside its sound codes: smallest beta */
 #define DZ_STATUS_PRESSURE_B 0x0004u /* pressure B outside its sound codes: smallest beta */
-#define DZ_STATUS_DIFFERENCE 0x0008u /* pressure drop below -0.195 MPa: smallest beta */
+#define DZ_STATUS_DIFFERENCE 0x0008u /* pressure drop of sound signals below -0.195 MPa: smallest beta */
 
 /* Returns the PWM compare value, 0 to DZ_COMPARE_LIMIT, of
  *     u_O = beta*u_min0 + u_i*(beta*(k*x_max/u_max - 1) + 1)   (18)
@@ -33,5 +33,8 @@ uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
 
 /* Returns what is wrong with the inputs, DZ_STATUS_..., or 0. */
 uint16_t dz_status(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
+
+/* Returns the beta that dz_comp() uses at these pressures, times 2^15, rounded down: for a display, not for control. */
+uint16_t dz_beta(uint16_t p_a_adc, uint16_t p_b_adc);
 
 #endif

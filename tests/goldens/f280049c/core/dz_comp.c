@@ -7,127 +7,143 @@
 /* u_O = beta*u_min0 + u_i*(beta*(k*x_max/u_max - 1) + 1)   (18)
  * k x_max/u_max = 15917/32768 = 0.485748, rounded to nearest
  * u_min0/u_max  = 33701/65536 = 0.514236, rounded down with half a count to spare
- * beta(dP): 67 nodes, one every 64 codes of the pressure difference (0.3126 MPa), straight between.
+ * beta(dP): straight over 64 segments of 64 codes of the pressure difference (0.3126 MPa) each.
  *
- * In counts of the PWM this is sum / (819 * 2^31) with the 64-bit integer
- *     sum = beta * (-168510 * c + 690027975) + 125 * 2^37 * c + 879394553856,
- * c being the codes of command from zero on and beta the table's value times 64. Nothing is rounded before the
- * one shift and the one division. Each input takes the same way through the code.
+ * In counts of the PWM this is sum / (819 * 2^32) with the 64-bit integer
+ *     sum = beta * (-168510 * c + 690027975) + 125 * 2^38 * c + 1758789107712,
+ * c being the codes of command from zero on and beta the table's value. Nothing is rounded before the
+ * one shift and the one division. There is no branch: each input takes the same way through the code.
  */
 
 /* Eq. (29): zero command is code 0, full command 4095; sound codes 0 to 4095. Exact. */
-#define COMMAND_ZERO 0
-#define COMMAND_SPAN 4095
+#define COMMAND_ZERO 0u
 #define COMMAND_LOW 0u
-#define COMMAND_SOUND 4095u /* codes above the lowest sound one */
+#define COMMAND_HIGH 4095u
 
 /* Below Eq. (29): codes of no pressure, and sound codes. One code of sensor A is 0.004884 MPa. Exact. */
-#define PRESSURE_A_ZERO 0
+#define PRESSURE_A_ZERO 0u
 #define PRESSURE_A_LOW 0u
-#define PRESSURE_A_SOUND 4095u
-#define PRESSURE_B_ZERO 0
+#define PRESSURE_A_HIGH 4095u
+#define PRESSURE_B_ZERO 0u
 #define PRESSURE_B_LOW 0u
-#define PRESSURE_B_SOUND 4095u
-#define REVERSE_LIMIT (-40) /* -0.195 MPa: below it a sensor has failed */
+#define PRESSURE_B_HIGH 4095u
+#define REVERSE 40u /* -0.195 MPa: below it a sensor has failed */
 
-/* Eq. (7): beta at the nodes, times 819200; the last two are the smallest beta, the safe one when the pressure
- * can't be right. Rounded down, so that the certificate holds. */
-#define NODE_FALLBACK 4160u
-static const uint32_t beta_node[67] = {
-    UINT32_C(819200), UINT32_C(819200), UINT32_C(819200), UINT32_C(819200), UINT32_C(817225),
-    UINT32_C(814875), UINT32_C(812525), UINT32_C(810150), UINT32_C(807800), UINT32_C(804125),
-    UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125),
-    UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125),
-    UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125),
-    UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125),
-    UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125),
-    UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125),
-    UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125),
-    UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125),
-    UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125),
-    UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125),
-    UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125), UINT32_C(804125),
-    UINT32_C(804125), UINT32_C(804125),
+/* Eq. (7): beta = start + change * dP, times 1638400, in each segment; dP in codes of sensor A. The first
+ * entry is the smallest beta, the safe one when the pressure can't be right. Nodes rounded down, so that the
+ * certificate holds. */
+struct segment
+{
+    int32_t start;
+    int32_t change;
 };
 
-/* The quotient whose compare value is DZ_COMPARE_LIMIT: (DZ_COMPARE_LIMIT + 1) * 819 - 1. */
-#define QUOTIENT_LIMIT UINT32_C(32760818)
+static const struct segment law_segment[65] = {
+    {102928000, 0}, {104857600, 0}, {104857600, 0}, {104857600, 0},
+    {105616000, -3950}, {105808000, -4700}, {105808000, -4700}, {105827200, -4750},
+    {105804800, -4700}, {107161600, -7350}, {102928000, 0}, {102928000, 0},
+    {102928000, 0}, {102928000, 0}, {102928000, 0}, {102928000, 0},
+    {102928000, 0}, {102928000, 0}, {102928000, 0}, {102928000, 0},
+    {102928000, 0}, {102928000, 0}, {102928000, 0}, {102928000, 0},
+    {102928000, 0}, {102928000, 0}, {102928000, 0}, {102928000, 0},
+    {102928000, 0}, {102928000, 0}, {102928000, 0}, {102928000, 0},
+    {102928000, 0}, {102928000, 0}, {102928000, 0}, {102928000, 0},
+    {102928000, 0}, {102928000, 0}, {102928000, 0}, {102928000, 0},
+    {102928000, 0}, {102928000, 0}, {102928000, 0}, {102928000, 0},
+    {102928000, 0}, {102928000, 0}, {102928000, 0}, {102928000, 0},
+    {102928000, 0}, {102928000, 0}, {102928000, 0}, {102928000, 0},
+    {102928000, 0}, {102928000, 0}, {102928000, 0}, {102928000, 0},
+    {102928000, 0}, {102928000, 0}, {102928000, 0}, {102928000, 0},
+    {102928000, 0}, {102928000, 0}, {102928000, 0}, {102928000, 0},
+    {102928000, 0},
+};
 
-/* Codes of command from zero on, towards code 4095. */
-static int32_t command_from_zero(uint16_t u_adc)
+/* All ones if the subtraction that gave x went below zero, else 0. */
+static uint32_t below_zero(uint32_t x)
 {
-    const int32_t signed_code = (int32_t)u_adc - COMMAND_ZERO;
-    const int32_t code = (signed_code > 0) ? signed_code : 0;
-
-    return (code < COMMAND_SPAN) ? code : COMMAND_SPAN;
+    return (uint32_t)(0u - (uint32_t)(x >> 31));
 }
 
-/* Difference of the pressures, in codes of sensor A. */
-static int32_t pressure_difference(uint16_t p_a_adc, uint16_t p_b_adc)
+/* All ones if the command can't come from a sound signal. */
+static uint32_t unsound_command(uint32_t u)
 {
-    const int32_t p_a = (int32_t)p_a_adc - PRESSURE_A_ZERO;
-    const int32_t p_b = (int32_t)p_b_adc - PRESSURE_B_ZERO;
-
-    return p_a - p_b;
+    return below_zero((uint32_t)((uint32_t)(u - COMMAND_LOW) | (uint32_t)(COMMAND_HIGH - u)));
 }
 
-/* Place in the tables: the difference of the pressures, or the fallback's. */
-static uint16_t place_of(uint16_t p_a_adc, uint16_t p_b_adc)
+/* Difference of the pressures, modulo the word. */
+static uint32_t pressure_difference(uint32_t p_a, uint32_t p_b)
 {
-    const int32_t difference = pressure_difference(p_a_adc, p_b_adc);
-    const uint32_t from_zero = (difference > 0) ? (uint32_t)difference : 0u;
-    uint16_t place = (uint16_t)(from_zero);
+    const uint32_t a = (uint32_t)(p_a - PRESSURE_A_ZERO);
+    const uint32_t b = (uint32_t)(p_b - PRESSURE_B_ZERO);
 
-    place = (difference >= REVERSE_LIMIT) ? place : NODE_FALLBACK;
-    place = ((uint16_t)(p_a_adc - PRESSURE_A_LOW) <= PRESSURE_A_SOUND) ? place : NODE_FALLBACK;
-    place = ((uint16_t)(p_b_adc - PRESSURE_B_LOW) <= PRESSURE_B_SOUND) ? place : NODE_FALLBACK;
-    return place;
+    return (uint32_t)(a - b);
 }
 
-/* A table at a place, times 64; at most 31 bits. */
-static uint32_t interpolate(const uint32_t *node, uint16_t place)
+/* All ones if the pressures can't be right: one is not sound, or the drop is below -REVERSE. */
+static uint32_t failed_pressures(uint32_t p_a, uint32_t p_b, uint32_t difference)
 {
-    const uint16_t left = (uint16_t)(place >> 6);
-    const uint32_t past = (uint32_t)place & 63u;
+    return below_zero((uint32_t)((uint32_t)(p_a - PRESSURE_A_LOW) | (uint32_t)(PRESSURE_A_HIGH - p_a) |
+                                 (uint32_t)(p_b - PRESSURE_B_LOW) | (uint32_t)(PRESSURE_B_HIGH - p_b) |
+                                 (uint32_t)(difference + REVERSE)));
+}
 
-    return (node[left] * (64u - past)) + (node[left + 1u] * past);
+/* Pressure drop in codes of sensor A; 0 below zero, and where the pressures can't be right. */
+static uint32_t pressure_drop(uint32_t difference, uint32_t failed)
+{
+    return (uint32_t)((difference & (uint32_t)~(below_zero(difference) | failed)));
+}
+
+/* Place in the tables: one more than the segment's number, 0 where the pressures can't be right. */
+static uint32_t segment_of(uint32_t dp, uint32_t failed)
+{
+    return (uint32_t)(((uint32_t)(dp + 64u) >> 6) & (uint32_t)~failed);
 }
 
 uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
 {
-    const int32_t command = command_from_zero(u_adc);
-    const uint16_t place = place_of(p_a_adc, p_b_adc);
-    const uint32_t beta = interpolate(beta_node, place);
-    /* Casts come before products: an int has 16 bits on some targets. */
-    const int32_t factor = (-INT32_C(168510) * command) + INT32_C(690027975);
-    const int64_t product = (int64_t)beta * factor;
-    const uint64_t straight = (UINT64_C(125) * (uint32_t)command) << 37;
-    const uint64_t law = (uint64_t)product + straight + UINT64_C(879394553856);
+    const uint32_t u = u_adc;
+    const uint32_t p_a = p_a_adc;
+    const uint32_t p_b = p_b_adc;
+    const uint32_t let_go = unsound_command(u);
+    const uint32_t from_zero = (uint32_t)((uint32_t)(u - COMMAND_ZERO) & (uint32_t)~let_go);
+    const uint32_t command = from_zero;
+    const uint32_t difference = pressure_difference(p_a, p_b);
+    const uint32_t failed = failed_pressures(p_a, p_b, difference);
+    const uint32_t dp = pressure_drop(difference, failed);
+    const uint32_t place = segment_of(dp, failed);
+    const int32_t beta = law_segment[place].start + (law_segment[place].change * (int32_t)dp);
+    const int32_t factor = (-INT32_C(168510) * (int32_t)command) + INT32_C(690027975);
+    const uint64_t law = (uint64_t)((int64_t)beta * factor) + ((uint64_t)(UINT32_C(8000) * command) << 32) + UINT64_C(1758789107712);
     const uint64_t sum = law;
     /* Modulo 2^64, and never negative (proved over the tables' nodes). */
-    const uint32_t unlimited = (uint32_t)(sum >> 31);
-    const uint32_t quotient = (unlimited < QUOTIENT_LIMIT) ? unlimited : QUOTIENT_LIMIT;
+    const uint32_t unlimited = (uint32_t)(sum >> 32);
+    const uint32_t quotient = unlimited; /* never above the one of DZ_COMPARE_LIMIT */
     /* quotient / 819, exact for every quotient up to 32760818. */
-    const uint32_t compare = (uint32_t)(((uint64_t)quotient * UINT32_C(41953283)) >> 35);
+    const uint32_t compare = (uint32_t)(((uint64_t)quotient * UINT32_C(2685010091)) >> 41);
 
-    return ((uint16_t)(u_adc - COMMAND_LOW) <= COMMAND_SOUND) ? (uint16_t)compare : 0u;
+    return (uint16_t)((uint16_t)compare & (uint16_t)~let_go);
 }
 
 uint16_t dz_status(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
 {
-    uint16_t status = 0u;
+    const uint32_t p_a = p_a_adc;
+    const uint32_t p_b = p_b_adc;
+    const uint32_t a = below_zero((uint32_t)((uint32_t)(p_a - PRESSURE_A_LOW) | (uint32_t)(PRESSURE_A_HIGH - p_a)));
+    const uint32_t b = below_zero((uint32_t)((uint32_t)(p_b - PRESSURE_B_LOW) | (uint32_t)(PRESSURE_B_HIGH - p_b)));
+    /* Of a pressure that is not sound the difference says nothing. */
+    const uint32_t reversed = (uint32_t)(below_zero((uint32_t)(pressure_difference(p_a, p_b) + REVERSE)) & (uint32_t)~(a | b));
 
-    if ((uint16_t)(u_adc - COMMAND_LOW) > COMMAND_SOUND) {
-        status = DZ_STATUS_COMMAND;
-    }
-    if ((uint16_t)(p_a_adc - PRESSURE_A_LOW) > PRESSURE_A_SOUND) {
-        status = (uint16_t)(status | DZ_STATUS_PRESSURE_A);
-    }
-    if ((uint16_t)(p_b_adc - PRESSURE_B_LOW) > PRESSURE_B_SOUND) {
-        status = (uint16_t)(status | DZ_STATUS_PRESSURE_B);
-    }
-    if (pressure_difference(p_a_adc, p_b_adc) < REVERSE_LIMIT) {
-        status = (uint16_t)(status | DZ_STATUS_DIFFERENCE);
-    }
-    return status;
+    return (uint16_t)((unsound_command(u_adc) & DZ_STATUS_COMMAND) | (a & DZ_STATUS_PRESSURE_A) |
+                      (b & DZ_STATUS_PRESSURE_B) | (reversed & DZ_STATUS_DIFFERENCE));
+}
+
+uint16_t dz_beta(uint16_t p_a_adc, uint16_t p_b_adc)
+{
+    const uint32_t difference = pressure_difference(p_a_adc, p_b_adc);
+    const uint32_t failed = failed_pressures(p_a_adc, p_b_adc, difference);
+    const uint32_t dp = pressure_drop(difference, failed);
+    const uint32_t place = segment_of(dp, failed);
+    const uint32_t beta = (uint32_t)(law_segment[place].start + (law_segment[place].change * (int32_t)dp));
+
+    return (uint16_t)(((uint64_t)beta * UINT32_C(42949673)) >> 37); /* exact for the whole table */
 }

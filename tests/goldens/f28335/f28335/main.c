@@ -6,6 +6,7 @@
 
 #include "dz_hardware.h"
 #include "dz_isr.h"
+#include "dz_telemetry.h"
 
 /* The watchdog watches the interrupt, not this loop: no tick since the last look, no service. */
 static void service_watchdog_if_isr_ran(void)
@@ -40,12 +41,15 @@ int main(void)
     InitAdc(); /* calibration, power-up, 5 ms */
 
     dz_hardware_init();
+    dz_telemetry_init();
     dz_interrupt_init();
     dz_watchdog_start();
     EINT;
 
     for (;;)
     {
+        /* Neither waits for anything, so neither keeps the other from its turn. */
         service_watchdog_if_isr_ran();
+        dz_telemetry_poll();
     }
 }

@@ -1,0 +1,216 @@
+"""The telemetry frame, stated once: its C is printed from here, and `dzdesign monitor` reads by it.
+
+    sync (2)   version (1)   length (1)   payload (length)   CRC (2)
+
+Octets; numbers of more than one octet come with the most significant first. The CRC runs over version, length and
+payload: CRC-16/IBM-3740 (also called CCITT-FALSE), polynomial x^16 + x^12 + x^5 + 1 (1021h), start FFFFh, not
+reflected, nothing added at the end; of the octets of "123456789" it is 29B1h.
+"""
+
+import binascii
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+
+from dzdesign.core.errors import InputError
+
+SYNC = 0xA55A
+VERSION = 1
+CRC_POLYNOMIAL, CRC_START = 0x1021, 0xFFFF
+HEADER_OCTETS, CRC_OCTETS = 4, 2
+#: A start bit, eight of data, a stop bit.
+BITS_PER_OCTET = 10
+#: Fraction bits of beta in a frame.
+BETA_BITS = 15
+#: Ticks count modulo this.
+TICKS_MODULUS = 1 << 32
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Field:
+    """One number of the payload: name in C and in Python, bits (16 or 32), and what it is."""
+
+    name: str
+    bits: int
+    text: str
+
+
+FIELDS = (
+    Field(name="ticks", bits=32, text="PWM periods since the start, modulo 2^32"),
+    Field(name="origin", bits=16, text="first 16 bits of the SHA-256 of compensator.json"),
+    Field(name="u_adc", bits=16, text="code of the command"),
+    Field(name="p_a_adc", bits=16, text="code of pressure A"),
+    Field(name="p_b_adc", bits=16, text="code of pressure B"),
+    Field(name="beta", bits=16, text="beta(dP) times 2^15, rounded down"),
+    Field(name="compare", bits=16, text="PWM compare value"),
+    Field(name="status", bits=16, text="bits of the status word"),
+)
+#: The status word: what the hardware reports, in its low octet, and in the high one what dz_status() finds wrong.
+STATUS_BITS = {
+    0x0001: "no usable sample in time",
+    0x0002: "trip input went low",
+    0x0004: "watchdog reset",
+    0x0008: "crystal or PLL not as expected",
+    0x0100: "command not sound",
+    0x0200: "pressure A not sound",
+    0x0400: "pressure B not sound",
+    0x0800: "pressure drop not plausible",
+}
+#: The output is in use; without it the trip zone holds the pin low, whatever the compare value.
+STATUS_RELEASED = 0x0080
+PAYLOAD_OCTETS = sum(field.bits // 8 for field in FIELDS)
+FRAME_OCTETS = HEADER_OCTETS + PAYLOAD_OCTETS + CRC_OCTETS
+FRAME_BITS = FRAME_OCTETS * BITS_PER_OCTET
+_FORMAT = ">" + "".join({16: "H", 32: "I"}[field.bits] for field in FIELDS)
+_START = struct.pack(">HBB", SYNC, VERSION, PAYLOAD_OCTETS)
+_SYNC = _START[:2]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Link:
+    """The serial line of a target.
+
+    Attributes
+    ----------
+    tick_Hz : int
+        PWM periods in a second: the unit of a frame's time.
+    frame_ticks : int
+        PWM periods from one frame to the next.
+    baud : int
+        Nominal bits in a second.
+    """
+
+    tick_Hz: int
+    frame_ticks: int
+    baud: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Frame:
+    """The numbers of one frame, as `FIELDS` states them."""
+
+    ticks: int
+    origin: int
+    u_adc: int
+    p_a_adc: int
+    p_b_adc: int
+    beta: int
+    compare: int
+    status: int
+
+
+def crc_of(octets: bytes) -> int:
+    """Return the frame's CRC of some octets.
+
+    Examples
+    --------
+    >>> hex(crc_of(b"123456789"))
+    '0x29b1'
+    """
+    return binascii.crc_hqx(octets, CRC_START)
+
+
+class FrameReader:
+    """Finds the frames in a stream of octets, whatever lies between them.
+
+    Attributes
+    ----------
+    frames, bad_crc, other_version, skipped : int
+        Frames found; frames whose CRC was wrong; headers of another version or length; octets outside good frames.
+    """
+
+    def __init__(self) -> None:
+        self._held = bytearray()
+        self.frames = self.bad_crc = self.other_version = self.skipped = 0
+
+    def feed(self, octets: bytes) -> Iterator[Frame]:
+        """Yield the frames that are complete with these octets.
+
+        After a bad frame the search goes on one octet behind its sync word, so that a good frame which begins inside
+        the bad one (a cut frame) is not lost with it.
+        """
+        held = self._held
+        held += octets
+        while True:
+            start = held.find(_SYNC)
+            if start < 0:  # the last octet may be the first half of a sync word
+                self._skip(len(held) - held.endswith(_SYNC[:1]))
+                return
+            self._skip(start)
+            if not held.startswith(_START):
+                if len(held) < HEADER_OCTETS:
+                    return
+                self.other_version += 1
+                self._skip(1)
+                continue
+            if len(held) < FRAME_OCTETS:
+                return
+            if crc_of(held[2:FRAME_OCTETS]):  # with its own CRC behind it, the CRC of sound octets is zero
+                self.bad_crc += 1
+                self._skip(1)
+                continue
+            numbers = struct.unpack_from(_FORMAT, held, HEADER_OCTETS)
+            self.frames += 1
+            del held[:FRAME_OCTETS]
+            yield Frame(**{field.name: number for field, number in zip(FIELDS, numbers, strict=True)})
+
+    def _skip(self, count: int) -> None:
+        self.skipped += count
+        del self._held[:count]
+
+
+def frame_context() -> dict[str, str]:
+    """Return what the templates of a target print of the frame: sizes, the layout as a comment, the C of the fields."""
+    rows, at = [], HEADER_OCTETS
+    for field in FIELDS:
+        rows.append(f" *   {at:2d}  {field.bits // 8}  {field.name:8s} {field.text}")
+        at += field.bits // 8
+    return {
+        "frame_sync": f"0x{SYNC:04X}",
+        "frame_version": str(VERSION),
+        "frame_payload": str(PAYLOAD_OCTETS),
+        "frame_octets": str(FRAME_OCTETS),
+        "frame_layout": "\n".join(rows),
+        "frame_crc_at": str(at),
+        "frame_members": "\n".join(f"    uint{field.bits}_t {field.name}; /* {field.text} */" for field in FIELDS),
+        "frame_puts": "\n".join(f"    at = put_{field.bits}(octets, at, frame->{field.name});" for field in FIELDS),
+        "crc_polynomial": f"0x{CRC_POLYNOMIAL:04X}",
+        "crc_start": f"0x{CRC_START:04X}",
+        "status_released": f"0x{STATUS_RELEASED:04X}",
+    }
+
+
+def beta_factor(unit: int, largest: int) -> tuple[int, int]:
+    """Return (m, s) with ``v * m >> s`` equal to ``v * 2^15 // unit`` for every v up to `largest`.
+
+    Parameters
+    ----------
+    unit
+        What stands for beta = 1 on the scale of the core's table.
+    largest
+        Largest value on that scale; below 2^31.
+
+    Raises
+    ------
+    InputError
+        If no 32-bit factor is exact.
+
+    Notes
+    -----
+    With n/d = 2^15 / unit in lowest terms, m = ceil(2^s n / d) and e = m d - 2^s n the quotient errs by v e / (d 2^s),
+    which must stay below 1/d, the least distance of v n / d to the integer above it.
+    """
+    share = Fraction(1 << BETA_BITS, unit)
+    for shift in range(64):
+        factor = -(-(share.numerator << shift) // share.denominator)
+        if factor >= 1 << 32:
+            break
+        if largest * (factor * share.denominator - (share.numerator << shift)) < 1 << shift:
+            return factor, shift
+    raise InputError(f"no 32-bit factor brings beta from units of 1/{unit} to 2^-{BETA_BITS} exactly up to {largest}")
+
+
+def line_load(baud: Fraction, frame_Hz: Fraction) -> Fraction:
+    """Return the share of the time in which the line is busy with frames."""
+    return FRAME_BITS * frame_Hz / baud
