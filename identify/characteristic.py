@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dzdesign.core.errors import InputError
 from dzdesign.identify.branches import Bins, Branch, bin_branch
 from dzdesign.identify.noise import colour_factor, measure_roughness, shared_correlation
 from dzdesign.identify.profile import crossing, flow_at_top, smooth_profile
@@ -124,9 +125,16 @@ def describe_branches(reads: Sequence[ReadBranch], *, u_max: float, window: tupl
     Raises
     ------
     InputError
-        If a window holds too few samples for a line.
+        If a window holds too few samples for a line, or the flow does not rise in it.
     """
     narrow = [lay_line(read, window) for read in reads]
+    for read, line in zip(reads, narrow, strict=True):
+        if not line.slope > 0:
+            raise InputError(
+                f"'{read.source}': between {window[0]:.0%} and {window[1]:.0%} of the largest flow, "
+                f"{read.y_max * 6e4:.3g} L/min, the flow does not rise with the command; look for "
+                "spikes in the column of Q, leave their cells blank, or choose another --knee-window"
+            )
     correlation, blocks = _shared_noise(narrow)
     narrow = [line.coloured(correlation, blocks) for line in narrow]
     noises = [_quiet_noise(read.branch, read.y, line.knee) for read, line in zip(reads, narrow, strict=True)]

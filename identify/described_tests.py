@@ -14,12 +14,11 @@ from dzdesign.identify.pooling import PooledTest, pool_ramps
 from dzdesign.identify.profile import flow_at_top, smooth_profile
 from dzdesign.identify.ramp_files import RampTest
 from dzdesign.identify.ramp_splitting import Ramp, despiked, nominal_dp, split_ramps
+from dzdesign.identify.refusals import refuse_a_jump, refuse_a_shut_valve, refuse_a_wrong_pressure
 from dzdesign.identify.straight_part import ReadBranch, read_branch
 
 MPA = 1e6
 L_MIN = 1e-3 / 60
-#: Pressure drops beyond these, Pa, are a wrong unit.
-SMALLEST_DP, LARGEST_DP = 1e3, 200 * MPA
 #: A recording whose command moves by less than this share of u_max is no part of a ramp.
 SMALLEST_SWEEP = 0.1
 #: A recording that comes to this share of the largest command is whole: the valve must have opened in it.
@@ -93,6 +92,8 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
     _refuse_what_shows_no_dead_zone(pooled, options)
     floor = options.meter_floor if options.meter_floor is not None else _found_floor(pooled, options)
     reads = [read for item in pooled for read in _read(item, floor, options.u_max)]
+    for read in reads:
+        refuse_a_jump(read, options.u_max)
     shapes = iter(describe_branches(reads, u_max=options.u_max, window=options.knee_window))
     described = [_describe(item, shapes, options.u_max) for item in pooled]
     described = _in_order_of_pressure(described)
@@ -143,59 +144,36 @@ def _split_all(tests: Sequence[RampTest], options: IdentifyOptions, lag: float) 
                 f"'{test.source}' has no column of dP (or pA and pB); several ramp tests can only be told apart by it: "
                 "record it, or declare it by --dp or [dp]"
             )
+        if lag > 0 and not np.ptp(test.time) > 0:
+            raise InputError(
+                f"'{test.source}': the time stands still at {test.time[0]:g} s, so the meter's lag can't be taken out; "
+                "correct the column of time, or leave out --meter-lag"
+            )
         mine = split_ramps(test, lag)
         if np.ptp(test.u) < SMALLEST_SWEEP * options.u_max or not any(ramp.branches for ramp in mine):
-            raise _no_ramp(test.source)
+            raise _no_ramp(test)
         for ramp in mine:
-            _refuse_a_wrong_pressure(test.source, ramp.dp)
+            refuse_a_wrong_pressure(test.source, ramp.dp)
         for item in pool_ramps(mine) if top >= FULL_SWEEP * highest else ():  # a fragment may well see no flow
-            _refuse_a_shut_valve(item.test.source, item.branches, options.u_max)
+            refuse_a_shut_valve(item.test.source, item.branches, options.u_max)
         ramps += mine
     return ramps
 
 
-def _no_ramp(source: str) -> InputError:
-    return InputError(f"'{source}' holds no ramp of the command from near zero up; expected a ramp test")
-
-
-def _refuse_a_wrong_pressure(source: str, dp: float | None) -> None:
-    """Refuse a pressure drop that is no valve's: a wrong unit, or ports that were swapped."""
-    if dp is None:
-        return
-    if 0 < dp < SMALLEST_DP or dp > LARGEST_DP:
-        raise InputError(
-            f"'{source}': the pressure drop is {dp / MPA:.3g} MPa, expected {SMALLEST_DP / MPA:g} to "
-            f"{LARGEST_DP / MPA:g} MPa; correct the unit in the header (mPa is a thousandth of a pascal)"
-        )
-    if dp <= 0:
-        raise InputError(
-            f"'{source}': the pressure drop is {dp / MPA:.3f} MPa, expected a positive one; "
-            "swap pA and pB, or correct the sign of dP"
-        )
+def _no_ramp(test: RampTest) -> InputError:
+    return InputError(
+        f"'{test.source}' holds no ramp of the command from near zero up: it runs from {test.u.min():.2f} to "
+        f"{test.u.max():.2f} V, expected a sweep over half of the command at least, without jumps; record it so, from "
+        "below the threshold"
+    )
 
 
 def _refuse_what_shows_no_dead_zone(pooled: list[PooledTest], options: IdentifyOptions) -> None:
     """Refuse a pressure drop without a whole branch, and a recording or a test whose valve never opens."""
     for item in pooled:
         if item.branches == (None, None):
-            raise _no_ramp(item.test.source)
-        _refuse_a_shut_valve(item.test.source, item.branches, options.u_max)
-
-
-def _refuse_a_shut_valve(source: str, branches: Sequence[Branch | None], u_max: float) -> None:
-    """Refuse a test whose flow at full command does not stand out of the meter's noise."""
-    for branch in branches:
-        if branch is None:
-            continue
-        bottom = branch.q[branch.u <= branch.u.min() + 0.05 * np.ptp(branch.u)]
-        noise = 1.4826 * float(np.median(np.abs(bottom - np.median(bottom))))
-        rise = flow_at_top(*smooth_profile(branch.u, branch.q, u_max)) - float(np.median(bottom))
-        if rise <= max(6 * noise, 0.01 * L_MIN):
-            raise InputError(
-                f"'{source}': the valve never opens: the flow at {branch.u.max():.2f} V is "
-                f"{rise / L_MIN:.3f} L/min above that at zero, within the meter's noise of {noise / L_MIN:.3f} L/min; "
-                "check the solenoid, the supply and the column of Q"
-            )
+            raise _no_ramp(item.test)
+        refuse_a_shut_valve(item.test.source, item.branches, options.u_max)
 
 
 def _found_floor(pooled: list[PooledTest], options: IdentifyOptions) -> float:

@@ -87,6 +87,8 @@ def _knees(group: Sequence[Ramp], rising: bool, options: IdentifyOptions) -> tup
                 line = lay_line(read, options.knee_window)
             except InputError:
                 continue
+            if not line.slope > 0:
+                continue
             found.append((branch.rate, line.knee, line.knee_se))
     columns = np.array(found).reshape(-1, 3)
     return columns[:, 0], columns[:, 1], columns[:, 2]

@@ -8,6 +8,7 @@ from dzdesign.identify.described_tests import L_MIN, DescribedTest, DescribedTes
 from dzdesign.identify.model import SideModel, TestResult, Warning_
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramp_files import RampTest
+from dzdesign.identify.sweep_quality import about_sweeps
 
 #: A softer edge than this share of u_max between knee and the tail's zero is said.
 SOFT_EDGE = 5e-3
@@ -45,7 +46,7 @@ def find_warnings(
         *_about_order(side, departure),
         *_about_pressure(side, group.tests),
         *_about_declarations(group.tests),
-        *_about_branches(side, group.tests, options.u_max),
+        *about_sweeps(side, group.tests, options.u_max),
         *_about_noise(side, options.u_max),
         *_about_the_edge(side, group, options.u_max),
     )
@@ -68,10 +69,14 @@ def about_thinning(tests: Sequence[RampTest]) -> Iterator[Warning_]:
 
 def _about_the_lag(group: DescribedTests, options: IdentifyOptions) -> Iterator[Warning_]:
     rates = [branch.rate for item in group.tests for branch in item.branches if branch and branch.rate > 0]
+    fastest, lag = max(rates, default=0.0), group.lag
     if not rates:
-        return
-    fastest, lag = max(rates), group.lag
-    if lag.origin == "unknown":
+        yield Warning_(
+            code="clock",
+            text="the column of time tells no ramp rate, so what the flow meter's lag does to the knees can't be said",
+            source=None,
+        )
+    elif lag.origin == "unknown":
         yield Warning_(
             code="lag-unknown",
             text=(
@@ -195,50 +200,6 @@ def _about_declarations(tests: tuple[DescribedTest, ...]) -> Iterator[Warning_]:
                 "for 5 % on a 10 V valve like the example's). Record dP (or pA and pB)"
             ),
             source=item.test.source,
-        )
-
-
-def _about_branches(side: SideModel, tests: tuple[DescribedTest, ...], u_max: float) -> Iterator[Warning_]:
-    for test, item in zip(side.tests, tests, strict=True):
-        if test.u_knee_falling_V is None:
-            yield Warning_(
-                code="one-branch",
-                text=(
-                    "no falling branch: valves close at a lower command than they open, so the certificate guards the "
-                    "opening threshold only and flow at zero command after closing is possible. Ramp down as well"
-                ),
-                source=test.source,
-            )
-        if test.u_knee_rising_V is None:
-            yield Warning_(
-                code="one-branch",
-                text="no rising branch: the residual dead zone on opening can't be said. Ramp up as well",
-                source=test.source,
-            )
-        if test.u_knee_rising_V and test.u_knee_falling_V and test.u_knee_rising_V < test.u_knee_falling_V:
-            yield Warning_(
-                code="branch-order",
-                text=(
-                    f"the valve closes ({test.u_knee_falling_V:.3f} V) above where it opens "
-                    f"({test.u_knee_rising_V:.3f} V): is the meter's lag over-corrected, or the time column wrong?"
-                ),
-                source=test.source,
-            )
-        top = float(item.test.u.max())
-        if top < 0.97 * u_max:
-            yield Warning_(
-                code="not-full-command",
-                text=f"the command reaches {top:.2f} V of {u_max:g} V, so k x_max is too small",
-                source=test.source,
-            )
-    if not any(test.saturates for test in side.tests):
-        yield Warning_(
-            code="no-saturation",
-            text=(
-                f"no test saturates: k x_max/u_max = {side.k_x_max_over_u_max:.4f} comes from the flow at full command "
-                "and is a lower bound of the stroke's"
-            ),
-            source=None,
         )
 
 

@@ -23,6 +23,8 @@ from dzdesign.identify.thinning import Thinner
 
 #: Fewest complete rows in which two branches with a threshold could stand.
 MIN_ROWS = 20
+#: Units of a command that is a current: what it means in volts, the file does not say.
+CURRENT = ("ma", "a")
 #: SI numbers beyond these are no measurement of a valve: a wrong unit, or what a logger writes for an overflow.
 LARGEST = {"time": 1e12, "voltage": 1e4, "pressure": 1e9, "flow": 10.0}
 
@@ -192,7 +194,7 @@ class _Clock:
             row = int(np.flatnonzero(complete)[backwards[0] - self._latest.size])
             raise InputError(
                 f"'{table.path}' {table.place(row)}: the time goes back; expected one recording in the order it was "
-                "taken"
+                "taken; where ramps with clocks of their own follow one another, make a file of each"
             )
         carried, self._latest = self._latest.size, latest[-1:]
         return latest[carried:]
@@ -224,7 +226,9 @@ def _factor(table: Table, quantity: str, column: Column, u_max: float) -> float:
             return u_max * si_factor(column.unit, "ratio")
         return si_factor(column.unit, QUANTITY_OF_COLUMN[quantity])
     except InputError as error:
-        raise InputError(f"'{table.path}' column '{column.label}': {error}") from error
+        current = quantity == "u" and column.unit.lower() in CURRENT
+        hint = "; write a command in mA as per cent of full command, u_%, zero where the current means none"
+        raise InputError(f"'{table.path}' column '{column.label}': {error}{hint if current else ''}") from error
 
 
 def ramp_file_bytes(columns: Mapping[str, np.ndarray], comments: tuple[str, ...], *, compress: bool) -> bytes:

@@ -13,6 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from dzdesign.core.errors import InputError
 from dzdesign.identify.branches import Branch
 from dzdesign.identify.ramp_files import RampTest
 
@@ -62,6 +63,11 @@ def split_ramps(test: RampTest, lag: float) -> list[Ramp]:
         One recording, of one ramp or several, with or without holds.
     lag : float
         Lag of the flow meter in s: the flow read at t belongs to the command at t - lag.
+
+    Raises
+    ------
+    InputError
+        Where the command jumps back and forth within a ramp.
     """
     test = _without_command_spikes(test)
     u = lagged_command(test.time, test.u, lag)
@@ -69,6 +75,11 @@ def split_ramps(test: RampTest, lag: float) -> list[Ramp]:
     turns = np.flatnonzero(np.diff(direction)) + 1
     cuts = [0, *(_cut(u, test.dp, int(turn), direction) for turn in turns), u.size]
     sweeps = [(slice(*ends), int(direction[turn])) for ends, turn in zip(pairwise(cuts), [0, *turns], strict=True)]
+    if any(part.stop <= part.start for part, _ in sweeps):
+        raise InputError(
+            f"'{test.source}': the command jumps back and forth ({turns.size} turns), expected ramps; if the logger "
+            "lost samples of the command, leave their cells blank"
+        )
     known = test.time >= test.time[0] + lag  # before that, the command that the flow belongs to was not recorded
     pace = [_pace(u[part]) for part, _ in sweeps]
     slowest = pace[int(np.argmax([part.stop - part.start for part, _ in sweeps]))]

@@ -27,6 +27,8 @@ Lines = list[tuple[int, str]]
 BLOCK_BYTES = 1 << 23
 #: Joins the cells of a line inside: no cell of a text file holds it.
 CELL_END = "\x1f"
+#: A cell with a date or a time of day.
+DATE = re.compile(r"\d[-/.:]\d+[-/.:]\d")
 #: What may stand between cells; where none of them is in the header, blanks do.
 SEPARATORS, BLANKS = ",;\t|", " "
 
@@ -97,9 +99,10 @@ class TextTable(Table):
             bad = (~(column.is_null() | (column == "")) & numbers.is_null()).arg_true()
             if len(bad):
                 row = int(bad[0])
+                date = " (the time has to be in seconds, not a date)" if DATE.search(column[row]) else ""
                 raise InputError(
                     f"'{self.path}' {self.place(row)}, column '{label}': '{column[row][:QUOTED_CHARACTERS]}' is not a "
-                    "number; correct it, or leave the cell blank if the sample is missing"
+                    f"number{date}; correct it, or leave the cell blank if the sample is missing"
                 )
         return numbers.fill_null(np.nan).to_numpy().copy()
 
@@ -166,6 +169,8 @@ def _blocks(file: BinaryIO, path: Path) -> Iterator[bytes]:
 
 def _refuse_no_text(data: bytes, offset: int, path: Path) -> None:
     """Refuse what is no text in UTF-8; `offset` bytes stand before it in the file."""
+    if not offset and data.startswith(b"PK"):
+        raise InputError(f"'{path}' is an Excel workbook or a zip archive; save the table as 'CSV UTF-8'")
     try:
         if not data.isascii():
             data.decode()
@@ -209,7 +214,7 @@ def _table(rows: bytes, number: int, header: Header, path: Path) -> TextTable:
         lines: Sequence[int] = range(number, number + cells.height)
     else:
         kept = _table_lines(rows.decode(), number)
-        cells = _read_cells(kept, header.separator, len(header.labels), path)
+        cells = _read_cells(kept, header, path)
         lines, rows = [number for number, _ in kept], b""
     return TextTable(
         path=path,
@@ -294,10 +299,11 @@ def _split(line: str, separator: str) -> list[str]:
     return next(csv.reader([line], delimiter=separator, skipinitialspace=True))
 
 
-def _read_cells(lines: Lines, separator: str, width: int, path: Path) -> "pl.DataFrame":
+def _read_cells(lines: Lines, header: Header, path: Path) -> "pl.DataFrame":
     """Return all cells as strings: numbers are read column by column, so that an error can name its row."""
     import polars as pl
 
+    separator, width = header.separator, len(header.labels)
     table = [CELL_END.join(f"c{index}" for index in range(width))]
     for number, line in lines:
         cells = _split(line, separator) if '"' in line or separator == BLANKS else None
@@ -305,7 +311,11 @@ def _read_cells(lines: Lines, separator: str, width: int, path: Path) -> "pl.Dat
         if count != width:
             comma = separator == "," and count == 2 * width
             hint = "; decimal commas need ';' or a tab between the cells" if comma else ""
-            raise InputError(f"'{path}' row {number} has {count} cells, expected {width} as in the header{hint}")
+            raise InputError(
+                f"'{path}' row {number} has {count} cells, expected {width} as in the header, row {header.line} "
+                f"('{', '.join(header.labels)[:QUOTED_CHARACTERS]}'){hint}; correct the row, or begin rows that stand "
+                "above the header with #"
+            )
         table.append(line.replace(separator, CELL_END) if cells is None else CELL_END.join(cells))
     try:
         return pl.read_csv("\n".join(table).encode(), separator=CELL_END, infer_schema=False, quote_char=None)

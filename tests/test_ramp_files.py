@@ -271,7 +271,7 @@ def test_long_cells_and_many_columns_are_cut(refusal):
         (table().replace("u_V", "Δu_V").encode("utf-16"), "is not a text file in UTF-8 (byte 1)"),
         (table().encode("utf-16-le"), "is UTF-16 or no text at all"),
         ("# Öl bei 40 °C\n".encode("latin-1") + table().encode(), "is not a text file in UTF-8 (byte 3)"),
-        (b"PK\x03\x04\x14\x00\x06\x00\x08\x00\x00\x00!\x00\xff", "is not a text file in UTF-8"),
+        (b"PK\x03\x04\x14\x00\x06\x00\x08\x00\x00\x00!\x00\xff", "is an Excel workbook or a zip archive"),
     ],
 )  # fmt: skip
 def test_refused_with_the_reason_and_the_place(refusal, content, words):
