@@ -196,19 +196,16 @@ def _table_plan(form: IntegerForm, step: int, arithmetic: str) -> Plan:
     changes = [change for table in tables for _, change in table]
     falls = max(changes) <= 0
     short = (falls or min(changes) >= 0) and max(map(abs, changes)) < 1 << 16
-    plan: Plan = {"change_sign": "+", "start_type": "int32_t", "change_type": "int32_t", "change_product": ""}
+    plan: Plan = {"change_sign": "+", "change_type": "int32_t", "change_product": ""}
     turn = 1
     if arithmetic == "narrow":
-        plan["start_type"] = "uint32_t"
         if short:
             turn = -1 if falls else 1
             plan |= {"change_sign": "-" if falls else "+", "change_type": "uint16_t"}
             plan["change_product"] = "short_product({}[place].change, (uint16_t)dp)"
         else:
             plan |= {"change_type": "int32_t", "change_product": "((uint32_t){}[place].change * dp)"}
-    rows = [[f"{{{start % 2**32}u, {turn * change}}}," for start, change in table] for table in tables]
-    if plan["start_type"] == "int32_t":
-        rows = [[f"{{{start}, {change}}}," for start, change in table] for table in tables]
+    rows = [[f"{{UINT32_C({start % 2**32}), {turn * change}}}," for start, change in table] for table in tables]
     law_rows, zero_rows = ([" ".join(row[at : at + 4]) for at in range(0, len(row), 4)] for row in rows)
     return {
         **plan,

@@ -145,7 +145,7 @@ def integer_form(compensator: Compensator, sign: int = 1) -> IntegerForm:
     # Rounding to nearest needs half a unit, and a shift by a whole word of 32 bits costs nothing.
     shift, common = max(shift, WORD_BITS), common << max(WORD_BITS - shift, 0)
     slope, offset, linear, edge = (int(value * common) for value in (per_command, constant, plain, per_edge_code))
-    scale_beta = _share((slope, offset, edge), (abs(slope) * span + abs(offset), edge * c.edge_codes))
+    scale_beta = _share((slope, offset, edge), (abs(slope) * span, abs(offset), edge * c.edge_codes))
     slope, offset, edge = slope // scale_beta, offset // scale_beta, edge // scale_beta
     linear_shift = 0
     while linear and linear % 2 == 0:
@@ -264,14 +264,10 @@ def _prove_widths(form: IntegerForm, compensator: Compensator, sign: int) -> Non
     step = compensator.beta_step_codes
     beta = max(form.table) * step
     gap = beta if form.zero_table else 0
-    reach = compensator.signals.largest_difference(sign)
-    segments = segments_of(form.table, step) + segments_of(form.zero_table, step)
     inner = max(abs(form.offset), abs(form.slope * span + form.offset))
     straight = form.linear * span << form.linear_shift
     checks = {
         "the interpolated table": (beta, INT32_MAX),
-        "a segment's start": (max(abs(start) for start, _ in segments), INT32_MAX),
-        "a segment's slope times the pressure code": (max(abs(slope) for _, slope in segments) * reach, INT32_MAX),
         "slope times command": (abs(form.slope) * span, INT32_MAX),
         "the command-dependent factor": (inner, INT32_MAX),
         "the edge's factor": (form.edge * compensator.edge_codes, INT32_MAX),

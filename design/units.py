@@ -11,9 +11,8 @@ from dzdesign.design.signals import Signals
 #: than half a count of a PWM of 60 000.
 BETA_BITS = (15, 11)
 COEFFICIENT_BITS = (16, 12)
-#: What either factor of the firmware's product may take: 31 bits, and half of it for the sum of two terms.
-TABLE_LIMIT = 2**31
-FACTOR_LIMIT = 2**30
+#: What either factor of the firmware's product may take: 31 bits.
+FACTOR_LIMIT = 2**31
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,9 +63,9 @@ def _fits(span: int, compare_max: int, edge_codes: int, beta_bits: int, coeffici
     shared = gcd(compare_max, powers * span * edge)
     remains = compare_max // shared
     table = STEP_CODES << (beta_bits + 1)
-    factor = (span // gcd(span, compare_max)) * edge << coefficient_bits
+    factor = span * edge << coefficient_bits
     return any(
-        table * moved < TABLE_LIMIT and factor * (remains // moved) < FACTOR_LIMIT
+        table * moved < FACTOR_LIMIT and factor * (remains // moved) < FACTOR_LIMIT
         for moved in range(1, remains + 1)
         if remains % moved == 0
     )

@@ -18,6 +18,8 @@ from dzdesign.design.compensator import SideLaw
 from dzdesign.design.compensator_file import compensator_document
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
+from dzdesign.design.signals import CommandSignal
+from dzdesign.design.units import finest_units
 from dzdesign.verify.host_compiler import STRICT, check_strictly, find_compilers
 
 
@@ -45,17 +47,21 @@ def random_compensators(base, count: int, seed: int):
     """Vary every coefficient of a compensator at random, within what a valve can have."""
     rng = np.random.default_rng(seed)
     for _ in range(count):
-        falling = np.sort(rng.integers(20000, 32769, len(base.positive.beta_numerators)))[::-1]
         edge = int(rng.choice([0, 1, 32]))
+        units = finest_units(base.signals, edge)
+        unit = units.beta
+        falling = np.sort(rng.integers(unit // 2, unit + 1, base.nodes(1)))[::-1]
         side = SideLaw(
-            k_x_max_over_u_max=Fraction(int(rng.integers(2000, 65536)), 65536),
-            u_min0_over_u_max=Fraction(int(rng.integers(100, 60000)), 65536),
+            k_x_max_over_u_max=Fraction(
+                int(rng.integers(units.coefficient // 32, units.coefficient)), units.coefficient
+            ),
+            u_min0_over_u_max=Fraction(int(rng.integers(20, units.coefficient)), units.coefficient),
             beta_numerators=tuple(int(value) for value in falling),
-            edge_numerators=tuple(int(value) + 2000 for value in falling) if edge else None,
+            edge_numerators=tuple(int(value) + unit // 16 for value in falling) if edge else None,
             certificate=base.positive.certificate,
         )
         law_name = str(rng.choice(["paper", "target"]))
-        yield dataclasses.replace(base, law_name=law_name, positive=side, edge_codes=edge)
+        yield dataclasses.replace(base, law_name=law_name, positive=side, edge_codes=edge, beta_denominator=unit)
 
 
 def test_integer_form_equals_the_exact_law_at_random_and_at_corners(example_compensator):
@@ -66,6 +72,24 @@ def test_integer_form_equals_the_exact_law_at_random_and_at_corners(example_comp
         codes = [-4095, -41, -40, -1, 0, 1, 63, 64, 65, 4094, 4095, *rng.integers(-100, 4096, 20)]
         for command in map(int, commands):
             for code in map(int, codes):
+                assert evaluate(form, compensator, command, code) == compensator.compare(command, code)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_whatever_units_design_takes_the_firmware_can_count_in(example_compensator, seed):
+    """Converters, attenuators, PWMs and edges as they come: the coarsest units that design falls back to are enough."""
+    rng = np.random.default_rng(seed)
+    compare_max = int(rng.choice([60000, 40000, 10000, 4096, 1023]))
+    span = int(rng.choice([4095, 3276, 3277, 2047, 2048, 4000, 1021]))
+    signals = dataclasses.replace(
+        example_compensator.signals, compare_max=compare_max, command=CommandSignal(full_code=span)
+    )
+    amplifier = dataclasses.replace(example_compensator.amplifier, compare_limit=compare_max)
+    base = dataclasses.replace(example_compensator, signals=signals, amplifier=amplifier)
+    for compensator in random_compensators(base, 6, seed):
+        form = integer_form(compensator)
+        for command in (0, 1, 16, 31, 32, span // 3, span - 1, span):
+            for code in (-41, -40, 0, 63, 700, 4095):
                 assert evaluate(form, compensator, command, code) == compensator.compare(command, code)
 
 

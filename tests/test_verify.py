@@ -44,22 +44,27 @@ def one_more(match: re.Match) -> str:
 FAULTS = {
     "slope": (r"(-INT32_C\()(\d+)(\) \*)", one_more),
     "offset": (r"(\+ INT32_C\()(\d+)(\);)", one_more),
-    "half": (r"(straight \+ UINT64_C\()(\d+)(\))", lambda m: m.group(1) + str(int(m.group(2)) * 2) + m.group(3)),
-    "reciprocal": (r"(quotient \* UINT32_C\()(\d+)(\))", lambda m: m.group(1) + str(int(m.group(2)) - 1) + m.group(3)),
-    "shift": (r"sum >> 32", "sum >> 31"),
-    "table": (r"(UINT32_C\()(\d+)(\), UINT32_C)", one_more),
-    "mask": (r"place & 63u", "place & 31u"),
-    "fallback": (r"(NODE_FALLBACK )(\d+)(u)", one_more),
-    "reverse >= becomes >": (r"difference >= REVERSE_LIMIT", "difference > REVERSE_LIMIT"),
-    "command <= becomes <": (r"\(u_adc - COMMAND_LOW\) <= COMMAND_SOUND", "(u_adc - COMMAND_LOW) < COMMAND_SOUND"),
-    "pressure <= becomes <": (
-        r"\(p_a_adc - PRESSURE_A_LOW\) <= PRESSURE_A_SOUND",
-        "(p_a_adc - PRESSURE_A_LOW) < PRESSURE_A_SOUND",
+    "half": (r"(\+ UINT64_C\()(\d+)(\);)", lambda m: m.group(1) + str(int(m.group(2)) * 2) + m.group(3)),
+    "reciprocal": (
+        r"(quotient \* UINT32_C\()(\d+)(\))",
+        lambda m: m.group(1) + str(int(m.group(2)) - 200) + m.group(3),
     ),
-    "p_b not looked at": (r"\(p_b_adc - PRESSURE_B_LOW\) <= PRESSURE_B_SOUND", "(0u) <= PRESSURE_B_SOUND"),
-    "depends on one pressure": (r"\(int32_t\)p_b_adc - ", "(int32_t)(p_b_adc & 4094u) - "),
-    "status": (r"\(u_adc - COMMAND_LOW\) > COMMAND_SOUND", "(u_adc - COMMAND_LOW) >= COMMAND_SOUND"),
-    "status's difference": (r"< REVERSE_LIMIT", "<= REVERSE_LIMIT"),
+    "shift": (r"sum >> 32", "sum >> 31"),
+    "table's start": (r"(\}, \{UINT32_C\()(\d+)(\),)", one_more),
+    "table's change": (r"(\}, \{UINT32_C\(\d+\), )(-?\d+)(\})", one_more),
+    "fallback": (r"(= \{\n    \{UINT32_C\()(\d+)(\), 0\})", one_more),
+    "segment": (r"dp \+ 64u", "dp + 63u"),
+    "reverse + 1": (r"(#define REVERSE )(\d+)(u)", one_more),
+    "command's end": (r"(#define COMMAND_HIGH )(\d+)(u)", lambda m: m.group(1) + str(int(m.group(2)) - 1) + m.group(3)),
+    "pressure's end": (
+        r"(#define PRESSURE_A_HIGH )(\d+)(u)",
+        lambda m: m.group(1) + str(int(m.group(2)) - 1) + m.group(3),
+    ),
+    "p_b not looked at": (r"\(uint32_t\)\(PRESSURE_B_HIGH - p_b\) \|", "0u |"),
+    "depends on one pressure": (r"\(p_b - PRESSURE_B_ZERO\)", "((p_b & 4094u) - PRESSURE_B_ZERO)"),
+    "command let go too late": (r"& \(uint16_t\)~let_go", "& (uint16_t)65535u"),
+    "status": (r"a & DZ_STATUS_PRESSURE_A", "b & DZ_STATUS_PRESSURE_A"),
+    "status's difference": (r"& \(uint32_t\)~\(a \| b\)", "& (uint32_t)~a"),
 }
 
 
@@ -76,7 +81,7 @@ def test_a_missing_limit_is_found_where_the_law_reaches_full_drive(example_compe
     firmware = generate(long_stroke, "f28335")
     write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
     assert check_all_inputs(tmp_path / "fw").holds
-    mutate(tmp_path / "fw", r"\(unlimited < QUOTIENT_LIMIT\)", "(1 > 0)")
+    mutate(tmp_path / "fw", r"\(excess & ", "(0u & ")
     assert not check_all_inputs(tmp_path / "fw").holds
 
 
@@ -101,7 +106,7 @@ def test_a_changed_file_fails_the_verification(firmware_folder):
 
 
 def test_a_core_that_does_not_compile_fails_the_verification(firmware_folder):
-    mutate(firmware_folder, r"return place;", "return plac;")
+    mutate(firmware_folder, r"const uint32_t sum = law;|const uint64_t sum = law;", "const uint64_t sum = lav;")
     result = verify(firmware_folder, sequence=QUICK)
     assert not result.holds and result.inputs == ()
 
