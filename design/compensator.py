@@ -30,6 +30,9 @@ class Certificate:
         Interval of the pressure drop on which it holds.
     smallest_margin_V : Fraction
         Smallest distance from the offset to the lower bound, over every pressure code of the interval.
+    mean_loss_V, largest_loss_V : float
+        By how much the table's offset stays under the certified curve, over the same codes: the price of few nodes,
+        rounding, the converter's error and the dither.
     """
 
     confidence: float
@@ -37,6 +40,8 @@ class Certificate:
     level_L_min: float
     dp_MPa: tuple[Fraction, Fraction]
     smallest_margin_V: Fraction
+    mean_loss_V: float
+    largest_loss_V: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

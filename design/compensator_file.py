@@ -40,6 +40,8 @@ SIDE = {
         "level_L_min": Number(0, 1e6),
         "dp_MPa": Exactly(2, RATIONAL),
         "smallest_margin_V": RATIONAL,
+        "mean_loss_V": Number(-1e6, 1e6),
+        "largest_loss_V": Number(-1e6, 1e6),
     },
 }
 SHAPE = {
@@ -149,6 +151,8 @@ def _side_document(side: SideLaw) -> dict[str, Any]:
             "level_L_min": certificate.level_L_min,
             "dp_MPa": [_pair(end) for end in certificate.dp_MPa],
             "smallest_margin_V": _pair(certificate.smallest_margin_V),
+            "mean_loss_V": certificate.mean_loss_V,
+            "largest_loss_V": certificate.largest_loss_V,
         },
     }
 
@@ -239,6 +243,8 @@ def _side(document: dict[str, Any], name: str) -> SideLaw:
             level_L_min=certificate["level_L_min"],
             dp_MPa=tuple(_fraction(end, f"{name}.certificate.dp_MPa") for end in certificate["dp_MPa"]),
             smallest_margin_V=_fraction(certificate["smallest_margin_V"], f"{name}.certificate.smallest_margin_V"),
+            mean_loss_V=certificate["mean_loss_V"],
+            largest_loss_V=certificate["largest_loss_V"],
         ),
     )
 

@@ -63,7 +63,12 @@ def _cost_of_side(compensator: Compensator, side: SideModel, sign: int) -> list[
             "the threshold grows with the pressure drop, so a pressure signal that reads too high raises the offset: a "
             "broken wire of sensor B is not recognised unless it has a live zero; monitor the sensors outside"
         )
-    guard = compensator.side(sign).certificate.guard
+    certificate = compensator.side(sign).certificate
+    lines.append(
+        f"the table's offset stays {1e3 * certificate.mean_loss_V:.2f} mV under the certified curve on average, "
+        f"{1e3 * certificate.largest_loss_V:.2f} mV at most"
+    )
+    guard = certificate.guard
     if guard != "closing":
         lines.append(
             f"the {guard} threshold is guarded: at zero command, after closing, flow may remain, up to what the valve "

@@ -18,6 +18,8 @@ from dzdesign.identify.valve_file import valve_from_document
 
 #: Share of the sensor's span by which the difference may read negative before it counts as a failed sensor.
 REVERSE_SHARE = Fraction(1, 100)
+#: Of a loss in V: tenths of a microvolt.
+LOSS_DIGITS = 7
 #: Standard errors by which the edge's end stands above the opening threshold.
 EDGE_ERRORS = 3
 
@@ -101,6 +103,7 @@ def _side_law(side: SideModel, options: DesignOptions, u_max: Fraction, sign: in
         return choose_beta_table(under, u_min0, side.trend, denominator=units.beta, above_one=above_one)
 
     beta = table(ceiling)
+    losses = _losses_V(certified, ceiling, signals, beta, u_min0 * u_max / units.beta)
     edge_beta = None
     if opening is not None:
         upper = table(_opening_ceiling(opening, signals, u_max, sign))
@@ -116,6 +119,8 @@ def _side_law(side: SideModel, options: DesignOptions, u_max: Fraction, sign: in
             level_L_min=side.level_L_min,
             dp_MPa=(certified.dp_MPa[0], certified.dp_MPa[-1]),
             smallest_margin_V=_smallest_margin(ceiling, beta, u_min0, units.beta) * u_max,
+            mean_loss_V=round(sum(losses) / len(losses), LOSS_DIGITS),
+            largest_loss_V=round(max(losses), LOSS_DIGITS),
         ),
     )
 
@@ -222,6 +227,18 @@ def _smallest_margin(ceiling: OffsetCeiling, table: tuple[int, ...], u_min0: Fra
     if smallest < 0:
         raise RequirementError(f"the offset exceeds the certified one by {float(-smallest):.2e} of u_max")
     return smallest
+
+
+def _losses_V(
+    curve: OffsetCurve, ceiling: OffsetCeiling, signals: Signals, table: tuple[int, ...], unit_V: Fraction
+) -> list[float]:
+    """Return by how much the table's offset lies under the certified curve at each certified code, V."""
+    losses = []
+    for code in ceiling.certified or range(1):
+        index, share = divmod(code, STEP_CODES)
+        numerator = Fraction(table[index] * (STEP_CODES - share) + table[index + 1] * share, STEP_CODES)
+        losses.append(float(curve.at(signals.dp_MPa(code)) - numerator * unit_V))
+    return losses
 
 
 def _prove_monotone(compensator: Compensator, sign: int) -> None:

@@ -1,0 +1,149 @@
+"""Signals as engineers write them, the codes they become, and the amplifier's options as integers."""
+
+import random
+from fractions import Fraction
+
+import pytest
+
+from dzdesign.core.errors import InputError
+from dzdesign.design.options import DesignOptions
+from dzdesign.design.signal_text import Converter, command_signal, parse_signal, pressure_signal
+from dzdesign.design.signals import CommandSignal, PressureSignal, Signals
+
+ADC = Converter()
+
+
+def command(text: str, **options) -> CommandSignal:
+    return command_signal(parse_signal(text, "--command-signal"), ADC, **options)
+
+
+def sensor(text: str, span: int = 20) -> PressureSignal:
+    return pressure_signal(parse_signal(text, "--pressure-a"), ADC, Fraction(span))
+
+
+def test_the_defaults_are_the_converters_whole_range():
+    assert command("0..10 V x 0.3") == CommandSignal()
+    assert sensor("0..3 V") == PressureSignal()
+
+
+def test_a_command_of_both_signs_has_its_zero_between():
+    both = command("-10..10 V x 0.15 + 1.5 V")
+    assert (both.negative_full_code, both.zero_code, both.full_code) == (0, 2048, 4095)
+    assert both.from_zero(2148, 1) == 100 and both.from_zero(2148, -1) == 0
+    turned = command("-10..10 V x 0.15 + 1.5 V", inverted=True)
+    assert (turned.negative_full_code, turned.full_code) == (4095, 0)
+    assert turned.from_zero(2148, -1) == 100
+
+
+def test_4_to_20_mA_on_a_shunt():
+    # 4 mA * 150 ohm = 0.6 V = 819.2 codes; 3.6 mA is the end of a sound signal, 20 mA fills the converter.
+    found = sensor("4..20 mA on 150 ohm = 25 MPa")
+    assert (found.zero_code, found.full_code, found.span_MPa) == (819, 4095, 25)
+    assert found.valid_codes == (737, 4095)
+    # 21 mA shows where the shunt leaves room for it.
+    assert sensor("4..20 mA on 140 ohm").valid_codes == (688, 4014)
+
+
+@pytest.mark.parametrize(
+    "text", ["0..3 V", "4..20 mA on 149 ohm = 25 MPa", "0.5..4.5 V x 0.6 = 160 bar", "0..10 V x 0.29"]
+)
+def test_a_code_stands_for_every_pressure_that_makes_it(text):
+    """Random pressures through the signal and the converter: the code's pressure and its error bounds hold them."""
+    signal = parse_signal(text, "--pressure-a")
+    found = pressure_signal(signal, ADC, Fraction(20))
+    draw = random.Random(4)
+    for _ in range(2000):
+        share = Fraction(draw.randrange(10**9), 10**9)
+        code = ADC.code(signal.volts(signal.low + share * (signal.high - signal.low)))
+        taken = (code - found.zero_code) * found.per_code_MPa
+        assert found.error_MPa[0] <= share * found.span_MPa - taken <= found.error_MPa[1]
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_difference_of_unlike_sensors_stands_for_every_drop_that_makes_it(sign, swapped):
+    texts = ("4..20 mA on 149 ohm = 25 MPa", "0.5..4.5 V x 0.6 = 160 bar")
+    parsed = [parse_signal(text, "--pressure-a") for text in texts]
+    a, b = (pressure_signal(one, ADC, Fraction(20)) for one in parsed)
+    both = command("-10..10 V x 0.15 + 1.5 V")
+    signals = Signals(command=both, pressure_a=a, pressure_b=b, swapped=swapped)
+    low, high = signals.difference_error(sign)
+    draw = random.Random(5)
+    for _ in range(3000):
+        shares = [Fraction(draw.randrange(10**9), 10**9) for _ in range(2)]
+        codes = [ADC.code(one.volts(one.low + s * (one.high - one.low))) for one, s in zip(parsed, shares, strict=True)]
+        drop = shares[0] * a.span_MPa - shares[1] * b.span_MPa
+        if sign < 0 and swapped:
+            drop = -drop
+        counted = signals.difference(*codes, sign)
+        assert low <= drop / a.per_code_MPa - counted <= high
+        assert counted <= signals.largest_difference(sign)
+
+
+WRONG = [
+    ("10 V", "'10 V' is no signal"),
+    ("0..10 V", "reaches 10 V at the converter's pin, expected 0 to 3 V"),
+    ("10..0 V x 0.3", "expected it to rise"),
+    ("-10..8 V x 0.15 + 1.5 V", "ends of unlike size"),
+    ("0..10 bar x 0.3", "is not a unit of voltage"),
+    ("4..20 mA x 0.3", "is not a unit of voltage"),
+    ("0..10 V x 0", "has gain 0"),
+]
+
+
+@pytest.mark.parametrize(("text", "words"), WRONG)
+def test_a_command_that_cannot_be(text, words):
+    with pytest.raises(InputError, match=words.replace("(", r"\(").replace(".", r"\.")):
+        command(text)
+
+
+def test_a_pressure_signal_may_not_start_below_zero():
+    with pytest.raises(InputError, match="starts below zero"):
+        sensor("-1..1 V + 1 V")
+
+
+def test_sensors_too_unlike_are_refused():
+    with pytest.raises(InputError, match="too unlike"):
+        Signals(
+            pressure_a=sensor("0..3 V = 1 MPa"),
+            pressure_b=sensor("4..20 mA on 150 ohm = 60 MPa"),
+            swapped=True,
+            command=command("-10..10 V x 0.15 + 1.5 V"),
+        )
+
+
+def test_the_amplifiers_integers():
+    options = DesignOptions(
+        signals=Signals(command=command("-10..10 V x 0.15 + 1.5 V")),
+        edge=Fraction(1, 100), ramp_up_s=(0.5, 0.8), dither_Hz=150.0, dither_height=Fraction(1, 100),
+        output_max=Fraction(9, 10),
+    )  # fmt: skip
+    amplifier = options.amplifier()
+    assert options.edge_codes() == 16  # 1 % of 2047 codes is 20: the power of two below
+    # 0.5 s are 625 samples: 2047 codes * 65536 / 625; of negative commands 2048 codes in 1000.
+    assert amplifier.ramp_up == (round(2047 * 65536 / 625), round(2048 * 65536 / 1000)) and amplifier.ramp_down == (
+        0,
+        0,
+    )
+    assert (amplifier.dither_counts, amplifier.dither_ticks) == (600, 8)  # 2500 Hz / 16 = 156 Hz
+    assert (amplifier.compare_limit, amplifier.window_codes) == (54000, 20)
+    assert DesignOptions().amplifier().window_codes == 0  # one sign has no other solenoid
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"edge": Fraction(1, 5)}, "the edge is 20.000%, expected 0 to 10%"),
+        ({"edge": Fraction(1, 10**5)}, "less than one code"),
+        ({"dither_Hz": 150.0}, "a dither needs both"),
+        ({"dither_Hz": 50.0, "dither_height": Fraction(1, 100)}, "expected 100 to 300 Hz"),
+        ({"output_max": Fraction(0)}, "the largest output"),
+        ({"ramp_up_s": (1e4, 0.0)}, "a ramp takes 10000 s"),
+        ({"guard": "closed"}, "did you mean 'closing'"),
+        ({"below_reference": "hod"}, "did you mean 'hold'"),
+    ],
+)
+def test_choices_that_cannot_be(options, words):
+    with pytest.raises(InputError) as error:
+        DesignOptions(**options).edge_codes()
+    assert words in str(error.value)
