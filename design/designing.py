@@ -55,12 +55,13 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
     laws = {}
     for sign in signals.signs:
         name = "positive" if sign > 0 else "negative"
-        if name not in valve.sides:
+        if sign < 0 and name not in valve.sides:
             raise InputError(
-                f"the command has both signs, but the valve's {name} side was not tested; record its ramps, or give a "
+                "the command has both signs, but the valve's negative side was not tested; record its ramps, or give a "
                 "command of one sign"
             )
-        laws[name] = _side_law(valve.sides[name], options, u_max, sign, units)
+        side = valve.positive if sign > 0 else valve.sides[name]
+        laws[name] = _side_law(side, options, u_max, sign, units)
     compensator = Compensator(
         law_name=options.law_name,
         below_reference=options.below_reference,

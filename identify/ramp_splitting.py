@@ -23,6 +23,12 @@ TURN = 0.1
 TURN_SEARCH_POINTS = 4000
 #: The valve is shut, and the pressure drop nominal, below this share of the range.
 SHUT = 0.05
+#: So near to the lowest command, as a share of the range, the command holds.
+HOLD = 1e-3
+#: A step between two ramps counts from this share of the pressure drop on (below it they are one test), and from so
+#: many standard errors.
+PRESSURE_STEP = 0.02
+STEP_SIGNIFICANCE = 5.0
 #: A ramp whose sweeps' pressure drops differ by more than this share was run at two.
 TWO_PRESSURES = 0.1
 #: Fewest samples of a sweep that is a branch, and how many times faster than the longest it may be.
@@ -176,19 +182,37 @@ def _rate(time: np.ndarray, u: np.ndarray) -> float:
 
 
 def _cut(u: np.ndarray, dp: np.ndarray | None, turn: int, direction: np.ndarray) -> int:
-    """Return where two sweeps are parted: at the turning point; in a hold at the bottom, where the pressure steps."""
+    """Return where two sweeps are parted: at the turning point, or at the bottom where the pressure steps.
+
+    A step that the noise may have made, or that leaves the pressure the same, parts nothing: the sweeps would lose what
+    lies between it and the turn, and with it an edge that opens there.
+    """
     if direction[turn] < 0:
         return turn
     shut = u <= u[turn - 1 : turn + 1].min() + SHUT * np.ptp(u)
     before, after = np.flatnonzero(~shut[:turn]), np.flatnonzero(~shut[turn:])
     start = int(before[-1]) + 1 if before.size else 0
     stop = turn + int(after[0]) if after.size else u.size
+    at_rest = _middle_of_hold(u, turn, start, stop)
     if dp is None or stop - start < 4:
-        return (start + stop) // 2
+        return at_rest
     # Two levels with the least squares about them; n m^2 of both sides is largest there.
-    held = dp[start:stop] - dp[start:stop].mean()
-    left, total, n = np.cumsum(held)[:-1], held.sum(), np.arange(1, held.size)
-    return start + 1 + int(np.argmax(left**2 / n + (total - left) ** 2 / (held.size - n)))
+    mean = dp[start:stop].mean()
+    held = dp[start:stop] - mean
+    left, n = np.cumsum(held)[:-1], np.arange(1, held.size)
+    gain = left**2 / n + left**2 / (held.size - n)
+    cut = int(np.argmax(gain))
+    step = abs(left[cut]) * (1 / n[cut] + 1 / (held.size - n[cut]))
+    about_levels = max(float(np.sum(held**2) - gain[cut]), 0.0) / (held.size - 2)
+    real = step > PRESSURE_STEP * abs(mean) and gain[cut] > STEP_SIGNIFICANCE**2 * about_levels
+    return start + 1 + cut if real else at_rest
+
+
+def _middle_of_hold(u: np.ndarray, turn: int, start: int, stop: int) -> int:
+    """Return the middle of the samples about a turn at the bottom that stand at its lowest command."""
+    lowest = u[start:stop].min() + HOLD * np.ptp(u)
+    at_bottom = start + np.flatnonzero(u[start:stop] <= lowest)
+    return int(at_bottom[at_bottom.size // 2]) if at_bottom.size else turn
 
 
 def despiked(u: np.ndarray) -> np.ndarray:

@@ -199,3 +199,16 @@ class TestSplitting:
         columns = dict(zip(("time_s", "u_V", "dP_MPa", "Q_Lmin"), arrays, strict=True))
         (tmp_path / "all.csv").write_bytes(ramp_file_bytes(columns, (), compress=False))
         assert len(identify([read_ramp_file(tmp_path / "all.csv")]).positive.tests) == 2
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.005])
+def test_a_ramp_from_the_top_keeps_its_bottom(noise):
+    """From full command to zero and back it is parted at zero, whatever noise the pressure has: an edge there stays."""
+    test = ramp(knee_rising=0.45, hysteresis=0.3)
+    half = test.u.size // 2
+    turned = {name: np.roll(getattr(test, name), -half) for name in ("u", "q", "dp")}
+    pressure = turned["dp"] * (1 + noise * np.random.default_rng(1).standard_normal(test.u.size))
+    turned = dataclasses.replace(test, **{**turned, "dp": pressure})
+    ramps = split_ramps(turned, lag=0.0)
+    lowest = [min(branch.u.min() for branch in ramp.branches if branch) for ramp in ramps]
+    assert max(lowest) < 0.02
