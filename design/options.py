@@ -63,7 +63,9 @@ class DesignOptions:
             ("choice below dP0", self.below_reference, BELOW_REFERENCE),
         ):
             if given not in known:
-                raise InputError(f"the {what} is '{given}'{nearest(given, known)}, expected {' or '.join(known)}")
+                raise InputError(
+                    f"the {what} is '{given}'{nearest(given, known)}, expected {', '.join(known[:-1])} or {known[-1]}"
+                )
         for what, share, limit in (
             ("edge", self.edge, LARGEST_EDGE),
             ("dither", self.dither_height, LARGEST_DITHER),
