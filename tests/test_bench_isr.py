@@ -81,7 +81,6 @@ def test_our_core_gives_the_exact_law_on_every_counted_input(machine, example_co
         assert found.least > 0
 
 
-@pytest.mark.xfail(reason="the core branches on impossible pressures and commands", strict=True)
 @on_every_machine
 def test_our_core_takes_the_same_for_every_input(machine, example_compensator, inputs, tmp_path):
     """Every form on machines with products of 32 bits; on AVR, whose library has branches, the one that is chosen."""
