@@ -152,10 +152,10 @@ def certificate_lines(compensator: Compensator, sign: int = 1) -> list[str]:
     low, high = (float(end) for end in certificate.dp_MPa)
     text = (
         f"Certificate: from {low:.2f} to {high:.2f} MPa, between the tests too, that lies below the "
-        f"{certificate.confidence:.0%} lower bound of the {certificate.guard} threshold, by {{:.4f}} V at the least, "
+        f"{certificate.confidence:.0%} lower bound of the {certificate.guard} threshold, by {{:.3g}} mV at the least, "
         f"so that nothing flows; flow below {certificate.level_L_min:.2f} L/min counts as none."
     )
-    return wrap(text.format(float(certificate.smallest_margin_V)), COLUMNS - 3)
+    return wrap(text.format(1e3 * float(certificate.smallest_margin_V)), COLUMNS - 3)
 
 
 def _signal_plan(compensator: Compensator, sign: int) -> Plan:

@@ -8,10 +8,10 @@ HERE, OPTIONS, SIGNALS = "codegen/drive_constants.py", "design/options.py", "des
 INT32_MAX = 2**31 - 1
 #: Bits of the status word, and what each says.
 STATUS_BITS = {
-    "COMMAND": "command outside its sound codes: the valve is let go",
-    "PRESSURE_A": "pressure A outside its sound codes: smallest beta",
-    "PRESSURE_B": "pressure B outside its sound codes: smallest beta",
-    "DIFFERENCE": "sound pressures, but their drop is too far below zero: smallest beta",
+    "COMMAND": "command outside its sound codes, so the valve is let go",
+    "PRESSURE_A": "pressure A outside its sound codes, so the smallest beta is used",
+    "PRESSURE_B": "pressure B outside its sound codes, so the smallest beta is used",
+    "DIFFERENCE": "sound pressures, but their drop too far below zero, so the smallest beta is used",
 }
 
 
@@ -35,7 +35,7 @@ def status_constants() -> list[Constant]:
     """Return the bits of the status word: a convention, from no datum."""
     return [
         Constant(symbol=f"DZ_STATUS_{name}", value=1 << place, equation=f"bit {place} of the status word",
-                 engineering=text, generator=HERE)
+                 engineering=text, rounding="a convention", generator=HERE)
         for place, (name, text) in enumerate(STATUS_BITS.items())
     ]  # fmt: skip
 

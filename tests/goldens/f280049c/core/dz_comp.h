@@ -2,7 +2,17 @@
 /* Compensator SHA-256: a477d2a8221363a7e7266a36c7323d9dc923418fe58be69d6f7cebb8864d2477 */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv */
 /*
- * The compensation law: what to call, and what goes in and comes out.
+ * The compensation law of a proportional valve's dead zone: what to call, and what goes in and comes out.
+ *
+ *     u_i      command, 0 to u_max = 10 V
+ *     u_O      what the valve is driven with, 0 to u_max; the PWM's duty is u_O/u_max
+ *     dP       pressure drop over the metering edge
+ *     u_min0   u_O at zero command and the reference pressure drop, close to where the valve opens
+ *     beta     how that offset changes with dP, 1 at the reference; read from a table
+ *     k x_max  span of u_O from that offset to full opening
+ *
+ * Numbers of equations are those of Wu et al. 2022, doi:10.11916/j.issn.1005-9113.20063; manifest.json lists the
+ * origin of every constant.
  *
  * MISRA C:2012: nothing found by cppcheck 2.10 (--platform=avr8 --std=c99 --addon=misra) in this file but for
  *   deviation from rule 2.5 (advisory) in DZ_COMPARE_MAX, DZ_COMPARE_LIMIT, DZ_ADC_CODE_MAX: the interface's limits
@@ -21,13 +31,14 @@
 #define DZ_ADC_CODE_MAX 4095u
 
 /* What dz_status() finds wrong with the inputs, one bit each. */
-/* Bit 0 of the status word: command outside its sound codes: the valve is let go (exact). */
+/* Bit 0 of the status word: command outside its sound codes, so the valve is let go (a convention). */
 #define DZ_STATUS_COMMAND 1u
-/* Bit 1 of the status word: pressure A outside its sound codes: smallest beta (exact). */
+/* Bit 1 of the status word: pressure A outside its sound codes, so the smallest beta is used (a convention). */
 #define DZ_STATUS_PRESSURE_A 2u
-/* Bit 2 of the status word: pressure B outside its sound codes: smallest beta (exact). */
+/* Bit 2 of the status word: pressure B outside its sound codes, so the smallest beta is used (a convention). */
 #define DZ_STATUS_PRESSURE_B 4u
-/* Bit 3 of the status word: sound pressures, but their drop is too far below zero: smallest beta (exact). */
+/* Bit 3 of the status word: sound pressures, but their drop too far below zero, so the smallest beta is used (a
+ * convention). */
 #define DZ_STATUS_DIFFERENCE 8u
 
 /* Returns the PWM compare value, 0 to DZ_COMPARE_LIMIT, of the law Eq. (18)
@@ -51,7 +62,7 @@
  *
  * At zero command it is 20191 to 20569, by the pressure drop.
  * Certificate: from 1.00 to 5.00 MPa, between the tests too, that lies below the 99% lower bound of the closing
- * threshold, by 0.0000 V at the least, so that nothing flows; flow below 0.25 L/min counts as none.
+ * threshold, by 0.0127 mV at the least, so that nothing flows; flow below 0.25 L/min counts as none.
  */
 uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
 

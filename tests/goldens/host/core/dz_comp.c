@@ -2,9 +2,10 @@
 /* Compensator SHA-256: 503a6da121a114f9d041dc8a091a1ce50270b566b88faaf02d8ab9d612abf383 */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv */
 /*
- * The compensation law, as an integer function of three converter codes: no division, no floating
- * point, no branch (every input takes the same instructions), no state. The origin of each constant, down to the
- * ramp tests, stands in manifest.json under "constants".
+ * The compensation law, an integer function of three converter codes.
+ * No division, no floating point, no state, and no branch: every input takes the same instructions.
+ * Every constant has a comment: what it is, its engineering value, and in brackets how it was rounded.
+ * manifest.json says under "constants" where each came from, down to the ramp tests.
  *
  * MISRA C:2012: nothing found by cppcheck 2.10 (--platform=avr8 --std=c99 --addon=misra) in this file.
  */
