@@ -1,22 +1,45 @@
 """The flat plan of printed strings for the core's templates: one side of a `Compensator`, and its constants' origin."""
 
+from dataclasses import dataclass
 from fractions import Fraction
+from textwrap import wrap
 from typing import Any
 
-from dzdesign.codegen.integer_form import IntegerForm, integer_form, segments_of
-from dzdesign.codegen.telemetry import beta_factor
-from dzdesign.derivation.law import law
+from dzdesign.codegen.constants import COLUMNS, Constant, defines
+from dzdesign.codegen.drive_constants import drive_constants, interface_constants, status_constants
+from dzdesign.codegen.integer_form import IntegerForm, integer_form
+from dzdesign.codegen.law_constants import (
+    KAPPA_ROUNDING,
+    U_MIN0_ROUNDING,
+    LawConstants,
+    TableForm,
+    equation_of,
+    table_form,
+)
+from dzdesign.codegen.misra import misra_lines
+from dzdesign.codegen.signal_constants import SignalConstants
+from dzdesign.derivation.law import Law, law
 from dzdesign.design.amplifier import RAMP_UNIT
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.signals import WEIGHT_SHIFT, PressureSignal
 
 #: Codes up to half of this leave the top bit of 16 for the sign of a difference.
 SHORT_MAX = 2**15 - 1
+#: Segments of a table in one line of C.
+TABLE_COLUMNS = 2
 
 Plan = dict[str, Any]
 
 
-def core_plan(compensator: Compensator, sign: int, arithmetic: str) -> Plan:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FilePlan:
+    """What a template of the core prints, and the constants among it, for the manifest."""
+
+    values: Plan
+    constants: tuple[Constant, ...]
+
+
+def core_plan(compensator: Compensator, sign: int, arithmetic: str) -> FilePlan:
     """Return what the core's template prints for one sign of command.
 
     Parameters
@@ -29,114 +52,110 @@ def core_plan(compensator: Compensator, sign: int, arithmetic: str) -> Plan:
         Products of 32 by 32 to 64 bits, or arithmetic of 32 bits only.
     """
     form = integer_form(compensator, sign)
+    narrow = arithmetic == "narrow"
+    word_bits = _word_bits(compensator, arithmetic)
+    codes = SignalConstants(compensator=compensator, sign=sign, word_bits=word_bits)
+    of_law = LawConstants(compensator=compensator, form=form, sign=sign, narrow=narrow)
+    signals, steps, integers = codes.signals(), codes.steps(), of_law.arithmetic(uses_beta=sign > 0)
+    rows = table_form(form, compensator.beta_step_codes, arithmetic)
+    tables = [of_law.table(False, rows)] + ([of_law.table(True, rows)] if form.zero_table else [])
     side, chosen = compensator.side(sign), law(compensator.law_name)
-    return {
+    values = {
         **_signal_plan(compensator, sign),
-        **_arithmetic_plan(form),
-        **_table_plan(form, compensator.beta_step_codes, arithmetic),
-        **_word_plan(compensator, arithmetic),
-        "narrow": arithmetic == "narrow",
+        **_arithmetic_plan(form, of_law),
+        "word": f"uint{word_bits}_t",
+        "word_bits": str(word_bits),
+        "signal_defines": defines(signals),
+        "step_defines": defines(steps),
+        "law_defines": defines(integers),
+        "tables": [_table_plan(table, rows, of_law, compensator) for table in tables],
+        "change_sign": rows.change_sign,
+        "change_type": rows.change_type,
+        "misra_lines": misra_lines(),
+        "narrow": narrow,
         "function": "dz_comp" if sign > 0 else "dz_comp_negative",
         "status_function": "dz_status" if sign > 0 else "dz_status_negative",
-        "side_text": "" if compensator.negative is None else f", {'positive' if sign > 0 else 'negative'} commands",
-        "law_text": str(chosen.output).replace("**", "^"),
-        "law_equation": chosen.equation,
-        "kappa_text": _rational(side.k_x_max_over_u_max) + ", rounded to nearest",
-        "u_min0_text": _rational(side.u_min0_over_u_max) + ", rounded down with half a count to spare",
+        "side_text": "" if compensator.negative is None else f" for {'positive' if sign > 0 else 'negative'} commands",
+        "law_text": _law_text(chosen),
+        "law_equation": equation_of(chosen),
+        "kappa_text": _rational(side.k_x_max_over_u_max) + f", {KAPPA_ROUNDING}",
+        "u_min0_text": _rational(side.u_min0_over_u_max) + f", {U_MIN0_ROUNDING}",
         "edge": bool(compensator.edge_codes),
         "edge_codes": str(compensator.edge_codes),
         "edge_text": f"{compensator.edge_codes / compensator.signals.command.span(sign):.2%}",
-        "edge_sum_text": f"\n *           - (beta - beta_closing) * {form.edge} * max({compensator.edge_codes} - c, 0)"
+        "edge_sum_text": f"\n *           - (B - B_closing) * {form.edge} * max({compensator.edge_codes} - c, 0)"
         if form.edge
         else "",
-        **_beta_plan(compensator, form),
-        "beta_scale": str(form.scale_beta * compensator.beta_denominator),
+        "beta_unit": str(of_law.unit),
+        "segment_count": str(len(tables[0].value) - 1),
         "step_codes": str(compensator.beta_step_codes),
         "step_MPa": f"{float(compensator.signals.dp_MPa(compensator.beta_step_codes)):.4f}",
-        "step_shift": str(compensator.beta_step_codes.bit_length() - 1),
     }
+    return FilePlan(values=values, constants=(*signals, *steps, *integers, *tables))
 
 
-def _beta_plan(compensator: Compensator, form: IntegerForm) -> Plan:
-    """Return what brings the table's beta to the 2^-15 of dz_beta()."""
-    step = compensator.beta_step_codes
-    factor, shift = beta_factor(form.scale_beta * compensator.beta_denominator * step, max(form.table) * step)
-    if shift >= 32:
-        narrow = f"scaled.high >> {shift - 32}" if shift > 32 else "scaled.high"
-    else:
-        narrow = f"(scaled.high << {32 - shift}) | (scaled.low >> {shift})" if shift else "scaled.low"
-    return {"beta_factor": str(factor), "beta_shift": str(shift), "beta_narrow": narrow}
+def _law_text(chosen: Law) -> str:
+    return str(chosen.output).replace("**", "^")
 
 
-def header_plan(compensator: Compensator) -> Plan:
+def header_plan(compensator: Compensator) -> FilePlan:
     """Return what the core's header prints."""
     chosen, signals = law(compensator.law_name), compensator.signals
-    limit = compensator.amplifier.compare_limit
+    ends, bits = interface_constants(compensator), status_constants()
     low, high = _zero_command(compensator, 1)
-    plan = {
+    values = {
         **_signal_plan(compensator, 1),
-        "law_text": str(chosen.output).replace("**", "^"),
-        "law_equation": chosen.equation,
+        "misra_lines": misra_lines("dz_comp.h"),
+        "interface_defines": defines(ends),
+        "status_defines": defines(bits),
+        "law_text": _law_text(chosen),
+        "law_equation": equation_of(chosen),
         "u_max_V": f"{float(compensator.u_max_V):g}",
-        "compare_max": str(signals.compare_max),
-        "compare_limit": str(limit),
-        "limit_text": "" if limit == signals.compare_max else f", {limit / signals.compare_max:.1%} of full drive",
-        "adc_code_max": str(signals.code_max),
         "zero_command_low": str(low),
         "zero_command_high": str(high),
-        "certificate_text": certificate_text(compensator, 1),
+        "certificate_lines": certificate_lines(compensator, 1),
         "bipolar": compensator.negative is not None,
+        "swapped": signals.swapped,
     }
     if compensator.negative is not None:
         low, high = _zero_command(compensator, -1)
-        plan |= {
+        values |= {
             "negative_full": str(signals.command.negative_full_code),
             "negative_zero_low": str(low),
             "negative_zero_high": str(high),
-            "negative_certificate_text": certificate_text(compensator, -1),
+            "negative_certificate_lines": certificate_lines(compensator, -1),
         }
-    return plan
+    return FilePlan(values=values, constants=(*ends, *bits))
 
 
-def drive_plan(compensator: Compensator) -> Plan:
+def drive_plan(compensator: Compensator) -> FilePlan:
     """Return what the templates of the amplifier around the law print."""
     signals, amplifier = compensator.signals, compensator.amplifier
-    command = signals.command
-
-    def ramp(step: int) -> str:
-        return str(step) if step else "RAMP_NONE"
-
-    names = ("up_positive", "up_negative", "down_positive", "down_negative")
-    ramps = {
-        f"ramp_{name}": ramp(step) for name, step in zip(names, amplifier.ramp_up + amplifier.ramp_down, strict=True)
-    }
-    return {
-        **ramps,
+    constants = drive_constants(compensator)
+    values = {
+        "misra_lines": misra_lines(),
+        "drive_defines": defines(constants),
         "bipolar": compensator.negative is not None,
         "ramp": amplifier.has_ramp,
         "dither": bool(amplifier.dither_counts),
-        "command_zero": str(command.zero_code),
-        "rises": command.direction(1) > 0,
-        "window_codes": str(amplifier.window_codes),
-        "window_text": f"{amplifier.window_codes / command.span(1):.2%}",
+        "rises": signals.command.direction(1) > 0,
         "ramp_unit": str(RAMP_UNIT),
         "sample_Hz": str(signals.sample_Hz),
-        "dither_counts": str(amplifier.dither_counts),
-        "dither_ticks": str(amplifier.dither_ticks),
-        "dither_period": str(2 * amplifier.dither_ticks),
-        "dither_text": f"{signals.tick_Hz / (2 * amplifier.dither_ticks):.1f} Hz, peak "
-        f"{amplifier.dither_counts / signals.compare_max:.3%} of full drive",
     }
+    return FilePlan(values=values, constants=tuple(constants))
 
 
-def certificate_text(compensator: Compensator, sign: int = 1) -> str:
-    """Say in one comment line what the offset is certified for."""
-    certificate = compensator.side(sign).certificate
+def certificate_lines(compensator: Compensator, sign: int = 1) -> list[str]:
+    """Say in comment lines what the offset is certified for."""
+    side = compensator.side(sign)
+    certificate = side.certificate
     low, high = (float(end) for end in certificate.dp_MPa)
-    return (
-        f"Certified for {low:.2f} to {high:.2f} MPa: below the {certificate.confidence:.0%} bound of the "
-        f"{certificate.guard} threshold; flow below {certificate.level_L_min:.2f} L/min counts as none."
+    text = (
+        f"Certificate: from {low:.2f} to {high:.2f} MPa, between the tests too, that lies below the "
+        f"{certificate.confidence:.0%} lower bound of the {certificate.guard} threshold, by {{:.3g}} mV at the least, "
+        f"so that nothing flows; flow below {certificate.level_L_min:.2f} L/min counts as none."
     )
+    return wrap(text.format(1e3 * float(certificate.smallest_margin_V)), COLUMNS - 3)
 
 
 def _signal_plan(compensator: Compensator, sign: int) -> Plan:
@@ -145,13 +164,10 @@ def _signal_plan(compensator: Compensator, sign: int) -> Plan:
     full = command.full_code if sign > 0 else command.negative_full_code
     rises = command.direction(sign) > 0
     swapped = sign < 0 and signals.swapped
-    weight = 2**WEIGHT_SHIFT
     towards = sorted(command.direction(sign) * (code - command.zero_code) for code in command.valid_codes)
-    reverse = compensator.reverse_codes if signals.like_sensors else compensator.reverse_codes * weight
     return {
         "command_zero": str(command.zero_code),
         "command_full": str(full),
-        "command_span": str(command.span(sign)),
         "command_low": str(command.valid_codes[0]),
         "command_high": str(command.valid_codes[1]),
         "command_difference": "u - COMMAND_ZERO" if rises else "COMMAND_ZERO - u",
@@ -161,13 +177,8 @@ def _signal_plan(compensator: Compensator, sign: int) -> Plan:
         **_sensor_plan("a", a),
         **_sensor_plan("b", b),
         "like_sensors": signals.like_sensors,
-        "a_weight": str(weight),
-        "b_weight": str(signals.weight_b),
-        "b_weight_text": f"{float(b.per_code_MPa):.6g} MPa over {float(a.per_code_MPa):.6g} MPa, rounded to nearest",
-        "weight_shift": str(WEIGHT_SHIFT),
+        "a_weight": str(2**WEIGHT_SHIFT),
         "pressure_turn": "b - a" if swapped else "a - b",
-        "code_MPa": f"{float(a.per_code_MPa):.6g}",
-        "reverse": str(reverse),
         "reverse_text": f"{-float(signals.dp_MPa(compensator.reverse_codes)):.3f} MPa",
     }
 
@@ -183,89 +194,78 @@ def _sensor_plan(name: str, sensor: PressureSignal) -> Plan:
     }
 
 
-def _word_plan(compensator: Compensator, arithmetic: str) -> Plan:
-    """Return the type of codes and their differences: 16 bits where a word of 32 costs more and they fit."""
+def _word_bits(compensator: Compensator, arithmetic: str) -> int:
+    """Return the width of codes and their differences: 16 bits where a word of 32 costs more and they fit."""
     signals = compensator.signals
-    short = arithmetic == "narrow" and signals.like_sensors and 2 * signals.code_max <= SHORT_MAX
-    return {"word": "uint16_t" if short else "uint32_t", "top_bit": "15" if short else "31"}
+    return 16 if arithmetic == "narrow" and signals.like_sensors and 2 * signals.code_max <= SHORT_MAX else 32
 
 
-def _table_plan(form: IntegerForm, step: int, arithmetic: str) -> Plan:
-    """Return the rows of the tables: signed where products of 32 bits are cheap, of one direction in 16 bits else."""
-    tables = [segments_of(table, step) for table in (form.table, form.zero_table)]
-    changes = [change for table in tables for _, change in table]
-    falls = max(changes) <= 0
-    short = (falls or min(changes) >= 0) and max(map(abs, changes)) < 1 << 16
-    plan: Plan = {"change_sign": "+", "change_type": "int32_t", "change_product": ""}
-    turn = 1
-    if arithmetic == "narrow":
-        if short:
-            turn = -1 if falls else 1
-            plan |= {"change_sign": "-" if falls else "+", "change_type": "uint16_t"}
-            plan["change_product"] = "short_product({}[place].change, (uint16_t)dp)"
-        else:
-            plan |= {"change_type": "int32_t", "change_product": "((uint32_t){}[place].change * dp)"}
-    rows = [[f"{{UINT32_C({start % 2**32}), {turn * change}}}," for start, change in table] for table in tables]
-    law_rows, zero_rows = ([" ".join(row[at : at + 4]) for at in range(0, len(row), 4)] for row in rows)
+def _table_plan(table: Constant, rows: TableForm, of_law: LawConstants, compensator: Compensator) -> Plan:
+    """Return a table's rows, the pressure drop from which each line of them goes, and its beta there."""
+    ending, step = "u" if rows.short else "", compensator.beta_step_codes
+    turn = -1 if rows.falls else 1
+    printed = [f"{{UINT32_C({start}), {change}{ending}}}," for start, change in table.value]
+    lines = [f"{printed[0]} /* pressures can't be right: beta {table.value[0][0] / of_law.unit:.6f} */"]
+    for at in range(1, len(printed), TABLE_COLUMNS):
+        start, change = table.value[at]
+        codes = (at - 1) * step
+        beta = (start + turn * change * codes) % 2**32 / of_law.unit
+        from_MPa = float(compensator.signals.dp_MPa(codes))
+        lines.append(f"{' '.join(printed[at : at + TABLE_COLUMNS])} /* from {from_MPa:.3f} MPa: beta {beta:.6f} */")
+    name = table.symbol
+    product = (
+        f"short_product{'' if of_law.sign > 0 else '_negative'}({name}[row].change, (uint16_t)dp)"
+        if rows.short
+        else f"((uint32_t){name}[row].change * dp)"
+    )
     return {
-        **plan,
-        "law_rows": law_rows,
-        "zero_rows": zero_rows,
-        "segment_count": str(len(tables[0]) - 1),
-        "segment_count_all": str(len(tables[0])),
+        "symbol": name,
+        "function": "zero_beta" if name == "zero_segment" else "law_beta",
+        "comment": table.comment(),
+        "size": str(len(printed)),
+        "rows": lines,
+        "product": product,
     }
 
 
-def _arithmetic_plan(form: IntegerForm) -> Plan:
-    high, low = divmod(form.half, 1 << 32)
+def _arithmetic_plan(form: IntegerForm, of_law: LawConstants) -> Plan:
     straight_high, straight_low = divmod(form.linear << form.linear_shift, 1 << 32)
-    if not form.linear:
-        straight_text = ""
-    elif straight_low == 0:  # a product of one word, that stands in the high one
-        straight_text = f" + ((uint64_t)(UINT32_C({straight_high}) * command) << 32)"
-    else:
-        straight_text = f" + ((UINT64_C({form.linear}) * command) << {form.linear_shift})"
-    estimate, rest = form.estimate, form.divisor * (form.estimate.corrections + 1)
-    rest_short = rest < 1 << 15
-    short_estimate = estimate.factor < 1 << 16
+    straight = "" if not form.linear else "long" if straight_low else "word"  # a word stands in the sum's high one
+    suffix = "" if of_law.sign > 0 else "_negative"
+    rest_short = form.divisor * (form.estimate.corrections + 1) < 1 << 15
+    short_estimate = form.estimate.factor < 1 << 16
+    _, beta_shift = of_law.beta_scaling()
+    beta_narrow = (
+        "scaled.high >> (BETA_SHIFT - 32u)"
+        if beta_shift >= 32
+        else "(scaled.high << (32u - BETA_SHIFT)) | (scaled.low >> BETA_SHIFT)"
+    )
     return {
-        "slope_c": _int32(form.slope),
-        "offset_c": _int32(form.offset),
         "slope": str(form.slope),
         "offset": str(form.offset),
-        "offset_modulo": str(form.offset % 2**32),
+        "has_slope": bool(form.slope),
         "slope_sign": "-" if form.slope < 0 else "+",
-        "slope_size": str(abs(form.slope)),
-        "edge_factor": str(form.edge),
         "linear": str(form.linear),
         "linear_shift": str(form.linear_shift),
-        "straight_text": straight_text,
-        "straight_high": str(straight_high),
-        "straight_low": str(straight_low),
-        "straight_product": f"short_product((uint16_t)command, {straight_high}u)"
+        "straight": straight,
+        "straight_high": bool(straight_high),
+        "straight_low": bool(straight_low),
+        "straight_product": f"short_product{suffix}((uint16_t)command, COMMAND_HIGH_WORD)"
         if straight_high < 1 << 16
-        else f"UINT32_C({straight_high}) * command",
+        else "COMMAND_HIGH_WORD * command",
         "half": str(form.half),
-        "half_high": str(high),
-        "half_low": str(low),
-        # One half alone in the low word: it carries where the other has its top bit, and the sum then lacks it.
-        "half_carry": "(law.low >> 31)"
-        if low == 1 << 31
-        else f"(((law.low & UINT32_C({low})) | ((law.low | UINT32_C({low})) & ~low)) >> 31)",
+        # Half of an odd divisor times a power of two: alone in the low word it is its top bit, and else nothing.
+        "half_carries": bool(form.half % 2**32),
+        "uses_low_word": of_law.uses_low_word,
         "shift": str(form.shift),
-        "high_shift": f" >> {form.shift - 32}" if form.shift > 32 else "",
+        "high_shifts": form.shift > 32,
         "divisor": str(form.divisor),
-        "largest": str(form.largest),
         "exceeds": form.exceeds,
-        "reciprocal": str(form.reciprocal),
-        "reciprocal_shift": str(form.reciprocal_shift),
-        "estimate_product": (
-            f"short_product((uint16_t)(quotient >> {estimate.shift}), {estimate.factor}u)"
-            if short_estimate
-            else f"((quotient >> {estimate.shift}) * UINT32_C({estimate.factor}))"
-        ),
-        "corrections": str(estimate.corrections),
-        "correction_bounds": [str(form.divisor * (step + 1)) for step in range(estimate.corrections)],
+        "beta_narrow": beta_narrow,
+        "estimate_product": f"short_product{suffix}((uint16_t)(quotient >> ESTIMATE_SHIFT), ESTIMATE_FACTOR)"
+        if short_estimate
+        else "((quotient >> ESTIMATE_SHIFT) * ESTIMATE_FACTOR)",
+        "correction_steps": [str(step + 1) for step in range(form.estimate.corrections)],
         "rest_type": "uint16_t" if rest_short else "uint32_t",
         "rest_top": "15" if rest_short else "31",
     }
@@ -281,8 +281,3 @@ def _zero_command(compensator: Compensator, sign: int) -> tuple[int, int]:
 
 def _rational(value: Fraction) -> str:
     return f"{value.numerator}/{value.denominator} = {float(value):.6f}"
-
-
-def _int32(value: int) -> str:
-    """Print a 32-bit constant that is one on every compiler, whatever its `long` is."""
-    return f"{'-' if value < 0 else ''}INT32_C({abs(value)})"

@@ -2,12 +2,13 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from importlib.resources import files as files_of
 from typing import TYPE_CHECKING, Any
 
-from dzdesign.codegen.core_plan import Plan, core_plan, drive_plan, header_plan
+from dzdesign.codegen.core_plan import FilePlan, core_plan, drive_plan, header_plan
+from dzdesign.codegen.origin import origin_of_constants
 from dzdesign.codegen.target import Target, folder_of
 from dzdesign.codegen.user_names import printable_list
 from dzdesign.core.artefacts import TOOL, sha256_of, to_json
@@ -83,10 +84,15 @@ def generate(compensator: Compensator, target_name: str, compensator_bytes: byte
     digest = sha256_of(document)
     recordings = ramp_tests_of(compensator)
     header = header_plan(compensator)
-    hardware = {**target.context, "u_max_V": header["u_max_V"], "pressure_span_MPa": header["a_span_MPa"]}
+    hardware = {
+        **target.context,
+        "u_max_V": header.values["u_max_V"],
+        "pressure_span_MPa": header.values["a_span_MPa"],
+    }
     hardware["firmware_origin"] = f"0x{digest[:4].upper()}"
     shared = environment(PACKAGE)
-    plans = [(path, shared, template, plan) for path, template, plan in _core_files(compensator, target, header)]
+    core = _core_files(compensator, target, header)
+    plans = [(path, shared, template, plan.values) for path, template, plan in core]
     own = environment(f"{PACKAGE}.{target.folder}")
     plans += [(path, own, template, hardware) for path, template in target.templates.items()]
     files = {
@@ -101,11 +107,12 @@ def generate(compensator: Compensator, target_name: str, compensator_bytes: byte
         "target": target.name,
         "law": compensator.law_name,
         "core": sorted(path for path in files if path.startswith("core/")),
+        **origin_of_constants(compensator, digest, {path: plan.constants for path, _, plan in core}),
     }
     return Firmware(files=files, manifest=manifest)
 
 
-def _core_files(compensator: Compensator, target: Target, header: Plan) -> list[tuple[str, str, Plan]]:
+def _core_files(compensator: Compensator, target: Target, header: FilePlan) -> list[tuple[str, str, FilePlan]]:
     """Return path, template and plan of every file of the core."""
     sides = [
         (f"core/{name}", "dz_comp.c.jinja", core_plan(compensator, sign, target.arithmetic))
@@ -116,7 +123,8 @@ def _core_files(compensator: Compensator, target: Target, header: Plan) -> list[
     return [
         *sides,
         ("core/dz_comp.h", "dz_comp.h.jinja", header),
-        *((f"core/{name}", f"{name}.jinja", drive) for name in ("dz_drive.c", "dz_drive.h")),
+        ("core/dz_drive.c", "dz_drive.c.jinja", drive),
+        ("core/dz_drive.h", "dz_drive.h.jinja", replace(drive, constants=())),
     ]
 
 

@@ -42,18 +42,18 @@ def one_more(match: re.Match) -> str:
 
 
 FAULTS = {
-    "slope": (r"(-INT32_C\()(\d+)(\) \*)", one_more),
-    "offset": (r"(\+ INT32_C\()(\d+)(\);)", one_more),
-    "half": (r"(\+ UINT64_C\()(\d+)(\);)", lambda m: m.group(1) + str(int(m.group(2)) * 2) + m.group(3)),
+    "slope": (r"(#define FACTOR_SLOPE \(-INT32_C\()(\d+)(\))", one_more),
+    "offset": (r"(#define FACTOR_OFFSET INT32_C\()(\d+)(\))", one_more),
+    "half": (r"(#define HALF UINT64_C\()(\d+)(\))", lambda m: m.group(1) + str(int(m.group(2)) * 2) + m.group(3)),
     "reciprocal": (
-        r"(quotient \* UINT32_C\()(\d+)(\))",
+        r"(#define RECIPROCAL UINT32_C\()(\d+)(\))",
         lambda m: m.group(1) + str(int(m.group(2)) - 200) + m.group(3),
     ),
-    "shift": (r"sum >> 32", "sum >> 31"),
+    "shift": (r"#define SUM_SHIFT 32u", "#define SUM_SHIFT 31u"),
     "table's start": (r"(\}, \{UINT32_C\()(\d+)(\),)", one_more),
     "table's change": (r"(\}, \{UINT32_C\(\d+\), )(-?\d+)(\})", one_more),
-    "fallback": (r"(= \{\n    \{UINT32_C\()(\d+)(\), 0\})", one_more),
-    "segment": (r"dp \+ 64u", "dp + 63u"),
+    "fallback": (r"(= \{\n        \{UINT32_C\()(\d+)(\), 0\})", one_more),
+    "segment": (r"dp \+ STEP_CODES", "dp + 63u"),
     "reverse + 1": (r"(#define REVERSE )(\d+)(u)", one_more),
     "command's end": (r"(#define COMMAND_HIGH )(\d+)(u)", lambda m: m.group(1) + str(int(m.group(2)) - 1) + m.group(3)),
     "pressure's end": (

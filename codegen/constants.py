@@ -1,0 +1,118 @@
+"""`Constant`: a number of the generated C, and where it is from; C's comment and the manifest's entry print it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from textwrap import wrap
+from typing import Any
+
+from dzdesign.core.errors import DzdesignError
+
+#: Longest line of a comment in the generated C.
+COLUMNS = 120
+#: C99's macros and suffixes: each gives the same number whatever the width of `int` and `long`.
+LITERALS: Mapping[str, str] = {
+    "plain": "{}u",
+    "uint32": "UINT32_C({})",
+    "uint64": "UINT64_C({})",
+    "int32": "INT32_C({})",
+}
+EXACT = "exact"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Constant:
+    """One `#define` or table.
+
+    Attributes
+    ----------
+    symbol : str
+        Name in C.
+    value : int or tuple of (int, int)
+        The number, or a table's rows (start, change), as the C has them.
+    equation : str
+        What it is, with the equation of the paper where there is one.
+    engineering : str
+        What it stands for, in engineering units.
+    rounding : str
+        How the number came from that value.
+    data : tuple of str
+        Keys of compensator.json that it was computed from, dotted; none for what codegen chooses itself.
+    generator : str
+        Source file of dzdesign that computes it.
+    literal : str
+        One of `LITERALS`.
+    """
+
+    symbol: str
+    value: int | tuple[tuple[int, int], ...]
+    equation: str
+    engineering: str
+    rounding: str = EXACT
+    data: tuple[str, ...] = ()
+    generator: str
+    literal: str = "plain"
+
+    def __post_init__(self) -> None:
+        if isinstance(self.value, int) and self.value < 0 and not self.literal.startswith("int"):
+            raise DzdesignError(f"constant {self.symbol} is {self.value}, which its unsigned type can't hold")
+
+    @property
+    def text(self) -> str:
+        """Say in a comment what the number is."""
+        text = f"{self.equation}: {self.engineering} ({self.rounding})."
+        return text[0].upper() + text[1:]
+
+    def comment(self) -> list[str]:
+        """Return the comment in C, wrapped."""
+        return c_comment(self.text)
+
+    def printed(self) -> str:
+        """Return the number of a `#define` as C prints it; a negative one in brackets."""
+        literal = LITERALS[self.literal].format(abs(self.value))
+        return f"(-{literal})" if self.value < 0 else literal
+
+    def lines(self) -> list[str]:
+        """Return the comment and the `#define`."""
+        return [*self.comment(), f"#define {self.symbol} {self.printed()}"]
+
+    def entry(self, file: str, valve_keys: Mapping[str, Sequence[str]]) -> dict[str, Any]:
+        """Return the manifest's entry of the constant in one file.
+
+        Parameters
+        ----------
+        file : str
+            Where the C is, relative to the firmware's folder.
+        valve_keys : mapping
+            Keys of valve.json by the key of compensator.json that was designed from them.
+        """
+        from_valve = [key for datum in self.data for key in valve_keys.get(datum, ())]
+        return {
+            "file": file,
+            "symbol": self.symbol,
+            "value": self.value if isinstance(self.value, int) else [list(row) for row in self.value],
+            "equation": self.equation,
+            "engineering": self.engineering,
+            "rounding": self.rounding,
+            "compensator_json": list(self.data),
+            "valve_json": list(dict.fromkeys(from_valve)),
+            "generator": self.generator,
+        }
+
+
+def c_comment(text: str) -> list[str]:
+    """Return a comment of C, its lines no longer than `COLUMNS`.
+
+    Examples
+    --------
+    >>> c_comment("Full command.")
+    ['/* Full command. */']
+    """
+    lines = wrap(text, COLUMNS - 6, break_long_words=False, break_on_hyphens=False)
+    return [f"{' *' if number else '/*'} {line}" for number, line in enumerate(lines[:-1])] + [
+        f"{' *' if len(lines) > 1 else '/*'} {lines[-1]} */"
+    ]
+
+
+def defines(constants: Sequence[Constant]) -> list[str]:
+    """Return the lines of several `#define`s, each with its comment."""
+    return [line for constant in constants for line in constant.lines()]
