@@ -203,37 +203,17 @@ def run_codegen(args: argparse.Namespace) -> int:
     content = read_bytes(path, "compensator file")
     document = parse_document(content, str(path), (COMPENSATOR_SCHEMA, VALVE_SCHEMA))
     if document["schema"] == VALVE_SCHEMA:
-        compensator = _design(path, content, args)
-        _refuse_unserved(compensator, args.target)
-        firmware = generate(compensator, args.target)
+        firmware = generate(_design(path, content, args), args.target)
     else:
         for option in given_design_options(args):
             raise InputError(f"{option} is an option of the design, and '{path}' is designed; use `dzdesign design`")
-        compensator = compensator_from_document(content, str(path))
-        _refuse_unserved(compensator, args.target)
-        firmware = generate(compensator, args.target, content)
+        firmware = generate(compensator_from_document(content, str(path)), args.target, content)
     write_folder(Path(args.output), firmware.files, firmware.manifest)
     if args.json:
         print(to_json(firmware.manifest), end="")
     else:
         print_firmware(firmware, args.output)
     return 0
-
-
-def _refuse_unserved(compensator: "Compensator", target: str) -> None:  # noqa: F821
-    """Refuse options that the target does not carry out; with the library of the host the caller runs dz_drive."""
-    amplifier = compensator.amplifier
-    asked = {
-        "two solenoids": compensator.negative is not None,
-        "ramps": amplifier.has_ramp,
-        "a dither": bool(amplifier.dither_counts),
-    }
-    unserved = [what for what, wanted in asked.items() if wanted]
-    if unserved and target != "host":
-        raise InputError(
-            f"{' and '.join(unserved)}: that is done by core/dz_drive, which target {target} does not call yet; "
-            "generate for --target host and call dz_drive_sample() and dz_drive_tick(), or leave the option out"
-        )
 
 
 def _list_targets(args: argparse.Namespace) -> int:

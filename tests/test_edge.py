@@ -9,7 +9,7 @@ import pytest
 from synthetic import SHARED, needs_compiler
 
 from dzdesign.cli import main
-from dzdesign.core.artefacts import to_json, write_folder
+from dzdesign.core.artefacts import write_folder
 from dzdesign.core.errors import InputError
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
@@ -108,18 +108,3 @@ def test_both_signs_need_both_sides(example_valve):
     both = command_signal(parse_signal("-10..10 V x 0.15 + 1.5 V", "--command-signal"), Converter())
     with pytest.raises(InputError, match="negative side was not tested"):
         design(example_valve, DesignOptions(signals=Signals(command=both)))
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (["--dither", "150 Hz 1 %"], "a dither: that is done by core/dz_drive"),
-        (["--ramp-up", "0.5 s"], "ramps: that is done"),
-    ],
-)
-def test_a_target_that_would_not_carry_an_option_out_is_refused(example_valve, options, words, tmp_path, capsys):
-    valve = tmp_path / "valve.json"
-    valve.write_text(to_json(example_valve.to_document()))
-    assert main(["codegen", str(valve), *options, "-o", str(tmp_path / "fw")]) == 2
-    assert words in capsys.readouterr().err and not (tmp_path / "fw").exists()
-    assert main(["codegen", str(valve), *options, "--target", "host", "-o", str(tmp_path / "fw")]) == 0
