@@ -6,7 +6,12 @@ from textwrap import wrap
 from typing import Any
 
 from dzdesign.codegen.constants import COLUMNS, Constant, defines
-from dzdesign.codegen.drive_constants import drive_constants, interface_constants, status_constants
+from dzdesign.codegen.drive_constants import (
+    drive_constants,
+    drive_interface_constants,
+    interface_constants,
+    status_constants,
+)
 from dzdesign.codegen.integer_form import IntegerForm, integer_form
 from dzdesign.codegen.law_constants import (
     KAPPA_ROUNDING,
@@ -56,7 +61,7 @@ def core_plan(compensator: Compensator, sign: int, arithmetic: str) -> FilePlan:
     word_bits = _word_bits(compensator, arithmetic)
     codes = SignalConstants(compensator=compensator, sign=sign, word_bits=word_bits)
     of_law = LawConstants(compensator=compensator, form=form, sign=sign, narrow=narrow)
-    signals, steps, integers = codes.signals(), codes.steps(), of_law.arithmetic(uses_beta=sign > 0)
+    signals, steps, integers = codes.signals(), codes.steps(), of_law.arithmetic()
     rows = table_form(form, compensator.beta_step_codes, arithmetic)
     tables = [of_law.table(False, rows)] + ([of_law.table(True, rows)] if form.zero_table else [])
     side, chosen = compensator.side(sign), law(compensator.law_name)
@@ -75,6 +80,7 @@ def core_plan(compensator: Compensator, sign: int, arithmetic: str) -> FilePlan:
         "narrow": narrow,
         "function": "dz_comp" if sign > 0 else "dz_comp_negative",
         "status_function": "dz_status" if sign > 0 else "dz_status_negative",
+        "beta_function": "dz_beta" if sign > 0 else "dz_beta_negative",
         "side_text": "" if compensator.negative is None else f" for {'positive' if sign > 0 else 'negative'} commands",
         "law_text": _law_text(chosen),
         "law_equation": equation_of(chosen),
@@ -129,7 +135,7 @@ def header_plan(compensator: Compensator) -> FilePlan:
 
 
 def drive_plan(compensator: Compensator) -> FilePlan:
-    """Return what the templates of the amplifier around the law print."""
+    """Return what dz_drive.c prints, the amplifier around the law."""
     signals, amplifier = compensator.signals, compensator.amplifier
     constants = drive_constants(compensator)
     values = {
@@ -141,6 +147,17 @@ def drive_plan(compensator: Compensator) -> FilePlan:
         "rises": signals.command.direction(1) > 0,
         "ramp_unit": str(RAMP_UNIT),
         "sample_Hz": str(signals.sample_Hz),
+    }
+    return FilePlan(values=values, constants=tuple(constants))
+
+
+def drive_header_plan(compensator: Compensator) -> FilePlan:
+    """Return what dz_drive.h prints."""
+    constants = drive_interface_constants(compensator)
+    values = {
+        **drive_plan(compensator).values,
+        "misra_lines": misra_lines("dz_drive.h"),
+        "interface_defines": defines(constants),
     }
     return FilePlan(values=values, constants=tuple(constants))
 

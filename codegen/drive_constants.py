@@ -40,6 +40,17 @@ def status_constants() -> list[Constant]:
     ]  # fmt: skip
 
 
+def drive_interface_constants(compensator: Compensator) -> list[Constant]:
+    """Return what a caller of the drive must know: `#define`s of dz_drive.h."""
+    signals = compensator.signals
+    return [
+        Constant(symbol="DZ_DRIVE_TICKS_PER_SAMPLE", value=signals.tick_Hz // signals.sample_Hz,
+                 equation="PWM periods from one sample to the next",
+                 engineering=f"{signals.tick_Hz} periods and {signals.sample_Hz} samples a second",
+                 data=("signals.tick_Hz", "signals.sample_Hz"), generator=HERE)
+    ]  # fmt: skip
+
+
 def drive_constants(compensator: Compensator) -> list[Constant]:
     """Return what the amplifier's options need; nothing where all are off."""
     amplifier, bipolar = compensator.amplifier, compensator.negative is not None

@@ -95,18 +95,11 @@ class LawConstants:
             generator=HERE,
         )
 
-    def arithmetic(self, *, uses_beta: bool) -> list[Constant]:
-        """Return the law's integers.
-
-        Parameters
-        ----------
-        uses_beta : bool
-            Whether this side's C also has dz_beta().
-        """
+    def arithmetic(self) -> list[Constant]:
+        """Return the law's integers."""
         limit = [self._limit()] if self.form.exceeds else []
         division = self._estimate() if self.narrow else self._reciprocal()
-        beta = self._beta() if uses_beta else []
-        return [*self._factor(), *self._straight(), *self._half(), *limit, *division, *beta]
+        return [*self._factor(), *self._straight(), *self._half(), *limit, *division, *self._beta()]
 
     def _constant(
         self, symbol: str, value: int, equation: str, engineering: str, data: tuple[str, ...] = (), **how: str

@@ -16,7 +16,14 @@ DEVIATIONS = {
             "DZ_COMPARE_MAX, DZ_COMPARE_LIMIT, DZ_ADC_CODE_MAX",
             "the interface's limits are for those who call the core; not every firmware needs all of them.",
         ),
-    )
+    ),
+    "dz_drive.h": (
+        (
+            "2.5",
+            "DZ_DRIVE_TICKS_PER_SAMPLE",
+            "it is for those who call the drive; who is told of a new sample does without.",
+        ),
+    ),
 }
 
 

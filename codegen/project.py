@@ -2,12 +2,12 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib import import_module
 from importlib.resources import files as files_of
 from typing import TYPE_CHECKING, Any
 
-from dzdesign.codegen.core_plan import FilePlan, core_plan, drive_plan, header_plan
+from dzdesign.codegen.core_plan import FilePlan, core_plan, drive_header_plan, drive_plan, header_plan
 from dzdesign.codegen.origin import origin_of_constants
 from dzdesign.codegen.target import Target, folder_of
 from dzdesign.codegen.user_names import printable_list
@@ -86,10 +86,11 @@ def generate(compensator: Compensator, target_name: str, compensator_bytes: byte
     header = header_plan(compensator)
     hardware = {
         **target.context,
+        **core_context(compensator.signals.signs),
         "u_max_V": header.values["u_max_V"],
         "pressure_span_MPa": header.values["a_span_MPa"],
+        "firmware_origin": f"0x{digest[:4].upper()}",
     }
-    hardware["firmware_origin"] = f"0x{digest[:4].upper()}"
     shared = environment(PACKAGE)
     core = _core_files(compensator, target, header)
     plans = [(path, shared, template, plan.values) for path, template, plan in core]
@@ -119,13 +120,32 @@ def _core_files(compensator: Compensator, target: Target, header: FilePlan) -> l
         for sign, name in CORE_SOURCES.items()
         if sign in compensator.signals.signs
     ]
-    drive = drive_plan(compensator)
     return [
         *sides,
         ("core/dz_comp.h", "dz_comp.h.jinja", header),
-        ("core/dz_drive.c", "dz_drive.c.jinja", drive),
-        ("core/dz_drive.h", "dz_drive.h.jinja", replace(drive, constants=())),
+        ("core/dz_drive.c", "dz_drive.c.jinja", drive_plan(compensator)),
+        ("core/dz_drive.h", "dz_drive.h.jinja", drive_header_plan(compensator)),
     ]
+
+
+def core_context(signs: Sequence[int]) -> dict[str, Any]:
+    """Return what the templates of a target print of the core.
+
+    Parameters
+    ----------
+    signs : sequence of int
+        Signs of command that it has a law for.
+
+    Returns
+    -------
+    dict
+        ``bipolar``, and the core's files in the order of a makefile: ``core_sources``, ``core_headers``.
+    """
+    return {
+        "bipolar": len(signs) == 2,
+        "core_sources": [*(CORE_SOURCES[sign] for sign in signs), "dz_drive.c"],
+        "core_headers": ["dz_comp.h", "dz_drive.h"],
+    }
 
 
 def ramp_tests_of(compensator: Compensator) -> tuple[str, ...]:

@@ -15,7 +15,9 @@ from dzdesign.design.signals import Signals
 #: Products that the core may use: 32x32->64 bits, or none longer than 32 bits.
 ARITHMETICS = ("wide", "narrow")
 
-RENDERER_NAMES = frozenset({"banner", "project", "u_max_V", "pressure_span_MPa", "firmware_origin"})
+RENDERER_NAMES = frozenset(
+    {"banner", "project", "u_max_V", "pressure_span_MPa", "firmware_origin", "bipolar", "core_sources", "core_headers"}
+)
 """Names that the renderer itself passes to every template; a target's context may not use them."""
 
 
@@ -133,12 +135,14 @@ class Target:
         if self.takes_any_signals:
             return
         for what, asked, has in (
-            ("compare value", signals.compare_max, self.compare_max),
-            ("converter code", signals.code_max, self.adc_code_max),
+            ("largest compare value", signals.compare_max, self.compare_max),
+            ("largest converter code", signals.code_max, self.adc_code_max),
+            ("number of samples a second", signals.sample_Hz, self.sample_Hz),
+            ("number of PWM periods a second", signals.tick_Hz, self.tick_Hz),
         ):
             if asked != has:
                 raise InputError(
-                    f"the compensator's largest {what} is {asked}, but target {self.name} has {has}; "
+                    f"the compensator's {what} is {asked}, but target {self.name} has {has}; "
                     f"design it again with `dzdesign design --target {self.name}`"
                 )
 

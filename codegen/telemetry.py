@@ -16,7 +16,7 @@ from fractions import Fraction
 from dzdesign.core.errors import InputError
 
 SYNC = 0xA55A
-VERSION = 1
+VERSION = 2
 CRC_POLYNOMIAL, CRC_START = 0x1021, 0xFFFF
 HEADER_OCTETS, CRC_OCTETS = 4, 2
 #: A start bit, eight of data, a stop bit.
@@ -43,7 +43,8 @@ FIELDS = (
     Field(name="p_a_adc", bits=16, text="code of pressure A"),
     Field(name="p_b_adc", bits=16, text="code of pressure B"),
     Field(name="beta", bits=16, text="beta(dP) times 2^15, rounded down"),
-    Field(name="compare", bits=16, text="PWM compare value"),
+    Field(name="compare_a", bits=16, text="PWM compare value of solenoid A"),
+    Field(name="compare_b", bits=16, text="of solenoid B; one of the two is 0"),
     Field(name="status", bits=16, text="bits of the status word"),
 )
 #: The status word: what the hardware reports, in its low octet, and in the high one what dz_status() finds wrong.
@@ -96,7 +97,8 @@ class Frame:
     p_a_adc: int
     p_b_adc: int
     beta: int
-    compare: int
+    compare_a: int
+    compare_b: int
     status: int
 
 
@@ -164,7 +166,7 @@ def frame_context() -> dict[str, str]:
     """Return what the templates of a target print of the frame: sizes, the layout as a comment, the C of the fields."""
     rows, at = [], HEADER_OCTETS
     for field in FIELDS:
-        rows.append(f" *   {at:2d}  {field.bits // 8}  {field.name:8s} {field.text}")
+        rows.append(f" *   {at:2d}  {field.bits // 8}  {field.name:9s} {field.text}")
         at += field.bits // 8
     return {
         "frame_sync": f"0x{SYNC:04X}",

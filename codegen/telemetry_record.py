@@ -22,8 +22,8 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.design.signals import PressureSignal
 
-COLUMNS = ("time_s", "u_V", "pA_MPa", "pB_MPa", "uO_V", "beta", "compare", "status")
-_ROW = struct.Struct("<8I")
+COLUMNS = ("time_s", "u_V", "pA_MPa", "pB_MPa", "uO_V", "beta", "compare_a", "compare_b", "status")
+_ROW = struct.Struct("<9I")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -151,12 +151,12 @@ class Recording:
         (u_zero, volts), (a_zero, a_MPa), (b_zero, b_MPa) = ((one.zero_code, float(one.per_code)) for one in channels)
         volts_out = float(scale.volts_out)
         for periods, row in zip(self._periods, _ROW.iter_unpack(self._rows), strict=True):
-            _, _, u_adc, p_a_adc, p_b_adc, beta, compare, status = row
-            out = compare * volts_out if status & STATUS_RELEASED else 0.0
+            _, _, u_adc, p_a_adc, p_b_adc, beta, compare_a, compare_b, status = row
+            out = (compare_a - compare_b) * volts_out if status & STATUS_RELEASED else 0.0
             volts_in, a_now, b_now = (u_adc - u_zero) * volts, (p_a_adc - a_zero) * a_MPa, (p_b_adc - b_zero) * b_MPa
             yield (
                 f"{periods / scale.link.tick_Hz:.4f},{volts_in:.5f},{a_now:.5f},{b_now:.5f},"
-                f"{out:.5f},{beta / (1 << BETA_BITS):.5f},{compare},{status}\n"
+                f"{out:.5f},{beta / (1 << BETA_BITS):.5f},{compare_a},{compare_b},{status}\n"
             )
 
     def to_csv(self, reader: FrameReader) -> str:
@@ -170,9 +170,10 @@ class Recording:
         comments = (
             f"recorded by dzdesign {TOOL['version']} monitor, firmware of compensator SHA-256 {self.scalings.sha256}",
             f"{len(self)} frames, {self.lost} lost, {reader.bad_crc} with a wrong CRC, {self.restarts} restarts",
-            "u_V: command u_i. uO_V: output u_O, 0 while the output is held low; to look at the valve without its "
+            "u_V: command u_i. uO_V: output u_O, negative of solenoid B, 0 while the output is held low; "
+            "to look at the valve without its "
             'compensator: --columns "u=uO_V"',
-            "compare: PWM compare value. status: bits, 128: output in use, "
+            "compare_a, compare_b: PWM compare values of the solenoids. status: bits, 128: output in use, "
             + ", ".join(f"{bit}: {text}" for bit, text in STATUS_BITS.items()),
             "The firmware does not measure the flow: add a column Q_Lmin, your flow meter's reading at each time_s. "
             "The ramp of u_V, recorded by both, tells the shift between the two clocks",

@@ -6,6 +6,8 @@ from dzdesign.core.errors import InputError
 
 #: Ramps count in codes of command over this, a sample.
 RAMP_UNIT = 1 << 16
+#: Codes of command from zero on that a ramp counts in 32 bits.
+RAMPED_CODES = (1 << 31) // RAMP_UNIT - 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

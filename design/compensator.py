@@ -7,7 +7,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.derivation.edge import evaluate_edge
 from dzdesign.derivation.law import law
 from dzdesign.derivation.scaling import drive, evaluate_line
-from dzdesign.design.amplifier import Amplifier
+from dzdesign.design.amplifier import RAMPED_CODES, Amplifier
 from dzdesign.design.signals import Signals
 
 #: What to do below the reference pressure drop: beta = 1 as in Eq. (7), or what the tests there say.
@@ -149,6 +149,12 @@ class Compensator:
             raise InputError(
                 f"the compare limit is {self.amplifier.compare_limit}, above full drive, {self.signals.compare_max}"
             )
+        command = self.signals.command
+        if (
+            self.amplifier.has_ramp
+            and max(abs(code - command.zero_code) for code in command.valid_codes) > RAMPED_CODES
+        ):
+            raise InputError(f"a ramp counts up to {RAMPED_CODES} codes of command from zero on; use a shorter signal")
         for sign in self.signals.signs:
             self._check_side(sign)
 

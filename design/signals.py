@@ -140,6 +140,11 @@ class Signals:
         for name in ("code_max", "compare_max", "sample_Hz", "tick_Hz"):
             if not 1 <= getattr(self, name) <= CODE_LIMIT:
                 raise InputError(f"{name} is {getattr(self, name)}, expected 1 to {CODE_LIMIT} (16 bits)")
+        if self.tick_Hz % self.sample_Hz:
+            raise InputError(
+                f"tick_Hz is {self.tick_Hz} and sample_Hz {self.sample_Hz}, "
+                "expected a whole number of PWM periods a sample"
+            )
         for name in ("command", "pressure_a", "pressure_b"):
             low, high = getattr(self, name).valid_codes
             if not 0 <= low < high <= self.code_max:

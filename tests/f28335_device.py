@@ -8,20 +8,21 @@ from xml.etree import ElementTree
 import pytest
 
 from dzdesign.codegen.f28335.target import TARGET
-from dzdesign.codegen.project import banner, environment
+from dzdesign.codegen.project import banner, core_context, environment
 
 HERE = Path(__file__).parent / "f28335"
 COMPILER = next((path for name in ("cc", "gcc", "clang") if (path := shutil.which(name))), None)
 needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no C compiler (cc, gcc or clang) on the path")
 
 
-def render_firmware(folder: Path) -> dict[str, Path]:
-    """Write the target's files below `folder`, by the real renderer; output path to file."""
+def render_firmware(folder: Path, *signs: int) -> dict[str, Path]:
+    """Write the target's files below `folder`, by the real renderer; output path to file. One sign by default."""
     renderer = environment("dzdesign.codegen.f28335")
     written = {}
     for path, template in TARGET.templates.items():
         text = renderer.get_template(template).render(
             **TARGET.context,
+            **core_context(signs or (1,)),
             banner=banner(template, "0123456789abcdef"),
             project="paper_valve",
             u_max_V="10",

@@ -15,7 +15,7 @@ from synthetic import needs_compiler
 
 from dzdesign.codegen.f280049c import target as f280049c
 from dzdesign.codegen.f280049c.target import TARGET
-from dzdesign.codegen.project import banner, environment
+from dzdesign.codegen.project import banner, core_context, environment
 from dzdesign.core.errors import DzdesignError
 from dzdesign.verify.host_compiler import STRICT, host_compiler
 
@@ -25,11 +25,21 @@ TIMEOUT = int(TARGET.context["sample_timeout_ticks"])
 
 @pytest.fixture
 def firmware(tmp_path) -> Path:
-    """The target's folder, by the real renderer."""
+    return render(tmp_path, 1)
+
+
+@pytest.fixture
+def bipolar(tmp_path) -> Path:
+    return render(tmp_path, 1, -1)
+
+
+def render(tmp_path: Path, *signs: int) -> Path:
+    """Write the target's folder, by the real renderer."""
     renderer = environment("dzdesign.codegen.f280049c")
     for path, template in TARGET.templates.items():
         text = renderer.get_template(template).render(
             **TARGET.context,
+            **core_context(signs),
             banner=banner(template, "0" * 64),
             project="dzdesign",
             u_max_V="10",
@@ -87,7 +97,7 @@ def check_order(program: Path) -> None:
     """The output is tripped before anything can drive it, and the interrupt comes last."""
     calls = run(program, "calls")
     at = calls.index
-    trip = at("EPWM_forceTripZoneEvent EPWM1_BASE EPWM_TZ_FORCE_EVENT_OST")
+    trip = max(i for i, call in enumerate(calls[: at("device_eint")]) if call.startswith("EPWM_forceTripZoneEvent"))
     listened = at("EPWM_enableTripZoneSignals EPWM1_BASE EPWM_TZ_SIGNAL_OSHT1")
     assert at("XBAR_setInputPin XBAR_INPUT1 12") < listened < trip
     assert at("EPWM_setTripZoneAction EPWM1_BASE EPWM_TZ_ACTION_EVENT_TZA EPWM_TZ_ACTION_LOW") < trip
@@ -132,6 +142,50 @@ CHECKS = [check_set_up, check_order, check_normal_running, check_trip_on_missing
 @pytest.mark.parametrize("check", CHECKS)
 def test_firmware_on_the_model(firmware, check):
     check(build(firmware))
+
+
+def check_both_outputs(program: Path) -> None:
+    """A drives, then B, then A; never both; a fault ends both at once, and they stay low."""
+    ticks = periods(program, "....B.....A.....")
+    assert all(a == 0 or b == 0 for a, b in zip(ticks["duty"], ticks["duty_b"], strict=True))
+    assert ticks["duty_b"] == [0] * 6 + [100 * n + 210 for n in (3, 3, 4, 4, 5, 5)] + [0] * 4 and ticks["duty"][-1]
+    tripped = periods(program, "....B...T.t.....")
+    assert not any(tripped["duty"][8:] + tripped["duty_b"][8:]) and set(tripped["tripped_b"][8:]) == {1}
+
+
+def check_second_trip_on_missing_samples(program: Path) -> None:
+    ticks = periods(program, "B..." + "x" * 10 + "....")
+    tripped = ticks["fault"].index(1)
+    assert any(ticks["duty_b"][:tripped]) and not any(ticks["duty"] + ticks["duty_b"][tripped + 1 :])
+    assert set(ticks["tripped_b"][tripped:]) == {1}
+
+
+@needs_compiler
+@pytest.mark.parametrize("check", [*CHECKS, check_both_outputs, check_second_trip_on_missing_samples])
+def test_firmware_of_two_solenoids_on_the_model(bipolar, check):
+    check(build(bipolar))
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("file", "old", "new", "check"),
+    [
+        ("dz_isr.c", "    EPWM_forceTripZoneEvent(EPWM2_BASE, EPWM_TZ_FORCE_EVENT_OST);", "",
+         check_second_trip_on_missing_samples),
+        ("dz_isr.c", "EPWM_clearTripZoneFlag(EPWM2_BASE, EPWM_TZ_FLAG_OST);", "", check_both_outputs),
+        ("dz_isr.c", "write_compare_b(drive.compare_b)", "write_compare_b(drive.compare_a)", check_both_outputs),
+        ("dz_hardware.c", "EPWM_enableTripZoneSignals(EPWM2_BASE, EPWM_TZ_SIGNAL_OSHT1);", "",
+         check_both_outputs),
+    ],
+)  # fmt: skip
+def test_a_seeded_fault_of_the_second_output_is_caught(bipolar, file, old, new, check):
+    source = bipolar / file
+    before, found, after = source.read_text(encoding="utf-8").partition(old)
+    assert found
+    source.write_text(before + new + after, encoding="utf-8")
+    program = build(bipolar)
+    with pytest.raises((AssertionError, ValueError)):
+        check(program)
 
 
 @needs_compiler
@@ -232,13 +286,12 @@ def test_projectspec_and_makefile_name_the_same_files(firmware):
     files = [entry.get("path") for entry in project.findall("file")]
     assert {entry.get("action") for entry in project.findall("file")} == {"link"}
     ours = {Path(path).name for path in files if not path.startswith("C2000WARE_ROOT/")}
-    assert ours == {path.name for path in firmware.iterdir()} - {"Makefile", "dzdesign.projectspec"} | {
-        "dz_comp.c", "dz_comp.h"
-    }  # fmt: skip
+    core_files = {"dz_comp.c", "dz_comp.h", "dz_drive.c", "dz_drive.h"}
+    assert ours == {path.name for path in firmware.iterdir()} - {"Makefile", "dzdesign.projectspec"} | core_files
     make = shutil.which("make") or pytest.skip("no make on the path")
     core = firmware.parent / "core"
     core.mkdir()
-    for name in ("dz_comp.c", "dz_comp.h"):
+    for name in core_files:
         (core / name).touch()
     linked = set()
     for kind in ("RAM", "FLASH"):

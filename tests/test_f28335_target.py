@@ -30,10 +30,21 @@ START_VALUES = {
     "PIEIER3": 1, "IER": 0x0004, "OST": 1, "CMPA": 0, "VECTOR_SET": 1,
 }  # fmt: skip
 
+#: Of the second output, which only a command of both signs has.
+SECOND_VALUES = {
+    "SECOND_TBCTL": 0x0004, "SECOND_TBPRD": 0xEA5F, "SECOND_CMPCTL": 0, "SECOND_AQCTLA": 0x0012, "SECOND_ETSEL": 0,
+    "SECOND_TZSEL": 0x0100, "SECOND_TZCTL": 0x0002, "SECOND_OST": 1, "GPIO2_MUX": 1, "GPIO2_PULLUP_OFF": 1,
+}  # fmt: skip
+
 
 @pytest.fixture
 def firmware(tmp_path):
     return render_firmware(tmp_path)
+
+
+@pytest.fixture
+def bipolar(tmp_path):
+    return render_firmware(tmp_path, 1, -1)
 
 
 def compare_of_sample(n: int) -> int:
@@ -57,7 +68,9 @@ def check_normal_running(program: Path) -> None:
 
 
 def check_registers(program: Path) -> None:
-    assert registers(program) == START_VALUES
+    found = registers(program)
+    assert {name: found[name] for name in START_VALUES} == START_VALUES
+    assert {found[name] for name in SECOND_VALUES} == {0, 0x0083}, "the second output is left as a reset leaves it"
 
 
 def check_trip_on_missing_samples(program: Path) -> None:
@@ -175,7 +188,9 @@ def test_constants_fit_the_16_bit_int_of_the_c28x(firmware):
     assert len(values) > 10 and all(value.endswith("u") and int(value[:-1], 0) <= 0xFFFF for value in values)
 
 
-def test_projectspec_and_makefile_name_the_same_files(firmware):
+@pytest.mark.parametrize("signs", [(1,), (1, -1)])
+def test_projectspec_and_makefile_name_the_same_files(signs, tmp_path):
+    firmware = render_firmware(tmp_path, *signs)
     project = ElementTree.parse(firmware["f28335/dzdesign.projectspec"]).getroot().find("project")
     assert project.get("device") == "TMS320F28335" and project.get("outputFormat") == "COFF"
     assert [entry.get("name") for entry in project.findall("configuration")] == ["RAM", "FLASH"]
@@ -183,12 +198,14 @@ def test_projectspec_and_makefile_name_the_same_files(firmware):
     assert all(entry.get("action") == "link" for entry in project.findall("file"))
     ours = {Path(path).name for path in files if not path.startswith("C2000WARE_ROOT/")}
     generated = {Path(path).name for path in firmware} - {"Makefile", "dzdesign.projectspec"}
-    assert ours == generated | {"dz_comp.c", "dz_comp.h"}
+    core_files = {"dz_comp.c", "dz_comp.h", "dz_drive.c", "dz_drive.h"}
+    core_files |= {"dz_comp_negative.c"} if len(signs) == 2 else set()
+    assert ours == generated | core_files
 
     make = shutil.which("make") or pytest.skip("no make on the path")
     core = firmware["f28335/Makefile"].parent.parent / "core"
     core.mkdir()
-    for name in ("dz_comp.c", "dz_comp.h"):
+    for name in core_files:
         (core / name).touch()
     our_sources = {path for path in files if path.endswith(".c") and not path.startswith("C2000WARE_ROOT/")}
     for configuration in project.findall("configuration"):
@@ -244,6 +261,90 @@ CHECKS = [check_registers, check_normal_running, check_trip_on_missing_samples, 
 @pytest.mark.parametrize("check", CHECKS)
 def test_firmware_on_the_device_model(firmware, check):
     check(build(firmware))
+
+
+def check_second_registers(program: Path) -> None:
+    """ePWM1 differs from that of one solenoid by the pulse that keeps ePWM2 in step."""
+    found = registers(program)
+    assert found == START_VALUES | SECOND_VALUES | {"TBCTL": 0x0010}
+
+
+def check_drive_calls(program: Path) -> None:
+    """A tick each period, a sample where there is one, both from the release of the output on."""
+    ticks = periods(program, "." * 9)
+    assert column(ticks, "drive_ticks") == [0, 1, 2, 3, 4, 5, 6, 7, 8]
+    assert column(ticks, "samples") == [0, 1, 1, 2, 2, 3, 3, 4, 4]
+
+
+def check_both_outputs(program: Path) -> None:
+    """A drives, then B, then A; in no period both; a fault ends both at once, and they stay low."""
+    ticks = periods(program, "....B.....A.....")
+    assert all(tick["duty"] == 0 or tick["duty_b"] == 0 for tick in ticks)
+    assert any(column(ticks, "duty")[:6]) and any(column(ticks, "duty")[-4:])
+    of_b = [compare_of_sample(n) for n in (3, 3, 4, 4, 5, 5)]
+    assert column(ticks, "duty_b") == [0] * 6 + of_b + [0] * 4
+    for start in ("....", "....B..."):
+        tripped = periods(program, start + "T.t.....")
+        after = tripped[len(start) :]
+        assert {(tick["duty"], tick["duty_b"]) for tick in after} == {(0, 0)}
+        assert {(tick["fault"], tick["forced"], tick["forced_b"], tick["cmpa"], tick["cmpb"]) for tick in after} == {
+            (2, 1, 1, 0, 0)
+        }
+
+
+def check_second_trip_on_missing_samples(program: Path) -> None:
+    ticks = periods(program, "B..." + "x" * 10 + "......")
+    tripped = column(ticks, "fault").index(1)
+    assert any(column(ticks, "duty_b")[:tripped])
+    for tick in ticks[tripped + 1 :]:
+        assert (tick["duty"], tick["duty_b"], tick["forced"], tick["forced_b"]) == (0, 0, 1, 1)
+        assert (tick["samples"], tick["drive_ticks"]) == (0, 0), "the drive is at rest"
+
+
+def check_delayed_start(program: Path) -> None:
+    """While the trip input is low the drive does not run: its ramps start with the output."""
+    ticks = periods(program, "T.....t....")
+    assert column(ticks, "drive_ticks") == [0] * 7 + [1, 2, 3, 4] and not any(column(ticks, "fault"))
+
+
+BIPOLAR_CHECKS = [
+    check_second_registers, check_drive_calls, check_both_outputs, check_second_trip_on_missing_samples,
+    check_delayed_start,
+]  # fmt: skip
+
+
+@needs_compiler
+@pytest.mark.parametrize("check", [*CHECKS[1:], *BIPOLAR_CHECKS])
+def test_firmware_of_two_solenoids_on_the_device_model(bipolar, check):
+    check(build(bipolar))
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("file", "old", "new", "check"),
+    [
+        ("dz_hardware.c", "EPwm2Regs.TZFRC.bit.OST = 1u;", "", check_second_registers),
+        ("dz_hardware.c", "EPwm2Regs.TZCTL.bit.TZA = TZ_FORCE_LO", "EPwm2Regs.TZCTL.bit.TZA = 0u", check_both_outputs),
+        ("dz_hardware.c", "EPwm2Regs.TZSEL.bit.OSHT1 = TZ_ENABLE", "EPwm2Regs.TZSEL.all = 0u", check_second_registers),
+        ("dz_hardware.c", "EPwm2Regs.TBCTL.bit.PHSEN = TB_ENABLE;", "", check_both_outputs),
+        ("dz_isr.c", "EPwm2Regs.TZFRC.bit.OST = 1u;", "", check_second_trip_on_missing_samples),
+        ("dz_isr.c", "EPwm2Regs.TZCLR.bit.OST = 1u;", "", check_both_outputs),
+        ("dz_isr.c", "write_compare_b(drive.compare_b);", "", check_both_outputs),
+        ("dz_isr.c", "write_compare_b(0u);", "", check_both_outputs),
+        ("dz_isr.c", "write_compare_b(drive.compare_b)", "write_compare_b(drive.compare_a)", check_both_outputs),
+        ("dz_isr.c", "dz_drive_tick(&drive);", "if (fresh) { dz_drive_tick(&drive); }", check_drive_calls),
+        ("dz_isr.c", "            if (fresh != 0u)", "            if (fresh <= 1u)", check_drive_calls),
+        ("dz_isr.c", "if (dz_state.released != 0u)", "if (dz_state.ticks != 0u)", check_delayed_start),
+    ],
+)
+def test_a_seeded_fault_of_the_second_output_is_caught(bipolar, file, old, new, check):
+    source = bipolar[f"f28335/{file}"]
+    before, found, after = source.read_text(encoding="utf-8").partition(old)
+    assert found
+    source.write_text(before + new + after, encoding="utf-8")
+    program = build(bipolar)
+    with pytest.raises((AssertionError, ValueError)):
+        check(program)
 
 
 @needs_compiler
@@ -304,7 +405,7 @@ def test_start_up_order_and_watchdog(firmware):
         ("dz_hardware.c", "INTPRD = ET_1ST", "INTPRD = 0u", check_normal_running),
         ("dz_hardware.c", "ACQ_PS = DZ_ADC_ACQ_PS", "ACQ_PS = 0u", check_delays),
         ("dz_hardware.c", "SOCAPRD = ET_2ND", "SOCAPRD = ET_1ST", check_delays),
-        ("dz_isr.c", "    write_compare(dz_state.compare);", "", check_delays),
+        ("dz_isr.c", "    write_compare_a(drive.compare_a);", "", check_delays),
         ("dz_telemetry.c", "LOSPCP.all = DZ_SCI_LOSPCP", "LOSPCP.all = 2u", check_registers),
         ("dz_telemetry.c", "    EALLOW;\n    SysCtrlRegs", "    SysCtrlRegs", check_registers),
         ("dz_telemetry.c", "GPAMUX2.bit.GPIO29 = 1u", "GPAMUX2.bit.GPIO29 = 2u", check_registers),

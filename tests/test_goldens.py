@@ -10,11 +10,14 @@ import subprocess
 import sys
 
 import pytest
-from golden_firmware import GOLDENS, differences, golden_compensator, golden_files, update
+from drive_model import walked_line
+from golden_firmware import FULL, FULL_TARGETS, GOLDENS, INPUT, differences, golden_compensator, golden_files, update
 from grid_hash import GRID, SAMPLE, exact_line
 
 from dzdesign.codegen.host.target import EXPORTS
-from dzdesign.codegen.project import TARGET_NAMES
+from dzdesign.codegen.project import TARGET_NAMES, generate
+from dzdesign.core.artefacts import write_folder
+from dzdesign.verify.all_inputs import check_all_inputs
 from dzdesign.verify.host_compiler import STRICT
 
 WARNINGS = " ".join(("-O2", *STRICT[1:]))
@@ -73,19 +76,24 @@ def run(*command: str, cwd, timeout: float = 300) -> str:
 
 
 def lines_of_selftest(text: str) -> list[str]:
-    """The lines about dz_comp; simavr adds colour codes and a dot."""
+    """The lines of the self-test; simavr adds colour codes and a dot."""
     plain = re.sub(r"\x1b\[[0-9;]*m", "", text)
-    return [line.rstrip(".") for line in plain.splitlines() if line.startswith("dz_comp ")]
+    return [line.rstrip(".") for line in plain.splitlines() if re.match("dz_(comp|drive) ", line)]
 
 
-@pytest.mark.parametrize("target", TARGET_NAMES)
-def test_the_same_input_gives_the_same_bytes(target):
-    said = differences(GOLDENS / target, golden_files(target))
+#: Every golden folder: the root of its set, and its target.
+EVERY = [*((GOLDENS, target) for target in TARGET_NAMES), *((FULL, target) for target in FULL_TARGETS)]
+
+
+@pytest.mark.parametrize(("root", "target"), EVERY)
+def test_the_same_input_gives_the_same_bytes(root, target):
+    said = differences(root / target, golden_files(target, root))
     assert not said, f"{said}\nIf that is meant: pytest tests/test_goldens.py --update-goldens"
 
 
 def test_there_is_no_golden_of_a_target_that_is_gone():
-    assert sorted(path.name for path in GOLDENS.iterdir() if path.is_dir()) == sorted(TARGET_NAMES)
+    for root, names in ((GOLDENS, TARGET_NAMES), (FULL, FULL_TARGETS)):
+        assert sorted(path.name for path in root.iterdir() if path.is_dir()) == sorted(names)
 
 
 def test_a_difference_is_shown_by_file_and_line(copy):
@@ -100,20 +108,21 @@ def test_a_difference_is_shown_by_file_and_line(copy):
 
 
 @pytest.mark.parametrize("compiler", CROSS_COMPILERS)
-@pytest.mark.parametrize("target", TARGET_NAMES)
-def test_core_and_self_test_compile_strictly(target, compiler, tmp_path):
-    folder = GOLDENS / target
-    sources = [folder / "core" / "dz_comp.c", *folder.glob("*/dz_selftest.c")]
+@pytest.mark.parametrize(("root", "target"), EVERY)
+def test_core_and_self_test_compile_strictly(root, target, compiler, tmp_path):
+    folder = root / target
+    sources = [*folder.glob("core/*.c"), *folder.glob("*/dz_selftest.c")]
+    assert len(sources) >= (3 if root == FULL else 2)
     for source in sources:
         include = [f"-I{folder / 'core'}", f"-I{source.parent}"]
         run(*compiler.split(), *STRICT, *include, "-c", str(source), "-o", "one.o", cwd=tmp_path)
 
 
 @pytest.mark.parametrize("compiler", [*COMPILERS, CROSS_COMPILERS[2]])
-@pytest.mark.parametrize("target", ["f28335", "f280049c"])
-def test_firmware_of_the_c2000_compiles_strictly_with_the_real_core(target, compiler, tmp_path):
+@pytest.mark.parametrize(("root", "target"), [(GOLDENS, "f28335"), (FULL, "f28335"), (GOLDENS, "f280049c")])
+def test_firmware_of_the_c2000_compiles_strictly_with_the_real_core(root, target, compiler, tmp_path):
     """Against the stand-ins for TI's headers; avr-gcc because its int has 16 bits, as TI's."""
-    folder = GOLDENS / target
+    folder = root / target
     include = [f"-I{path}" for path in (folder / "core", folder / target, HERE / target)]
     for source in sorted((folder / target).glob("*.c")):
         run(*compiler.split(), *STRICT, *include, "-c", str(source), "-o", "one.o", cwd=tmp_path)
@@ -148,7 +157,8 @@ def test_host_prints_the_hash_of_the_exact_law(copy, compiler):
     printed = run(make, f"CC={compiler}", f"CFLAGS={WARNINGS}", "check", cwd=copy("host") / "host")
     lines = lines_of_selftest(printed)
     assert lines[0] == exact_line(golden_compensator("host"), SAMPLE)
-    assert len(lines) == 2 and lines[1].startswith(f"dz_comp {GRID[0]} ")
+    assert len(lines) == 3 and lines[1].startswith(f"dz_comp {GRID[0]} ")
+    assert lines[2] == walked_line(golden_compensator("host"))
 
 
 @needs("cmake", package="cmake")
@@ -167,14 +177,46 @@ def test_cortex_m4_in_qemu_prints_the_hashes_of_the_host(copy):
     run("make", f"CFLAGS={WARNINGS}", "all", cwd=folder)
     printed = run("make", f"CFLAGS={WARNINGS}", "check", cwd=folder)
     assert lines_of_selftest(printed) == host
-    assert "dz_tick: 25 interrupts, compare value of dz_comp()" in printed
+    assert "dz_tick: 25 interrupts, compare values of dz_drive_tick()" in printed
 
 
 @needs_avr
 def test_avr_in_simavr_prints_the_hash_of_the_exact_law(copy):
     folder = copy("avr") / "avr"
     printed = run("make", f"CFLAGS={WARNINGS.replace('-O2', '-Os')}", "check", cwd=folder)
-    assert lines_of_selftest(printed) == [exact_line(golden_compensator("avr"), SAMPLE)]
+    assert lines_of_selftest(printed) == [
+        exact_line(golden_compensator("avr"), SAMPLE),
+        walked_line(golden_compensator("avr")),
+    ]
+
+
+@needs_avr
+def test_everything_switched_on_in_simavr_prints_the_hashes_of_the_host(tmp_path):
+    """The avr's core has 32-bit arithmetic only, the host's 64-bit products; the walk drives both solenoids."""
+    compensator = golden_compensator("avr", FULL)
+    firmware = generate(compensator, "host")
+    write_folder(tmp_path / "host", firmware.files, firmware.manifest)
+    host = lines_of_selftest(run("make", f"CFLAGS={WARNINGS}", "check", cwd=tmp_path / "host" / "host"))
+    folder = shutil.copytree(FULL / "avr", tmp_path / "avr") / "avr"
+    printed = run("make", f"CFLAGS={WARNINGS.replace('-O2', '-Os')}", "check", cwd=folder)
+    assert lines_of_selftest(printed) == [host[0], host[2]] and host[2] == walked_line(compensator)
+
+
+@needs_arm
+def test_everything_switched_on_in_qemu_prints_the_hash_of_the_model(tmp_path):
+    folder = shutil.copytree(FULL / "cortex-m4", tmp_path / "fw") / "cortex_m4"
+    run("make", f"CFLAGS={WARNINGS}", "all", cwd=folder)
+    printed = run("make", f"CFLAGS={WARNINGS}", "check", cwd=folder)
+    assert walked_line(golden_compensator("cortex-m4", FULL)) in lines_of_selftest(printed)
+    assert "dz_tick: 25 interrupts, compare values of dz_drive_tick()" in printed
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_everything_switched_on_is_exact_on_all_inputs(sign, tmp_path):
+    shutil.copytree(FULL / "f28335", tmp_path / "fw")
+    shutil.copy(FULL / INPUT, tmp_path / "fw" / INPUT)
+    result = check_all_inputs(tmp_path / "fw", sign)
+    assert result.holds and result.wrong == 0 and result.over_compensated == 0
 
 
 @needs_avr
@@ -199,7 +241,7 @@ def test_a_tick_that_writes_nothing_fails_in_qemu(copy):
     folder = copy("cortex-m4") / "cortex_m4"
     source = folder / "dz_tick.c"
     text = source.read_text()
-    assert "    dz_board_write_compare(compare);\n" in text
-    source.write_text(text.replace("    dz_board_write_compare(compare);\n", ""))
+    assert "    dz_board_write_compare(drive.compare_a, drive.compare_b);\n" in text
+    source.write_text(text.replace("    dz_board_write_compare(drive.compare_a, drive.compare_b);\n", ""))
     with pytest.raises(AssertionError, match="wrong compare value"):
         run("make", "check", cwd=folder)

@@ -82,7 +82,7 @@ class Bench:
     def frame(self, index: int, **changes: int) -> str:
         values = Frame(
             ticks=TICKS * (index + 1), origin=self.origin, u_adc=index % 4096, p_a_adc=1000, p_b_adc=795, beta=1 << 15,
-            compare=2 * index, status=STATUS_RELEASED,
+            compare_a=2 * index, compare_b=0, status=STATUS_RELEASED,
         )  # fmt: skip
         return "frame " + " ".join(str(getattr(replace(values, **changes), name)) for name in Frame.__slots__)
 
@@ -122,8 +122,17 @@ def test_good_frames_become_rows_in_units(bench):
     assert np.allclose(rows[:, 1], 10 * index / 4095, atol=1e-5)
     assert np.allclose(rows[:, 2], 20 * 1000 / 4095, atol=1e-5) and np.allclose(rows[:, 3], 20 * 795 / 4095, atol=1e-5)
     assert np.allclose(rows[:, 4], 10 * 2 * index / 60000, atol=1e-5)
-    assert np.all(rows[:, 5:] == np.column_stack([np.ones(300), 2 * index, np.full(300, STATUS_RELEASED)]))
+    assert np.all(rows[:, 5:] == np.column_stack([np.ones(300), 2 * index, 0 * index, np.full(300, STATUS_RELEASED)]))
     assert [path.name for path in bench.folder.iterdir()] == ["ramp.csv"]
+
+
+def test_what_solenoid_b_gets_is_written_as_its_own_and_negative(bench):
+    bench.listen()
+    bench.send([bench.frame(index, compare_a=0, compare_b=6 * index) for index in range(20)])
+    assert bench.stop()[0] == 0
+    rows, index = table(bench.output), np.arange(20)
+    assert np.allclose(rows[:, 4], -10 * 6 * index / 60000, atol=1e-5)
+    assert np.all(rows[:, 6] == 0) and np.all(rows[:, 7] == 6 * index)
 
 
 def test_garbage_cut_frames_and_bad_crcs_are_passed_over_and_counted(bench):
@@ -131,7 +140,7 @@ def test_garbage_cut_frames_and_bad_crcs_are_passed_over_and_counted(bench):
     lines[10] = lines[10].replace("frame", "cut 11")
     lines[20] = lines[20].replace("frame", "flip 13")
     lines[21] = lines[21].replace("frame", "flip 23")
-    lines[30] = "raw " + "a55a0112" + "5a" * 9
+    lines[30] = "raw " + "a55a0214" + "5a" * 9
     lines[40] = "raw " + random.Random(1).randbytes(100).replace(b"\xa5", b"\0").hex()
     bench.listen()
     bench.send(lines)
@@ -165,7 +174,7 @@ def test_an_output_that_is_held_low_is_zero_and_faults_are_named(bench):
 def test_identify_reads_the_recording_with_the_flow_meters_column(bench):
     up = np.arange(0, 4096, 3)
     codes = np.concatenate([up, up[::-1]])
-    frames = [bench.frame(i, u_adc=int(c), compare=int(c) * 14) for i, c in enumerate(codes)]
+    frames = [bench.frame(i, u_adc=int(c), compare_a=int(c) * 14) for i, c in enumerate(codes)]
     bench.listen()
     bench.send(frames)
     assert bench.stop()[0] == 0

@@ -57,7 +57,7 @@ def random_frames(count: int, seed: int = 7) -> list[Frame]:
     return [Frame(ticks=rng.randrange(2**32), **{name: rng.randrange(2**16) for name in NAMES}) for _ in range(count)]
 
 
-NAMES = ("origin", "u_adc", "p_a_adc", "p_b_adc", "beta", "compare", "status")
+NAMES = ("origin", "u_adc", "p_a_adc", "p_b_adc", "beta", "compare_a", "compare_b", "status")
 
 
 def read(octets: bytes) -> tuple[list[Frame], FrameReader]:
@@ -92,7 +92,7 @@ def test_frames_are_found_between_garbage_cuts_and_errors_in_pieces_of_any_size(
         if kind == 1:
             lines.append("raw " + rng.randbytes(rng.randrange(1, 40)).hex())
         if kind == 2:
-            lines.append("raw a5a55aa55a" + rng.choice(["", "01", "0112", "0212"]))
+            lines.append("raw a5a55aa55a" + rng.choice(["", "02", "0214", "0114"]))
         lines.append({4: f"cut {rng.randrange(1, FRAME_OCTETS)} ", 5: f"flip {rng.randrange(2, FRAME_OCTETS)} "}
                      .get(kind, "frame ") + numbers(frame))  # fmt: skip
         good += [frame] if kind < 4 else []
@@ -105,7 +105,7 @@ def test_frames_are_found_between_garbage_cuts_and_errors_in_pieces_of_any_size(
 
 
 def test_every_single_and_double_bit_error_is_seen():
-    frame = bytes.fromhex("A55A0112") + bytes(range(18))
+    frame = bytes.fromhex("A55A0214") + bytes(range(20))
     frame += crc_of(frame[2:]).to_bytes(2, "big")
     assert len(read(frame)[0]) == 1
     bits = range(16, 8 * FRAME_OCTETS)
@@ -134,7 +134,7 @@ def check_stream(program: Path) -> None:
     for frame in frames:
         sample = frame.ticks // 2  # of the model's 1250 a second
         assert (frame.u_adc, frame.p_a_adc, frame.p_b_adc) == (100 * (sample % 41), 1, 2)
-        assert frame.compare == frame.u_adc + 10 * frame.p_a_adc + 100 * frame.p_b_adc, "of one moment"
+        assert frame.compare_a == frame.u_adc + 10 * frame.p_a_adc + 100 * frame.p_b_adc, "of one moment"
         assert frame.beta == 3 * frame.p_a_adc + 7 * frame.p_b_adc and frame.origin == ORIGIN
     assert frames[0].status == STATUS_RELEASED | 0x0500, "with the stand-in's status of a command and these pressures"
 
@@ -197,7 +197,7 @@ def preempted(program: Path, look: int) -> str:
 
 
 def torn(frames: list[Frame]) -> list[Frame]:
-    return [f for f in frames if f.compare != f.u_adc + 10 * f.p_a_adc + 100 * f.p_b_adc]
+    return [f for f in frames if f.compare_a != f.u_adc + 10 * f.p_a_adc + 100 * f.p_b_adc]
 
 
 @needs_compiler
@@ -254,7 +254,7 @@ def test_a_pass_costs_what_is_stated_and_packs_the_same_where_int_has_16_bits(fi
     folder = firmware["f28335/dz_frame.c"].parent
     core = tmp_path / "core"
     core.mkdir()
-    for name in ("dz_comp.c", "dz_comp.h"):
+    for name in ("dz_comp.c", "dz_comp.h", "dz_drive.h"):
         (core / name).write_text(example_firmware.files[f"core/{name}"])
     program = tmp_path / "a.elf"
     sources = [core / "dz_comp.c", folder / "dz_telemetry.c", folder / "dz_frame.c", HERE / "telemetry_avr.c"]
@@ -271,7 +271,7 @@ def test_a_pass_costs_what_is_stated_and_packs_the_same_where_int_has_16_bits(fi
     (frame,), reader = read(bytes.fromhex(facts["line"]))
     assert reader.skipped == 0
     assert frame.ticks == (2**32 - 2**16 + 65530 + LINK.frame_ticks) % TICKS_MODULUS
-    assert (frame.u_adc, frame.p_a_adc, frame.p_b_adc, frame.compare) == (4095, 1234, 321, 59999)
+    assert (frame.u_adc, frame.p_a_adc, frame.p_b_adc, frame.compare_a) == (4095, 1234, 321, 59999)
     assert frame.status == 0x000F | STATUS_RELEASED
     octets = octets_of(frames_program(firmware), [f"frame {numbers(frame)}"])
     assert octets.hex().upper() == facts["line"]

@@ -1,7 +1,7 @@
 """The compiled core in closed loop with the plant: ramps up and down, the pulse resolved, pressures through the ADC."""
 
 import ctypes
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.design.amplifier import RAMP_UNIT
 from dzdesign.verify.host_compiler import load_library
 from dzdesign.verify.plant import STATES, Plant, period_step
 
@@ -19,6 +20,8 @@ RECORD_S = PERIODS_PER_RECORD * 400e-6
 BACK_PRESSURE_MPA = 1.0
 #: Flow counts as flow from this share of the largest flow on: no meter stands between.
 FLOW_SHARE = 1e-3
+#: The command's ramps are longer than the amplifier's own by this factor.
+RAMP_RESERVE = 1.1
 MODES = {"direct": 0, "compensated": 1, "without beta": 2}
 
 
@@ -30,6 +33,10 @@ class RampSequence:
     ramp: float = 100.0
     top: float = 2.0
 
+    def no_faster_than(self, ramp: float) -> "RampSequence":
+        """Return the sequence with ramps of so many s at least."""
+        return replace(self, ramp=max(self.ramp, ramp))
+
     def command(self) -> np.ndarray:
         """Return the command as a share of u_max, one value a record."""
         corners = np.cumsum([0, self.rest, self.ramp, self.top, self.ramp, self.rest])
@@ -39,13 +46,19 @@ class RampSequence:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoopRun:
-    """Records of one run, 100 a second: time in s, command share, compare value, dP in MPa, flow in L/min, all (N,)."""
+    """Records of one run, 100 a second: time in s, command share, compare value, dP in MPa, flow in L/min, all (N,).
+
+    Of the flow three: at the record's end; its mean over the record, and its largest there. A dither of 100 Hz or more
+    has a whole wave in a record: its mean is what a meter sees, its largest is at the wave's top.
+    """
 
     time: np.ndarray
     command: np.ndarray
     compare: np.ndarray
     dp_MPa: np.ndarray
     q_L_min: np.ndarray
+    q_mean_L_min: np.ndarray
+    q_largest_L_min: np.ndarray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,8 +66,9 @@ class PressureResult:
     """The closed loop at one pressure drop, as shares of u_max and L/min.
 
     Dead zones are the commands at which the plant's own flow passes `FLOW_SHARE` of the largest (no meter between),
-    on the opening and on the closing branch, without compensator and with it. Flow at zero command is taken at the
-    end, after closing; `without_beta` with the pressures frozen at dP0.
+    on the opening and on the closing branch, without compensator and with it; with a dither the mean over its wave.
+    Flow at zero command is taken at the end, after closing, with a dither at the wave's top; `without_beta` with the
+    pressures frozen at dP0.
     """
 
     side: str
@@ -116,6 +130,15 @@ def _scalings(document: dict[str, Any], sign: int) -> Scalings:
     )
 
 
+def _slowest_ramp_s(document: dict[str, Any], sign: int) -> float:
+    amplifier, command = document["amplifier"], document["signals"]["command"]
+    full = command["full_code" if sign > 0 else "negative_full_code"]
+    units = abs(full - command["zero_code"]) * RAMP_UNIT
+    side = 0 if sign > 0 else 1
+    steps = [amplifier[name][side] for name in ("ramp_up", "ramp_down") if amplifier[name][side]]
+    return max((units / step / document["signals"]["sample_Hz"] * RAMP_RESERVE for step in steps), default=0.0)
+
+
 class ClosedLoop:
     """One plant and, where given, one generated core, compiled into one native loop.
 
@@ -150,6 +173,8 @@ class ClosedLoop:
         self._library = load_library(sources, "the closed loop")
         self._work_sizes = max(step.sz_w(), 1), max(step.sz_iw(), 1)
         self._scalings = _scalings(document, sign) if document else DIRECT
+        #: Of the amplifier's own ramps on this side, from zero to full command or back, s; 0: none.
+        self.slowest_ramp_s = _slowest_ramp_s(document, sign) if document else 0.0
         self._has_core = firmware is not None
 
     def run(self, command: np.ndarray, supply_MPa: float, mode: str = "direct", dp_frozen_MPa: float = 0.0) -> LoopRun:
@@ -169,7 +194,7 @@ class ClosedLoop:
         if mode != "direct" and not self._has_core:
             raise InputError("this loop was built without a compensator; give the firmware folder")
         command = np.ascontiguousarray(command, dtype=float)
-        record, state = np.empty((command.size, 3)), np.zeros(STATES)
+        record, state = np.empty((command.size, 5)), np.zeros(STATES)
         # Of this run alone, so that runs may go on side by side (ctypes lets go of the interpreter's lock).
         work = np.zeros(self._work_sizes[0]), np.zeros(self._work_sizes[1], dtype=np.int64)
         scalings = self._scalings
@@ -196,18 +221,24 @@ class ClosedLoop:
             compare=record[:, 0],
             dp_MPa=record[:, 1],
             q_L_min=record[:, 2],
+            q_mean_L_min=record[:, 3],
+            q_largest_L_min=record[:, 4],
         )
 
 
 def compare_at_pressure(
     loop: ClosedLoop, dp_MPa: float, dp0_MPa: float, sequence: RampSequence, side: str = "positive"
 ) -> LoopComparison:
-    """Run the ramp without and with the compensator at one pressure drop, and read dead zones and flows."""
-    command = sequence.command()
+    """Run the ramp without and with the compensator at one pressure drop, and read dead zones and flows.
+
+    Where the firmware has ramps of its own, the command goes no faster than they: then they hold nothing back, and
+    what is read over the command is of the valve and the law, not of the ramps' lag.
+    """
+    command = sequence.no_faster_than(loop.slowest_ramp_s).command()
     direct = loop.run(command, dp_MPa)
     with_core = loop.run(command, dp_MPa, "compensated")
     # Only the flow at zero command is asked of this one, so it may open and close the valve quickly.
-    quick = RampSequence(rest=sequence.rest, ramp=5.0, top=0.5).command()
+    quick = RampSequence(rest=sequence.rest, ramp=5.0, top=0.5).no_faster_than(loop.slowest_ramp_s).command()
     without_beta = loop.run(quick, dp_MPa, "without beta", dp_frozen_MPa=dp0_MPa)
     level = FLOW_SHARE * direct.q_L_min.max()
     result = PressureResult(
@@ -217,10 +248,10 @@ def compare_at_pressure(
         dead_zone_closing=dead_zone(direct, level, rising=False),
         residual_opening=dead_zone(with_core, level, rising=True),
         residual_closing=dead_zone(with_core, level, rising=False),
-        q_zero_L_min=float(with_core.q_L_min[-1]),
-        q_zero_without_beta_L_min=float(without_beta.q_L_min[-1]),
+        q_zero_L_min=float(with_core.q_largest_L_min[-1]),
+        q_zero_without_beta_L_min=float(without_beta.q_largest_L_min[-1]),
         q_max_direct_L_min=float(direct.q_L_min.max()),
-        q_max_L_min=float(with_core.q_L_min.max()),
+        q_max_L_min=float(with_core.q_mean_L_min.max()),
     )
     return LoopComparison(result=result, direct=direct, compensated=with_core)
 
@@ -228,7 +259,7 @@ def compare_at_pressure(
 def dead_zone(run: LoopRun, level: float, *, rising: bool) -> float:
     """Return the command share at which flow first reaches `level` going up, or last holds it going down."""
     top = int(np.argmax(run.command))
-    flows = np.flatnonzero(run.q_L_min > level)
+    flows = np.flatnonzero(run.q_mean_L_min > level)
     part = flows[flows <= top] if rising else flows[flows > top]
     if part.size == 0:
         return 1.0

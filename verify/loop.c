@@ -39,7 +39,7 @@ static uint16_t convert(const struct channel *channel, double value, int32_t cod
 /* mode 0: the command goes to the PWM as it is. mode 1: through the amplifier. mode 2: through the amplifier with the
  * pressure codes frozen at dp_frozen, that is without beta.
  * command[n]: share of u_max, each held for `every` periods; sign -1 drives solenoid B. channels: command, pressures.
- * record[n][3]: compare value, dP in MPa, Q in L/min. */
+ * record[n][5]: compare value, dP in MPa, Q in L/min at its end; over the record mean and largest Q. */
 EXPORT void dz_loop(int32_t n, int32_t every, int32_t mode, int32_t negative, int32_t swapped, const double *command,
                     double supply_MPa, double back_MPa, double dp_frozen_MPa, const int32_t *zeros,
                     const int32_t *fulls, const double *spans, int32_t code_max, double compare_max,
@@ -57,6 +57,8 @@ EXPORT void dz_loop(int32_t n, int32_t every, int32_t mode, int32_t negative, in
 
     dz_drive_init(&drive);
     for (int32_t k = 0; k < n; k++) {
+        double sum = 0.0;
+        double largest = 0.0;
         for (int32_t j = 0; j < every; j++) {
             const double shadow = (double)compare / compare_max; /* written in the last period, in force in this one */
             if (((k * every + j) % 2) == 0) {
@@ -78,9 +80,13 @@ EXPORT void dz_loop(int32_t n, int32_t every, int32_t mode, int32_t negative, in
             for (int m = 0; m < STATES; m++) {
                 state[m] = next[m];
             }
+            sum += flow;
+            largest = flow > largest ? flow : largest;
         }
-        record[3 * k] = (double)compare;
-        record[3 * k + 1] = dp_MPa;
-        record[3 * k + 2] = flow;
+        record[5 * k] = (double)compare;
+        record[5 * k + 1] = dp_MPa;
+        record[5 * k + 2] = flow;
+        record[5 * k + 3] = sum / (double)every;
+        record[5 * k + 4] = largest;
     }
 }

@@ -50,6 +50,9 @@ static void record(const char *function, int count, ...)
     printf("\n");
 }
 
+/* ePWM1 or ePWM2. */
+static unsigned at(uint32_t base) { return (base == EPWM2_BASE) ? 1u : 0u; }
+
 #define U(value) ((uint32_t)(value))
 #define RECORD0() record(__func__, 0)
 #define RECORD1(a) record(__func__, 1, U(a))
@@ -71,7 +74,7 @@ void EPWM_setCounterCompareValue(uint32_t base, EPWM_CounterCompareModule module
     RECORD3(base, module, count);
     if (module == EPWM_COUNTER_COMPARE_A)
     {
-        model.cmpa = count;
+        model.cmpa[at(base)] = count;
     }
     else
     {
@@ -84,11 +87,11 @@ void EPWM_setActionQualifierAction(uint32_t base, EPWM_ActionQualifierOutputModu
     record(__func__, 4, U(base), U(module), U(output), U(event));
     if (event == EPWM_AQ_OUTPUT_ON_TIMEBASE_ZERO)
     {
-        model.at_zero = output;
+        model.at_zero[at(base)] = output;
     }
     else
     {
-        model.at_cmpa = output;
+        model.at_cmpa[at(base)] = output;
     }
 }
 void EPWM_setActionQualifierContSWForceShadowMode(uint32_t base, EPWM_ActionQualifierContForce mode) { RECORD2(base, mode); }
@@ -96,7 +99,7 @@ void EPWM_setActionQualifierContSWForceAction(uint32_t base, EPWM_ActionQualifie
                                               EPWM_ActionQualifierSWOutput output)
 {
     RECORD3(base, module, output);
-    model.force = output;
+    model.force[at(base)] = output;
 }
 void EPWM_setADCTriggerSource(uint32_t base, EPWM_ADCStartOfConversionType a, EPWM_ADCStartOfConversionSource b)
 {
@@ -115,19 +118,18 @@ void EPWM_clearEventTriggerInterruptFlag(uint32_t base) { RECORD1(base); model.i
 void EPWM_setTripZoneAction(uint32_t base, EPWM_TripZoneEvent event, EPWM_TripZoneAction action)
 {
     RECORD3(base, event, action);
-    model.trip_action = action;
+    model.trip_action[at(base)] = action;
 }
-void EPWM_enableTripZoneSignals(uint32_t base, uint16_t signals) { RECORD2(base, signals); model.trip_signals = signals; }
-void EPWM_forceTripZoneEvent(uint32_t base, uint16_t event) { RECORD2(base, event); model.tripped = true; }
+void EPWM_enableTripZoneSignals(uint32_t base, uint16_t signals) { RECORD2(base, signals); model.trip_signals[at(base)] = signals; }
+void EPWM_forceTripZoneEvent(uint32_t base, uint16_t event) { RECORD2(base, event); model.tripped[at(base)] = true; }
 void EPWM_clearTripZoneFlag(uint32_t base, uint16_t flags)
 {
     RECORD2(base, flags);
-    model.tripped = model.trip_pin_low; /* a level that is still there trips again */
+    model.tripped[at(base)] = model.trip_pin_low; /* a level that is still there trips again */
 }
 uint16_t EPWM_getTripZoneFlagStatus(uint32_t base)
 {
-    (void)base;
-    return model.tripped ? (uint16_t)EPWM_TZ_FLAG_OST : (uint16_t)0;
+    return model.tripped[at(base)] ? (uint16_t)EPWM_TZ_FLAG_OST : (uint16_t)0;
 }
 
 void ADC_setVREF(uint32_t base, ADC_ReferenceMode a, ADC_ReferenceVoltage b) { RECORD3(base, a, b); }
@@ -210,29 +212,40 @@ static void convert(char event)
     model.adc_flag = (model.last_conversion == 2u); /* else the flag came before the results */
 }
 
+/* Pin A of ePWM1 or ePWM2 in this period. */
+static const char *pin(unsigned index, uint32_t *duty)
+{
+    *duty = 0u;
+    if (model.tripped[index])
+    {
+        return (model.trip_action[index] == EPWM_TZ_ACTION_HIGH) ? "high" : "low";
+    }
+    if ((model.force[index] == EPWM_AQ_SW_OUTPUT_LOW) || (model.at_zero[index] != EPWM_AQ_OUTPUT_HIGH) ||
+        (model.at_cmpa[index] != EPWM_AQ_OUTPUT_LOW))
+    {
+        return "low";
+    }
+    /* A compare value of 0 that is loaded here misses its own event: SPRAAI1. */
+    *duty = model.cmpa[index];
+    return (model.cmpa[index] == 0u) ? "full" : "pwm";
+}
+
 struct tick device_period(char event)
 {
-    struct tick tick = {"low", 0u, 0u};
+    struct tick tick = {"low", 0u, 0u, 0u};
+    unsigned index;
 
     model.zero = (event == 'z') || (model.zero && (event != 'n'));
     model.trip_pin_low = (event == 'T') || (model.trip_pin_low && (event != 't'));
-    model.tripped = model.tripped || (model.trip_pin_low && (model.trip_signals == EPWM_TZ_SIGNAL_OSHT1));
+    device_side = (event == 'B') ? -1 : (event == 'A') ? 1 : device_side;
+    for (index = 0u; index < 2u; index++)
+    {
+        model.tripped[index] =
+            model.tripped[index] || (model.trip_pin_low && (model.trip_signals[index] == EPWM_TZ_SIGNAL_OSHT1));
+    }
     /* CTR = 0: the shadows are loaded, and every so many periods the converter is started. */
-    if (model.tripped && (model.trip_action == EPWM_TZ_ACTION_HIGH))
-    {
-        tick.output = "high";
-    }
-    else if (!model.tripped && (model.force != EPWM_AQ_SW_OUTPUT_LOW) && (model.at_zero == EPWM_AQ_OUTPUT_HIGH) &&
-             (model.at_cmpa == EPWM_AQ_OUTPUT_LOW))
-    {
-        /* A compare value of 0 that is loaded here misses its own event: SPRAAI1. */
-        tick.output = (model.cmpa == 0u) ? "full" : "pwm";
-        tick.duty = model.cmpa;
-    }
-    else
-    {
-        /* low */
-    }
+    tick.output = pin(0u, &tick.duty);
+    (void)pin(1u, &tick.duty_b);
     if (model.soca && model.converter && (model.powered_us >= 1000u) && (++model.periods % model.soca_prescale == 0u) &&
         (event != 'x'))
     {

@@ -3,7 +3,8 @@
  *   driver calls                  main() up to EINT, every DriverLib call, then the calls of one interrupt
  *   driver run EVENTS [W|C]       the same in silence (after a watchdog reset, or without crystal), then one period an event:
  *                                 . nothing special, x no conversion, h a code above 12 bits, b converter busy,
- *                                 z the command is zero from here, n no longer, T the trip pin goes low, t high
+ *                                 z the command is zero from here, n no longer, T the trip pin goes low, t high,
+ *                                 B the stand-in core drives solenoid B from here, A solenoid A
  *   driver watchdog               how often the main loop serves the watchdog without and with an interrupt
  */
 #include <setjmp.h>
@@ -36,9 +37,9 @@ static void run(const char *events)
     for (; *events != '\0'; events++)
     {
         const struct tick tick = device_period(*events);
-        printf("tick event=%c output=%s duty=%u served=%u cmpa=%u without=%u released=%u fault=%u\n", *events,
-               tick.output, (unsigned)tick.duty, tick.served, (unsigned)model.cmpa, dz_state.ticks_without_sample,
-               dz_state.released, dz_state.fault);
+        printf("tick event=%c output=%s duty=%u served=%u cmpa=%u without=%u released=%u fault=%u duty_b=%u tripped_b=%u\n", *events,
+               tick.output, (unsigned)tick.duty, tick.served, (unsigned)model.cmpa[0], dz_state.ticks_without_sample,
+               dz_state.released, dz_state.fault, (unsigned)tick.duty_b, (unsigned)model.tripped[1]);
     }
 }
 

@@ -14,7 +14,7 @@
     X(INTERRUPT_ACK_GROUP3, 30005) X(EPWM_TZ_SIGNAL_OSHT1, 30006) X(EPWM_TZ_FORCE_EVENT_OST, 30007)                    \
     X(EPWM_TZ_FLAG_OST, 30008) X(EPWM_INT_TBCTR_U_CMPB, 30009) X(EPWM_INT_TBCTR_ZERO, 30010)                           \
     X(GPIO_PIN_TYPE_STD, 30011) X(GPIO_PIN_TYPE_PULLUP, 30012) X(GPIO_0_EPWM1_A, 30013) X(GPIO_12_GPIO12, 30014)       \
-    X(SYSCTL_CAUSE_WDRS, 30015)
+    X(SYSCTL_CAUSE_WDRS, 30015) X(EPWM2_BASE, 30016) X(GPIO_2_EPWM2_A, 30017)
 #define TYPED_WORDS                                                                                                    \
     T(EPWM_ClockDivider, X(EPWM_CLOCK_DIVIDER_1, 30101))                                                               \
     T(EPWM_HSClockDivider, X(EPWM_HSCLOCK_DIVIDER_1, 30111))                                                           \

@@ -24,6 +24,8 @@ typedef uint16_t Uint16;
 
 #define TB_COUNT_UP 0u
 #define TB_DIV1 0u
+#define TB_ENABLE 1u
+#define TB_CTR_ZERO 1u
 #define CC_SHADOW 0u
 #define CC_CTR_ZERO 0u
 #define AQ_CLEAR 1u
@@ -44,6 +46,15 @@ struct EPWM_REGS
     REGISTER(TBCTL_REG, uint16_t CTRMODE : 2; uint16_t PHSEN : 1; uint16_t PRDLD : 1; uint16_t SYNCOSEL : 2;
              uint16_t SWFSYNC : 1; uint16_t HSPCLKDIV : 3; uint16_t CLKDIV : 3; uint16_t PHSDIR : 1;
              uint16_t FREE_SOFT : 2;) TBCTL;
+    union
+    {
+        uint32_t all;
+        struct
+        {
+            uint16_t TBPHSHR;
+            uint16_t TBPHS;
+        } half;
+    } TBPHS;
     uint16_t TBCTR;
     uint16_t TBPRD;
     REGISTER(CMPCTL_REG, uint16_t LOADAMODE : 2; uint16_t LOADBMODE : 2; uint16_t SHDWAMODE : 1; uint16_t rsvd1 : 1;
@@ -134,7 +145,7 @@ struct SYS_CTRL_REGS
 
 struct GPIO_PAIRS
 {
-    uint16_t GPIO0 : 2, GPIO1_5 : 10, GPIO6_7 : 4, GPIO8_11 : 8, GPIO12 : 2, GPIO13_15 : 6;
+    uint16_t GPIO0 : 2, GPIO1 : 2, GPIO2 : 2, GPIO3_5 : 6, GPIO6_7 : 4, GPIO8_11 : 8, GPIO12 : 2, GPIO13_15 : 6;
 };
 
 struct GPIO_PAIRS_2
@@ -144,7 +155,7 @@ struct GPIO_PAIRS_2
 
 struct GPIO_BITS
 {
-    uint16_t GPIO0 : 1, GPIO1_11 : 11, GPIO12 : 1, GPIO13_15 : 3;
+    uint16_t GPIO0 : 1, GPIO1 : 1, GPIO2 : 1, GPIO3_11 : 9, GPIO12 : 1, GPIO13_15 : 3;
     uint16_t GPIO16_27 : 12, GPIO28 : 1, GPIO29 : 1, GPIO30_31 : 2;
 };
 
@@ -187,7 +198,7 @@ struct PIE_VECT_TABLE
     void (*EPWM1_INT)(void);
 };
 
-extern volatile struct EPWM_REGS EPwm1Regs;
+extern volatile struct EPWM_REGS EPwm1Regs, EPwm2Regs;
 extern volatile struct ADC_REGS AdcRegs;
 extern volatile struct ADC_RESULT_MIRROR_REGS AdcMirror;
 extern volatile struct SYS_CTRL_REGS SysCtrlRegs;

@@ -4,12 +4,12 @@
 
 #include "DSP28x_Project.h"
 #include "device.h"
-#include "dz_comp.h"
+#include "dz_drive.h"
 
 #define FIFO_OCTETS 16u
 #define NOT_WRITTEN 0xFFFFu /* in SCITXBUF: no octet since the last look */
 
-volatile struct EPWM_REGS EPwm1Regs;
+volatile struct EPWM_REGS EPwm1Regs, EPwm2Regs;
 volatile struct ADC_REGS AdcRegs;
 volatile struct ADC_RESULT_MIRROR_REGS AdcMirror;
 volatile struct SYS_CTRL_REGS SysCtrlRegs;
@@ -32,11 +32,12 @@ struct protected_registers
     struct SYS_CTRL_REGS sys_ctrl;
     struct GPIO_CTRL_REGS gpio_ctrl;
     struct PIE_VECT_TABLE vectors;
-    uint16_t tzsel, tzctl, tzclr, tzfrc;
+    uint16_t tzsel[2], tzctl[2], tzclr[2], tzfrc[2];
 };
 
+static volatile struct EPWM_REGS *const pwms[2] = {&EPwm1Regs, &EPwm2Regs};
 static struct protected_registers kept;
-static uint16_t unlocked, active_cmpa, active_force, etflg_int, pie_blocked, command_zero;
+static uint16_t unlocked, active_cmpa[2], active_force[2], etflg_int, pie_blocked, command_zero;
 static unsigned soca_count, int_count, sequencer, samples, period_begins;
 static volatile struct SCI_REGS scia;
 static uint8_t fifo[FIFO_OCTETS];
@@ -48,10 +49,13 @@ static struct protected_registers protected_now(void)
     now.sys_ctrl = SysCtrlRegs;
     now.gpio_ctrl = GpioCtrlRegs;
     now.vectors = PieVectTable;
-    now.tzsel = EPwm1Regs.TZSEL.all;
-    now.tzctl = EPwm1Regs.TZCTL.all;
-    now.tzclr = EPwm1Regs.TZCLR.all;
-    now.tzfrc = EPwm1Regs.TZFRC.all;
+    for (unsigned i = 0u; i < 2u; i++)
+    {
+        now.tzsel[i] = pwms[i]->TZSEL.all;
+        now.tzctl[i] = pwms[i]->TZCTL.all;
+        now.tzclr[i] = pwms[i]->TZCLR.all;
+        now.tzfrc[i] = pwms[i]->TZFRC.all;
+    }
     return now;
 }
 
@@ -60,10 +64,13 @@ void device_settle(void)
     SysCtrlRegs = kept.sys_ctrl;
     GpioCtrlRegs = kept.gpio_ctrl;
     PieVectTable = kept.vectors;
-    EPwm1Regs.TZSEL.all = kept.tzsel;
-    EPwm1Regs.TZCTL.all = kept.tzctl;
-    EPwm1Regs.TZCLR.all = kept.tzclr;
-    EPwm1Regs.TZFRC.all = kept.tzfrc;
+    for (unsigned i = 0u; i < 2u; i++)
+    {
+        pwms[i]->TZSEL.all = kept.tzsel[i];
+        pwms[i]->TZCTL.all = kept.tzctl[i];
+        pwms[i]->TZCLR.all = kept.tzclr[i];
+        pwms[i]->TZFRC.all = kept.tzfrc[i];
+    }
 }
 
 void device_eallow(void)
@@ -74,10 +81,13 @@ void device_eallow(void)
 
 static void latch_trip_input(void)
 {
-    if ((GpioDataRegs.GPADAT.bit.GPIO12 == 0u) && (GpioCtrlRegs.GPAMUX1.bit.GPIO12 == 1u)
-        && (EPwm1Regs.TZSEL.bit.OSHT1 == 1u))
+    for (unsigned i = 0u; i < 2u; i++)
     {
-        EPwm1Regs.TZFLG.bit.OST = 1u;
+        if ((GpioDataRegs.GPADAT.bit.GPIO12 == 0u) && (GpioCtrlRegs.GPAMUX1.bit.GPIO12 == 1u)
+            && (pwms[i]->TZSEL.bit.OSHT1 == 1u))
+        {
+            pwms[i]->TZFLG.bit.OST = 1u;
+        }
     }
 }
 
@@ -88,16 +98,19 @@ void device_edis(void)
         device_settle();
     }
     unlocked = 0u;
-    if (EPwm1Regs.TZCLR.bit.OST != 0u)
+    for (unsigned i = 0u; i < 2u; i++)
     {
-        EPwm1Regs.TZFLG.bit.OST = 0u;
+        if (pwms[i]->TZCLR.bit.OST != 0u)
+        {
+            pwms[i]->TZFLG.bit.OST = 0u;
+        }
+        if (pwms[i]->TZFRC.bit.OST != 0u)
+        {
+            pwms[i]->TZFLG.bit.OST = 1u;
+        }
+        pwms[i]->TZCLR.all = 0u;
+        pwms[i]->TZFRC.all = 0u;
     }
-    if (EPwm1Regs.TZFRC.bit.OST != 0u)
-    {
-        EPwm1Regs.TZFLG.bit.OST = 1u;
-    }
-    EPwm1Regs.TZCLR.all = 0u;
-    EPwm1Regs.TZFRC.all = 0u;
     latch_trip_input();
     kept = protected_now();
 }
@@ -173,7 +186,7 @@ void device_transmit(unsigned counts)
 void device_power_up(void)
 {
     scia.SCITXBUF = NOT_WRITTEN;
-    EPwm1Regs.TBCTL.all = 0x0083u; /* HSPCLKDIV = 1, counter frozen */
+    EPwm1Regs.TBCTL.all = EPwm2Regs.TBCTL.all = 0x0083u; /* HSPCLKDIV = 1, counter frozen */
     GpioDataRegs.GPADAT.bit.GPIO12 = 1u;
     SysCtrlRegs.SCSR = 0x0005u;
     kept = protected_now();
@@ -236,6 +249,37 @@ uint16_t dz_status(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
 }
 
 uint16_t dz_beta(uint16_t p_a_adc, uint16_t p_b_adc) { return (uint16_t)(3u * p_a_adc + 7u * p_b_adc); }
+
+uint16_t dz_beta_negative(uint16_t p_a_adc, uint16_t p_b_adc) { return (uint16_t)(5u * p_a_adc + 9u * p_b_adc); }
+
+uint16_t dz_status_negative(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
+{
+    return (uint16_t)(dz_status(u_adc, p_a_adc, p_b_adc) ^ 8u);
+}
+
+int device_side = 1;
+unsigned device_drive_samples, device_drive_ticks;
+
+void dz_drive_init(struct dz_drive *drive)
+{
+    const struct dz_drive at_rest = {0u, 0u, 0u, 0};
+    *drive = at_rest;
+    device_drive_samples = device_drive_ticks = 0u;
+}
+
+void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
+{
+    drive->law = dz_comp(u_adc, p_a_adc, p_b_adc);
+    drive->side = (int16_t)device_side;
+    device_drive_samples++;
+}
+
+void dz_drive_tick(struct dz_drive *drive)
+{
+    drive->compare_a = (uint16_t)((drive->side > 0) ? drive->law : 0u);
+    drive->compare_b = (uint16_t)((drive->side < 0) ? drive->law : 0u);
+    device_drive_ticks++;
+}
 
 /* Codes of ADCINA0, A1, A2 in the n-th sample: 100 (n modulo 41), 1, 2; other channels give nonsense. */
 static uint16_t code_of(unsigned channel, char event)
@@ -355,40 +399,58 @@ static void serve_interrupt(struct tick *tick, int busy)
     AdcRegs.ADCTRL2.bit.RST_SEQ1 = 0u;
 }
 
+/* Counts high in this period at pin A of ePWM1 or ePWM2. */
+static unsigned duty_of(unsigned index)
+{
+    volatile const struct EPWM_REGS *pwm = pwms[index];
+    const unsigned period = EPwm1Regs.TBPRD + 1u;
+
+    if (pwm->TZFLG.bit.OST != 0u)
+    {
+        return (pwm->TZCTL.bit.TZA == TZ_FORCE_LO) ? 0u : period;
+    }
+    if ((pwm->TBCTL.bit.CTRMODE != TB_COUNT_UP) || (pwm->AQCTLA.bit.ZRO != AQ_SET) || (pwm->TBPRD + 1u != period)
+        || ((index == 1u) && ((pwm->TBCTL.bit.PHSEN == 0u) || (EPwm1Regs.TBCTL.bit.SYNCOSEL != TB_CTR_ZERO))))
+    {
+        return 0u; /* set up as the other, and in step with it, or not at all */
+    }
+    if (active_force[index] == 1u)
+    {
+        return 0u;
+    }
+    /* Load at CTR = 0: a new 0 misses its compare event (SPRAAI1), the old action lasts. */
+    return ((active_cmpa[index] < period) && (active_cmpa[index] != 0u)) ? active_cmpa[index] : period;
+}
+
 static void drive_pin(struct tick *tick)
 {
     const unsigned period = EPwm1Regs.TBPRD + 1u;
-    if (EPwm1Regs.TZFLG.bit.OST != 0u)
-    {
-        tick->duty = (EPwm1Regs.TZCTL.bit.TZA == TZ_FORCE_LO) ? 0u : period;
-    }
-    else
-    {
-        tick->duty = (active_force == 1u) ? 0u : (active_cmpa < period) ? active_cmpa : period;
-        /* Load at CTR = 0: a new 0 misses its compare event (SPRAAI1), the old action lasts. */
-        if ((active_force != 1u) && (active_cmpa == 0u))
-        {
-            tick->duty = period;
-        }
-    }
+
+    tick->duty = duty_of(0u);
+    tick->duty_b = (GpioCtrlRegs.GPAMUX1.bit.GPIO2 == 1u) ? duty_of(1u) : 0u;
     tick->begins = period_begins;
     tick->falls = ((tick->duty > 0u) && (tick->duty < period)) ? period_begins + tick->duty : 0u;
     tick->output = (tick->duty == 0u) ? "low" : (tick->duty == period) ? "high" : "pwm";
 }
 
 /* Events: '.' none; 'x' no conversion; 'l' conversion still busy at the interrupt; 'h' codes above 12 bits;
- * 'f' codes that make 59999 of the stand-in core; 'T' / 't' trip input low / high; 'z' / 'n' command zero / normal. */
+ * 'f' codes that make 59999 of the stand-in core; 'T' / 't' trip input low / high; 'z' / 'n' command zero / normal; 'B' / 'A' the
+ * stand-in core drives solenoid B / A from here. */
 struct tick device_period(char event)
 {
-    struct tick tick = {"", 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u};
+    struct tick tick = {"", 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u};
     const int due = conversion_is_due() && (event != 'x');
     const unsigned at = (EPwm1Regs.ETSEL.bit.INTSEL == ET_CTRU_CMPB) ? EPwm1Regs.CMPB : 0u;
     const int busy = due && ((event == 'l') || (at < counts_of_sequence()));
 
     GpioDataRegs.GPADAT.bit.GPIO12 = (event == 'T') ? 0u : (event == 't') ? 1u : GpioDataRegs.GPADAT.bit.GPIO12;
     command_zero = (uint16_t)((event == 'z') ? 1u : (event == 'n') ? 0u : command_zero);
-    active_cmpa = EPwm1Regs.CMPA.half.CMPA;
-    active_force = EPwm1Regs.AQCSFRC.bit.CSFA;
+    device_side = (event == 'B') ? -1 : (event == 'A') ? 1 : device_side;
+    for (unsigned i = 0u; i < 2u; i++)
+    {
+        active_cmpa[i] = pwms[i]->CMPA.half.CMPA;
+        active_force[i] = pwms[i]->AQCSFRC.bit.CSFA;
+    }
     latch_trip_input();
     drive_pin(&tick);
     tick.held = due ? period_begins + counts_to_hold() : 0u;

@@ -16,6 +16,7 @@ struct tick
     unsigned held;      /* when the command's sample was held, if one was taken */
     unsigned begins;    /* when the period began */
     unsigned falls;     /* when the pin fell in it, if it did */
+    unsigned duty_b;    /* counts high of the second output */
 };
 
 extern void (*device_on_eint)(void);
@@ -26,6 +27,10 @@ extern void (*device_on_service)(void);
 extern uint8_t device_line[DEVICE_LINE_OCTETS];
 extern unsigned device_line_count, device_line_lost;
 extern unsigned device_line_blocked; /* 1: the transmitter stands still */
+
+/* Calls of the stand-in drive since it was at rest. */
+extern int device_side;
+extern unsigned device_drive_samples, device_drive_ticks;
 
 void device_power_up(void);
 /* SCI-A after so many counts more. */

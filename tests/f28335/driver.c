@@ -64,6 +64,16 @@ static void show_registers(void)
     SHOW("IER", IER);
     SHOW("OST", EPwm1Regs.TZFLG.bit.OST);
     SHOW("CMPA", EPwm1Regs.CMPA.half.CMPA);
+    SHOW("SECOND_TBCTL", EPwm2Regs.TBCTL.all);
+    SHOW("SECOND_TBPRD", EPwm2Regs.TBPRD);
+    SHOW("SECOND_CMPCTL", EPwm2Regs.CMPCTL.all);
+    SHOW("SECOND_AQCTLA", EPwm2Regs.AQCTLA.all);
+    SHOW("SECOND_ETSEL", EPwm2Regs.ETSEL.all);
+    SHOW("SECOND_TZSEL", EPwm2Regs.TZSEL.all);
+    SHOW("SECOND_TZCTL", EPwm2Regs.TZCTL.all);
+    SHOW("SECOND_OST", EPwm2Regs.TZFLG.bit.OST);
+    SHOW("GPIO2_MUX", GpioCtrlRegs.GPAMUX1.bit.GPIO2);
+    SHOW("GPIO2_PULLUP_OFF", GpioCtrlRegs.GPAPUD.bit.GPIO2);
     SHOW("VECTOR_SET", PieVectTable.EPWM1_INT == dz_isr);
 }
 
@@ -93,10 +103,12 @@ static void run(const char *events)
     {
         const struct tick tick = device_period(*events);
         printf("tick event=%c output=%s duty=%u served=%u resets=%u reset_busy=%u pieack=%u cmpa=%u forced=%u "
-               "without=%u released=%u fault=%u held=%u begins=%u falls=%u\n",
+               "without=%u released=%u fault=%u held=%u begins=%u falls=%u duty_b=%u cmpb=%u forced_b=%u "
+               "samples=%u drive_ticks=%u\n",
                *events, tick.output, tick.duty, tick.served, tick.resets, tick.reset_busy, tick.acknowledged,
                EPwm1Regs.CMPA.half.CMPA, EPwm1Regs.TZFLG.bit.OST, dz_state.ticks_without_sample, dz_state.released,
-               dz_state.fault, tick.held, tick.begins, tick.falls);
+               dz_state.fault, tick.held, tick.begins, tick.falls, tick.duty_b, EPwm2Regs.CMPA.half.CMPA,
+               EPwm2Regs.TZFLG.bit.OST, device_drive_samples, device_drive_ticks);
     }
 }
 

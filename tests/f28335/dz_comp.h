@@ -10,5 +10,7 @@
 uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
 uint16_t dz_status(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
 uint16_t dz_beta(uint16_t p_a_adc, uint16_t p_b_adc);
+uint16_t dz_status_negative(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
+uint16_t dz_beta_negative(uint16_t p_a_adc, uint16_t p_b_adc);
 
 #endif

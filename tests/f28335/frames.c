@@ -22,10 +22,10 @@ static void put(const uint16_t *octets, unsigned count)
 
 static int frame_of(const char *text, uint16_t *octets)
 {
-    unsigned n[8];
+    unsigned n[9];
     struct dz_frame frame;
 
-    if (sscanf(text, "%u %u %u %u %u %u %u %u", n, n + 1, n + 2, n + 3, n + 4, n + 5, n + 6, n + 7) != 8)
+    if (sscanf(text, "%u %u %u %u %u %u %u %u %u", n, n + 1, n + 2, n + 3, n + 4, n + 5, n + 6, n + 7, n + 8) != 9)
     {
         return 0;
     }
@@ -35,8 +35,9 @@ static int frame_of(const char *text, uint16_t *octets)
     frame.p_a_adc = (uint16_t)n[3];
     frame.p_b_adc = (uint16_t)n[4];
     frame.beta = (uint16_t)n[5];
-    frame.compare = (uint16_t)n[6];
-    frame.status = (uint16_t)n[7];
+    frame.compare_a = (uint16_t)n[6];
+    frame.compare_b = (uint16_t)n[7];
+    frame.status = (uint16_t)n[8];
     dz_frame_pack(&frame, octets);
     return 1;
 }

@@ -54,7 +54,7 @@ int main(void)
     dz_state.u_adc = 4095u;
     dz_state.p_a_adc = 1234u;
     dz_state.p_b_adc = 321u;
-    dz_state.compare = 59999u;
+    dz_state.compare_a = 59999u;
     pack = pass_cycles();
     feed = pass_cycles();
     idle = pass_cycles();

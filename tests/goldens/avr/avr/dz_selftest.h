@@ -33,9 +33,22 @@ extern const struct dz_selftest_grid dz_selftest_sample; /* for a slow one: the 
 
 struct dz_selftest_result dz_selftest_run(const struct dz_selftest_grid *grid);
 
+/* The walk: dz_drive through DZ_SELFTEST_WALK ticks, a sample every DZ_DRIVE_TICKS_PER_SAMPLE of them from the first on. With r
+ * the next number of r = (1664525 r + 1013904223) modulo 2^32, from r = 1 on, taken anew for each code,
+ *     u_adc    every 64th sample another aim: (r >> 16) modulo (DZ_ADC_CODE_MAX + 1); each sample one sixteenth of the way there
+ *              is gone (rounded towards where it stands), and (r >> 16) modulo 9 less 4 codes are added for noise, within the
+ *              converter's range; of the samples with (r >> 16) modulo 128 equal to 0 the command is 65535
+ *     p_a_adc  (r >> 16) modulo (DZ_ADC_CODE_MAX + 2)
+ *     p_b_adc  (r >> 16) modulo (DZ_ADC_CODE_MAX + 2)
+ * Of every tick compare_a, compare_b and status are hashed, two bytes each, the low one first. */
+#define DZ_SELFTEST_WALK UINT16_C(20000)
+
 #define DZ_SELFTEST_LINE 64u /* longest line, with its end */
 
 /* Writes `dz_comp grid FNV-1a-32 0123ABCD over 123 compare values`, a line feed and the terminating 0. */
 void dz_selftest_line(const struct dz_selftest_grid *grid, char line[DZ_SELFTEST_LINE]);
+
+/* Writes `dz_drive walk FNV-1a-32 0123ABCD over 20000 ticks` likewise. */
+void dz_selftest_drive_line(char line[DZ_SELFTEST_LINE]);
 
 #endif

@@ -2,7 +2,7 @@
 /* Compensator SHA-256: 503a6da121a114f9d041dc8a091a1ce50270b566b88faaf02d8ab9d612abf383 */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv */
 
-/* Prints a hash of what dz_comp() answers (dz_selftest.h) on UART0, then sleeps for good. */
+/* Prints hashes of what dz_comp() and dz_drive_tick() answer (dz_selftest.h) on UART0, then sleeps for good. */
 #include <avr/interrupt.h>
 #include <avr/io.h>
 #include <avr/sleep.h>
@@ -37,6 +37,8 @@ int main(void)
     char line[DZ_SELFTEST_LINE];
 
     dz_selftest_line(&dz_selftest_sample, line);
+    print(line);
+    dz_selftest_drive_line(line);
     print(line);
     cli(); /* asleep without interrupts: simavr ends here */
     sleep_enable();

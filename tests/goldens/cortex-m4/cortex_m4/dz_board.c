@@ -9,7 +9,8 @@
 volatile uint16_t dz_board_u_adc = DZ_NO_CODE;
 volatile uint16_t dz_board_p_a_adc = DZ_NO_CODE;
 volatile uint16_t dz_board_p_b_adc = DZ_NO_CODE;
-volatile uint16_t dz_board_compare = 0u;
+volatile uint16_t dz_board_compare_a = 0u;
+volatile uint16_t dz_board_compare_b = 0u;
 
 uint16_t dz_board_read_command(void)
 {
@@ -22,7 +23,8 @@ void dz_board_read_pressures(uint16_t *p_a_adc, uint16_t *p_b_adc)
     *p_b_adc = dz_board_p_b_adc;
 }
 
-void dz_board_write_compare(uint16_t compare)
+void dz_board_write_compare(uint16_t compare_a, uint16_t compare_b)
 {
-    dz_board_compare = compare;
+    dz_board_compare_a = compare_a;
+    dz_board_compare_b = compare_b;
 }

@@ -12,13 +12,14 @@
  * the smallest beta for such a pressure. */
 #define DZ_NO_CODE UINT16_C(0xFFFF)
 
-/* Converter code of the command, right-justified; called once a tick. */
+/* Converter code of the command, right-justified; called once a sample. */
 uint16_t dz_board_read_command(void);
 
 /* Converter codes of the pressures ahead of and behind the metering edge. */
 void dz_board_read_pressures(uint16_t *p_a_adc, uint16_t *p_b_adc);
 
-/* Compare value 0 to DZ_COMPARE_MAX to the PWM, in its shadow register; 0 must be a pin that stays low. */
-void dz_board_write_compare(uint16_t compare);
+/* Compare values 0 to DZ_COMPARE_MAX of solenoids A and B to the PWM, in its shadow registers; 0 must be a pin that stays
+ * low. One of the two is always 0; without a second solenoid it is compare_b. */
+void dz_board_write_compare(uint16_t compare_a, uint16_t compare_b);
 
 #endif

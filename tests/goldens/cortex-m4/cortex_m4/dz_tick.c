@@ -5,7 +5,7 @@
 #include "dz_tick.h"
 
 #include "dz_board.h"
-#include "dz_comp.h"
+#include "dz_drive.h"
 
 /* SysTick of the ARMv7-M architecture (DDI 0403, B3.3). */
 #define SYST_CSR (*(volatile uint32_t *)0xE000E010u)
@@ -17,29 +17,46 @@
 
 volatile struct dz_state dz_state;
 
+/* The interrupt's own; what others may look at is copied to dz_state. */
+static struct dz_drive drive;
+static uint16_t ticks_to_sample;
+
 void dz_tick_start(void)
 {
-    dz_board_write_compare(0u);
     SYST_CSR = 0u;
+    dz_drive_init(&drive);
+    ticks_to_sample = 0u;
+    dz_board_write_compare(0u, 0u);
     SYST_RVR = DZ_TICK_RELOAD;
     SYST_CVR = 0u; /* any write clears it */
     SYST_CSR = SYST_CSR_ENABLE | SYST_CSR_TICKINT | SYST_CSR_CLKSOURCE;
 }
 
-void dz_tick(void)
+static void take_sample(void)
 {
     uint16_t p_a_adc;
     uint16_t p_b_adc;
     const uint16_t u_adc = dz_board_read_command();
-    uint16_t compare;
 
     dz_board_read_pressures(&p_a_adc, &p_b_adc);
-    compare = dz_comp(u_adc, p_a_adc, p_b_adc);
-    dz_board_write_compare(compare);
-
+    dz_drive_sample(&drive, u_adc, p_a_adc, p_b_adc);
     dz_state.u_adc = u_adc;
     dz_state.p_a_adc = p_a_adc;
     dz_state.p_b_adc = p_b_adc;
-    dz_state.compare = compare;
+}
+
+void dz_tick(void)
+{
+    if (ticks_to_sample == 0u)
+    {
+        take_sample();
+        ticks_to_sample = DZ_DRIVE_TICKS_PER_SAMPLE;
+    }
+    ticks_to_sample--;
+    dz_drive_tick(&drive);
+    dz_board_write_compare(drive.compare_a, drive.compare_b);
+
+    dz_state.compare_a = drive.compare_a;
+    dz_state.compare_b = drive.compare_b;
     dz_state.ticks++;
 }

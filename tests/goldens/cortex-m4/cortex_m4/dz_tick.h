@@ -18,12 +18,13 @@ struct dz_state
     uint16_t u_adc;
     uint16_t p_a_adc;
     uint16_t p_b_adc;
-    uint16_t compare;
+    uint16_t compare_a;
+    uint16_t compare_b;
 };
 
 extern volatile struct dz_state dz_state;
 
-/* Compare value 0, then SysTick from the processor's clock; the first interrupt comes one period later. */
+/* Compare values 0, then SysTick from the processor's clock; the first interrupt comes one period later. */
 void dz_tick_start(void);
 
 /* SysTick's handler, in the vector table of startup.c. */

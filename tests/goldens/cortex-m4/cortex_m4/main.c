@@ -12,7 +12,7 @@ void dz_fault(void)
 {
     for (;;)
     {
-        dz_board_write_compare(0u);
+        dz_board_write_compare(0u, 0u);
     }
 }
 

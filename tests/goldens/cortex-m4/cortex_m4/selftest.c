@@ -2,13 +2,13 @@
 /* Compensator SHA-256: 503a6da121a114f9d041dc8a091a1ce50270b566b88faaf02d8ab9d612abf383 */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv */
 
-/* In QEMU, in the place of main.c and dz_board.c: hashes of what dz_comp() answers (dz_selftest.h), then 25 real
+/* In QEMU, in the place of main.c and dz_board.c: hashes of what the core answers (dz_selftest.h), then 25 real
  * interrupts on a board in memory. Output and exit by semihosting (ARM IHI 0100: SYS_WRITE0, SYS_EXIT); on a chip without a
  * debugger its breakpoint instruction is a fault. */
 #include "dz_selftest.h"
 
 #include "dz_board.h"
-#include "dz_comp.h"
+#include "dz_drive.h"
 #include "dz_tick.h"
 
 #define SYS_WRITE0 0x04u
@@ -17,8 +17,13 @@
 #define STOPPED_RUN_TIME_ERROR 0x20023u
 #define TICKS 25u
 
-static volatile uint16_t first_written;
-static volatile uint16_t written;
+/* Well above zero command, whether zero stands at the range's end or in its middle. */
+#define COMMAND ((uint16_t)(DZ_ADC_CODE_MAX - (DZ_ADC_CODE_MAX / 8u)))
+#define PRESSURE_A ((uint16_t)(DZ_ADC_CODE_MAX / 3u))
+#define PRESSURE_B ((uint16_t)(DZ_ADC_CODE_MAX / 9u))
+
+static volatile uint16_t written_a[TICKS + 1u];
+static volatile uint16_t written_b[TICKS + 1u];
 static volatile uint32_t writes;
 
 static void semihosting(uint32_t operation, uint32_t argument)
@@ -52,36 +57,51 @@ void dz_fault(void)
 
 uint16_t dz_board_read_command(void)
 {
-    return (uint16_t)(DZ_ADC_CODE_MAX / 2u);
+    return COMMAND;
 }
 
 void dz_board_read_pressures(uint16_t *p_a_adc, uint16_t *p_b_adc)
 {
-    *p_a_adc = (uint16_t)(DZ_ADC_CODE_MAX / 3u);
-    *p_b_adc = (uint16_t)(DZ_ADC_CODE_MAX / 9u);
+    *p_a_adc = PRESSURE_A;
+    *p_b_adc = PRESSURE_B;
 }
 
-void dz_board_write_compare(uint16_t compare)
+void dz_board_write_compare(uint16_t compare_a, uint16_t compare_b)
 {
-    if (writes == 0u)
+    if (writes <= TICKS)
     {
-        first_written = compare;
+        written_a[writes] = compare_a;
+        written_b[writes] = compare_b;
     }
-    written = compare;
     writes++;
 }
 
 static uint32_t interrupts_answer(void)
 {
-    const uint16_t expected = dz_comp((uint16_t)(DZ_ADC_CODE_MAX / 2u), (uint16_t)(DZ_ADC_CODE_MAX / 3u),
-                                      (uint16_t)(DZ_ADC_CODE_MAX / 9u));
+    struct dz_drive drive;
+    uint32_t same;
+    uint32_t tick;
 
     dz_tick_start();
     while (dz_state.ticks < TICKS)
     {
     }
     /* The valve is let go before the first sample, and each tick writes once. */
-    return ((first_written == 0u) && (writes > TICKS) && (written == expected) && (expected != 0u)) ? 1u : 0u;
+    same = ((writes > TICKS) && (written_a[0] == 0u) && (written_b[0] == 0u)) ? 1u : 0u;
+    dz_drive_init(&drive);
+    for (tick = 0u; tick < TICKS; tick++)
+    {
+        if ((tick % DZ_DRIVE_TICKS_PER_SAMPLE) == 0u)
+        {
+            dz_drive_sample(&drive, COMMAND, PRESSURE_A, PRESSURE_B);
+        }
+        dz_drive_tick(&drive);
+        if ((written_a[tick + 1u] != drive.compare_a) || (written_b[tick + 1u] != drive.compare_b))
+        {
+            same = 0u;
+        }
+    }
+    return ((drive.compare_a != 0u) || (drive.compare_b != 0u)) ? same : 0u;
 }
 
 int main(void)
@@ -92,12 +112,14 @@ int main(void)
     print(line);
     dz_selftest_line(&dz_selftest_grid, line);
     print(line);
+    dz_selftest_drive_line(line);
+    print(line);
     if (interrupts_answer() == 0u)
     {
-        print("dz_tick: wrong compare value\n");
+        print("dz_tick: wrong compare values\n");
         leave(STOPPED_RUN_TIME_ERROR);
     }
-    print("dz_tick: 25 interrupts, compare value of dz_comp()\n");
+    print("dz_tick: 25 interrupts, compare values of dz_drive_tick()\n");
     leave(STOPPED_APPLICATION_EXIT);
     return 0;
 }

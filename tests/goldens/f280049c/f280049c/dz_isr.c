@@ -6,23 +6,29 @@
 #include "device.h"
 
 #include "dz_comp.h"
+#include "dz_drive.h"
 #include "dz_hardware.h"
 #include "dz_isr.h"
 
 volatile struct dz_state dz_state;
 
+/* The interrupt's own; what others may look at is copied to dz_state. */
+static struct dz_drive drive;
+
 static uint16_t take_sample(void);
-static void write_compare(uint16_t compare);
+static void show_drive(void);
+static void write_compare_a(uint16_t compare);
 static void force_output_low(void);
-static void follow_sample(void);
+static void release_output(void);
 
 /* In the FLASH build these run from RAM, without wait states; TI's linker file places .TI.ramfunc. */
 #ifdef __TI_COMPILER_VERSION__
 #pragma CODE_SECTION(dz_isr, ".TI.ramfunc");
 #pragma CODE_SECTION(take_sample, ".TI.ramfunc");
-#pragma CODE_SECTION(write_compare, ".TI.ramfunc");
+#pragma CODE_SECTION(show_drive, ".TI.ramfunc");
+#pragma CODE_SECTION(write_compare_a, ".TI.ramfunc");
 #pragma CODE_SECTION(force_output_low, ".TI.ramfunc");
-#pragma CODE_SECTION(follow_sample, ".TI.ramfunc");
+#pragma CODE_SECTION(release_output, ".TI.ramfunc");
 #endif
 
 void dz_isr_init(uint16_t faults)
@@ -34,7 +40,15 @@ void dz_isr_init(uint16_t faults)
     dz_state.u_adc = 0u;
     dz_state.p_a_adc = 0u;
     dz_state.p_b_adc = 0u;
-    dz_state.compare = 0u;
+    dz_drive_init(&drive);
+    show_drive();
+}
+
+static void show_drive(void)
+{
+    dz_state.compare_a = drive.compare_a;
+    dz_state.compare_b = drive.compare_b;
+    dz_state.side = drive.side;
 }
 
 /* 1 if three finished conversions with 12-bit codes were there, 0 otherwise. */
@@ -72,7 +86,7 @@ static uint16_t take_sample(void)
 /* A new compare value is loaded at CTR = 0. If it is 0, it can miss its own compare event there and the old action lasts
  * for one period more: full duty at zero command (0-100 % duty: SPRAAI1). The continuous force, loaded
  * at the same instant, keeps the pin low whatever the counter does. */
-static void write_compare(uint16_t compare)
+static void write_compare_a(uint16_t compare)
 {
     EPWM_setCounterCompareValue(EPWM1_BASE, EPWM_COUNTER_COMPARE_A, compare);
     EPWM_setActionQualifierContSWForceAction(EPWM1_BASE, EPWM_AQ_OUTPUT_A,
@@ -83,21 +97,17 @@ static void force_output_low(void)
 {
     EPWM_forceTripZoneEvent(EPWM1_BASE, EPWM_TZ_FORCE_EVENT_OST);
     dz_state.released = 0u;
-    dz_state.compare = 0u;
-    write_compare(0u);
+    dz_drive_init(&drive);
+    show_drive();
+    write_compare_a(0u);
 }
 
-static void follow_sample(void)
+/* Only from here on the drive runs: its ramps start from rest. */
+static void release_output(void)
 {
-    dz_state.compare = dz_comp(dz_state.u_adc, dz_state.p_a_adc, dz_state.p_b_adc);
-    write_compare(dz_state.compare);
-
-    /* Until the trip input is high the start waits: that is not a fault. */
-    if ((dz_state.released == 0u) && (GPIO_readPin(DZ_TRIP_PIN) != 0u))
-    {
-        EPWM_clearTripZoneFlag(EPWM1_BASE, EPWM_TZ_FLAG_OST);
-        dz_state.released = 1u;
-    }
+    dz_drive_init(&drive);
+    EPWM_clearTripZoneFlag(EPWM1_BASE, EPWM_TZ_FLAG_OST);
+    dz_state.released = 1u;
 }
 
 __interrupt void dz_isr(void)
@@ -131,13 +141,24 @@ __interrupt void dz_isr(void)
     {
         force_output_low();
     }
-    else if (fresh != 0u)
-    {
-        follow_sample();
-    }
     else
     {
-        /* The tick between two samples: nothing is written, the last compare value holds. */
+        /* Until the trip input is high the start waits: that is not a fault. */
+        if ((dz_state.released == 0u) && (fresh != 0u) && (GPIO_readPin(DZ_TRIP_PIN) != 0u))
+        {
+            release_output();
+        }
+        if (dz_state.released != 0u)
+        {
+            if (fresh != 0u)
+            {
+                dz_drive_sample(&drive, dz_state.u_adc, dz_state.p_a_adc, dz_state.p_b_adc);
+            }
+            /* Each tick, for the dither's sake; between two samples the law's value holds. */
+            dz_drive_tick(&drive);
+            show_drive();
+            write_compare_a(drive.compare_a);
+        }
     }
 
     EPWM_clearEventTriggerInterruptFlag(EPWM1_BASE);

@@ -5,8 +5,8 @@
 #include "dz_frame.h"
 
 #define SYNC 0xA55Au
-#define VERSION 1u
-#define PAYLOAD_OCTETS 18u
+#define VERSION 2u
+#define PAYLOAD_OCTETS 20u
 #define CRC_POLYNOMIAL 0x1021u
 #define CRC_START 0xFFFFu
 #define CRC_FROM 2u /* version, length and payload; the sync word is not covered */
@@ -27,7 +27,7 @@ static uint16_t put_32(uint16_t *octets, uint16_t at, uint32_t value)
     return put_16(octets, put_16(octets, at, (uint16_t)(value >> 16)), (uint16_t)(value & 0xFFFFu));
 }
 
-/* Bit by bit: 20 octets a frame need no table. */
+/* Bit by bit: 22 octets a frame need no table. */
 static uint16_t crc_of(const uint16_t *octets, uint16_t from, uint16_t to)
 {
     uint16_t crc = CRC_START;
@@ -59,7 +59,8 @@ void dz_frame_pack(const struct dz_frame *frame, uint16_t octets[DZ_FRAME_OCTETS
     at = put_16(octets, at, frame->p_a_adc);
     at = put_16(octets, at, frame->p_b_adc);
     at = put_16(octets, at, frame->beta);
-    at = put_16(octets, at, frame->compare);
+    at = put_16(octets, at, frame->compare_a);
+    at = put_16(octets, at, frame->compare_b);
     at = put_16(octets, at, frame->status);
     (void)put_16(octets, at, crc_of(octets, CRC_FROM, at));
 }

@@ -6,17 +6,18 @@
  *
  *    at  octets
  *    0  2  0xA55A, begins a frame
- *    2  1  version of this layout, 1
- *    3  1  octets of the payload, 18
- *    4  4  ticks    PWM periods since the start, modulo 2^32
- *    8  2  origin   first 16 bits of the SHA-256 of compensator.json
- *   10  2  u_adc    code of the command
- *   12  2  p_a_adc  code of pressure A
- *   14  2  p_b_adc  code of pressure B
- *   16  2  beta     beta(dP) times 2^15, rounded down
- *   18  2  compare  PWM compare value
- *   20  2  status   bits of the status word
- *   22  2  CRC of version, length and payload
+ *    2  1  version of this layout, 2
+ *    3  1  octets of the payload, 20
+ *    4  4  ticks     PWM periods since the start, modulo 2^32
+ *    8  2  origin    first 16 bits of the SHA-256 of compensator.json
+ *   10  2  u_adc     code of the command
+ *   12  2  p_a_adc   code of pressure A
+ *   14  2  p_b_adc   code of pressure B
+ *   16  2  beta      beta(dP) times 2^15, rounded down
+ *   18  2  compare_a PWM compare value of solenoid A
+ *   20  2  compare_b of solenoid B; one of the two is 0
+ *   22  2  status    bits of the status word
+ *   24  2  CRC of version, length and payload
  *
  * The most significant octet comes first. CRC-16/IBM-3740: polynomial 0x1021, start 0xFFFF, not reflected,
  * nothing added at the end. */
@@ -25,7 +26,7 @@
 
 #include <stdint.h>
 
-#define DZ_FRAME_OCTETS 24u
+#define DZ_FRAME_OCTETS 26u
 
 struct dz_frame
 {
@@ -35,7 +36,8 @@ struct dz_frame
     uint16_t p_a_adc; /* code of pressure A */
     uint16_t p_b_adc; /* code of pressure B */
     uint16_t beta; /* beta(dP) times 2^15, rounded down */
-    uint16_t compare; /* PWM compare value */
+    uint16_t compare_a; /* PWM compare value of solenoid A */
+    uint16_t compare_b; /* of solenoid B; one of the two is 0 */
     uint16_t status; /* bits of the status word */
 };
 

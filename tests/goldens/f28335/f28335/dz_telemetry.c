@@ -67,7 +67,8 @@ static uint16_t read_state(struct dz_state *copy)
         copy->u_adc = dz_state.u_adc;
         copy->p_a_adc = dz_state.p_a_adc;
         copy->p_b_adc = dz_state.p_b_adc;
-        copy->compare = dz_state.compare;
+        copy->compare_a = dz_state.compare_a;
+        copy->compare_b = dz_state.compare_b;
         whole = (dz_state.ticks == copy->ticks) ? 1u : 0u;
     }
     return whole;
@@ -103,7 +104,8 @@ static void start_frame(void)
         frame.p_a_adc = state.p_a_adc;
         frame.p_b_adc = state.p_b_adc;
         frame.beta = dz_beta(state.p_a_adc, state.p_b_adc);
-        frame.compare = state.compare;
+        frame.compare_a = state.compare_a;
+        frame.compare_b = state.compare_b;
         frame.status = status_of(&state);
         dz_frame_pack(&frame, dz_telemetry.octets);
         dz_telemetry.at = 0u;

@@ -2,7 +2,7 @@
 /* Compensator SHA-256: 503a6da121a114f9d041dc8a091a1ce50270b566b88faaf02d8ab9d612abf383 */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv */
 
-/* What the library shows besides dz_comp(): for a caller that can't read the macros of dz_comp.h. */
+/* What the library shows besides dz_comp() and dz_drive_tick(): for a caller that can't read the macros of dz_comp.h. */
 #ifndef DZ_HOST_H
 #define DZ_HOST_H
 
@@ -13,7 +13,7 @@
 extern "C" {
 #endif
 
-#include "dz_comp.h" /* within, because C++ would look for another name */
+#include "dz_drive.h" /* within, because C++ would look for another name */
 
 /* Largest compare value: full drive. */
 uint16_t dz_compare_max(void);

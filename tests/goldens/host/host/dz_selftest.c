@@ -4,7 +4,7 @@
 
 #include "dz_selftest.h"
 
-#include "dz_comp.h"
+#include "dz_drive.h"
 
 #define FNV_OFFSET UINT32_C(0x811C9DC5)
 #define FNV_PRIME UINT32_C(0x01000193)
@@ -126,6 +126,85 @@ static char *put_decimal(char *end, uint32_t value)
         end++;
     }
     return end;
+}
+
+/* The walk of dz_selftest.h: where it stands, where it goes, and the state of its random numbers. */
+struct walk
+{
+    uint32_t random;
+    uint16_t samples;
+    uint16_t aim;
+    uint16_t at;
+};
+
+static uint16_t draw(struct walk *walk, uint16_t count)
+{
+    walk->random = (walk->random * UINT32_C(1664525)) + UINT32_C(1013904223);
+    return (uint16_t)((walk->random >> 16) % count);
+}
+
+static uint16_t next_command(struct walk *walk)
+{
+    int32_t noisy;
+    int32_t command;
+
+    if ((walk->samples % 64u) == 0u)
+    {
+        walk->aim = draw(walk, (uint16_t)(DZ_ADC_CODE_MAX + 1u));
+    }
+    walk->samples++;
+    if (walk->aim > walk->at)
+    {
+        walk->at = (uint16_t)(walk->at + ((walk->aim - walk->at) / 16u));
+    }
+    else
+    {
+        walk->at = (uint16_t)(walk->at - ((walk->at - walk->aim) / 16u));
+    }
+    noisy = (int32_t)walk->at + (int32_t)draw(walk, 9u) - 4;
+    command = (noisy < 0) ? 0 : noisy;
+    command = (command > (int32_t)DZ_ADC_CODE_MAX) ? (int32_t)DZ_ADC_CODE_MAX : command;
+    return (draw(walk, 128u) == 0u) ? LAST_CODE : (uint16_t)command;
+}
+
+static uint32_t with_number(uint32_t hash, uint16_t number)
+{
+    return with_byte(with_byte(hash, number & 0xFFu), (uint32_t)number >> 8);
+}
+
+static uint32_t walked_hash(void)
+{
+    struct walk walk = {1u, 0u, 0u, 0u};
+    struct dz_drive drive;
+    uint32_t hash = FNV_OFFSET;
+    uint16_t tick;
+
+    dz_drive_init(&drive);
+    for (tick = 0u; tick < DZ_SELFTEST_WALK; tick++)
+    {
+        if ((tick % DZ_DRIVE_TICKS_PER_SAMPLE) == 0u)
+        {
+            const uint16_t u_adc = next_command(&walk);
+            const uint16_t p_a_adc = draw(&walk, (uint16_t)(DZ_ADC_CODE_MAX + 2u));
+            const uint16_t p_b_adc = draw(&walk, (uint16_t)(DZ_ADC_CODE_MAX + 2u));
+
+            dz_drive_sample(&drive, u_adc, p_a_adc, p_b_adc);
+        }
+        dz_drive_tick(&drive);
+        hash = with_number(with_number(with_number(hash, drive.compare_a), drive.compare_b), drive.status);
+    }
+    return hash;
+}
+
+void dz_selftest_drive_line(char line[DZ_SELFTEST_LINE])
+{
+    char *end = put_text(line, "dz_drive walk FNV-1a-32 ");
+
+    end = put_hexadecimal(end, walked_hash());
+    end = put_text(end, " over ");
+    end = put_decimal(end, DZ_SELFTEST_WALK);
+    end = put_text(end, " ticks\n");
+    *end = '\0';
 }
 
 void dz_selftest_line(const struct dz_selftest_grid *grid, char line[DZ_SELFTEST_LINE])

@@ -14,5 +14,7 @@ int main(void)
     dz_selftest_line(&dz_selftest_sample, line);
     (void)fputs(line, stdout);
     dz_selftest_line(&dz_selftest_grid, line);
+    (void)fputs(line, stdout);
+    dz_selftest_drive_line(line);
     return (fputs(line, stdout) < 0) ? 1 : 0;
 }

@@ -1,0 +1,16 @@
+/* In the place of the core's: what the interrupt uses of the drive, and who drives is told from outside. */
+#ifndef DZ_DRIVE_H
+#define DZ_DRIVE_H
+#include "dz_comp.h"
+struct dz_drive
+{
+    uint16_t compare_a;
+    uint16_t compare_b;
+    uint16_t law;
+    int16_t side;
+    uint16_t samples, ticks; /* since the drive was at rest */
+};
+void dz_drive_init(struct dz_drive *drive);
+void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
+void dz_drive_tick(struct dz_drive *drive);
+#endif
