@@ -1,8 +1,10 @@
 """Rows of results with their limits, as tables."""
 
+import os
 import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 WIDTH = 150
 
@@ -62,6 +64,11 @@ def markdown_rows(rows: Iterable[Row]) -> str:
         limit = "" if row.limit is None else f"{row.limit:g} {row.unit}".strip()
         cells.append((row.what, f"{row.value:.4g} {row.unit}".strip(), limit, row.verdict, row.note))
     return markdown(("goal", "measured", "limit", "verdict", "note"), cells)
+
+
+def environment() -> dict[str, str]:
+    """Return the environment in which a benchmark starts another of its files: with this one to be found."""
+    return os.environ | {"PYTHONPATH": str(Path(__file__).parent)}
 
 
 def say(text: str) -> None:

@@ -11,8 +11,15 @@ if TYPE_CHECKING:
     import pint
 
 #: The SI unit in which each quantity is kept inside, and the units to name when one is not understood.
-SI_UNIT = {"time": "s", "voltage": "V", "pressure": "Pa", "flow": "m**3/s", "length": "m", "ratio": "",
-    "current": "A", "resistance": "ohm",
+SI_UNIT = {
+    "time": "s",
+    "voltage": "V",
+    "pressure": "Pa",
+    "flow": "m**3/s",
+    "length": "m",
+    "ratio": "",
+    "current": "A",
+    "resistance": "ohm",
 }
 EXAMPLES = {
     "time": "s, ms, min",

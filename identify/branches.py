@@ -58,6 +58,14 @@ class Bins:
     u_censored: np.ndarray
 
 
+def bin_index(u: np.ndarray, u_max: float) -> tuple[np.ndarray, int]:
+    """Return the number of each sample's bin of `BIN_WIDTH` u_max, empty ones not counted, and how many there are."""
+    index = np.floor(u / (BIN_WIDTH * u_max)).astype(int)
+    index -= index.min()
+    filled = np.bincount(index) > 0
+    return np.cumsum(filled)[index] - 1, int(filled.sum())
+
+
 def bin_branch(u: np.ndarray, y: np.ndarray, censored: np.ndarray, u_max: float) -> Bins:
     """Gather samples in bins of `BIN_WIDTH` u_max.
 
@@ -70,9 +78,7 @@ def bin_branch(u: np.ndarray, y: np.ndarray, censored: np.ndarray, u_max: float)
     u_max : float
         Full command, V.
     """
-    index = np.floor(u / (BIN_WIDTH * u_max)).astype(int)
-    used, index = np.unique(index, return_inverse=True)
-    size = used.size
+    index, size = bin_index(u, u_max)
 
     def total(weight: np.ndarray, where: np.ndarray) -> np.ndarray:
         return np.bincount(index[where], weights=weight[where], minlength=size)

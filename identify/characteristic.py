@@ -8,7 +8,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.branches import Bins, Branch, bin_branch
-from dzdesign.identify.noise import colour_factor, measure_roughness, shared_correlation
+from dzdesign.identify.noise import colour_factor, measure_roughness, robust_sigma, shared_correlation
 from dzdesign.identify.profile import crossing, flow_at_top, smooth_profile
 from dzdesign.identify.straight_part import (
     GATE,
@@ -200,7 +200,7 @@ def find_meter_floor(u: np.ndarray, q: np.ndarray, u_max: float) -> float:
     shut = q[u < 0.5 * start]
     if shut.size < 5 or straight < 100 or u_profile.size < 200:  # a staircase skips flows, whatever the meter
         return 0.0
-    noise = 1.4826 * float(np.median(np.abs(shut - np.median(shut))))
+    noise = robust_sigma(shut)
     lowest = max(3 * noise, 1e-3 * q_max)
     # Near the opening only: far below it, thousands of shut readings would put some of their noise into the gap.
     # It reaches down to where the profile leaves the noise, or a soft edge's small flows would be cut off and missed.
@@ -217,7 +217,7 @@ def _without_outliers(u: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndar
     for _ in range(3):
         slope, zero = fit_line(u[kept], y[kept])
         residual = y - slope * (u - zero)
-        sigma = 1.4826 * float(np.median(np.abs(residual - np.median(residual))))
+        sigma = robust_sigma(residual)
         inside = np.abs(residual - np.median(residual)) <= GATE * sigma
         if inside.sum() < TAIL_SAMPLES or np.ptp(u[inside]) == 0:
             break
@@ -228,7 +228,7 @@ def _without_outliers(u: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndar
 def _quiet_noise(branch: Branch, y: np.ndarray, knee: float) -> float:
     """Return the robust standard deviation of a reading while the valve is shut (u below half the knee), m³/s."""
     shut = y[branch.u < 0.5 * knee]
-    return 1.4826 * float(np.median(np.abs(shut - np.median(shut)))) if shut.size >= 5 else 0.0
+    return robust_sigma(shut) if shut.size >= 5 else 0.0
 
 
 def _find_onset(read: ReadBranch, tail: Tail, level: float, noise: float) -> tuple[float, float]:

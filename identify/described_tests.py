@@ -9,6 +9,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.identify.branches import Branch, at_nominal_pressure
 from dzdesign.identify.characteristic import BranchShape, describe_branches, find_meter_floor
 from dzdesign.identify.lag import MeterLag, find_lag
+from dzdesign.identify.noise import robust_sigma
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.pooling import PooledTest, pool_ramps
 from dzdesign.identify.profile import flow_at_top, smooth_profile
@@ -126,7 +127,7 @@ def _reading_at_zero(test: RampTest, u_max: float) -> float:
 
 
 def _error_of_median(values: np.ndarray) -> float:
-    return 1.4826 * float(np.median(np.abs(values - np.median(values)))) / np.sqrt(values.size)
+    return robust_sigma(values) / np.sqrt(values.size)
 
 
 def _split_all(tests: Sequence[RampTest], options: IdentifyOptions, lag: float) -> list[Ramp]:

@@ -1,6 +1,7 @@
 """The constrained fits in CasADi: knees and slopes of all ramp tests jointly; the offset curve under its bounds."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -93,7 +94,7 @@ def fit_knees(
 
     where = [(row, column) for row, pair in enumerate(shapes) for column, shape in enumerate(pair) if shape]
     position = {place: index for index, place in enumerate(where)}
-    slopes, knees = ca.MX.sym("slope", len(where)), ca.MX.sym("knee", len(where))
+    slopes, knees = ca.SX.sym("slope", len(where)), ca.SX.sym("knee", len(where))
     scales = [_expected_errors(shapes[row][column]) for row, column in where]
     cost = 0
     for (row, column), index in position.items():
@@ -101,7 +102,7 @@ def fit_knees(
         cost += _branch_cost(shapes[row][column], steeper, later, floor, u_max)
     # Those whose knees must run one way, and in standard errors how far each lies from the next.
     chain = [index for place, index in position.items() if place[1] == ordered and trend != "flat"]
-    start, order, unit = np.zeros(2 * len(where)), ca.MX(0, 1), np.zeros(0)
+    start, order, unit = np.zeros(2 * len(where)), ca.SX(0, 1), np.zeros(0)
     if len(chain) > 1:
         mine = [shapes[where[index][0]][ordered] for index in chain]
         slope_scale, knee_scale = np.array([scales[index] for index in chain]).T
@@ -120,7 +121,7 @@ def fit_knees(
             "look at the ramp tests, and leave out the one that is unlike the others"
         )
     best, slack = np.asarray(solution["x"]).ravel(), np.asarray(solution["g"]).ravel() * unit
-    hessian = np.asarray(ca.Function("h", [variables], [ca.hessian(cost, variables)[0]])(best))
+    hessian = _hessian_of_cost(solver, best)
     variance = np.diag(np.linalg.inv(hessian))
     knee, knee_se, slope = (np.full((len(shapes), 2), np.nan) for _ in range(3))
     for (row, column), index in position.items():
@@ -140,6 +141,15 @@ def fit_knees(
         ),
         iterations=int(solver.stats()["iter_count"]),
     )
+
+
+def _hessian_of_cost(solver: "ca.Function", at: np.ndarray) -> np.ndarray:
+    """Return the second derivatives of a solver's objective, which it has for its own steps: the upper triangle."""
+    import casadi as ca
+
+    constraints = solver.size1_out("g")
+    upper = np.asarray(ca.DM(solver.get_function("nlp_hess_l")(at, [], 1, np.zeros(constraints))))
+    return upper + np.triu(upper, 1).T
 
 
 def _expected_errors(shape: BranchShape) -> tuple[float, float]:
@@ -174,7 +184,7 @@ def _ordered_start(shapes: list[BranchShape], *, increasing: bool) -> tuple[np.n
     return np.array(steeper), ordered - knees
 
 
-def _branch_cost(shape: BranchShape, steeper: "ca.MX", later: "ca.MX", floor: float, u_max: float) -> "ca.MX":
+def _branch_cost(shape: BranchShape, steeper: "ca.SX", later: "ca.SX", floor: float, u_max: float) -> "ca.SX":
     """Return the negative log-likelihood of one branch.
 
     `steeper` is the slope's relative change from its start value, `later` the knee's over u_max. In changes, a quiet
@@ -183,38 +193,43 @@ def _branch_cost(shape: BranchShape, steeper: "ca.MX", later: "ca.MX", floor: fl
     import casadi as ca
 
     bins, per_sigma = shape.bins, shape.slope * u_max / shape.sigma
-
-    def rise(u: np.ndarray) -> "ca.MX":
-        return per_sigma * (steeper * (ca.DM((u - shape.knee) / u_max) - later) - later)
-
-    miss = ca.DM((bins.y - shape.slope * (bins.u - shape.knee)) / shape.sigma) - rise(bins.u)
+    # The line's change, in standard deviations, is tilt x + shift with x = (u - knee) / u_max.
+    tilt, shift = per_sigma * steeper, -per_sigma * later * (1 + steeper)
+    x = (bins.u - shape.knee) / u_max
+    miss = (bins.y - shape.slope * (bins.u - shape.knee)) / shape.sigma
+    # Its sum of squares is quadratic in both, so five sums over the bins are all that the solver ever sees.
+    n, n_x, n_xx, n_m, n_mx = (float(np.sum(bins.n * term)) for term in (np.ones_like(x), x, x * x, miss, miss * x))
+    cost = tilt**2 * n_xx + 2 * tilt * shift * n_x + shift**2 * n - 2 * tilt * n_mx - 2 * shift * n_m
+    # Inside a bin it has a closed form too: sum (dy - line du)^2 about the bin's means.
     line = per_sigma * (1 + steeper)
-    # Inside a bin the sum of squares has a closed form: sum (dy - line du)^2 about the bin's means.
     c_uy = float(bins.c_uy.sum()) / (u_max * shape.sigma)
     c_uu = float(bins.c_uu.sum()) / u_max**2
-    cost = (ca.sum1(ca.DM(bins.n) * miss**2) - 2 * line * c_uy + line**2 * c_uu) / 2
+    cost = (cost - 2 * line * c_uy + line**2 * c_uu) / 2
     cut = bins.censored > 0
     if cut.any():
         u = bins.u_censored[cut]
-        depth = ca.DM((floor - shape.slope * (u - shape.knee)) / shape.sigma) - rise(u)
-        cost -= ca.sum1(ca.DM(bins.censored[cut]) * _log_below(depth))
+        depth = (floor - shape.slope * (u - shape.knee)) / shape.sigma
+        depth = ca.DM(depth) - tilt * ca.DM((u - shape.knee) / u_max) - shift
+        cost -= ca.dot(ca.DM(bins.censored[cut]), _log_below().map(depth.numel())(depth.T).T)
     return cost
 
 
-def _log_below(depth: "ca.MX") -> "ca.MX":
-    """Return the logarithm of the normal distribution function.
+@lru_cache(maxsize=1)
+def _log_below() -> "ca.Function":
+    """Return the logarithm of the normal distribution function, as a function of one number.
 
     ``1 + erf`` has lost half of its digits at -6, where a drop-out may lie, and all of them at -8.3; the tail is the
     continued fraction of Mills' ratio (Abramowitz and Stegun 26.2.14).
     """
     import casadi as ca
 
+    depth = ca.SX.sym("depth")
     middle = ca.log((1 + ca.erf(ca.fmax(depth, -TAIL_FROM) / np.sqrt(2))) / 2)
     away = ca.fmax(-depth, TAIL_FROM)
-    return middle + _log_tail(away) - _log_tail(TAIL_FROM)
+    return ca.Function("log_below", [depth], [middle + _log_tail(away) - _log_tail(TAIL_FROM)])
 
 
-def _log_tail(away: "ca.MX | float") -> "ca.MX | float":
+def _log_tail(away: "ca.SX | float") -> "ca.SX | float":
     """Return the logarithm of the probability beyond `away` standard deviations, but for a constant."""
     import casadi as ca
 

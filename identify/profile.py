@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dzdesign.identify.branches import BIN_WIDTH
+from dzdesign.identify.branches import bin_index
 
 #: Share of the command's range, from the top, over which the largest flow is read.
 TOP = 0.05
@@ -10,11 +10,11 @@ TOP = 0.05
 
 def smooth_profile(u: np.ndarray, y: np.ndarray, u_max: float) -> tuple[np.ndarray, np.ndarray]:
     """Return command and flow averaged over bins of u and freed of single spikes (medians of five bins)."""
-    used, index = np.unique(np.floor(u / (BIN_WIDTH * u_max)).astype(int), return_inverse=True)
-    n = np.bincount(index, minlength=used.size)
+    index, size = bin_index(u, u_max)
+    n = np.bincount(index)
     u_mean = np.bincount(index, weights=u) / n
     y_mean = np.bincount(index, weights=y) / n
-    if used.size < 200:  # one level a step, as a staircase test gives: nothing to smooth over
+    if size < 200:  # one level a step, as a staircase test gives: nothing to smooth over
         return u_mean, y_mean
     padded = np.pad(y_mean, 2, mode="edge")
     return u_mean, np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)

@@ -6,6 +6,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.branches import Branch
+from dzdesign.identify.noise import robust_sigma
 from dzdesign.identify.profile import crossing, flow_at_top, smooth_profile
 from dzdesign.identify.straight_part import ReadBranch
 
@@ -61,7 +62,7 @@ def refuse_a_shut_valve(source: str, branches: Sequence[Branch | None], u_max: f
         if branch is None:
             continue
         bottom = branch.q[branch.u <= branch.u.min() + 0.05 * np.ptp(branch.u)]
-        noise = 1.4826 * float(np.median(np.abs(bottom - np.median(bottom))))
+        noise = robust_sigma(bottom)
         rise = flow_at_top(*smooth_profile(branch.u, branch.q, u_max)) - float(np.median(bottom))
         least = max(6 * noise, 0.01 * L_MIN)
         if rise > least:

@@ -38,27 +38,30 @@ LARGEST_SHIFT = 3e-3
 
 def fit_line(u: np.ndarray, y: np.ndarray) -> tuple[float, float]:
     """Return slope and zero of the least-squares line."""
-    centre = u.mean()
-    slope = float(np.sum((u - centre) * (y - y.mean())) / np.sum((u - centre) ** 2))
-    return slope, float(centre - y.mean() / slope)
+    centre, height = u.mean(), y.mean()
+    du = u - centre
+    slope = float(du @ (y - height) / (du @ du))
+    return slope, float(centre - height / slope)
 
 
 def colour_of_blocks(residual: np.ndarray, sigma: float) -> float:
     """Return the long-run variance factor from the means of `BLOCKS` blocks in time order."""
-    blocks = np.array_split(residual, min(BLOCKS, residual.size // 2))
-    if len(blocks) < 4:
+    count = min(BLOCKS, residual.size // 2)
+    if count < 4:
         return 1.0
-    spread = sum(block.size * block.mean() ** 2 for block in blocks) / (len(blocks) - 2)
+    base, longer = divmod(residual.size, count)
+    starts = np.arange(count) * base + np.minimum(np.arange(count), longer)
+    sizes = np.diff(starts, append=residual.size)
+    spread = float(np.sum(np.add.reduceat(residual, starts) ** 2 / sizes)) / (count - 2)
     return max(1.0, spread / sigma**2)
 
 
 def _refuse_no_line(u: np.ndarray, window: tuple[float, float], floor: float, source: str) -> None:
     """Refuse samples that hold no straight line: too few above the meter's floor, or all at one command."""
-    levels = np.unique(u).size
-    if u.size < 5 or levels < 2:
+    if u.size < FEWEST or np.ptp(u) == 0:
         raise InputError(
-            f"'{source}': {u.size} samples at {levels} levels of the command lie between {window[0]:.0%} and "
-            f"{window[1]:.0%} of the largest flow and above half the meter's floor of {floor * 6e4:.3g} L/min, "
+            f"'{source}': {u.size} samples at {np.unique(u).size} levels of the command lie between {window[0]:.0%} "
+            f"and {window[1]:.0%} of the largest flow and above half the meter's floor of {floor * 6e4:.3g} L/min, "
             "expected at least 5 at 2 levels; record a slower ramp or more levels, or correct --meter-floor"
         )
 
@@ -169,21 +172,21 @@ def lay_line(read: ReadBranch, window: tuple[float, float]) -> GatedLine:
             f"'{read.source}': only {inside.sum()} samples lie between {window[0]:.0%} and {window[1]:.0%} of the "
             "largest flow, expected at least 5; record a slower ramp or more levels"
         )
-    censored = inside & (branch.q < 0.5 * floor)
-    seen = inside & ~censored
-    _refuse_no_line(branch.u[seen], window, floor, read.source)
-    slope, knee = fit_line(branch.u[seen], y[seen])
+    u, y, censored = branch.u[inside], y[inside], branch.q[inside] < 0.5 * floor
+    seen = ~censored
+    _refuse_no_line(u[seen], window, floor, read.source)
+    slope, knee = fit_line(u[seen], y[seen])
     finest = FINEST_NOISE * read.y_max
     for _ in range(3):
-        miss = y - slope * (branch.u - knee)
-        sigma = max(1.4826 * float(np.median(np.abs(miss[inside & ~censored]))), finest)
+        line = slope * (u - knee)
+        miss = np.abs(y - line)
+        sigma = max(1.4826 * float(np.median(miss[~censored])), finest)
         # A zero reading is a censored sample only where flow below the floor is credible.
-        credible = slope * (branch.u - knee) < floor + GATE * sigma
-        kept = inside & np.where(censored, credible, np.abs(miss) < GATE * sigma)
+        kept = np.where(censored, line < floor + GATE * sigma, miss < GATE * sigma)
         seen = kept & ~censored
-        _refuse_no_line(branch.u[seen], window, floor, read.source)
-        slope, knee = fit_line(branch.u[seen], y[seen])
-    u_seen = branch.u[seen]
+        _refuse_no_line(u[seen], window, floor, read.source)
+        slope, knee = fit_line(u[seen], y[seen])
+    u_seen = u[seen]
     residual = y[seen] - slope * (u_seen - knee)
     sigma = max(float(np.sqrt(np.sum(residual**2) / max(u_seen.size - 2, 1))), finest)
     block_colour = colour_of_blocks(residual, sigma)
@@ -196,11 +199,18 @@ def lay_line(read: ReadBranch, window: tuple[float, float]) -> GatedLine:
         block_colour=block_colour,
         colour=block_colour,
         inside=inside,
-        kept=kept,
-        censored=censored,
+        kept=_among(inside, kept),
+        censored=_among(inside, censored),
         roughness=measure_roughness(u_seen, residual),
-        outliers=int((inside & ~kept).sum()),
+        outliers=int((~kept).sum()),
     )
+
+
+def _among(inside: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """Return which samples of all are chosen, from which of those inside the window are."""
+    among = np.zeros(inside.size, dtype=bool)
+    among[inside] = chosen
+    return among
 
 
 def _chord(read: ReadBranch, window: tuple[float, float]) -> GatedLine | None:

@@ -359,7 +359,7 @@ class TestOrderedKnees:
             def solved(x0, lbg, ubg):
                 return solver(x0=x0, lbg=lbg if fault == "reversed" else -np.inf, ubg=ubg)
 
-            solved.stats = solver.stats
+            solved.stats, solved.size1_out, solved.get_function = solver.stats, solver.size1_out, solver.get_function
             return solved
 
         if fault in ("reversed", "left out"):

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scoreboard import Row, print_rows, say
+from scoreboard import Row, environment, print_rows, say
 
 #: Rows made at a time, and rows of the two files.
 PART = 400_000
@@ -100,7 +100,7 @@ def scan(path: str) -> None:
 def cost_of(*arguments: object) -> Cost:
     """Run this file with these arguments and return what that took."""
     command = [sys.executable, __file__, *map(str, arguments)]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=Path(__file__).parent)
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment())
     output = process.stdout.read()
     _, status, usage = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)

@@ -3,13 +3,12 @@
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 from bench_model import Bench, readings
 from replicates import options_for
-from scoreboard import Row, print_rows
+from scoreboard import Row, environment, print_rows
 
 from dzdesign.identify.identification import identify
 
@@ -77,7 +76,7 @@ def _instructions() -> tuple[float, float] | None:
 
 def _count(what: str, times: int) -> float | None:
     command = ["perf", "stat", "-x", ",", "-e", "instructions:u", sys.executable, __file__, what, str(times)]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=Path(__file__).parent, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, env=environment(), check=False)
     for line in done.stderr.splitlines():
         if "instructions" in line and line.split(",")[0].isdigit():
             return float(line.split(",")[0])
