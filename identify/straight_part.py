@@ -34,6 +34,9 @@ WIDER = (0.65, 0.8, 0.9, 0.98)
 STRAIGHT, ALONE = 2.5, 3.5
 #: Share of u_max beyond which no departure is put down to noise: slow noise and a slight bend look alike.
 LARGEST_SHIFT = 3e-3
+#: A table's flow that leaves less than `SHUT` of the largest, for more than `JUMPED`, between two levels of the
+#: command jumps if it rises so many times faster there than over the next two levels.
+SHUT, JUMPED, JUMP = 0.05, 0.15, 3.0
 
 
 def fit_line(u: np.ndarray, y: np.ndarray) -> tuple[float, float]:
@@ -218,6 +221,7 @@ def _chord(read: ReadBranch, window: tuple[float, float]) -> GatedLine | None:
 
     The zero is known to one level of the command, and its error is said to be that.
     """
+    _refuse_a_jump_between_levels(read)
     u, y = read.profile
     order = np.argsort(u)
     u, y = u[order], y[order]
@@ -250,6 +254,28 @@ def _chord(read: ReadBranch, window: tuple[float, float]) -> GatedLine | None:
         censored=censored,
         roughness=Roughness(0, 0.0, 0.0),
         outliers=0,
+    )
+
+
+def _refuse_a_jump_between_levels(read: ReadBranch) -> None:
+    """Refuse a table whose flow jumps from one level of the command to the next.
+
+    A valve that opens into a straight part rises from its last shut level by less than one level's worth; what rises
+    by several comes from a meter that wakes up late, and the line down to the shut level would end volts too high.
+    """
+    u, share = read.profile[0], read.profile[1] / read.y_max
+    opened = int(np.argmax(share > SHUT))
+    if opened == 0 or opened + 2 >= u.size or share[opened] < JUMPED:
+        return
+    before = (share[opened] - share[opened - 1]) / (u[opened] - u[opened - 1])
+    after = (share[opened + 2] - share[opened]) / (u[opened + 2] - u[opened])
+    if before <= JUMP * max(after, 0.0):
+        return
+    raise InputError(
+        f"'{read.source}': the flow jumps between {u[opened - 1]:.2f} and {u[opened]:.2f} V, from "
+        f"{max(share[opened - 1], 0.0):.0%} to {share[opened]:.0%} of the largest flow of {read.y_max * 6e4:.3g} "
+        f"L/min, {before / after if after > 0 else np.inf:.3g} times as steep as above it, expected a straight rise; record "
+        "levels in between, or, if the meter shows nothing below some flow, take one of a smaller range"
     )
 
 
