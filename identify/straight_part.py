@@ -274,8 +274,8 @@ def _refuse_a_jump_between_levels(read: ReadBranch) -> None:
     raise InputError(
         f"'{read.source}': the flow jumps between {u[opened - 1]:.2f} and {u[opened]:.2f} V, from "
         f"{max(share[opened - 1], 0.0):.0%} to {share[opened]:.0%} of the largest flow of {read.y_max * 6e4:.3g} "
-        f"L/min, {before / after if after > 0 else np.inf:.3g} times as steep as above it, expected a straight rise; record "
-        "levels in between, or, if the meter shows nothing below some flow, take one of a smaller range"
+        f"L/min, {before / after if after > 0 else np.inf:.3g} times as steep as above it, expected a straight rise; "
+        "record levels in between, or, if the meter shows nothing below some flow, take one of a smaller range"
     )
 
 
