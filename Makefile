@@ -11,7 +11,7 @@ demo: $(STAMP)
 	$(BIN)/dzdesign demo demo
 
 test: lint
-	$(BIN)/pytest
+	$(BIN)/pytest --numprocesses auto --dist loadfile
 
 lint: $(STAMP)
 	$(BIN)/ruff check .
