@@ -86,10 +86,11 @@ def core_plan(compensator: Compensator, sign: int, arithmetic: str) -> FilePlan:
         "law_equation": equation_of(chosen),
         "kappa_text": _rational(side.k_x_max_over_u_max) + f", {KAPPA_ROUNDING}",
         "u_min0_text": _rational(side.u_min0_over_u_max) + f", {U_MIN0_ROUNDING}",
+        "guard": side.certificate.guard,
         "edge": bool(compensator.edge_codes),
         "edge_codes": str(compensator.edge_codes),
         "edge_text": f"{compensator.edge_codes / compensator.signals.command.span(sign):.2%}",
-        "edge_sum_text": f"\n *           - (B - B_closing) * {form.edge} * max({compensator.edge_codes} - c, 0)"
+        "edge_sum_text": f"\n *           - (B - B_zero) * {form.edge} * max({compensator.edge_codes} - c, 0)"
         if form.edge
         else "",
         "beta_unit": str(of_law.unit),
@@ -117,6 +118,7 @@ def header_plan(compensator: Compensator) -> FilePlan:
         "law_text": _law_text(chosen),
         "law_equation": equation_of(chosen),
         "u_max_V": f"{float(compensator.u_max_V):g}",
+        "edge": bool(compensator.edge_codes),
         "zero_command_low": str(low),
         "zero_command_high": str(high),
         "certificate_lines": certificate_lines(compensator, 1),
@@ -169,10 +171,23 @@ def certificate_lines(compensator: Compensator, sign: int = 1) -> list[str]:
     low, high = (float(end) for end in certificate.dp_MPa)
     text = (
         f"Certificate: from {low:.2f} to {high:.2f} MPa, between the tests too, that lies below the "
-        f"{certificate.confidence:.0%} lower bound of the {certificate.guard} threshold, by {{:.3g}} mV at the least, "
-        f"so that nothing flows; flow below {certificate.level_L_min:.2f} L/min counts as none."
+        f"{certificate.confidence:.0%} lower bound of the {certificate.guard} threshold, by "
+        f"{1e3 * float(certificate.smallest_margin_V):.3g} mV at the least beyond {_counted(compensator)}"
     )
-    return wrap(text.format(1e3 * float(certificate.smallest_margin_V)), COLUMNS - 3)
+    if certificate.guard == "closing":
+        text += f", so that nothing flows; flow below {certificate.level_L_min:.2f} L/min counts as none."
+    else:
+        text += ". After closing, flow may remain: the closing threshold lies lower, and is not the one guarded."
+    return wrap(text, COLUMNS - 3)
+
+
+def _counted(compensator: Compensator) -> str:
+    """Say what the certificate's margin is left of."""
+    rounding = "the converters' error and the rounding to counts"
+    if not compensator.amplifier.dither_counts:
+        return rounding
+    peak = compensator.amplifier.dither_counts / compensator.signals.compare_max * float(compensator.u_max_V)
+    return f"{rounding} and the dither's peak of {1e3 * peak:.4g} mV, which dz_drive adds to it"
 
 
 def _signal_plan(compensator: Compensator, sign: int) -> Plan:

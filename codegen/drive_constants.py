@@ -124,6 +124,6 @@ def _dither(compensator: Compensator) -> list[Constant]:
                  engineering=f"{1e3 * ticks / signals.tick_Hz:.4g} ms", rounding="rounded to nearest, 1 or more",
                  data=("amplifier.dither_ticks", "signals.tick_Hz"), generator=OPTIONS),
         Constant(symbol="DITHER_PERIOD", value=2 * ticks, equation="the dither's period, PWM periods",
-                 engineering=f"{signals.tick_Hz / (2 * ticks):.1f} Hz",
+                 engineering=f"{signals.tick_Hz / (2 * ticks):g} Hz",
                  data=("amplifier.dither_ticks", "signals.tick_Hz"), generator=HERE),
     ]  # fmt: skip

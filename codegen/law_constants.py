@@ -72,18 +72,19 @@ class LawConstants:
         """True if anything but the half is added to the lower 32 bits of beta's product."""
         return bool(self.form.edge or (self.form.linear << self.form.linear_shift) % 2**32)
 
-    def table(self, closing: bool, rows: TableForm) -> Constant:
-        """Return the law's table, or the one of the certified closing beta."""
+    def table(self, at_zero: bool, rows: TableForm) -> Constant:
+        """Return the law's table, or the one of the certified beta at zero command."""
         c, form = self.compensator, self.form
-        numerators = form.zero_table if closing else form.table
+        numerators = form.zero_table if at_zero else form.table
         turn = -1 if rows.falls else 1
         segments = segments_of(numerators, c.beta_step_codes)
         unit = form.scale_beta * c.beta_denominator
         low, high = (edge(numerators[:-2]) / unit for edge in (min, max))
-        key = "edge_beta" if form.zero_table and not closing else "beta"
-        what = "certified beta of the closing threshold" if closing else "beta of the law"
+        key = "edge_beta" if form.zero_table and not at_zero else "beta"
+        guard = c.side(self.sign).certificate.guard
+        what = f"certified beta of the {guard} threshold" if at_zero else "beta of the law"
         return Constant(
-            symbol="zero_segment" if closing else "law_segment",
+            symbol="zero_segment" if at_zero else "law_segment",
             value=tuple((start % 2**32, turn * change) for start, change in segments),
             equation=f"Eq. (7), {what} times {self.unit}: start {rows.change_sign} change * dP modulo 2^32, dP in "
             "codes of sensor A; the first row is the smallest beta, for pressures that can't be right",
@@ -155,7 +156,7 @@ class LawConstants:
                 self._constant(
                     "EDGE_FACTOR",
                     form.edge,
-                    "edge, coefficient of (beta - beta_closing) in u_O, for each code of command missing to u_edge",
+                    "edge, coefficient of (beta - beta_zero) in u_O, for each code of command missing to u_edge",
                     f"u_min0/{c.edge_codes} = {self._volts(form.edge * self.unit):.6g} V",
                     (u_min0_key, "edge_codes", "u_max_V", *SCALED),
                     rounding=f"exact from {u_min0_text}",
@@ -236,7 +237,8 @@ class LawConstants:
         return [
             self._constant(
                 "RECIPROCAL", form.reciprocal, f"what the quotient is multiplied by to get counts, times 2^{shift}",
-                f"1/{form.divisor}", rounding=f"rounded up, and proved exact for every quotient up to {form.largest}",
+                f"1/{form.divisor}",
+                rounding=f"one of those above it that are exact for every quotient up to {form.largest}",
             ),
             self._constant("RECIPROCAL_SHIFT", shift, "the power of two in RECIPROCAL", f"2^{shift}", literal="plain"),
         ]  # fmt: skip

@@ -2,12 +2,21 @@
 
 from fractions import Fraction
 
+from dzdesign.core.errors import InputError
+from dzdesign.design.amplifier import RAMP_UNIT
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.signals_in_words import unseen_failures
 from dzdesign.identify.model import SideModel, TestResult, ValveModel
 
 
 def costs_of(compensator: Compensator, valve: ValveModel) -> tuple[str, ...]:
-    """Return one line per test and per choice."""
+    """Return one line per test and per choice.
+
+    Raises
+    ------
+    InputError
+        If the largest output does not open the valve.
+    """
     lines = []
     for sign in compensator.signals.signs:
         name = "positive" if sign > 0 else "negative"
@@ -20,7 +29,12 @@ def costs_of(compensator: Compensator, valve: ValveModel) -> tuple[str, ...]:
         f"outside {low:.2f} to {high:.2f} MPa the nearest tested beta is held and nothing is certified; "
         f"a pressure difference below -{compensator.reverse_codes} codes is taken as a failed sensor: smallest beta"
     )
-    return tuple(lines + _cost_of_options(compensator))
+    if compensator.negative is None and valve.sides.get("negative") is not None:
+        lines.append(
+            "the valve's negative side is left out: the command has one sign; give a --command-signal of both to drive "
+            "two solenoids"
+        )
+    return tuple(lines + unseen_failures(compensator.signals) + _cost_of_options(compensator))
 
 
 def _cost_of_test(compensator: Compensator, test: TestResult, sign: int) -> str:
@@ -45,7 +59,18 @@ def _cost_of_test(compensator: Compensator, test: TestResult, sign: int) -> str:
     if edge and test.u_knee_falling_V is not None:
         flow = test.slope_L_min_V * max(at_edge * u_max - test.u_knee_falling_V, 0.0)
         parts.append(f"flow on closing at the edge's end {flow:.2f} L/min")
-    parts.append(f"drive at full command {full:.2%}")
+    limit = compensator.amplifier.compare_limit / signals.compare_max
+    if limit <= offset or limit <= (test.u_knee_rising_V or 0.0) / u_max:
+        raise InputError(
+            f"the largest output is {limit:.1%} of full drive, but the valve opens at "
+            f"{max(offset, (test.u_knee_rising_V or 0.0) / u_max):.1%} at {test.dp_MPa:.2f} MPa, so nothing would ever "
+            "flow; give a larger --output-max"
+        )
+    if limit < full:
+        reached = edge / span + (1 - edge / span) * (limit - at_edge) / (full - at_edge)
+        parts.append(f"the largest drive, {limit:.2%}, is reached at {reached:.1%} of command")
+    else:
+        parts.append(f"drive at full command {full:.2%}")
     return ", ".join(parts)
 
 
@@ -66,7 +91,7 @@ def _cost_of_side(compensator: Compensator, side: SideModel, sign: int) -> list[
     certificate = compensator.side(sign).certificate
     lines.append(
         f"the table's offset stays {1e3 * certificate.mean_loss_V:.2f} mV under the certified curve on average, "
-        f"{1e3 * certificate.largest_loss_V:.2f} mV at most"
+        f"{1e3 * certificate.largest_loss_V:.2f} mV at most{_of_which_dither(compensator)}"
     )
     guard = certificate.guard
     if guard != "closing":
@@ -84,14 +109,40 @@ def _cost_of_options(compensator: Compensator) -> list[str]:
         peak = amplifier.dither_counts / signals.compare_max
         frequency = signals.tick_Hz / (2 * amplifier.dither_ticks)
         lines.append(
-            f"dither of {frequency:.0f} Hz and {peak:.2%} of full drive: the offset stands lower by that much, so that "
-            "zero command stays shut at the wave's top"
+            f"dither of {frequency:.4g} Hz (half a wave is a whole number of PWM periods) and ±{peak:.2%} of full "
+            "drive: the offset stands lower by that much, so that zero command stays shut at the wave's top"
         )
+    if compensator.edge_codes:
+        lines.append(f"the edge is a power of two in codes of command: {compensator.edge_codes}")
     if amplifier.has_ramp:
-        lines.append("ramps hold for zero command too: the valve closes no faster than they let it")
-    if amplifier.compare_limit < signals.compare_max:
-        lines.append(f"the drive ends at {amplifier.compare_limit / signals.compare_max:.1%} of full")
+        lines.append(
+            f"ramps: {_ramp_text(compensator)}; they hold for zero command too: the valve closes no faster than they "
+            "let it"
+        )
     if amplifier.window_codes:
         share = amplifier.window_codes / signals.command.span(1)
-        lines.append(f"a command must pass zero by {share:.2%} before the other solenoid is driven")
+        lines.append(
+            f"coming from the other sign a command must pass zero by {share:.2%} before its solenoid is driven: that "
+            "much dead zone remains then, if the lines above say less"
+        )
     return lines
+
+
+def _of_which_dither(compensator: Compensator) -> str:
+    counts = compensator.amplifier.dither_counts
+    if not counts:
+        return ""
+    peak = counts / compensator.signals.compare_max * float(compensator.u_max_V)
+    return f", of which {1e3 * peak:.2f} mV are the dither's peak"
+
+
+def _ramp_text(compensator: Compensator) -> str:
+    """Say how long a command takes from zero to full and back, of each sign."""
+    signals, amplifier = compensator.signals, compensator.amplifier
+    parts = []
+    for place, sign in enumerate(signals.signs):
+        for way, steps in (("up", amplifier.ramp_up), ("down", amplifier.ramp_down)):
+            name = f"{'positive ' if sign > 0 else 'negative '}{way}" if compensator.negative is not None else way
+            seconds = signals.command.span(sign) * RAMP_UNIT / (steps[place] * signals.sample_Hz) if steps[place] else 0
+            parts.append(f"{name} {seconds:.4g} s" if seconds else f"{name} at once")
+    return ", ".join(parts)

@@ -12,7 +12,7 @@ from dzdesign.design.costs import costs_of
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.signals import Signals
 from dzdesign.design.units import Units, finest_units
-from dzdesign.identify.guard_curve import GuardCurve
+from dzdesign.identify.guard_curve import GUARDS, GuardCurve
 from dzdesign.identify.model import SideModel, ValveModel
 from dzdesign.identify.valve_file import valve_from_document
 
@@ -52,14 +52,11 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
     u_max = Fraction(repr(valve.u_max_V))
     edge_codes = options.edge_codes()
     units = finest_units(signals, edge_codes)
+    if len(signals.signs) == 2:
+        _refuse_two_signs(valve, options.guard)
     laws = {}
     for sign in signals.signs:
         name = "positive" if sign > 0 else "negative"
-        if sign < 0 and name not in valve.sides:
-            raise InputError(
-                "the command has both signs, but the valve's negative side was not tested; record its ramps, or give a "
-                "command of one sign"
-            )
         side = valve.positive if sign > 0 else valve.sides[name]
         laws[name] = _side_law(side, options, u_max, sign, units)
     compensator = Compensator(
@@ -98,7 +95,7 @@ def _side_law(side: SideModel, options: DesignOptions, u_max: Fraction, sign: in
     dither = Fraction(options.amplifier().dither_counts, signals.compare_max)
     ceiling = offset_ceiling(certified, signals, u_max, sign=sign, reserve=dither)
     if min(ceiling.limit) <= 0:
-        raise InputError("the dither's height leaves no offset under the certified one; make it smaller")
+        raise InputError("the dither's peak leaves no offset under the certified one; make it smaller")
 
     def table(under: OffsetCeiling) -> tuple[int, ...]:
         return choose_beta_table(under, u_min0, side.trend, denominator=units.beta, above_one=above_one)
@@ -148,19 +145,41 @@ def _curve_of(side: SideModel, guard: str) -> GuardCurve:
     """Return the curve that certifies a threshold; refuse one that valve.json does not have, and say why."""
     if guard in side.guards:
         return side.guards[guard]
-    has_rising, has_falling = side.tests[0].rising is not None, side.tests[0].falling is not None
-    if guard != "opening" and not has_falling:
-        remedy = "record the falling branch too, or accept flow at zero command after closing with --guard opening"
-    elif guard != "closing" and not has_rising:
-        remedy = "record the rising branch too, or take --guard closing, the safer one"
-    else:
-        remedy = (
-            "make valve.json again with `dzdesign identify`; if it is still missing, no offset lies under that "
-            "threshold's bounds: take one that is there"
-        )
     raise InputError(
         f"the ramp tests bound the {' and the '.join(side.guards)} threshold, but the {guard} one is to be guarded; "
-        + remedy
+        + _remedy(side, guard)
+    )
+
+
+def _refuse_two_signs(valve: ValveModel, guard: str) -> None:
+    """Refuse a command of both signs where a side was not tested, or does not bound the guarded threshold."""
+    if "negative" not in valve.sides:
+        raise InputError(
+            "the command has both signs, but the valve's negative side was not tested; record its ramps, or give a "
+            "command of one sign"
+        )
+    guards = {name: valve.sides[name].guards for name in ("positive", "negative")}
+    lacking = [name for name, found in guards.items() if guard not in found]
+    if not lacking:
+        return
+    common = [name for name in GUARDS if all(name in found for found in guards.values())]
+    raise InputError(
+        f"the {' and the '.join(lacking)} side's ramp tests do not bound the {guard} threshold, which is to be "
+        "guarded; "
+        + (f"take --guard {common[0]}, or " if common else "no guard serves both sides: ")
+        + "record both branches of both sides"
+    )
+
+
+def _remedy(side: SideModel, guard: str) -> str:
+    has_rising, has_falling = side.tests[0].rising is not None, side.tests[0].falling is not None
+    if guard != "opening" and not has_falling:
+        return "record the falling branch too, or accept flow at zero command after closing with --guard opening"
+    if guard != "closing" and not has_rising:
+        return "record the rising branch too, or take --guard closing, the safer one"
+    return (
+        "make valve.json again with `dzdesign identify`; if it is still missing, no offset lies under that threshold's "
+        "bounds: take one that is there"
     )
 
 

@@ -39,8 +39,8 @@ class DesignOptions:
         Of a command of both signs: share of full command that it must pass zero by before the other side is driven.
     ramp_up_s, ramp_down_s : tuple of float
         Time of the command from zero to full, and back, s: positive, then negative command. 0: no limit.
-    dither_Hz, dither_height : float, Fraction
-        Frequency of the dither, and its peak over full drive; 0: none.
+    dither_Hz, dither_peak : float, Fraction
+        Frequency of the dither, a square wave, and its peak (half its height) over full drive; 0: none.
     output_max : Fraction
         Largest drive over full drive.
     """
@@ -54,7 +54,7 @@ class DesignOptions:
     ramp_up_s: tuple[float, float] = (0.0, 0.0)
     ramp_down_s: tuple[float, float] = (0.0, 0.0)
     dither_Hz: float = 0.0
-    dither_height: Fraction = Fraction(0)
+    dither_peak: Fraction = Fraction(0)
     output_max: Fraction = Fraction(1)
 
     def __post_init__(self) -> None:
@@ -68,22 +68,25 @@ class DesignOptions:
                 )
         for what, share, limit in (
             ("edge", self.edge, LARGEST_EDGE),
-            ("dither", self.dither_height, LARGEST_DITHER),
+            ("dither", self.dither_peak, LARGEST_DITHER),
             ("zero window", self.window, LARGEST_WINDOW),
         ):
             if not 0 <= share <= limit:
                 raise InputError(f"the {what} is {float(share):.3%}, expected 0 to {float(limit):.0%}")
         if not 0 < self.output_max <= 1:
             raise InputError(f"the largest output is {float(self.output_max):.3%}, expected more than 0, up to 100 %")
-        if bool(self.dither_Hz) != bool(self.dither_height):
-            raise InputError("a dither needs both, a frequency and a height, such as '150 Hz 1 %'")
+        if bool(self.dither_Hz) != bool(self.dither_peak):
+            raise InputError("a dither needs both, a frequency and a peak, such as '150 Hz 1 %'")
         if self.dither_Hz and not DITHER_HZ[0] <= self.dither_Hz <= DITHER_HZ[1]:
             raise InputError(
                 f"the dither's frequency is {self.dither_Hz:g} Hz, expected {DITHER_HZ[0]:g} to {DITHER_HZ[1]:g} Hz"
             )
         for seconds in self.ramp_up_s + self.ramp_down_s:
-            if not 0 <= seconds <= LONGEST_RAMP_S:
-                raise InputError(f"a ramp takes {seconds:g} s, expected 0 (none) to {LONGEST_RAMP_S:g} s")
+            if not 0 <= seconds <= LONGEST_RAMP_S or 0 < seconds < 1 / self.signals.sample_Hz:
+                raise InputError(
+                    f"a ramp takes {seconds:g} s, expected 0 (none), or from one sample, "
+                    f"{1 / self.signals.sample_Hz:g} s, to {LONGEST_RAMP_S:g} s"
+                )
 
     def edge_codes(self) -> int:
         """Return the codes of the edge: the largest power of two within its share of the shorter command."""
@@ -106,7 +109,7 @@ class DesignOptions:
             window_codes=round(self.window * min(spans)) if both else 0,
             ramp_up=self._ramp(self.ramp_up_s, spans),
             ramp_down=self._ramp(self.ramp_down_s, spans),
-            dither_counts=round(self.dither_height * signals.compare_max),
+            dither_counts=round(self.dither_peak * signals.compare_max),
             dither_ticks=max(1, round(signals.tick_Hz / (2 * self.dither_Hz))) if self.dither_Hz else 1,
             compare_limit=int(self.output_max * signals.compare_max),
         )

@@ -41,6 +41,27 @@ def finest_units(signals: Signals, edge_codes: int) -> Units:
     InputError
         If even the coarsest do not fit.
     """
+    units = _finest_that_fit(signals, edge_codes)
+    if units is not None:
+        return units
+    spans = " and ".join(str(signals.command.span(sign)) for sign in signals.signs)
+    what = f"a full command of {spans} codes over {signals.compare_max} counts"
+    shorter = edge_codes
+    while shorter and _finest_that_fit(signals, shorter) is None:
+        shorter //= 2
+    if shorter:
+        share = shorter / min(signals.command.span(sign) for sign in signals.signs)
+        raise InputError(
+            f"an edge of {edge_codes} codes of command, with {what}, needs more than 64-bit arithmetic; choose one of "
+            f"{100 * share + 0.01:.2f} % ({shorter} codes) at most"
+        )
+    raise InputError(
+        f"{what} needs more than 64-bit arithmetic; choose an attenuator whose full command has more factors in common "
+        "with the counts" + (", or leave out the edge" if edge_codes else "")
+    )
+
+
+def _finest_that_fit(signals: Signals, edge_codes: int) -> Units | None:
     spans = [signals.command.span(sign) for sign in signals.signs]
     finest, coarsest = sum((BETA_BITS[0], COEFFICIENT_BITS[0])), sum((BETA_BITS[1], COEFFICIENT_BITS[1]))
     for total in range(finest, coarsest - 1, -1):
@@ -50,10 +71,7 @@ def finest_units(signals: Signals, edge_codes: int) -> Units:
                 _fits(span, signals.compare_max, edge_codes, beta, coefficient) for span in spans
             ):
                 return Units(beta=1 << beta, coefficient=1 << coefficient)
-    raise InputError(
-        f"a full command of {' and '.join(map(str, spans))} codes over {signals.compare_max} counts needs more than "
-        "64-bit arithmetic; choose an attenuator whose full command has more factors in common with the counts"
-    )
+    return None
 
 
 def _fits(span: int, compare_max: int, edge_codes: int, beta_bits: int, coefficient_bits: int) -> bool:

@@ -1,6 +1,7 @@
 """The options of `design` on the command line, turned into `DesignOptions`."""
 
 import argparse
+import re
 from fractions import Fraction
 
 from dzdesign.core.errors import InputError, nearest
@@ -71,7 +72,9 @@ def design_options(args: argparse.Namespace, target: "TargetInputs") -> "DesignO
     command = command_signal(
         parse_signal(text["command_signal"], "--command-signal"), converter, inverted=text["polarity"] == "inverted"
     )
-    dither_Hz, dither_height = _dither(text["dither"])
+    if command.negative_full_code is None:
+        _refuse_what_needs_both_signs(args, text)
+    dither_Hz, dither_peak = _dither(text["dither"])
     return DesignOptions(
         law_name=text["law"],
         signals=Signals(
@@ -90,9 +93,24 @@ def design_options(args: argparse.Namespace, target: "TargetInputs") -> "DesignO
         ramp_up_s=_seconds(text["ramp_up"], "--ramp-up"),
         ramp_down_s=_seconds(text["ramp_down"], "--ramp-down"),
         dither_Hz=dither_Hz,
-        dither_height=dither_height,
+        dither_peak=dither_peak,
         output_max=_share(text["output_max"], "--output-max"),
     )
+
+
+def _refuse_what_needs_both_signs(args: argparse.Namespace, text: dict[str, str]) -> None:
+    """Refuse options of negative commands where the command has none, and would leave them without effect."""
+    given = [
+        f"--{name.replace('_', '-')}" for name in ("negative_dp", "zero_window") if getattr(args, name) is not None
+    ]
+    given += [
+        f"the second time of --{name.replace('_', '-')}" for name in ("ramp_up", "ramp_down") if "/" in text[name]
+    ]
+    if given:
+        raise InputError(
+            f"{given[0]} is for a command of both signs, but {text['command_signal']!r} has one; leave it out, or give "
+            "a --command-signal such as '-10..10 V x 0.15 + 1.5 V'"
+        )
 
 
 def _share(text: str, option: str) -> Fraction:
@@ -109,14 +127,13 @@ def _seconds(text: str, option: str) -> tuple[float, float]:
 
 
 def _dither(text: str) -> tuple[float, Fraction]:
-    """Read ``off`` or a frequency and a height."""
+    """Read ``off`` or a frequency and the peak of the wave."""
     if text == "off":
         return 0.0, Fraction(0)
-    words = text.split()
-    if len(words) != 4 or words[1].lower() != "hz":
-        raise InputError(f"--dither is '{text}', expected 'off' or a frequency and a height, such as '150 Hz 1 %'")
-    try:
-        frequency = float(words[0])
-    except ValueError as error:
-        raise InputError(f"--dither is '{text}', expected a frequency such as '150 Hz' first") from error
-    return frequency, _share(" ".join(words[2:]), "--dither")
+    parts = re.fullmatch(r"(.+?hz)\b(.+)", text.strip(), re.IGNORECASE)
+    if parts is None:
+        raise InputError(
+            f"--dither is '{text}', expected 'off', or a frequency in Hz and the wave's peak over full drive, such as "
+            "'150 Hz 1 %'"
+        )
+    return parse_quantity(parts[1], "frequency", "--dither"), _share(parts[2], "--dither")

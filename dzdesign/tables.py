@@ -109,9 +109,13 @@ def _side_lines(side: "SideModel") -> tuple[str, ...]:
 def print_compensator(compensator: "Compensator") -> None:
     """Print the law, the certificate and what the choices cost."""
     from dzdesign.derivation.law import law
+    from dzdesign.design.signals_in_words import signals_in_words
 
     chosen = law(compensator.law_name)
-    lines = [f"law {chosen.name} {chosen.equation}: u_O = {chosen.output}"]
+    lines = [
+        f"law {chosen.name} {chosen.equation}: u_O = {chosen.output}",
+        *signals_in_words(compensator.signals, float(compensator.u_max_V)),
+    ]
     for sign in compensator.signals.signs:
         side = compensator.side(sign)
         certificate = side.certificate
@@ -128,7 +132,8 @@ def print_compensator(compensator: "Compensator") -> None:
         ]
     if compensator.edge_codes:
         share = compensator.edge_codes / compensator.signals.command.span(1)
-        lines.append(f"edge: from the closing to the opening threshold over the first {share:.2%} of command")
+        guard = compensator.positive.certificate.guard
+        lines.append(f"edge: from the {guard} to the opening threshold over the first {share:.2%} of command")
     console = _console()
     for line in (*lines, *(f"cost: {line}" for line in compensator.costs)):
         console.print(line, markup=False, soft_wrap=True)
@@ -154,10 +159,11 @@ def print_verification(verification: "Verification") -> None:
         "dP (MPa)", "without: opening", "closing", "with: opening", "closing", "Q at zero, no beta", "with beta",
         "Q max without", "with (L/min)",
     )  # fmt: skip
+    both = len({loop.result.side for loop in verification.loops}) > 1
     for loop in verification.loops:
         result = loop.result
         table.add_row(
-            f"{result.dp_MPa:.2f}",
+            f"{result.side} {result.dp_MPa:.2f}" if both else f"{result.dp_MPa:.2f}",
             _percent(result.dead_zone_opening),
             _percent(result.dead_zone_closing),
             _percent(result.residual_opening),

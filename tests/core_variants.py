@@ -40,7 +40,7 @@ AMPLIFIER = {
     "ramp_up_s": (0.5, 0.8),
     "ramp_down_s": (0.3, 0.0),
     "dither_Hz": 150.0,
-    "dither_height": Fraction(1, 100),
+    "dither_peak": Fraction(1, 100),
     "output_max": Fraction(9, 10),
 }
 #: Name to the options of `design`; "signals" are those that differ from the target's own.

@@ -48,7 +48,7 @@ def full_options(**changes) -> DesignOptions:
         "ramp_up_s": (0.5, 0.8),
         "ramp_down_s": (0.4, 0.0),
         "dither_Hz": 150.0,
-        "dither_height": Fraction(1, 100),
+        "dither_peak": Fraction(1, 100),
         "output_max": Fraction(95, 100),
     }
     return DesignOptions(**(chosen | changes))

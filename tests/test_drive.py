@@ -77,7 +77,7 @@ def options_named(name: str) -> DesignOptions:
             signals=replace(plain.signals, command=turned("4..20 mA on 140 ohm")),
             ramp_down_s=(0.2, 0.0),
             dither_Hz=250.0,
-            dither_height=Fraction(3, 100),
+            dither_peak=Fraction(3, 100),
             output_max=Fraction(3, 4),
         ),
         "quick ramps, no window": full_options(window=Fraction(0), ramp_up_s=(0.001, 0.02), ramp_down_s=(0.0, 0.003)),
@@ -250,7 +250,7 @@ def test_the_dither_has_its_frequency_and_its_peak(name):
     exact = signals.tick_Hz / (2 * amplifier.dither_ticks)
     assert abs(rises - exact) <= 1
     assert abs(1 / exact - 1 / asked.dither_Hz) <= 1 / signals.tick_Hz, "to a PWM period"
-    assert amplifier.dither_counts == round(asked.dither_height * signals.compare_max)
+    assert amplifier.dither_counts == round(asked.dither_peak * signals.compare_max)
     assert sum(seen[: 2 * amplifier.dither_ticks]) == 2 * amplifier.dither_ticks * law, "its mean is the law's"
 
 

@@ -20,7 +20,7 @@ from dzdesign.verify.plant import plants_from_tests
 pytestmark = needs_compiler
 QUICK = RampSequence(rest=1.0, ramp=20.0, top=0.5)
 NO_RAMPS = {"ramp_up_s": (0.0, 0.0), "ramp_down_s": (0.0, 0.0)}
-NO_DITHER = {"dither_Hz": 0.0, "dither_height": Fraction(0)}
+NO_DITHER = {"dither_Hz": 0.0, "dither_peak": Fraction(0)}
 
 
 @cache
@@ -67,7 +67,7 @@ def test_a_dither_that_the_certificate_does_not_count_is_seen_at_the_waves_top(t
     def uncounted(compensator):
         return replace(compensator, amplifier=replace(compensator.amplifier, dither_counts=6000, dither_ticks=12))
 
-    _, counted = compared(tmp_path / "counted", dither_Hz=104.0, dither_height=Fraction(10, 100))
+    _, counted = compared(tmp_path / "counted", dither_Hz=104.0, dither_peak=Fraction(10, 100))
     assert counted.result.q_zero_L_min == 0
     _, leaking = compared(tmp_path / "leaking", change=uncounted, **NO_DITHER)
     assert leaking.result.q_zero_L_min > 1e-3

@@ -115,7 +115,7 @@ def test_sensors_too_unlike_are_refused():
 def test_the_amplifiers_integers():
     options = DesignOptions(
         signals=Signals(command=command("-10..10 V x 0.15 + 1.5 V")),
-        edge=Fraction(1, 100), ramp_up_s=(0.5, 0.8), dither_Hz=150.0, dither_height=Fraction(1, 100),
+        edge=Fraction(1, 100), ramp_up_s=(0.5, 0.8), dither_Hz=150.0, dither_peak=Fraction(1, 100),
         output_max=Fraction(9, 10),
     )  # fmt: skip
     amplifier = options.amplifier()
@@ -136,7 +136,7 @@ def test_the_amplifiers_integers():
         ({"edge": Fraction(1, 5)}, "the edge is 20.000%, expected 0 to 10%"),
         ({"edge": Fraction(1, 10**5)}, "less than one code"),
         ({"dither_Hz": 150.0}, "a dither needs both"),
-        ({"dither_Hz": 50.0, "dither_height": Fraction(1, 100)}, "expected 100 to 300 Hz"),
+        ({"dither_Hz": 50.0, "dither_peak": Fraction(1, 100)}, "expected 100 to 300 Hz"),
         ({"output_max": Fraction(0)}, "the largest output"),
         ({"ramp_up_s": (1e4, 0.0)}, "a ramp takes 10000 s"),
         ({"guard": "closed"}, "did you mean 'closing'"),

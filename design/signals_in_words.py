@@ -1,0 +1,49 @@
+"""What the codes of a compensator stand for, and which failures of a wire they do not show, in a person's words."""
+
+from dzdesign.design.signals import PressureSignal, Signals
+
+
+def signals_in_words(signals: Signals, u_max_V: float) -> list[str]:
+    """Return one line for the command and one for each sensor."""
+    command = signals.command
+    text = f"command: code {command.zero_code} is zero, {command.full_code} is {u_max_V:g} V"
+    if command.negative_full_code is not None:
+        text += f", {command.negative_full_code} is -{u_max_V:g} V"
+    lines = [f"{text}; {_sound(command.valid_codes)}"]
+    for name, sensor in _sensors(signals).items():
+        lines.append(
+            f"pressure {name}: code {sensor.zero_code} is none, {sensor.full_code} is {float(sensor.span_MPa):g} MPa; "
+            + _sound(sensor.valid_codes)
+        )
+    if signals.swapped:
+        lines.append("the pressure drop of negative commands is B less A")
+    return lines
+
+
+def unseen_failures(signals: Signals) -> list[str]:
+    """Return one line for each signal whose sound codes hide a failure."""
+    lines = []
+    command = signals.command
+    away = -command.direction(1) * command.zero_code
+    sign = 1 if away > 0 else -1
+    if command.valid_codes[0] == 0 and away and sign in signals.signs:
+        share = command.from_zero(0, sign) / command.span(sign)
+        lines.append(
+            f"a broken wire of the command that reads code 0 is taken for {'-' if sign < 0 else ''}{share:.0%} of "
+            "command: have the wire supervised outside, or use a signal with a live zero"
+        )
+    for name, sensor in _sensors(signals).items():
+        low, high = sensor.valid_codes
+        unseen = ["a broken wire"] if low == 0 else []
+        unseen += ["a reading above the span"] if high == signals.code_max else []
+        if unseen:
+            lines.append(f"of sensor {name} {' and '.join(unseen)} can't be told from a pressure")
+    return lines
+
+
+def _sensors(signals: Signals) -> dict[str, PressureSignal]:
+    return {"A": signals.pressure_a, "B": signals.pressure_b}
+
+
+def _sound(codes: tuple[int, int]) -> str:
+    return f"{codes[0]} to {codes[1]} are sound"
