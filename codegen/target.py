@@ -61,6 +61,8 @@ class Target:
     takes_any_signals
         True for a target without a converter and timer of its own, such as a library: it takes the scalings of any
         compensator, and ``compare_max`` and ``adc_code_max`` are only what `design` uses if nobody says otherwise.
+    has_timer
+        True if it takes samples and ticks by a timer of its own, at `sample_Hz` and `tick_Hz` and no other rate.
 
     Raises
     ------
@@ -79,6 +81,7 @@ class Target:
     context: Mapping[str, str]
     arithmetic: str = "wide"
     takes_any_signals: bool = False
+    has_timer: bool = True
     link: Link | None = None
 
     def __post_init__(self) -> None:
@@ -132,15 +135,13 @@ class Target:
         InputError
             With the first scaling that differs.
         """
-        if self.takes_any_signals:
-            return
-        for what, asked, has in (
-            ("largest compare value", signals.compare_max, self.compare_max),
-            ("largest converter code", signals.code_max, self.adc_code_max),
-            ("number of samples a second", signals.sample_Hz, self.sample_Hz),
-            ("number of PWM periods a second", signals.tick_Hz, self.tick_Hz),
+        for what, asked, has, fixed in (
+            ("largest compare value", signals.compare_max, self.compare_max, not self.takes_any_signals),
+            ("largest converter code", signals.code_max, self.adc_code_max, not self.takes_any_signals),
+            ("number of samples a second", signals.sample_Hz, self.sample_Hz, self.has_timer),
+            ("number of PWM periods a second", signals.tick_Hz, self.tick_Hz, self.has_timer),
         ):
-            if asked != has:
+            if fixed and asked != has:
                 raise InputError(
                     f"the compensator's {what} is {asked}, but target {self.name} has {has}; "
                     f"design it again with `dzdesign design --target {self.name}`"

@@ -76,19 +76,28 @@ def _no_number(word: str) -> float:
     raise ValueError(f"{word} is not a number of JSON")
 
 
+def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        seen: set[str] = set()
+        twice = next(key for key, _ in pairs if key in seen or seen.add(key))
+        raise ValueError(f"the key {twice[:40]!r} is there twice")
+    return found
+
+
 def parse_document(content: bytes, source: str, schemas: tuple[str, ...]) -> dict[str, Any]:
     """Read a JSON artefact and check that its schema is one of `schemas`.
 
     Raises
     ------
     InputError
-        If it is no JSON object in UTF-8, holds what can't be written again (NaN, half a character), or has another
-        schema.
+        If it is no JSON object in UTF-8, holds what can't be written again (NaN, half a character) or a key twice, or
+        has another schema.
     """
     expected = " or ".join(schemas)
     try:
         # JSON in UTF-16, or after a byte order mark, would be read here and stumbled over later.
-        document = json.loads(content.decode("utf-8"), parse_constant=_no_number)
+        document = json.loads(content.decode("utf-8"), parse_constant=_no_number, object_pairs_hook=_unique_keys)
         to_json(document).encode()
     except (ValueError, RecursionError) as error:
         raise InputError(f"'{source}' is not JSON ({error}); expected an artefact of schema {expected}") from error

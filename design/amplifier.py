@@ -47,8 +47,10 @@ class Amplifier:
         ):
             if not 0 <= value <= limit:
                 raise InputError(f"{name} is {value}, expected 0 to {limit}")
-        if not 1 <= self.dither_ticks <= 65535:
-            raise InputError(f"dither_ticks is {self.dither_ticks}, expected at least one PWM period")
+        if not 1 <= self.dither_ticks <= 32767:
+            raise InputError(
+                f"dither_ticks is {self.dither_ticks}, expected 1 to 32767 PWM periods: a wave is twice that"
+            )
 
     @property
     def has_ramp(self) -> bool:

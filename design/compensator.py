@@ -9,6 +9,7 @@ from dzdesign.derivation.law import law
 from dzdesign.derivation.scaling import drive, evaluate_line
 from dzdesign.design.amplifier import RAMPED_CODES, Amplifier
 from dzdesign.design.signals import Signals
+from dzdesign.identify.guard_curve import GUARDS
 
 #: What to do below the reference pressure drop: beta = 1 as in Eq. (7), or what the tests there say.
 BELOW_REFERENCE = ("hold", "extend")
@@ -42,6 +43,10 @@ class Certificate:
     smallest_margin_V: Fraction
     mean_loss_V: float
     largest_loss_V: float
+
+    def __post_init__(self) -> None:
+        if self.guard not in GUARDS:
+            raise InputError(f"the guard is {self.guard[:40]!r}, expected {', '.join(GUARDS[:-1])} or {GUARDS[-1]}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,22 +4,21 @@ from dataclasses import replace
 from fractions import Fraction
 
 from dzdesign.core.artefacts import sha256_of, to_json
-from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.errors import InputError
 from dzdesign.derivation.law import law
 from dzdesign.design.beta_table import STEP_CODES, OffsetCeiling, OffsetCurve, choose_beta_table, offset_ceiling
-from dzdesign.design.compensator import Certificate, Compensator, SideLaw
+from dzdesign.design.certifying import certify, guarded_curve, hold_below
+from dzdesign.design.compensator import Compensator, SideLaw
 from dzdesign.design.costs import costs_of
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.signals import Signals
 from dzdesign.design.units import Units, finest_units
-from dzdesign.identify.guard_curve import GUARDS, GuardCurve
+from dzdesign.identify.guard_curve import GUARDS
 from dzdesign.identify.model import SideModel, ValveModel
 from dzdesign.identify.valve_file import valve_from_document
 
 #: Share of the sensor's span by which the difference may read negative before it counts as a failed sensor.
 REVERSE_SHARE = Fraction(1, 100)
-#: Of a loss in V: tenths of a microvolt.
-LOSS_DIGITS = 7
 #: Standard errors by which the edge's end stands above the opening threshold.
 EDGE_ERRORS = 3
 
@@ -83,7 +82,7 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
 def _side_law(side: SideModel, options: DesignOptions, u_max: Fraction, sign: int, units: Units) -> SideLaw:
     """Choose the coefficients and tables of one side, and prove its certificate."""
     signals = options.signals
-    certified = _guarded_curve(side, options)
+    certified = guarded_curve(side, options.guard, options.below_reference)
     opening = _opening_curve(side, options) if options.edge else None
     reference = Fraction(repr(side.reference_dp_MPa))
     top = (opening or certified).at(reference)
@@ -101,7 +100,6 @@ def _side_law(side: SideModel, options: DesignOptions, u_max: Fraction, sign: in
         return choose_beta_table(under, u_min0, side.trend, denominator=units.beta, above_one=above_one)
 
     beta = table(ceiling)
-    losses = _losses_V(certified, ceiling, signals, beta, u_min0 * u_max / units.beta)
     edge_beta = None
     if opening is not None:
         upper = table(_opening_ceiling(opening, signals, u_max, sign))
@@ -111,43 +109,17 @@ def _side_law(side: SideModel, options: DesignOptions, u_max: Fraction, sign: in
         u_min0_over_u_max=u_min0,
         beta_numerators=beta,
         edge_numerators=edge_beta,
-        certificate=Certificate(
-            confidence=side.confidence,
+        certificate=certify(
+            side,
+            certified,
+            ceiling,
             guard=options.guard,
-            level_L_min=side.level_L_min,
-            dp_MPa=(certified.dp_MPa[0], certified.dp_MPa[-1]),
-            smallest_margin_V=_smallest_margin(ceiling, beta, u_min0, units.beta) * u_max,
-            mean_loss_V=round(sum(losses) / len(losses), LOSS_DIGITS),
-            largest_loss_V=round(max(losses), LOSS_DIGITS),
+            signals=signals,
+            u_max_V=u_max,
+            u_min0=u_min0,
+            table=beta,
+            denominator=units.beta,
         ),
-    )
-
-
-def _guarded_curve(side: SideModel, options: DesignOptions) -> OffsetCurve:
-    """Return the certified offset of the threshold that is to be guarded."""
-    if not side.beta_dp_MPa:
-        raise InputError(
-            "the valve was identified without a pressure drop, so no offset can be certified at any pressure; "
-            "record the ramp test again with a column of dP (or pA and pB)"
-        )
-    curve = _curve_of(side, options.guard)
-    u_min0 = Fraction(repr(curve.u_min0_V))
-    return OffsetCurve(
-        dp_MPa=tuple(Fraction(repr(value)) for value in curve.beta_dp_MPa),
-        offset_V=tuple(Fraction(repr(value)) * u_min0 for value in curve.beta),
-        steps_V=tuple(Fraction(repr(step)) for step in curve.certified_steps_V),
-        lowest_V=min(Fraction(repr(bound)) for bound in curve.u_lower_V),
-        hold_below_MPa=_hold_below(side, options),
-    )
-
-
-def _curve_of(side: SideModel, guard: str) -> GuardCurve:
-    """Return the curve that certifies a threshold; refuse one that valve.json does not have, and say why."""
-    if guard in side.guards:
-        return side.guards[guard]
-    raise InputError(
-        f"the ramp tests bound the {' and the '.join(side.guards)} threshold, but the {guard} one is to be guarded; "
-        + _remedy(side, guard)
     )
 
 
@@ -171,18 +143,6 @@ def _refuse_two_signs(valve: ValveModel, guard: str) -> None:
     )
 
 
-def _remedy(side: SideModel, guard: str) -> str:
-    has_rising, has_falling = side.tests[0].rising is not None, side.tests[0].falling is not None
-    if guard != "opening" and not has_falling:
-        return "record the falling branch too, or accept flow at zero command after closing with --guard opening"
-    if guard != "closing" and not has_rising:
-        return "record the rising branch too, or take --guard closing, the safer one"
-    return (
-        "make valve.json again with `dzdesign identify`; if it is still missing, no offset lies under that threshold's "
-        "bounds: take one that is there"
-    )
-
-
 def _opening_curve(side: SideModel, options: DesignOptions) -> OffsetCurve:
     """Return where the edge ends and the law goes on: the opening threshold, and its error on top.
 
@@ -201,12 +161,8 @@ def _opening_curve(side: SideModel, options: DesignOptions) -> OffsetCurve:
         offset_V=tuple(offset),
         steps_V=(),
         lowest_V=min(offset),
-        hold_below_MPa=_hold_below(side, options),
+        hold_below_MPa=hold_below(side, options.below_reference),
     )
-
-
-def _hold_below(side: SideModel, options: DesignOptions) -> Fraction | None:
-    return Fraction(repr(side.reference_dp_MPa)) if options.below_reference == "hold" else None
 
 
 def _opening_ceiling(opening: OffsetCurve, signals: Signals, u_max: Fraction, sign: int) -> OffsetCeiling:
@@ -233,32 +189,6 @@ def _over(value: Fraction, rounding: str, unit: int) -> Fraction:
     scaled = value * unit
     numerator = scaled.numerator // scaled.denominator if rounding == "down" else round(scaled)
     return Fraction(numerator, unit)
-
-
-def _smallest_margin(ceiling: OffsetCeiling, table: tuple[int, ...], u_min0: Fraction, denominator: int) -> Fraction:
-    """Return the least distance over u_max between ceiling and offset on the certified codes; never negative."""
-    scale = denominator * STEP_CODES
-    margins = []
-    for code in ceiling.certified or range(len(ceiling.limit)):
-        index, share = divmod(code, STEP_CODES)
-        beta = Fraction(table[index] * (STEP_CODES - share) + table[index + 1] * share, scale)
-        margins.append(ceiling.limit[code] - beta * u_min0)
-    smallest = min(margins)
-    if smallest < 0:
-        raise RequirementError(f"the offset exceeds the certified one by {float(-smallest):.2e} of u_max")
-    return smallest
-
-
-def _losses_V(
-    curve: OffsetCurve, ceiling: OffsetCeiling, signals: Signals, table: tuple[int, ...], unit_V: Fraction
-) -> list[float]:
-    """Return by how much the table's offset lies under the certified curve at each certified code, V."""
-    losses = []
-    for code in ceiling.certified or range(1):
-        index, share = divmod(code, STEP_CODES)
-        numerator = Fraction(table[index] * (STEP_CODES - share) + table[index + 1] * share, STEP_CODES)
-        losses.append(float(curve.at(signals.dp_MPa(code)) - numerator * unit_V))
-    return losses
 
 
 def _prove_monotone(compensator: Compensator, sign: int) -> None:

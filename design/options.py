@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from fractions import Fraction
+from math import ceil, floor
 
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.design.amplifier import RAMP_UNIT, Amplifier
@@ -109,10 +110,32 @@ class DesignOptions:
             window_codes=round(self.window * min(spans)) if both else 0,
             ramp_up=self._ramp(self.ramp_up_s, spans),
             ramp_down=self._ramp(self.ramp_down_s, spans),
-            dither_counts=round(self.dither_peak * signals.compare_max),
-            dither_ticks=max(1, round(signals.tick_Hz / (2 * self.dither_Hz))) if self.dither_Hz else 1,
+            dither_counts=self._dither_counts(),
+            dither_ticks=self._dither_ticks(),
             compare_limit=int(self.output_max * signals.compare_max),
         )
+
+    def _dither_counts(self) -> int:
+        counts = round(self.dither_peak * self.signals.compare_max)
+        if self.dither_peak and not counts:
+            raise InputError(
+                f"a dither of {float(self.dither_peak):.4%} is less than half a count of the PWM, "
+                f"1/{self.signals.compare_max}; give more, or leave it out"
+            )
+        return counts
+
+    def _dither_ticks(self) -> int:
+        """Return the PWM periods of half a wave: the nearest frequency within `DITHER_HZ`."""
+        if not self.dither_Hz:
+            return 1
+        half = self.signals.tick_Hz / 2
+        slowest, fastest = floor(half / DITHER_HZ[0]), ceil(half / DITHER_HZ[1])
+        if fastest > slowest:
+            raise InputError(
+                f"no whole number of PWM periods, {self.signals.tick_Hz} a second, makes a dither of "
+                f"{DITHER_HZ[0]:g} to {DITHER_HZ[1]:g} Hz; leave it out"
+            )
+        return min(max(round(half / self.dither_Hz), fastest), slowest)
 
     def _ramp(self, seconds: tuple[float, float], spans: tuple[int, ...]) -> tuple[int, int]:
         """Return the steps a sample; at least one unit, so that a ramp never stands still."""

@@ -90,9 +90,13 @@ class PinSignal:
                 )
 
     def sound_codes(self, converter: Converter) -> tuple[int, int]:
-        """Return the first and last code of a sound signal: a broken wire reads below a live zero."""
-        low = self.low * BELOW_LIVE_ZERO if self.low > 0 else self.low
+        """Return the first and last code of a sound signal: a broken wire reads below a live zero.
+
+        Without a live zero it may be as much below its low end as above its high one, or a code of noise at the end
+        would count as a failure.
+        """
         margin = (ABOVE_SPAN - 1) * self.high
+        low = self.low * BELOW_LIVE_ZERO if self.low > 0 else self.low - margin
         return converter.code(self.volts(low)), converter.code(self.volts(self.high + margin))
 
 
@@ -182,7 +186,7 @@ def pressure_signal(signal: PinSignal, converter: Converter, span_MPa: Fraction)
     signal.check_within(converter)
     if signal.low < 0:
         raise InputError(f"the pressure signal '{signal.text}' starts below zero, expected 0 or a live zero")
-    span = signal.span_MPa or span_MPa
+    span = span_MPa if signal.span_MPa is None else signal.span_MPa
     zero, full = (converter.code(signal.volts(end)) for end in (signal.low, signal.high))
     if not zero < full:
         raise InputError(f"the pressure signal '{signal.text}' spans no code of the converter")

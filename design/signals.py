@@ -151,9 +151,9 @@ class Signals:
                 raise InputError(
                     f"{name}: sound codes {low} to {high} are outside the converter's 0 to {self.code_max}"
                 )
-        if self.largest_difference(1) > LARGEST_DIFFERENCE or (
-            self.swapped and self.largest_difference(-1) > LARGEST_DIFFERENCE
-        ):
+        # Either way round: a failed sensor makes any difference of sound codes.
+        a, b = self.pressure_a.valid_codes, self.pressure_b.valid_codes
+        if max(self.difference(a[1], b[0]), -self.difference(a[0], b[1])) > LARGEST_DIFFERENCE:
             raise InputError(
                 f"the sensors' spans of {float(self.pressure_a.span_MPa):g} and {float(self.pressure_b.span_MPa):g} "
                 "MPa are too unlike; choose sensors within a factor of seven"

@@ -73,7 +73,11 @@ DESIGN = (
         help='time from zero to full command, such as "0.5 s" or "0.5 s / 0.8 s" (default: none)',
     ),
     _given("--ramp-down", metavar="T", help="time from full command to zero (default: none)"),
-    _given("--dither", metavar="D", help='square wave on the output, such as "150 Hz 1 %%": plus and minus 1 %% of full drive (default: off)'),
+    _given(
+        "--dither",
+        metavar="D",
+        help='square wave on the output, such as "150 Hz 1 %%": plus and minus 1 %% of full drive (default: off)',
+    ),
     _given("--output-max", metavar="C", help='largest drive (default: "100 %%")'),
 )
 TARGET = _given("--target", default="f28335", metavar="NAME", help="microcontroller, see codegen --list-targets")

@@ -187,6 +187,7 @@ def run_design(args: argparse.Namespace) -> int:
 def run_codegen(args: argparse.Namespace) -> int:
     """Generate the firmware of a compensator."""
     from dzdesign.codegen.project import SCHEMA, generate, target_named
+    from dzdesign.design.certifying import prove_certificates
     from dzdesign.design.compensator_file import SCHEMA as COMPENSATOR_SCHEMA
     from dzdesign.design.compensator_file import compensator_from_document
     from dzdesign.design_options import given_design_options
@@ -207,7 +208,12 @@ def run_codegen(args: argparse.Namespace) -> int:
     else:
         for option in given_design_options(args):
             raise InputError(f"{option} is an option of the design, and '{path}' is designed; use `dzdesign design`")
-        firmware = generate(compensator_from_document(content, str(path)), args.target, content)
+        compensator = compensator_from_document(content, str(path))
+        try:
+            prove_certificates(compensator)
+        except InputError as error:
+            raise InputError(f"'{path}': {error}") from error
+        firmware = generate(compensator, args.target, content)
     write_folder(Path(args.output), firmware.files, firmware.manifest)
     if args.json:
         print(to_json(firmware.manifest), end="")

@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -14,7 +15,7 @@ from dzdesign.verify.all_inputs import check_all_inputs
 from dzdesign.verify.closed_loop import ClosedLoop, RampSequence, dead_zone
 from dzdesign.verify.plant import PWM_PERIOD_S, STATES, Plant, derivatives, period_step, plants_from_tests
 from dzdesign.verify.reference import ExactLaw
-from dzdesign.verify.verification import verify
+from dzdesign.verify.verification import _certificate_follows, verify
 
 pytestmark = needs_compiler
 
@@ -96,6 +97,15 @@ def test_an_offset_above_the_bound_is_over_compensation(example_compensator, tmp
     result = check_all_inputs(tmp_path / "fw")
     assert result.wrong == 0
     assert result.over_compensated > 0 and not result.holds
+
+
+def test_a_certificate_that_says_too_much_is_found(example_compensator):
+    """What the header promises beyond the tests is no property of the machine code, so no input shows it."""
+    honest = _certificate_follows(example_compensator)
+    certificate = replace(example_compensator.positive.certificate, dp_MPa=(Fraction(0), Fraction(20)))
+    boastful = _certificate_follows(with_side(example_compensator, certificate=certificate))
+    assert honest.holds and not boastful.holds
+    assert "says dp_MPa = 0 to 20" in boastful.text
 
 
 def test_a_changed_file_fails_the_verification(firmware_folder):

@@ -61,7 +61,7 @@ EXPORT void dz_loop(int32_t n, int32_t every, int32_t mode, int32_t negative, in
         double largest = 0.0;
         for (int32_t j = 0; j < every; j++) {
             const double shadow = (double)compare / compare_max; /* written in the last period, in force in this one */
-            if (((k * every + j) % 2) == 0) {
+            if (((k * every + j) % (int32_t)DZ_DRIVE_TICKS_PER_SAMPLE) == 0) {
                 const double dp = mode == 2 ? dp_frozen_MPa : dp_MPa;
                 const double ahead = back_MPa + dp;
                 dz_drive_sample(&drive, convert(&u, command[k], code_max),

@@ -4,6 +4,8 @@
 
 #include <stdint.h>
 
+#define DZ_DRIVE_TICKS_PER_SAMPLE 2u /* no code is read, so any number */
+
 struct dz_drive
 {
     uint16_t compare_a;

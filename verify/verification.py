@@ -9,8 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from dzdesign.core.artefacts import MANIFEST_NAME, TOOL, parse_document, read_bytes, sha256_of, to_json
-from dzdesign.core.errors import RequirementError
+from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.shape import check_shape
+from dzdesign.design.certifying import prove_certificates
+from dzdesign.design.compensator import Compensator
 from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.identify.valve_file import valve_from_document
 from dzdesign.verify.all_inputs import InputCheck, check_all_inputs
@@ -101,7 +103,7 @@ def verify(
         manifest, {"files": dict, "core": [str]}, str(folder / MANIFEST_NAME), "make it again with `dzdesign codegen`"
     )
     content = read_bytes(folder / "compensator.json", "compensator")
-    compensator_from_document(content, str(folder / "compensator.json"))  # every key that is read below
+    compensator = compensator_from_document(content, str(folder / "compensator.json"))  # every key that is read below
     document = json.loads(content)
     host_compiler()
     say("compiling the core with every warning an error")
@@ -121,6 +123,7 @@ def verify(
         say("running the closed loop")
         loops = _run_loops(folder, document, plant, sequence or RampSequence())
         checks += [_plant_opens(loops), _no_flow_at_zero(loops, document, plant)]
+    checks.append(_certificate_follows(compensator))
     source = plant_source or "made from the identified thresholds"
     return Verification(
         checks=tuple(checks),
@@ -152,6 +155,23 @@ def _files_unchanged(folder: Path, manifest: dict[str, Any]) -> Check:
     ]
     text = f"changed or missing: {', '.join(changed)}" if changed else f"{len(manifest['files'])} files as generated"
     return Check(name="files as generated", holds=not changed, text=text)
+
+
+def _certificate_follows(compensator: Compensator) -> Check:
+    """Tell whether what the header promises follows from the valve that the compensator was made from."""
+    name = "the certificate follows from the valve"
+    try:
+        prove_certificates(compensator)
+    except InputError as error:
+        return Check(name=name, holds=False, text=str(error))
+    certificate = compensator.positive.certificate
+    return Check(
+        name=name,
+        holds=True,
+        text=f"the {certificate.guard} threshold's {certificate.confidence:.0%} lower bound, from "
+        f"{float(certificate.dp_MPa[0]):.2f} to {float(certificate.dp_MPa[1]):.2f} MPa, proved again at every "
+        "difference of pressure codes",
+    )
 
 
 def _compiles_strictly(folder: Path, manifest: dict[str, Any]) -> Check:

@@ -36,6 +36,7 @@ TARGET = Target(
     compare_max=60_000,
     adc_code_max=4_095,
     takes_any_signals=True,
+    has_timer=False,
     arithmetic="narrow",  # an 8-bit processor pays for 64-bit products
     templates={f"avr/{file}": f"{file}.jinja" for file in FILES},
     context={

@@ -22,6 +22,7 @@ TARGET = Target(
     compare_max=60_000,
     adc_code_max=4_095,
     takes_any_signals=True,
+    has_timer=False,
     templates={f"host/{file}": f"{file}.jinja" for file in (*FILES, *SHARED_FILES, "CMakeLists.txt", "README.md")},
     context={
         "exports_for_windows": "\n".join(f"    {name}" for name in EXPORTS),
