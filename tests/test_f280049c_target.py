@@ -4,6 +4,7 @@ Oracle of names, argument order and argument types: epwm.h, adc.h, sysctl.h, gpi
 C2000Ware's DriverLib for the F28004x; of the zero-duty case: SPRAAI1.
 """
 
+import re
 import shutil
 import subprocess
 from fractions import Fraction
@@ -278,6 +279,15 @@ def test_a_quantity_that_does_not_fit_is_refused(monkeypatch, name, value, said)
     with pytest.raises(DzdesignError, match=said):
         f280049c.timing()
         f280049c.converter()
+
+
+def test_projectspec_links_with_the_options_and_library_of_the_makefile(firmware):
+    make = (firmware / "Makefile").read_text(encoding="utf-8")
+    options = re.search(r"^LFLAGS := (.*) --warn_sections", make, re.MULTILINE)[1].split()
+    assert "--rom_model" in options and "--library=libc.a" in make
+    project = ElementTree.parse(firmware / "dzdesign.projectspec").getroot().find("project")
+    for configuration in project.findall("configuration"):
+        assert configuration.get("linkerBuildOptions").split() == [*options, "--library=libc.a"]
 
 
 def test_projectspec_and_makefile_name_the_same_files(firmware):

@@ -144,7 +144,7 @@ CONTEXT = {
     # device.h and the linker files expect these of the compiler, as TI's own project files for this part set them.
     "compiler_options": "-v28 -ml -mt --float_support=fpu32 --tmu_support=tmu0 --abi=eabi -O2 --c99 -g "
     "--gen_func_subsections=on --diag_warning=225 --diag_suppress=10063",
-    "linker_options": "--stack_size=0x3F8 --entry_point=code_start",
+    "linker_options": "--stack_size=0x3F8 --entry_point=code_start --rom_model",
 }
 
 TARGET = Target(
