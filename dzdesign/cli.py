@@ -47,16 +47,16 @@ DESIGN = (
         "--command-signal",
         metavar="S",
         help='command at the converter: range, attenuator, offset, such as "-10..10 V x 0.15 + 1.5 V", which has both '
-        'signs (default: "0..10 V x 0.3")',
+        "signs (default: 0 to 10 V over the converter's whole range)",
     ),
     _given("--polarity", metavar="P", help="normal, or inverted: the command counts the other way (default: normal)"),
     _given("--pressure-span", metavar="P", help='span of both pressure sensors (default: "20 MPa")'),
     _given(
         "--pressure-a",
         metavar="S",
-        help='sensor ahead of the edge, such as "4..20 mA on 150 ohm = 25 MPa" (default: "0..3 V")',
+        help='sensor ahead of the edge, such as "4..20 mA on 150 ohm = 25 MPa" (default: the converter\'s whole range)',
     ),
-    _given("--pressure-b", metavar="S", help='sensor behind the edge (default: "0..3 V")'),
+    _given("--pressure-b", metavar="S", help="sensor behind the edge (default: the converter's whole range)"),
     _given(
         "--negative-dp",
         metavar="D",
