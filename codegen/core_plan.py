@@ -109,7 +109,7 @@ def header_plan(compensator: Compensator) -> FilePlan:
     """Return what the core's header prints."""
     chosen, signals = law(compensator.law_name), compensator.signals
     ends, bits = interface_constants(compensator), status_constants()
-    low, high = _zero_command(compensator, 1)
+    low, high = zero_command(compensator, 1)
     values = {
         **_signal_plan(compensator, 1),
         "misra_lines": misra_lines("dz_comp.h"),
@@ -126,7 +126,7 @@ def header_plan(compensator: Compensator) -> FilePlan:
         "swapped": signals.swapped,
     }
     if compensator.negative is not None:
-        low, high = _zero_command(compensator, -1)
+        low, high = zero_command(compensator, -1)
         values |= {
             "negative_full": str(signals.command.negative_full_code),
             "negative_zero_low": str(low),
@@ -303,7 +303,7 @@ def _arithmetic_plan(form: IntegerForm, of_law: LawConstants) -> Plan:
     }
 
 
-def _zero_command(compensator: Compensator, sign: int) -> tuple[int, int]:
+def zero_command(compensator: Compensator, sign: int) -> tuple[int, int]:
     """Return the least and the largest compare value at zero command."""
     zero = compensator.signals.command.zero_code
     nodes = [node * compensator.beta_step_codes for node in range(compensator.nodes(sign) - 1)]

@@ -11,10 +11,12 @@ from dzdesign.codegen.core_plan import FilePlan, core_plan, drive_header_plan, d
 from dzdesign.codegen.origin import origin_of_constants
 from dzdesign.codegen.target import Target, folder_of
 from dzdesign.codegen.user_names import printable_list
+from dzdesign.codegen.wiring import wiring_of
 from dzdesign.core.artefacts import TOOL, sha256_of, to_json
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.compensator_file import compensator_document
+from dzdesign.design.signal_text import Converter
 
 if TYPE_CHECKING:
     import jinja2
@@ -84,13 +86,7 @@ def generate(compensator: Compensator, target_name: str, compensator_bytes: byte
     digest = sha256_of(document)
     recordings = ramp_tests_of(compensator)
     header = header_plan(compensator)
-    hardware = {
-        **target.context,
-        **core_context(compensator.signals.signs),
-        "u_max_V": header.values["u_max_V"],
-        "pressure_span_MPa": header.values["a_span_MPa"],
-        "firmware_origin": f"0x{digest[:4].upper()}",
-    }
+    hardware = hardware_context(compensator, target, digest)
     shared = environment(PACKAGE)
     core = _core_files(compensator, target, header)
     plans = [(path, shared, template, plan.values) for path, template, plan in core]
@@ -126,6 +122,27 @@ def _core_files(compensator: Compensator, target: Target, header: FilePlan) -> l
         ("core/dz_drive.c", "dz_drive.c.jinja", drive_plan(compensator)),
         ("core/dz_drive.h", "dz_drive.h.jinja", drive_header_plan(compensator)),
     ]
+
+
+def hardware_context(compensator: Compensator, target: Target, digest: str) -> dict[str, Any]:
+    """Return what the templates of a target print, but for banner and project.
+
+    Parameters
+    ----------
+    compensator : Compensator
+        What the firmware is of.
+    target : Target
+        Where it goes.
+    digest : str
+        SHA-256 of compensator.json.
+    """
+    levels = compensator.signals.code_max + 1  # a target without a converter of its own takes any
+    return {
+        **target.context,
+        **core_context(compensator.signals.signs),
+        "wiring": wiring_of(compensator, Converter(full_V=target.adc_full_V, levels=levels)),
+        "firmware_origin": f"0x{digest[:4].upper()}",
+    }
 
 
 def core_context(signs: Sequence[int]) -> dict[str, Any]:

@@ -6,9 +6,10 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from golden_firmware import FULL, GOLDENS, golden_compensator
 
 from dzdesign.codegen.f28335.target import TARGET
-from dzdesign.codegen.project import banner, core_context, environment
+from dzdesign.codegen.project import banner, environment, hardware_context
 
 HERE = Path(__file__).parent / "f28335"
 COMPILER = next((path for name in ("cc", "gcc", "clang") if (path := shutil.which(name))), None)
@@ -21,13 +22,9 @@ def render_firmware(folder: Path, *signs: int) -> dict[str, Path]:
     written = {}
     for path, template in TARGET.templates.items():
         text = renderer.get_template(template).render(
-            **TARGET.context,
-            **core_context(signs or (1,)),
+            **hardware_context(golden_compensator("f28335", FULL if -1 in signs else GOLDENS), TARGET, "1234"),
             banner=banner(template, "0123456789abcdef"),
             project="paper_valve",
-            u_max_V="10",
-            pressure_span_MPa="20",
-            firmware_origin="0x1234",
         )
         written[path] = folder / path
         written[path].parent.mkdir(parents=True, exist_ok=True)

@@ -12,11 +12,12 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from golden_firmware import FULL, GOLDENS, golden_compensator
 from synthetic import needs_compiler
 
 from dzdesign.codegen.f280049c import target as f280049c
 from dzdesign.codegen.f280049c.target import TARGET
-from dzdesign.codegen.project import banner, core_context, environment
+from dzdesign.codegen.project import banner, environment, hardware_context
 from dzdesign.core.errors import DzdesignError
 from dzdesign.verify.host_compiler import STRICT, host_compiler
 
@@ -39,12 +40,9 @@ def render(tmp_path: Path, *signs: int) -> Path:
     renderer = environment("dzdesign.codegen.f280049c")
     for path, template in TARGET.templates.items():
         text = renderer.get_template(template).render(
-            **TARGET.context,
-            **core_context(signs),
+            **hardware_context(golden_compensator("f280049c", FULL if -1 in signs else GOLDENS), TARGET, "0" * 64),
             banner=banner(template, "0" * 64),
             project="dzdesign",
-            u_max_V="10",
-            pressure_span_MPa="20",
         )
         (tmp_path / path).parent.mkdir(exist_ok=True)
         (tmp_path / path).write_text(text, encoding="utf-8", newline="\n")

@@ -14,6 +14,9 @@ CLOCK_HZ = 25_000_000
 PWM_HZ = 2_500  # section 3 of the paper
 SYSTICK_MAX = 2**24  # SYST_RVR has 24 bits
 SELFTEST_TICKS = 25
+ADC_SPAN_V, ADC_BITS = Fraction(3), 12  # what a compensator for this target is made for; a user's converter is his own
+OTHER_SPAN_V = Fraction(33, 10)  # of the README's example
+COMPARE_MAX = 60_000  # the PWM is the user's: full drive may be any 16-bit compare value
 
 
 def systick_counts() -> int:
@@ -30,15 +33,20 @@ def systick_counts() -> int:
     return counts.numerator
 
 
+def rescaled_gain(gain: Fraction) -> str:
+    """Print a gain at a converter of `OTHER_SPAN_V` as one at `ADC_SPAN_V`, rounded down to stay inside its range."""
+    return f"{int(gain * ADC_SPAN_V / OTHER_SPAN_V * 10**5) / 10**5:.5f}"
+
+
 OWN_FILES = ("main.c", "dz_tick.c", "dz_tick.h", "dz_board.c", "dz_board.h", "startup.c", "selftest.c")
 OTHER_FILES = ("dz_selftest.c", "dz_selftest.h", "mps2_an386.ld", "Makefile", "README.md")
 
 TARGET = Target(
     name="cortex-m4",
     description="ARM Cortex-M4 without CMSIS: start-up, SysTick at 2.5 kHz, three functions to fill in; runs in QEMU",
-    # The PWM is the user's: full drive may be any 16-bit compare value.
-    compare_max=60_000,
-    adc_code_max=4_095,
+    compare_max=COMPARE_MAX,
+    adc_code_max=2**ADC_BITS - 1,
+    adc_full_V=ADC_SPAN_V,
     takes_any_signals=True,
     templates={f"{FOLDER}/{file}": f"{file}.jinja" for file in OWN_FILES + OTHER_FILES},
     context={
@@ -48,5 +56,11 @@ TARGET = Target(
         "systick_counts": str(systick_counts()),
         "systick_reload": str(systick_counts() - 1),
         "selftest_ticks": str(SELFTEST_TICKS),
+        "adc_span_v": f"{float(ADC_SPAN_V):g}",
+        "adc_bits": str(ADC_BITS),
+        "full_count": str(COMPARE_MAX),
+        "other_span_v": f"{float(OTHER_SPAN_V):g}",
+        "other_gain": rescaled_gain(Fraction(3, 10)),
+        "other_shunt": rescaled_gain(Fraction(150)),
     },
 )

@@ -119,8 +119,6 @@ def converter() -> dict[str, str]:
         "adc_codes": str(2**ADC_BITS),
         "adc_code_max": str(2**ADC_BITS - 1),
         "adc_span_v": printed(ADC_SPAN_V),
-        "code_at_tenth": str(2**ADC_BITS // 10),
-        "code_at_half": str(2**ADC_BITS // 2),
     }
 
 

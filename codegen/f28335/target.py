@@ -173,8 +173,6 @@ def converter() -> dict[str, str]:
         "adc_code_max": str(2**ADC_BITS - 1),
         "adc_span_v": str(ADC_SPAN_V),
         "adcclk_max_mhz": printed(Fraction(ADCCLK_MAX_HZ, 10**6)),
-        "code_at_tenth": str(2**ADC_BITS // 10),
-        "code_at_half": str(2**ADC_BITS // 2),
     }
 
 

@@ -18,7 +18,7 @@ struct dz_state
     uint16_t u_adc;                /* ADCINA0, command, 0..4095 */
     uint16_t p_a_adc;              /* ADCINA1, pressure A */
     uint16_t p_b_adc;              /* ADCINA2, pressure B */
-    uint16_t compare_a;            /* last compare value, 0..60000 */
+    uint16_t compare_a;            /* last compare value, 0..57000 */
     uint16_t compare_b;            /* of solenoid B; one of the two is 0 */
     int16_t side;                  /* 1: solenoid A is driven, -1: B, 0: neither yet */
 };
