@@ -11,8 +11,10 @@ from hypothesis import strategies as st
 from synthetic import L_MIN, MPA, Truth, needs_compiler, synthetic_ramp
 
 from dzdesign.cli import main
-from dzdesign.core.artefacts import to_json
+from dzdesign.codegen.project import generate
+from dzdesign.core.artefacts import to_json, write_folder
 from dzdesign.core.errors import InputError
+from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.design.designing import DesignOptions, design
 from dzdesign.identify.bounds import staircase
 from dzdesign.identify.guard_curve import GUARDS
@@ -277,8 +279,13 @@ def test_verify_holds_the_core_against_the_bounds_of_its_own_guard(tmp_path, mon
     assert main(["design", "valve.json", "--guard", "opening"]) == 0
     document = json.loads(Path("compensator.json").read_text())
     document["sides"]["positive"]["certificate"]["guard"] = "mean"
-    Path("compensator.json").write_text(json.dumps(document))
-    assert main(["codegen", "compensator.json", "-o", "wrong"]) == 0
-    capsys.readouterr()
+    content = json.dumps(document).encode()
+    Path("compensator.json").write_bytes(content)
+    assert main(["codegen", "compensator.json", "-o", "wrong"]) == 2
+    assert "certificate does not hold" in capsys.readouterr().err
+    firmware = generate(compensator_from_document(content, "compensator.json"), "f28335", content)
+    write_folder(Path("wrong"), firmware.files, firmware.manifest)
     assert main(["verify", "wrong"]) == 1
-    assert "FAILS  no over-compensation on the tested interval" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "FAILS  the certificate follows from the valve" in out
+    assert "FAILS  no over-compensation on the tested interval" in out
