@@ -197,14 +197,14 @@ def _branch_cost(shape: BranchShape, steeper: "ca.SX", later: "ca.SX", floor: fl
     tilt, shift = per_sigma * steeper, -per_sigma * later * (1 + steeper)
     x = (bins.u - shape.knee) / u_max
     miss = (bins.y - shape.slope * (bins.u - shape.knee)) / shape.sigma
-    # Its sum of squares is quadratic in both, so five sums over the bins are all that the solver ever sees.
+    # Its sum of squares is quadratic in both, so five sums are all that the solver ever sees: over the bins' means, and
+    # inside the bins sum (dy - line du)^2 about them, which only the tilt changes.
+    inside_xx = float(bins.c_uu.sum()) / u_max**2
+    inside_mx = float(np.sum(bins.c_uy - shape.slope * bins.c_uu)) / (u_max * shape.sigma)
     n, n_x, n_xx, n_m, n_mx = (float(np.sum(bins.n * term)) for term in (np.ones_like(x), x, x * x, miss, miss * x))
-    cost = tilt**2 * n_xx + 2 * tilt * shift * n_x + shift**2 * n - 2 * tilt * n_mx - 2 * shift * n_m
-    # Inside a bin it has a closed form too: sum (dy - line du)^2 about the bin's means.
-    line = per_sigma * (1 + steeper)
-    c_uy = float(bins.c_uy.sum()) / (u_max * shape.sigma)
-    c_uu = float(bins.c_uu.sum()) / u_max**2
-    cost = (cost - 2 * line * c_uy + line**2 * c_uu) / 2
+    squares, products = ca.DM([[n_xx + inside_xx, n_x], [n_x, n]]), ca.DM([n_mx + inside_mx, n_m])
+    change = ca.vertcat(tilt, shift)
+    cost = ca.bilin(squares, change, change) / 2 - ca.dot(products, change)
     cut = bins.censored > 0
     if cut.any():
         u = bins.u_censored[cut]

@@ -26,7 +26,15 @@ LONGEST_MEMORY = 2.0
 
 def robust_sigma(values: np.ndarray) -> float:
     """Return the standard deviation of the middle half: the median of departures from the median, for a normal law."""
-    return 1.4826 * float(np.median(np.abs(values - np.median(values))))
+    return 1.4826 * median(np.abs(values - median(values)))
+
+
+def median(values: np.ndarray) -> float:
+    """Return the median of one or more numbers, none of them NaN: NumPy's looks for those, at twice the time."""
+    half = values.size // 2
+    parted = np.partition(values, half)
+    upper = float(parted[half])
+    return upper if values.size % 2 else (float(parted[:half].max()) + upper) / 2
 
 
 @dataclass(frozen=True, slots=True)

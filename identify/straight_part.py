@@ -14,7 +14,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.branches import Branch
-from dzdesign.identify.noise import Roughness, colour_factor, measure_roughness
+from dzdesign.identify.noise import Roughness, colour_factor, measure_roughness, median
 from dzdesign.identify.profile import crossing, flow_at_top, smooth_profile
 
 #: A sample further than this many robust standard deviations from the line is an outlier.
@@ -180,12 +180,15 @@ def lay_line(read: ReadBranch, window: tuple[float, float]) -> GatedLine:
     _refuse_no_line(u[seen], window, floor, read.source)
     slope, knee = fit_line(u[seen], y[seen])
     finest = FINEST_NOISE * read.y_max
+    kept = np.ones(u.size, dtype=bool)
     for _ in range(3):
-        line = slope * (u - knee)
+        line, before = slope * (u - knee), kept
         miss = np.abs(y - line)
-        sigma = max(1.4826 * float(np.median(miss[~censored])), finest)
+        sigma = max(1.4826 * median(miss[~censored]), finest)
         # A zero reading is a censored sample only where flow below the floor is credible.
         kept = np.where(censored, line < floor + GATE * sigma, miss < GATE * sigma)
+        if np.array_equal(kept, before):  # the same samples, so the same line
+            break
         seen = kept & ~censored
         _refuse_no_line(u[seen], window, floor, read.source)
         slope, knee = fit_line(u[seen], y[seen])
