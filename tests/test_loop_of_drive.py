@@ -72,7 +72,7 @@ def test_a_dither_that_the_certificate_does_not_count_is_seen_at_the_waves_top(t
     _, leaking = compared(tmp_path / "leaking", change=uncounted, **NO_DITHER)
     assert leaking.result.q_zero_L_min > 1e-3
     ends = leaking.compensated.q_L_min[-25:]
-    assert leaking.result.q_zero_L_min >= ends.max()
+    assert leaking.result.q_zero_L_min >= ends.max() * (1 - 1e-12)
 
 
 def test_a_record_holds_a_whole_wave_of_any_dither(tmp_path):

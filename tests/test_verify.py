@@ -7,13 +7,15 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from plant_oracle import Oracle
 from synthetic import needs_compiler, signals_with_span, with_side
 
 from dzdesign.core.artefacts import to_json, write_folder
 from dzdesign.design.compensator_file import compensator_document
+from dzdesign.verify import motion
 from dzdesign.verify.all_inputs import check_all_inputs
-from dzdesign.verify.closed_loop import ClosedLoop, RampSequence, dead_zone
-from dzdesign.verify.plant import PWM_PERIOD_S, STATES, Plant, derivatives, period_step, plants_from_tests
+from dzdesign.verify.closed_loop import PERIODS_PER_RECORD, ClosedLoop, RampSequence, dead_zone
+from dzdesign.verify.plant import Plant, plants_from_tests
 from dzdesign.verify.reference import ExactLaw
 from dzdesign.verify.verification import _certificate_follows, verify
 
@@ -145,39 +147,29 @@ class TestPlant:
         flow = plant.C_d_W_mm * 1e-3 * opening * np.sqrt(2 * run.dp_MPa[-1] * 1e6 / plant.rho_kg_m3) * 6e4
         assert run.q_L_min[-1] == pytest.approx(flow, rel=2e-3)
 
-    def test_step_agrees_with_tight_cvodes(self):
-        import casadi as ca
-
-        plant = Plant(hysteresis_V=0.0)
-        step = period_step(plant)
-        inner, inputs, rates = derivatives(plant)
-        duty, supply = 0.75, 1.0
-        phases = []
-        for share in (duty, 1 - duty):
-            problem = {"x": inner, "p": inputs, "ode": rates}
-            options = {"abstol": 1e-13, "reltol": 1e-12, "max_num_steps": 100000}
-            phases.append(ca.integrator("phase", "cvodes", problem, 0, share * PWM_PERIOD_S, options))
-        ours, theirs = np.zeros(STATES), np.zeros(3)
-        for _ in range(150):
-            ours = np.asarray(step(ours, duty, supply)[0]).ravel()
-            for integrate, voltage in zip(phases, (plant.u_max_V, 0.0), strict=True):
-                theirs = np.asarray(integrate(x0=theirs, p=[voltage, 0.0, supply])["xf"]).ravel()
-        assert ours[0] == pytest.approx(theirs[0], abs=1e-6)
-        assert ours[1] == pytest.approx(theirs[1], abs=2e-9)  # of 1.5 mm
+    @pytest.mark.parametrize(
+        "plant",
+        [Plant(), Plant(hysteresis_V=0.0, droop_MPa_L_min2=0.0), Plant(preload_N=10.0, stroke_mm=0.8, m_e_kg=0.1)],
+        ids=["default", "without play and droop", "heavy, with a short stroke"],
+    )
+    def test_motion_agrees_with_the_oracle(self, plant):
+        """A ramp, then jumps of the duty: lift-off, landings at both stops, and the edge, to 1e-5 of the stroke."""
+        shares = np.concatenate([np.linspace(0, 1, 12), np.random.default_rng(1).random(12)])
+        duties = np.repeat(np.round(shares * 60000) / 60000, PERIODS_PER_RECORD)
+        exact = Oracle(plant, 2.0).periods(np.concatenate([[0.0], duties[:-1]]))  # a compare value acts a period later
+        found = ClosedLoop(plant).run(shares, 2.0).position_mm
+        assert np.abs(found - exact[PERIODS_PER_RECORD - 1 :: PERIODS_PER_RECORD]).max() <= 1e-5 * plant.stroke_mm
+        assert exact.max() > 0.8 * plant.stroke_mm and exact.min() == 0
+        assert exact.max() == plant.stroke_mm or plant.stroke_mm > 0.8  # the short stroke comes to its upper stop
 
     def test_runge_kutta_converges_with_order_four(self, monkeypatch):
-        from dzdesign.verify import plant as module
-
+        plant = Plant(hysteresis_V=0.0, overlap_mm=0.0, preload_N=0.0, flow_force_N_mm_MPa=0.0)
         ends = {}
-        for steps in (2, 4, 8, 64):
-            monkeypatch.setattr(module, "STEPS_PER_PHASE", steps)
-            step = period_step(Plant(hysteresis_V=0.0))
-            state = np.zeros(STATES)
-            for _ in range(30):  # before the spool leaves its stop: the motion is smooth
-                state = np.asarray(step(state, 0.3, 1.0)[0]).ravel()
-            ends[steps] = state[0]
-        errors = [abs(ends[steps] - ends[64]) for steps in (2, 4)]
-        assert errors[0] / errors[1] == pytest.approx(16, rel=0.35)
+        for steps, longest in ((1, 1.0), (2, 0.15), (24, 0.0126)):
+            monkeypatch.setattr(motion, "STEP_RAD", longest)
+            assert motion._steps(plant) == steps
+            ends[steps] = ClosedLoop(plant).run(np.full(2, 0.5), 1.0).position_mm[-1]  # in motion, free of the stops
+        assert (ends[1] - ends[24]) / (ends[2] - ends[24]) == pytest.approx(16, rel=0.5)
 
     def test_hysteresis_is_the_width_of_the_play(self):
         plant = Plant(hysteresis_V=0.3)

@@ -11,17 +11,22 @@ import numpy as np
 from dzdesign.core.errors import InputError
 from dzdesign.design.amplifier import RAMP_UNIT
 from dzdesign.verify.host_compiler import load_library
-from dzdesign.verify.plant import STATES, Plant, period_step
+from dzdesign.verify.motion import motion_sources
+from dzdesign.verify.plant import PWM_PERIOD_S, Plant
 
 #: Periods of the PWM between two records: 100 a second, as in the paper's tests.
 PERIODS_PER_RECORD = 25
-RECORD_S = PERIODS_PER_RECORD * 400e-6
+RECORD_S = PERIODS_PER_RECORD * PWM_PERIOD_S
+#: Numbers in a record; loop.c has the same.
+RECORDED = 6
 #: Pressure behind the edge: what both sensors see beside the drop.
 BACK_PRESSURE_MPA = 1.0
 #: Flow counts as flow from this share of the largest flow on: no meter stands between.
 FLOW_SHARE = 1e-3
 #: The command's ramps are longer than the amplifier's own by this factor.
 RAMP_RESERVE = 1.1
+#: The plant divides by its constants: products by their reciprocals move its last digits only. The core has none.
+FLOATING = ("-fno-math-errno", "-fno-trapping-math", "-freciprocal-math")
 MODES = {"direct": 0, "compensated": 1, "without beta": 2}
 
 
@@ -46,7 +51,8 @@ class RampSequence:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoopRun:
-    """Records of one run, 100 a second: time in s, command share, compare value, dP in MPa, flow in L/min, all (N,).
+    """Records of one run, 100 a second: time in s, command share, compare value, dP in MPa, flow in L/min, position of
+    the spool in mm, all (N,).
 
     Of the flow three: at the record's end; its mean over the record, and its largest there. A dither of 100 Hz or more
     has a whole wave in a record: its mean is what a meter sees, its largest is at the wave's top.
@@ -59,6 +65,7 @@ class LoopRun:
     q_L_min: np.ndarray
     q_mean_L_min: np.ndarray
     q_largest_L_min: np.ndarray
+    position_mm: np.ndarray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -157,21 +164,16 @@ class ClosedLoop:
     def __init__(
         self, plant: Plant, firmware: Path | None = None, document: dict[str, Any] | None = None, sign: int = 1
     ) -> None:
-        import casadi as ca
-
-        step = period_step(plant)
-        generator = ca.CodeGenerator("plant_step.c")
-        generator.add(step)
-        sources = {"plant_step.c": generator.dump()}
         driver = files("dzdesign.verify")
-        sources["loop.c"] = driver.joinpath("loop.c").read_text(encoding="utf-8")
+        sources = motion_sources(plant)
+        for name in ("loop.c", "plant_period.h"):
+            sources[name] = driver.joinpath(name).read_text(encoding="utf-8")
         if firmware is None:
             sources["dz_drive.h"] = driver.joinpath("no_drive.h").read_text(encoding="utf-8")
         else:
             for path in sorted((firmware / "core").glob("*.[ch]")):
                 sources[path.name] = path.read_text(encoding="utf-8")
-        self._library = load_library(sources, "the closed loop")
-        self._work_sizes = max(step.sz_w(), 1), max(step.sz_iw(), 1)
+        self._library = load_library(sources, "the closed loop", FLOATING)
         self._scalings = _scalings(document, sign) if document else DIRECT
         #: Of the amplifier's own ramps on this side, from zero to full command or back, s; 0: none.
         self.slowest_ramp_s = _slowest_ramp_s(document, sign) if document else 0.0
@@ -194,26 +196,24 @@ class ClosedLoop:
         if mode != "direct" and not self._has_core:
             raise InputError("this loop was built without a compensator; give the firmware folder")
         command = np.ascontiguousarray(command, dtype=float)
-        record, state = np.empty((command.size, 5)), np.zeros(STATES)
-        # Of this run alone, so that runs may go on side by side (ctypes lets go of the interpreter's lock).
-        work = np.zeros(self._work_sizes[0]), np.zeros(self._work_sizes[1], dtype=np.int64)
+        record = np.empty((command.size, RECORDED))
         scalings = self._scalings
         span = float(scalings.spans[1:].min())
         back_MPa = min(BACK_PRESSURE_MPA, span - supply_MPa)
         if back_MPa < 0:
             raise InputError(f"a pressure drop of {supply_MPa:g} MPa exceeds the sensors' span of {span:g} MPa")
-        arrays = (scalings.zeros, scalings.fulls, scalings.spans, command, *work, state, record)
-        zeros, fulls, spans, *rest = (array.ctypes.data_as(ctypes.c_void_p) for array in arrays)
+        arrays = (scalings.zeros, scalings.fulls, scalings.spans, command, record)
+        zeros, fulls, spans, given, recorded = (array.ctypes.data_as(ctypes.c_void_p) for array in arrays)
         self._library.dz_loop(
             *map(ctypes.c_int32, (command.size, PERIODS_PER_RECORD, MODES[mode], scalings.negative, scalings.swapped)),
-            rest[0],
+            given,
             *map(ctypes.c_double, (supply_MPa, back_MPa, dp_frozen_MPa)),
             zeros,
             fulls,
             spans,
             ctypes.c_int32(scalings.code_max),
             ctypes.c_double(scalings.compare_max),
-            *rest[1:],
+            recorded,
         )
         return LoopRun(
             time=np.arange(command.size) * RECORD_S,
@@ -223,6 +223,7 @@ class ClosedLoop:
             q_L_min=record[:, 2],
             q_mean_L_min=record[:, 3],
             q_largest_L_min=record[:, 4],
+            position_mm=1e3 * record[:, 5],
         )
 
 

@@ -70,7 +70,7 @@ def check_strictly(source: Path, compiler: str, options: Sequence[str] = ()) -> 
     _run(command, f"{source.name} ({Path(compiler).name})")
 
 
-def load_library(sources: Mapping[str, str], what: str) -> ctypes.CDLL:
+def load_library(sources: Mapping[str, str], what: str, options: Sequence[str] = ()) -> ctypes.CDLL:
     """Compile C files together and load them.
 
     Parameters
@@ -79,6 +79,8 @@ def load_library(sources: Mapping[str, str], what: str) -> ctypes.CDLL:
         File name to text; headers may be among them.
     what : str
         For messages.
+    options : sequence of str
+        Further options of the compiler.
 
     Returns
     -------
@@ -86,7 +88,7 @@ def load_library(sources: Mapping[str, str], what: str) -> ctypes.CDLL:
     """
     compiler = host_compiler()
     key = sha256_of(
-        "\0".join([compiler, *(f"{name}\0{text}" for name, text in sorted(sources.items()))]).encode(
+        "\0".join([compiler, *options, *(f"{name}\0{text}" for name, text in sorted(sources.items()))]).encode(
             errors="surrogateescape"
         )
     )
@@ -98,7 +100,7 @@ def load_library(sources: Mapping[str, str], what: str) -> ctypes.CDLL:
             (folder / name).write_text(text, encoding="utf-8", errors="surrogateescape")
         units = [str(folder / name) for name in sources if name.endswith(".c")]
         position = [] if sys.platform == "win32" else ["-fPIC"]
-        _run([compiler, "-std=c99", "-O2", *position, "-shared", *units, "-o", str(library), "-lm"], what)
+        _run([compiler, "-std=c99", "-O2", *options, *position, "-shared", *units, "-o", str(library), "-lm"], what)
     try:
         return ctypes.CDLL(str(library))
     except OSError as error:

@@ -1,4 +1,4 @@
-"""The plant of Eqs. (19)-(24), with what a real valve's measurements need, and its step over one PWM period in CasADi.
+"""The plant of Eqs. (19)-(24), with what a real valve's measurements need.
 
 Added to the paper's equations, each of them off where its parameter is zero: preload, overlap, stops, a pressure force
 that moves the threshold, flow force, a play in the magnetic force (hysteresis), droop of the supply.
@@ -19,13 +19,6 @@ if TYPE_CHECKING:
     import casadi
 
 PWM_PERIOD_S = 400e-6
-#: Runge-Kutta steps over the on-phase and over the off-phase of a period.
-STEPS_PER_PHASE = 2
-#: Numbers in the state of `period_step`; loop.c has the same.
-STATES = 5
-#: Stops are stiff springs, so that the motion stays a smooth ordinary differential equation.
-STOP_STIFFNESS_N_M = 3e6
-STOP_DAMPING_N_S_M = 400.0
 MPA, L_MIN = 1e6, 1e-3 / 60
 #: Beyond any plant in the units of the names; an integer of TOML has no end.
 LARGEST_PARAMETER = 1e12
@@ -154,7 +147,7 @@ def derivatives(plant: Plant) -> tuple["casadi.SX", "casadi.SX", "casadi.SX"]:
     -------
     tuple
         state (i in A, x_e in m, v in m/s); inputs (amplifier voltage in V, force offset of the play in N, supply
-        pressure drop in MPa); d state/dt.
+        pressure drop in MPa); d state/dt, free of the stops.
     """
     import casadi as ca
 
@@ -166,16 +159,10 @@ def derivatives(plant: Plant) -> tuple["casadi.SX", "casadi.SX", "casadi.SX"]:
     voltage, play_force, supply = (inputs[index] for index in range(3))
     opening = ca.fmax(position - plant.overlap_mm * 1e-3, 0)
     dp_MPa, _ = orifice(plant, opening, supply)
-    at_rest = STOP_STIFFNESS_N_M * ca.fmin(position, 0)
-    at_end = STOP_STIFFNESS_N_M * ca.fmax(position - plant.stroke_mm * 1e-3, 0)
-    touching = ca.logic_or(position < 0, position > plant.stroke_mm * 1e-3)
     load = (
         plant.preload_N
         - plant.pressure_force_N_MPa * dp_MPa
         + plant.flow_force_N_mm_MPa * 1e3 * dp_MPa * opening
-        + at_rest
-        + at_end
-        + touching * STOP_DAMPING_N_S_M * speed
         - play_force
     )
     parameters = (
@@ -201,37 +188,3 @@ def orifice(plant: Plant, opening_m: Any, supply_MPa: Any) -> tuple[Any, Any]:
     conductance = flow(opening_m, 1.0, plant.C_d_W_mm * 1e-3, plant.rho_kg_m3, MPA) / L_MIN  # L/min at 1 MPa
     dp_MPa = supply_MPa / (1 + plant.droop_MPa_L_min2 * conductance**2)
     return dp_MPa, conductance * ca.sqrt(dp_MPa)
-
-
-def period_step(plant: Plant) -> "casadi.Function":
-    """Return the plant's step over one PWM period, the pulse resolved: on for `duty`, off for the rest.
-
-    Returns
-    -------
-    casadi.Function
-        ``(state[5], duty, supply_MPa) -> (state[5], dp_MPa, Q_L_min)``. Beyond current, travel and speed, it holds
-        the play of the magnetic force and the mean current of the last period, both in V of command.
-    """
-    import casadi as ca
-
-    inner, inputs, rates = derivatives(plant)
-    # The integral of the current rides along: its mean over the period is free of the pulse's ripple.
-    rate = ca.Function("rate", [ca.vertcat(inner, ca.SX.sym("charge")), inputs], [ca.vertcat(rates, inner[0])])
-    state, duty, supply = ca.SX.sym("x", STATES), ca.SX.sym("duty"), ca.SX.sym("supply")
-    volts_per_ampere = plant.K_i_N_A / plant.force_per_volt
-    half, mean = plant.hysteresis_V / 2, state[4]
-    play = ca.fmin(ca.fmax(state[3], mean - half), mean + half)
-    play_force = (play - mean) * plant.force_per_volt
-    x = ca.vertcat(state[:3], 0)
-    for voltage, share in ((plant.u_max_V, duty), (0.0, 1 - duty)):
-        h = share * PWM_PERIOD_S / STEPS_PER_PHASE
-        given = ca.vertcat(voltage, play_force, supply)
-        for _ in range(STEPS_PER_PHASE):  # classical Runge-Kutta, order 4
-            k1 = rate(x, given)
-            k2 = rate(x + h / 2 * k1, given)
-            k3 = rate(x + h / 2 * k2, given)
-            k4 = rate(x + h * k3, given)
-            x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-    dp_MPa, flow = orifice(plant, ca.fmax(x[1] - plant.overlap_mm * 1e-3, 0), supply)
-    after = ca.vertcat(x[:3], play, x[3] / PWM_PERIOD_S * volts_per_ampere)
-    return ca.Function("plant_step", [state, duty, supply], [after, dp_MPa, flow])
