@@ -33,6 +33,8 @@ TAIL = 3.0
 TAIL_SAMPLES = 12
 #: Fewest levels of the command in the tail for a line: the steps of a staircase may put all of it at one.
 TAIL_LEVELS = 3
+#: Rounds in which censored samples of the tail are filled in and its line laid: each leaves a third of the error.
+TAIL_ROUNDS = 8
 #: The window may reach down to this multiple of the first flow that counts: nearer to a floor readings are cut off.
 ABOVE_LEVEL = 1.5
 
@@ -164,7 +166,7 @@ def _describe(
     read: ReadBranch, line: GatedLine, level: float, noise: float, correlation: float, u_max: float
 ) -> BranchShape:
     branch = read.branch
-    tail = _find_tail(read, level, line.slope, noise, correlation)
+    tail = _find_tail(read, level, line, noise, correlation)
     onset, onset_se = _find_onset(read, tail, level, noise)
     return BranchShape(
         rising=branch.rising,
@@ -231,6 +233,33 @@ def _quiet_noise(branch: Branch, y: np.ndarray, knee: float) -> float:
     return robust_sigma(shut) if shut.size >= 5 else 0.0
 
 
+def _with_censored(
+    u: np.ndarray, y: np.ndarray, u_cut: np.ndarray, floor: float, sigma: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the samples of a tail and, for those that read below the floor, what they would have read on average.
+
+    Left out, they would lift the line's lower end, where only the noise's upper half is seen, and every sharp edge
+    would look a little soft. Expectation and maximisation take turns (a Tobit line); where flow below the floor is not
+    credible, a zero is a drop-out.
+    """
+    slope, zero = fit_line(u, y)
+    if not u_cut.size or not slope > 0:
+        return u, y
+    from scipy.special import erfcx
+
+    for _ in range(TAIL_ROUNDS):
+        line = slope * (u_cut - zero)
+        credible = line < floor + GATE * sigma
+        below = (line[credible] - floor) / (math.sqrt(2) * sigma)
+        # The mean of a normal law cut off above: mu - sigma phi/Phi, by the scaled error function exact far below too.
+        filled = line[credible] - sigma * math.sqrt(2 / math.pi) / erfcx(below)
+        u_all, y_all = np.concatenate([u, u_cut[credible]]), np.concatenate([y, filled])
+        slope, zero = fit_line(u_all, y_all)
+        if not slope > 0:
+            return u, y
+    return u_all, y_all
+
+
 def _find_onset(read: ReadBranch, tail: Tail, level: float, noise: float) -> tuple[float, float]:
     """Return where flow starts and the standard error, V: the first flow seen, or the tail's zero if that is lower.
 
@@ -246,21 +275,24 @@ def _find_onset(read: ReadBranch, tail: Tail, level: float, noise: float) -> tup
     return first, float(u[at] - u[at - 1])
 
 
-def _find_tail(read: ReadBranch, level: float, slope: float, noise: float, correlation: float) -> Tail:
+def _find_tail(read: ReadBranch, level: float, line: GatedLine, noise: float, correlation: float) -> Tail:
     """Extrapolate the first flow seen to zero: the valve opens (or closes) no later than this, as far as can be seen.
 
     A soft edge passes flow below the knee. What the meter sees of it is the tail from `level` to `TAIL` times it; the
     line through the tail crosses zero at or below the knee's. What happens below `level` stays hidden.
     """
-    u, y, profile = read.branch.u, read.y, read.profile
+    u, profile = read.branch.u, read.profile
     first, last = crossing(*profile, level), crossing(*profile, TAIL * level)
-    tail = (u >= first) & (u <= last) & (y > 0.5 * level)
-    if tail.sum() >= TAIL_SAMPLES and np.unique(u[tail]).size >= TAIL_LEVELS:
-        u_tail, y_tail = _without_outliers(u[tail], y[tail])
+    tail = (u >= first) & (u <= last)
+    seen = tail & (read.branch.q >= 0.5 * read.floor)
+    if seen.sum() >= TAIL_SAMPLES and np.unique(u[seen]).size >= TAIL_LEVELS:
+        u_tail, y_tail = _without_outliers(u[seen], read.y[seen])
+        u_tail, y_tail = _with_censored(u_tail, y_tail, u[tail & ~seen], read.floor, line.sigma)
         tail_slope, onset = fit_line(u_tail, y_tail)
-        if tail_slope > 0.1 * slope:  # else a notch or a leak: no line, so the chord below
+        if tail_slope > 0.1 * line.slope:  # else a notch or a leak: no line, so the chord below
             residual = y_tail - tail_slope * (u_tail - onset)
             sigma = math.sqrt(np.sum(residual**2) / (u_tail.size - 2))
+            sigma = sigma if seen.sum() == tail.sum() else max(sigma, line.sigma)  # what was filled in does not scatter
             roughness = measure_roughness(u_tail, residual)
             colour = max(colour_of_blocks(residual, max(sigma, 1e-12)), colour_factor(correlation, roughness, sigma))
             spread = np.sum((u_tail - u_tail.mean()) ** 2)
