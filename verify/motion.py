@@ -7,7 +7,6 @@ Runge-Kutta steps, the stops apart (see plant_period.h).
 import math
 from typing import TYPE_CHECKING
 
-from dzdesign.core.errors import InputError
 from dzdesign.verify.plant import PWM_PERIOD_S, Plant, derivatives, orifice
 
 if TYPE_CHECKING:
@@ -15,8 +14,6 @@ if TYPE_CHECKING:
 
 #: Radians of the fastest free motion in a Runge-Kutta step: its error stays below 1e-5 of the stroke.
 STEP_RAD = 0.6
-#: More steps than these in a phase are no valve's.
-MOST_STEPS = 1000
 
 
 def motion_sources(plant: Plant) -> dict[str, str]:
@@ -102,12 +99,4 @@ def _runge_kutta(rate, currents, position, speed, h):
 
 def _steps(plant: Plant) -> int:
     """Return how many steps a phase takes, so that none is longer than `STEP_RAD` of the fastest motion."""
-    stiffest = plant.K_et_N_m + plant.flow_force_N_mm_MPa * 1e3 * 40  # under 40 MPa, a hydraulic system's most
-    fastest = max(math.sqrt(stiffest / plant.m_e_kg), plant.B_e_N_s_m / plant.m_e_kg)
-    steps = math.ceil(fastest * PWM_PERIOD_S / STEP_RAD)
-    if steps > MOST_STEPS:
-        raise InputError(
-            f"the plant's spool moves at {fastest:.3g} rad/s, expected at most "
-            f"{MOST_STEPS * STEP_RAD / PWM_PERIOD_S:.3g}; correct m_e_kg, K_et_N_m or B_e_N_s_m"
-        )
-    return max(steps, 1)
+    return max(math.ceil(plant.fastest_rad_s * PWM_PERIOD_S / STEP_RAD), 1)

@@ -22,6 +22,10 @@ PWM_PERIOD_S = 400e-6
 MPA, L_MIN = 1e6, 1e-3 / 60
 #: Beyond any plant in the units of the names; an integer of TOML has no end.
 LARGEST_PARAMETER = 1e12
+#: Faster than this is no valve's spool, and would take the integrator a thousand steps a phase.
+FASTEST_RAD_S = 1e6
+#: Of a hydraulic system, for the flow force.
+LARGEST_DP_MPA = 40.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,6 +83,17 @@ class Plant:
                 raise InputError(f"plant parameter {name} is {getattr(self, name)}, expected a positive number")
         if self.stroke_mm <= self.overlap_mm:
             raise InputError(f"the stroke of {self.stroke_mm} mm ends inside the overlap of {self.overlap_mm} mm")
+        if self.fastest_rad_s > FASTEST_RAD_S:
+            raise InputError(
+                f"the plant's spool moves at {self.fastest_rad_s:.3g} rad/s, expected at most {FASTEST_RAD_S:.3g}; "
+                "correct m_e_kg, K_et_N_m or B_e_N_s_m"
+            )
+
+    @property
+    def fastest_rad_s(self) -> float:
+        """Rate of the spool's fastest free motion: against spring and flow force, or against its damping."""
+        stiffest = self.K_et_N_m + self.flow_force_N_mm_MPa * 1e3 * LARGEST_DP_MPA
+        return max(math.sqrt(stiffest / self.m_e_kg), self.B_e_N_s_m / self.m_e_kg)
 
     @property
     def force_per_volt(self) -> float:
