@@ -16,8 +16,8 @@ from dzdesign.identify.options import IdentifyOptions
 #: Branch (column of the fit) whose threshold a guard protects; "mean" is of both.
 COLUMNS = {"opening": 0, "closing": 1}
 #: Standard errors by which the tail's zero must lie below the knee, in one test or in all together, to be taken for a
-#: soft edge. At 3 one sharp valve in a hundred was, and beta(5 MPa) scattered by 7e-4 instead of 2.6e-4; which soft edges
-#: are found hardly changes (a width of 0.6 V always is, with any meter).
+#: soft edge. At 3 one sharp valve in a hundred was, and beta(5 MPa) scattered by 7e-4 instead of 2.6e-4; which soft
+#: edges are found hardly changes (a width of 0.6 V always is, with any meter).
 SOFT_SIGNIFICANCE = 3.5
 #: Standard errors of a lag that was found, against which the bounds guard.
 LAG_ERRORS = 3.0

@@ -6,6 +6,7 @@ from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
+import plant_oracle
 import pytest
 from plant_oracle import Oracle
 from synthetic import needs_compiler, signals_with_span, with_side
@@ -162,14 +163,30 @@ class TestPlant:
         assert exact.max() > 0.8 * plant.stroke_mm and exact.min() == 0
         assert exact.max() == plant.stroke_mm or plant.stroke_mm > 0.8  # the short stroke comes to its upper stop
 
-    def test_runge_kutta_converges_with_order_four(self, monkeypatch):
-        plant = Plant(hysteresis_V=0.0, overlap_mm=0.0, preload_N=0.0, flow_force_N_mm_MPa=0.0)
-        ends = {}
-        for steps, longest in ((1, 1.0), (2, 0.15), (24, 0.0126)):
-            monkeypatch.setattr(motion, "STEP_RAD", longest)
-            assert motion._steps(plant) == steps
-            ends[steps] = ClosedLoop(plant).run(np.full(2, 0.5), 1.0).position_mm[-1]  # in motion, free of the stops
-        assert (ends[1] - ends[24]) / (ends[2] - ends[24]) == pytest.approx(16, rel=0.5)
+    @pytest.mark.parametrize("more", [{}, {"hysteresis_V": 0.0, "stroke_mm": 0.8, "m_e_kg": 0.3}], ids=["", "landings"])
+    def test_linear_motion_is_exact(self, monkeypatch, more):
+        """Where nothing depends on the position, to 1e-12 of the stroke, stops included."""
+        monkeypatch.setattr(plant_oracle, "TIGHT", {"method": "DOP853", "rtol": 3e-14})
+        plant = Plant(flow_force_N_mm_MPa=0.0, droop_MPa_L_min2=0.0, **more)
+        shares = np.concatenate([np.linspace(0.3, 1, 4), np.random.default_rng(1).random(6)])
+        duties = np.repeat(np.round(shares * 60000) / 60000, PERIODS_PER_RECORD)
+        exact = Oracle(plant, 2.0).periods(np.concatenate([[0.0], duties[:-1]]))
+        found = ClosedLoop(plant).run(shares, 2.0).position_mm
+        assert np.abs(found - exact[PERIODS_PER_RECORD - 1 :: PERIODS_PER_RECORD]).max() <= 1e-12 * plant.stroke_mm
+
+    def test_response_over_a_period_is_the_matrix_exponential(self):
+        from scipy.linalg import expm
+
+        numbers = motion.numbers_of(Plant(), 750)
+        driven = np.zeros((5, 5))
+        driven[0, 0], driven[0, 4] = -1000.0, 1000.0  # Eqs. (19)-(21): 100 A/s a volt, at 10 V
+        driven[1, 2], driven[2, :3], driven[3, 0] = 1.0, [1000.0, -250000.0, -750.0], 1.0
+        for count in (0, 1, 511, 512, 777, 1500):
+            coarse, row = numbers.coarse[count // motion.FINE], numbers.fine[count % motion.FINE]
+            i_i, q_i, x_i, x_x, x_v, v_i, v_x, v_v = row[:8]
+            free = [[i_i, 0, 0, 0], [x_i, x_x, x_v, 0], [v_i, v_x, v_v, 0], [q_i, 0, 0, 1]]
+            exact = expm(driven * 400e-6 * count / 1500)[:4, 4]
+            assert np.array(free) @ coarse + row[8:] == pytest.approx(exact, rel=1e-12, abs=1e-20)
 
     def test_hysteresis_is_the_width_of_the_play(self):
         plant = Plant(hysteresis_V=0.3)

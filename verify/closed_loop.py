@@ -11,7 +11,7 @@ import numpy as np
 from dzdesign.core.errors import InputError
 from dzdesign.design.amplifier import RAMP_UNIT
 from dzdesign.verify.host_compiler import load_library
-from dzdesign.verify.motion import motion_sources
+from dzdesign.verify.motion import motion_header, numbers_of
 from dzdesign.verify.plant import PWM_PERIOD_S, Plant
 
 #: Periods of the PWM between two records: 100 a second, as in the paper's tests.
@@ -25,8 +25,8 @@ BACK_PRESSURE_MPA = 1.0
 FLOW_SHARE = 1e-3
 #: The command's ramps are longer than the amplifier's own by this factor.
 RAMP_RESERVE = 1.1
-#: The plant divides by its constants: products by their reciprocals move its last digits only. The core has none.
-FLOATING = ("-fno-math-errno", "-fno-trapping-math", "-freciprocal-math")
+#: No contraction to fused products: every processor gives the same digits.
+FLOATING = ("-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
 MODES = {"direct": 0, "compensated": 1, "without beta": 2}
 
 
@@ -165,7 +165,7 @@ class ClosedLoop:
         self, plant: Plant, firmware: Path | None = None, document: dict[str, Any] | None = None, sign: int = 1
     ) -> None:
         driver = files("dzdesign.verify")
-        sources = motion_sources(plant)
+        sources = {"plant_motion.h": motion_header()}
         for name in ("loop.c", "plant_period.h"):
             sources[name] = driver.joinpath(name).read_text(encoding="utf-8")
         if firmware is None:
@@ -178,6 +178,7 @@ class ClosedLoop:
         #: Of the amplifier's own ramps on this side, from zero to full command or back, s; 0: none.
         self.slowest_ramp_s = _slowest_ramp_s(document, sign) if document else 0.0
         self._has_core = firmware is not None
+        self._plant = numbers_of(plant, self._scalings.compare_max)
 
     def run(self, command: np.ndarray, supply_MPa: float, mode: str = "direct", dp_frozen_MPa: float = 0.0) -> LoopRun:
         """Run the loop from rest.
@@ -202,8 +203,13 @@ class ClosedLoop:
         back_MPa = min(BACK_PRESSURE_MPA, span - supply_MPa)
         if back_MPa < 0:
             raise InputError(f"a pressure drop of {supply_MPa:g} MPa exceeds the sensors' span of {span:g} MPa")
-        arrays = (scalings.zeros, scalings.fulls, scalings.spans, command, record)
-        zeros, fulls, spans, given, recorded = (array.ctypes.data_as(ctypes.c_void_p) for array in arrays)
+        arrays = (
+            scalings.zeros, scalings.fulls, scalings.spans, command, self._plant.flat, self._plant.coarse,
+            self._plant.fine, record,
+        )  # fmt: skip
+        zeros, fulls, spans, given, flat, coarse, fine, recorded = (
+            array.ctypes.data_as(ctypes.c_void_p) for array in arrays
+        )
         self._library.dz_loop(
             *map(ctypes.c_int32, (command.size, PERIODS_PER_RECORD, MODES[mode], scalings.negative, scalings.swapped)),
             given,
@@ -212,7 +218,10 @@ class ClosedLoop:
             fulls,
             spans,
             ctypes.c_int32(scalings.code_max),
-            ctypes.c_double(scalings.compare_max),
+            ctypes.c_int32(scalings.compare_max),
+            flat,
+            coarse,
+            fine,
             recorded,
         )
         return LoopRun(

@@ -12,65 +12,102 @@
 #define EXPORT
 #endif
 
-/* One channel of the converter: codes of zero and full signal, and what the full one stands for. */
+/* One channel of the converter: code of zero, codes a unit of what it measures, its largest code. */
 struct channel
 {
-    int32_t zero;
-    int32_t full;
-    double span;
+    double zero;
+    double codes;
+    double largest;
 };
 
-/* The code of a value: rounded down as converters do, limited to the converter's range. */
-static uint16_t convert(const struct channel *channel, double value, int32_t code_max)
+/* What drives the PWM. */
+enum mode
 {
-    const double codes = (double)(channel->full - channel->zero);
-    const double code = (double)channel->zero + value / channel->span * (codes + (codes > 0.0 ? 1.0 : -1.0));
-    return (uint16_t)(code < 0.0 ? 0.0 : (code > (double)code_max ? (double)code_max : code));
+    DIRECT,      /* the command as it is */
+    COMPENSATED, /* the amplifier */
+    WITHOUT_BETA /* the amplifier, its pressure codes frozen at dp_frozen */
+};
+
+static struct channel channel_of(int32_t zero, int32_t full, double span, int32_t code_max)
+{
+    const double codes = (double)(full - zero);
+    const struct channel channel = {(double)zero, (codes + ((codes > 0.0) ? 1.0 : -1.0)) / span, (double)code_max};
+
+    return channel;
 }
 
-/* mode 0: the command goes to the PWM as it is. mode 1: through the amplifier. mode 2: through the amplifier with the
- * pressure codes frozen at dp_frozen, that is without beta.
- * command[n]: share of u_max, each held for `every` periods; sign -1 drives solenoid B. channels: command, pressures.
- * record[n][6]: compare value, dP in MPa, Q in L/min at its end; over the record mean and largest Q; position in m. */
-EXPORT void dz_loop(int32_t n, int32_t every, int32_t mode, int32_t negative, int32_t swapped, const double *command,
-                    double supply_MPa, double back_MPa, double dp_frozen_MPa, const int32_t *zeros,
-                    const int32_t *fulls, const double *spans, int32_t code_max, double compare_max,
-                    double *record)
+/* The code of a value: rounded down as converters do, limited to the converter's range. */
+static uint16_t convert(const struct channel *channel, double value)
 {
-    const struct channel u = {zeros[0], fulls[0], spans[0]};
-    const struct channel a = {zeros[1], fulls[1], spans[1]};
-    const struct channel b = {zeros[2], fulls[2], spans[2]};
+    const double code = channel->zero + value * channel->codes;
+
+    return (uint16_t)(int32_t)((code < 0.0) ? 0.0 : ((code > channel->largest) ? channel->largest : code));
+}
+
+static inline void run(int32_t n, int32_t every, enum mode mode, int32_t negative, int32_t swapped,
+                       const double *command, double back_MPa, double dp_frozen_MPa, const struct channel *channels,
+                       struct plant *plant, double *record, int linear)
+{
     struct dz_drive drive;
-    struct plant plant = {.dp_MPa = supply_MPa};
     uint16_t compare = 0u;
+    int32_t tick = 0;
 
     dz_drive_init(&drive);
     for (int32_t k = 0; k < n; k++) {
+        const uint16_t u_code = convert(&channels[0], command[k]);
+        const uint16_t direct = (uint16_t)(int32_t)(command[k] * (double)plant->counts + 0.5);
         double sum = 0.0;
         double largest = 0.0;
+
         for (int32_t j = 0; j < every; j++) {
-            const double shadow = (double)compare / compare_max; /* written in the last period, in force in this one */
-            if (((k * every + j) % (int32_t)DZ_DRIVE_TICKS_PER_SAMPLE) == 0) {
-                const double dp = mode == 2 ? dp_frozen_MPa : plant.dp_MPa;
-                const double ahead = back_MPa + dp;
-                dz_drive_sample(&drive, convert(&u, command[k], code_max),
-                                convert(&a, swapped ? back_MPa : ahead, code_max),
-                                convert(&b, swapped ? ahead : back_MPa, code_max));
+            const int32_t in_force = (int32_t)compare; /* written in the last period, in force in this one */
+
+            if (mode == DIRECT) {
+                compare = direct;
+            } else {
+                if (tick == 0) {
+                    const double ahead = back_MPa + ((mode == WITHOUT_BETA) ? dp_frozen_MPa : plant->dp_MPa);
+                    const uint16_t a = convert(&channels[1], swapped ? back_MPa : ahead);
+                    const uint16_t b = convert(&channels[2], swapped ? ahead : back_MPa);
+
+                    dz_drive_sample(&drive, u_code, a, b);
+                    tick = (int32_t)DZ_DRIVE_TICKS_PER_SAMPLE;
+                }
+                tick--;
+                dz_drive_tick(&drive);
+                compare = negative ? drive.compare_b : drive.compare_a;
             }
-            dz_drive_tick(&drive);
-            compare = negative ? drive.compare_b : drive.compare_a;
-            if (mode == 0) {
-                compare = (uint16_t)(command[k] * compare_max + 0.5);
-            }
-            plant_period(&plant, shadow, supply_MPa);
-            sum += plant.flow;
-            largest = plant.flow > largest ? plant.flow : largest;
+            plant_period(plant, (in_force < plant->counts) ? in_force : plant->counts, linear);
+            sum += plant->flow;
+            largest = (plant->flow > largest) ? plant->flow : largest;
         }
         record[RECORDED * k] = (double)compare;
-        record[RECORDED * k + 1] = plant.dp_MPa;
-        record[RECORDED * k + 2] = plant.flow;
+        record[RECORDED * k + 1] = plant->dp_MPa;
+        record[RECORDED * k + 2] = plant->flow;
         record[RECORDED * k + 3] = sum / (double)every;
         record[RECORDED * k + 4] = largest;
-        record[RECORDED * k + 5] = plant.inner[1];
+        record[RECORDED * k + 5] = plant->x;
+    }
+}
+
+/* command[n]: share of u_max, each held for `every` periods; `negative` drives solenoid B. channels: command, pressures.
+ * p, coarse, fine: the plant, see motion.py.
+ * record[n][6]: compare value, dP in MPa, Q in L/min at its end; over the record mean and largest Q; position in m. */
+EXPORT void dz_loop(int32_t n, int32_t every, int32_t mode, int32_t negative, int32_t swapped, const double *command,
+                    double supply_MPa, double back_MPa, double dp_frozen_MPa, const int32_t *zeros,
+                    const int32_t *fulls, const double *spans, int32_t code_max, int32_t compare_max, const double *p,
+                    const double *coarse, const double *fine, double *record)
+{
+    struct plant plant;
+    struct channel channels[3];
+
+    for (int index = 0; index < 3; index++) {
+        channels[index] = channel_of(zeros[index], fulls[index], spans[index], code_max);
+    }
+    plant_at_rest(&plant, p, coarse, fine, compare_max, supply_MPa);
+    if (p[PLANT_LINEAR] > 0.5) {
+        run(n, every, (enum mode)mode, negative, swapped, command, back_MPa, dp_frozen_MPa, channels, &plant, record, 1);
+    } else {
+        run(n, every, (enum mode)mode, negative, swapped, command, back_MPa, dp_frozen_MPa, channels, &plant, record, 0);
     }
 }

@@ -172,7 +172,7 @@ def derivatives(plant: Plant) -> tuple["casadi.SX", "casadi.SX", "casadi.SX"]:
     state, inputs = ca.SX.sym("state", 3), ca.SX.sym("inputs", 3)
     current, position, speed = (state[index] for index in range(3))
     voltage, play_force, supply = (inputs[index] for index in range(3))
-    opening = ca.fmax(position - plant.overlap_mm * 1e-3, 0)
+    opening = opening_of(plant, position)
     dp_MPa, _ = orifice(plant, opening, supply)
     load = (
         plant.preload_N
@@ -189,6 +189,14 @@ def derivatives(plant: Plant) -> tuple["casadi.SX", "casadi.SX", "casadi.SX"]:
     return state, inputs, ca.vertcat(*lowered(current, position, speed, voltage, load, *parameters))
 
 
+def opening_of(plant: Plant, position: Any) -> Any:
+    """Return how far the edge is open, m."""
+    import casadi as ca
+
+    past = position - plant.overlap_mm * 1e-3
+    return ca.if_else(past > 0, past, 0)  # fmax would be a call of the C library
+
+
 def orifice(plant: Plant, opening_m: Any, supply_MPa: Any) -> tuple[Any, Any]:
     """Return pressure drop (MPa) and flow (L/min) across the edge, the supply's droop solved for in closed form.
 
@@ -200,6 +208,7 @@ def orifice(plant: Plant, opening_m: Any, supply_MPa: Any) -> tuple[Any, Any]:
     from dzdesign.derivation.lowering import lower
 
     flow = lower(equations.flow(), (equations.STATE[1], *equations.FLOW_PARAMETERS), {"sqrt": ca.sqrt})
-    conductance = flow(opening_m, 1.0, plant.C_d_W_mm * 1e-3, plant.rho_kg_m3, MPA) / L_MIN  # L/min at 1 MPa
+    # L/min at 1 MPa; Eq. (24) is linear in the opening, and of one metre it is a number.
+    conductance = opening_m * (flow(1.0, 1.0, plant.C_d_W_mm * 1e-3, plant.rho_kg_m3, MPA) / L_MIN)
     dp_MPa = supply_MPa / (1 + plant.droop_MPa_L_min2 * conductance**2)
     return dp_MPa, conductance * ca.sqrt(dp_MPa)

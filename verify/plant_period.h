@@ -3,152 +3,372 @@
 #ifndef PLANT_PERIOD_H
 #define PLANT_PERIOD_H
 
-#include "plant_constants.h"
+#include <math.h>
+
+#define CASADI_SYMBOL_EXPORT static inline
 #include "plant_motion.h"
 
-/* The place of a stop is found to h/2^HALVINGS; more events in one phase are chatter. */
-#define HALVINGS 30
+/* A stop is met where the spool is as close to it as this share of the stroke; more events in one phase are chatter. */
+#define CLOSE 1e-14
+#define STEPS 60
 #define EVENTS 4
+/* Where the edge is passed, each phase is moved in so many pieces. */
+#define PIECES 8
+
+/* What full voltage makes of a plant at rest. */
+struct response
+{
+    double i;
+    double x;
+    double v;
+    double charge;
+};
 
 struct plant
 {
-    double inner[3]; /* current, A; position, m; speed, m/s */
-    double play;     /* play of the magnetic force, V of command */
-    double mean;     /* mean current of the last period, V of command */
+    const double *p;        /* the numbers of motion.py */
+    const double *coarse;   /* and its responses to full voltage, in large steps */
+    const double *fine;     /* and in small ones */
+    int32_t counts;         /* of the compare value in a period */
+    double supply_MPa;
+    double i;    /* A */
+    double x;    /* m */
+    double v;    /* m/s */
+    double play; /* play of the magnetic force, V of command */
+    double mean; /* mean current of the last period, V of command */
+    double push; /* acceleration by the play, m/s^2 */
+    double acts; /* acceleration at x by what is neither current, spring, damping nor play, m/s^2 */
     double dp_MPa;
     double flow; /* L/min */
+    double flow_a_metre; /* of opening, where the pressure drop is constant */
+    struct response all; /* to full voltage through the period */
+    double half_x;       /* its position in the middle */
+    int32_t compare;     /* of the last period, and for it: */
+    double off;          /* the current that full voltage makes in the time for which it is off */
+    double response[5];  /* what the voltage adds: current, position, speed, charge, position in the middle */
 };
 
-/* The current after h, and what flowed in it. */
+/* What depends on the position. */
+static inline void act(struct plant *plant)
+{
+    const casadi_real *arg[3] = {&plant->x, &plant->supply_MPa, plant->p};
+    casadi_real *res[3] = {&plant->acts, &plant->dp_MPa, &plant->flow};
+
+    (void)plant_acting(arg, res, 0, 0, 0);
+}
+
+/* The acceleration of a spool that rests where it is, under a current. */
+static inline double pulled(const struct plant *plant, double current)
+{
+    return plant->p[PLANT_PULL] * current + plant->acts + plant->push - plant->p[PLANT_SPRING] * plant->x;
+}
+
+static inline int at_stop(const struct plant *plant)
+{
+    return (plant->x <= 0.0) || (plant->x >= plant->p[PLANT_STROKE_M]);
+}
+
+/* The current after h, and what flowed in it: Eqs. (19) to (21) do not feel the spool. */
 static double coil(const struct plant *plant, double voltage, double h, double *passed)
 {
-    double after;
-    const casadi_real *arg[3] = {&plant->inner[0], &voltage, &h};
-    casadi_real *res[2] = {&after, passed};
+    const double *p = plant->p;
+    const double settled = p[PLANT_DRIVE] * voltage / p[PLANT_DECAY];
+    const double after = settled + (plant->i - settled) * exp(-p[PLANT_DECAY] * h);
 
-    (void)plant_coil(arg, res, 0, 0, 0);
+    *passed = settled * h + (plant->i - after) / p[PLANT_DECAY];
     return after;
 }
 
-/* The state after moving freely for h. */
-static void move(const struct plant *plant, double voltage, double h, double play_N, double supply, double *after,
-                 double *passed)
+/* The path of a free spool, as powers of the share of the time that has passed. */
+struct path
 {
-    const casadi_real *arg[5] = {plant->inner, &voltage, &h, &play_N, &supply};
-    casadi_real *res[2] = {after, passed};
+    double i[PLANT_TERMS];
+    double x[PLANT_TERMS];
+    double v[PLANT_TERMS];
+    double charge[PLANT_TERMS];
+};
 
-    (void)plant_move(arg, res, 0, 0, 0);
+static inline double at(const double *terms, double share)
+{
+    double value = terms[PLANT_TERMS - 1];
+
+    for (int term = PLANT_TERMS - 2; term >= 0; term--) {
+        value = value * share + terms[term];
+    }
+    return value;
 }
 
-static int outside(double position)
+static struct path free_path(const struct plant *plant, double voltage, double h)
 {
-    return (position < 0.0) || (position > PLANT_STROKE_M);
+    struct path path;
+    const double before[3] = {plant->i, plant->x, plant->v};
+    const double *p = plant->p;
+    const double closed = (p[PLANT_LINEAR] > 0.5) ? 2.0 * p[PLANT_STROKE_M] : 0.5 * p[PLANT_OVERLAP_M];
+    const casadi_real *arg[6] = {before, &voltage, &h, &plant->acts, &plant->push, plant->p};
+    casadi_real *res[4] = {path.i, path.x, path.v, path.charge};
+
+    /* As long as the edge is closed, nothing that acts depends on the position. */
+    if (plant->x < closed) {
+        (void)plant_path_linear(arg, res, 0, 0, 0);
+    }
+    if ((plant->x >= closed) || (at(path.x, 1.0) >= closed)) {
+        arg[3] = &plant->push;
+        arg[4] = &plant->supply_MPa;
+        (void)plant_path(arg, res, 0, 0, 0);
+    }
+    return path;
+}
+
+/* How far a position is past a stop, m. */
+static inline double past_stop(const struct plant *plant, double position)
+{
+    return fmax(-position, position - plant->p[PLANT_STROKE_M]);
+}
+
+/* The share of h at which a path that ends outside comes to the stop: Newton's steps, halves where they lead astray. */
+static double share_to_stop(const struct plant *plant, const struct path *path, double stop, double h)
+{
+    double inside = 0.0;
+    double outside = 1.0;
+    double share = 1.0;
+
+    for (int step = 0; step < STEPS; step++) {
+        const double x = at(path->x, share);
+
+        if (fabs(x - stop) <= CLOSE * plant->p[PLANT_STROKE_M]) {
+            break;
+        }
+        if (past_stop(plant, x) > 0.0) {
+            outside = share;
+        } else {
+            inside = share;
+        }
+        share -= (x - stop) / (h * at(path->v, share));
+        if (!((share > inside) && (share < outside))) {
+            share = 0.5 * (inside + outside);
+        }
+    }
+    return share;
 }
 
 /* Moves for h, or until a stop ends the motion, and returns for how long. */
-static double move_to_stop(struct plant *plant, double voltage, double h, double play_N, double supply, double *charge)
+static double move_to_stop(struct plant *plant, double voltage, double h, double *charge)
 {
-    double after[3];
-    double passed;
-    double moved = h;
+    const struct path path = free_path(plant, voltage, h);
+    const double end = at(path.x, 1.0);
+    double share = 1.0;
 
-    move(plant, voltage, h, play_N, supply, after, &passed);
-    if (outside(after[1])) {
-        double inside = 0.0;
+    if (past_stop(plant, end) > 0.0) {
+        const double stop = (end < 0.0) ? 0.0 : plant->p[PLANT_STROKE_M];
 
-        for (int halving = 0; halving < HALVINGS; halving++) {
-            const double middle = 0.5 * (inside + moved);
-
-            move(plant, voltage, middle, play_N, supply, after, &passed);
-            if (outside(after[1])) {
-                moved = middle;
-            } else {
-                inside = middle;
-            }
-        }
-        move(plant, voltage, moved, play_N, supply, after, &passed);
-        after[1] = (after[1] < 0.5 * PLANT_STROKE_M) ? 0.0 : PLANT_STROKE_M;
-        after[2] = 0.0;
+        share = share_to_stop(plant, &path, stop, h);
+        plant->x = stop;
+        plant->v = 0.0;
+    } else {
+        plant->x = end;
+        plant->v = at(path.v, 1.0);
     }
-    plant->inner[0] = after[0];
-    plant->inner[1] = after[1];
-    plant->inner[2] = after[2];
-    *charge += passed;
-    return moved;
-}
-
-/* The current that lets a spool go which rests where it is. */
-static double release(const struct plant *plant, double play_N, double supply)
-{
-    double current;
-    const casadi_real *arg[3] = {&plant->inner[1], &play_N, &supply};
-    casadi_real *res[1] = {&current};
-
-    (void)plant_release(arg, res, 0, 0, 0);
-    return current;
+    plant->i = at(path.i, share);
+    *charge += at(path.charge, share);
+    act(plant);
+    return share * h;
 }
 
 /* Stays at the stop until the current lets go, or for all of h, and returns for how long. */
-static double stay(struct plant *plant, double voltage, double h, double play_N, double supply, double *charge)
+static double stay(struct plant *plant, double voltage, double h, double *charge)
 {
-    const int low = plant->inner[1] <= 0.0;
-    const double limit = release(plant, play_N, supply);
+    const double *p = plant->p;
+    const double away = (plant->x <= 0.0) ? 1.0 : -1.0;
     double passed;
     double stayed = h;
     double after;
 
-    if (low ? (plant->inner[0] > limit) : (plant->inner[0] < limit)) {
+    if (away * pulled(plant, plant->i) > 0.0) {
         return 0.0;
     }
     after = coil(plant, voltage, h, &passed);
-    if (low ? (after > limit) : (after < limit)) {
-        const casadi_real *arg[3] = {&plant->inner[0], &limit, &voltage};
-        casadi_real *res[1] = {&stayed};
+    if (away * pulled(plant, after) > 0.0) {
+        const double settled = p[PLANT_DRIVE] * voltage / p[PLANT_DECAY];
+        const double limit = -pulled(plant, 0.0) / p[PLANT_PULL];
 
-        (void)plant_time(arg, res, 0, 0, 0);
-        stayed = (stayed < h) ? stayed : h;
+        stayed = fmin(log((plant->i - settled) / (limit - settled)) / p[PLANT_DECAY], h);
         after = coil(plant, voltage, stayed, &passed);
     }
-    plant->inner[0] = after;
+    plant->i = after;
     *charge += passed;
     return stayed;
 }
 
-static void phase(struct plant *plant, double voltage, double h, double play_N, double supply, double *charge)
+static void phase(struct plant *plant, double voltage, double h, double *charge)
 {
     double left = h;
 
     for (int event = 0; (event < EVENTS) && (left > 0.0); event++) {
-        if ((plant->inner[1] <= 0.0) || (plant->inner[1] >= PLANT_STROKE_M)) {
-            left -= stay(plant, voltage, left, play_N, supply, charge);
+        if (at_stop(plant)) {
+            left -= stay(plant, voltage, left, charge);
         }
         if (left > 0.0) {
-            left -= move_to_stop(plant, voltage, left, play_N, supply, charge);
+            left -= move_to_stop(plant, voltage, left, charge);
         }
     }
     if (left > 0.0) { /* to and fro at a stop: it stays there for the rest of the phase */
         double passed;
 
-        plant->inner[0] = coil(plant, voltage, left, &passed);
+        plant->i = coil(plant, voltage, left, &passed);
         *charge += passed;
     }
 }
 
-static void plant_period(struct plant *plant, double duty, double supply)
+/* A period in pieces, each with the stops that it comes to; returns the charge. */
+static double period_in_pieces(struct plant *plant, int32_t compare, int32_t pieces)
 {
-    const double low = plant->mean - PLANT_HALF_PLAY_V;
-    const double high = plant->mean + PLANT_HALF_PLAY_V;
-    const casadi_real *arg[2] = {&plant->inner[1], &supply};
-    casadi_real *res[2] = {&plant->dp_MPa, &plant->flow};
+    const double *p = plant->p;
+    const double on = p[PLANT_PERIOD_S] * (double)compare / (double)plant->counts;
+    const double off = p[PLANT_PERIOD_S] - on;
     double charge = 0.0;
-    double play_N;
 
+    for (int32_t piece = 0; piece < pieces; piece++) {
+        phase(plant, p[PLANT_U_MAX_V], on / (double)pieces, &charge);
+    }
+    for (int32_t piece = 0; piece < pieces; piece++) {
+        phase(plant, 0.0, off / (double)pieces, &charge);
+    }
+    return charge;
+}
+
+/* Whether a spool at a stop stays there through the period: by the current's largest value, or its least. */
+static inline int held(const struct plant *plant, double after)
+{
+    const double *p = plant->p;
+
+    if (plant->x > 0.0) {
+        return (pulled(plant, plant->i) > 0.0) && (pulled(plant, after) > 0.0);
+    }
+    /* Switched off, a current keeps the share of itself that one from rest, switched on, has still to go. */
+    return (pulled(plant, plant->i) < 0.0) &&
+           (p[PLANT_PULL] * after + pulled(plant, 0.0) * (1.0 - plant->off * p[PLANT_PER_SETTLED]) < 0.0);
+}
+
+/* A period that may be taken whole, in one piece: 0. Otherwise nothing moves, and it needs so many pieces a phase. */
+static inline int32_t whole_period(struct plant *plant, int linear, double *charge)
+{
+    const double *p = plant->p;
+    double i, x, v, middle, end, near;
+    double excess = 0.0;
+
+    if (linear) {
+        const casadi_real *arg[7] = {&plant->i, &plant->x, &plant->v, plant->response, &plant->acts, &plant->push, p};
+        casadi_real *res[5] = {&i, &x, &v, charge, &middle};
+
+        (void)plant_step_linear(arg, res, 0, 0, 0);
+    } else {
+        const casadi_real *arg[8] = {&plant->i,    &plant->x,    &plant->v,          plant->response,
+                                     &plant->acts, &plant->push, &plant->supply_MPa, p};
+        casadi_real *res[7] = {&i, &x, &v, charge, &middle, &end, &excess};
+
+        (void)plant_step(arg, res, 0, 0, 0);
+    }
+    /* Further than this from a stop it can't have been there and back. */
+    near = (fabs(plant->v) + fabs(v)) * p[PLANT_PERIOD_S];
+    if ((plant->x <= near) || (x <= near) || (middle <= near) || (plant->x >= p[PLANT_STROKE_M] - near) ||
+        (x >= p[PLANT_STROKE_M] - near) || (middle >= p[PLANT_STROKE_M] - near)) {
+        return 1;
+    }
+    if (fabs(excess) > p[PLANT_JUMP]) {
+        return PIECES;
+    }
+    plant->i = i;
+    plant->x = x;
+    plant->v = v;
+    if (!linear) {
+        act(plant);
+        plant->acts = end - plant->push; /* which the next period need not wait for */
+    }
+    return 0;
+}
+
+/* What full voltage leaves of a plant at rest after so many half counts: after a coarse time, and a fine one more. */
+static inline struct response response_after(const struct plant *plant, int32_t half_counts)
+{
+    const double *then = &plant->coarse[4 * (half_counts / PLANT_FINE)];
+    const double *fine = &plant->fine[12 * (half_counts % PLANT_FINE)];
+    const struct response response = {
+        fine[0] * then[0] + fine[8],
+        fine[2] * then[0] + fine[3] * then[1] + fine[4] * then[2] + fine[9],
+        fine[5] * then[0] + fine[6] * then[1] + fine[7] * then[2] + fine[10],
+        fine[1] * then[0] + then[3] + fine[11],
+    };
+
+    return response;
+}
+
+/* What the voltage adds in a period of this compare value: the rest of a whole one's, as off is all that comes after. */
+static inline void respond(struct plant *plant, int32_t compare)
+{
+    const int32_t off_half = plant->counts - 2 * compare;
+    const struct response off = response_after(plant, 2 * (plant->counts - compare));
+
+    plant->compare = compare;
+    plant->off = off.i;
+    plant->response[0] = plant->all.i - off.i;
+    plant->response[1] = plant->all.x - off.x;
+    plant->response[2] = plant->all.v - off.v;
+    plant->response[3] = plant->all.charge - off.charge;
+    plant->response[4] = plant->half_x - ((off_half > 0) ? response_after(plant, off_half).x : 0.0);
+}
+
+static void plant_at_rest(struct plant *plant, const double *p, const double *coarse, const double *fine,
+                          int32_t counts, double supply_MPa)
+{
+    const struct plant rest = {.p = p, .coarse = coarse, .fine = fine, .counts = counts, .supply_MPa = supply_MPa};
+
+    *plant = rest;
+    plant->all = response_after(plant, 2 * counts);
+    plant->half_x = response_after(plant, counts).x;
+    respond(plant, 0);
+    plant->x = p[PLANT_STROKE_M];
+    act(plant);
+    plant->flow_a_metre = plant->flow / (p[PLANT_STROKE_M] - p[PLANT_OVERLAP_M]);
+    plant->x = 0.0;
+    act(plant);
+}
+
+/* linear: nothing that acts depends on the position, and the pressure drop is constant. */
+static inline void plant_period(struct plant *plant, int32_t compare, int linear)
+{
+    const double *p = plant->p;
+    const double low = plant->mean - p[PLANT_HALF_PLAY_V];
+    const double high = plant->mean + p[PLANT_HALF_PLAY_V];
+    double charge = 0.0;
+
+    if (compare != plant->compare) {
+        respond(plant, compare);
+    }
     plant->play = (plant->play < low) ? low : ((plant->play > high) ? high : plant->play);
-    play_N = (plant->play - plant->mean) * PLANT_FORCE_PER_VOLT;
-    phase(plant, PLANT_U_MAX_V, duty * PLANT_PERIOD_S, play_N, supply, &charge);
-    phase(plant, 0.0, (1.0 - duty) * PLANT_PERIOD_S, play_N, supply, &charge);
-    plant->mean = charge / PLANT_PERIOD_S * PLANT_VOLTS_PER_AMPERE;
-    (void)plant_flow(arg, res, 0, 0, 0);
+    plant->push = (plant->play - plant->mean) * p[PLANT_PUSH];
+    if (at_stop(plant)) {
+        const double after = p[PLANT_I_I] * plant->i + plant->response[0];
+
+        if (held(plant, after)) {
+            charge = p[PLANT_Q_I] * plant->i + plant->response[3];
+            plant->i = after;
+        } else {
+            charge = period_in_pieces(plant, compare, (int32_t)p[PLANT_STEPS]);
+        }
+    } else {
+        const int32_t steps = (int32_t)p[PLANT_STEPS];
+        const int32_t pieces = (!linear && (steps > 1)) ? 1 : whole_period(plant, linear, &charge);
+
+        if (pieces > 0) {
+            charge = period_in_pieces(plant, compare, pieces * steps);
+        }
+    }
+    if (linear) {
+        const double opening = plant->x - p[PLANT_OVERLAP_M];
+
+        plant->flow = plant->flow_a_metre * ((opening > 0.0) ? opening : 0.0);
+    }
+    plant->mean = charge * p[PLANT_VOLTS_PER_CHARGE];
 }
 
 #endif
