@@ -199,7 +199,8 @@ def run_simulate(args: argparse.Namespace) -> int:
     ramp_s = parse_quantity(args.ramp_time, "time", "--ramp-time")
     bench = Bench(seed=_seed(args.seed))
     check_folder_may_be_written(Path(args.output))
-    files, manifest = simulated_files(plant, pressures, ramp_s, bench, say=say)
+    firmware = Path(args.firmware) if args.firmware else None
+    files, manifest = simulated_files(plant, pressures, ramp_s, bench, say=say, firmware=firmware)
     write_folder(Path(args.output), files, manifest)
     print(to_json(manifest) if args.json else f"Written: {len(files)} simulated ramp tests in {args.output}")
     return 0
