@@ -19,12 +19,14 @@ FILE_WIDTH = 140
 
 
 def new_console() -> "Console":
+    """Return stdout as a page: as wide as the terminal, or `FILE_WIDTH` columns."""
     from rich.console import Console
 
     return Console(highlight=False, width=None if sys.stdout.isatty() else FILE_WIDTH)
 
 
 def new_table(title: str, *columns: str) -> "Table":
+    """Return an empty table; its first column is of words, the others of numbers."""
     from rich import box
     from rich.table import Table
 

@@ -15,7 +15,8 @@ from dzdesign.identify.sides import tests_of_side
 from dzdesign.verify.assessment_limits import LimitResult, check_limits
 from dzdesign.verify.assessment_notes import find_notes
 from dzdesign.verify.flow_curves import PressureCurves, read_curves
-from dzdesign.verify.valve_quantities import Reading, differences, read_quantities, symmetry
+from dzdesign.verify.quantity_readings import read_quantities
+from dzdesign.verify.valve_quantities import Reading, differences, symmetry
 
 MPA, L_MIN = 1e6, 1e-3 / 60
 SETS = ("before", "after")

@@ -12,7 +12,6 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.branches import Branch, at_nominal_pressure
-from dzdesign.identify.characteristic import USEFUL_FLOW, BranchShape, describe_branches
 from dzdesign.identify.described_tests import split_recordings
 from dzdesign.identify.noise import robust_sigma
 from dzdesign.identify.options import IdentifyOptions
@@ -21,13 +20,14 @@ from dzdesign.identify.profile import flow_at_top, smooth_profile
 from dzdesign.identify.ramp_files import RampTest
 from dzdesign.identify.ramp_splitting import Ramp, nominal_dp
 from dzdesign.identify.refusals import refuse_a_jump
-from dzdesign.identify.straight_part import GATE, ReadBranch, read_branch
+from dzdesign.identify.straight_lines import USEFUL_FLOW, find_straight_parts
+from dzdesign.identify.straight_part import GATE, GatedLine, ReadBranch, read_branch
 
 #: Width over u_max of the cells in which a curve is averaged: a mean over some tens of samples.
 CELL = 0.01
 #: A sample so far off the smoothed course, over the largest flow, may be an outlier; a finer meter's steps are not.
 LEAST_GATE = 0.01
-#: Commands within this share of u_max of the lowest are a hold, and the lowest is zero if it is within `ZERO`.
+#: Commands that stay within this share of u_max are a hold; commands within `ZERO` of it are zero.
 HOLD, ZERO = 2e-3, 0.01
 #: A hold takes at least so long, s, and so many times longer than the ramp takes to cross it; and so many samples.
 SHORTEST_HOLD_S, LONGER_THAN_RAMP, HOLD_SAMPLES = 0.5, 3.0, 10
@@ -49,8 +49,10 @@ class FlowCurve:
         Robust standard deviation of one sample about the course where the flow is small, m³/s.
     colour : float
         Long-run variance of the noise over its variance; 1 where no line tells it.
-    shape : BranchShape or None
-        What `identify` sees in the branch; None where it sees no straight part, which `no_shape` explains.
+    level : float
+        Flow that counts as flow, m³/s: the meter's floor, its noise or 0.5 % of the largest flow.
+    line : GatedLine or None
+        Through the straight part; None where there is none, which `no_line` explains.
     """
 
     read: ReadBranch
@@ -59,8 +61,9 @@ class FlowCurve:
     q_se: np.ndarray
     sigma: float
     colour: float
-    shape: BranchShape | None
-    no_shape: str = ""
+    level: float
+    line: GatedLine | None
+    no_line: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,9 +114,8 @@ class PressureCurves:
 
     @property
     def counts(self) -> float:
-        """Flow that counts as flow, m³/s: the meter's floor, its noise or 0.5 % of the largest flow."""
-        levels = [curve.shape.level for curve in self.curves if curve.shape]
-        return max(levels, default=max(self.curves[0].read.floor, USEFUL_FLOW * self.y_max))
+        """Flow that counts as flow on both branches, m³/s."""
+        return max(curve.level for curve in self.curves)
 
 
 def read_curves(
@@ -141,9 +143,11 @@ def read_curves(
     pooled, groups = pool_ramps(ramps), group_by_pressure(ramps)
     for item in pooled:
         if item.branches == (None, None):
+            u = item.test.u
             raise InputError(
-                f"'{item.test.source}' has no whole branch at {_said(nominal_dp(item.test))}, expected a ramp of the "
-                "command over half of its range at least; record it so"
+                f"'{item.test.source}' has no ramp from near zero up at {_said(nominal_dp(item.test))}: the command "
+                f"runs from {u.min():.2f} to {u.max():.2f} V, expected a sweep over half of it at least; record it so, "
+                "and give the compensator's input, not its output"
             )
     reads = [
         None if branch is None else _read(branch, item, options.u_max, floor)
@@ -167,7 +171,7 @@ def _read(branch: Branch, item: PooledTest, u_max: float, floor: float) -> ReadB
 
 
 def _curves(reads: Sequence[ReadBranch | None], options: IdentifyOptions) -> list[FlowCurve | None]:
-    """Return a curve for each branch: `identify` describes them together, or each that it can by itself."""
+    """Return a curve for each branch; straight parts are those of all together, or of each that has one by itself."""
     reasons: dict[int, str] = {}
     for index, read in enumerate(reads):
         if read is not None:
@@ -176,26 +180,26 @@ def _curves(reads: Sequence[ReadBranch | None], options: IdentifyOptions) -> lis
             except InputError as error:
                 reasons[index] = str(error)
     known = [index for index, read in enumerate(reads) if read is not None and index not in reasons]
-    shapes: dict[int, BranchShape] = {}
+    found: dict[int, tuple[GatedLine, float]] = {}
     # One meter has read all branches, and one valve has made them: together they tell more of noise and of bends.
     for group in (known, *([index] for index in known)):
-        missing = [index for index in group if index not in shapes]
+        missing = [index for index in group if index not in found]
         if not missing:
             continue
         try:
             mine = [reads[index] for index in missing]
-            found = describe_branches(mine, u_max=options.u_max, window=options.knee_window)
+            parts = find_straight_parts(mine, u_max=options.u_max, window=options.knee_window)
         except InputError as error:
             reasons |= {index: str(error) for index in missing}
             continue
-        shapes |= dict(zip(missing, found, strict=True))
+        found |= dict(zip(missing, zip(parts.lines, parts.levels, strict=True), strict=True))
     return [
-        read and _curve(read, shapes.get(index), reasons.get(index, ""), options.u_max)
+        read and _curve(read, *found.get(index, (None, None)), reasons.get(index, ""), options.u_max)
         for index, read in enumerate(reads)
     ]
 
 
-def _curve(read: ReadBranch, shape: BranchShape | None, reason: str, u_max: float) -> FlowCurve:
+def _curve(read: ReadBranch, line: GatedLine | None, level: float | None, reason: str, u_max: float) -> FlowCurve:
     """Average a branch over cells of the command, samples far off its smoothed course left out."""
     u, y = read.branch.u, read.y
     about = y - np.interp(u, *read.profile)
@@ -208,19 +212,18 @@ def _curve(read: ReadBranch, shape: BranchShape | None, reason: str, u_max: floa
         return np.bincount(index, weights=values, minlength=filled.size) / n
 
     # Noise with a memory averages out no better than 1/colour of its samples would, white.
-    colour = shape.colour if shape else 1.0
-    scatter = np.sqrt(mean(about**2) * np.minimum(colour, n) / n)
+    colour = line.colour if line else 1.0
     small = np.interp(u, *read.profile) < 0.05 * read.y_max
-    sigma = robust_sigma(about[small] if small.sum() >= 20 else about)
     return FlowCurve(
         read=read,
         u=mean(u),
         q=mean(y),
-        q_se=scatter,
-        sigma=sigma,
+        q_se=np.sqrt(mean(about**2) * np.minimum(colour, n) / n),
+        sigma=robust_sigma(about[small] if small.sum() >= 20 else about),
         colour=colour,
-        shape=shape,
-        no_shape="" if shape else reason,
+        level=max(read.floor, USEFUL_FLOW * read.y_max) if level is None else level,
+        line=line,
+        no_line="" if line else reason,
     )
 
 
@@ -263,12 +266,12 @@ def _hold_after_closing(ramp: Ramp, u_max: float) -> np.ndarray:
         time, u, q = time[: gaps[0] + 1], u[: gaps[0] + 1], q[: gaps[0] + 1]
     if u.size < HOLD_SAMPLES:
         return np.empty(0)
-    held = u <= float(np.median(u[-HOLD_SAMPLES:])) + HOLD * u_max
-    first = int(np.argmax(held))
-    crossed = HOLD * u_max / falling[-1].rate if falling[-1].rate > 0 else math.nan
-    seconds = float(time[-1] - time[first])
+    held = np.flatnonzero(np.abs(u - np.median(u)) <= HOLD * u_max)
+    rate = falling[-1].rate
+    crossed = 2 * HOLD * u_max / rate if rate > 0 else math.nan
+    seconds = float(time[held[-1]] - time[held[0]])
     if seconds > 0 and not seconds >= np.fmax(SHORTEST_HOLD_S, LONGER_THAN_RAMP * crossed):
         return np.empty(0)
-    hold = q[first:]
+    hold = q[held]
     return hold[hold.size // 2 :] if hold.size >= HOLD_SAMPLES else np.empty(0)
 
