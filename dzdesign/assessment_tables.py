@@ -92,12 +92,16 @@ def _not_observable(assessment: "Assessment") -> list[str]:
                 if reading.value is None and not (key == "symmetry" and _one_sided(assessment)):
                     places = reasons.setdefault((QUANTITIES[key].name, reading.not_observable), {})
                     where = "unknown" if item.dp is None else f"{item.dp / 1e6:.2f}"
-                    places.setdefault(f"{name.upper()}, {item.side} commands", []).append(where)
-    sentences = []
+                    side = "" if _one_sided(assessment) else f", {item.side} commands"
+                    places.setdefault(name.upper() + side, []).append(where)
+    together: dict[tuple[str, str], list[str]] = {}
     for (quantity, reason), places in reasons.items():
         where = " and ".join(f"{name} at {', '.join(dp)} MPa" for name, dp in places.items())
-        sentences.append(f"not observable: {quantity}, {where}, because {reason}")
-    return sentences
+        together.setdefault((where, reason), []).append(quantity)
+    return [
+        f"not observable: {'; '.join(quantities)}: {where}, because {reason}"
+        for (where, reason), quantities in together.items()
+    ]
 
 
 def _shown_pressures(assessment: "Assessment") -> list["PressureAssessment"]:

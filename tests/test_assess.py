@@ -2,16 +2,20 @@
 
 import json
 import re
+import shlex
+import textwrap
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from bench_recordings import AFTER, BEFORE, L_MIN, Valve, record, write
-from synthetic import needs_compiler
+from synthetic import SHARED, needs_compiler
 
 from dzdesign.cli import main
 from dzdesign.core.errors import InputError
 from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.ramp_files import RampTest, read_ramp_file
 from dzdesign.verify.assessment import AssessOptions, assess
 from dzdesign.verify.assessment_file import assessment_document
 from dzdesign.verify.assessment_limits import LIMITED, parse_limits
@@ -240,7 +244,7 @@ def test_a_fault_at_one_pressure_drop_is_found_there():
     options = replace(OPTIONS, limits={"flow_at_zero": 0.1 * L_MIN})
     after = [record(AFTER, 1, seed=2), record(replace(AFTER, closing=-0.3), 5, seed=3)]
     found = assess([record(BEFORE, dp, seed=1) for dp in (1, 5)], after, options)
-    assert [(result.place[-5:], result.holds) for result in found.limits] == [("1 MPa", True), ("5 MPa", False)]
+    assert [(result.place[-8:], result.holds) for result in found.limits] == [("1.00 MPa", True), ("5.00 MPa", False)]
 
 
 def test_sets_that_were_swapped_are_seen_in_every_quantity():
@@ -263,7 +267,7 @@ def test_a_pressure_drop_without_a_partner_is_said():
         (True, True), (True, False), (False, True),
     ]  # fmt: skip
     notes = [note.text for note in found.notes if note.code == "no-partner"]
-    assert len(notes) == 2 and "at 2 MPa were recorded without" in notes[0] and "at 5 MPa" in notes[1]
+    assert len(notes) == 2 and "at 2.00 MPa were recorded without" in notes[0] and "at 5.00 MPa" in notes[1]
     # What was recorded with the compensator is checked, with or without a partner.
     assert [result.holds for result in found.limits] == [False, False]
     assert found.pressures[1].changes == {}
@@ -293,7 +297,7 @@ def test_a_bipolar_valve_has_two_sides_and_a_symmetry():
 def test_a_side_that_was_not_recorded_with_the_compensator_is_said():
     options = replace(OPTIONS, limits={"symmetry": 0.03})
     found = assess(both_sides(BEFORE, BEFORE, 1), [record(AFTER, seed=2)], options)
-    assert any("negative commands at 1 MPa were recorded without" in note.text for note in found.notes)
+    assert any("negative commands at 1.00 MPa were recorded without" in note.text for note in found.notes)
     assert [result.holds for result in found.limits] == [None]
     assert "the negative side was not recorded" in found.limits[0].text
 
@@ -320,7 +324,6 @@ def test_one_recording_of_both_signs_reads_each_sides_own_hold():
 def test_the_dead_zones_of_the_closed_loop_are_found_in_its_records(example_compensator, firmware_folder):
     """The loop reads its records at 0.1 % of the largest flow; read at that, they must agree to 0.1 % of command."""
     from dzdesign.design.compensator_file import compensator_document
-    from dzdesign.identify.ramp_files import RampTest
     from dzdesign.verify.closed_loop import FLOW_SHARE, ClosedLoop, RampSequence, compare_at_pressure
     from dzdesign.verify.plant import Plant
 
@@ -543,3 +546,53 @@ def test_the_document_is_written_as_json_whatever_is_not_observable():
     zero = document["pressures"][0]["quantities"]["flow_at_zero"]
     assert zero["after"]["value"] is None and "falling branch" in zero["after"]["not_observable"]
     assert zero["change"] is None
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason=f"the shared measurements are not at {SHARED}")
+def test_dead_zones_at_a_level_on_recordings_that_the_project_did_not_make():
+    """Valve A has a dead zone, valve E next to none; the truth at 1 L/min is their simulation's, of true flow."""
+    truth = json.loads((SHARED / "truth.json").read_text())
+    names = {"before": ["A_dP1", "A_dP5"], "after": ["E_dP1", "E_dP5"]}
+    folders = {"before": SHARED / "valve_a", "after": SHARED / "valve_e"}
+    sets = [[read_ramp_file(folders[key] / f"{name}.csv.gz") for name in names[key]] for key in folders]
+    reading = IdentifyOptions(meter_lag=0.125)  # 0.1 s of one bench, 0.15 s of the other: 2.5 mV
+    found = assess(*sets, replace(OPTIONS, reading=reading, level=1.0 * L_MIN))
+    for row, item in enumerate(found.pressures):
+        for key, readings in item.readings.items():
+            known = truth[names[key][row]]["pos"]
+            for direction, way in (("rising", "opening"), ("falling", "closing")):
+                reading = readings[f"dead_zone_{way}"]
+                assert reading.value * 10 == pytest.approx(known[f"u_{direction}_Q1.0"], abs=0.02), (key, row, way)
+                assert reading.se * 10 < 0.02
+            assert readings["largest_flow"].value / L_MIN == pytest.approx(known["Qmax_true"], rel=0.01)
+
+
+@needs_compiler
+def test_the_readme_shows_what_the_commands_print(firmware_folder, tmp_path, monkeypatch, capsys):
+    root = Path(__file__).parents[1]
+    readme = (root / "README.md").read_text(encoding="utf-8")
+    section = readme.partition("## Before and after")[2].partition("\n## ")[0]
+    block = section.replace("\\\n", " ").replace("demo/firmware", str(firmware_folder))
+    block = block.replace("examples/paper_valve", str(root / "examples" / "paper_valve"))
+    simulate, compare = (shlex.split(line) for line in block.splitlines() if line.startswith("    dzdesign "))
+    monkeypatch.chdir(tmp_path)
+    assert main(simulate[1:]) == 0
+    manifest = json.loads((tmp_path / "after" / "manifest.json").read_text())
+    assert manifest["simulated"] is True and len(manifest["compensator"]["sha256"]) == 64
+    capsys.readouterr()
+    assert main(compare[1:]) == 1
+    printed = {line.strip() for line in capsys.readouterr().out.splitlines()}
+    output = section.partition("(exit status 1):")[2].partition("The valve's hysteresis")[0]
+    shown = [line.strip() for line in output.splitlines() if line.strip()]
+    assert len(shown) == 15 and [line for line in shown if line not in printed] == []
+    options = re.search(r"    (meter-lag = .*?)\n\n", section, re.DOTALL)[1]
+    Path("options.toml").write_text(textwrap.dedent("    " + options))
+    assert main(["assess", *compare[2:5], "--config", "options.toml"]) in (0, 1)
+
+
+@needs_compiler
+def test_a_simulated_recording_with_the_compensator_needs_a_firmware(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["simulate", "--firmware", "nowhere", "-o", "after"]) == 2
+    assert "compensator of the firmware 'nowhere" in capsys.readouterr().err
+    assert not (tmp_path / "after").exists()

@@ -87,7 +87,7 @@ class PressureAssessment:
     @property
     def place(self) -> str:
         """Side and pressure drop in words."""
-        return f"{self.side} commands" + ("" if self.dp is None else f", {self.dp / MPA:.3g} MPa")
+        return f"{self.side} commands" + ("" if self.dp is None else f", {self.dp / MPA:.2f} MPa")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -243,7 +243,7 @@ def _refuse_what_has_no_partner(
 
 
 def _said(dp: float | None) -> str:
-    return "unknown" if dp is None else f"{dp / MPA:.3g} MPa"
+    return "unknown" if dp is None else f"{dp / MPA:.2f} MPa"
 
 
 def _assess_pair(

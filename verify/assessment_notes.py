@@ -60,7 +60,7 @@ def _about_partners(pressures: Sequence["PressureAssessment"]) -> Iterator[Warni
         ):
             mine = [item for item in alone if getattr(item, name)]
             if mine:
-                listed = ", ".join("unknown" if item.dp is None else f"{item.dp / MPA:.3g}" for item in mine)
+                listed = ", ".join("unknown" if item.dp is None else f"{item.dp / MPA:.2f}" for item in mine)
                 yield Warning_(
                     code="no-partner",
                     text=f"{side} commands at {listed} MPa were recorded {have}: {tail}",

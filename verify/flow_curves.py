@@ -25,6 +25,8 @@ from dzdesign.identify.straight_part import GATE, GatedLine, ReadBranch, read_br
 
 #: Width over u_max of the cells in which a curve is averaged: a mean over some tens of samples.
 CELL = 0.01
+#: Fewest samples of a cell that tell how they scatter.
+FEWEST_IN_CELL = 3
 #: A sample so far off the smoothed course, over the largest flow, may be an outlier; a finer meter's steps are not.
 LEAST_GATE = 0.01
 #: Commands that stay within this share of u_max are a hold; commands within `ZERO` of it are zero.
@@ -44,7 +46,8 @@ class FlowCurve:
     read : ReadBranch
         Its samples and their course, smoothed over 0.1 % of u_max (V, m³/s).
     u, q, q_se : (C,) array
-        Means over cells of `CELL` u_max without outliers, in the order of rising command: V, m³/s, standard error.
+        Means over cells of `CELL` u_max without outliers, in the order of rising command: V, m³/s, standard error (NaN
+        where a cell holds too few samples to tell it, as in a table).
     sigma : float
         Robust standard deviation of one sample about the course where the flow is small, m³/s.
     colour : float
@@ -218,7 +221,7 @@ def _curve(read: ReadBranch, line: GatedLine | None, level: float | None, reason
         read=read,
         u=mean(u),
         q=mean(y),
-        q_se=np.sqrt(mean(about**2) * np.minimum(colour, n) / n),
+        q_se=np.where(n < FEWEST_IN_CELL, np.nan, np.sqrt(mean(about**2) * np.minimum(colour, n) / n)),
         sigma=robust_sigma(about[small] if small.sum() >= 20 else about),
         colour=colour,
         level=max(read.floor, USEFUL_FLOW * read.y_max) if level is None else level,

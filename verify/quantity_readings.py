@@ -163,7 +163,8 @@ def _command_at(curve: FlowCurve, level: float) -> tuple[float, float]:
     if not slope > 0:
         return at, step
     on_line = float(np.clip(zero + level / slope, at - step, at + step))
-    return on_line, float(np.sqrt(np.mean(curve.q_se[near] ** 2))) / math.sqrt(2 * NEAR) / slope
+    error = float(np.sqrt(np.mean(curve.q_se[near] ** 2))) / math.sqrt(2 * NEAR) / slope
+    return on_line, error if math.isfinite(error) else step
 
 
 def _linearity(curves: PressureCurves, rated: float, window: tuple[float, float], u_max: float) -> Reading:
@@ -184,10 +185,11 @@ def _linearity(curves: PressureCurves, rated: float, window: tuple[float, float]
     errors = np.array([np.interp(u, curve.u, curve.q_se) for curve in curves.curves])
     departure = np.abs(mean - np.polyval(np.polyfit(u, mean, 1), u))
     widest = int(np.argmax(departure))
+    error = float(np.sqrt(np.sum(errors[:, widest] ** 2))) / len(errors) / rated
     one = "" if len(curves.curves) == 2 else ", of one branch only"
     return Reading(
         value=float(departure[widest]) / rated,
-        se=float(np.sqrt(np.sum(errors[:, widest] ** 2))) / len(errors) / rated,
+        se=error if math.isfinite(error) else None,
         note=f"largest at {u[widest] / u_max:.0%} of command{one}",
     )
 
