@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.signal import lfilter
 
 from dzdesign.identify.ramp_files import RampTest
 
@@ -14,17 +15,21 @@ L_MIN, MPA = 1e-3 / 60, 1e6
 class Valve:
     """Flow gain (u - edge) beyond an edge on either branch, bent by a parabola; V, L/min, MPa, s.
 
-    `bow` is what the parabola adds to the flow in the middle of 0 to 10 V, `leak` flows at every command, `bump` adds
-    flow between 5.5 and 6.5 V; `gain` holds at 1 MPa and grows as sqrt(dP).
+    `bow` is what the parabola adds to the flow in the middle of 0 to 10 V, on the closing branch `bow_back` times that;
+    `leak` flows at every command, `bump` adds flow between 5.5 and 6.5 V; `gain` holds at 1 MPa and grows as sqrt(dP),
+    on the closing branch it is `gain_back` times that; `memory` is the correlation of two samples' noise.
     """
 
     opening: float = 5.4
     closing: float = 5.2
     gain: float = 4.0
+    gain_back: float = 1.0
     bow: float = 0.0
+    bow_back: float = 1.0
     leak: float = 0.0
     bump: float = 0.0
     noise: float = 0.05
+    memory: float = 0.0
     floor: float = 0.0
     lag: float = 0.0
     bits: int = 0
@@ -54,15 +59,15 @@ def record(
     opening = np.arange(u.size) < hold.size + ramp.size + peak.size
     factor = np.sqrt(dp_MPa)
     edge = np.where(opening, valve.opening, valve.closing)
-    q = factor * valve.gain * np.clip(u - edge, 0, None) + valve.leak
-    q += valve.bow * 4 * (u / 10) * (1 - u / 10) * (u > edge) + valve.bump * ((u > 5.5) & (u < 6.5))
-    if valve.lag:  # a straight ramp lags by a time: the filter's transient is over in a few lags
-        from scipy.signal import lfilter
-
+    gain, bow = (np.where(opening, 1.0, back) for back in (valve.gain_back, valve.bow_back))
+    q = factor * valve.gain * gain * np.clip(u - edge, 0, None) + valve.leak
+    q += valve.bow * bow * 4 * (u / 10) * (1 - u / 10) * (u > edge) + valve.bump * ((u > 5.5) & (u < 6.5))
+    if valve.lag:
         share = 1 - np.exp(-1 / (rate_Hz * valve.lag))
         q = lfilter([share], [1, share - 1], q)
     random = np.random.default_rng([seed, round(1000 * dp_MPa), sign + 1])
-    read = np.where(q < valve.floor, 0.0, q) + valve.noise * random.standard_normal(u.size)
+    noise = lfilter([np.sqrt(1 - valve.memory**2)], [1, -valve.memory], random.standard_normal(u.size))
+    read = np.where(q < valve.floor, 0.0, q) + valve.noise * noise
     if valve.spikes:
         struck = random.random(u.size) < valve.spikes
         read = np.where(struck, random.choice([-20.0, 0.0, 80.0], u.size), read)

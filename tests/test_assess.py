@@ -79,16 +79,15 @@ def test_every_quantity_of_a_known_valve(dirt):
             assert (reading.se or 0.0) < 2.5 * TOLERANCES[key], (name, key)
 
 
-def test_standard_errors_say_how_far_a_reading_scatters():
-    """Over 12 recordings with their own noise; a chi-square of 12 lies between 0.2 and 2.6 times its mean."""
+@pytest.mark.parametrize("memory", [0.0, 0.95])
+def test_standard_errors_say_how_far_a_reading_scatters(memory):
+    """Over 12 recordings with their own noise, white and slow; a chi-square of 12 is 0.2 to 2.6 times its mean."""
+    noise = {"noise": 0.1, "memory": memory}
+    before = record(replace(BEFORE, **noise), seed=99)
     found = [
-        assess(
-            [record(replace(BEFORE, noise=0.1), seed=seed)],
-            [record(replace(AFTER, noise=0.1), seed=100 + seed)],
-            OPTIONS,
-        ).pressures[0].readings["after"]
+        assess([before], [record(replace(AFTER, **noise), seed=seed)], OPTIONS).pressures[0].readings["after"]
         for seed in range(12)
-    ]  # fmt: skip
+    ]
     for key in ("dead_zone_opening", "dead_zone_closing", "knee_opening", "gain", "flow_at_zero"):
         values = np.array([each[key].value for each in found])
         errors = np.array([each[key].se for each in found])
@@ -105,6 +104,20 @@ def test_linearity_of_a_parabola_is_two_thirds_of_its_height():
     assert found.value == pytest.approx(2 / 3 * height / rated, abs=1e-3)
     whole = readings(after=bent, options=replace(OPTIONS, window=(0.0, 1.0)))["after"]["linearity"]
     assert whole.value == pytest.approx(2 / 3 * 1.5 / rated, abs=2e-3)
+
+
+def test_linearity_is_of_the_mean_of_both_branches():
+    bent = replace(AFTER, opening=0.0, closing=0.0, bow=1.5, bow_back=-1.0, noise=0.02)
+    assert readings(after=bent)["after"]["linearity"].value < 2e-3
+
+
+def test_hysteresis_is_where_the_branches_are_furthest_apart():
+    """With unequal gains the width grows with the flow: at 90 % of the smaller branch's largest flow it is largest."""
+    valve = replace(AFTER, gain_back=1.1)
+    flow = 0.9 * valve.gain * (10 - valve.opening)
+    width = valve.opening + flow / valve.gain - valve.closing - flow / (1.1 * valve.gain)
+    reading = readings(after=valve)["after"]["hysteresis"]
+    assert reading.value == pytest.approx(width / 10, abs=2e-3) and "at 90%" in reading.note
 
 
 def test_linearity_before_is_that_of_a_dead_zone():
