@@ -26,7 +26,7 @@ def print_assessment(assessment: "Assessment") -> None:
 
     for item in _shown_pressures(assessment):
         page.print(_table_of(item))
-    for text in _not_observable(assessment):
+    for text in (*_not_observable(assessment), *_remarks(assessment)):
         say(text)
     say(f"{TERMS[0].upper()}{TERMS[1:]}:")
     for text in _formulas(assessment):
@@ -104,6 +104,19 @@ def _not_observable(assessment: "Assessment") -> list[str]:
     ]
 
 
+def _remarks(assessment: "Assessment") -> list[str]:
+    """Return what must be known beside the values."""
+    from dzdesign.verify.valve_quantities import QUANTITIES
+
+    return [
+        f"{QUANTITIES[key].name}, {name.upper()} at {item.place}: {reading.note}"
+        for item in _shown_pressures(assessment)
+        for name, readings in item.readings.items()
+        for key, reading in readings.items()
+        if reading.note
+    ]
+
+
 def _shown_pressures(assessment: "Assessment") -> list["PressureAssessment"]:
     """Return those with a recording with the compensator: of the others there is a note, and all in the JSON."""
     return [item for item in assessment.pressures if item.after]
@@ -125,8 +138,9 @@ def _formulas(assessment: "Assessment") -> list[str]:
     ]
     return [
         *lines,
-        f"u_r(Q), u_f(Q): command at which the rising, the falling branch has the flow Q, brought to the pressure drop "
-        f"of the title by sqrt(dP); straight part: {knee} of the largest flow, wider where it goes on straight; window "
+        "u_r(Q), u_f(Q): command at which the rising, the falling branch has the flow Q; every flow but the largest "
+        "and that at zero is brought by sqrt(dP) to its set's pressure drop at no flow (of the two sets within 2 %); "
+        f"straight part: {knee} of the largest flow, wider where it goes on straight; window "
         f"of u: {low:.0%} to {high:.0%} of u_max",
     ]
 

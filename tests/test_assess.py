@@ -117,7 +117,7 @@ def test_hysteresis_is_where_the_branches_are_furthest_apart():
     flow = 0.9 * valve.gain * (10 - valve.opening)
     width = valve.opening + flow / valve.gain - valve.closing - flow / (1.1 * valve.gain)
     reading = readings(after=valve)["after"]["hysteresis"]
-    assert reading.value == pytest.approx(width / 10, abs=2e-3) and "at 90%" in reading.note
+    assert reading.value == pytest.approx(width / 10, abs=2e-3) and reading.where == "at 90% of the largest flow"
 
 
 def test_linearity_before_is_that_of_a_dead_zone():
@@ -478,6 +478,20 @@ def test_limits_in_the_file_of_options_decide_the_exit_status(bench, capsys):
 def test_a_limit_that_is_not_checked_is_exit_status_1(bench, capsys):
     status, out, _ = run(capsys, *SETS, "--limits", "symmetry = 5 %")
     assert status == 1 and out.count("NOT CHECKED  symmetry") == 2
+
+
+def test_over_compensation_is_printed_beside_a_dead_zone_of_none(bench, capsys):
+    write(bench / "after_4.csv", record(replace(AFTER, opening=-0.5, closing=-0.6), 4, seed=2))
+    status, out, _ = run(capsys, *SETS, "--limits", "dead_zone_opening = 9 %, flow_at_zero = 0.1 L/min")
+    assert status == 1
+    assert "dead zone, opening, AFTER at positive commands, 4.00 MPa: the flow lies above the level at every" in out
+    assert "holds  dead zone, opening, positive commands, 4.00 MPa: 0 %" in out
+    assert "MISSED  flow at zero, positive commands, 4.00 MPa" in out
+
+
+def test_of_one_branch_the_gain_says_so(bench, capsys):
+    write(bench / "after_4.csv", record(AFTER, 4, seed=2, falling=False))
+    assert "gain, AFTER at positive commands, 4.00 MPa: of one branch only: the other was not" in run(capsys, *SETS)[1]
 
 
 def test_json_is_the_artefact(bench, capsys):

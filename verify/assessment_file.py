@@ -96,6 +96,7 @@ def _reading(key: str, reading: Reading) -> dict[str, Any]:
         "at_most": scaled(reading.at_most),
         "not_observable": reading.not_observable or None,
         "note": reading.note or None,
+        "where": reading.where or None,
     }
 
 

@@ -74,5 +74,5 @@ def _figure(assessment: Assessment, item: PressureAssessment) -> "Figure":
                 axes.plot(100 * found.value, item.level / L_MIN, marker, ms=7, color=COLOURS[name], mec=BLACK, mew=0.8,
                           label=f"{name}, dead zone {NAMES[marker == 'v']}", zorder=5)  # fmt: skip
     axes.axhline(item.level / L_MIN, color=BLACK, lw=0.9, ls=":", label=f"level {item.level / L_MIN:.3g} L/min")
-    axes.set(xlabel="command (% of full)", ylabel="flow at the pressure drop above (L/min)", xlim=(0, 100))
+    axes.set(xlabel="command (% of full)", ylabel="flow at the nominal pressure drop (L/min)", xlim=(0, 100))
     return finish(figure, 3)

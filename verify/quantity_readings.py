@@ -144,7 +144,7 @@ def _hysteresis(rising: FlowCurve | None, falling: FlowCurve | None, u_max: floa
     return Reading(
         value=widths[widest] / u_max,
         se=math.hypot(found[widest][0][1], found[widest][1][1]) / u_max,
-        note=f"widest at {levels[widest] / top:.0%} of the largest flow",
+        where=f"at {levels[widest] / top:.0%} of the largest flow",
     )
 
 
@@ -186,11 +186,20 @@ def _linearity(curves: PressureCurves, rated: float, window: tuple[float, float]
     departure = np.abs(mean - np.polyval(np.polyfit(u, mean, 1), u))
     widest = int(np.argmax(departure))
     error = float(np.sqrt(np.sum(errors[:, widest] ** 2))) / len(errors) / rated
-    one = "" if len(curves.curves) == 2 else ", of one branch only"
     return Reading(
         value=float(departure[widest]) / rated,
         se=error if math.isfinite(error) else None,
-        note=f"largest at {u[widest] / u_max:.0%} of command{one}",
+        note=_one_branch(curves, len(curves.curves)),
+        where=f"at {u[widest] / u_max:.0%} of command",
+    )
+
+
+def _one_branch(curves: PressureCurves, used: int) -> str:
+    """Say of a mean of both branches that it is of one, where it is."""
+    if used == 2:
+        return ""
+    return "of one branch only: " + (
+        "the other has no straight part" if len(curves.curves) == 2 else "the other was not recorded"
     )
 
 
@@ -204,11 +213,10 @@ def _gain(curves: PressureCurves) -> Reading:
         spread = float(np.var(u[line.kept & ~line.censored])) * int(np.sum(line.kept & ~line.censored))
         errors.append(line.sigma * math.sqrt(line.colour / spread))
     count = len(lines)
-    one = "" if count == len(curves.curves) == 2 else "of one branch only"
     return Reading(
         value=sum(line.slope for line in lines) / count,
         se=math.sqrt(sum(error**2 for error in errors)) / count,
-        note=one,
+        note=_one_branch(curves, count),
     )
 
 

@@ -101,8 +101,8 @@ class Reading:
         What it does not exceed, where the value itself can't be seen.
     not_observable : str
         Why there is no value; empty where there is one.
-    note : str
-        What must be known beside the value.
+    note, where : str
+        What must be known beside the value; at which flow or command it was found, of what is largest somewhere.
     """
 
     value: float | None = None
@@ -110,6 +110,7 @@ class Reading:
     at_most: float | None = None
     not_observable: str = ""
     note: str = ""
+    where: str = ""
 
     def __post_init__(self) -> None:
         if (self.value is None) == (not self.not_observable):
