@@ -17,7 +17,7 @@ from dzdesign.core.errors import DzdesignError, InputError, RequirementError, ne
 DOES_NOT_HOLD, BAD_INPUT, INTERRUPTED, PIPE_CLOSED = 1, 2, 130, 141
 
 #: Options that may be a table in the TOML file.
-TABLES = ("columns", "dp")
+TABLES = ("columns", "dp", "after_columns", "limits")
 #: Command -> (one line of help, function that runs it, its options). An option is (names, keywords of add_argument).
 Option = tuple[tuple[str, ...], dict]
 
@@ -29,6 +29,23 @@ def _given(*names: str, **keywords: object) -> Option:
 
 
 OUTPUT = ("-o", "--output")
+#: Of every command that reads recordings.
+COLUMNS = _given(
+    "--columns",
+    metavar="MAP",
+    help='columns, such as "u=AO0:V, Q=Flow (L/min)": a quantity (time, u, dP, pA, pB, Q), its '
+    "label in the file and, after a colon, the unit that the label lacks; in the TOML file a table",
+)
+DP = _given(
+    "--dp",
+    metavar="P",
+    help='pressure drop of files without a column of it, such as "1 MPa"; in the TOML file also a table '
+    "[dp] from file name (or pattern) to pressure",
+)
+U_MAX = _given("--u-max", default="10 V", metavar="U", help="full command")
+METER_LAG = _given("--meter-lag", metavar="T", help="lag of the flow meter (default: found from ramps of two rates)")
+METER_FLOOR = _given("--meter-floor", metavar="Q", help="flow below which the meter reads zero (default: found)")
+KNEE_WINDOW = _given("--knee-window", default="12-50", metavar="A-B", help="per cent of the largest flow, straight")
 #: Of `design`, and of `codegen` where it designs first; their defaults stand in `dzdesign.design_options`.
 DESIGN = (
     _given("--law", metavar="LAW", help="paper: Eq. (18); target: meets Eq. (16) (default: paper)"),
@@ -110,22 +127,12 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
                 help="CSV, TDMS, MAT, HDF5, Parquet or Feather: columns time_s, u_V, dP_MPa, Q_Lmin",
             ),
             _given(*OUTPUT, default="valve.json", metavar="FILE", help="file to write"),
-            _given(
-                "--columns",
-                metavar="MAP",
-                help='columns, such as "u=AO0:V, Q=Flow (L/min)": a quantity (time, u, dP, pA, pB, Q), its '
-                "label in the file and, after a colon, the unit that the label lacks; in the TOML file a table",
-            ),
-            _given(
-                "--dp",
-                metavar="P",
-                help='pressure drop of files without a column of it, such as "1 MPa"; in the TOML file also a table '
-                "[dp] from file name (or pattern) to pressure",
-            ),
+            COLUMNS,
+            DP,
             _given("--dp0", metavar="P", help='reference pressure drop (default: the test nearest to "1 MPa")'),
-            _given("--u-max", default="10 V", metavar="U", help="full command"),
-            _given("--meter-floor", metavar="Q", help="flow below which the meter reads zero (default: found)"),
-            _given("--meter-lag", metavar="T", help="lag of the flow meter (default: found from ramps of two rates)"),
+            U_MAX,
+            METER_FLOOR,
+            METER_LAG,
             _given("--meter-zero", default="0 L/min", metavar="Q", help="bound of the meter's zero error"),
             _given("--x-max", metavar="X", help='stroke, such as "1.8 mm": gives k in V/mm'),
             _given("--confidence", default="0.99", metavar="C", help="of all lower bounds together"),
@@ -135,7 +142,7 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
                 help="also draw, as SVG and PNG in this folder: each pressure drop's flow with its knees, onsets and "
                 "residuals; thresholds, bounds and beta over dP",
             ),
-            _given("--knee-window", default="12-50", metavar="A-B", help="per cent of the largest flow, straight"),
+            KNEE_WINDOW,
             _given(
                 "--flat-below",
                 default="0.1",
@@ -180,6 +187,44 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
             _given("--c2000ware", metavar="DIR", help="also compile f28335 firmware against your C2000Ware's headers"),
         ),
     ),
+    "assess": (
+        "ramp tests without and with the compensator, side by side; limits for the latter",
+        "dzdesign.assess:run_assess",
+        (
+            _given("before", nargs="+", metavar="BEFORE", help="recordings without the compensator, as for identify"),
+            _given(
+                "--after",
+                nargs="+",
+                required=True,
+                metavar="AFTER",
+                help="recordings with it; the command is the compensator's input",
+            ),
+            _given(*OUTPUT, default="assessment.json", metavar="FILE", help="file to write"),
+            _given(
+                "--limits",
+                metavar="L",
+                help='largest values AFTER, such as "dead_zone_opening = 5 %%, flow_at_zero = 0.1 L/min", also of '
+                "dead_zone_closing, knee_opening, knee_closing, hysteresis, linearity, symmetry, largest_flow_loss; in "
+                "the TOML file a table [limits]",
+            ),
+            _given(
+                "--level",
+                metavar="Q",
+                help='flow that ends the dead zone, such as "0.6 L/min" or "1 %%" of the largest flow before (default: '
+                "what counts as flow: the meter's floor, its noise or 0.5 %% of the largest flow)",
+            ),
+            _given("--linearity-window", default="10-90", metavar="A-B", help="per cent of full command"),
+            COLUMNS,
+            _given("--after-columns", metavar="MAP", help="columns of the recordings after (default: as --columns)"),
+            DP,
+            U_MAX,
+            _given("--after-u-max", metavar="U", help="full command of the recordings after (default: as --u-max)"),
+            METER_FLOOR,
+            METER_LAG,
+            KNEE_WINDOW,
+            _given("--plots", metavar="DIR", help="also draw, as SVG in this folder, flow over command"),
+        ),
+    ),
     "monitor": (
         "the telemetry of a running firmware in, a ramp file out",
         "dzdesign.monitor:run_monitor",
@@ -197,6 +242,7 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
         (
             _given(*OUTPUT, default="ramps", metavar="DIR", help="folder to write"),
             PLANT,
+            _given("--firmware", metavar="DIR", help="with the compensator of this folder, made by `dzdesign codegen`"),
             _given("--dp", action="append", metavar="P", help="pressure drop, repeatable (default: 0.5 to 5 MPa)"),
             _given("--ramp-time", default="100 s", metavar="T", help="from zero to full command"),
             _given("--seed", default="1", metavar="N", help="of the noise"),

@@ -1,9 +1,6 @@
 """The commands: read, call one room, write the artefact whole, print what a person wants to know."""
 
 import argparse
-import fnmatch
-import glob
-import os
 import re
 import sys
 from pathlib import Path
@@ -12,7 +9,6 @@ from dzdesign.core.artefacts import (
     TOOL,
     check_file_may_be_written,
     check_folder_may_be_written,
-    check_place_of_files,
     parse_document,
     read_bytes,
     to_json,
@@ -20,25 +16,14 @@ from dzdesign.core.artefacts import (
     write_files,
     write_folder,
 )
-from dzdesign.core.errors import InputError, nearest
+from dzdesign.core.errors import InputError
 from dzdesign.core.units import parse_quantity
-from dzdesign.progress import with_bar
+from dzdesign.recordings import check_plots, knee_window, optional_quantity, read_recordings, refuse_copies
 
 
 def say(text: str) -> None:
     """Tell of progress, on stderr: stdout is for results."""
     print(f"dzdesign: {text}", file=sys.stderr)
-
-
-def expand(patterns: list[str]) -> list[Path]:
-    """Return the files that the patterns name; cmd.exe leaves ``*.csv`` to the program."""
-    paths = []
-    for pattern in patterns:
-        matches = sorted(glob.glob(pattern)) if glob.has_magic(pattern) and not os.path.exists(pattern) else [pattern]
-        if not matches:
-            raise InputError(f"no file matches '{pattern}'; check the name and the folder")
-        paths += [Path(match) for match in matches]
-    return paths
 
 
 def _number(text: str, option: str, example: str) -> float:
@@ -48,95 +33,35 @@ def _number(text: str, option: str, example: str) -> float:
         raise InputError(f"{option} is '{text}', expected a number such as {example}") from error
 
 
-def _window(text: str) -> tuple[float, float]:
-    ends = re.fullmatch(r"\s*(\d+\.?\d*)\s*%?\s*-\s*(\d+\.?\d*)\s*%?\s*", text, re.ASCII)
-    if ends is None:
-        raise InputError(f"--knee-window is '{text}', expected two per cents of the largest flow such as '12-50'")
-    return float(ends[1]) / 100, float(ends[2]) / 100
-
-
 def _seed(text: str) -> int:
     if not re.fullmatch(r"\d{1,18}", text, re.ASCII):
         raise InputError(f"--seed is '{text}', expected a whole number of zero or more, such as 1")
     return int(text)
 
 
-def _optional(text: str | None, quantity: str, option: str) -> float | None:
-    return None if text is None else parse_quantity(text, quantity, option)
-
-
-def _declared_dp(path: Path, declared: str | dict[str, str] | None) -> float | None:
-    """Return the pressure drop that --dp or [dp] declares for a file, in Pa; a name goes before a pattern."""
-    if declared is None or isinstance(declared, str):
-        return _optional(declared, "pressure", "--dp")
-    patterns = [name for name in declared if name == path.name]
-    patterns += [name for name in declared if fnmatch.fnmatchcase(path.name, name)]
-    return parse_quantity(declared[patterns[0]], "pressure", f"[dp] '{patterns[0]}'") if patterns else None
-
-
-def _refuse_unnamed(tests: list["RampTest"], declared: str | dict[str, str] | None) -> None:  # noqa: F821
-    """Refuse a file without a pressure drop where the table [dp] names others: a name was mistyped."""
-    for test in tests:
-        if isinstance(declared, dict) and test.dp is None:
-            raise InputError(
-                f"'{test.source}' has no column of dP, and no name in [dp] is its own{nearest(test.source, declared)}; "
-                f'add "{test.source}" = "1 MPa" to [dp], with its pressure drop'
-            )
-
-
-def _refuse_copies(tests: list["RampTest"]) -> None:  # noqa: F821
-    """Refuse a recording that is given twice: counted as a repetition it would feign certainty."""
-    known: dict[str, str] = {}
-    for test in tests:
-        if test.sha256 in known:
-            raise InputError(
-                f"'{test.source}' is byte for byte the same recording as '{known[test.sha256]}'; give it once "
-                "(a repeated ramp test is welcome, a copy is no repetition)"
-            )
-        known[test.sha256] = test.source
-
-
-def _check_plots(folder: str | None, output: Path) -> None:
-    """Refuse a folder for plots that can't be one, or in whose place the output goes."""
-    if folder is None:
-        return
-    if not folder:
-        raise InputError("--plots is empty, expected the name of a folder, such as plots")
-    check_place_of_files(Path(folder), "--plots")
-    if output.absolute() in (Path(folder).absolute(), *Path(folder).absolute().parents):
-        raise InputError(f"--plots '{folder}' lies at '{output}', where -o puts a file; choose another --plots")
-
-
 def run_identify(args: argparse.Namespace) -> int:
     """Identify a valve from ramp tests."""
-    from dzdesign.identify.column_labels import parse_columns
     from dzdesign.identify.identification import identify_sides
     from dzdesign.identify.model import SCHEMA
     from dzdesign.identify.options import IdentifyOptions
-    from dzdesign.identify.ramp_files import read_ramp_file
     from dzdesign.tables import print_valve
 
     u_max = parse_quantity(args.u_max, "voltage", "--u-max")
     options = IdentifyOptions(
         u_max=u_max,
-        dp0=_optional(args.dp0, "pressure", "--dp0"),
-        meter_floor=_optional(args.meter_floor, "flow", "--meter-floor"),
-        meter_lag=_optional(args.meter_lag, "time", "--meter-lag"),
+        dp0=optional_quantity(args.dp0, "pressure", "--dp0"),
+        meter_floor=optional_quantity(args.meter_floor, "flow", "--meter-floor"),
+        meter_lag=optional_quantity(args.meter_lag, "time", "--meter-lag"),
         meter_zero=parse_quantity(args.meter_zero, "flow", "--meter-zero"),
-        x_max=_optional(args.x_max, "length", "--x-max"),
+        x_max=optional_quantity(args.x_max, "length", "--x-max"),
         confidence=_number(args.confidence, "--confidence", "0.99"),
-        knee_window=_window(args.knee_window),
+        knee_window=knee_window(args.knee_window),
         flat_change=_number(args.flat_below, "--flat-below", "0.1") / 100,
     )
     check_file_may_be_written(Path(args.output), SCHEMA)
-    _check_plots(args.plots, Path(args.output))
-    columns = parse_columns(args.columns) if args.columns else {}
-    tests = [
-        read_ramp_file(path, u_max, columns=columns, dp=_declared_dp(path, args.dp))
-        for path in with_bar(expand(args.ramps), "reading recordings")
-    ]
-    _refuse_copies(tests)
-    _refuse_unnamed(tests, args.dp)
+    check_plots(args.plots, Path(args.output))
+    tests = read_recordings(args.ramps, u_max=u_max, columns=args.columns, dp=args.dp)
+    refuse_copies(tests)
     say(f"fitting {len(tests)} recording{'s' if len(tests) > 1 else ''}")
     found = identify_sides(tests, options)
     document = found.model.to_document()
@@ -274,7 +199,8 @@ def run_simulate(args: argparse.Namespace) -> int:
     ramp_s = parse_quantity(args.ramp_time, "time", "--ramp-time")
     bench = Bench(seed=_seed(args.seed))
     check_folder_may_be_written(Path(args.output))
-    files, manifest = simulated_files(plant, pressures, ramp_s, bench, say=say)
+    firmware = Path(args.firmware) if args.firmware else None
+    files, manifest = simulated_files(plant, pressures, ramp_s, bench, say=say, firmware=firmware)
     write_folder(Path(args.output), files, manifest)
     print(to_json(manifest) if args.json else f"Written: {len(files)} simulated ramp tests in {args.output}")
     return 0

@@ -18,13 +18,15 @@ if TYPE_CHECKING:
 FILE_WIDTH = 140
 
 
-def _console() -> "Console":
+def new_console() -> "Console":
+    """Return stdout as a page: as wide as the terminal, or `FILE_WIDTH` columns."""
     from rich.console import Console
 
     return Console(highlight=False, width=None if sys.stdout.isatty() else FILE_WIDTH)
 
 
-def _table(title: str, *columns: str) -> "Table":
+def new_table(title: str, *columns: str) -> "Table":
+    """Return an empty table; its first column is of words, the others of numbers."""
     from rich import box
     from rich.table import Table
 
@@ -48,7 +50,7 @@ def _percent(share: float) -> str:
 
 def print_valve(valve: "ValveModel") -> None:
     """Print thresholds per ramp test, the law's parameters and every warning."""
-    console = _console()
+    console = new_console()
     for name, side in valve.sides.items():
         title = "Thresholds (V)" if len(valve.sides) == 1 else f"Thresholds (V), {name} side"
         console.print(_thresholds(side, title))
@@ -69,7 +71,7 @@ def print_valve(valve: "ValveModel") -> None:
 
 
 def _thresholds(side: "SideModel", title: str) -> "Table":
-    table = _table(
+    table = new_table(
         title, "ramp test", "dP (MPa)", "knee opening", "knee closing", "s.e. of knee", "onset closing",
          "bound", "beta", "Q max (L/min)",
     )  # fmt: skip
@@ -134,7 +136,7 @@ def print_compensator(compensator: "Compensator") -> None:
         share = compensator.edge_codes / compensator.signals.command.span(1)
         guard = compensator.positive.certificate.guard
         lines.append(f"edge: from the {guard} to the opening threshold over the first {share:.2%} of command")
-    console = _console()
+    console = new_console()
     for line in (*lines, *(f"cost: {line}" for line in compensator.costs)):
         console.print(line, markup=False, soft_wrap=True)
 
@@ -148,13 +150,13 @@ def print_firmware(firmware: "Firmware", folder: str) -> None:
 
 def print_verification(verification: "Verification") -> None:
     """Print every check and the closed loop, per pressure drop."""
-    console = _console()
+    console = new_console()
     for check in verification.checks:
         verdict = {True: "holds", False: "FAILS", None: "NOT CHECKED"}[check.holds]
         console.print(f"{verdict}  {check.name}: {check.text}", markup=False, soft_wrap=True)
     if not verification.loops:
         return
-    table = _table(
+    table = new_table(
         f"Closed loop (plant: {verification.plant_source}); dead zones in per cent of full command, onset of flow",
         "dP (MPa)", "without: opening", "closing", "with: opening", "closing", "Q at zero, no beta", "with beta",
         "Q max without", "with (L/min)",
@@ -178,7 +180,7 @@ def print_verification(verification: "Verification") -> None:
 
 def print_demo(valve: "ValveModel", verification: "Verification", folder: str) -> None:
     """Print the demo's closing table: per pressure drop, what was found and what the compensator does."""
-    table = _table(
+    table = new_table(
         "Simulated example valve, 0-10 V ramps in closed loop with the generated C",
         "dP (MPa)", "threshold open/close (V)", "dead zone without", "with: opening", "with: closing",
         "Q at zero without beta", "with beta (L/min)",
@@ -196,7 +198,7 @@ def print_demo(valve: "ValveModel", verification: "Verification", folder: str) -
             f"{result.q_zero_without_beta_L_min:.2f}",
             f"{result.q_zero_L_min:.2f}",
         )
-    console = _console()
+    console = new_console()
     console.print(table)
     checked, wrong = (sum(getattr(each, name) for each in verification.inputs) for name in ("inputs", "wrong"))
     console.print(f"Inputs checked: {checked}, wrong: {wrong}", markup=False, soft_wrap=True)
@@ -208,10 +210,10 @@ def print_demo(valve: "ValveModel", verification: "Verification", folder: str) -
 
 def print_mutations(document: dict) -> None:
     """Print how many wrong equations were caught, those that were not, and the changes that mean the same."""
-    table = _table("Wrong equations", "statement", "wrong", "caught", "same meaning")
+    table = new_table("Wrong equations", "statement", "wrong", "caught", "same meaning")
     for row in document["statements"]:
         table.add_row(row["number"], str(row["mutants"]), str(row["caught"]), str(len(row["equivalent"]) or ""))
-    console = _console()
+    console = new_console()
     console.print(table)
     for row in document["statements"]:
         for survivor in row["survivors"]:

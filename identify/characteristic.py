@@ -6,25 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dzdesign.core.errors import InputError
-from dzdesign.identify.branches import Bins, Branch, bin_branch
-from dzdesign.identify.noise import colour_factor, measure_roughness, robust_sigma, shared_correlation
+from dzdesign.identify.branches import Bins, bin_branch
+from dzdesign.identify.noise import colour_factor, measure_roughness, robust_sigma
 from dzdesign.identify.profile import crossing, flow_at_top, smooth_profile
-from dzdesign.identify.straight_part import (
-    GATE,
-    LARGEST_SHIFT,
-    GatedLine,
-    ReadBranch,
-    colour_of_blocks,
-    fit_line,
-    lay_line,
-    widest_straight,
-)
+from dzdesign.identify.straight_lines import find_straight_parts
+from dzdesign.identify.straight_part import GATE, GatedLine, ReadBranch, colour_of_blocks, fit_line
 
-#: Flow below this share of the largest is no useful flow, however fine the meter.
-USEFUL_FLOW = 0.005
-#: Standard deviations of a shut reading above which a single reading is flow.
-NOISE_LEVEL = 3.0
 #: Standard deviations of a shut reading above which the mean of a bin is flow.
 FIRST_SEEN = 5.0
 #: The tail runs from the first flow seen to this multiple of it.
@@ -35,8 +22,6 @@ TAIL_SAMPLES = 12
 TAIL_LEVELS = 3
 #: Rounds in which censored samples of the tail are filled in and its line laid: each leaves a third of the error.
 TAIL_ROUNDS = 8
-#: The window may reach down to this multiple of the first flow that counts: nearer to a floor readings are cut off.
-ABOVE_LEVEL = 1.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,37 +114,11 @@ def describe_branches(reads: Sequence[ReadBranch], *, u_max: float, window: tupl
     InputError
         If a window holds too few samples for a line, or the flow does not rise in it.
     """
-    narrow = [lay_line(read, window) for read in reads]
-    for read, line in zip(reads, narrow, strict=True):
-        if not line.slope > 0:
-            raise InputError(
-                f"'{read.source}': between {window[0]:.0%} and {window[1]:.0%} of the largest flow, "
-                f"{read.y_max * 6e4:.3g} L/min, the flow does not rise with the command; look for "
-                "spikes in the column of Q, leave their cells blank, or choose another --knee-window"
-            )
-    correlation, blocks = _shared_noise(narrow)
-    narrow = [line.coloured(correlation, blocks) for line in narrow]
-    noises = [_quiet_noise(read.branch, read.y, line.knee) for read, line in zip(reads, narrow, strict=True)]
-    levels = [
-        max(read.floor, USEFUL_FLOW * read.y_max, NOISE_LEVEL * noise)
-        for read, noise in zip(reads, noises, strict=True)
-    ]
-    lowest = [ABOVE_LEVEL * level / read.y_max for read, level in zip(reads, levels, strict=True)]
-    lines = widest_straight(reads, narrow, lowest, correlation, blocks, LARGEST_SHIFT * u_max)
-    # The wider windows know the noise better.
-    correlation, blocks = _shared_noise(lines)
+    parts = find_straight_parts(reads, u_max=u_max, window=window)
     return [
-        _describe(read, line.coloured(correlation, blocks), level, noise, correlation, u_max)
-        for read, line, level, noise in zip(reads, lines, levels, noises, strict=True)
+        _describe(read, line, level, noise, parts.correlation, u_max)
+        for read, line, level, noise in zip(reads, parts.lines, parts.levels, parts.noises, strict=True)
     ]
-
-
-def _shared_noise(lines: Sequence[GatedLine]) -> tuple[float, float]:
-    """Return the correlation of neighbouring samples and the mean colour of blocks, by all branches together."""
-    correlation = shared_correlation([line.roughness for line in lines])
-    # A branch that stands out has a bend in it; the middle half is of the noise.
-    colours = np.sort([line.block_colour for line in lines])
-    return correlation, float(colours[colours.size // 4 : colours.size - colours.size // 4].mean())
 
 
 def _describe(
@@ -225,12 +184,6 @@ def _without_outliers(u: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndar
             break
         kept = inside
     return u[kept], y[kept]
-
-
-def _quiet_noise(branch: Branch, y: np.ndarray, knee: float) -> float:
-    """Return the robust standard deviation of a reading while the valve is shut (u below half the knee), m³/s."""
-    shut = y[branch.u < 0.5 * knee]
-    return robust_sigma(shut) if shut.size >= 5 else 0.0
 
 
 def _with_censored(

@@ -87,11 +87,11 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
         raise InputError("no ramp tests were given; expected at least one file")
     zeros = [_reading_at_zero(test, options.u_max) for test in tests]
     tests = [replace(test, q=test.q - zero) for test, zero in zip(tests, zeros, strict=True)]
-    ramps = _split_all(tests, options, options.meter_lag or 0.0)
+    ramps = split_recordings(tests, options, options.meter_lag or 0.0)
     lag = find_lag(ramps, options)
-    pooled = pool_ramps(ramps if lag.origin != "identified" else _split_all(tests, options, lag.seconds))
+    pooled = pool_ramps(ramps if lag.origin != "identified" else split_recordings(tests, options, lag.seconds))
     _refuse_what_shows_no_dead_zone(pooled, options)
-    floor = options.meter_floor if options.meter_floor is not None else _found_floor(pooled, options)
+    floor = options.meter_floor if options.meter_floor is not None else found_floor(pooled, options)
     reads = [read for item in pooled for read in _read(item, floor, options.u_max)]
     for read in reads:
         refuse_a_jump(read, options.u_max)
@@ -130,8 +130,18 @@ def _error_of_median(values: np.ndarray) -> float:
     return robust_sigma(values) / np.sqrt(values.size)
 
 
-def _split_all(tests: Sequence[RampTest], options: IdentifyOptions, lag: float) -> list[Ramp]:
-    """Split every recording into ramps; refuse what has no ramp, too large a command, a wrong pressure, or no flow."""
+def split_recordings(tests: Sequence[RampTest], options: IdentifyOptions, lag: float) -> list[Ramp]:
+    """Split every recording into ramps; refuse what has no ramp, too large a command, a wrong pressure, or no flow.
+
+    Parameters
+    ----------
+    tests : sequence of RampTest
+        In any order.
+    options : IdentifyOptions
+        Choices of the engineer.
+    lag : float
+        Of the flow meter, s.
+    """
     ramps = []
     highest = max(float(despiked(test.u).max()) for test in tests)
     for test in tests:
@@ -177,8 +187,16 @@ def _refuse_what_shows_no_dead_zone(pooled: list[PooledTest], options: IdentifyO
         refuse_a_shut_valve(item.test.source, item.branches, options.u_max)
 
 
-def _found_floor(pooled: list[PooledTest], options: IdentifyOptions) -> float:
-    """Return the largest meter floor that any branch shows (one meter, so one floor), m³/s."""
+def found_floor(pooled: list[PooledTest], options: IdentifyOptions) -> float:
+    """Return the largest meter floor that any branch shows (one meter, so one floor), m³/s.
+
+    Parameters
+    ----------
+    pooled : list of PooledTest
+        All of them.
+    options : IdentifyOptions
+        Choices of the engineer.
+    """
     return max(
         find_meter_floor(branch.u, branch.q, options.u_max)
         for item in pooled

@@ -1,13 +1,16 @@
 """`simulate`: ramp tests as a bench would record them, from the plant; always marked as simulated."""
 
+import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from dzdesign.core.artefacts import TOOL
+from dzdesign.core.artefacts import TOOL, read_bytes, sha256_of
 from dzdesign.core.errors import InputError
+from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.identify.ramp_files import ramp_file_bytes
 from dzdesign.verify.closed_loop import RECORD_S, ClosedLoop, RampSequence
 from dzdesign.verify.plant import Plant, plant_document
@@ -43,9 +46,9 @@ class Bench:
 
 
 def simulate_ramp(
-    loop: ClosedLoop, plant: Plant, dp_MPa: float, bench: Bench, sequence: RampSequence
+    loop: ClosedLoop, plant: Plant, dp_MPa: float, bench: Bench, sequence: RampSequence, mode: str = "direct"
 ) -> dict[str, np.ndarray]:
-    """Record one ramp test of the plant without compensator.
+    """Record one ramp test of the plant, without compensator ("direct") or with it ("compensated").
 
     Returns
     -------
@@ -54,12 +57,15 @@ def simulate_ramp(
     """
     from scipy.signal import lfilter
 
-    run = loop.run(sequence.command(), dp_MPa)
+    run = loop.run(sequence.no_faster_than(loop.slowest_ramp_s).command(), dp_MPa, mode)
     share = 1 - np.exp(-RECORD_S / bench.meter_lag_s) if bench.meter_lag_s > 0 else 1.0
-    metered = lfilter([share], [1, share - 1], run.q_L_min)
+    with_core = mode != "direct"
+    # Of a dither a meter sees the mean.
+    metered = lfilter([share], [1, share - 1], run.q_mean_L_min if with_core else run.q_L_min)
     rows = np.round(np.arange(0, run.time[-1], 1 / bench.rate_Hz) / RECORD_S).astype(int)
     # One stream of numbers per pressure drop, so that adding a test changes none of the others.
-    noise = np.random.default_rng([bench.seed, round(dp_MPa * 1e6)]).standard_normal((3, rows.size))
+    stream = [bench.seed, round(dp_MPa * 1e6), *([1] if with_core else [])]
+    noise = np.random.default_rng(stream).standard_normal((3, rows.size))
     seen = np.where(metered[rows] < bench.meter_floor_L_min, 0.0, metered[rows])
     return {
         "time_s": run.time[rows],
@@ -70,9 +76,14 @@ def simulate_ramp(
 
 
 def simulated_files(
-    plant: Plant, pressures_MPa: list[float], ramp_s: float, bench: Bench, say: Callable[[str], None]
+    plant: Plant,
+    pressures_MPa: list[float],
+    ramp_s: float,
+    bench: Bench,
+    say: Callable[[str], None],
+    firmware: Path | None = None,
 ) -> tuple[dict[str, bytes], dict[str, Any]]:
-    """Simulate one ramp test per pressure drop, up and down.
+    """Simulate one ramp test per pressure drop, up and down; with a firmware folder, of the compensated valve.
 
     Returns
     -------
@@ -81,7 +92,8 @@ def simulated_files(
     """
     if not 1 <= ramp_s <= 1000:
         raise InputError(f"the ramp time is {ramp_s:g} s, expected 1 to 1000 s")
-    loop = ClosedLoop(plant)
+    loop, origin = (ClosedLoop(plant), {}) if firmware is None else _loop_of(plant, firmware)
+    name, mode = ("ramp", "direct") if firmware is None else ("compensated", "compensated")
     sequence = RampSequence(ramp=ramp_s)
     contents = {}
     for dp_MPa in pressures_MPa:
@@ -93,14 +105,25 @@ def simulated_files(
             f"pressure drop {dp_MPa:g} MPa at no flow; 0-{plant.u_max_V:g} V in {ramp_s:g} s and back",
             f"meter: floor {bench.meter_floor_L_min:g} L/min, lag {bench.meter_lag_s:g} s, "
             f"noise {bench.meter_noise_L_min:g} L/min; seed {bench.seed}",
+            *(["with the compensator; u is its command"] if firmware else []),
         )
-        columns = simulate_ramp(loop, plant, dp_MPa, bench, sequence)
-        contents[f"ramp_dP{dp_MPa:g}.csv.gz"] = ramp_file_bytes(columns, comments, compress=True)
+        columns = simulate_ramp(loop, plant, dp_MPa, bench, sequence, mode)
+        contents[f"{name}_dP{dp_MPa:g}.csv.gz"] = ramp_file_bytes(columns, comments, compress=True)
     manifest = {
         "schema": "dzdesign.simulation/1",
         "tool": TOOL,
         "simulated": True,
         "plant": plant_document(plant),
         "bench": asdict(bench),
+        **origin,
     }
     return contents, manifest
+
+
+def _loop_of(plant: Plant, firmware: Path) -> tuple[ClosedLoop, dict[str, Any]]:
+    """Return the loop of a plant with a firmware's core, and what the manifest says of it."""
+    path = firmware / "compensator.json"
+    content = read_bytes(path, "compensator of the firmware")
+    compensator_from_document(content, str(path))  # every key that the loop reads is there
+    origin = {"compensator": {"source": path.name, "sha256": sha256_of(content)}}
+    return ClosedLoop(plant, firmware, json.loads(content)), origin

@@ -1,0 +1,94 @@
+"""`dzdesign assess`: ramps recorded without and with the compensator, side by side, and the limits of the latter."""
+
+import argparse
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dzdesign.commands import say
+from dzdesign.core.artefacts import check_file_may_be_written, to_json, write_file, write_files
+from dzdesign.core.errors import InputError
+from dzdesign.core.units import parse_quantity
+from dzdesign.recordings import check_plots, knee_window, optional_quantity, read_recordings, refuse_copies
+
+if TYPE_CHECKING:
+    from dzdesign.verify.assessment import AssessOptions
+
+
+def run_assess(args: argparse.Namespace) -> int:
+    """Compare recordings; 1 if one with the compensator misses a limit, or a limit can't be checked."""
+    from dzdesign.assessment_tables import print_assessment
+    from dzdesign.verify.assessment import assess
+    from dzdesign.verify.assessment_file import SCHEMA, assessment_document
+
+    options = _options(args)
+    output = Path(args.output)
+    check_file_may_be_written(output, SCHEMA)
+    check_plots(args.plots, output)
+    sets = {
+        name: read_recordings(
+            patterns, u_max=options.of_set(name).u_max, columns=columns, dp=args.dp, what=f"reading recordings {name}"
+        )
+        for name, patterns, columns in (
+            ("before", args.before, args.columns),
+            ("after", args.after, args.after_columns or args.columns),
+        )
+    }
+    refuse_copies([*sets["before"], *sets["after"]])
+    say(f"comparing {len(sets['before'])} recordings before with {len(sets['after'])} after")
+    found = assess(sets["before"], sets["after"], options)
+    document = assessment_document(found)
+    write_file(output, to_json(document), SCHEMA)
+    if args.plots:
+        from dzdesign.verify.assessment_plots import plot_files
+
+        say("drawing")
+        write_files(Path(args.plots), plot_files(found), "--plots")
+    if args.json:
+        print(to_json(document), end="")
+    else:
+        print_assessment(found)
+        print(f"Written: {args.output}" + (f", plots in {args.plots}" if args.plots else ""))
+    return 0 if found.holds else 1
+
+
+def _options(args: argparse.Namespace) -> "AssessOptions":
+    """Return the engineer's choices."""
+    from dzdesign.identify.options import IdentifyOptions
+    from dzdesign.verify.assessment import AssessOptions
+    from dzdesign.verify.assessment_limits import parse_limits
+
+    reading = IdentifyOptions(
+        u_max=parse_quantity(args.u_max, "voltage", "--u-max"),
+        meter_floor=optional_quantity(args.meter_floor, "flow", "--meter-floor"),
+        meter_lag=optional_quantity(args.meter_lag, "time", "--meter-lag"),
+        knee_window=knee_window(args.knee_window),
+    )
+    after_u_max = optional_quantity(args.after_u_max, "voltage", "--after-u-max")
+    if after_u_max is not None and not after_u_max > 0:
+        raise InputError(f"--after-u-max is '{args.after_u_max}', expected a positive command")
+    level, share = _level(args.level)
+    return AssessOptions(
+        reading=reading,
+        after_u_max=after_u_max,
+        level=level,
+        level_share=share,
+        window=_window(args.linearity_window),
+        limits=parse_limits(args.limits, after_u_max or reading.u_max) if args.limits is not None else {},
+    )
+
+
+def _level(text: str | None) -> tuple[float | None, float | None]:
+    """Return the level as a flow (m³/s) or as a share of the largest flow; None for what it is not."""
+    if text is None:
+        return None, None
+    if text.rstrip().endswith("%"):
+        return None, parse_quantity(text, "ratio", "--level")
+    return parse_quantity(text, "flow", "--level"), None
+
+
+def _window(text: str) -> tuple[float, float]:
+    ends = re.fullmatch(r"\s*(\d+\.?\d*)\s*%?\s*-\s*(\d+\.?\d*)\s*%?\s*", text, re.ASCII)
+    if ends is None:
+        raise InputError(f"--linearity-window is '{text}', expected two per cents of full command such as '10-90'")
+    return float(ends[1]) / 100, float(ends[2]) / 100

@@ -1,0 +1,122 @@
+"""Reading recordings as the command line names them: patterns, columns, declared pressure drops, no copies."""
+
+import fnmatch
+import glob
+import os
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dzdesign.core.artefacts import check_place_of_files
+from dzdesign.core.errors import InputError, nearest
+from dzdesign.core.units import parse_quantity
+from dzdesign.progress import with_bar
+
+if TYPE_CHECKING:
+    from dzdesign.identify.ramp_files import RampTest
+
+
+def read_recordings(
+    patterns: list[str],
+    *,
+    u_max: float,
+    columns: str | dict[str, str] | None,
+    dp: str | dict[str, str] | None,
+    what: str = "reading recordings",
+) -> "list[RampTest]":
+    """Read the recordings that patterns name.
+
+    Parameters
+    ----------
+    patterns : list of str
+        Names of files, or patterns such as ``ramps/*.csv``.
+    u_max : float
+        Command in V that 100 % means.
+    columns : str or dict, optional
+        Of --columns, or of the table in the file of options.
+    dp : str or dict, optional
+        Pressure drop that --dp declares for all files, or that [dp] declares for each.
+    what : str
+        For the bar of progress.
+
+    Raises
+    ------
+    InputError
+        If a file can't be read, or has no pressure drop where [dp] names those of others.
+    """
+    from dzdesign.identify.column_labels import parse_columns
+    from dzdesign.identify.ramp_files import read_ramp_file
+
+    chosen = parse_columns(columns) if columns else {}
+    tests = [
+        read_ramp_file(path, u_max, columns=chosen, dp=_declared_dp(path, dp))
+        for path in with_bar(expand(patterns), what)
+    ]
+    _refuse_unnamed(tests, dp)
+    return tests
+
+
+def expand(patterns: list[str]) -> list[Path]:
+    """Return the files that the patterns name; cmd.exe leaves ``*.csv`` to the program."""
+    paths = []
+    for pattern in patterns:
+        matches = sorted(glob.glob(pattern)) if glob.has_magic(pattern) and not os.path.exists(pattern) else [pattern]
+        if not matches:
+            raise InputError(f"no file matches '{pattern}'; check the name and the folder")
+        paths += [Path(match) for match in matches]
+    return paths
+
+
+def knee_window(text: str) -> tuple[float, float]:
+    """Return the two shares of the largest flow that --knee-window names."""
+    ends = re.fullmatch(r"\s*(\d+\.?\d*)\s*%?\s*-\s*(\d+\.?\d*)\s*%?\s*", text, re.ASCII)
+    if ends is None:
+        raise InputError(f"--knee-window is '{text}', expected two per cents of the largest flow such as '12-50'")
+    return float(ends[1]) / 100, float(ends[2]) / 100
+
+
+def optional_quantity(text: str | None, quantity: str, option: str) -> float | None:
+    """Return what an option says, in SI, or None if it is not given."""
+    return None if text is None else parse_quantity(text, quantity, option)
+
+
+def _declared_dp(path: Path, declared: str | dict[str, str] | None) -> float | None:
+    """Return the pressure drop that --dp or [dp] declares for a file, in Pa; a name goes before a pattern."""
+    if declared is None or isinstance(declared, str):
+        return optional_quantity(declared, "pressure", "--dp")
+    patterns = [name for name in declared if name == path.name]
+    patterns += [name for name in declared if fnmatch.fnmatchcase(path.name, name)]
+    return parse_quantity(declared[patterns[0]], "pressure", f"[dp] '{patterns[0]}'") if patterns else None
+
+
+def _refuse_unnamed(tests: list["RampTest"], declared: str | dict[str, str] | None) -> None:
+    """Refuse a file without a pressure drop where the table [dp] names others: a name was mistyped."""
+    for test in tests:
+        if isinstance(declared, dict) and test.dp is None:
+            raise InputError(
+                f"'{test.source}' has no column of dP, and no name in [dp] is its own{nearest(test.source, declared)}; "
+                f'add "{test.source}" = "1 MPa" to [dp], with its pressure drop'
+            )
+
+
+def refuse_copies(tests: list["RampTest"]) -> None:
+    """Refuse a recording that is given twice: counted as a repetition it would feign certainty."""
+    known: dict[str, str] = {}
+    for test in tests:
+        if test.sha256 in known:
+            raise InputError(
+                f"'{test.source}' is byte for byte the same recording as '{known[test.sha256]}'; give it once "
+                "(a repeated ramp test is welcome, a copy is no repetition)"
+            )
+        known[test.sha256] = test.source
+
+
+def check_plots(folder: str | None, output: Path) -> None:
+    """Refuse a folder for plots that can't be one, or in whose place the output goes."""
+    if folder is None:
+        return
+    if not folder:
+        raise InputError("--plots is empty, expected the name of a folder, such as plots")
+    check_place_of_files(Path(folder), "--plots")
+    if output.absolute() in (Path(folder).absolute(), *Path(folder).absolute().parents):
+        raise InputError(f"--plots '{folder}' lies at '{output}', where -o puts a file; choose another --plots")
