@@ -1,5 +1,6 @@
 """The compiled core in closed loop with the plant: ramps up and down, the pulse resolved, pressures through the ADC."""
 
+import copy
 import ctypes
 from dataclasses import dataclass, replace
 from importlib.resources import files
@@ -179,6 +180,12 @@ class ClosedLoop:
         self.slowest_ramp_s = _slowest_ramp_s(document, sign) if document else 0.0
         self._has_core = firmware is not None
         self._plant = numbers_of(plant, self._scalings.compare_max)
+
+    def with_plant(self, plant: Plant) -> "ClosedLoop":
+        """Return the same loop with another plant; nothing is compiled again."""
+        other = copy.copy(self)
+        other._plant = numbers_of(plant, self._scalings.compare_max)
+        return other
 
     def run(self, command: np.ndarray, supply_MPa: float, mode: str = "direct", dp_frozen_MPa: float = 0.0) -> LoopRun:
         """Run the loop from rest.

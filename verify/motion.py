@@ -34,10 +34,11 @@ NAMED = (
     "PULL", "SPRING", "DAMPING", "PUSH", "OVERLAP_M", "STEPS", "LINEAR", "JUMP",
 )  # fmt: skip
 #: Entries of the exact maps over a period, row by column of (current, position, speed, charge); of the position in its
-#: middle; what the acceleration adds, from its values at start, middle and end.
+#: middle; what the acceleration adds: to the middle and, foreseen, to the end from its value at the start, and to
+#: position and speed from its values at start, middle and end.
 MAP = (
     "i_i", "q_i", "x_i", "x_x", "x_v", "v_i", "v_x", "v_v", "mid_i", "mid_x", "mid_v",
-    "mid_start", "ahead_start", "ahead_mid", "x_start", "x_mid", "x_end", "v_start", "v_mid", "v_end",
+    "mid_start", "ahead_start", "x_start", "x_mid", "x_end", "v_start", "v_mid", "v_end",
 )  # fmt: skip
 
 
@@ -142,11 +143,9 @@ def _map(rates: np.ndarray) -> list[float]:
     share = 1 / PWM_PERIOD_S
     # Values at 0, T/2, T -> coefficients of s^j/j!.
     quadratic = np.array([[1, 0, 0], [-3 * share, 4 * share, -share], [4 * share**2, -8 * share**2, 4 * share**2]])
-    straight = np.array([[1, 0], [-2 * share, 2 * share]])
-    ahead = by_power[1, :2] @ straight
     return [
         end[0, 0], end[3, 0], *end[1, :3], *end[2, :3], *middle[1, :3],
-        by_power_middle[1, 0], *ahead, *(by_power[1] @ quadratic), *(by_power[2] @ quadratic),
+        by_power_middle[1, 0], by_power[1, 0], *(by_power[1] @ quadratic), *(by_power[2] @ quadratic),
     ]  # fmt: skip
 
 
@@ -232,7 +231,8 @@ def _step(through, state, response, start, acceleration: Callable) -> list:
     at_middle = acceleration(middle)
     free_x = through.x_i * i + through.x_x * x + through.x_v * v + response[1]
     free_v = through.v_i * i + through.v_x * x + through.v_v * v + response[2]
-    at_end = acceleration(free_x + through.ahead_start * start + through.ahead_mid * at_middle)
+    # Not from `at_middle`, which would have to be waited for; the difference is of the fourth order.
+    at_end = acceleration(free_x + through.ahead_start * start)
     return [
         through.i_i * i + response[0],
         free_x + through.x_start * start + through.x_mid * at_middle + through.x_end * at_end,
