@@ -28,7 +28,7 @@ FLOW_SHARE = 1e-3
 RAMP_RESERVE = 1.1
 #: No contraction to fused products: every processor gives the same digits.
 FLOATING = ("-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
-MODES = {"direct": 0, "compensated": 1, "without beta": 2}
+MODES = ("direct", "compensated", "without beta")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,8 +52,8 @@ class RampSequence:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoopRun:
-    """Records of one run, 100 a second: time in s, command share, compare value, dP in MPa, flow in L/min, position of
-    the spool in mm, all (N,).
+    """Records of one run, 100 a second unless others were asked for: time in s, command share, compare value, dP in MPa,
+    flow in L/min, position of the spool in mm, all (N,).
 
     Of the flow three: at the record's end; its mean over the record, and its largest there. A dither of 100 Hz or more
     has a whole wave in a record: its mean is what a meter sees, its largest is at the wave's top.
@@ -187,52 +187,58 @@ class ClosedLoop:
         other._plant = numbers_of(plant, self._scalings.compare_max)
         return other
 
-    def run(self, command: np.ndarray, supply_MPa: float, mode: str = "direct", dp_frozen_MPa: float = 0.0) -> LoopRun:
+    def run(
+        self,
+        command: np.ndarray,
+        supply_MPa: float | np.ndarray,
+        mode: str = "direct",
+        dp_frozen_MPa: float = 0.0,
+        *,
+        seen_MPa: np.ndarray | None = None,
+        periods_per_record: int = PERIODS_PER_RECORD,
+    ) -> LoopRun:
         """Run the loop from rest.
 
         Parameters
         ----------
         command : (N,) array
-            Share of u_max, one value a record of 10 ms.
-        supply_MPa : float
+            Share of u_max, one value a record.
+        supply_MPa : float or (N,) array
             Pressure drop at no flow.
         mode : {"direct", "compensated", "without beta"}
             What drives the PWM.
         dp_frozen_MPa : float
             The pressure drop that mode "without beta" shows to the core.
+        seen_MPa : (N,) array, optional
+            Pressure drop that the sensors show, of sensors that fail; not a number: the plant's own.
+        periods_per_record : int
+            Periods of the PWM that a value of the command is held for, and a record is of.
         """
+        if mode not in MODES:
+            raise ValueError(f"mode is '{mode}', expected one of {', '.join(MODES)}")
         if mode != "direct" and not self._has_core:
             raise InputError("this loop was built without a compensator; give the firmware folder")
         command = np.ascontiguousarray(command, dtype=float)
+        supply = np.ascontiguousarray(np.broadcast_to(supply_MPa, command.shape), dtype=float)
+        if mode == "without beta":
+            seen_MPa = np.full(command.shape, dp_frozen_MPa)
+        seen = np.full(command.shape, np.nan) if seen_MPa is None else np.ascontiguousarray(seen_MPa, dtype=float)
         record = np.empty((command.size, RECORDED))
-        scalings = self._scalings
-        span = float(scalings.spans[1:].min())
-        back_MPa = min(BACK_PRESSURE_MPA, span - supply_MPa)
+        scalings, plant = self._scalings, self._plant
+        span, highest = float(scalings.spans[1:].min()), float(supply.max())
+        back_MPa = min(BACK_PRESSURE_MPA, span - highest)
         if back_MPa < 0:
-            raise InputError(f"a pressure drop of {supply_MPa:g} MPa exceeds the sensors' span of {span:g} MPa")
-        arrays = (
-            scalings.zeros, scalings.fulls, scalings.spans, command, self._plant.flat, self._plant.coarse,
-            self._plant.fine, record,
+            raise InputError(f"a pressure drop of {highest:g} MPa exceeds the sensors' span of {span:g} MPa")
+        choices = (
+            command.size, periods_per_record, mode != "direct", scalings.negative, scalings.swapped,
+            scalings.code_max, scalings.compare_max,
         )  # fmt: skip
-        zeros, fulls, spans, given, flat, coarse, fine, recorded = (
-            array.ctypes.data_as(ctypes.c_void_p) for array in arrays
-        )
-        self._library.dz_loop(
-            *map(ctypes.c_int32, (command.size, PERIODS_PER_RECORD, MODES[mode], scalings.negative, scalings.swapped)),
-            given,
-            *map(ctypes.c_double, (supply_MPa, back_MPa, dp_frozen_MPa)),
-            zeros,
-            fulls,
-            spans,
-            ctypes.c_int32(scalings.code_max),
-            ctypes.c_int32(scalings.compare_max),
-            flat,
-            coarse,
-            fine,
-            recorded,
-        )
+        series = (np.array(choices, dtype=np.int32), command, supply, seen)
+        given = (scalings.zeros, scalings.fulls, scalings.spans, plant.flat, plant.coarse, plant.fine, record)
+        pointers = [[array.ctypes.data_as(ctypes.c_void_p) for array in arrays] for arrays in (series, given)]
+        self._library.dz_loop(*pointers[0], ctypes.c_double(back_MPa), *pointers[1])
         return LoopRun(
-            time=np.arange(command.size) * RECORD_S,
+            time=np.arange(command.size) * periods_per_record * PWM_PERIOD_S,
             command=command,
             compare=record[:, 0],
             dp_MPa=record[:, 1],

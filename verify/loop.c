@@ -20,14 +20,6 @@ struct channel
     double largest;
 };
 
-/* What drives the PWM. */
-enum mode
-{
-    DIRECT,      /* the command as it is */
-    COMPENSATED, /* the amplifier */
-    WITHOUT_BETA /* the amplifier, its pressure codes frozen at dp_frozen */
-};
-
 static struct channel channel_of(int32_t zero, int32_t full, double span, int32_t code_max)
 {
     const double codes = (double)(full - zero);
@@ -44,38 +36,53 @@ static uint16_t convert(const struct channel *channel, double value)
     return (uint16_t)(int32_t)((code < 0.0) ? 0.0 : ((code > channel->largest) ? channel->largest : code));
 }
 
-static inline void run(int32_t n, int32_t every, enum mode mode, int32_t negative, int32_t swapped,
-                       const double *command, double back_MPa, double dp_frozen_MPa, const struct channel *channels,
-                       struct plant *plant, double *record, int linear)
+/* What the loop does: the series have n values, each held for `every` periods. */
+struct task
+{
+    int32_t n;
+    int32_t every;
+    int32_t amplifier; /* 0: the command goes to the PWM as it is */
+    int32_t negative;  /* drive solenoid B */
+    int32_t swapped;   /* sensors A and B the other way round */
+    const double *command;    /* share of u_max */
+    const double *supply_MPa; /* pressure drop at no flow */
+    const double *seen_MPa;   /* pressure drop that the sensors show; not a number: the plant's */
+    double back_MPa;          /* pressure behind the edge */
+    struct channel channels[3]; /* command, pressures A and B */
+};
+
+static inline void run(const struct task *task, struct plant *plant, double *record, int linear)
 {
     struct dz_drive drive;
     uint16_t compare = 0u;
     int32_t tick = 0;
 
     dz_drive_init(&drive);
-    for (int32_t k = 0; k < n; k++) {
-        const uint16_t u_code = convert(&channels[0], command[k]);
-        const uint16_t direct = (uint16_t)(int32_t)(command[k] * (double)plant->counts + 0.5);
+    for (int32_t k = 0; k < task->n; k++) {
+        const uint16_t u_code = convert(&task->channels[0], task->command[k]);
+        const uint16_t direct = (uint16_t)(int32_t)(task->command[k] * (double)plant->counts + 0.5);
+        const double seen_MPa = task->seen_MPa[k];
         double sum = 0.0;
         double largest = 0.0;
 
-        for (int32_t j = 0; j < every; j++) {
+        plant_supply(plant, task->supply_MPa[k]);
+        for (int32_t j = 0; j < task->every; j++) {
             const int32_t in_force = (int32_t)compare; /* written in the last period, in force in this one */
 
-            if (mode == DIRECT) {
-                compare = direct;
-            } else {
+            if (task->amplifier) {
                 if (tick == 0) {
-                    const double ahead = back_MPa + ((mode == WITHOUT_BETA) ? dp_frozen_MPa : plant->dp_MPa);
-                    const uint16_t a = convert(&channels[1], swapped ? back_MPa : ahead);
-                    const uint16_t b = convert(&channels[2], swapped ? ahead : back_MPa);
+                    const double ahead = task->back_MPa + ((seen_MPa == seen_MPa) ? seen_MPa : plant->dp_MPa);
+                    const uint16_t a = convert(&task->channels[1], task->swapped ? task->back_MPa : ahead);
+                    const uint16_t b = convert(&task->channels[2], task->swapped ? ahead : task->back_MPa);
 
                     dz_drive_sample(&drive, u_code, a, b);
                     tick = (int32_t)DZ_DRIVE_TICKS_PER_SAMPLE;
                 }
                 tick--;
                 dz_drive_tick(&drive);
-                compare = negative ? drive.compare_b : drive.compare_a;
+                compare = task->negative ? drive.compare_b : drive.compare_a;
+            } else {
+                compare = direct;
             }
             plant_period(plant, (in_force < plant->counts) ? in_force : plant->counts, linear);
             sum += plant->flow;
@@ -84,30 +91,30 @@ static inline void run(int32_t n, int32_t every, enum mode mode, int32_t negativ
         record[RECORDED * k] = (double)compare;
         record[RECORDED * k + 1] = plant->dp_MPa;
         record[RECORDED * k + 2] = plant->flow;
-        record[RECORDED * k + 3] = sum / (double)every;
+        record[RECORDED * k + 3] = sum / (double)task->every;
         record[RECORDED * k + 4] = largest;
         record[RECORDED * k + 5] = plant->x;
     }
 }
 
-/* command[n]: share of u_max, each held for `every` periods; `negative` drives solenoid B. channels: command, pressures.
+/* choices: n, every, amplifier, negative, swapped, largest code, largest compare value. series, channels: see `task`.
  * p, coarse, fine: the plant, see motion.py.
  * record[n][6]: compare value, dP in MPa, Q in L/min at its end; over the record mean and largest Q; position in m. */
-EXPORT void dz_loop(int32_t n, int32_t every, int32_t mode, int32_t negative, int32_t swapped, const double *command,
-                    double supply_MPa, double back_MPa, double dp_frozen_MPa, const int32_t *zeros,
-                    const int32_t *fulls, const double *spans, int32_t code_max, int32_t compare_max, const double *p,
+EXPORT void dz_loop(const int32_t *choices, const double *command, const double *supply_MPa, const double *seen_MPa,
+                    double back_MPa, const int32_t *zeros, const int32_t *fulls, const double *spans, const double *p,
                     const double *coarse, const double *fine, double *record)
 {
     struct plant plant;
-    struct channel channels[3];
+    struct task task = {choices[0], choices[1], choices[2], choices[3], choices[4], command, supply_MPa, seen_MPa,
+                        back_MPa,   {{0.0, 0.0, 0.0}}};
 
     for (int index = 0; index < 3; index++) {
-        channels[index] = channel_of(zeros[index], fulls[index], spans[index], code_max);
+        task.channels[index] = channel_of(zeros[index], fulls[index], spans[index], choices[5]);
     }
-    plant_at_rest(&plant, p, coarse, fine, compare_max, supply_MPa);
+    plant_at_rest(&plant, p, coarse, fine, choices[6], supply_MPa[0]);
     if (p[PLANT_LINEAR] > 0.5) {
-        run(n, every, (enum mode)mode, negative, swapped, command, back_MPa, dp_frozen_MPa, channels, &plant, record, 1);
+        run(&task, &plant, record, 1);
     } else {
-        run(n, every, (enum mode)mode, negative, swapped, command, back_MPa, dp_frozen_MPa, channels, &plant, record, 0);
+        run(&task, &plant, record, 0);
     }
 }

@@ -317,20 +317,32 @@ static inline void respond(struct plant *plant, int32_t compare)
     plant->response[4] = plant->half_x - ((off_half > 0) ? response_after(plant, off_half).x : 0.0);
 }
 
+/* Another pressure drop at no flow. */
+static inline void plant_supply(struct plant *plant, double supply_MPa)
+{
+    const double *p = plant->p;
+    const double x = plant->x;
+
+    if ((supply_MPa < plant->supply_MPa) || (supply_MPa > plant->supply_MPa)) {
+        plant->supply_MPa = supply_MPa;
+        plant->x = p[PLANT_STROKE_M];
+        act(plant);
+        plant->flow_a_metre = plant->flow / (p[PLANT_STROKE_M] - p[PLANT_OVERLAP_M]);
+        plant->x = x;
+        act(plant);
+    }
+}
+
 static void plant_at_rest(struct plant *plant, const double *p, const double *coarse, const double *fine,
                           int32_t counts, double supply_MPa)
 {
-    const struct plant rest = {.p = p, .coarse = coarse, .fine = fine, .counts = counts, .supply_MPa = supply_MPa};
+    const struct plant rest = {.p = p, .coarse = coarse, .fine = fine, .counts = counts, .supply_MPa = -1.0};
 
     *plant = rest;
     plant->all = response_after(plant, 2 * counts);
     plant->half_x = response_after(plant, counts).x;
     respond(plant, 0);
-    plant->x = p[PLANT_STROKE_M];
-    act(plant);
-    plant->flow_a_metre = plant->flow / (p[PLANT_STROKE_M] - p[PLANT_OVERLAP_M]);
-    plant->x = 0.0;
-    act(plant);
+    plant_supply(plant, supply_MPa);
 }
 
 /* linear: nothing that acts depends on the position, and the pressure drop is constant. */

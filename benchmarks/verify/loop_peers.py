@@ -84,7 +84,7 @@ def numbers(plant: Plant) -> np.ndarray:
 
 
 def sample_function(core: Core) -> ca.Function:
-    """Return (state, compare), command, parameters -> (state, compare), flow: one sample, two PWM periods, RK4 a phase."""
+    """Return (state and compare, command, parameters) -> (state and compare, flow): two PWM periods, RK4 a phase."""
     parameters = ca.SX.sym("parameters", len(PARAMETERS))
     rates, flow = motion_of(parameters)
     state, duty, p = ca.SX.sym("state", 3), ca.SX.sym("duty"), parameters
@@ -105,7 +105,8 @@ def sample_function(core: Core) -> ca.Function:
     dp_MPa, _ = flow(before[1], SUPPLY_MPA, given)
     compare = core.external(*core.codes(command, dp_MPa, ca.floor))
     after = moved(before[:3], before[3] / core.compare_max, given)
-    return ca.Function("sample", [before, command, given], [ca.vertcat(after, compare), flow(after[1], SUPPLY_MPA, given)[1]])
+    q_L_min = flow(after[1], SUPPLY_MPA, given)[1]
+    return ca.Function("sample", [before, command, given], [ca.vertcat(after, compare), q_L_min])
 
 
 def python_loop(plant: Plant, core: Core, command: np.ndarray, tolerance: float = 1e-6) -> np.ndarray:

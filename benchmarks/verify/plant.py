@@ -9,7 +9,6 @@ from time import perf_counter
 
 import numpy as np
 from loop_peers import (
-    PARAMETERS,
     SAMPLE_S,
     SUPPLY_MPA,
     Core,
