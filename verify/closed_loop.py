@@ -52,8 +52,8 @@ class RampSequence:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoopRun:
-    """Records of one run, 100 a second unless others were asked for: time in s, command share, compare value, dP in MPa,
-    flow in L/min, position of the spool in mm, all (N,).
+    """Records of one run, 100 a second unless others were asked for: time in s, command share, compare value, dP in
+    MPa, flow in L/min, position of the spool in mm, all (N,).
 
     Of the flow three: at the record's end; its mean over the record, and its largest there. A dither of 100 Hz or more
     has a whole wave in a record: its mean is what a meter sees, its largest is at the wave's top.
