@@ -4,7 +4,7 @@ import sympy
 
 from dzdesign.derivation import scaling
 from dzdesign.derivation.law import law
-from dzdesign.derivation.published import FIRST, SECOND
+from dzdesign.derivation.published import DUTY_COMMAND_V, DUTY_WITH_PERCENT, DUTY_WITHOUT_PERCENT, FIRST, SECOND
 from dzdesign.derivation.statement import Case, Condition, Ground, Kind, Outcome, Statement, Value
 from dzdesign.derivation.symbols import (
     K_c,
@@ -313,14 +313,19 @@ CODES = (
             Value(
                 label="without compensation at 2 V",
                 of=u_i / u_max,
-                at=(*FIRST.at(), (u_i, sympy.Integer(2))),
+                at=(*FIRST.at(), (u_i, sympy.Integer(DUTY_COMMAND_V))),
                 unit="%",
-                published="20",
+                published=DUTY_WITHOUT_PERCENT,
             ),
-            Value(label="second valve at 2 V", at=(*SECOND.at(), (u_i, sympy.Integer(2))), unit="%", published="55"),
+            Value(
+                label="second valve at 2 V",
+                at=(*SECOND.at(), (u_i, sympy.Integer(DUTY_COMMAND_V))),
+                unit="%",
+                published=DUTY_WITH_PERCENT,
+            ),
             Value(
                 label="first valve at 2 V",
-                at=(*FIRST.at(), (u_i, sympy.Integer(2))),
+                at=(*FIRST.at(), (u_i, sympy.Integer(DUTY_COMMAND_V))),
                 unit="%",
                 remark="Fig. 13 does not name its valve; its 55 % fits the second, not the first.",
             ),

@@ -159,7 +159,7 @@ METER_FLOOR = (
                 label="first valve",
                 at=(*FIRST.at(), (u_seen0, sympy.Rational("5.39")), (u_seen1, sympy.Rational("5.17"))),
                 unit="L/min",
-                published="1.6",
+                published=FIRST.zero_flow_without_beta,
                 remark="6 % above what was measured, where the model without the floor (T3b) is 30 % below",
             ),
         ),

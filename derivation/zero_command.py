@@ -123,14 +123,14 @@ ZERO_COMMAND = (
                 label="simulation",
                 at=SIMULATION.at(),
                 unit="L/min",
-                published="0.95",
+                published=SIMULATION.zero_flow_without_beta,
                 remark="read off a figure; 0.01 L/min is 0.002 V of threshold",
             ),
             Value(
                 label="first valve",
                 at=FIRST.at(),
                 unit="L/min",
-                published="1.6",
+                published=FIRST.zero_flow_without_beta,
                 remark="If the paper's thresholds are the first flow that its meter shows (it starts at 0.6 L/min), "
                 "T9d gives 1.69.",
             ),

@@ -236,6 +236,11 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
             _given(*OUTPUT, default="ramp.csv", metavar="FILE", help="file to write"),
         ),
     ),
+    "reproduce": (
+        "the paper's valves through the whole product; every number of the paper beside ours, its figures redrawn",
+        "dzdesign.reproduce:run_reproduce",
+        (_given(*OUTPUT, default="reproduction", metavar="DIR", help="folder to write"),),
+    ),
     "simulate": (
         "ramp tests of a simulated valve, marked as such",
         "dzdesign.commands:run_simulate",
