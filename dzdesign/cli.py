@@ -184,6 +184,11 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
             _given("firmware", metavar="DIR", help="made by `dzdesign codegen`"),
             _given(*OUTPUT, default="evidence", metavar="DIR", help="folder to write"),
             PLANT,
+            _given(
+                "--tolerances",
+                metavar="TOL.toml",
+                help="also run a series of plants, like examples/paper_valve/tolerances.toml; needs --plant",
+            ),
             _given("--c2000ware", metavar="DIR", help="also compile f28335 firmware against your C2000Ware's headers"),
         ),
     ),
@@ -331,6 +336,8 @@ def _is_meant(value: str | list[str] | dict[str, str], repeatable: bool) -> bool
 
 def main(argv: list[str] | None = None) -> int:
     """Run the command line and return the exit status."""
+    # The matrices here are small: threads of NumPy's BLAS would only wait for each other, to a tenth of the speed.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # a console that can't print a character prints a ? instead
             stream.reconfigure(errors="replace")

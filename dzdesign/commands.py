@@ -166,15 +166,17 @@ def run_verify(args: argparse.Namespace) -> int:
     from dzdesign.tables import print_verification
     from dzdesign.verify.c2000ware import check_against_c2000ware, with_check
     from dzdesign.verify.plant import read_plant
+    from dzdesign.verify.tolerances import read_tolerances
     from dzdesign.verify.verification import SCHEMA, evidence_files, verify
 
     output = Path(args.output)
     check_folder_may_be_written(output, SCHEMA)
     plant = read_plant(Path(args.plant)) if args.plant else None
     source = Path(args.plant).name if args.plant else ""
+    tolerances = read_tolerances(Path(args.tolerances)) if args.tolerances else None
     firmware = Path(args.firmware)
     ware = check_against_c2000ware(firmware, Path(args.c2000ware), say) if args.c2000ware else None
-    verification = verify(firmware, plant, source, say=say)
+    verification = verify(firmware, plant, source, tolerances=tolerances, say=say)
     verification = with_check(verification, ware) if ware else verification
     manifest = {"schema": SCHEMA, "tool": TOOL, "made_from": verification.document["made_from"]}
     write_folder(output, evidence_files(verification), manifest)

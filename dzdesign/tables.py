@@ -4,6 +4,7 @@ import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from fractions import Fraction
 
     from rich.console import Console
@@ -12,6 +13,8 @@ if TYPE_CHECKING:
     from dzdesign.codegen.project import Firmware
     from dzdesign.design.compensator import Compensator
     from dzdesign.identify.model import SideModel, ValveModel
+    from dzdesign.verify.scenarios import ScenarioResult
+    from dzdesign.verify.tolerances import Scatter
     from dzdesign.verify.verification import Verification
 
 #: Columns of a page when stdout is a file or a pipe.
@@ -176,6 +179,65 @@ def print_verification(verification: "Verification") -> None:
             f"{result.q_max_L_min:.1f}",
         )
     console.print(table)
+    print_scenarios(verification.scenarios)
+    print_scatter(verification.scatter)
+
+
+def print_scenarios(scenarios: "Sequence[ScenarioResult]") -> None:
+    """Print every scenario once: its worst over the pressure drops, and the figures there."""
+    if not scenarios:
+        return
+    table = new_table(
+        "Scenarios with the compensator, worst of all pressure drops", "scenario", "dP (MPa)", "Q at zero, at the end",
+        "at most, on the way (L/min)", "figures there",
+    )  # fmt: skip
+    table.columns[-1].justify = "left"
+    for name in dict.fromkeys(each.name for each in scenarios):
+        group = [each for each in scenarios if each.name == name]
+        worst = max(group, key=lambda each: (each.q_zero_L_min, each.q_peak_at_zero_L_min, each.dp_MPa))
+        figures = ", ".join(_figure(key, value) for key, value in worst.figures.items())
+        table.add_row(
+            name + ("" if worst.must_shut else " (no core can know)"),
+            f"{worst.dp_MPa:.2f}",
+            f"{worst.q_zero_L_min:.2f}",
+            f"{worst.q_peak_at_zero_L_min:.2f}",
+            figures,
+        )
+    new_console().print(table)
+
+
+def _figure(key: str, value: float) -> str:
+    """Return a figure whose name ends in its unit as words: rise_ms is a rise in ms."""
+    for ending, unit in (("_L_min", "L/min"), ("_MPa", "MPa"), ("_ms", "ms"), ("_mL", "mL"), ("_percent", "%")):
+        if key.endswith(ending):
+            return f"{key.removesuffix(ending).replace('_', ' ')} {value:.3g} {unit}"
+    return f"{key} {value:.3g}"
+
+
+def print_scatter(series: "Sequence[Scatter]") -> None:
+    """Print the quantiles of a series of plants per pressure drop."""
+    if not series:
+        return
+    table = new_table(
+        f"Series of {series[0].plants} plants: median (1 to 99 %)", "side", "dP (MPa)", "dead zone opening (%)",
+        "closing (%)", "Q max (L/min)", "Q at zero (L/min)", "plants that leak",
+    )  # fmt: skip
+
+    def spread(quantiles: dict[str, float], by: float, digits: int) -> str:
+        middle, low, high = (by * quantiles[q] for q in ("0.5", "0.01", "0.99"))
+        return f"{middle:.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
+
+    for each in series:
+        table.add_row(
+            each.side,
+            f"{each.dp_MPa:.2f}",
+            spread(each.quantiles["residual_opening"], 100, 1),
+            spread(each.quantiles["residual_closing"], 100, 1),
+            spread(each.quantiles["q_max_L_min"], 1, 1),
+            spread(each.quantiles["q_zero_L_min"], 1, 2),
+            f"{each.leaking} of {each.plants}",
+        )
+    new_console().print(table)
 
 
 def print_demo(valve: "ValveModel", verification: "Verification", folder: str) -> None:

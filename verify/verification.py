@@ -19,11 +19,11 @@ from dzdesign.verify.all_inputs import InputCheck, check_all_inputs
 from dzdesign.verify.closed_loop import ClosedLoop, LoopComparison, RampSequence, compare_at_pressure
 from dzdesign.verify.host_compiler import check_strictly, find_compilers, host_compiler
 from dzdesign.verify.plant import Plant, plant_document, plants_from_tests
+from dzdesign.verify.scenarios import ScenarioResult, Scene, run_scenarios
+from dzdesign.verify.tolerances import NO_FLOW_L_MIN, Scatter, Tolerances, scatter, scatter_document
 
 SCHEMA = "dzdesign.evidence/1"
 FIRMWARE_SCHEMA = "dzdesign.firmware/1"
-#: Flow at zero command below this is none: the plant's edge is shut, only the last bits of a number remain.
-NO_FLOW_L_MIN = 1e-9
 #: Runs side by side.
 WORKERS = 2
 #: Every so many records are drawn: a tenth of a second, finer than the line is wide.
@@ -51,6 +51,10 @@ class Verification:
         Figures of the input check, one a sign of command; empty if the core did not compile.
     loops : tuple of LoopComparison
         Closed loop, one a tested pressure drop.
+    scenarios : tuple of ScenarioResult
+        What happens beside ramps, at every tested pressure drop.
+    scatter : tuple of Scatter
+        The series of plants, where tolerances were given.
     plant_source : str
         Where the plant of the closed loop came from.
     document : dict
@@ -60,6 +64,8 @@ class Verification:
     checks: tuple[Check, ...]
     inputs: tuple[InputCheck, ...]
     loops: tuple[LoopComparison, ...]
+    scenarios: tuple[ScenarioResult, ...]
+    scatter: tuple[Scatter, ...]
     plant_source: str
     document: dict[str, Any]
 
@@ -74,6 +80,7 @@ def verify(
     plant: Plant | None = None,
     plant_source: str = "",
     sequence: RampSequence | None = None,
+    tolerances: Tolerances | None = None,
     say: Callable[[str], None] = lambda _: None,
 ) -> Verification:
     """Verify a firmware folder.
@@ -88,6 +95,8 @@ def verify(
         Name of the plant's file, for the evidence.
     sequence : RampSequence, optional
         The command over time; 0-10 V in 100 s and back by default.
+    tolerances : Tolerances, optional
+        Of a series of plants about `plant`, which is then needed.
     say : callable
         Told each stage before it begins.
 
@@ -96,6 +105,8 @@ def verify(
     InputError
         If the folder is no firmware, or there is no C compiler.
     """
+    if tolerances and plant is None:
+        raise InputError("tolerances are about a plant; give it with --plant PLANT.toml")
     folder = Path(folder)
     manifest_bytes = read_bytes(folder / MANIFEST_NAME, "firmware manifest")
     manifest = parse_document(manifest_bytes, str(folder / MANIFEST_NAME), (FIRMWARE_SCHEMA,))
@@ -110,6 +121,8 @@ def verify(
     checks = [_files_unchanged(folder, manifest), _compiles_strictly(folder, manifest)]
     inputs: tuple[InputCheck, ...] = ()
     loops: tuple[LoopComparison, ...] = ()
+    scenarios: tuple[ScenarioResult, ...] = ()
+    scattered: tuple[Scatter, ...] = ()
     signs = (1, -1) if document["sides"]["negative"] else (1,)
     if checks[1].holds:
         say("comparing every input with the exact law")
@@ -121,14 +134,25 @@ def verify(
         for each in inputs:
             checks += _input_checks(each, len(inputs) > 1)
         say("running the closed loop")
-        loops = _run_loops(folder, document, plant, sequence or RampSequence())
-        checks += [_plant_opens(loops), _no_flow_at_zero(loops, document, plant)]
+        scenes = _scenes(folder, document, plant)
+        loops = _run_loops(scenes, sequence or RampSequence())
+        say("running the scenarios")
+        scenarios = tuple(result for scene in scenes for result in run_scenarios(scene))
+        shut = _no_flow_at_zero(loops, document, plant)
+        checks += [_plant_opens(loops), shut, _shut_after_scenarios(scenarios, shut)]
+        if tolerances and plant:
+            say(f"running {tolerances.plants} plants at {len(scenes)} pressure drops")
+            scattered = tuple(
+                scatter(scene.loop, plant, tolerances, scene.dp_MPa, scene.side) for scene in scenes
+            )
     checks.append(_certificate_follows(compensator))
     source = plant_source or "made from the identified thresholds"
     return Verification(
         checks=tuple(checks),
         inputs=inputs,
         loops=loops,
+        scenarios=scenarios,
+        scatter=scattered,
         plant_source=source,
         document={
             "schema": SCHEMA,
@@ -142,6 +166,8 @@ def verify(
                 "plant_source": source,
                 "pressures": [asdict(loop.result) for loop in loops],
             },
+            "scenarios": [asdict(each) for each in scenarios],
+            "monte_carlo": scatter_document(tolerances, scattered) if tolerances else None,
         },
     )
 
@@ -229,24 +255,35 @@ def _input_checks(inputs: InputCheck, both: bool) -> list[Check]:
     return [replace(check, name=label + check.name) for check in checks]
 
 
-def _run_loops(
-    folder: Path, document: dict[str, Any], plant: Plant | None, sequence: RampSequence
-) -> tuple[LoopComparison, ...]:
-    """Run the closed loop at every tested pressure drop, two at a time."""
+def _scenes(folder: Path, document: dict[str, Any], plant: Plant | None) -> tuple[Scene, ...]:
+    """Return the compensated loop of each side at every tested pressure drop."""
     valve = valve_from_document(to_json(document["valve"]).encode(), "compensator.json")
-    loops: list[tuple[float, ClosedLoop, float, str]] = []
+    scenes: list[Scene] = []
     for name, sign in (("positive", 1), ("negative", -1)):
         if not document["sides"][name]:
             continue
         side = valve.sides[name]
-        if plant is None:
-            plants = plants_from_tests(side, valve.u_max_V)
-            found = {dp: ClosedLoop(one, folder, document, sign) for dp, one in plants.items()}
-        else:
-            found = dict.fromkeys(side.beta_dp_MPa, ClosedLoop(plant, folder, document, sign))
-        loops += [(dp, loop, side.reference_dp_MPa, name) for dp, loop in found.items()]
+        # One that stands in for the valve at one pressure drop says nothing of another.
+        plants = dict.fromkeys(side.beta_dp_MPa, plant) if plant else plants_from_tests(side, valve.u_max_V)
+        tested = (min(plants), max(plants)) if plant else None
+        first = ClosedLoop(next(iter(plants.values())), folder, document, sign)
+        scenes += [
+            Scene(
+                loop=first.with_plant(one), plant=one, side=name, dp_MPa=dp_MPa,
+                reference_MPa=side.reference_dp_MPa, tested_MPa=tested,
+            )
+            for dp_MPa, one in plants.items()
+        ]  # fmt: skip
+    return tuple(scenes)
+
+
+def _run_loops(scenes: tuple[Scene, ...], sequence: RampSequence) -> tuple[LoopComparison, ...]:
+    """Run the ramps of every scene, two at a time."""
     with ThreadPoolExecutor(WORKERS) as pool:
-        runs = pool.map(lambda item: compare_at_pressure(item[1], item[0], item[2], sequence, item[3]), loops)
+        runs = pool.map(
+            lambda scene: compare_at_pressure(scene.loop, scene.dp_MPa, scene.reference_MPa, sequence, scene.side),
+            scenes,
+        )
         return tuple(runs)
 
 
@@ -291,6 +328,18 @@ def _no_flow_at_zero(loops: tuple[LoopComparison, ...], document: dict[str, Any]
         text=f"at most {worst.q_zero_L_min:.4g} L/min after closing (at {worst.dp_MPa:.2f} MPa), "
         f"{max(loop.result.q_zero_without_beta_L_min for loop in loops):.3g} L/min without beta",
     )
+
+
+def _shut_after_scenarios(scenarios: tuple[ScenarioResult, ...], ramps: Check) -> Check:
+    """Tell whether the valve is shut at zero command after everything that a core can know of."""
+    name = "no flow at zero command after any scenario"
+    required = [each for each in scenarios if each.must_shut]
+    worst = max(required, key=lambda each: each.q_zero_L_min)
+    text = f"{len(required)} runs of {len({each.name for each in required})} scenarios: at most "
+    text += f"{worst.q_zero_L_min:.4g} L/min ({worst.name}, at {worst.dp_MPa:.2f} MPa)"
+    if ramps.holds is None:
+        return Check(name=name, holds=None, text=f"{text}; see the ramps")
+    return Check(name=name, holds=worst.q_zero_L_min <= NO_FLOW_L_MIN, text=text)
 
 
 def evidence_files(verification: Verification) -> dict[str, str | bytes]:
