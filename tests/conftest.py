@@ -1,9 +1,9 @@
 """What many tests share: the bundled example through the pipeline, once."""
 
-# ruff: noqa: E402 (the number of threads is read when NumPy is imported)
 import os
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does: small matrices
+# As the command line does: the matrices are small. Read when NumPy is imported.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from importlib.resources import files
 from pathlib import Path
