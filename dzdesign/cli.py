@@ -185,6 +185,11 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
             _given(*OUTPUT, default="evidence", metavar="DIR", help="folder to write"),
             PLANT,
             _given("--c2000ware", metavar="DIR", help="also compile f28335 firmware against your C2000Ware's headers"),
+            _given(
+                "--machine-code",
+                action="store_true",
+                help="also check machine code: every input on a Cortex-M4 in QEMU, a sample on an AVR in simavr",
+            ),
         ),
     ),
     "assess": (

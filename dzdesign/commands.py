@@ -175,7 +175,14 @@ def run_verify(args: argparse.Namespace) -> int:
     firmware = Path(args.firmware)
     ware = check_against_c2000ware(firmware, Path(args.c2000ware), say) if args.c2000ware else None
     verification = verify(firmware, plant, source, say=say)
-    verification = with_check(verification, ware) if ware else verification
+    added = [ware] if ware else []
+    if args.machine_code:
+        from dzdesign.verify.machine_code import machine_code_checks
+
+        say("comparing the machine code of other processors with the exact law, in simulators")
+        added += machine_code_checks(firmware, verification.inputs)
+    for check in added:
+        verification = with_check(verification, check)
     manifest = {"schema": SCHEMA, "tool": TOOL, "made_from": verification.document["made_from"]}
     write_folder(output, evidence_files(verification), manifest)
     if args.json:

@@ -198,7 +198,8 @@ def _input_checks(inputs: InputCheck, both: bool) -> list[Check]:
         Check(
             name="equals the exactly rounded law",
             holds=inputs.wrong == 0,
-            text=f"{inputs.inputs} inputs checked, {inputs.wrong} wrong" + (f" ({found})" if found else ""),
+            text=f"{inputs.inputs} inputs checked, {inputs.wrong} wrong" + (f" ({found})" if found else "")
+            + f"; hash of all compare values {inputs.outputs_hash}, object {inputs.object_sha256}",
         ),
         Check(
             name="within range, monotone",
@@ -215,8 +216,8 @@ def _input_checks(inputs: InputCheck, both: bool) -> list[Check]:
         Check(
             name="depends on the pressures by their difference only",
             holds=inputs.odd_pairs == 0,
-            text=f"{inputs.odd_pairs} pairs of pressure codes differ (at every command the lowest and the highest pair "
-            "of each difference; at zero, half and full command all pairs)",
+            text=f"{inputs.odd_pairs} of {inputs.pressure_pairs} pairs of pressure codes differ (the commands of each "
+            "difference take its pairs in turn; at zero command all pairs that the law follows or that are not sound)",
         ),
         Check(
             name="codes that are not sound fall back",
