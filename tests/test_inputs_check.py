@@ -111,6 +111,21 @@ def test_a_pair_of_pressures_that_is_not_its_difference_is_odd_and_not_wrong(pla
     assert low.check(prepared.everything()).odd >= 1, "where the law does not follow, the commands still take it"
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_what_is_shown_is_checked_on_both_sides(full, sign):
+    prepared, core = PreparedInputs(exact_law(full, sign)), CompiledCore(full, sign)
+    name = ("dz_comp.c", "dz_comp_negative.c")[sign < 0]
+    text = core.sources[name].decode()
+    for old, new, count in (
+        ("u_adc) & DZ_STATUS_COMMAND", "u_adc) & 16u", "bad_status"),
+        ("(scaled.high >> (BETA_SHIFT - 32u))", "(scaled.high >> (BETA_SHIFT - 32u)) + 1u", "bad_betas"),
+        ("* BETA_FACTOR) >> BETA_SHIFT", "* BETA_FACTOR) >> 34u", "bad_betas"),
+    ):
+        if old in text:
+            found = core.edited(name, text.replace(old, new).encode()).check(prepared.sample(), sample=True)
+            assert getattr(found, count) > 0 and found.faults == getattr(found, count)
+
+
 def test_both_sides_of_everything_see_a_fault_at_one_place(full):
     for sign, function in ((1, "dz_comp"), (-1, "dz_comp_negative")):
         prepared = PreparedInputs(exact_law(full, sign))

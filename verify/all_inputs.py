@@ -33,6 +33,8 @@ class InputCheck:
         Pairs of pressure codes that give another value than their difference does.
     bad_fallbacks, bad_status : int
         Codes that are not sound and do not fall back to the safe value; status words that say something else.
+    bad_betas : int
+        Pairs of pressure codes at which what is shown of beta is not the law's, rounded down.
     smallest_margin_V : float
         Smallest distance from the zero-command drive to the threshold's lower bound; negative if it is exceeded.
     core_sha256, object_sha256 : str
@@ -58,6 +60,7 @@ class InputCheck:
     odd_pairs: int
     bad_fallbacks: int
     bad_status: int
+    bad_betas: int
     smallest_margin_V: float
     core_sha256: str
     object_sha256: str
@@ -79,6 +82,7 @@ class InputCheck:
                 self.odd_pairs,
                 self.bad_fallbacks,
                 self.bad_status,
+                self.bad_betas,
             )
         )
 
@@ -137,6 +141,7 @@ def input_check(document: dict[str, Any], prepared: PreparedInputs, core: Compil
         odd_pairs=found.odd,
         bad_fallbacks=found.bad_fallbacks,
         bad_status=found.bad_status,
+        bad_betas=found.bad_betas,
         smallest_margin_V=float(margin),
         core_sha256=core.sha256,
         object_sha256=found.object_sha256,

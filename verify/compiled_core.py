@@ -10,8 +10,8 @@ from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.verify.host_compiler import build_folder
 from dzdesign.verify.machines import HOST, Machine, compile_object, link_program, programs_folder, run_program
 
-#: Source and function of each sign of command; the status word stands with the first.
-SOURCES = {1: ("dz_comp.c", "dz_comp"), -1: ("dz_comp_negative.c", "dz_comp_negative")}
+#: Source of each sign of command, and what its functions' names end with.
+SOURCES = {1: ("dz_comp.c", ""), -1: ("dz_comp_negative.c", "_negative")}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,7 +22,7 @@ class Findings:
     ----------
     outputs_hash : str
         Of all compare values in their order, 64 bits.
-    inputs, wrong, largest_error, out_of_range, falls, against, odd, bad_fallbacks, bad_status, calls : int
+    inputs, wrong, largest_error, out_of_range, falls, against, odd, bad_fallbacks, bad_status, bad_betas, calls : int
         As `InputCheck` names them; calls of the core in all.
     first_row, first_place, first_found, first_expected : int
         Of the first wrong value.
@@ -42,6 +42,7 @@ class Findings:
     odd: int
     bad_fallbacks: int
     bad_status: int
+    bad_betas: int
     calls: int
     first_row: int
     first_place: int
@@ -53,9 +54,8 @@ class Findings:
     @property
     def faults(self) -> int:
         """All that must be none, together."""
-        return (
-            self.wrong + self.out_of_range + self.falls + self.against + self.odd + self.bad_fallbacks + self.bad_status
-        )
+        counts = (self.wrong, self.out_of_range, self.falls, self.against, self.odd)
+        return sum(counts) + self.bad_fallbacks + self.bad_status + self.bad_betas
 
 
 class CompiledCore:
@@ -70,9 +70,8 @@ class CompiledCore:
     """
 
     def __init__(self, folder: Path, sign: int = 1) -> None:
-        self._name, self._function = SOURCES[sign]
+        self._name, self._ending = SOURCES[sign]
         self.sources = {name: _read(folder / "core" / name) for name in (self._name, "dz_comp.h")}
-        self._has_status = sign > 0
         self.sha256 = sha256_of(b"".join(self.sources.values()))
 
     def edited(self, name: str, text: bytes) -> "CompiledCore":
@@ -104,7 +103,8 @@ class CompiledCore:
             If the core does not compile, crashes, or hangs.
         """
         core = self.compiled(machine)
-        flags = (*machine.check_flags, f"-DDZ_CORE={self._function}", *(["-DDZ_STATUS"] if self._has_status else []))
+        called = (f"-DDZ_{name.upper()}=dz_{name}{self._ending}" for name in ("status", "beta"))
+        flags = (*machine.check_flags, f"-DDZ_CORE=dz_comp{self._ending}", *called)
         check = {name: _read(programs_folder() / name) for name in ("every_input.c", "every_input.h", machine.main)}
         objects = [core, compile_object(machine, "every_input.c", check, flags, "the check")]
         objects.append(compile_object(machine, machine.main, check, machine.check_flags, "the check"))
@@ -131,13 +131,13 @@ def _read(path: Path) -> bytes:
 
 
 def _findings(said: list[list[int]], object_sha256: str, what: str) -> Findings:
-    fields = 16
+    fields = 17
     if not said or len(said[0]) != fields:
         raise RequirementError(f"{what} reported {said[0][:3] if said else 'nothing'}, expected {fields} numbers")
     high, low, *counts = said[0]
     return Findings(
         outputs_hash=f"{high:08x}{low:08x}",
-        **dict(zip(list(Findings.__dataclass_fields__)[1:15], counts, strict=True)),
+        **dict(zip(list(Findings.__dataclass_fields__)[1:16], counts, strict=True)),
         at_zero=np.array(said[1] if len(said) > 1 else [], dtype=np.int64),
         object_sha256=object_sha256,
     )

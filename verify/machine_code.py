@@ -88,9 +88,10 @@ def _words(done: MachineCheck) -> str:
     found, machine = done.found, done.machine
     which = f"a sample of {found.inputs} inputs with the corners" if machine.small else f"{found.inputs} inputs, all"
     beyond = f" (every {SAMPLED_STRIDE}th)" if machine.small else ""
+    elsewhere = found.bad_fallbacks + found.bad_status + found.bad_betas
     same = "as on the host" if found.outputs_hash == done.host_hash else f"on the host {done.host_hash}"
     return (
-        f"{which}: {found.wrong} wrong, {found.odd} odd pairs, {found.bad_fallbacks + found.bad_status} wrong at codes "
+        f"{which}: {found.wrong} wrong, {found.odd} odd pairs, {elsewhere} wrong at codes "
         f"that are not sound{beyond}; hash of all compare values {found.outputs_hash}, {same}; {machine.runner[0]}, "
         f"{machine.compiler} {' '.join(machine.core_flags)}, object {found.object_sha256}"
     )

@@ -23,10 +23,13 @@ SAMPLED_ROWS, SAMPLED_PLACES, SAMPLED_STRIDE = 32, 200, 257
 SPREAD = 40503
 #: Above every numerator of beta.
 KEY = 2**31
+#: What dz_beta() multiplies beta by, rounding down.
+SHOWN_BETA = 2**15
 SCALARS = (
     "parts", "codes", "first_code", "code_step", "sound_from", "sound_to", "zero_place", "zero_code", "compare_limit",
     "a_low", "a_high", "b_low", "b_high", "turn", "reverse", "lowest", "safe_law", "safe_at_zero", "rows", "pairs",
-    "places", "stride", "cube", "unused", "laws_at", "rows_at", "directions_at", "slant_at", "pairs_at", "places_at",
+    "places", "stride", "cube", "impatient", "laws_at", "rows_at", "directions_at", "slant_at", "pairs_at",
+    "places_at", "betas_at", "unused",
 )  # fmt: skip
 PLAN = np.dtype([("denominator", "<i8", PARTS), ("part_end", "<i4", PARTS), *((name, "<i4") for name in SCALARS)])
 PART = np.dtype([("remainder", "<i8"), ("carry", "<i8"), ("quotient", "<i4"), ("step", "<i4")])
@@ -102,6 +105,7 @@ class PreparedInputs:
         betas, self._unit = exact.beta_numerators(np.append(self.differences.values, -exact.reverse - 1))
         key, law_of = np.unique(betas.law * KEY + betas.zero, return_inverse=True)
         both = np.stack(np.divmod(key, KEY))
+        self._shown_betas = both[0] * SHOWN_BETA // self._unit
         self._law_of = law_of
         self._corners = self._corner_numerators(both)
         self._along = 1 if exact.full > exact.zero else -1
@@ -111,14 +115,17 @@ class PreparedInputs:
         self._sound = ends if self._along > 0 else tuple(exact.code_max - code for code in ends[::-1])
         self._parts = self._straight_parts()
 
-    def everything(self, *, cube: bool = True) -> bytes:
-        """Return all rows and all places; with `cube` every pair of pressures at zero command too."""
+    def everything(self, *, cube: bool = True, impatient: bool = False) -> bytes:
+        """Return all rows and all places; with `cube` every pair of pressures at zero command too.
+
+        With `impatient` the check ends where a row has a fault.
+        """
         rows = np.arange(self.differences.values.size)
-        return self._assembled(rows, np.zeros(0, dtype="<i4"), 1, cube)
+        return self._assembled(rows, np.zeros(0, dtype="<i4"), 1, {"cube": cube, "impatient": impatient})
 
     def sample(self) -> bytes:
         """Return some rows and places, all corners among them: `sampled_rows`, `sampled_places`."""
-        return self._assembled(self.sampled_rows(), self.sampled_places().astype("<i4"), SAMPLED_STRIDE, False)
+        return self._assembled(self.sampled_rows(), self.sampled_places().astype("<i4"), SAMPLED_STRIDE, {})
 
     def code_at(self, place: int) -> int:
         """Return the command's code at a place."""
@@ -227,7 +234,7 @@ class PreparedInputs:
         pairs += [(a, b, 1) for a in inside[0] for b in inside[1]]
         return np.array(pairs, dtype=PAIR)
 
-    def _assembled(self, chosen: np.ndarray, places: np.ndarray, stride: int, cube: bool) -> bytes:
+    def _assembled(self, chosen: np.ndarray, places: np.ndarray, stride: int, how: dict[str, bool]) -> bytes:
         """Return the plan and its tables, one after the other, each at a multiple of 8 bytes."""
         exact, safe = self.exact, int(self._law_of[-1])
         laws, rows = self._laws(), self._rows()[chosen]
@@ -257,7 +264,6 @@ class PreparedInputs:
             "rows": rows.size,
             "places": places.size,
             "stride": stride,
-            "cube": cube,
         }
         values |= dict(zip(("a_low", "a_high"), exact.a["valid_codes"], strict=True))
         values |= dict(zip(("b_low", "b_high"), exact.b["valid_codes"], strict=True))
@@ -270,11 +276,12 @@ class PreparedInputs:
             "slant_at": self.differences.slant.astype("<i4"),
             "pairs_at": pairs,
             "places_at": places,
+            "betas_at": self._shown_betas[used].astype("<u2"),
         }
         content = b""
         for name, table in tables.items():
             values[name] = PLAN.itemsize + len(content)
             content += table.tobytes() + bytes(-table.nbytes % 8)
-        for name, value in values.items():
+        for name, value in (values | how).items():
             plan[name] = value
         return plan.tobytes() + content

@@ -221,9 +221,9 @@ def _input_checks(inputs: InputCheck, both: bool) -> list[Check]:
         ),
         Check(
             name="codes that are not sound fall back",
-            holds=not (inputs.bad_fallbacks or inputs.bad_status),
+            holds=not (inputs.bad_fallbacks or inputs.bad_status or inputs.bad_betas),
             text=f"{inputs.bad_fallbacks} codes outside the sound ones without the safe value, {inputs.bad_status} "
-            "status words that say otherwise",
+            f"status words that say otherwise, {inputs.bad_betas} values of dz_beta() that are not the law's",
         ),
     ]
     label = ("positive" if inputs.sign > 0 else "negative") + " commands: " if both else ""

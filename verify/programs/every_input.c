@@ -6,9 +6,8 @@
 #include "every_input.h"
 
 uint16_t DZ_CORE(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
-#ifdef DZ_STATUS
-uint16_t dz_status(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
-#endif
+uint16_t DZ_STATUS(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
+uint16_t DZ_BETA(uint16_t p_a_adc, uint16_t p_b_adc);
 
 /* By itself, so that the linker can lay it beside the core: an emulator's jumps are quick within a page. */
 #define NEAR __attribute__((noinline))
@@ -266,6 +265,9 @@ static void check_rows(const struct dz_plan *plan, const uint8_t *prepared, uint
         findings->hash = hashed(findings->hash, out, plan->codes);
         findings->inputs += (uint32_t)plan->codes;
         at_zero[row] = out[plan->zero_place];
+        if (wrong != 0u && plan->impatient != 0) {
+            return;
+        }
         done = before;
         before = out;
         out = done;
@@ -382,7 +384,6 @@ static void check_fallbacks(const struct dz_plan *plan, const uint8_t DZ_TABLE *
     }
 }
 
-#ifdef DZ_STATUS
 static uint16_t outside(int32_t code, int32_t low, int32_t high)
 {
     return code < low || code > high;
@@ -414,21 +415,35 @@ static void check_status(const struct dz_plan *plan, const int32_t DZ_TABLE *sla
                     expected = (uint16_t)(expected + 8u);
                 }
                 findings->bad_status +=
-                    dz_status((uint16_t)code[0], (uint16_t)code[1], (uint16_t)code[2]) != expected;
+                    DZ_STATUS((uint16_t)code[0], (uint16_t)code[1], (uint16_t)code[2]) != expected;
                 findings->calls++;
             }
         }
     }
 }
-#else
-/* The status stands with the other side. */
-static void check_status(const struct dz_plan *plan, const int32_t DZ_TABLE *slant, struct dz_findings *findings)
+/* What is shown of beta: at the first, the last and another pair of each difference, and where it can't be right. */
+static void check_betas(const struct dz_plan *plan, const uint8_t DZ_TABLE *prepared, struct dz_findings *findings)
 {
-    (void)plan;
-    (void)slant;
-    (void)findings;
+    const struct dz_row DZ_TABLE *rows = (const struct dz_row DZ_TABLE *)(prepared + plan->rows_at);
+    const struct dz_pair DZ_TABLE *pairs = (const struct dz_pair DZ_TABLE *)(prepared + plan->pairs_at);
+    const int32_t DZ_TABLE *slant = (const int32_t DZ_TABLE *)(prepared + plan->slant_at);
+    const uint16_t DZ_TABLE *betas = (const uint16_t DZ_TABLE *)(prepared + plan->betas_at);
+
+    for (int32_t index = 0; index < plan->rows; index++) {
+        const struct dz_row row = rows[index];
+        const uint16_t beta = betas[row.law], last = (uint16_t)(row.b_low + row.pairs - 1u);
+        const uint16_t tried[3] = {row.b_low, last, (uint16_t)(row.b_low + row.first)};
+
+        for (int16_t k = 0; row.pairs != 0u && k < 3; k++) {
+            findings->bad_betas += DZ_BETA((uint16_t)(row.offset + slant[tried[k]]), tried[k]) != beta;
+        }
+    }
+    for (int32_t index = 0; index < plan->pairs; index++) {
+        const struct dz_pair pair = pairs[index];
+
+        findings->bad_betas += !pair.sound && DZ_BETA(pair.a, pair.b) != betas[plan->safe_law];
+    }
 }
-#endif
 
 /* ---- all of it ---- */
 
@@ -452,6 +467,7 @@ void dz_check_everything(const uint8_t *prepared, uint16_t *work, uint16_t *at_z
     }
     check_fallbacks(plan, prepared, findings);
     check_status(plan, slant, findings);
+    check_betas(plan, prepared, findings);
 }
 
 void dz_check_sample(const uint8_t DZ_TABLE *prepared, struct dz_findings *findings)
@@ -462,6 +478,7 @@ void dz_check_sample(const uint8_t DZ_TABLE *prepared, struct dz_findings *findi
     check_places(&plan, prepared, findings);
     check_fallbacks(&plan, prepared, findings);
     check_status(&plan, (const int32_t DZ_TABLE *)(prepared + plan.slant_at), findings);
+    check_betas(&plan, prepared, findings);
 }
 
 void dz_put_findings(const struct dz_findings *findings, void (*put)(uint32_t number))
@@ -469,7 +486,7 @@ void dz_put_findings(const struct dz_findings *findings, void (*put)(uint32_t nu
     const uint32_t numbers[] = {
         (uint32_t)(findings->hash >> 32), (uint32_t)findings->hash, findings->inputs, findings->wrong,
         findings->largest_error, findings->out_of_range, findings->falls, findings->against, findings->odd,
-        findings->bad_fallbacks, findings->bad_status, findings->calls, (uint32_t)findings->first_row,
+        findings->bad_fallbacks, findings->bad_status, findings->bad_betas, findings->calls, (uint32_t)findings->first_row,
         (uint32_t)findings->first_place, (uint32_t)findings->first_found, (uint32_t)findings->first_expected,
     };
 

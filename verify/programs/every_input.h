@@ -34,8 +34,10 @@ struct dz_plan {
     int32_t safe_at_zero;
     int32_t rows, pairs, places; /* how many; no places: all */
     int32_t stride;              /* of codes of 16 bits */
-    int32_t cube, unused;        /* 1: every pair of pressures at zero command too */
-    int32_t laws_at, rows_at, directions_at, slant_at, pairs_at, places_at;
+    int32_t cube;                /* 1: every pair of pressures at zero command too */
+    int32_t impatient;           /* 1: the first row with a fault is the last */
+    int32_t laws_at, rows_at, directions_at, slant_at, pairs_at, places_at, betas_at;
+    int32_t unused;
 };
 
 /* A part of the law, straight in the command: counts (and a half) at its first place, and what a place adds. */
@@ -66,9 +68,9 @@ struct dz_pair {
 
 struct dz_findings {
     uint64_t hash; /* of all compare values, in their order */
-    uint32_t inputs, wrong, largest_error, out_of_range, falls, against, odd, bad_fallbacks, bad_status, calls;
+    uint32_t inputs, wrong, largest_error, out_of_range, falls, against, odd, bad_fallbacks, bad_status, bad_betas, calls;
     int32_t first_row, first_place; /* of the first wrong value */
-    int32_t first_found, first_expected;
+    int32_t first_found, first_expected, unused;
 };
 
 /* All inputs. `work` holds three rows of codes, `at_zero` takes what the core gives at zero command for each row. */
