@@ -185,6 +185,7 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
             _given(*OUTPUT, default="evidence", metavar="DIR", help="folder to write"),
             PLANT,
             _given("--c2000ware", metavar="DIR", help="also compile f28335 firmware against your C2000Ware's headers"),
+            _given("--mutate", action="store_true", help="also make the C wrong in every place; count what is caught"),
             _given(
                 "--machine-code",
                 action="store_true",

@@ -7,8 +7,7 @@ import numpy as np
 
 from dzdesign.core.artefacts import sha256_of
 from dzdesign.core.errors import InputError, RequirementError
-from dzdesign.verify.host_compiler import build_folder
-from dzdesign.verify.machines import HOST, Machine, compile_object, link_program, programs_folder, run_program
+from dzdesign.verify.machines import HOST, Machine, compile_object, link_program, programs_folder, run_program, stored
 
 #: Source of each sign of command, and what its functions' names end with.
 SOURCES = {1: ("dz_comp.c", ""), -1: ("dz_comp_negative.c", "_negative")}
@@ -114,9 +113,7 @@ class CompiledCore:
             tables = {"prepared.S": text.encode(), "prepared.bin": prepared}
             objects.append(compile_object(machine, "prepared.S", tables, machine.check_flags, "the prepared inputs"))
         else:
-            file = build_folder() / f"{sha256_of(prepared)[:32]}.bin"
-            if not file.exists():
-                file.write_bytes(prepared)
+            file = stored(prepared)
             arguments = [str(file), *(["sample"] if sample else [])]
         program = link_program(machine, objects, f"the core {self._name} ({machine.name})")
         said = run_program(machine, program, arguments, f"the core {self._name}")

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
+from threading import Lock
 
 from dzdesign.core.artefacts import sha256_of
 from dzdesign.core.errors import RequirementError
@@ -147,7 +148,9 @@ def compile_object(
     )
     folder = build_folder() / sha256_of(key)[:32]
     target = folder / f"{name}.o"
-    if not target.exists():
+    with _alone(target):
+        if target.exists():
+            return target
         folder.mkdir(exist_ok=True)
         for each, text in sources.items():
             (folder / each).write_bytes(text)
@@ -166,11 +169,32 @@ def link_program(machine: Machine, objects: list[Path], what: str) -> Path:
     """
     key = sha256_of("\0".join(map(str, objects)).encode())[:32]
     program = build_folder() / f"{key}{'.exe' if sys.platform == 'win32' and machine is HOST else ''}"
-    if not program.exists():
+    with _alone(program):
+        if program.exists():
+            return program
         flags = [flag.replace("{programs}", str(programs_folder())) for flag in machine.link_flags]
         compiler = machine.compiler or host_compiler()
         _build([compiler, *map(str, objects), *flags, "-o", str(program)], build_folder(), what)
     return program
+
+
+def stored(content: bytes) -> Path:
+    """Return a file of that content, written once."""
+    file = build_folder() / f"{sha256_of(content)[:32]}.bin"
+    with _alone(file):
+        if not file.exists():
+            file.write_bytes(content)
+    return file
+
+
+_guard = Lock()
+_locks: dict[Path, Lock] = {}
+
+
+def _alone(file: Path) -> Lock:
+    """Return the lock of a file: mutants are built side by side, and share what is the same."""
+    with _guard:
+        return _locks.setdefault(file, Lock())
 
 
 def _build(command: list[str], folder: Path, what: str) -> None:

@@ -17,6 +17,7 @@ from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.identify.valve_file import valve_from_document
 from dzdesign.verify.all_inputs import InputCheck, check_all_inputs
 from dzdesign.verify.closed_loop import ClosedLoop, LoopComparison, RampSequence, compare_at_pressure
+from dzdesign.verify.drive_check import SEED, CompiledDrive, PreparedDrive
 from dzdesign.verify.host_compiler import check_strictly, find_compilers, host_compiler
 from dzdesign.verify.plant import Plant, plant_document, plants_from_tests
 
@@ -120,6 +121,7 @@ def verify(
     if inputs:
         for each in inputs:
             checks += _input_checks(each, len(inputs) > 1)
+        checks.append(_drive_follows(folder, compensator))
         say("running the closed loop")
         loops = _run_loops(folder, document, plant, sequence or RampSequence())
         checks += [_plant_opens(loops), _no_flow_at_zero(loops, document, plant)]
@@ -172,6 +174,19 @@ def _certificate_follows(compensator: Compensator) -> Check:
         f"{float(certificate.dp_MPa[0]):.2f} to {float(certificate.dp_MPa[1]):.2f} MPa, proved again at every "
         "difference of pressure codes",
     )
+
+
+def _drive_follows(folder: Path, compensator: Compensator) -> Check:
+    """Tell whether the drive around the law does what its model in rational numbers does."""
+    name, prepared = "the drive follows its model", PreparedDrive(compensator)
+    try:
+        found = CompiledDrive(folder).check(prepared)
+    except RequirementError as error:
+        return Check(name=name, holds=False, text=str(error))
+    text = f"outputs and state after each of {found.ticks} PWM periods, {len(prepared.samples)} samples of corners, "
+    text += f"steps, noise and random codes (seed {SEED}): {found.wrong} wrong"
+    text += f" ({found.first_wrong})" if found.wrong else ""
+    return Check(name=name, holds=found.wrong == 0, text=text)
 
 
 def _compiles_strictly(folder: Path, manifest: dict[str, Any]) -> Check:
