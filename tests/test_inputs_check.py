@@ -11,8 +11,9 @@ import pytest
 from golden_firmware import FULL, GOLDENS, INPUT
 from synthetic import needs_compiler
 
+from dzdesign.cli import main
 from dzdesign.core.errors import RequirementError
-from dzdesign.verify import machines
+from dzdesign.verify import machine_code, machines
 from dzdesign.verify.all_inputs import check_all_inputs, first_wrong, input_check
 from dzdesign.verify.compiled_core import CompiledCore, Findings
 from dzdesign.verify.host_compiler import host_compiler
@@ -298,3 +299,13 @@ def input_check_of(folder):
     at_zero = np.zeros(prepared.differences.values.size, dtype=int)
     found = Findings(outputs_hash="", object_sha256="", at_zero=at_zero, **dict.fromkeys(counts, 0))
     return input_check(document, prepared, CompiledCore(folder), found)
+
+
+def test_the_command_line_reports_a_machine_that_is_not_here_and_does_not_hold(
+    firmware_folder, tmp_path, capsys, monkeypatch
+):
+    monkeypatch.setattr(machine_code, "MACHINES", (replace(CORTEX_M4, needs={"no-such-compiler": "its-package"}),))
+    assert main(["verify", str(firmware_folder), "--machine-code", "-o", str(tmp_path / "evidence")]) == 1
+    words = "NOT CHECKED  machine code of the Cortex-M4: not run: no-such-compiler not found; apt install its-package"
+    assert words in capsys.readouterr().out
+    assert json.loads((tmp_path / "evidence" / "verification.json").read_text())["holds"] is False

@@ -1,5 +1,6 @@
 """Faults seeded in the C by verify itself: what is made, and that each verdict is given where it is due."""
 
+import json
 import random
 import shutil
 
@@ -7,7 +8,9 @@ import pytest
 from golden_firmware import FULL, GOLDENS, INPUT
 from synthetic import needs_compiler
 
+from dzdesign.cli import main
 from dzdesign.core.errors import RequirementError
+from dzdesign.verify import mutation
 from dzdesign.verify.c_mutants import Mutant, mutants_of
 from dzdesign.verify.drive_check import FIELDS, CompiledDrive
 from dzdesign.verify.mutation import (
@@ -132,6 +135,17 @@ def test_a_part_of_all_mutants_is_killed_or_equivalent(name, request):
     assert document["survived"] == 0 and document["refused"] == 0
     assert document["killed"] >= 0.7 * TRIED
     assert sum(document["killers"].values()) == document["killed"]
+
+
+def test_the_command_line_adds_the_row_and_the_list(firmware_folder, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(mutation, "all_mutants", lambda bench: [edited(bench, *JUDGED[k][:3]) for k in (0, 3)])
+    assert main(["verify", str(firmware_folder), "--mutate", "-o", str(tmp_path / "evidence")]) == 0
+    out = capsys.readouterr().out
+    assert "holds  wrong C is caught: 1 of 2 mutants killed, 1 equivalent (1 of the same object code" in out
+    assert "same object code, dz_comp.h line 0: DZ_ADC_CODE_MAX 4095u -> DZ_ADC_CODE_MAX 4096u" in out
+    document = json.loads((tmp_path / "evidence" / "verification.json").read_text())
+    assert document["mutants"]["killed"] == 1 and document["holds"]
+    assert [check["holds"] for check in document["checks"] if check["name"] == "the drive follows its model"] == [True]
 
 
 def test_a_negative_side_and_the_drive_of_both_have_their_killers(full):
