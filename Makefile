@@ -32,7 +32,7 @@ $(VENV)/.bench: $(STAMP)
 bench-isr: $(STAMP)
 	$(BIN)/python benchmarks/isr/run.py
 
-# Some five minutes, most of them mutants; `make bench-verify BENCH=--quick` takes one.
+# Minutes, most of them for mutants; `make bench-verify BENCH=--quick` tries a part of those.
 bench-verify: $(STAMP)
 	$(BIN)/python benchmarks/verify/run.py $(BENCH)
 

@@ -225,7 +225,7 @@ def print_mutations(document: dict) -> None:
 
 def print_firmware_mutants(document: dict) -> None:
     """Print what of the wrong C was not killed, and why."""
-    console = _console()
+    console = new_console()
     console.print(f"Mutants that were not killed; equivalent: {document['equivalent_means']}", markup=False)
     for row in document["not_killed"]:
         place = f"{row['file']} line {row['line']}"

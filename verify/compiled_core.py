@@ -12,6 +12,9 @@ from dzdesign.verify.machines import HOST, Machine, compile_object, link_program
 #: Source of each sign of command, and what its functions' names end with.
 SOURCES = {1: ("dz_comp.c", ""), -1: ("dz_comp_negative.c", "_negative")}
 
+#: The check in C, of programs/.
+CHECK = ("every_input.c", "other_codes.c", "every_input.h", "march.h")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Findings:
@@ -104,9 +107,9 @@ class CompiledCore:
         core = self.compiled(machine)
         called = (f"-DDZ_{name.upper()}=dz_{name}{self._ending}" for name in ("status", "beta"))
         flags = (*machine.check_flags, f"-DDZ_CORE=dz_comp{self._ending}", *called)
-        check = {name: _read(programs_folder() / name) for name in ("every_input.c", "every_input.h", machine.main)}
-        objects = [core, compile_object(machine, "every_input.c", check, flags, "the check")]
-        objects.append(compile_object(machine, machine.main, check, machine.check_flags, "the check"))
+        check = {name: _read(programs_folder() / name) for name in (*CHECK, machine.main)}
+        units = [name for name in check if name.endswith(".c")]
+        objects = [core, *(compile_object(machine, name, check, flags, "the check") for name in units)]
         arguments = []
         if machine.section:
             text = f'{machine.section}\n.balign 8\n.global dz_prepared\ndz_prepared:\n.incbin "prepared.bin"\n'

@@ -4,83 +4,14 @@
  * and never seen: it is an object of its own. `int` may have 16 bits here.
  */
 #include "every_input.h"
+#include "march.h"
 
 uint16_t DZ_CORE(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
-uint16_t DZ_STATUS(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
-uint16_t DZ_BETA(uint16_t p_a_adc, uint16_t p_b_adc);
 
 /* By itself, so that the linker can lay it beside the core: an emulator's jumps are quick within a page. */
 #define NEAR __attribute__((noinline))
 #define HASH_START UINT64_C(0xCBF29CE484222325)
 #define HASH_FACTOR UINT64_C(0x100000001B3)
-
-/* ---- the law, place by place ---- */
-
-struct march {
-    int64_t remainder, carry, denominator;
-    int32_t quotient, step;
-    int32_t place, end; /* the next one; behind the last of the part */
-    int32_t part;
-    const struct dz_part DZ_TABLE *parts;
-};
-
-static void enter_part(struct march *at, const struct dz_plan *plan, int32_t part)
-{
-    const struct dz_part DZ_TABLE *from = &at->parts[part];
-
-    at->part = part;
-    at->end = plan->part_end[part];
-    at->denominator = plan->denominator[part];
-    at->remainder = from->remainder;
-    at->carry = from->carry;
-    at->quotient = from->quotient;
-    at->step = from->step;
-}
-
-static struct march start_march(const struct dz_plan *plan, const struct dz_part DZ_TABLE *parts)
-{
-    struct march at;
-
-    at.parts = parts;
-    at.place = 0;
-    enter_part(&at, plan, 0);
-    return at;
-}
-
-static uint16_t limited(int32_t value, int32_t limit)
-{
-    value = value < 0 ? 0 : value;
-    return (uint16_t)(value > limit ? limit : value);
-}
-
-/* The next `count` expected compare values, `apart` from each other; 0 apart the last one stays. */
-static void march(struct march *at, const struct dz_plan *plan, int32_t count, uint16_t *expected, int16_t apart)
-{
-    const int32_t limit = plan->compare_limit, last = at->place + count;
-
-    while (at->place < last) {
-        const int32_t end = at->end < last ? at->end : last;
-        const int64_t carry = at->carry, denominator = at->denominator, less = carry - denominator;
-        const int32_t step = at->step;
-        int64_t remainder = at->remainder - denominator; /* below zero: the carry shows in the sign */
-        int32_t quotient = at->quotient;
-
-        for (int32_t k = at->place; k < end; k++) {
-            const int64_t on = remainder + carry, back = remainder + less;
-
-            *expected = limited(quotient, limit);
-            expected += apart;
-            quotient += step + (on >= 0);
-            remainder = on >= 0 ? back : on;
-        }
-        at->remainder = remainder + denominator;
-        at->quotient = quotient;
-        at->place = end;
-        if (end == at->end && end < plan->codes) {
-            enter_part(at, plan, at->part + 1);
-        }
-    }
-}
 
 /* ---- hash and comparison ---- */
 
@@ -125,11 +56,6 @@ static void note_wrong(const struct dz_plan *plan, const struct dz_row *row, int
     }
     findings->wrong++;
     findings->largest_error = size > findings->largest_error ? size : findings->largest_error;
-}
-
-static uint16_t code_at(const struct dz_plan *plan, int32_t place)
-{
-    return (uint16_t)(plan->first_code + (place * plan->code_step));
 }
 
 /* ---- all commands at all differences ---- */
@@ -355,96 +281,6 @@ static void check_places(const struct dz_plan *plan, const uint8_t DZ_TABLE *pre
     findings->calls += findings->inputs;
 }
 
-/* ---- codes that are not sound ---- */
-
-/* Every `stride`-th code of 16 bits as command, at each pair of pressures: without a sound command nothing is driven,
- * without sound pressures the law's safe end. */
-static void check_fallbacks(const struct dz_plan *plan, const uint8_t DZ_TABLE *prepared, struct dz_findings *findings)
-{
-    const struct dz_part DZ_TABLE *laws = (const struct dz_part DZ_TABLE *)(prepared + plan->laws_at);
-    const struct dz_pair DZ_TABLE *pairs = (const struct dz_pair DZ_TABLE *)(prepared + plan->pairs_at);
-
-    for (int32_t index = 0; index < plan->pairs; index++) {
-        const struct dz_pair pair = pairs[index];
-        struct march at = start_march(plan, &laws[plan->safe_law * plan->parts]);
-
-        for (int32_t place = 0; place < plan->codes; place += plan->stride) {
-            uint16_t expected = 0;
-
-            march(&at, plan, place + 1 - at.place, &expected, 0);
-            if (!pair.sound || place < plan->sound_from || place >= plan->sound_to) {
-                findings->bad_fallbacks += DZ_CORE(code_at(plan, place), pair.a, pair.b) != expected;
-                findings->calls++;
-            }
-        }
-        for (int32_t code = INT32_C(65535); code >= plan->codes; code -= plan->stride) {
-            findings->bad_fallbacks += DZ_CORE((uint16_t)code, pair.a, pair.b) != 0u;
-            findings->calls++;
-        }
-    }
-}
-
-static uint16_t outside(int32_t code, int32_t low, int32_t high)
-{
-    return code < low || code > high;
-}
-
-/* Every `stride`-th code of each input, with the others at the ends of their sound codes. */
-static void check_status(const struct dz_plan *plan, const int32_t DZ_TABLE *slant, struct dz_findings *findings)
-{
-    const int32_t u_first = code_at(plan, plan->sound_from), u_last = code_at(plan, plan->sound_to - 1);
-    const int32_t low[3] = {u_first < u_last ? u_first : u_last, plan->a_low, plan->b_low};
-    const int32_t high[3] = {u_first < u_last ? u_last : u_first, plan->a_high, plan->b_high};
-
-    for (int16_t moving = 0; moving < 3; moving++) {
-        for (int16_t ends = 0; ends < 8; ends++) {
-            int32_t code[3];
-
-            if ((ends >> moving) & 1) {
-                continue; /* the moving one has no end */
-            }
-            for (int16_t input = 0; input < 3; input++) {
-                code[input] = ((ends >> input) & 1) ? high[input] : low[input];
-            }
-            for (code[moving] = 0; code[moving] <= INT32_C(65535); code[moving] += plan->stride) {
-                const uint16_t a = outside(code[1], low[1], high[1]), b = outside(code[2], low[2], high[2]);
-                uint16_t expected = (uint16_t)(outside(code[0], low[0], high[0]) + 2u * a + 4u * b);
-
-                /* Of pressures that are not sound the difference says nothing. */
-                if (!a && !b && plan->turn * (code[1] - slant[code[2]]) < -plan->reverse) {
-                    expected = (uint16_t)(expected + 8u);
-                }
-                findings->bad_status +=
-                    DZ_STATUS((uint16_t)code[0], (uint16_t)code[1], (uint16_t)code[2]) != expected;
-                findings->calls++;
-            }
-        }
-    }
-}
-/* What is shown of beta: at the first, the last and another pair of each difference, and where it can't be right. */
-static void check_betas(const struct dz_plan *plan, const uint8_t DZ_TABLE *prepared, struct dz_findings *findings)
-{
-    const struct dz_row DZ_TABLE *rows = (const struct dz_row DZ_TABLE *)(prepared + plan->rows_at);
-    const struct dz_pair DZ_TABLE *pairs = (const struct dz_pair DZ_TABLE *)(prepared + plan->pairs_at);
-    const int32_t DZ_TABLE *slant = (const int32_t DZ_TABLE *)(prepared + plan->slant_at);
-    const uint16_t DZ_TABLE *betas = (const uint16_t DZ_TABLE *)(prepared + plan->betas_at);
-
-    for (int32_t index = 0; index < plan->rows; index++) {
-        const struct dz_row row = rows[index];
-        const uint16_t beta = betas[row.law], last = (uint16_t)(row.b_low + row.pairs - 1u);
-        const uint16_t tried[3] = {row.b_low, last, (uint16_t)(row.b_low + row.first)};
-
-        for (int16_t k = 0; row.pairs != 0u && k < 3; k++) {
-            findings->bad_betas += DZ_BETA((uint16_t)(row.offset + slant[tried[k]]), tried[k]) != beta;
-        }
-    }
-    for (int32_t index = 0; index < plan->pairs; index++) {
-        const struct dz_pair pair = pairs[index];
-
-        findings->bad_betas += !pair.sound && DZ_BETA(pair.a, pair.b) != betas[plan->safe_law];
-    }
-}
-
 /* ---- all of it ---- */
 
 static void begin(struct dz_findings *findings)
@@ -465,9 +301,9 @@ void dz_check_everything(const uint8_t *prepared, uint16_t *work, uint16_t *at_z
     if (plan->cube != 0) {
         check_cube(plan, slant, at_zero, findings);
     }
-    check_fallbacks(plan, prepared, findings);
-    check_status(plan, slant, findings);
-    check_betas(plan, prepared, findings);
+    dz_check_fallbacks(plan, prepared, findings);
+    dz_check_status(plan, slant, findings);
+    dz_check_betas(plan, prepared, findings);
 }
 
 void dz_check_sample(const uint8_t DZ_TABLE *prepared, struct dz_findings *findings)
@@ -476,9 +312,9 @@ void dz_check_sample(const uint8_t DZ_TABLE *prepared, struct dz_findings *findi
 
     begin(findings);
     check_places(&plan, prepared, findings);
-    check_fallbacks(&plan, prepared, findings);
-    check_status(&plan, (const int32_t DZ_TABLE *)(prepared + plan.slant_at), findings);
-    check_betas(&plan, prepared, findings);
+    dz_check_fallbacks(&plan, prepared, findings);
+    dz_check_status(&plan, (const int32_t DZ_TABLE *)(prepared + plan.slant_at), findings);
+    dz_check_betas(&plan, prepared, findings);
 }
 
 void dz_put_findings(const struct dz_findings *findings, void (*put)(uint32_t number))

@@ -79,6 +79,11 @@ void dz_check_everything(const uint8_t *prepared, uint16_t *work, uint16_t *at_z
 /* The places and rows that were prepared, for a machine that is slow and small. */
 void dz_check_sample(const uint8_t DZ_TABLE *prepared, struct dz_findings *findings);
 
+/* Of both, in other_codes.c. */
+void dz_check_fallbacks(const struct dz_plan *plan, const uint8_t DZ_TABLE *prepared, struct dz_findings *findings);
+void dz_check_status(const struct dz_plan *plan, const int32_t DZ_TABLE *slant, struct dz_findings *findings);
+void dz_check_betas(const struct dz_plan *plan, const uint8_t DZ_TABLE *prepared, struct dz_findings *findings);
+
 /* Every number found, as text: the hash in two halves, then the counts. */
 void dz_put_findings(const struct dz_findings *findings, void (*put)(uint32_t number));
 
