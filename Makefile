@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 DOCS   := docs/derivation
 
-.PHONY: demo test lint docs goldens lock clean bench-identify bench-isr
+.PHONY: demo test lint docs goldens lock clean bench-identify bench-isr bench-verify
 
 demo: $(STAMP)
 	$(BIN)/dzdesign demo demo
@@ -31,6 +31,10 @@ $(VENV)/.bench: $(STAMP)
 # A minute or two; needs the simulators that .ci/run installs.
 bench-isr: $(STAMP)
 	$(BIN)/python benchmarks/isr/run.py
+
+# Minutes, most of them for mutants; `make bench-verify BENCH=--quick` tries a part of those.
+bench-verify: $(STAMP)
+	$(BIN)/python benchmarks/verify/run.py $(BENCH)
 
 # The account of the paper as a page, for LaTeX and for machines; built, never committed.
 docs: $(STAMP)

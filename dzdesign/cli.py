@@ -190,6 +190,12 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
                 help="also run a series of plants, like examples/paper_valve/tolerances.toml; needs --plant",
             ),
             _given("--c2000ware", metavar="DIR", help="also compile f28335 firmware against your C2000Ware's headers"),
+            _given("--mutate", action="store_true", help="also make the C wrong in every place; count what is caught"),
+            _given(
+                "--machine-code",
+                action="store_true",
+                help="also check machine code: every input on a Cortex-M4 in QEMU, a sample on an AVR in simavr",
+            ),
         ),
     ),
     "assess": (

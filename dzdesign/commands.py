@@ -4,6 +4,7 @@ import argparse
 import re
 import sys
 from pathlib import Path
+from typing import Any
 
 from dzdesign.core.artefacts import (
     TOOL,
@@ -163,7 +164,7 @@ def _list_targets(args: argparse.Namespace) -> int:
 
 def run_verify(args: argparse.Namespace) -> int:
     """Verify a firmware folder and write the evidence."""
-    from dzdesign.tables import print_verification
+    from dzdesign.tables import print_firmware_mutants, print_verification
     from dzdesign.verify.c2000ware import check_against_c2000ware, with_check
     from dzdesign.verify.plant import read_plant
     from dzdesign.verify.tolerances import read_tolerances
@@ -177,15 +178,43 @@ def run_verify(args: argparse.Namespace) -> int:
     firmware = Path(args.firmware)
     ware = check_against_c2000ware(firmware, Path(args.c2000ware), say) if args.c2000ware else None
     verification = verify(firmware, plant, source, tolerances=tolerances, say=say)
-    verification = with_check(verification, ware) if ware else verification
+    added = [ware] if ware else []
+    if args.machine_code:
+        from dzdesign.verify.machine_code import machine_code_checks
+
+        say("comparing the machine code of other processors with the exact law, in simulators")
+        added += machine_code_checks(firmware, verification.inputs)
+    mutants = _firmware_mutants(firmware) if args.mutate else None
+    if mutants:
+        from dzdesign.verify.mutation import mutation_check
+
+        added.append(mutation_check(mutants))
+    for check in added:
+        verification = with_check(verification, check)
+    if mutants:
+        verification.document["mutants"] = mutants
     manifest = {"schema": SCHEMA, "tool": TOOL, "made_from": verification.document["made_from"]}
     write_folder(output, evidence_files(verification), manifest)
     if args.json:
         print(to_json(verification.document), end="")
     else:
         print_verification(verification)
+        if mutants:
+            print_firmware_mutants(mutants)
         print(f"Evidence: {output}")
     return 0 if verification.holds else 1
+
+
+def _firmware_mutants(firmware: Path) -> dict[str, Any]:
+    """Make the firmware's core wrong in every place, and return what verify says to each."""
+    from dzdesign.progress import with_bar
+    from dzdesign.verify.mutation import MutationBench, all_mutants, judge_all, mutation_document
+
+    bench = MutationBench(firmware)
+    mutants = all_mutants(bench)
+    say(f"checking the core with {len(mutants)} faults, one at a time")
+    bench.check_original()
+    return mutation_document(judge_all(bench, mutants, lambda work: with_bar(work, "mutants")))
 
 
 def run_simulate(args: argparse.Namespace) -> int:

@@ -283,3 +283,12 @@ def print_mutations(document: dict) -> None:
         for text in row["equivalent"]:
             console.print(f"same meaning, {row['number']}: {text}", markup=False)
     console.print(f"{document['caught']} of {document['mutants']} wrong equations are caught.")
+
+
+def print_firmware_mutants(document: dict) -> None:
+    """Print what of the wrong C was not killed, and why."""
+    console = new_console()
+    console.print(f"Mutants that were not killed; equivalent: {document['equivalent_means']}", markup=False)
+    for row in document["not_killed"]:
+        place = f"{row['file']} line {row['line']}"
+        console.print(f"{row['verdict']}, {place}: {row['change']}", markup=False, soft_wrap=True)

@@ -8,7 +8,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from drive_model import STEP_UNIT, DriveModel
 from golden_firmware import FULL, GOLDENS, full_options, golden_compensator
 from synthetic import needs_compiler
 
@@ -19,6 +18,8 @@ from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.signal_text import Converter, command_signal, parse_signal
 from dzdesign.identify.valve_file import valve_from_document
+from dzdesign.verify.drive_check import drive_samples as sequence
+from dzdesign.verify.drive_reference import STEP_UNIT, DriveModel
 from dzdesign.verify.host_compiler import load_library
 
 pytestmark = needs_compiler
@@ -94,31 +95,6 @@ SETS = (
 def compensator_named(name: str) -> Compensator:
     content = (FULL / "valve.json").read_bytes()
     return design(valve_from_document(content, "valve.json"), options_named(name), content)
-
-
-def sequence(compensator: Compensator, seed: int, count: int) -> list[tuple[int, int, int]]:
-    """Random codes, corners, steps from end to end, and noise about zero, one after the other."""
-    rng = np.random.default_rng(seed)
-    signals = compensator.signals
-    zero, window = signals.command.zero_code, max(compensator.amplifier.window_codes, 4)
-    low, high = signals.command.valid_codes
-    corners = [0, low, high, signals.code_max, signals.code_max + 1, 65535, zero, signals.command.full_code]
-    corners += [max(zero + sign * (window + step), 0) for sign in (1, -1) for step in (-1, 0, 1)]
-    made = []
-    while len(made) < count:
-        kind = int(rng.integers(6))
-        length = int(rng.integers(1, 900 if kind == 5 else 60))
-        held = int(rng.integers(low, high + 1))
-        for _ in range(length):
-            near = min(max(held + int(rng.integers(-3, 4)), low), high)
-            about_zero = max(zero + int(rng.integers(-2 * window, 2 * window + 1)), 0)
-            anything = int(rng.integers(0, 65536)) if rng.random() < 0.02 else int(rng.integers(low, high + 1))
-            end = held if held % 2 else (low, high)[held // 2 % 2]
-            command = (anything, int(rng.choice(corners)), held, about_zero, near, end)[kind]
-            sound = rng.random() < 0.9
-            pressures = rng.integers(850, 3800, 2) if sound else rng.choice([0, 700, 4014, 4095, 4096, 65535], 2)
-            made.append((command, *map(int, pressures)))
-    return made[:count]
 
 
 def first_difference(firmware, model: DriveModel, samples: list[tuple[int, int, int]]) -> str:

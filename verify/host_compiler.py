@@ -23,6 +23,11 @@ def _build_folder() -> tempfile.TemporaryDirectory:
     return tempfile.TemporaryDirectory(prefix="dzdesign-", ignore_cleanup_errors=True)
 
 
+def build_folder() -> Path:
+    """Return the folder that everything is built in; it goes when the process ends."""
+    return Path(_build_folder().name)
+
+
 def find_compilers() -> tuple[str, ...]:
     """Return the C compilers on this machine, the one to use first: $CC, then cc, gcc, clang."""
     wanted = (os.environ.get("CC"), "cc", "gcc", "clang")

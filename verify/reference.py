@@ -74,10 +74,7 @@ class ExactLaw:
 
     def difference(self, p_a: np.ndarray, p_b: np.ndarray) -> np.ndarray:
         """Return the differences of pressure codes, in codes of sensor A, that pairs of codes make (rounded down)."""
-        a_MPa, b_MPa = (
-            Fraction(*sensor["span_MPa"]) / (sensor["full_code"] - sensor["zero_code"]) for sensor in (self.a, self.b)
-        )
-        weight = max(1, round(b_MPa / a_MPa * WEIGHT_UNIT))
+        weight = self._weight()
         a, b = (np.asarray(p, dtype=np.int64) - sensor["zero_code"] for p, sensor in ((p_a, self.a), (p_b, self.b)))
         return np.floor_divide(self.turn * (a * WEIGHT_UNIT - b * weight), WEIGHT_UNIT)
 
@@ -86,9 +83,33 @@ class ExactLaw:
         (a_low, a_high), (b_low, b_high) = self.a["valid_codes"], self.b["valid_codes"]
         return (p_a >= a_low) & (p_a <= a_high) & (p_b >= b_low) & (p_b <= b_high)
 
+    def slant(self) -> np.ndarray:
+        """Return, per pressure code b, what a difference d is short of pressure code a: a = turn * d + slant[b]."""
+        away = (np.arange(self.code_max + 1) - self.b["zero_code"]) * self._weight()
+        return self.a["zero_code"] - self.turn * np.floor_divide(-self.turn * away, WEIGHT_UNIT)
+
+    def _weight(self) -> int:
+        a_MPa, b_MPa = (
+            Fraction(*sensor["span_MPa"]) / (sensor["full_code"] - sensor["zero_code"]) for sensor in (self.a, self.b)
+        )
+        return max(1, round(b_MPa / a_MPa * WEIGHT_UNIT))
+
     def betas(self, dp_code: int | None) -> Betas:
         """Return both betas at a difference; None, and one below ``-reverse``: the signal can't be right."""
         return Betas(self._at(self._law_nodes, dp_code), self._at(self._zero_nodes, dp_code))
+
+    def beta_numerators(self, differences: np.ndarray) -> tuple[Betas, int]:
+        """Return both betas at many differences as integers, and what they are over."""
+        left, past = np.divmod(np.maximum(differences, 0), self._step)
+        failed = differences < -self.reverse
+
+        def interpolated(nodes: list[int]) -> np.ndarray:
+            node = np.array([*nodes, nodes[-1]], dtype=np.int64)  # the last node is reached, never passed
+            between = node[left] * self._step + (node[left + 1] - node[left]) * past
+            return np.where(failed, min(nodes) * self._step, between)
+
+        both = Betas(interpolated(self._law_nodes), interpolated(self._zero_nodes))
+        return both, self._denominator * self._step
 
     def _at(self, nodes: list[int], dp_code: int | None) -> Fraction:
         if dp_code is None or dp_code < -self.reverse:
@@ -111,6 +132,20 @@ class ExactLaw:
         if self._edge:
             corners.append((self._edge, line.slope * self._edge + line.start))
         return [*corners, (self.span, line.slope * self.span + line.start)]
+
+    def lines_in_beta(self) -> list[tuple[int, Fraction, Fraction]]:
+        """Return the corners as lines in their beta: command, counts at beta 0, counts that a beta of 1 adds.
+
+        Raises
+        ------
+        RequirementError
+            If the law is no line in beta.
+        """
+        at = [self.corners(Betas(Fraction(beta), Fraction(beta))) for beta in (0, 1, 2)]
+        lines = [(code, none, one - none) for (code, none), (_, one) in zip(at[0], at[1], strict=True)]
+        if any(two != none + 2 * more for (_, none, more), (_, two) in zip(lines, at[2], strict=True)):
+            raise RequirementError("the law is not straight in beta, so its rows can't be prepared")
+        return lines
 
     def rows(self, betas: list[Betas]) -> Iterator[np.ndarray]:
         """Yield, for command codes 0, 1, ... from zero on, the rounded and limited compare values at all `betas`."""

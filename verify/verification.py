@@ -17,6 +17,7 @@ from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.identify.valve_file import valve_from_document
 from dzdesign.verify.all_inputs import InputCheck, check_all_inputs
 from dzdesign.verify.closed_loop import ClosedLoop, LoopComparison, RampSequence, compare_at_pressure
+from dzdesign.verify.drive_check import SEED, CompiledDrive, PreparedDrive
 from dzdesign.verify.host_compiler import check_strictly, find_compilers, host_compiler
 from dzdesign.verify.plant import Plant, plant_document, plants_from_tests
 from dzdesign.verify.scenarios import ScenarioResult, Scene, run_scenarios
@@ -133,6 +134,7 @@ def verify(
     if inputs:
         for each in inputs:
             checks += _input_checks(each, len(inputs) > 1)
+        checks.append(_drive_follows(folder, compensator))
         say("running the closed loop")
         scenes = _scenes(folder, document, plant)
         loops = _run_loops(scenes, sequence or RampSequence())
@@ -200,6 +202,19 @@ def _certificate_follows(compensator: Compensator) -> Check:
     )
 
 
+def _drive_follows(folder: Path, compensator: Compensator) -> Check:
+    """Tell whether the drive around the law does what its model in rational numbers does."""
+    name, prepared = "the drive follows its model", PreparedDrive(compensator)
+    try:
+        found = CompiledDrive(folder).check(prepared)
+    except RequirementError as error:
+        return Check(name=name, holds=False, text=str(error))
+    text = f"outputs and state after each of {found.ticks} PWM periods, {len(prepared.samples)} samples of corners, "
+    text += f"steps, noise and random codes (seed {SEED}): {found.wrong} wrong"
+    text += f" ({found.first_wrong})" if found.wrong else ""
+    return Check(name=name, holds=found.wrong == 0, text=text)
+
+
 def _compiles_strictly(folder: Path, manifest: dict[str, Any]) -> Check:
     compilers = find_compilers()
     try:
@@ -224,7 +239,8 @@ def _input_checks(inputs: InputCheck, both: bool) -> list[Check]:
         Check(
             name="equals the exactly rounded law",
             holds=inputs.wrong == 0,
-            text=f"{inputs.inputs} inputs checked, {inputs.wrong} wrong" + (f" ({found})" if found else ""),
+            text=f"{inputs.inputs} inputs checked, {inputs.wrong} wrong" + (f" ({found})" if found else "")
+            + f"; hash of all compare values {inputs.outputs_hash}, object {inputs.object_sha256}",
         ),
         Check(
             name="within range, monotone",
@@ -241,14 +257,14 @@ def _input_checks(inputs: InputCheck, both: bool) -> list[Check]:
         Check(
             name="depends on the pressures by their difference only",
             holds=inputs.odd_pairs == 0,
-            text=f"{inputs.odd_pairs} pairs of pressure codes differ (at every command the lowest and the highest pair "
-            "of each difference; at zero, half and full command all pairs)",
+            text=f"{inputs.odd_pairs} of {inputs.pressure_pairs} pairs of pressure codes differ (the commands of each "
+            "difference take its pairs in turn; at zero command all pairs that the law follows or that are not sound)",
         ),
         Check(
             name="codes that are not sound fall back",
-            holds=not (inputs.bad_fallbacks or inputs.bad_status),
+            holds=not (inputs.bad_fallbacks or inputs.bad_status or inputs.bad_betas),
             text=f"{inputs.bad_fallbacks} codes outside the sound ones without the safe value, {inputs.bad_status} "
-            "status words that say otherwise",
+            f"status words that say otherwise, {inputs.bad_betas} values of dz_beta() that are not the law's",
         ),
     ]
     label = ("positive" if inputs.sign > 0 else "negative") + " commands: " if both else ""

@@ -1,0 +1,120 @@
+"""The check of every input against a bare batch of the core and against ctypes with Fraction, and on simulators."""
+
+import ctypes
+import random
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from time import perf_counter
+
+from firmware import example_firmware
+from scoreboard import Row, print_rows, say
+
+from dzdesign.design.compensator import Compensator
+from dzdesign.verify.all_inputs import check_all_inputs
+from dzdesign.verify.compiled_core import CompiledCore
+from dzdesign.verify.host_compiler import load_library
+from dzdesign.verify.machine_code import check_on_machine
+from dzdesign.verify.machines import AVR, CORTEX_M4, HOST, compile_object, link_program, run_program
+
+ROUNDS, QUICK_ROUNDS = 9, 3
+#: Inputs of the comparison with ctypes and Fraction, of which the whole is extrapolated.
+STATED_PART = 20_000
+TIMES_BARE, TIMES_SLOWER, TIMES_HOST = 2.0, 2000.0, 8.0
+
+
+def print_inputs(quick: bool = False, seed: int = 0) -> list[Row]:
+    """Measure, print and return the rows."""
+    with tempfile.TemporaryDirectory(prefix="bench-verify-") as folder:
+        firmware = Path(folder) / "fw"
+        compensator = example_firmware(firmware)
+        rows = _rows(firmware, compensator, QUICK_ROUNDS if quick else ROUNDS, seed)
+    print_rows("Every input of the compiled core", rows)
+    return rows
+
+
+def _rows(firmware: Path, compensator: Compensator, rounds: int, seed: int) -> list[Row]:
+    last = compensator.signals.code_max
+    bare = _bare_batch(firmware)
+    result = check_all_inputs(firmware)  # compiled from here on
+    say("bare batch and check, in turn ...")
+    runs = [(_seconds(lambda: bare(last)), _seconds(lambda: check_all_inputs(firmware))) for _ in range(rounds)]
+    bare_s, check_s = (min(column) for column in zip(*runs, strict=True))
+    # A round's two stand side by side, so that what else the machine does meets both.
+    ratios = sorted(check / batch for batch, check in runs)
+    note = f"smallest of {rounds}, not compiling; {result.inputs} inputs, {result.calls} calls of the core in the check"
+    say("ctypes and Fraction ...")
+    one_s = _seconds(lambda: _by_fractions(firmware, compensator, STATED_PART, seed)) / STATED_PART
+    slower = one_s * result.inputs / check_s
+    rows = [
+        Row(what="bare batch: the core at every input, nothing else", value=bare_s, unit="s", note=note),
+        Row(what="check of every input, all properties", value=check_s, unit="s", note=note),
+        Row(
+            what="check over bare batch, median of the rounds",
+            value=ratios[rounds // 2],
+            limit=TIMES_BARE,
+            note=f"{ratios[0]:.2f} to {ratios[-1]:.2f}",
+        ),
+        Row(what="inputs that are wrong in any property", value=float(not result.holds), limit=0),
+        Row(
+            what="check over ctypes with Fraction, times 2000",
+            value=TIMES_SLOWER / slower,
+            limit=1,
+            note=f"{slower:.0f} times faster: {1e6 * one_s:.1f} us an input there, from {STATED_PART} random inputs",
+        ),
+    ]
+    return rows + _simulated(firmware, check_s)
+
+
+def _simulated(firmware: Path, check_s: float) -> list[Row]:
+    rows, host = [], check_all_inputs(firmware)
+    for machine, limit in ((CORTEX_M4, TIMES_HOST), (AVR, None)):
+        if missing := machine.missing():
+            rows.append(Row(what=f"{machine.name}", value=float("nan"), limit=limit, note=f"not run: {missing}"))
+            continue
+        say(f"{machine.name} ...")
+        done = check_on_machine(firmware, machine, host)
+        seconds = min(_seconds(lambda on=machine: check_on_machine(firmware, on, host)) for _ in range(3))
+        rows.append(
+            Row(
+                what=f"{machine.name} in {machine.runner[0]} over the host's check",
+                value=seconds / check_s,
+                limit=limit,
+                note=f"{seconds:.2f} s for {done.found.inputs} inputs",
+            )
+        )
+        rows.append(
+            Row(
+                what=f"{machine.name}: 1 if there are faults or its hash is not the host's",
+                value=float(not done.holds),
+                limit=0,
+                note=done.found.outputs_hash,
+            )
+        )
+    return rows
+
+
+def _bare_batch(firmware: Path) -> Callable[[int], object]:
+    core = CompiledCore(firmware).compiled()
+    source = {"bare_batch.c": (Path(__file__).parent / "bare_batch.c").read_bytes()}
+    objects = [core, compile_object(HOST, "bare_batch.c", source, HOST.check_flags, "the bare batch")]
+    program = link_program(HOST, objects, "the bare batch")
+    return lambda last: run_program(HOST, program, [str(last)], "the bare batch")
+
+
+def _by_fractions(firmware: Path, compensator: Compensator, count: int, seed: int) -> None:
+    """Compare `count` random inputs one by one, as one would in plain Python."""
+    names = ("dz_comp.c", "dz_comp.h")
+    dz_comp = load_library({name: (firmware / "core" / name).read_text() for name in names}, "the core").dz_comp
+    dz_comp.argtypes, dz_comp.restype = [ctypes.c_uint16] * 3, ctypes.c_uint16
+    draw, last = random.Random(seed), compensator.signals.code_max
+    for _ in range(count):
+        command, p_a, p_b = (draw.randint(0, last) for _ in range(3))
+        if dz_comp(command, p_a, p_b) != compensator.compare(command, p_a - p_b):
+            raise RuntimeError(f"the core is wrong at {(command, p_a, p_b)}")
+
+
+def _seconds(work: Callable[[], object]) -> float:
+    start = perf_counter()
+    work()
+    return perf_counter() - start

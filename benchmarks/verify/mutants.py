@@ -1,0 +1,38 @@
+"""Every constant, comparison and operator of the generated core made wrong: what verify's checks let through."""
+
+import random
+import tempfile
+from pathlib import Path
+from time import perf_counter
+
+from firmware import example_firmware
+from scoreboard import Row, print_rows, say
+
+from dzdesign.verify.mutation import MutationBench, all_mutants, judge_all, mutation_document
+
+QUICK = 60
+
+
+def print_mutants(quick: bool = False, seed: int = 0) -> list[Row]:
+    """Judge all mutants, print and return the rows."""
+    rows = []
+    for target in ("f28335", "avr"):
+        with tempfile.TemporaryDirectory(prefix="bench-verify-") as folder:
+            example_firmware(Path(folder) / "fw", target)
+            bench = MutationBench(Path(folder) / "fw")
+            bench.check_original()
+            mutants = all_mutants(bench)
+            tried = random.Random(seed).sample(mutants, QUICK) if quick else mutants
+            say(f"{target}: {len(tried)} of {len(mutants)} mutants ...")
+            start = perf_counter()
+            document = mutation_document(judge_all(bench, tried))
+            seconds = perf_counter() - start
+        note = f"{document['killed']} killed, {document['same_object']} of the same object code, "
+        note += f"{document['same_outputs']} of the same outputs, {document['refused']} refused; {seconds:.0f} s"
+        rows.append(
+            Row(what=f"{target}: mutants of {len(tried)} that survive", value=document["survived"], limit=0, note=note)
+        )
+        for each in document["not_killed"]:
+            print(f"{target}: {each['verdict']}, {each['file']} line {each['line']}: {each['change']}")
+    print_rows("Wrong C", rows)
+    return rows

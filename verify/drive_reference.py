@@ -1,0 +1,119 @@
+"""What the firmware's drive must do, in rational numbers from the compensator: no code of the generated C.
+
+Written from what an amplifier is asked for, not from the template: the command is a position in codes that the ramps
+hold back, the side changes where that position passes the window, the dither is a square wave about the law.
+"""
+
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+from dzdesign.design.compensator import Compensator
+
+#: Seconds and steps of a ramp are held as codes over this.
+STEP_UNIT = 65536
+
+
+@dataclass
+class DriveModel:
+    """One drive: state, and what it puts out after each tick.
+
+    Attributes
+    ----------
+    compensator : Compensator
+        The law and what is around it.
+    compare_a, compare_b, status : int
+        Outputs.
+    law, side, tick_of_wave : int
+        The law's compare value, the driven side (1, -1; 0: neither) and the place in the dither's wave.
+    position : Fraction
+        Command after the ramps, in codes from zero; positive commands above zero.
+    """
+
+    compensator: Compensator
+    compare_a: int = 0
+    compare_b: int = 0
+    status: int = 0
+    law: int = 0
+    side: int = 0
+    tick_of_wave: int = 0
+    position: Fraction = field(default_factory=Fraction)
+
+    def __post_init__(self) -> None:
+        self.both = len(self.compensator.signals.signs) == 2
+        self.side = 0 if self.both else 1
+
+    def sample(self, command: int, p_a: int, p_b: int) -> None:
+        """Take new codes."""
+        signals, amplifier = self.compensator.signals, self.compensator.amplifier
+        low, high = signals.command.valid_codes
+        if not low <= command <= high:
+            self.status = self._status(command, p_a, p_b, 1)
+            self.law, self.side, self.position = 0, 0 if self.both else 1, Fraction(0)
+            return
+        away = signals.command.direction(1) * (command - signals.command.zero_code)
+        if any(amplifier.ramp_up + amplifier.ramp_down):
+            self._ramp(away)
+            away = int(self.position)  # towards zero: never more command than the ramp has reached
+        if self.both and abs(away) > amplifier.window_codes:
+            self.side = 1 if away > 0 else -1
+        code = signals.command.zero_code + signals.command.direction(1) * away
+        self.status = self._status(command, p_a, p_b, self.side or 1)
+        self.law = self._law(code, p_a, p_b) if self.side else 0
+
+    def _ramp(self, asked: int) -> None:
+        """Move towards what is asked, within the step of the side and the direction, and stop at zero on the way."""
+        amplifier = self.compensator.amplifier
+        goal = Fraction(asked)
+        if self.position * goal < 0:
+            goal = Fraction(0)
+        negative = self.position < 0 or (self.position == 0 and goal < 0)
+        if not self.both:
+            goal, negative = max(goal, Fraction(0)), False
+        limits = amplifier.ramp_up if abs(goal) > abs(self.position) else amplifier.ramp_down
+        step = Fraction(limits[int(negative)], STEP_UNIT)
+        way = goal - self.position
+        if step and abs(way) > step:
+            way = step if way > 0 else -step
+        self.position += way
+
+    def _sound(self, p_a: int, p_b: int) -> tuple[bool, bool]:
+        signals = self.compensator.signals
+        return tuple(
+            sensor.valid_codes[0] <= code <= sensor.valid_codes[1]
+            for sensor, code in ((signals.pressure_a, p_a), (signals.pressure_b, p_b))
+        )
+
+    def _status(self, command: int, p_a: int, p_b: int, sign: int) -> int:
+        signals = self.compensator.signals
+        low, high = signals.command.valid_codes
+        a, b = self._sound(p_a, p_b)
+        reversed_ = a and b and signals.difference(p_a, p_b, sign) < -self.compensator.reverse_codes
+        return (not low <= command <= high) + 2 * (not a) + 4 * (not b) + 8 * reversed_
+
+    def _law(self, code: int, p_a: int, p_b: int) -> int:
+        failed = -self.compensator.reverse_codes - 1
+        difference = self.compensator.signals.difference(p_a, p_b, self.side)
+        return self.compensator.compare(code, difference if all(self._sound(p_a, p_b)) else failed, self.side)
+
+    def tick(self) -> None:
+        """Go one PWM period on."""
+        amplifier = self.compensator.amplifier
+        compare = self.law
+        if amplifier.dither_counts:
+            self.tick_of_wave = (self.tick_of_wave + 1) % (2 * amplifier.dither_ticks)
+            if compare:
+                up = self.tick_of_wave < amplifier.dither_ticks
+                compare += amplifier.dither_counts if up else -amplifier.dither_counts
+        compare = min(max(compare, 0), amplifier.compare_limit)
+        self.compare_a, self.compare_b = (compare, 0) if self.side > 0 else (0, compare if self.side < 0 else 0)
+
+    @property
+    def outputs(self) -> tuple[int, int, int]:
+        """Compare values of both solenoids and the status word."""
+        return self.compare_a, self.compare_b, self.status
+
+    @property
+    def state(self) -> tuple[int, ...]:
+        """Everything that `struct dz_drive` holds, in its order."""
+        ramped = self.position * STEP_UNIT
+        return (*self.outputs, self.law, self.side, self.tick_of_wave, int(ramped))
