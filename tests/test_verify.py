@@ -15,10 +15,11 @@ from dzdesign.core.artefacts import to_json, write_folder
 from dzdesign.design.compensator_file import compensator_document
 from dzdesign.verify import motion
 from dzdesign.verify.all_inputs import check_all_inputs
+from dzdesign.verify.checks import certificate_follows
 from dzdesign.verify.closed_loop import PERIODS_PER_RECORD, ClosedLoop, RampSequence, dead_zone
 from dzdesign.verify.plant import Plant, plants_from_tests
 from dzdesign.verify.reference import ExactLaw
-from dzdesign.verify.verification import _certificate_follows, verify
+from dzdesign.verify.verification import verify
 
 pytestmark = needs_compiler
 
@@ -104,9 +105,9 @@ def test_an_offset_above_the_bound_is_over_compensation(example_compensator, tmp
 
 def test_a_certificate_that_says_too_much_is_found(example_compensator):
     """What the header promises beyond the tests is no property of the machine code, so no input shows it."""
-    honest = _certificate_follows(example_compensator)
+    honest = certificate_follows(example_compensator)
     certificate = replace(example_compensator.positive.certificate, dp_MPa=(Fraction(0), Fraction(20)))
-    boastful = _certificate_follows(with_side(example_compensator, certificate=certificate))
+    boastful = certificate_follows(with_side(example_compensator, certificate=certificate))
     assert honest.holds and not boastful.holds
     assert "says dp_MPa = 0 to 20" in boastful.text
 

@@ -13,8 +13,9 @@ from xml.etree import ElementTree
 from dzdesign.core.artefacts import MANIFEST_NAME, parse_document, read_bytes
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.shape import check_shape
+from dzdesign.verify.checks import Check
 from dzdesign.verify.host_compiler import check_strictly, host_compiler
-from dzdesign.verify.verification import FIRMWARE_SCHEMA, Check, Verification
+from dzdesign.verify.verification import FIRMWARE_SCHEMA, Verification
 
 TARGET = "f28335"
 DEVICE = "device_support/f2833x"

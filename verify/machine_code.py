@@ -6,11 +6,11 @@ from pathlib import Path
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.verify.all_inputs import InputCheck
+from dzdesign.verify.checks import Check
 from dzdesign.verify.compiled_core import CompiledCore, Findings
 from dzdesign.verify.machines import AVR, CORTEX_M4, Machine
 from dzdesign.verify.prepared_inputs import SAMPLED_STRIDE, PreparedInputs
 from dzdesign.verify.reference import ExactLaw
-from dzdesign.verify.verification import Check
 
 MACHINES = (CORTEX_M4, AVR)
 

@@ -20,12 +20,12 @@ from dzdesign.core.artefacts import parse_document, read_bytes
 from dzdesign.core.errors import RequirementError
 from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.verify.c_mutants import Mutant, mutants_of
+from dzdesign.verify.checks import Check
 from dzdesign.verify.compiled_core import CompiledCore
 from dzdesign.verify.drive_check import CompiledDrive, PreparedDrive
 from dzdesign.verify.machines import HOST, compile_object, link_program, programs_folder, run_program
 from dzdesign.verify.prepared_inputs import PreparedInputs
 from dzdesign.verify.reference import ExactLaw
-from dzdesign.verify.verification import Check
 
 KILLED, REFUSED, SAME_OBJECT, SAME_OUTPUTS, SURVIVED = (
     "killed", "refused by the compiler", "same object code", "same outputs", "survived",
