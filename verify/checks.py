@@ -68,6 +68,7 @@ def drive_follows(folder: Path, compensator: Compensator) -> Check:
 
 
 def compiles_strictly(folder: Path, manifest: dict[str, Any]) -> Check:
+    """Tell whether every compiler on this machine takes the core with every warning an error."""
     compilers = find_compilers()
     try:
         for compiler in compilers:
@@ -135,6 +136,7 @@ def plant_opens(loops: tuple[LoopComparison, ...]) -> Check:
 
 
 def no_flow_at_zero(loops: tuple[LoopComparison, ...], document: dict[str, Any], plant: Plant | None) -> Check:
+    """Tell whether the valve is shut at zero command, after closing."""
     name = "no flow at zero command in the closed loop"
     worst = max(loops, key=lambda loop: loop.result.q_zero_L_min).result
     designed = {side_name: side["certificate"]["guard"] for side_name, side in document["sides"].items() if side}

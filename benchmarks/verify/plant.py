@@ -3,11 +3,11 @@
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from importlib.resources import as_file, files
 from pathlib import Path
 from time import perf_counter
 
 import numpy as np
+from firmware import example_firmware
 from loop_peers import (
     SAMPLE_S,
     SUPPLY_MPA,
@@ -21,12 +21,7 @@ from loop_peers import (
 )
 from scoreboard import Row, print_rows, say
 
-from dzdesign.codegen.project import generate
-from dzdesign.core.artefacts import write_folder
 from dzdesign.design.compensator_file import compensator_document
-from dzdesign.design.designing import design
-from dzdesign.identify.identification import identify
-from dzdesign.identify.ramp_files import read_ramp_file
 from dzdesign.verify.closed_loop import PERIODS_PER_RECORD, RECORD_S, ClosedLoop
 from dzdesign.verify.plant import PWM_PERIOD_S, Plant
 
@@ -42,7 +37,8 @@ ERROR_GOALS = {"nonlinear": 1e-5, "linear": 1e-10}
 def print_plant(*, quick: bool, seed: int) -> list[Row]:
     """Print and return the rows of the closed loop."""
     with tempfile.TemporaryDirectory(prefix="bench-verify-") as folder:
-        firmware, document = _example(Path(folder))
+        firmware = Path(folder) / "firmware"
+        document = compensator_document(example_firmware(firmware))
         core = core_of(firmware)
         rows = _speed(firmware, document, quick)
         rows += _peers(core, rows[0].value, quick)
@@ -50,16 +46,6 @@ def print_plant(*, quick: bool, seed: int) -> list[Row]:
         rows += _monte_carlo(core, firmware, document, quick, seed)
     print_rows(f"The plant in the loop, PWM resolved (seed {seed})", rows)
     return rows
-
-
-def _example(folder: Path) -> tuple[Path, dict]:
-    """Return the firmware of the bundled example, and its compensator.json."""
-    with as_file(files("dzdesign.example") / "ramps") as ramps:
-        valve = identify([read_ramp_file(path, 10.0) for path in sorted(ramps.glob("*.csv*"))])
-    compensator = design(valve)
-    firmware = generate(compensator, "f28335")
-    write_folder(folder / "firmware", firmware.files, firmware.manifest)
-    return folder / "firmware", compensator_document(compensator)
 
 
 def _ramp(seconds: float, step: float) -> np.ndarray:

@@ -15,10 +15,12 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # for the scoreboard that al
 
 from all_inputs import print_inputs  # noqa: E402
 from mutants import print_mutants  # noqa: E402
+from plant import print_plant  # noqa: E402
 from scoreboard import print_rows  # noqa: E402
 
 PARTS = {
     "inputs": (print_inputs, 101),
+    "plant": (print_plant, 303),
     "mutants": (print_mutants, 202),
 }
 
