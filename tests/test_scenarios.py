@@ -59,9 +59,9 @@ def test_the_valve_is_shut_after_everything_that_a_core_can_know(results):
 
 def test_a_step_without_compensator_gives_no_flow_where_half_command_is_dead(results):
     figures = results["step to half command and back"].figures
-    assert figures["without_flow_L_min"] == 0
-    assert 6 < figures["with_flow_L_min"] < 9
-    assert 1 < figures["with_rise_ms"] < figures["with_settling_ms"] < 50
+    assert figures["direct_flow_L_min"] == 0
+    assert 6 < figures["compensated_flow_L_min"] < 9
+    assert 1 < figures["compensated_rise_ms"] < figures["compensated_settling_ms"] < 50
 
 
 def test_a_load_step_may_open_the_valve_for_a_moment_and_never_for_good(results):
@@ -87,6 +87,13 @@ def test_a_core_that_holds_its_offset_when_a_sensor_fails_leaks(firmware, exampl
         (core / path.name).write_text(text)
     found = by_name(scene_of(core.parent, example_compensator, plant, dp_MPa=5.0))
     assert found["sensor ahead breaks, or the one behind shows full"].q_zero_L_min > 0.3
+
+
+def test_a_plant_that_is_not_the_identified_valve_is_seen(firmware, plant):
+    """With 45 N of preload it opens at 83 % of command and not at 54 %: the residual dead zone would be the plant's."""
+    found = verify(firmware, replace(plant, preload_N=45.0), sequence=QUICK)
+    (check,) = [check for check in found.checks if "identified valve" in check.name]
+    assert check.holds is False and "preload" in check.text
 
 
 def test_ramps_of_the_firmware_are_waited_for(firmware, example_compensator, plant):

@@ -141,7 +141,8 @@ def _about_the_command(pressures: Sequence["PressureAssessment"], options: "Asse
                 code="unchanged",
                 text=(
                     f"{item.place}: the dead zone is {old.value:.1%} without the compensator and {new.value:.1%} with "
-                    "it; is the command AFTER the compensator's input, and not its output? --after-columns says which"
+                    "it; are the sets the wrong way round, or is the command AFTER the compensator's output and not "
+                    "its input? --after-columns says which column"
                 ),
                 source=item.after.source,
             )

@@ -8,6 +8,7 @@ from dzdesign.core.artefacts import sha256_of
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.certifying import prove_certificates
 from dzdesign.design.compensator import Compensator
+from dzdesign.identify.model import ValveModel
 from dzdesign.verify.all_inputs import InputCheck
 from dzdesign.verify.closed_loop import LoopComparison
 from dzdesign.verify.drive_check import SEED, CompiledDrive, PreparedDrive
@@ -15,6 +16,9 @@ from dzdesign.verify.host_compiler import check_strictly, find_compilers
 from dzdesign.verify.plant import Plant
 from dzdesign.verify.scenarios import ScenarioResult
 from dzdesign.verify.tolerances import NO_FLOW_L_MIN
+
+#: Share of full command by which the opening of a plant may differ from the identified valve's: rounding, a quick ramp.
+SAME_THRESHOLD = 0.03
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,6 +137,24 @@ def plant_opens(loops: tuple[LoopComparison, ...]) -> Check:
         holds=least.q_max_L_min > NO_FLOW_L_MIN,
         text=f"{least.q_max_L_min:.4g} L/min at full command and {least.dp_MPa:.2f} MPa, where it is least",
     )
+
+
+def plant_is_the_valve(loops: tuple[LoopComparison, ...], valve: ValveModel) -> Check:
+    """Tell whether the plant opens where the ramp tests say that the valve does."""
+
+    def opens_V(loop: LoopComparison) -> tuple[float, float]:
+        tests = valve.sides[loop.result.side].tests
+        test = min(tests, key=lambda test: abs((test.dp_MPa or 0.0) - loop.result.dp_MPa))
+        known = test.u_guard_V if test.u_knee_rising_V is None else test.u_knee_rising_V
+        return loop.result.dead_zone_opening * valve.u_max_V, known
+
+    loop = max(loops, key=lambda loop: abs(float.__sub__(*opens_V(loop))))
+    plant_V, valve_V = opens_V(loop)
+    holds = abs(plant_V - valve_V) <= SAME_THRESHOLD * valve.u_max_V
+    text = f"at {plant_V:.2f} V, the ramp tests at {valve_V:.2f} V (at {loop.result.dp_MPa:.2f} MPa, the worst)"
+    if not holds:
+        text += "; the closed loop is of another valve: correct preload, spring or force in --plant"
+    return Check(name="the plant opens where the identified valve does", holds=holds, text=text)
 
 
 def no_flow_at_zero(loops: tuple[LoopComparison, ...], document: dict[str, Any], plant: Plant | None) -> Check:

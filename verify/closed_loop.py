@@ -171,6 +171,8 @@ class ClosedLoop:
             sources[name] = driver.joinpath(name).read_text(encoding="utf-8")
         if firmware is None:
             sources["dz_drive.h"] = driver.joinpath("no_drive.h").read_text(encoding="utf-8")
+        elif not (firmware / "core" / "dz_drive.h").is_file():
+            raise InputError(f"'{firmware}' has no core/dz_drive.h; give the folder that `dzdesign codegen` made")
         else:
             for path in sorted((firmware / "core").glob("*.[ch]")):
                 sources[path.name] = path.read_text(encoding="utf-8")

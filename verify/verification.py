@@ -21,6 +21,7 @@ from dzdesign.verify.checks import (
     files_unchanged,
     input_checks,
     no_flow_at_zero,
+    plant_is_the_valve,
     plant_opens,
     shut_after_scenarios,
 )
@@ -138,7 +139,8 @@ def verify(
         say("running the scenarios")
         scenarios = tuple(result for scene in scenes for result in run_scenarios(scene))
         shut = no_flow_at_zero(loops, document, plant)
-        checks += [plant_opens(loops), shut, shut_after_scenarios(scenarios, shut)]
+        valve = valve_from_document(to_json(document["valve"]).encode(), "compensator.json")
+        checks += [plant_opens(loops), plant_is_the_valve(loops, valve), shut, shut_after_scenarios(scenarios, shut)]
         if tolerances and plant:
             say(f"running {tolerances.plants} plants at {len(scenes)} pressure drops")
             scattered = tuple(
