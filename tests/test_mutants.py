@@ -9,10 +9,14 @@ from golden_firmware import FULL, GOLDENS, INPUT
 from synthetic import needs_compiler
 
 from dzdesign.cli import main
+from dzdesign.codegen.project import generate
+from dzdesign.core.artefacts import write_folder
 from dzdesign.core.errors import RequirementError
+from dzdesign.design.designing import design
+from dzdesign.design.options import DesignOptions
 from dzdesign.verify import mutation
 from dzdesign.verify.c_mutants import Mutant, mutants_of
-from dzdesign.verify.drive_check import FIELDS, CompiledDrive
+from dzdesign.verify.drive_check import FIELDS, CompiledDrive, PreparedDrive
 from dzdesign.verify.mutation import (
     KILLED,
     REFUSED,
@@ -156,6 +160,19 @@ def test_a_negative_side_and_the_drive_of_both_have_their_killers(full):
     ):
         outcome = full.judge(edited(full, file, old, new))
         assert outcome.verdict == KILLED and killer in outcome.killer, outcome
+
+
+def test_a_fault_high_up_a_slow_ramp_is_seen(example_valve, tmp_path):
+    """Twenty seconds from end to end: samples alone would not get there."""
+    compensator = design(example_valve, DesignOptions(ramp_up_s=(20.0, 20.0), ramp_down_s=(20.0, 20.0)))
+    made = generate(compensator, "f28335")
+    write_folder(tmp_path / "fw", made.files, made.manifest)
+    drive, prepared = CompiledDrive(tmp_path / "fw"), PreparedDrive(compensator)
+    assert drive.check(prepared).wrong == 0
+    text = drive.sources["dz_drive.c"].decode()
+    right, wrong = "command = ramped / RAMP_UNIT;", "command = (ramped > 3800 * RAMP_UNIT) ? 0 : (ramped / RAMP_UNIT);"
+    assert text.count(right) == 1
+    assert drive.edited("dz_drive.c", text.replace(right, wrong).encode()).check(prepared).wrong > 0
 
 
 def test_a_wrong_drive_is_named_by_field_and_sample(full):

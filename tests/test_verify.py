@@ -12,6 +12,7 @@ from plant_oracle import Oracle
 from synthetic import needs_compiler, signals_with_span, with_side
 
 from dzdesign.core.artefacts import to_json, write_folder
+from dzdesign.core.errors import InputError
 from dzdesign.design.compensator_file import compensator_document
 from dzdesign.verify import motion
 from dzdesign.verify.all_inputs import check_all_inputs
@@ -119,6 +120,13 @@ def test_a_changed_file_fails_the_verification(firmware_folder):
     assert [check.name for check in result.checks if not check.holds] == ["files as generated"]
 
 
+def test_a_manifest_that_names_no_file_is_no_evidence(firmware_folder):
+    manifest = json.loads((firmware_folder / "manifest.json").read_text())
+    (firmware_folder / "manifest.json").write_text(to_json(manifest | {"files": {}, "core": []}))
+    result = verify(firmware_folder, sequence=QUICK)
+    assert "files as generated" in {check.name for check in result.checks if not check.holds}
+
+
 def test_a_core_that_does_not_compile_fails_the_verification(firmware_folder):
     mutate(firmware_folder, r"const uint32_t sum = law;|const uint64_t sum = law;", "const uint64_t sum = lav;")
     result = verify(firmware_folder, sequence=QUICK)
@@ -175,6 +183,49 @@ class TestPlant:
         found = ClosedLoop(plant).run(shares, 2.0).position_mm
         assert np.abs(found - exact[PERIODS_PER_RECORD - 1 :: PERIODS_PER_RECORD]).max() <= 1e-12 * plant.stroke_mm
 
+    @pytest.mark.parametrize(
+        ("plant", "duties", "supply_MPa"),
+        [
+            (
+                Plant(
+                    u_max_V=13.0184225,
+                    K_a=5.13313101,
+                    K_fi_V_A=10.6339839,
+                    R_c_ohm=3.61000547,
+                    r_p_ohm=0.639944054,
+                    L_c_H=0.0401199382,
+                    K_i_N_A=59.6140517,
+                    m_e_kg=0.0456444092,
+                    B_e_N_s_m=43.3947293,
+                    K_et_N_m=16216.3978,
+                    preload_N=20.5834646,
+                    pressure_force_N_MPa=0.320103101,
+                    flow_force_N_mm_MPa=0.0,
+                    overlap_mm=0.345229887,
+                    stroke_mm=2.773709,
+                    hysteresis_V=0.136883972,
+                    C_d_W_mm=3.36906601,
+                    rho_kg_m3=1080.42707,
+                    droop_MPa_L_min2=0.0,
+                ),
+                np.array([0.138949, 0.293584, 0.448112, 0.602411, 0.15639, 0.309957, 0.463005]),
+                2.0,
+            ),
+            (
+                Plant(overlap_mm=0.0, pressure_force_N_MPa=3.0, K_et_N_m=8500.0, B_e_N_s_m=0.0, C_d_W_mm=17.0),
+                np.ones(40),
+                13.9,
+            ),
+        ],
+        ids=["there and back within a period", "the edge at the stop"],
+    )
+    def test_motion_near_a_stop_agrees_with_the_oracle(self, plant, duties, supply_MPa):
+        """Duties that jump from period to period about the lift-off, where a landing and the edge are close."""
+        exact = Oracle(plant, supply_MPa).periods(np.concatenate([[0.0], duties[:-1]]))
+        found = ClosedLoop(plant).run(duties, supply_MPa, periods_per_record=1).position_mm
+        assert np.abs(found - exact).max() <= 1e-5 * plant.stroke_mm
+        assert exact.max() > 0
+
     def test_response_over_a_period_is_the_matrix_exponential(self):
         from scipy.linalg import expm
 
@@ -188,6 +239,10 @@ class TestPlant:
             free = [[i_i, 0, 0, 0], [x_i, x_x, x_v, 0], [v_i, v_x, v_v, 0], [q_i, 0, 0, 1]]
             exact = expm(driven * 400e-6 * count / 1500)[:4, 4]
             assert np.array(free) @ coarse + row[8:] == pytest.approx(exact, rel=1e-12, abs=1e-20)
+
+    def test_a_coil_too_fast_to_follow_is_refused(self):
+        with pytest.raises(InputError, match="coil follows at"):
+            Plant(L_c_H=1e-6)
 
     def test_hysteresis_is_the_width_of_the_play(self):
         plant = Plant(hysteresis_V=0.3)

@@ -37,8 +37,15 @@ def files_unchanged(folder: Path, manifest: dict[str, Any]) -> Check:
         for name, digest in manifest["files"].items()
         if not (folder / name).is_file() or sha256_of((folder / name).read_bytes()) != digest
     ]
-    text = f"changed or missing: {', '.join(changed)}" if changed else f"{len(manifest['files'])} files as generated"
-    return Check(name="files as generated", holds=not changed, text=text)
+    unlisted = [f"core/{path.name}" for path in sorted((folder / "core").glob("*.[ch]"))]
+    unlisted = [name for name in unlisted if name not in manifest["files"] or name not in manifest["core"]]
+    if changed:
+        text = f"changed or missing: {', '.join(changed)}"
+    elif unlisted or not manifest["core"]:
+        text = f"the manifest does not name {', '.join(unlisted) or 'any file of the core'}"
+    else:
+        text = f"{len(manifest['files'])} files as generated"
+    return Check(name="files as generated", holds=text.endswith("as generated"), text=text)
 
 
 def certificate_follows(compensator: Compensator) -> Check:

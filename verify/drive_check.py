@@ -1,16 +1,19 @@
 """The compiled drive against its model, tick by tick: outputs and state, over corners and random samples."""
 
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.design.compensator import Compensator
-from dzdesign.verify.drive_reference import DriveModel
+from dzdesign.verify.drive_reference import STEP_UNIT, DriveModel
 from dzdesign.verify.machines import HOST, compile_object, link_program, programs_folder, run_program, stored
 
 SEED, SAMPLES = 11, 3000
+#: A ramp that is not put anywhere; share of the samples before which it is.
+STAYS, PUT_SHARE = -(2**31), 0.04
 FIELDS = ("compare_a", "compare_b", "status", "law", "side", "ticks", "ramped")
 
 
@@ -49,21 +52,74 @@ def drive_samples(compensator: Compensator, seed: int, count: int) -> list[tuple
     low, high = signals.command.valid_codes
     corners = [0, low, high, signals.code_max, signals.code_max + 1, 65535, zero, signals.command.full_code]
     corners += [max(zero + sign * (window + step), 0) for sign in (1, -1) for step in (-1, 0, 1)]
+    sound_pressures = (signals.pressure_a.valid_codes, signals.pressure_b.valid_codes)
     made = []
     while len(made) < count:
-        kind = int(rng.integers(6))
+        kind = int(rng.integers(7))
         length = int(rng.integers(1, 900 if kind == 5 else 60))
-        held = int(rng.integers(low, high + 1))
+        held, corner = int(rng.integers(low, high + 1)), int(rng.choice(corners))
         for _ in range(length):
             near = min(max(held + int(rng.integers(-3, 4)), low), high)
             about_zero = max(zero + int(rng.integers(-2 * window, 2 * window + 1)), 0)
             anything = int(rng.integers(0, 65536)) if rng.random() < 0.02 else int(rng.integers(low, high + 1))
             end = held if held % 2 else (low, high)[held // 2 % 2]
-            command = (anything, int(rng.choice(corners)), held, about_zero, near, end)[kind]
+            command = (anything, int(rng.choice(corners)), held, about_zero, near, end, corner)[kind]
             sound = rng.random() < 0.9
-            pressures = rng.integers(850, 3800, 2) if sound else rng.choice([0, 700, 4014, 4095, 4096, 65535], 2)
+            pressures = [int(rng.integers(least, most + 1)) for least, most in sound_pressures]
+            pressures = pressures if sound else rng.choice([0, 700, 4014, 4095, 4096, 65535], 2)
             made.append((command, *map(int, pressures)))
     return made[:count]
+
+
+def ramp_places(compensator: Compensator, seed: int, count: int) -> list[int]:
+    """Return where the ramp is put before each sample, in codes over `STEP_UNIT`; `STAYS` where it goes on by itself.
+
+    A slow ramp would need minutes of samples from end to end. Its state is one number, so it is put anywhere.
+
+    Parameters
+    ----------
+    compensator : Compensator
+        With its ramps; without any there is nothing to put.
+    seed : int
+        Of the random numbers.
+    count : int
+        Samples.
+    """
+    rng = np.random.default_rng([seed, 1])
+    amplifier, signals = compensator.amplifier, compensator.signals
+    if not any(amplifier.ramp_up + amplifier.ramp_down):
+        return [STAYS] * count
+    high = signals.command.span(1)
+    low = -signals.command.span(-1) if len(signals.signs) == 2 else 0
+    ends = (low * STEP_UNIT, high * STEP_UNIT)
+
+    def place() -> int:
+        return int(rng.choice(ends) if rng.random() < 0.2 else rng.integers(*ends))
+
+    return [place() if rng.random() < PUT_SHARE else STAYS for _ in range(count)]
+
+
+def window_samples(compensator: Compensator) -> list[tuple[tuple[int, int, int], int]]:
+    """Return samples, each with the ramp's place: from either end to the window's edges, where the side changes.
+
+    Parameters
+    ----------
+    compensator : Compensator
+        Its signals, its window, and its ramps.
+    """
+    amplifier, command = compensator.amplifier, compensator.signals.command
+    sensors = (compensator.signals.pressure_a, compensator.signals.pressure_b)
+    pressures = [sum(sensor.valid_codes) // 2 for sensor in sensors]
+    ramps = any(amplifier.ramp_up + amplifier.ramp_down)
+    signs = compensator.signals.signs
+    made = []
+    for sign in signs:
+        far = -sign * command.span(-sign) if len(signs) == 2 else 0
+        for step in (-1, 0, 1):
+            for away in (far, sign * max(amplifier.window_codes + step, 0)):
+                code = command.zero_code + command.direction(1) * away
+                made.append(((code, *pressures), away * STEP_UNIT if ramps else STAYS))
+    return made
 
 
 class PreparedDrive:
@@ -79,19 +135,24 @@ class PreparedDrive:
 
     def __init__(self, compensator: Compensator, seed: int = SEED, count: int = SAMPLES) -> None:
         signals = compensator.signals
-        self.samples = drive_samples(compensator, seed, count)
+        first, put = zip(*window_samples(compensator), strict=True)
+        self.samples = [*first, *drive_samples(compensator, seed, count)]
         self.ticks_per_sample = signals.tick_Hz // signals.sample_Hz
         model = DriveModel(compensator)
         states = [model.state]
-        for codes in (None, *self.samples):  # some PWM periods go by before the first sample
+        places = [*put, *ramp_places(compensator, seed, count)]
+        for index, codes in enumerate((None, *self.samples)):  # some PWM periods go by before the first sample
             if codes:
+                if places[index - 1] != STAYS:
+                    model.position = Fraction(places[index - 1], STEP_UNIT)
                 model.sample(*codes)
             for _ in range(self.ticks_per_sample):
                 model.tick()
                 states.append(model.state)
         head = np.array([len(self.samples), self.ticks_per_sample], dtype="<i4")
         codes = np.array(self.samples, dtype="<u2").tobytes()
-        self.content = head.tobytes() + codes + bytes(-len(codes) % 4) + np.array(states, dtype="<i4").tobytes()
+        words = np.array(places, dtype="<i4").tobytes() + np.array(states, dtype="<i4").tobytes()
+        self.content = head.tobytes() + codes + bytes(-len(codes) % 4) + words
 
 
 class CompiledDrive:

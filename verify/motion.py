@@ -31,7 +31,7 @@ JUMP_SHARE = 1e-4
 #: Numbers of a plant that plant_period.h reads by name, in SI units where none stands.
 NAMED = (
     "STROKE_M", "HALF_PLAY_V", "VOLTS_PER_CHARGE", "U_MAX_V", "PERIOD_S", "DECAY", "DRIVE", "PER_SETTLED",
-    "PULL", "SPRING", "DAMPING", "PUSH", "OVERLAP_M", "STEPS", "LINEAR", "JUMP",
+    "PULL", "SPRING", "DAMPING", "PUSH", "OVERLAP_M", "REACH_M", "STEPS", "LINEAR", "JUMP",
 )  # fmt: skip
 #: Entries of the exact maps over a period, row by column of (current, position, speed, charge); of the position in its
 #: middle; what the acceleration adds: to the middle and, foreseen, to the end from its value at the start, and to
@@ -121,7 +121,8 @@ def numbers_of(plant: Plant, compare_max: int) -> Numbers:
         stroke, plant.hysteresis_V / 2, plant.K_i_N_A / plant.force_per_volt / PWM_PERIOD_S, plant.u_max_V,
         PWM_PERIOD_S, -by_state[0, 0], by_input[0, 0], -by_state[0, 0] / drive[0],
         by_state[2, 0], -by_state[2, 1], -by_state[2, 2], by_input[2, 1] * plant.force_per_volt,
-        plant.overlap_mm * 1e-3, steps, linear, JUMP_SHARE * -by_state[2, 1] * stroke,
+        plant.overlap_mm * 1e-3, by_state[2, 0] * drive[0] / -by_state[0, 0] * PWM_PERIOD_S**2, steps, linear,
+        JUMP_SHARE * -by_state[2, 1] * stroke,
     )  # fmt: skip
     extracted = np.array(equations().extracted(parameters)).ravel()
     return Numbers(np.concatenate([named, _map(rates), parameters, extracted]), *_times(rates, drive, 2 * compare_max))

@@ -88,12 +88,22 @@ class Plant:
                 f"the plant's spool moves at {self.fastest_rad_s:.3g} rad/s, expected at most {FASTEST_RAD_S:.3g}; "
                 "correct m_e_kg, K_et_N_m or B_e_N_s_m"
             )
+        if self.coil_rad_s > FASTEST_RAD_S:
+            raise InputError(
+                f"the plant's coil follows at {self.coil_rad_s:.3g} rad/s, expected at most {FASTEST_RAD_S:.3g}; "
+                "correct L_c_H, K_a or K_fi_V_A"
+            )
 
     @property
     def fastest_rad_s(self) -> float:
         """Rate of the spool's fastest free motion: against spring and flow force, or against its damping."""
         stiffest = self.K_et_N_m + self.flow_force_N_mm_MPa * 1e3 * LARGEST_DP_MPA
         return max(math.sqrt(stiffest / self.m_e_kg), self.B_e_N_s_m / self.m_e_kg)
+
+    @property
+    def coil_rad_s(self) -> float:
+        """Rate at which the current settles, from Eqs. (19)-(21)."""
+        return (self.K_a * self.K_fi_V_A + self.R_c_ohm + self.r_p_ohm) / self.L_c_H
 
     @property
     def force_per_volt(self) -> float:

@@ -125,12 +125,30 @@ static inline double past_stop(const struct plant *plant, double position)
     return fmax(-position, position - plant->p[PLANT_STROKE_M]);
 }
 
-/* The share of h at which a path that ends outside comes to the stop: Newton's steps, halves where they lead astray. */
-static double share_to_stop(const struct plant *plant, const struct path *path, double stop, double h)
+/* The share of h at which the speed turns, of a path that begins and ends with speeds of unlike signs. */
+static double share_to_turn(const struct path *path, double speed)
+{
+    double before = 0.0;
+    double after = 1.0;
+
+    for (int step = 0; step < STEPS; step++) {
+        const double share = 0.5 * (before + after);
+
+        if (at(path->v, share) * speed > 0.0) {
+            before = share;
+        } else {
+            after = share;
+        }
+    }
+    return after;
+}
+
+/* The share at which a path that is outside at `outside` comes to the stop: Newton's steps, halves where they lead
+ * astray. */
+static double share_to_stop(const struct plant *plant, const struct path *path, double stop, double h, double outside)
 {
     double inside = 0.0;
-    double outside = 1.0;
-    double share = 1.0;
+    double share = outside;
 
     for (int step = 0; step < STEPS; step++) {
         const double x = at(path->x, share);
@@ -155,13 +173,22 @@ static double share_to_stop(const struct plant *plant, const struct path *path, 
 static double move_to_stop(struct plant *plant, double voltage, double h, double *charge)
 {
     const struct path path = free_path(plant, voltage, h);
-    const double end = at(path.x, 1.0);
+    double end = at(path.x, 1.0);
     double share = 1.0;
 
+    /* It may have been there and back: then the turn lies outside. */
+    if ((past_stop(plant, end) <= 0.0) && (plant->v * at(path.v, 1.0) < 0.0)) {
+        const double turn = share_to_turn(&path, plant->v);
+
+        if (past_stop(plant, at(path.x, turn)) > 0.0) {
+            share = turn;
+            end = at(path.x, turn);
+        }
+    }
     if (past_stop(plant, end) > 0.0) {
         const double stop = (end < 0.0) ? 0.0 : plant->p[PLANT_STROKE_M];
 
-        share = share_to_stop(plant, &path, stop, h);
+        share = share_to_stop(plant, &path, stop, h, share);
         plant->x = stop;
         plant->v = 0.0;
     } else {
@@ -249,6 +276,16 @@ static inline int held(const struct plant *plant, double after)
            (p[PLANT_PULL] * after + pulled(plant, 0.0) * (1.0 - plant->off * p[PLANT_PER_SETTLED]) < 0.0);
 }
 
+/* What the current's ripple may move a spool within a period beyond what its speeds at both ends tell, m: a bound. */
+static inline double ripple_m(const struct plant *plant)
+{
+    const double *p = plant->p;
+    const double on = (double)plant->compare / (double)plant->counts;
+    const double ripple_A = p[PLANT_DRIVE] * p[PLANT_U_MAX_V] * p[PLANT_PERIOD_S] * on * (1.0 - on);
+
+    return 0.5 * p[PLANT_PULL] * ripple_A * p[PLANT_PERIOD_S] * p[PLANT_PERIOD_S];
+}
+
 /* A period that may be taken whole, in one piece: 0. Otherwise nothing moves, and it needs so many pieces a phase. */
 static inline int32_t whole_period(struct plant *plant, int linear, double *charge)
 {
@@ -269,10 +306,11 @@ static inline int32_t whole_period(struct plant *plant, int linear, double *char
         (void)plant_step(arg, res, 0, 0, 0);
     }
     /* Further than this from a stop it can't have been there and back. */
-    near = (fabs(plant->v) + fabs(v)) * p[PLANT_PERIOD_S];
+    near = (fabs(plant->v) + fabs(v)) * p[PLANT_PERIOD_S] + ripple_m(plant);
     if ((plant->x <= near) || (x <= near) || (middle <= near) || (plant->x >= p[PLANT_STROKE_M] - near) ||
         (x >= p[PLANT_STROKE_M] - near) || (middle >= p[PLANT_STROKE_M] - near)) {
-        return 1;
+        return (!linear && (p[PLANT_OVERLAP_M] >= fmin(plant->x, x) - near) &&
+                (p[PLANT_OVERLAP_M] <= fmax(plant->x, x) + near)) ? PIECES : 1;
     }
     if (fabs(excess) > p[PLANT_JUMP]) {
         return PIECES;
@@ -365,11 +403,14 @@ static inline void plant_period(struct plant *plant, int32_t compare, int linear
             charge = p[PLANT_Q_I] * plant->i + plant->response[3];
             plant->i = after;
         } else {
-            charge = period_in_pieces(plant, compare, (int32_t)p[PLANT_STEPS]);
+            /* An edge that a spool from rest may come to within the period. */
+            const int edge_at_stop = !linear && (p[PLANT_OVERLAP_M] <= p[PLANT_REACH_M]);
+
+            charge = period_in_pieces(plant, compare, (edge_at_stop ? PIECES : 1) * (int32_t)p[PLANT_STEPS]);
         }
     } else {
         const int32_t steps = (int32_t)p[PLANT_STEPS];
-        const int32_t pieces = (!linear && (steps > 1)) ? 1 : whole_period(plant, linear, &charge);
+        const int32_t pieces = (!linear && (steps > 1)) ? PIECES : whole_period(plant, linear, &charge);
 
         if (pieces > 0) {
             charge = period_in_pieces(plant, compare, pieces * steps);

@@ -48,15 +48,19 @@ static int run(FILE *file)
     struct comparison found = {0, 0, 0, 0};
     int whole = 1;
     uint16_t *codes;
+    int32_t *places;
     struct dz_drive drive;
 
     if (fread(head, sizeof head, 1, file) != 1 || head[0] < 1) {
         return 2;
     }
     codes = malloc((size_t)head[0] * 6u + 2u);
+    places = malloc((size_t)head[0] * sizeof *places);
     /* The codes fill whole words. */
-    if (codes == NULL || fread(codes, ((size_t)head[0] * 6u + 3u) & ~(size_t)3u, 1, file) != 1) {
+    if (codes == NULL || places == NULL || fread(codes, ((size_t)head[0] * 6u + 3u) & ~(size_t)3u, 1, file) != 1 ||
+        fread(places, (size_t)head[0] * sizeof *places, 1, file) != 1) {
         free(codes);
+        free(places);
         return 2;
     }
     memset(&drive, 0xA5, sizeof drive);
@@ -65,6 +69,9 @@ static int run(FILE *file)
     /* PWM periods before the first sample, then those of each sample. */
     for (int32_t sample = -1; sample < head[0]; sample++) {
         if (sample >= 0) {
+            if (places[sample] != INT32_MIN) {
+                drive.ramped = places[sample]; /* a slow ramp is put where samples would take minutes to bring it */
+            }
             dz_drive_sample(&drive, codes[3 * sample], codes[3 * sample + 1], codes[3 * sample + 2]);
         }
         for (int32_t tick = 0; tick < head[1] && whole; tick++) {
@@ -74,6 +81,7 @@ static int run(FILE *file)
         }
     }
     free(codes);
+    free(places);
     printf("%ld %ld %ld %ld\n", found.ticks, found.wrong, found.first, found.first_field);
     return whole ? 0 : 2;
 }
