@@ -11,6 +11,7 @@
 /* A stop is met where the spool is as close to it as this share of the stroke; more events in one phase are chatter. */
 #define CLOSE 1e-14
 #define STEPS 60
+#define TURN_STEPS 27
 #define EVENTS 4
 /* Where the edge is passed, each phase is moved in so many pieces. */
 #define PIECES 8
@@ -125,13 +126,14 @@ static inline double past_stop(const struct plant *plant, double position)
     return fmax(-position, position - plant->p[PLANT_STROKE_M]);
 }
 
-/* The share of h at which the speed turns, of a path that begins and ends with speeds of unlike signs. */
+/* The share of h at which the speed turns, of a path that begins and ends with speeds of unlike signs; the position is
+ * flat there, so that a share to 1e-8 is one to 1e-16 of it. */
 static double share_to_turn(const struct path *path, double speed)
 {
     double before = 0.0;
     double after = 1.0;
 
-    for (int step = 0; step < STEPS; step++) {
+    for (int step = 0; step < TURN_STEPS; step++) {
         const double share = 0.5 * (before + after);
 
         if (at(path->v, share) * speed > 0.0) {
@@ -169,6 +171,15 @@ static double share_to_stop(const struct plant *plant, const struct path *path, 
     return share;
 }
 
+/* Whether a path that turns could have come to the stop on its side, had it kept the faster speed of its two ends. */
+static int may_touch(const struct plant *plant, const struct path *path, double end, double h)
+{
+    const double reach = fmax(fabs(plant->v), fabs(at(path->v, 1.0))) * h;
+
+    return (plant->v < 0.0) ? (fmin(plant->x, end) < reach)
+                            : (fmax(plant->x, end) > plant->p[PLANT_STROKE_M] - reach);
+}
+
 /* Moves for h, or until a stop ends the motion, and returns for how long. */
 static double move_to_stop(struct plant *plant, double voltage, double h, double *charge)
 {
@@ -177,7 +188,7 @@ static double move_to_stop(struct plant *plant, double voltage, double h, double
     double share = 1.0;
 
     /* It may have been there and back: then the turn lies outside. */
-    if ((past_stop(plant, end) <= 0.0) && (plant->v * at(path.v, 1.0) < 0.0)) {
+    if ((past_stop(plant, end) <= 0.0) && (plant->v * at(path.v, 1.0) < 0.0) && may_touch(plant, &path, end, h)) {
         const double turn = share_to_turn(&path, plant->v);
 
         if (past_stop(plant, at(path.x, turn)) > 0.0) {
