@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from dzdesign.identify.characteristic import BranchShape
 from dzdesign.identify.described_tests import L_MIN, DescribedTest
 from dzdesign.identify.model import SideModel, TestResult, Warning_
 
@@ -13,6 +14,8 @@ FULL_COMMAND = 0.97
 ORDER_SIGNIFICANCE = 5.0
 #: Share of the largest flow by which the flow at full command may lie below it, and noises of one sample.
 FLOW_FALLS, FALL_SIGNIFICANCE = 0.05, 3.0
+#: Share of the largest flow that is missing where the straight part would reach it: above this a valve is curved.
+CURVED = 0.05
 #: Share of the samples of the straight part that are left out as outliers, above which it is said.
 MANY_OUTLIERS = 0.02
 
@@ -110,6 +113,18 @@ def _about_the_flow(test: TestResult, item: DescribedTest) -> Iterator[Warning_]
             ),
             source=test.source,
         )
+    missing = float(np.mean([_missing_at_full_drive(shape) for shape in shapes]))
+    if missing > CURVED:
+        yield Warning_(
+            code="curved",
+            text=(
+                "the flow is not straight over the command: where the straight part would reach the largest flow, "
+                f"{missing:.0%} of it are missing. The compensator's full command drives "
+                "to there, so that much is lost, and `verify` without --plant, whose plant is straight, does not show "
+                "it. A wider --knee-window loses less, with a threshold that is less sharp; see --plots"
+            ),
+            source=test.source,
+        )
     share = sum(shape.outliers for shape in shapes) / max(sum(int(shape.line.inside.sum()) for shape in shapes), 1)
     if share > MANY_OUTLIERS:
         yield Warning_(
@@ -121,3 +136,9 @@ def _about_the_flow(test: TestResult, item: DescribedTest) -> Iterator[Warning_]
             ),
             source=test.source,
         )
+
+
+def _missing_at_full_drive(shape: BranchShape) -> float:
+    """Return which share of the largest flow is missing at the law's full drive, where the line would reach it."""
+    u, y = shape.read.profile
+    return 1.0 - float(np.interp(shape.knee + shape.y_max / shape.slope, u, y)) / shape.y_max

@@ -106,6 +106,14 @@ def test_a_flow_that_falls_at_the_top_is_said():
     assert "flow-falls" in codes(dataclasses.replace(test, q=test.q - 6 * L_MIN * np.clip(test.u - 8, 0, None)))
 
 
+def test_a_curve_that_bends_away_from_its_straight_part_is_said():
+    """Full drive of the law is where the line would reach the largest flow; a curved valve passes less there."""
+    test = synthetic_ramp(1.0, Truth())
+    assert "curved" not in codes(test)
+    bent = test.q.max() * (1 - np.exp(-1.8 * test.q / test.q.max())) / (1 - np.exp(-1.8))
+    assert "curved" in codes(dataclasses.replace(test, q=bent))
+
+
 def test_many_outliers_are_said():
     test = synthetic_ramp(1.0, Truth())
     assert not {"outliers", "flow-falls"} & codes(with_share(test, "q", 0.01, 999 * L_MIN))
