@@ -172,7 +172,7 @@ def run_verify(args: argparse.Namespace) -> int:
 
     output = Path(args.output)
     check_folder_may_be_written(output, SCHEMA)
-    plant = read_plant(Path(args.plant)) if args.plant else None
+    plant = read_plant(Path(args.plant), say) if args.plant else None
     source = Path(args.plant).name if args.plant else ""
     tolerances = read_tolerances(Path(args.tolerances)) if args.tolerances else None
     firmware = Path(args.firmware)
@@ -222,7 +222,7 @@ def run_simulate(args: argparse.Namespace) -> int:
     from dzdesign.verify.plant import Plant, read_plant
     from dzdesign.verify.simulation import Bench, simulated_files
 
-    plant = read_plant(Path(args.plant)) if args.plant else Plant()
+    plant = read_plant(Path(args.plant), say) if args.plant else Plant()
     texts = args.dp or ["0.5 MPa", "1 MPa", "2 MPa", "3 MPa", "4 MPa", "5 MPa"]
     pressures = [parse_quantity(text, "pressure", "--dp") / 1e6 for text in texts]
     if len({f"{dp_MPa:g}" for dp_MPa in pressures}) < len(pressures):  # one file each, named by it

@@ -96,6 +96,14 @@ def test_a_plant_that_is_not_the_identified_valve_is_seen(firmware, plant):
     assert check.holds is False and "preload" in check.text
 
 
+def test_what_a_plant_file_leaves_out_is_named(tmp_path):
+    path = tmp_path / "p.toml"
+    path.write_text("preload_N = 20.0")
+    said = []
+    assert read_plant(path, said.append).preload_N == 20.0
+    assert "K_et_N_m" in said[0] and "preload_N" not in said[0]
+
+
 def test_ramps_of_the_firmware_are_waited_for(firmware, example_compensator, plant):
     scene = scene_of(firmware, example_compensator, plant)
     scene.loop.slowest_ramp_s = 3.0

@@ -7,6 +7,7 @@ that moves the threshold, flow force, a play in the magnetic force (hysteresis),
 import json
 import math
 import tomllib
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -111,8 +112,14 @@ class Plant:
         return self.K_i_N_A * self.K_a / (self.R_c_ohm + self.r_p_ohm + self.K_a * self.K_fi_V_A)
 
 
-def read_plant(path: Path) -> Plant:
+def read_plant(path: Path, say: Callable[[str], None] = lambda _: None) -> Plant:
     """Read a plant from TOML; a key that is none of `Plant`'s is refused, with the nearest that is.
+
+    Parameters
+    ----------
+    path : Path
+    say : callable
+        Told which parameters the file leaves as the default plant has them.
 
     Raises
     ------
@@ -128,7 +135,11 @@ def read_plant(path: Path) -> Plant:
     for key in values:
         if key not in known:
             raise InputError(f"'{path}': there is no plant parameter '{key}'{nearest(key, known)}")
-    return Plant(**values)
+    plant = Plant(**values)
+    missing = [name for name in known if name not in values]
+    if missing:
+        say(f"'{path}' leaves {', '.join(missing)} as the default plant has them")
+    return plant
 
 
 def plants_from_tests(side: SideModel, u_max_V: float) -> dict[float, Plant]:
