@@ -1,10 +1,12 @@
 """Rows of results with their limits, as tables."""
 
+import argparse
 import os
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from time import perf_counter
 
 WIDTH = 150
 
@@ -83,3 +85,27 @@ def share_interval(failures: int, count: int) -> str:
     low = betaincinv(failures, count - failures + 1, 0.025) if failures else 0.0
     high = betaincinv(failures + 1, count - failures, 0.975) if failures < count else 1.0
     return f"{failures} of {count}, 95 % interval {100 * low:.2f}-{100 * high:.2f} %"
+
+
+def run_parts(
+    description: str, parts: Mapping[str, tuple[Callable[..., list[Row]], int]], quick: str, arguments: list[str] | None
+) -> int:
+    """Run the parts asked for on the command line, print what missed its limit, and return 1 if any did.
+
+    A part is a function of ``quick`` and ``seed``, and its seed; `quick` is the help of the option of that name.
+    """
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("--quick", action="store_true", help=quick)
+    parser.add_argument("--only", choices=parts, action="append", help="one part; may be given again")
+    chosen = parser.parse_args(arguments)
+    start = perf_counter()
+    rows = []
+    for name in chosen.only or parts:
+        part, seed = parts[name]
+        rows += part(quick=chosen.quick, seed=seed)
+        sys.stdout.flush()
+    missed = [row for row in rows if row.verdict == "MISSES"]
+    if missed:
+        print_rows(f"Missed: {len(missed)} of {sum(row.limit is not None for row in rows)} limits", missed)
+    print(f"{perf_counter() - start:.0f} s")
+    return 1 if missed else 0

@@ -10,12 +10,11 @@ from dzdesign.design.certifying import prove_certificates
 from dzdesign.design.compensator import Compensator
 from dzdesign.identify.model import ValveModel
 from dzdesign.verify.all_inputs import InputCheck
-from dzdesign.verify.closed_loop import LoopComparison
+from dzdesign.verify.closed_loop import NO_FLOW_L_MIN, LoopComparison
 from dzdesign.verify.drive_check import SEED, CompiledDrive, PreparedDrive
 from dzdesign.verify.host_compiler import check_strictly, find_compilers
 from dzdesign.verify.plant import Plant
 from dzdesign.verify.scenarios import ScenarioResult
-from dzdesign.verify.tolerances import NO_FLOW_L_MIN
 
 #: Share of full command by which the opening of a plant may differ from the identified valve's: rounding, a quick ramp.
 SAME_THRESHOLD = 0.03

@@ -24,6 +24,8 @@ RECORDED = 6
 BACK_PRESSURE_MPA = 1.0
 #: Flow counts as flow from this share of the largest flow on: no meter stands between.
 FLOW_SHARE = 1e-3
+#: Flow at zero command below this is none: the edge is shut, only the last bits of a number remain.
+NO_FLOW_L_MIN = 1e-9
 #: The command's ramps are longer than the amplifier's own by this factor.
 RAMP_RESERVE = 1.1
 #: No contraction to fused products: every processor gives the same digits.
@@ -167,7 +169,7 @@ class ClosedLoop:
     ) -> None:
         driver = files("dzdesign.verify")
         sources = {"plant_motion.h": motion_header()}
-        for name in ("loop.c", "plant_period.h"):
+        for name in ("loop.c", "plant_period.h", "plant_stops.h"):
             sources[name] = driver.joinpath(name).read_text(encoding="utf-8")
         if firmware is None:
             sources["dz_drive.h"] = driver.joinpath("no_drive.h").read_text(encoding="utf-8")

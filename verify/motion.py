@@ -3,7 +3,7 @@
 Eqs. (19)-(23) are linear but for one acceleration that depends on the spool's position: pressure and flow force. The
 linear part is solved exactly, by matrix exponentials that are tabulated over the duty; the acceleration is interpolated
 through its values at the start, the middle and the end of the period, which makes an exponential Runge-Kutta step.
-Where a stop or the edge is passed within the period, plant_period.h takes the period apart and moves by `plant_move`.
+Where a stop or the edge is passed within the period, plant_period.h takes it apart and follows `plant_path`.
 """
 
 import math

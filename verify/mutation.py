@@ -31,8 +31,6 @@ KILLED, REFUSED, SAME_OBJECT, SAME_OUTPUTS, SURVIVED = (
     "killed", "refused by the compiler", "same object code", "same outputs", "survived",
 )  # fmt: skip
 RANDOM_TRIPLES = 2**24
-#: Of a mutant's programs: the original's take half a second.
-PATIENCE_S = 20.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

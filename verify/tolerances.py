@@ -12,7 +12,7 @@ import numpy as np
 
 from dzdesign.core.artefacts import read_bytes
 from dzdesign.core.errors import InputError, nearest
-from dzdesign.verify.closed_loop import FLOW_SHARE, ClosedLoop, RampSequence, dead_zone
+from dzdesign.verify.closed_loop import FLOW_SHARE, NO_FLOW_L_MIN, ClosedLoop, RampSequence, dead_zone
 from dzdesign.verify.plant import Plant
 
 PARAMETERS = tuple(field.name for field in fields(Plant))
@@ -21,8 +21,6 @@ SEQUENCE = RampSequence(rest=1.0, ramp=10.0, top=0.5)
 QUANTILES = (0.01, 0.05, 0.5, 0.95, 0.99)
 WORKERS = 2
 MOST_PLANTS = 100_000
-#: Flow below this is none: only the last bits of a number remain.
-NO_FLOW_L_MIN = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
