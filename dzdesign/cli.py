@@ -191,6 +191,7 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
             ),
             _given("--c2000ware", metavar="DIR", help="also compile f28335 firmware against your C2000Ware's headers"),
             _given("--mutate", action="store_true", help="also make the C wrong in every place; count what is caught"),
+            _given("--proof", action="store_true", help="also show by Frama-C that nothing overflows a 16-bit int"),
             _given(
                 "--machine-code",
                 action="store_true",

@@ -184,6 +184,11 @@ def run_verify(args: argparse.Namespace) -> int:
 
         say("comparing the machine code of other processors with the exact law, in simulators")
         added += machine_code_checks(firmware, verification.inputs)
+    if args.proof:
+        from dzdesign.verify.proof import proof_check
+
+        say("reading the core's C for all inputs, with Frama-C: some minutes")
+        added.append(proof_check(firmware))
     mutants = _firmware_mutants(firmware) if args.mutate else None
     if mutants:
         from dzdesign.verify.mutation import mutation_check

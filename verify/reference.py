@@ -60,7 +60,7 @@ class ExactLaw:
         self._law_nodes: list[int] = side["edge_beta"] or side["beta"]
         self._denominator: int = document["beta_denominator"]
         self._step: int = document["beta_step_codes"]
-        self._edge: int = document["edge_codes"]
+        self.edge_codes: int = document["edge_codes"]
 
     @property
     def span(self) -> int:
@@ -129,8 +129,8 @@ class ExactLaw:
             n_full=self.compare_max,
         )
         corners = [(0, betas.zero * self._u_min0 * self.compare_max)]
-        if self._edge:
-            corners.append((self._edge, line.slope * self._edge + line.start))
+        if self.edge_codes:
+            corners.append((self.edge_codes, line.slope * self.edge_codes + line.start))
         return [*corners, (self.span, line.slope * self.span + line.start)]
 
     def lines_in_beta(self) -> list[tuple[int, Fraction, Fraction]]:

@@ -14,12 +14,14 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # for the scoreboard that al
 from all_inputs import print_inputs  # noqa: E402
 from mutants import print_mutants  # noqa: E402
 from plant import print_plant  # noqa: E402
+from proof_of_c import print_proof  # noqa: E402
 from scoreboard import run_parts  # noqa: E402
 
 PARTS = {
     "inputs": (print_inputs, 101),
     "plant": (print_plant, 303),
     "mutants": (print_mutants, 202),
+    "proof": (print_proof, 0),
 }
 
 
