@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 DOCS   := docs/derivation
 
-.PHONY: demo test lint docs goldens lock clean bench-identify bench-isr bench-verify
+.PHONY: demo test lint docs goldens lock clean bench bench-identify bench-isr bench-verify
 
 demo: $(STAMP)
 	$(BIN)/dzdesign demo demo
@@ -19,6 +19,10 @@ lint: $(STAMP)
 # After a change of what codegen writes: tests/goldens anew, then the tests that compile and run them. Read the diff.
 goldens: $(STAMP)
 	$(BIN)/pytest tests/test_goldens.py --update-goldens
+
+# All benchmarks and one Markdown table of every limit: hours; `make bench BENCH=--quick` takes a quarter of one.
+bench: $(VENV)/.bench
+	$(BIN)/python benchmarks/run.py $(BENCH)
 
 # Some three hours of one core, on all that there are; `make bench-identify BENCH=--quick` takes minutes.
 bench-identify: $(VENV)/.bench

@@ -1,10 +1,11 @@
 """Rows of results with their limits, as tables."""
 
 import argparse
+import json
 import os
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from time import perf_counter
 
@@ -59,6 +60,17 @@ def markdown(headings: Sequence[str], cells: Iterable[Sequence[str]]) -> str:
     return "\n".join(f"| {line} |" for line in lines)
 
 
+def keep_rows(rows: Iterable[Row], file: Path | None) -> None:
+    """Write rows to a file from which `kept_rows` reads them, for the table of all benchmarks."""
+    if file:
+        file.write_text(json.dumps([asdict(row) for row in rows]), encoding="utf-8")
+
+
+def kept_rows(file: Path) -> list[Row]:
+    """Return the rows of a file that `keep_rows` wrote; none if there is no such file."""
+    return [Row(**row) for row in json.loads(file.read_text(encoding="utf-8"))] if file.exists() else []
+
+
 def markdown_rows(rows: Iterable[Row]) -> str:
     """Return rows as a Markdown table."""
     cells = []
@@ -97,6 +109,7 @@ def run_parts(
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--quick", action="store_true", help=quick)
     parser.add_argument("--only", choices=parts, action="append", help="one part; may be given again")
+    parser.add_argument("--rows", type=Path, metavar="FILE", help="also write all rows there, as JSON")
     chosen = parser.parse_args(arguments)
     start = perf_counter()
     rows = []
@@ -104,6 +117,7 @@ def run_parts(
         part, seed = parts[name]
         rows += part(quick=chosen.quick, seed=seed)
         sys.stdout.flush()
+    keep_rows(rows, chosen.rows)
     missed = [row for row in rows if row.verdict == "MISSES"]
     if missed:
         print_rows(f"Missed: {len(missed)} of {sum(row.limit is not None for row in rows)} limits", missed)

@@ -21,7 +21,7 @@ from contender import our_forms
 from goals import goals
 from measuring import Measured, measure
 from rival_cores import rivals
-from scoreboard import markdown, markdown_rows, say
+from scoreboard import keep_rows, markdown, markdown_rows, say
 from tried_inputs import RANDOM_INPUTS, SEED, Codes, expected_compares, tried_inputs
 
 from dzdesign.design.compensator import Compensator
@@ -34,6 +34,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Measure all contenders, print the table and the goals."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--compensator", type=Path, help="compensator.json; without it the bundled example is designed")
+    parser.add_argument("--rows", type=Path, metavar="FILE", help="also write the goals there, as JSON")
     chosen = parser.parse_args(arguments)
     for machine in (on_x86.X86, on_cortex_m4.CORTEX_M4, on_avr.AVR):
         if missing := machine.missing():
@@ -60,6 +61,7 @@ def main(arguments: list[str] | None = None) -> int:
     print("\nHow each was made:\n")
     print("\n".join(f"- {contender.name}: {contender.made}" for contender in contenders))
     rows = goals(results)
+    keep_rows(rows, chosen.rows)
     print("\n" + markdown_rows(rows))
     missed = sum(row.verdict == "MISSES" for row in rows)
     print(f"\n{missed} of {len(rows)} goals missed; {perf_counter() - start:.0f} s", flush=True)
