@@ -14,6 +14,7 @@ from dzdesign.codegen.user_names import printable_list
 from dzdesign.codegen.wiring import wiring_of
 from dzdesign.core.artefacts import TOOL, sha256_of, to_json
 from dzdesign.core.errors import InputError, nearest
+from dzdesign.core.shown import ShownInNotebooks
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.compensator_file import compensator_document
 from dzdesign.design.signal_text import Converter
@@ -38,7 +39,7 @@ TARGET_NAMES = _found_targets()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Firmware:
+class Firmware(ShownInNotebooks):
     """The files of a C project, path to text, and the manifest that names their origin."""
 
     files: Mapping[str, str]
