@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from importlib import import_module
 from importlib.resources import files as files_of
 from typing import TYPE_CHECKING, Any
@@ -172,8 +173,12 @@ def ramp_tests_of(compensator: Compensator) -> tuple[str, ...]:
     return tuple(str(entry["source"]) for entry in made_from)
 
 
+@cache
 def environment(package: str) -> "jinja2.Environment":
-    """Return the renderer of a package's templates, then of the shared ones: strict, a name without a value fails."""
+    """Return the renderer of a package's templates, then of the shared ones: strict, a name without a value fails.
+
+    Kept, with the templates that it has compiled.
+    """
     import jinja2
 
     packages = dict.fromkeys((package, PACKAGE))

@@ -3,6 +3,7 @@
 from bisect import bisect_left
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 from math import ceil, floor
 
 import numpy as np
@@ -90,6 +91,20 @@ class OffsetCurve:
         return min(touching)
 
 
+@lru_cache(maxsize=8)
+def pressures_MPa(signals: Signals, first: int, last: int) -> tuple[Fraction, ...]:
+    """Return the pressure drops of all differences of codes, MPa, exactly; kept, for a batch of valves has one scaling.
+
+    Parameters
+    ----------
+    signals : Signals
+        Scalings.
+    first, last : int
+        Differences of pressure codes.
+    """
+    return tuple(signals.dp_MPa(code) for code in range(first, last + 1))
+
+
 def offset_ceiling(
     curve: OffsetCurve, signals: Signals, u_max_V: Fraction, *, sign: int = 1, reserve: Fraction = Fraction(0)
 ) -> OffsetCeiling:
@@ -121,10 +136,10 @@ def offset_ceiling(
             f"{float(curve.dp_MPa[-1]):g} MPa; give the real span with --pressure-span"
         )
     low, high = signals.difference_error(sign)
+    pressures = pressures_MPa(signals, low, code_max + high)
     kept = Fraction(1, 2 * signals.compare_max) + reserve
     values = []
-    for code in range(low, code_max + high + 1):
-        dp_MPa = signals.dp_MPa(code)
+    for dp_MPa in pressures:
         offset, bound = curve.at(dp_MPa), curve.bound(dp_MPa)
         if bound is not None and offset > bound + DECIMALS:
             raise RequirementError(

@@ -10,6 +10,12 @@ from dzdesign.recordings import knee_window, optional_quantity
 if TYPE_CHECKING:
     from dzdesign.identify.options import IdentifyOptions
 
+#: Their names on the command line, in words of Python.
+IDENTIFY_NAMES = (
+    *("u_max", "dp0", "meter_floor", "meter_lag", "meter_zero"),
+    *("x_max", "confidence", "knee_window", "flat_below"),
+)
+
 
 def identify_options(args: argparse.Namespace) -> "IdentifyOptions":
     """Return the engineer's choices, SI.
