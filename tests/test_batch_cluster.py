@@ -19,19 +19,18 @@ from dzdesign.batch.runners import run_on_cluster
 from dzdesign.cli import main
 from dzdesign.core.artefacts import sha256_of
 
-COUNT, SEED = 8, 7
+COUNT, SEED = 7, 7
 OPTIONS = ["--meter-lag", "0.1 s", "--target", "host"]
 NOTHING = dict(recordings=(), identify={}, design={}, target="host")
 
 
-def start(*arguments: str, folder: Path) -> subprocess.Popen:
+def start(*arguments: str, folder: Path, deaths: int = 3) -> subprocess.Popen:
     """Start a process of Dask in a folder of its own, its tests' helpers importable."""
     folder.mkdir(parents=True)
     environment = os.environ | {
         "PYTHONPATH": str(Path(__file__).parent),
         "OPENBLAS_NUM_THREADS": "1",
-        # Deaths that the scheduler takes before it gives a task up; 3 would take eight workers below.
-        "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1",
+        "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": str(deaths),
     }
     return subprocess.Popen(
         [sys.executable, "-m", "dask", *arguments], cwd=folder, env=environment,
@@ -40,13 +39,13 @@ def start(*arguments: str, folder: Path) -> subprocess.Popen:
 
 
 @pytest.fixture
-def cluster(tmp_path):
-    """A scheduler, and a way to start workers; all end with the test."""
+def cluster(tmp_path, request):
+    """A scheduler, and a way to start workers; all end with the test. Its parameter: deaths that a task may survive."""
     contact = tmp_path / "scheduler.json"
     processes = [
         start(
             "scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(contact),
-            folder=tmp_path / "scheduler",
+            folder=tmp_path / "scheduler", deaths=getattr(request, "param", 3),
         )
     ]  # fmt: skip
     deadline = time.monotonic() + 60
@@ -101,9 +100,10 @@ def test_a_worker_is_killed_in_mid_run_and_nothing_is_lost(cluster, tmp_path, mo
 
 
 @pytest.mark.skipif(os.name == "nt", reason="SIGKILL is of POSIX")
+@pytest.mark.parametrize("cluster", [0], indirect=True)
 def test_a_valve_that_kills_every_worker_is_named(cluster):
     address, worker = cluster
-    for number in range(5):
+    for number in range(3):
         worker(f"w{number}")
     names = ["a", "bad", "b", "c"]
     tasks = (Task(name=name, **NOTHING) for name in names)

@@ -92,8 +92,9 @@ def rows_of(found: Mapping[str, Calibrated], common: "CommonSetting | None") -> 
         each = found[name]
         row: dict[str, Any] = {"name": name, "status": each.manifest["status"], "reason": each.manifest["reason"]}
         for prefix, sign in signs.items():
-            has_side = each.designed and (sign > 0 or each.designed.own.negative)
-            values = _side_values(each.designed, sign, common) if has_side else {}
+            designed = each.designed
+            has_side = designed is not None and (sign > 0 or designed.own.negative is not None)
+            values = _side_values(designed, sign, common) if designed and has_side else {}
             row.update({prefix + column: values.get(column) for column in SIDE_COLUMNS})
         codes = [warning.code for warning in each.designed.valve.warnings] if each.designed else []
         row["warnings"] = " ".join(dict.fromkeys(codes))
