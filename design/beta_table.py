@@ -72,11 +72,12 @@ class OffsetCurve:
 
     def _straight(self, dp_MPa: Fraction) -> Fraction:
         nodes, offset = self.dp_MPa, self.offset_V
-        at = min(max(dp_MPa, nodes[0]), nodes[-1])
-        right = bisect_left(nodes, at)
-        if right == 0 or nodes[right] == at:
-            return offset[right]
-        share = (at - nodes[right - 1]) / (nodes[right] - nodes[right - 1])
+        if dp_MPa >= nodes[-1]:
+            return offset[-1]
+        if dp_MPa <= nodes[0]:
+            return offset[0]
+        right = bisect_left(nodes, dp_MPa)
+        share = (dp_MPa - nodes[right - 1]) / (nodes[right] - nodes[right - 1])
         return offset[right - 1] + share * (offset[right] - offset[right - 1])
 
     def bound(self, dp_MPa: Fraction) -> Fraction | None:

@@ -24,6 +24,7 @@ from dzdesign.design.designing import over, prove_monotone, travel
 from dzdesign.design.signals import Signals
 from dzdesign.design.units import finest_units
 from dzdesign.identify.model import SideModel, ValveModel
+from dzdesign.identify.valve_file import valve_from_document
 
 #: Of u_max: a ceiling that is nowhere this near to the least one can't be the least by a rounding error (1e-12).
 CLEAR = 1e-6
@@ -35,10 +36,15 @@ SHARED = ("law_name", "below_reference", "signals", "u_max_V", "beta_denominator
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Designed:
-    """A valve of the batch and its own compensator."""
+    """A valve of the batch, as its file has it, and its own compensator."""
 
     valve: ValveModel
     own: Compensator
+
+    @classmethod
+    def of(cls, own: Compensator) -> "Designed":
+        """Return a compensator with the valve that it was designed from."""
+        return cls(valve=valve_from_document(own.valve_document.encode(), "compensator.json: valve"), own=own)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,6 +1,7 @@
 """What is done with one valve: bytes of recordings in, bytes of artefacts out, so that it can run on any machine."""
 
 import json
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -104,7 +105,9 @@ def calibrate(task: Task) -> Outcome:
         except Exception as error:  # a fault of ours must not stop the batch either
             status, reason, digest = FAILED, f"unexpected {type(error).__name__}: {error}", ""
         # The worker's own folder is no place that the user knows.
-        reason = one_line(reason.replace(f"{folder}/recordings/", "").replace(f"{folder}/", ""))
+        for place in (folder / "recordings", folder):
+            reason = reason.replace(f"{place}{os.sep}", "")
+        reason = one_line(reason)
         return Outcome(name=task.name, status=status, reason=reason, digest=digest, files=_files(folder / "out"))
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from dzdesign.batch.calibration import FAILED, OK
 from dzdesign.batch.results import Results
-from dzdesign.core.artefacts import sha256_of
+from dzdesign.core.artefacts import read_bytes, sha256_of
 from dzdesign.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -21,8 +21,12 @@ SIDE_COLUMNS = (
     *("beta_at_highest_dp", "k_x_max_over_u_max", "dead_zone_opening_percent", "dead_zone_closing_percent"),
     "common_extra_dead_zone_percent",
 )
-HASHES = ("inputs_sha256", "valve_json_sha256", "compensator_json_sha256", "firmware_manifest_sha256")
-TEXTS = ("name", "status", "reason", "warnings", *HASHES)
+HASHED = {
+    "valve_json_sha256": "valve.json",
+    "compensator_json_sha256": "compensator.json",
+    "firmware_manifest_sha256": "firmware/manifest.json",
+}
+TEXTS = ("name", "status", "reason", "warnings", "inputs_sha256", *HASHED)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,7 +35,7 @@ class Calibrated:
 
     manifest: Mapping[str, Any]
     designed: "Designed | None"
-    hashes: Mapping[str, str]
+    hashes: Mapping[str, str | None]
 
 
 def read_back(results: Results, name: str, unwritten: Mapping[str, str]) -> Calibrated:
@@ -48,30 +52,18 @@ def read_back(results: Results, name: str, unwritten: Mapping[str, str]) -> Cali
     """
     from dzdesign.design.common import Designed
     from dzdesign.design.compensator_file import compensator_from_document
-    from dzdesign.identify.valve_file import valve_from_document
 
     if name in unwritten:
         return Calibrated(manifest={"status": FAILED, "reason": unwritten[name]}, designed=None, hashes={})
     manifest = results.manifest(name)
-    hashes = {
-        f"{file.replace('/', '_').replace('.json', '')}{'' if 'manifest' in file else '_json'}_sha256": digest
-        for file, digest in manifest["files"].items()
-        if file in ("valve.json", "compensator.json", "firmware/manifest.json")
-    }
+    hashes = {column: manifest["files"].get(file) for column, file in HASHED.items()}
     if manifest["status"] != OK:
         return Calibrated(manifest=manifest, designed=None, hashes=hashes)
-    paths = {file: results.of(name) / file for file in ("valve.json", "compensator.json")}
-    try:
-        contents = {file: path.read_bytes() for file, path in paths.items()}
-    except OSError as error:
-        raise InputError(f"the folder of '{name}' can't be read: {error.strerror}; run the batch again") from error
-    for file, content in contents.items():
-        if sha256_of(content) != manifest["files"].get(file):
-            raise InputError(f"'{paths[file]}' was changed; take the valve's folder away and run the batch again")
-    designed = Designed(
-        valve=valve_from_document(contents["valve.json"], str(paths["valve.json"])),
-        own=compensator_from_document(contents["compensator.json"], str(paths["compensator.json"])),
-    )
+    path = results.of(name) / "compensator.json"
+    content = read_bytes(path, "compensator of the batch")
+    if sha256_of(content) != manifest["files"].get(path.name):
+        raise InputError(f"'{path}' was changed; take the valve's folder away and run the batch again")
+    designed = Designed.of(compensator_from_document(content, str(path)))
     return Calibrated(manifest=manifest, designed=designed, hashes=hashes)
 
 
@@ -99,7 +91,7 @@ def rows_of(found: Mapping[str, Calibrated], common: "CommonSetting | None") -> 
         codes = [warning.code for warning in each.designed.valve.warnings] if each.designed else []
         row["warnings"] = " ".join(dict.fromkeys(codes))
         row["inputs_sha256"] = each.manifest.get("inputs_sha256") or None
-        row.update({column: each.hashes.get(column) for column in HASHES[1:]})
+        row.update({column: each.hashes.get(column) for column in HASHED})
         rows.append(row)
     return rows
 
