@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 DOCS   := docs/derivation
 
-.PHONY: demo test lint docs goldens lock clean bench bench-identify bench-isr bench-verify
+.PHONY: demo test lint docs goldens lock clean bench bench-batch bench-identify bench-isr bench-verify
 
 demo: $(STAMP)
 	$(BIN)/dzdesign demo demo
@@ -39,6 +39,10 @@ bench-isr: $(STAMP)
 # Minutes, most of them for mutants; `make bench-verify BENCH=--quick` tries a part of those.
 bench-verify: $(STAMP)
 	$(BIN)/python benchmarks/verify/run.py $(BENCH)
+
+# 1000 valves: a quarter of an hour of two cores; `make bench-batch BENCH=--quick` tries 60.
+bench-batch: $(STAMP)
+	$(BIN)/python benchmarks/batch/run.py $(BENCH)
 
 # The account of the paper as a page, for LaTeX and for machines; built, never committed.
 docs: $(STAMP)

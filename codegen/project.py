@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from importlib import import_module
 from importlib.resources import files as files_of
 from typing import TYPE_CHECKING, Any
@@ -14,6 +15,7 @@ from dzdesign.codegen.user_names import printable_list
 from dzdesign.codegen.wiring import wiring_of
 from dzdesign.core.artefacts import TOOL, sha256_of, to_json
 from dzdesign.core.errors import InputError, nearest
+from dzdesign.core.shown import ShownInNotebooks
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.compensator_file import compensator_document
 from dzdesign.design.signal_text import Converter
@@ -38,7 +40,7 @@ TARGET_NAMES = _found_targets()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Firmware:
+class Firmware(ShownInNotebooks):
     """The files of a C project, path to text, and the manifest that names their origin."""
 
     files: Mapping[str, str]
@@ -171,8 +173,12 @@ def ramp_tests_of(compensator: Compensator) -> tuple[str, ...]:
     return tuple(str(entry["source"]) for entry in made_from)
 
 
+@cache
 def environment(package: str) -> "jinja2.Environment":
-    """Return the renderer of a package's templates, then of the shared ones: strict, a name without a value fails."""
+    """Return the renderer of a package's templates, then of the shared ones: strict, a name without a value fails.
+
+    Kept, with the templates that it has compiled.
+    """
     import jinja2
 
     packages = dict.fromkeys((package, PACKAGE))

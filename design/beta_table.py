@@ -3,6 +3,7 @@
 from bisect import bisect_left
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 from math import ceil, floor
 
 import numpy as np
@@ -71,11 +72,12 @@ class OffsetCurve:
 
     def _straight(self, dp_MPa: Fraction) -> Fraction:
         nodes, offset = self.dp_MPa, self.offset_V
-        at = min(max(dp_MPa, nodes[0]), nodes[-1])
-        right = bisect_left(nodes, at)
-        if right == 0 or nodes[right] == at:
-            return offset[right]
-        share = (at - nodes[right - 1]) / (nodes[right] - nodes[right - 1])
+        if dp_MPa >= nodes[-1]:
+            return offset[-1]
+        if dp_MPa <= nodes[0]:
+            return offset[0]
+        right = bisect_left(nodes, dp_MPa)
+        share = (dp_MPa - nodes[right - 1]) / (nodes[right] - nodes[right - 1])
         return offset[right - 1] + share * (offset[right] - offset[right - 1])
 
     def bound(self, dp_MPa: Fraction) -> Fraction | None:
@@ -88,6 +90,20 @@ class OffsetCurve:
         right = bisect_left(nodes, dp_MPa)
         touching = self.steps_V[max(right - 1, 0) : right + (nodes[right] == dp_MPa)]
         return min(touching)
+
+
+@lru_cache(maxsize=8)
+def pressures_MPa(signals: Signals, first: int, last: int) -> tuple[Fraction, ...]:
+    """Return the pressure drops of all differences of codes, MPa, exactly; kept, for a batch of valves has one scaling.
+
+    Parameters
+    ----------
+    signals : Signals
+        Scalings.
+    first, last : int
+        Differences of pressure codes.
+    """
+    return tuple(signals.dp_MPa(code) for code in range(first, last + 1))
 
 
 def offset_ceiling(
@@ -121,10 +137,10 @@ def offset_ceiling(
             f"{float(curve.dp_MPa[-1]):g} MPa; give the real span with --pressure-span"
         )
     low, high = signals.difference_error(sign)
+    pressures = pressures_MPa(signals, low, code_max + high)
     kept = Fraction(1, 2 * signals.compare_max) + reserve
     values = []
-    for code in range(low, code_max + high + 1):
-        dp_MPa = signals.dp_MPa(code)
+    for dp_MPa in pressures:
         offset, bound = curve.at(dp_MPa), curve.bound(dp_MPa)
         if bound is not None and offset > bound + DECIMALS:
             raise RequirementError(

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 from dzdesign.core.errors import InputError
+from dzdesign.core.shown import ShownInNotebooks
 from dzdesign.derivation.edge import evaluate_edge
 from dzdesign.derivation.law import law
 from dzdesign.derivation.scaling import drive, evaluate_line
@@ -89,7 +90,7 @@ class SideLaw:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Compensator:
+class Compensator(ShownInNotebooks):
     """The law ``u_O = g(dP) u_i + o(dP)`` on codes, every coefficient an exact rational number.
 
     Attributes

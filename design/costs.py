@@ -40,19 +40,13 @@ def costs_of(compensator: Compensator, valve: ValveModel) -> tuple[str, ...]:
 def _cost_of_test(compensator: Compensator, test: TestResult, sign: int) -> str:
     """Say what remains at one tested pressure drop."""
     signals, u_max = compensator.signals, float(compensator.u_max_V)
-    command = signals.command
     code = round(signals.dp_code(Fraction(repr(test.dp_MPa))))
-
-    def drive_at(from_zero: int) -> float:
-        return float(compensator.drive(command.zero_code + command.direction(sign) * from_zero, code, sign))
-
-    span, edge = command.span(sign), compensator.edge_codes
-    offset, at_edge, full = drive_at(0), drive_at(edge), drive_at(span)
+    offset, at_edge, full, edge = _corners(compensator, code, sign)
+    left = remaining_dead_zone(compensator, test, sign)
     parts = [f"{test.dp_MPa:.2f} MPa: offset {offset * u_max:.3f} V"]
     for name, knee in (("opening", test.u_knee_rising_V), ("closing", test.u_knee_falling_V)):
         if knee is not None and knee >= offset * u_max:
-            left = _residual(knee / u_max, offset, at_edge, full, edge / span)
-            parts.append(f"dead zone that remains on {name} {left:.2%} of command (knee)")
+            parts.append(f"dead zone that remains on {name} {left[name]:.2%} of command (knee)")
         elif knee is not None:
             above = offset * u_max - knee
             parts.append(f"flow at zero command on {name}: the offset lies {above:.3f} V above the knee")
@@ -67,11 +61,44 @@ def _cost_of_test(compensator: Compensator, test: TestResult, sign: int) -> str:
             "flow; give a larger --output-max"
         )
     if limit < full:
-        reached = edge / span + (1 - edge / span) * (limit - at_edge) / (full - at_edge)
+        reached = edge + (1 - edge) * (limit - at_edge) / (full - at_edge)
         parts.append(f"the largest drive, {limit:.2%}, is reached at {reached:.1%} of command")
     else:
         parts.append(f"drive at full command {full:.2%}")
     return ", ".join(parts)
+
+
+def remaining_dead_zone(compensator: Compensator, test: TestResult, sign: int = 1) -> dict[str, float]:
+    """Return the dead zone that the law leaves at a tested pressure drop, as a share of command.
+
+    Parameters
+    ----------
+    compensator : Compensator
+        The law.
+    test : TestResult
+        Knees of a valve at its pressure drop; it need not be the valve that the law was designed for.
+    sign : {1, -1}
+        Of the command.
+
+    Returns
+    -------
+    dict
+        "opening" and "closing", those recorded: the share up to the knee; 0 where flow passes at zero command.
+    """
+    code = round(compensator.signals.dp_code(Fraction(repr(test.dp_MPa))))
+    offset, at_edge, full, edge = _corners(compensator, code, sign)
+    knees = {"opening": test.u_knee_rising_V, "closing": test.u_knee_falling_V}
+    shares = {name: knee / float(compensator.u_max_V) for name, knee in knees.items() if knee is not None}
+    return {name: max(_residual(knee, offset, at_edge, full, edge), 0.0) for name, knee in shares.items()}
+
+
+def _corners(compensator: Compensator, dp_code: int, sign: int) -> tuple[float, float, float, float]:
+    """Return the drive at zero command, at the edge's end and at full command, over full, and the edge's share."""
+    command = compensator.signals.command
+    span, edge = command.span(sign), compensator.edge_codes
+    at = (command.zero_code + command.direction(sign) * from_zero for from_zero in (0, edge, span))
+    offset, at_edge, full = (float(compensator.drive(code, dp_code, sign)) for code in at)
+    return offset, at_edge, full, edge / span
 
 
 def _residual(knee: float, offset: float, at_edge: float, full: float, edge: float) -> float:

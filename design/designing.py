@@ -75,7 +75,7 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
         valve_sha256=sha256_of(document.encode()),
     )
     for sign in signals.signs:
-        _prove_monotone(compensator, sign)
+        prove_monotone(compensator, sign)
     return replace(compensator, costs=costs_of(compensator, valve))
 
 
@@ -87,7 +87,7 @@ def _side_law(side: SideModel, options: DesignOptions, u_max: Fraction, sign: in
     reference = Fraction(repr(side.reference_dp_MPa))
     top = (opening or certified).at(reference)
     # Half a count less, because the compare value of the offset may be rounded up.
-    u_min0 = _over(top / u_max - Fraction(1, 2 * signals.compare_max), "down", units.coefficient)
+    u_min0 = over(top / u_max - Fraction(1, 2 * signals.compare_max), "down", units.coefficient)
     if u_min0 <= 0:
         raise InputError(f"u_min0 is {float(top):.4f} V, less than one count of the PWM: no dead zone")
     above_one = side.trend == "increasing" or options.below_reference == "extend"
@@ -105,7 +105,7 @@ def _side_law(side: SideModel, options: DesignOptions, u_max: Fraction, sign: in
         upper = table(_opening_ceiling(opening, signals, u_max, sign))
         edge_beta = tuple(map(max, upper, beta))
     return SideLaw(
-        k_x_max_over_u_max=_over(_travel(side, u_max, top), "nearest", units.coefficient),
+        k_x_max_over_u_max=over(travel(side, u_max, top), "nearest", units.coefficient),
         u_min0_over_u_max=u_min0,
         beta_numerators=beta,
         edge_numerators=edge_beta,
@@ -171,7 +171,7 @@ def _opening_ceiling(opening: OffsetCurve, signals: Signals, u_max: Fraction, si
     return OffsetCeiling(limit=tuple(opening.at(signals.dp_MPa(code)) / u_max for code in codes), certified=range(0))
 
 
-def _travel(side: SideModel, u_max: Fraction, offset_V: Fraction) -> Fraction:
+def travel(side: SideModel, u_max: Fraction, offset_V: Fraction) -> Fraction:
     """Return k x_max/u_max for a law whose offset is u_min0: from there to the command of full flow on opening.
 
     Identification gives k x_max from the knee on. The law starts lower, at the guarded offset; without the difference
@@ -184,14 +184,14 @@ def _travel(side: SideModel, u_max: Fraction, offset_V: Fraction) -> Fraction:
     return min(travel, 1 - offset_V / u_max)  # beyond full drive there is nothing
 
 
-def _over(value: Fraction, rounding: str, unit: int) -> Fraction:
+def over(value: Fraction, rounding: str, unit: int) -> Fraction:
     """Return `value` as an integer over `unit`, rounded to nearest or down."""
     scaled = value * unit
     numerator = scaled.numerator // scaled.denominator if rounding == "down" else round(scaled)
     return Fraction(numerator, unit)
 
 
-def _prove_monotone(compensator: Compensator, sign: int) -> None:
+def prove_monotone(compensator: Compensator, sign: int) -> None:
     """Prove that more command gives more drive, at every pressure: the gain is affine in beta, so its ends decide.
 
     Inside the edge the drive rises faster still: what the edge takes away falls with the command.

@@ -46,6 +46,25 @@ U_MAX = _given("--u-max", default="10 V", metavar="U", help="full command")
 METER_LAG = _given("--meter-lag", metavar="T", help="lag of the flow meter (default: found from ramps of two rates)")
 METER_FLOOR = _given("--meter-floor", metavar="Q", help="flow below which the meter reads zero (default: found)")
 KNEE_WINDOW = _given("--knee-window", default="12-50", metavar="A-B", help="per cent of the largest flow, straight")
+#: Of `identify`, for each valve of `batch` too.
+IDENTIFY = (
+    COLUMNS,
+    DP,
+    _given("--dp0", metavar="P", help='reference pressure drop (default: the test nearest to "1 MPa")'),
+    U_MAX,
+    METER_FLOOR,
+    METER_LAG,
+    _given("--meter-zero", default="0 L/min", metavar="Q", help="bound of the meter's zero error"),
+    _given("--x-max", metavar="X", help='stroke, such as "1.8 mm": gives k in V/mm'),
+    _given("--confidence", default="0.99", metavar="C", help="of all lower bounds together"),
+    KNEE_WINDOW,
+    _given(
+        "--flat-below",
+        default="0.1",
+        metavar="C",
+        help="per cent of full command: a threshold that changes by less over the tests is flat, beta is 1",
+    ),
+)
 #: Of `design`, and of `codegen` where it designs first; their defaults stand in `dzdesign.design_options`.
 DESIGN = (
     _given("--law", metavar="LAW", help="paper: Eq. (18); target: meets Eq. (16) (default: paper)"),
@@ -127,27 +146,12 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
                 help="CSV, TDMS, MAT, HDF5, Parquet or Feather: columns time_s, u_V, dP_MPa, Q_Lmin",
             ),
             _given(*OUTPUT, default="valve.json", metavar="FILE", help="file to write"),
-            COLUMNS,
-            DP,
-            _given("--dp0", metavar="P", help='reference pressure drop (default: the test nearest to "1 MPa")'),
-            U_MAX,
-            METER_FLOOR,
-            METER_LAG,
-            _given("--meter-zero", default="0 L/min", metavar="Q", help="bound of the meter's zero error"),
-            _given("--x-max", metavar="X", help='stroke, such as "1.8 mm": gives k in V/mm'),
-            _given("--confidence", default="0.99", metavar="C", help="of all lower bounds together"),
+            *IDENTIFY,
             _given(
                 "--plots",
                 metavar="DIR",
                 help="also draw, as SVG and PNG in this folder: each pressure drop's flow with its knees, onsets and "
                 "residuals; thresholds, bounds and beta over dP",
-            ),
-            KNEE_WINDOW,
-            _given(
-                "--flat-below",
-                default="0.1",
-                metavar="C",
-                help="per cent of full command: a threshold that changes by less over the tests is flat, beta is 1",
             ),
         ),
     ),
@@ -197,6 +201,27 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
                 action="store_true",
                 help="also check machine code: every input on a Cortex-M4 in QEMU, a sample on an AVR in simavr",
             ),
+        ),
+    ),
+    "batch": (
+        "many valves: identify, design, codegen for each; one table, and the cost of one common setting",
+        "dzdesign.batch.command:run_batch",
+        (
+            _given(
+                "source",
+                metavar="FOLDER",
+                help="one subfolder of recordings a valve; or a CSV file with a row a valve: name, files (patterns, "
+                "parted by ;) and any option below that is different for it",
+            ),
+            _given(*OUTPUT, default="batch", metavar="DIR", help="folder to write; an earlier run there is taken up"),
+            _given("--jobs", metavar="N", help="processes of this machine (default: as many as it has processors)"),
+            _given("--dask", metavar="ADDRESS", help="instead, a Dask scheduler, such as tcp://10.0.0.5:8786"),
+            _given("--pattern", metavar="P", help='recordings in a subfolder, such as "*.csv" (default: by suffix)'),
+            _given("--verify", action="store_true", help="also verify each valve's firmware, as the command does"),
+            PLANT,
+            *IDENTIFY,
+            TARGET,
+            *DESIGN,
         ),
     ),
     "assess": (

@@ -19,19 +19,13 @@ from dzdesign.core.artefacts import (
 )
 from dzdesign.core.errors import InputError
 from dzdesign.core.units import parse_quantity
-from dzdesign.recordings import check_plots, knee_window, optional_quantity, read_recordings, refuse_copies
+from dzdesign.identify_options import identify_options
+from dzdesign.recordings import check_plots, read_recordings, refuse_copies
 
 
 def say(text: str) -> None:
     """Tell of progress, on stderr: stdout is for results."""
     print(f"dzdesign: {text}", file=sys.stderr)
-
-
-def _number(text: str, option: str, example: str) -> float:
-    try:
-        return float(text)
-    except ValueError as error:
-        raise InputError(f"{option} is '{text}', expected a number such as {example}") from error
 
 
 def _seed(text: str) -> int:
@@ -44,24 +38,12 @@ def run_identify(args: argparse.Namespace) -> int:
     """Identify a valve from ramp tests."""
     from dzdesign.identify.identification import identify_sides
     from dzdesign.identify.model import SCHEMA
-    from dzdesign.identify.options import IdentifyOptions
     from dzdesign.tables import print_valve
 
-    u_max = parse_quantity(args.u_max, "voltage", "--u-max")
-    options = IdentifyOptions(
-        u_max=u_max,
-        dp0=optional_quantity(args.dp0, "pressure", "--dp0"),
-        meter_floor=optional_quantity(args.meter_floor, "flow", "--meter-floor"),
-        meter_lag=optional_quantity(args.meter_lag, "time", "--meter-lag"),
-        meter_zero=parse_quantity(args.meter_zero, "flow", "--meter-zero"),
-        x_max=optional_quantity(args.x_max, "length", "--x-max"),
-        confidence=_number(args.confidence, "--confidence", "0.99"),
-        knee_window=knee_window(args.knee_window),
-        flat_change=_number(args.flat_below, "--flat-below", "0.1") / 100,
-    )
+    options = identify_options(args)
     check_file_may_be_written(Path(args.output), SCHEMA)
     check_plots(args.plots, Path(args.output))
-    tests = read_recordings(args.ramps, u_max=u_max, columns=args.columns, dp=args.dp)
+    tests = read_recordings(args.ramps, u_max=options.u_max, columns=args.columns, dp=args.dp)
     refuse_copies(tests)
     say(f"fitting {len(tests)} recording{'s' if len(tests) > 1 else ''}")
     found = identify_sides(tests, options)

@@ -6,6 +6,7 @@ from typing import Any
 
 from dzdesign.core.artefacts import TOOL
 from dzdesign.core.errors import InputError
+from dzdesign.core.shown import ShownInNotebooks
 from dzdesign.identify.guard_curve import GUARDS, ROUNDING_V, GuardCurve, OpeningCurve
 
 SCHEMA = "dzdesign.valve/1"
@@ -262,7 +263,7 @@ class Warning_:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ValveModel:
+class ValveModel(ShownInNotebooks):
     """The identified valve.
 
     Attributes

@@ -10,6 +10,7 @@ from typing import Any
 from dzdesign.core.artefacts import MANIFEST_NAME, TOOL, parse_document, read_bytes, sha256_of, to_json
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.shape import check_shape
+from dzdesign.core.shown import ShownInNotebooks
 from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.identify.valve_file import valve_from_document
 from dzdesign.verify.all_inputs import InputCheck, check_all_inputs
@@ -39,7 +40,7 @@ WORKERS = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Verification:
+class Verification(ShownInNotebooks):
     """All evidence about one firmware folder.
 
     Attributes

@@ -1,0 +1,145 @@
+"""`dzdesign batch`: calibrate many valves, in one table with the reasons of those that could not be."""
+
+import argparse
+import os
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dzdesign.batch.calibration import Outcome, Task
+from dzdesign.batch.results import Results
+from dzdesign.batch.runners import run_local, run_on_cluster
+from dzdesign.batch.summary import print_batch, summary_of
+from dzdesign.batch.table import Calibrated, read_back, rows_of, table_files
+from dzdesign.batch.valves import Valve, valves_of
+from dzdesign.commands import say
+from dzdesign.core.artefacts import read_bytes, to_json, write_files
+from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.design_options import DEFAULTS, design_options
+from dzdesign.identify_options import IDENTIFY_NAMES, identify_options
+from dzdesign.progress import with_bar
+
+if TYPE_CHECKING:
+    from dzdesign.design.common import CommonSetting
+
+#: Options of `identify` that a valve may have of its own, beside those of `design` and the target.
+IDENTIFY = (*IDENTIFY_NAMES, "columns", "dp")
+
+
+def run_batch(args: argparse.Namespace) -> int:
+    """Calibrate the valves of a folder or a list; raise at the end if any could not be."""
+    source, output = Path(args.source), Path(args.output)
+    jobs = _jobs(args.jobs, args.dask)
+    _check_options(args)
+    if source.is_dir() and output.resolve().is_relative_to(source.resolve()):
+        raise InputError(f"'{output}' lies in '{source}', whose subfolders are the valves; choose another with -o")
+    valves = valves_of(source, args.pattern, (*IDENTIFY, *DEFAULTS, "target"))
+    plant = _plant(args)
+    results = Results(output)
+    results.begin([valve.name for valve in valves])
+    waiting = [valve for valve in with_bar(valves, "reading") if not _is_done(results, _task(valve, args, plant))]
+    say(f"{len(valves)} valves, {len(valves) - len(waiting)} of them done before")
+    tasks = (_task(valve, args, plant) for valve in waiting)
+    outcomes = run_on_cluster(tasks, args.dask) if args.dask else run_local(tasks, jobs)
+    unwritten = _write_all(results, outcomes, len(waiting))
+    found = {valve.name: read_back(results, valve.name, unwritten) for valve in with_bar(valves, "making the table")}
+    common, why_not = _common(found)
+    rows = rows_of(found, common)
+    document = summary_of(rows, common, why_not)
+    files = table_files(rows)
+    if common is not None:
+        from dzdesign.design.compensator_file import compensator_document
+
+        files["common_compensator.json"] = to_json(compensator_document(common.compensator)).encode()
+    else:
+        (output / "common_compensator.json").unlink(missing_ok=True)  # of an earlier run with other valves
+    write_files(output, files, "-o")
+    results.write_summary(document)
+    print(to_json(document), end="") if args.json else print_batch(document, str(output))
+    if document["failed"]:
+        raise RequirementError(
+            f"{len(document['failed'])} of {len(valves)} valves are not calibrated; their reasons are in "
+            f"'{output / 'valves.csv'}'"
+        )
+    return 0
+
+
+def _jobs(text: str | None, dask: str | None) -> int:
+    """Return how many processes --jobs asks for."""
+    if text is None:
+        return os.cpu_count() or 1
+    if dask:
+        raise InputError("--jobs is for this machine; with --dask its workers decide, so leave it out")
+    if not re.fullmatch(r"[1-9]\d{0,3}", text, re.ASCII):
+        raise InputError(f"--jobs is '{text}', expected a number of processes such as 4")
+    return int(text)
+
+
+def _check_options(args: argparse.Namespace) -> None:
+    """Refuse what no valve could be calibrated with, before any is; a valve's own options are its own affair."""
+    from dzdesign.codegen.project import target_named
+    from dzdesign.identify.column_labels import parse_columns
+
+    identify_options(args)
+    design_options(args, target_named(args.target).inputs())
+    if args.columns:
+        parse_columns(args.columns)
+
+
+def _plant(args: argparse.Namespace) -> tuple[str, bytes] | None:
+    """Return name and content of the plant's file, which must be one."""
+    if args.plant is None:
+        return None
+    if not args.verify:
+        raise InputError("--plant is of the verification; give --verify too, or leave it out")
+    from dzdesign.verify.plant import read_plant
+
+    read_plant(Path(args.plant))
+    return Path(args.plant).name, read_bytes(Path(args.plant), "plant")
+
+
+def _task(valve: Valve, args: argparse.Namespace, plant: tuple[str, bytes] | None) -> Task:
+    """Read a valve's recordings; where they can't be read the task says why."""
+    options = {**vars(args), **valve.overrides}
+    recordings, refused = [], ""
+    try:
+        recordings = [(path.name, read_bytes(path, "ramp file")) for path in valve.recordings()]
+    except InputError as error:
+        refused = str(error)
+    return Task(
+        name=valve.name,
+        recordings=tuple(recordings),
+        identify={name: options[name] for name in IDENTIFY if options[name] is not None},
+        design={name: options[name] for name in DEFAULTS if options[name] is not None},
+        target=options["target"],
+        verify=args.verify,
+        plant=plant,
+        refused=refused,
+    )
+
+
+def _is_done(results: Results, task: Task) -> bool:
+    return results.is_done(task.name, task.digest)
+
+
+def _write_all(results: Results, outcomes: Iterator[Outcome], count: int) -> dict[str, str]:
+    """Write each valve's folder as it comes; return the reasons of those that could not be written."""
+    unwritten: dict[str, str] = {}
+    for _, outcome in zip(with_bar(range(count), "valves"), outcomes, strict=True):
+        try:
+            results.write(outcome)
+        except InputError as error:
+            unwritten[outcome.name] = str(error)
+    return unwritten
+
+
+def _common(found: Mapping[str, Calibrated]) -> "tuple[CommonSetting | None, str]":
+    """Return the common setting of the valves that are calibrated, or why there is none."""
+    from dzdesign.design.common import common_setting
+
+    designed = {name: each.designed for name, each in found.items() if each.designed is not None}
+    try:
+        return common_setting(designed), ""
+    except (InputError, RequirementError) as error:
+        return None, str(error)

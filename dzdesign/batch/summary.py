@@ -1,0 +1,123 @@
+"""What a batch comes to: counts, reasons, and the cost of one common safe setting, as batch.json and on paper."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from dzdesign.batch.calibration import OK
+from dzdesign.core.artefacts import sha256_of, to_json
+
+if TYPE_CHECKING:
+    from dzdesign.design.common import CommonSetting
+
+QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
+#: Columns of the table whose quantiles tell of the batch.
+SPREAD = (
+    *("knee_opening_V", "knee_closing_V", "offset_V", "beta_at_highest_dp", "k_x_max_over_u_max"),
+    *("dead_zone_opening_percent", "dead_zone_closing_percent", "common_extra_dead_zone_percent"),
+)
+
+
+def summary_of(
+    rows: Sequence[Mapping[str, Any]], common: "CommonSetting | None", why_not: str
+) -> dict[str, Any]:
+    """Return batch.json but for schema and tool.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        The table.
+    common : CommonSetting or None
+        Of the valves that are calibrated.
+    why_not : str
+        The reason where there is none.
+    """
+    failed = [{key: row[key] for key in ("name", "status", "reason")} for row in rows if row["status"] != OK]
+    columns = [column for column in rows[0] if column.removeprefix("positive_").removeprefix("negative_") in SPREAD]
+    return {
+        "complete": True,
+        "made_from": [{"source": row["name"], "inputs_sha256": row["inputs_sha256"]} for row in rows],
+        "valves": len(rows),
+        "calibrated": len(rows) - len(failed),
+        "failed": failed,
+        "quantiles": {column: _quantiles([row[column] for row in rows]) for column in columns},
+        "common_setting": _common_document(common) if common else {"why_not": why_not},
+    }
+
+
+def _quantiles(values: Sequence[float | None]) -> dict[str, float]:
+    """Return quantiles by the nearest rank: each is the value of a valve that is there."""
+    known = sorted(value for value in values if value is not None)
+    return {f"{q:g}": known[round(q * (len(known) - 1))] for q in QUANTILES} if known else {}
+
+
+def _common_document(common: "CommonSetting") -> dict[str, Any]:
+    from dzdesign.design.compensator_file import compensator_document
+
+    content = to_json(compensator_document(common.compensator)).encode()
+    return {
+        "file": "common_compensator.json",
+        "sha256": sha256_of(content),
+        "dp_MPa": list(common.dp_MPa),
+        "carrier": common.carrier,
+        "binding": list(common.binding),
+        "smallest_margin_V": {
+            name: [round(float(each.smallest_margin_V), 7) for each in certificates]
+            for name, certificates in common.proved.items()
+        },
+    }
+
+
+def print_batch(document: Mapping[str, Any], folder: str) -> None:
+    """Print the counts, the spread, the common setting's cost and the reasons.
+
+    Parameters
+    ----------
+    document : mapping
+        From `summary_of`.
+    folder : str
+        Where it was written.
+    """
+    from dzdesign.tables import new_console, new_table
+
+    console = new_console()
+    table = new_table(f"{document['calibrated']} valves", "", "least", "5 %", "median", "95 %", "largest")
+    for column, quantiles in document["quantiles"].items():
+        if quantiles:
+            name, _, unit = column.rpartition("_")
+            words, unit = (name.replace("_", " "), {"V": "V", "percent": "%"}[unit]) if unit in ("V", "percent") else (
+                column.replace("_", " "), "",
+            )  # fmt: skip
+            shown = [f"{quantiles[q]:.3f}" for q in ("0", "0.05", "0.5", "0.95", "1")]
+            table.add_row(f"{words} ({unit})" if unit else words, *shown)
+    console.print(table)
+    for line in _common_lines(document):
+        console.print(line, markup=False, soft_wrap=True)
+    for each in document["failed"]:
+        console.print(f"{each['status']}  {each['name']}: {each['reason']}", markup=False, soft_wrap=True)
+    console.print(
+        f"{document['calibrated']} of {document['valves']} valves calibrated, {len(document['failed'])} not. "
+        f"Table: {folder}/valves.csv, valves.parquet",
+        markup=False,
+        soft_wrap=True,
+    )
+
+
+def _common_lines(document: Mapping[str, Any]) -> list[str]:
+    """Say what one setting for all would cost, or why there is none."""
+    common = document["common_setting"]
+    if "why_not" in common:
+        return [f"no common setting: {common['why_not']}"]
+    low, high = common["dp_MPa"]
+    held = ", ".join(common["binding"][:5]) + (" and others" if len(common["binding"]) > 5 else "")
+    costs = [(name, q) for name, q in document["quantiles"].items() if name.endswith("common_extra_dead_zone_percent")]
+    lines = [
+        f"one common setting, safe for each of these valves from {low:g} to {high:g} MPa, is held down by {held}; "
+        f"it is in {common['file']}"
+    ]
+    for name, q in costs:
+        side = name.removesuffix("common_extra_dead_zone_percent").replace("_", " side: ")
+        lines.append(
+            f"{side}it leaves more dead zone than each valve's own setting: {q['0.5']:.2f} % of command at the median "
+            f"valve, {q['0.95']:.2f} % at one in twenty, {q['1']:.2f} % at most"
+        )
+    return lines

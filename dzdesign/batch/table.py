@@ -1,0 +1,174 @@
+"""The table of a batch: one row a valve, made from the valves' folders alone, whenever they were written."""
+
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+from dzdesign.batch.calibration import FAILED, OK
+from dzdesign.batch.results import Results
+from dzdesign.core.artefacts import read_bytes, sha256_of
+from dzdesign.core.errors import InputError
+
+if TYPE_CHECKING:
+    from dzdesign.design.common import CommonSetting, Designed
+    from dzdesign.identify.model import SideModel
+
+#: Columns of either side, after its name; a valve that was not calibrated has blanks.
+SIDE_COLUMNS = (
+    *("dp0_MPa", "knee_opening_V", "knee_closing_V", "knee_se_V", "bound_V", "offset_V", "trend", "highest_dp_MPa"),
+    *("beta_at_highest_dp", "k_x_max_over_u_max", "dead_zone_opening_percent", "dead_zone_closing_percent"),
+    "common_extra_dead_zone_percent",
+)
+HASHED = {
+    "valve_json_sha256": "valve.json",
+    "compensator_json_sha256": "compensator.json",
+    "firmware_manifest_sha256": "firmware/manifest.json",
+}
+TEXTS = ("name", "status", "reason", "warnings", "inputs_sha256", *HASHED)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Calibrated:
+    """A valve's folder, read back: its manifest and, where it was calibrated, valve and compensator."""
+
+    manifest: Mapping[str, Any]
+    designed: "Designed | None"
+    hashes: Mapping[str, str | None]
+
+
+def read_back(results: Results, name: str, unwritten: Mapping[str, str]) -> Calibrated:
+    """Read a valve's folder; one that could not be written has failed, whatever an earlier run left there.
+
+    Parameters
+    ----------
+    results : Results
+        Folder of the batch.
+    name : str
+        Of the valve.
+    unwritten : mapping
+        Name to the reason why its folder could not be written.
+    """
+    from dzdesign.design.common import Designed
+    from dzdesign.design.compensator_file import compensator_from_document
+
+    if name in unwritten:
+        return Calibrated(manifest={"status": FAILED, "reason": unwritten[name]}, designed=None, hashes={})
+    manifest = results.manifest(name)
+    hashes = {column: manifest["files"].get(file) for column, file in HASHED.items()}
+    if manifest["status"] != OK:
+        return Calibrated(manifest=manifest, designed=None, hashes=hashes)
+    path = results.of(name) / "compensator.json"
+    content = read_bytes(path, "compensator of the batch")
+    if sha256_of(content) != manifest["files"].get(path.name):
+        raise InputError(f"'{path}' was changed; take the valve's folder away and run the batch again")
+    designed = Designed.of(compensator_from_document(content, str(path)))
+    return Calibrated(manifest=manifest, designed=designed, hashes=hashes)
+
+
+def rows_of(found: Mapping[str, Calibrated], common: "CommonSetting | None") -> list[dict[str, Any]]:
+    """Return the rows, by name; see `SIDE_COLUMNS`.
+
+    Parameters
+    ----------
+    found : mapping
+        Name to what was read back.
+    common : CommonSetting or None
+        For the cost of it at each valve.
+    """
+    both = any(each.designed and each.designed.own.negative for each in found.values())
+    signs = {"": 1} if not both else {"positive_": 1, "negative_": -1}
+    rows = []
+    for name in sorted(found):
+        each = found[name]
+        row: dict[str, Any] = {"name": name, "status": each.manifest["status"], "reason": each.manifest["reason"]}
+        for prefix, sign in signs.items():
+            designed = each.designed
+            has_side = designed is not None and (sign > 0 or designed.own.negative is not None)
+            values = _side_values(designed, sign, common) if designed and has_side else {}
+            row.update({prefix + column: values.get(column) for column in SIDE_COLUMNS})
+        codes = [warning.code for warning in each.designed.valve.warnings] if each.designed else []
+        row["warnings"] = " ".join(dict.fromkeys(codes))
+        row["inputs_sha256"] = each.manifest.get("inputs_sha256") or None
+        row.update({column: each.hashes.get(column) for column in HASHED})
+        rows.append(row)
+    return rows
+
+
+def _side_values(designed: "Designed", sign: int, common: "CommonSetting | None") -> dict[str, Any]:
+    """Return what the table says of one side; numbers as valve.json has them."""
+    own, side = designed.own, designed.valve.sides["positive" if sign > 0 else "negative"]
+    test = _reference_test(side)
+    left = _remaining(designed, sign, own)
+    certificate = own.side(sign).certificate
+    code = round(own.signals.dp_code(Fraction(repr(side.reference_dp_MPa))))
+    return {
+        "dp0_MPa": side.reference_dp_MPa,
+        "knee_opening_V": test.u_knee_rising_V,
+        "knee_closing_V": test.u_knee_falling_V,
+        "knee_se_V": test.u_knee_se_V,
+        "bound_V": side.guards[certificate.guard].u_lower_V[side.tests.index(test)],
+        "offset_V": round(float(own.beta(code, sign) * own.side(sign).u_min0_over_u_max * own.u_max_V), 7),
+        "trend": side.trend,
+        "highest_dp_MPa": side.beta_dp_MPa[-1],
+        "beta_at_highest_dp": side.guards[certificate.guard].beta[-1],
+        "k_x_max_over_u_max": side.k_x_max_over_u_max,
+        "dead_zone_opening_percent": left.get("opening"),
+        "dead_zone_closing_percent": left.get("closing"),
+        "common_extra_dead_zone_percent": extra_dead_zone(designed, common, sign) if common else None,
+    }
+
+
+def _reference_test(side: "SideModel") -> Any:
+    return min(side.tests, key=lambda test: abs(test.dp_MPa - side.reference_dp_MPa))
+
+
+def _remaining(designed: "Designed", sign: int, law: Any) -> dict[str, float]:
+    """Return the worst dead zone over a valve's tests that a law leaves on each branch, in per cent of command."""
+    from dzdesign.design.costs import remaining_dead_zone
+
+    side = designed.valve.sides["positive" if sign > 0 else "negative"]
+    each = [remaining_dead_zone(law, test, sign) for test in side.tests]
+    return {name: round(100 * max(one[name] for one in each), 5) for name in each[0]}
+
+
+def extra_dead_zone(designed: "Designed", common: "CommonSetting", sign: int) -> float:
+    """Return how much more dead zone the common setting leaves than a valve's own, in per cent of command.
+
+    At the pressure drop of its tests where that is most, on opening; on closing where no opening was recorded.
+
+    Parameters
+    ----------
+    designed : Designed
+        The valve and its own compensator.
+    common : CommonSetting
+        The setting of all.
+    sign : {1, -1}
+        Of the command.
+    """
+    from dzdesign.design.costs import remaining_dead_zone
+
+    side = designed.valve.sides["positive" if sign > 0 else "negative"]
+    branch = "opening" if side.tests[0].rising is not None else "closing"
+    laws = common.compensator, designed.own
+    left = ([remaining_dead_zone(law, test, sign)[branch] for law in laws] for test in side.tests)
+    return round(100 * max(shared - own for shared, own in left), 5)
+
+
+def table_files(rows: Sequence[Mapping[str, Any]]) -> dict[str, bytes]:
+    """Return valves.csv and valves.parquet, the same rows in both.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        From `rows_of`.
+    """
+    import polars
+
+    text = [column for column in rows[0] if column in TEXTS or column.endswith("trend")]
+    schema = {column: polars.String if column in text else polars.Float64 for column in rows[0]}
+    frame = polars.DataFrame([dict(row) for row in rows], schema=schema)
+    parquet = io.BytesIO()
+    frame.write_parquet(parquet)
+    return {"valves.csv": frame.write_csv().encode(), "valves.parquet": parquet.getvalue()}

@@ -1,0 +1,132 @@
+"""Which valves a batch has: one subfolder of recordings a valve, or a CSV file with one row a valve."""
+
+import csv
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from dzdesign.core.artefacts import read_bytes
+from dzdesign.core.errors import InputError, nearest
+from dzdesign.recordings import expand
+
+#: What recordings are called in a valve's folder where no --pattern says so; notes and photographs may lie beside them.
+RECORDINGS = ("csv", "txt", "tsv", "dat", "gz", "tdms", "mat", "h5", "hdf5", "parquet", "feather", "arrow")
+#: A name is a folder's on every system and a cell's in every spreadsheet.
+NAME = re.compile(r"[^\W_][\w .+-]{0,99}(?<![. ])")
+RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Valve:
+    """One valve of the batch.
+
+    Attributes
+    ----------
+    name : str
+        By which it stands in the table, and its folder's name.
+    patterns : tuple of str
+        Names of its recordings, or patterns.
+    overrides : mapping of str to str
+        Options that are different for this valve, as on the command line.
+    """
+
+    name: str
+    patterns: tuple[str, ...]
+    overrides: Mapping[str, str] = field(default_factory=dict)
+
+    def recordings(self) -> list[Path]:
+        """Return its recordings.
+
+        Raises
+        ------
+        InputError
+            If there are none.
+        """
+        if not self.patterns:
+            raise InputError(f"valve '{self.name}' has no recording; expected files such as ramp_1MPa.csv")
+        return expand(list(self.patterns))
+
+
+def valves_of(source: Path, pattern: str | None, options: Collection[str]) -> list[Valve]:
+    """Return the valves that a folder or a CSV file names, in the order of their names.
+
+    Parameters
+    ----------
+    source : Path
+        A folder with one subfolder a valve, or a CSV file with the columns name, files and any option.
+    pattern : str or None
+        Of the recordings in a subfolder; None takes all that are called as recordings are.
+    options : collection of str
+        Names of the options that a column of the CSV file may override.
+
+    Raises
+    ------
+    InputError
+        If there is no valve, or a name or a column can't be one.
+    """
+    if source.is_dir():
+        valves = _of_folder(source, pattern)
+    else:
+        if pattern is not None:
+            raise InputError(f"--pattern is for a folder, and '{source}' is none; write patterns in its column files")
+        valves = _of_table(source, options)
+    if not valves:
+        raise InputError(f"'{source}' names no valve; expected one subfolder of recordings, or one row, a valve")
+    _check_names([valve.name for valve in valves], source)
+    return sorted(valves, key=lambda valve: valve.name)
+
+
+def _of_folder(folder: Path, pattern: str | None) -> list[Valve]:
+    subfolders = [path for path in sorted(folder.iterdir()) if path.is_dir() and not path.name.startswith(".")]
+    return [Valve(name=path.name, patterns=tuple(_recordings_in(path, pattern))) for path in subfolders]
+
+
+def _recordings_in(folder: Path, pattern: str | None) -> list[str]:
+    found = folder.glob(pattern) if pattern else (p for p in folder.iterdir() if p.suffix[1:].lower() in RECORDINGS)
+    return sorted(str(path) for path in found if path.is_file() and not path.name.startswith("."))
+
+
+def _of_table(path: Path, options: Collection[str]) -> list[Valve]:
+    """Read the CSV file; a pattern of its column `files` is relative to its folder."""
+    try:
+        lines = read_bytes(path, "list of valves").decode("utf-8-sig").splitlines()
+        rows = list(csv.reader(lines, strict=True))
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"'{path}' is no CSV in UTF-8: {error}; first row name,files") from error
+    heading = [label.strip().replace("-", "_") for label in rows[0]] if rows else []
+    known = ("name", "files", *options)
+    for label in heading:
+        if label not in known:
+            raise InputError(
+                f"'{path}' has a column '{label[:40]}'{nearest(label, known)}, expected name, files, and options of "
+                "identify and design"
+            )
+    if len(set(heading)) < len(heading) or not {"name", "files"} <= set(heading):
+        raise InputError(f"'{path}' has the columns {', '.join(heading)}, expected name and files, each column once")
+    valves = []
+    for number, row in enumerate(rows[1:], start=2):
+        if not any(cell.strip() for cell in row):
+            continue
+        if len(row) != len(heading):
+            raise InputError(f"'{path}' row {number} has {len(row)} cells, expected {len(heading)} as in its first row")
+        cells = {label: cell.strip() for label, cell in zip(heading, row, strict=True)}
+        name, files = cells.pop("name"), cells.pop("files")
+        patterns = [str(path.parent / part.strip()) for part in files.split(";") if part.strip()]
+        overrides = {label: cell for label, cell in cells.items() if cell}
+        valves.append(Valve(name=name, patterns=tuple(patterns), overrides=overrides))
+    return valves
+
+
+def _check_names(names: Sequence[str], source: Path) -> None:
+    """Refuse names that can't be a folder's everywhere, and two that are one where case is not told apart."""
+    seen: dict[str, str] = {}
+    for name in names:
+        if not NAME.fullmatch(name) or RESERVED.fullmatch(name):
+            raise InputError(
+                f"'{source}' has a valve named '{name[:100]}', expected up to 100 letters, digits, blanks and . _ + -, "
+                "a letter or digit first; rename it"
+            )
+        if name.casefold() in seen:
+            raise InputError(f"'{source}' has the valves '{seen[name.casefold()]}' and '{name}'; rename one")
+        seen[name.casefold()] = name
