@@ -203,7 +203,8 @@ class _Clock:
 def _si_numbers(table: Table, quantity: str, column: Column, u_max: float) -> np.ndarray:
     """Return one column in SI, NaN where a sample is missing; refuse what no valve gives."""
     factor = _factor(table, quantity, column, u_max)
-    numbers = table.numbers(column.label) * factor
+    with np.errstate(over="ignore", invalid="ignore"):  # an infinity is refused below
+        numbers = table.numbers(column.label) * factor
     far = np.flatnonzero(np.abs(numbers) > LARGEST[QUANTITY_OF_COLUMN[quantity]])
     if far.size:
         row = int(far[0])
