@@ -223,6 +223,16 @@ def check_folder_may_be_written(folder: Path, schema: str | None = None) -> None
     """
     folder = Path(folder)
     try:
+        if folder.absolute().parent.is_dir():
+            with alone_in(folder.absolute().parent):  # another process may be exchanging it
+                return _check_folder(folder, schema)
+        _check_folder(folder, schema)
+    except (OSError, ValueError) as error:
+        raise InputError(f"the folder '{folder}' can't be written: {_reason(error)}; choose another with -o") from error
+
+
+def _check_folder(folder: Path, schema: str | None) -> None:
+    try:
         ancestry = (folder, *folder.absolute().parents)
         nearest = next((one for one in ancestry if one.exists()), folder)
         if nearest.exists() and not nearest.is_dir():
@@ -296,14 +306,15 @@ def write_folder(folder: Path, files: Mapping[str, str | bytes], manifest: Mappi
     listing = {name: sha256_of(data) for name, data in contents.items()}
     contents[MANIFEST_NAME] = to_json({**manifest, "files": listing}).encode()
     folder = Path(folder)
-    check_folder_may_be_written(folder, manifest.get("schema"))
     staging = None
     try:
         folder = Path(os.path.realpath(folder))  # a link stays, its target is replaced
+        if not folder.parent.is_dir():
+            _check_folder(folder, manifest.get("schema"))
         folder.parent.mkdir(parents=True, exist_ok=True)
         with alone_in(folder.parent):
             bring_back(folder)
-            check_folder_may_be_written(folder, manifest.get("schema"))  # another one may have written it meanwhile
+            _check_folder(folder, manifest.get("schema"))
             staging = beside(folder)
             _write_staging(staging, contents)
             if folder.is_dir():
