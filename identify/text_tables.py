@@ -30,7 +30,7 @@ BLOCK_BYTES = 1 << 23
 MOST_COLUMNS, LONGEST_HEADER = 4096, 1 << 20
 #: A gzip file that holds more than this many times its bytes, and `FREE_BYTES`, is made to fill a memory or a day:
 #: of a recording, whose clock runs and whose meter is noisy, some five to fifteen times are usual.
-LARGEST_RATIO, FREE_BYTES = 200, 1 << 26
+LARGEST_RATIO, FREE_BYTES = 64, 1 << 26
 #: A line that is neither a comment nor blank; what a spreadsheet makes of either has quotes or separators.
 TABLE_LINE = re.compile(rb'^(?![ \t,;"]*$)(?![ \t"]*#).+', re.MULTILINE)
 #: Joins the cells of a line inside: no cell of a text file holds it.
