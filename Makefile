@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 DOCS   := docs/derivation
 
-.PHONY: demo test lint docs goldens lock clean bench bench-batch bench-identify bench-isr bench-verify
+.PHONY: demo test lint docs goldens lock clean fuzz bench bench-batch bench-identify bench-isr bench-verify
 
 demo: $(STAMP)
 	$(BIN)/dzdesign demo demo
@@ -43,6 +43,17 @@ bench-verify: $(STAMP)
 # 1000 valves: a quarter of an hour of two cores; `make bench-batch BENCH=--quick` tries 60.
 bench-batch: $(STAMP)
 	$(BIN)/python benchmarks/batch/run.py $(BENCH)
+
+# Every reader against files that nobody meant; `make fuzz SECONDS=3600 SEED=2` goes on for an hour.
+SECONDS ?= 180
+SEED ?= 1
+fuzz: $(VENV)/.fuzz
+	$(BIN)/python benchmarks/fuzz/run_fuzz.py --seconds $(SECONDS) --seed $(SEED)
+	DZDESIGN_FUZZ=5 DZDESIGN_SEED=$(SEED) $(BIN)/pytest -q tests/test_hostile_files.py
+
+$(VENV)/.fuzz: $(STAMP)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation -e '.[fuzz]'
+	touch $@
 
 # The account of the paper as a page, for LaTeX and for machines; built, never committed.
 docs: $(STAMP)

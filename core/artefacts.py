@@ -1,110 +1,28 @@
-"""Artefact files: read, write whole or not at all, hash, check the schema."""
+"""Artefact files: written whole or not at all, and never over what is somebody's own."""
 
 import contextlib
-import hashlib
-import io
 import json
 import os
 import shutil
-import tempfile
-from collections.abc import Iterator, Mapping
-from pathlib import Path
-from typing import Any, BinaryIO
+from collections.abc import Iterable, Mapping
+from pathlib import Path, PurePosixPath, PureWindowsPath
+from typing import Any
 
 from dzdesign import __version__
+from dzdesign.core.documents import parse_document, sha256_of, sha256_of_file, to_json
 from dzdesign.core.errors import InputError
+from dzdesign.core.exchange import alone_in, beside, bring_back, put_in_place
+from dzdesign.core.input_files import MOST_DOCUMENT, open_bytes, read_bytes
+
+__all__ = [
+    "MANIFEST_NAME", "TOOL", "check_file_may_be_written", "check_folder_may_be_written", "check_inside",
+    "check_place_of_files", "open_bytes", "parse_document", "read_bytes", "sha256_of", "sha256_of_file", "to_json",
+    "write_file", "write_files", "write_folder",
+]  # fmt: skip
 
 #: File by which a folder is known as made by dzdesign, so that it may be made anew.
 MANIFEST_NAME = "manifest.json"
 TOOL = {"name": "dzdesign", "version": __version__}
-
-
-def sha256_of(content: bytes) -> str:
-    """Return the SHA-256 of `content` in hex."""
-    return hashlib.sha256(content).hexdigest()
-
-
-def sha256_of_file(file: BinaryIO) -> str:
-    """Return the SHA-256 of a whole file in hex, read piece by piece; the file is at its beginning again then."""
-    file.seek(0)
-    digest = hashlib.file_digest(file, "sha256").hexdigest()
-    file.seek(0)
-    return digest
-
-
-def read_bytes(path: Path, what: str) -> bytes:
-    """Read a whole file, or say in one sentence why it can't be read."""
-    with _refusing(path, what):
-        return Path(path).read_bytes()
-
-
-@contextlib.contextmanager
-def open_bytes(path: Path, what: str) -> Iterator[BinaryIO]:
-    """Open a file that may be larger than memory; or say in one sentence why it can't be read.
-
-    What is no regular file, such as a pipe, can be read only once, and is held in memory.
-    """
-    with _refusing(path, what):
-        file = open(path, "rb") if os.path.isfile(path) else io.BytesIO(Path(path).read_bytes())  # noqa: SIM115
-    with file:
-        try:
-            yield file
-        except OSError as error:  # a disk that fails, a share that is gone
-            raise InputError(f"{what} '{path}' can't be read: {error.strerror or error}") from error
-
-
-@contextlib.contextmanager
-def _refusing(path: Path, what: str) -> Iterator[None]:
-    try:
-        yield
-    except (FileNotFoundError, NotADirectoryError) as error:
-        raise InputError(f"{what} '{path}' does not exist; check the name and the folder") from error
-    except OSError as error:
-        if os.path.isdir(path):  # Windows calls reading a folder a lack of permission
-            raise InputError(f"{what} '{path}' is a folder, expected a file") from error
-        raise InputError(f"{what} '{path}' can't be read: {error.strerror}") from error
-    except ValueError as error:  # a name with a NUL, from a TOML file
-        raise InputError(f"{what} '{path}' can't be a file's name ({error})") from error
-
-
-def to_json(document: Mapping[str, Any]) -> str:
-    """Return the document as JSON text; a NaN or an infinity is an error, never written."""
-    return json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-
-
-def _no_number(word: str) -> float:
-    raise ValueError(f"{word} is not a number of JSON")
-
-
-def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    found = dict(pairs)
-    if len(found) < len(pairs):
-        seen: set[str] = set()
-        twice = next(key for key, _ in pairs if key in seen or seen.add(key))
-        raise ValueError(f"the key {twice[:40]!r} is there twice")
-    return found
-
-
-def parse_document(content: bytes, source: str, schemas: tuple[str, ...]) -> dict[str, Any]:
-    """Read a JSON artefact and check that its schema is one of `schemas`.
-
-    Raises
-    ------
-    InputError
-        If it is no JSON object in UTF-8, holds what can't be written again (NaN, half a character) or a key twice, or
-        has another schema.
-    """
-    expected = " or ".join(schemas)
-    try:
-        # JSON in UTF-16, or after a byte order mark, would be read here and stumbled over later.
-        document = json.loads(content.decode("utf-8"), parse_constant=_no_number, object_pairs_hook=_unique_keys)
-        to_json(document).encode()
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"'{source}' is not JSON ({error}); expected an artefact of schema {expected}") from error
-    found = document.get("schema") if isinstance(document, dict) else None
-    if found not in schemas:
-        raise InputError(f"'{source}' has the schema {str(found)[:40]!r}, expected {expected}; give another file")
-    return document
 
 
 def _family(schema: object) -> str:
@@ -216,26 +134,26 @@ def write_file(path: Path, content: str | bytes, schema: str | None = None, opti
     path = Path(path)
     data = content.encode() if isinstance(content, str) else content
     check_file_may_be_written(path, schema, option)
-    temporary = None
+    temporary = beside(path)
     try:
-        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as handle:
-            temporary = handle.name
+        with open(temporary, "xb") as handle:
             handle.write(data)
             handle.flush()
             os.fsync(handle.fileno())
         os.chmod(temporary, 0o644)
         os.replace(temporary, path)
-        temporary = None
     except (OSError, ValueError) as error:
         raise InputError(f"'{path}' can't be written: {_reason(error)}; choose another place with {option}") from error
     finally:  # an interrupt, too, leaves no half-written file behind
-        if temporary:
-            Path(temporary).unlink(missing_ok=True)
+        with contextlib.suppress(OSError, ValueError):
+            temporary.unlink(missing_ok=True)
 
 
 def _json_object(path: Path) -> dict[str, Any] | None:
-    """Return the JSON object that a file holds, or None if it holds anything else."""
+    """Return the JSON object that a file holds, or None if it holds anything else; a long measurement is not read."""
     try:
+        if not path.is_file() or path.stat().st_size > MOST_DOCUMENT:
+            return None
         document = json.loads(path.read_bytes())
     except (OSError, ValueError, RecursionError):
         return None
@@ -246,7 +164,51 @@ def _manifest_of(folder: Path) -> dict[str, Any] | None:
     """Return the manifest that dzdesign left in `folder`, or None."""
     document = _json_object(folder / MANIFEST_NAME)
     ours = document is not None and str(document.get("schema", "")).startswith("dzdesign.")
-    return document if ours and isinstance(document.get("files"), dict) else None
+    if not ours or not isinstance(document.get("files"), dict):
+        return None
+    # One that names what lies elsewhere is none of ours: nothing there is looked at, let alone replaced.
+    return document if all(_is_name_inside(name) for name in document["files"]) else None
+
+
+def _is_name_inside(name: str) -> bool:
+    """Tell whether a relative path stays in its folder, on any system: no root, drive or way up."""
+    posix, windows = PurePosixPath(name), PureWindowsPath(name)
+    parts = {*posix.parts, *windows.parts}
+    return bool(parts) and not (windows.anchor or posix.is_absolute() or ".." in parts or "\0" in name)
+
+
+def check_inside(folder: Path, names: Iterable[str], source: str) -> None:
+    """Refuse names of files that lie outside their folder, also by way of a link, and what is no regular file.
+
+    Parameters
+    ----------
+    folder : Path
+        Which they are relative to.
+    names : iterable of str
+        As a manifest gives them; one that is missing is no concern here.
+    source : str
+        Who names them, for the message.
+
+    Raises
+    ------
+    InputError
+        Naming the first of them.
+    """
+    home = os.path.realpath(folder)
+    for name in names:
+        if not _is_name_inside(name):
+            raise InputError(f"{source} names '{name[:80]}', which is no file inside of the folder; make it again")
+        path = Path(folder) / name
+        try:
+            found = os.path.realpath(path, strict=True)
+        except FileNotFoundError:
+            continue
+        except OSError as error:
+            raise InputError(f"'{path}', which {source} names, can't be read: {_reason(error)}") from error
+        if os.path.commonpath([home, found]) != home:
+            raise InputError(f"'{path}' is a link to a place outside of '{folder}'; put the file itself there")
+        if not os.path.isfile(found):
+            raise InputError(f"'{path}', which {source} names, is no file; make the folder again")
 
 
 def check_folder_may_be_written(folder: Path, schema: str | None = None) -> None:
@@ -260,6 +222,16 @@ def check_folder_may_be_written(folder: Path, schema: str | None = None) -> None
         Of the manifest to be written; a folder of another kind (the firmware, named again for its evidence) is refused.
     """
     folder = Path(folder)
+    try:
+        if folder.absolute().parent.is_dir():
+            with alone_in(folder.absolute().parent):  # another process may be exchanging it
+                return _check_folder(folder, schema)
+        _check_folder(folder, schema)
+    except (OSError, ValueError) as error:
+        raise InputError(f"the folder '{folder}' can't be written: {_reason(error)}; choose another with -o") from error
+
+
+def _check_folder(folder: Path, schema: str | None) -> None:
     try:
         ancestry = (folder, *folder.absolute().parents)
         nearest = next((one for one in ancestry if one.exists()), folder)
@@ -283,11 +255,16 @@ def _check_folder_is_ours(folder: Path, schema: str | None) -> None:
         )
     for name, digest in manifest["files"].items():
         path = folder / name
-        if path.is_file() and sha256_of(path.read_bytes()) != digest:
+        if path.is_file() and _digest(path) != digest:
             raise InputError(
                 f"'{path}' was changed since dzdesign wrote it and would be lost; "
                 "move it away or choose a new folder with -o"
             )
+
+
+def _digest(path: Path) -> str:
+    with open(path, "rb") as file:
+        return sha256_of_file(file)
 
 
 def _carry_over(folder: Path, staging: Path, generated: set[str]) -> None:
@@ -329,23 +306,23 @@ def write_folder(folder: Path, files: Mapping[str, str | bytes], manifest: Mappi
     listing = {name: sha256_of(data) for name, data in contents.items()}
     contents[MANIFEST_NAME] = to_json({**manifest, "files": listing}).encode()
     folder = Path(folder)
-    check_folder_may_be_written(folder, manifest.get("schema"))
     staging = None
     try:
         folder = Path(os.path.realpath(folder))  # a link stays, its target is replaced
+        if not folder.parent.is_dir():
+            _check_folder(folder, manifest.get("schema"))
         folder.parent.mkdir(parents=True, exist_ok=True)
-        staging = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
-        os.chmod(staging, 0o755)
-        for name, data in contents.items():
-            target = staging / name
-            target.parent.mkdir(parents=True, exist_ok=True)
-            target.write_bytes(data)
-        if folder.is_dir():
-            old = _manifest_of(folder)
-            _carry_over(folder, staging, set(old["files"]) if old else set())
-            _exchange(folder, staging)
-        else:
-            os.replace(staging, folder)
+        with alone_in(folder.parent):
+            bring_back(folder)
+            _check_folder(folder, manifest.get("schema"))
+            staging = beside(folder)
+            _write_staging(staging, contents)
+            if folder.is_dir():
+                old = _manifest_of(folder)
+                _carry_over(folder, staging, set(old["files"]) if old else set())
+                put_in_place(staging, folder)
+            else:
+                os.replace(staging, folder)
     except (OSError, ValueError) as error:
         raise InputError(
             f"the folder '{folder}' can't be written: {_reason(error)}; choose another place with -o"
@@ -355,17 +332,11 @@ def write_folder(folder: Path, files: Mapping[str, str | bytes], manifest: Mappi
             shutil.rmtree(staging, ignore_errors=True)
 
 
-def _exchange(folder: Path, staging: Path) -> None:
-    """Put `staging` in the place of `folder`; if that fails half-way the old one comes back."""
-    retired = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}.old."))
-    old = retired / "old"
-    try:
-        os.replace(folder, old)
-        os.replace(staging, folder)
-    except BaseException:
-        if old.exists() and not folder.exists():
-            os.replace(old, folder)
-        with contextlib.suppress(OSError):  # not empty if the old one could not come back: then it stays there
-            retired.rmdir()
-        raise
-    shutil.rmtree(retired, ignore_errors=True)
+def _write_staging(staging: Path, contents: Mapping[str, bytes]) -> None:
+    """Write the files of a folder that nobody knows yet."""
+    staging.mkdir(mode=0o755)
+    os.chmod(staging, 0o755)  # whatever the umask
+    for name, data in contents.items():
+        target = staging / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_bytes(data)

@@ -5,14 +5,13 @@ from dataclasses import dataclass
 from types import NoneType
 from typing import Any
 
-from dzdesign.core.errors import InputError
+from dzdesign.core.errors import InputError, quoted
 
 #: A mapping has (at least) these keys, a list holds any number of one shape, a tuple is a choice of shapes,
 #: a type is a value of that type (``float``: a number), `Number` and `Exactly` say more.
 Shape = Any
 
 NAMES = {float: "a number", int: "a whole number", str: "text", bool: "true or false", dict: "an object"}
-LONGEST = 40
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,9 +78,7 @@ def _check(value: Any, shape: Shape, place: str, source: str, remedy: str) -> No
         if not (value is None and NoneType in shape):
             _check(value, next(one for one in shape if one is not NoneType), place, source, remedy)
     elif not _fits(value, shape):
-        found = repr(value)
-        found = found if len(found) <= LONGEST else f"{found[:LONGEST]}..."
-        raise InputError(f"{source}: '{place}' is {found}, expected {_named(shape)}; {remedy}")
+        raise InputError(f"{source}: '{place}' is {quoted(value)}, expected {_named(shape)}; {remedy}")
 
 
 def _fits(value: Any, shape: Shape) -> bool:

@@ -5,7 +5,7 @@ import re
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from dzdesign.core.errors import InputError, nearest
+from dzdesign.core.errors import InputError, nearest, quoted
 
 if TYPE_CHECKING:
     import pint
@@ -43,7 +43,7 @@ SPELLINGS = {
 #: ``9**9**9**9`` would never end.
 FACTOR = r"[^\W\d]\w*(?:(?:\*\*|\^)-?\d)?"
 UNIT = re.compile(rf"{FACTOR}(?:\s*[*/·\s]\s*{FACTOR})*")
-LONGEST_UNIT = 40
+LONGEST_UNIT, LONGEST_QUANTITY = 40, 200
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", re.ASCII)
 
 
@@ -81,11 +81,11 @@ def si_factor(unit: str, quantity: str) -> float:
         # A unit scales from zero: gauge offsets (degC, dBm) have no place in these quantities.
         factor = _registry().Quantity(1.0, spelled).to(SI_UNIT[quantity]).magnitude
     except Exception as error:  # pint and its tokenizer raise many kinds; all mean "not this unit"
-        known = EXAMPLES[quantity].split(", ")
+        shown, known = unit[:LONGEST_UNIT], EXAMPLES[quantity].split(", ")
         by_lower_case = {name.lower(): name for name in known}  # BAR, Mpa: the commonest slip
         hint = f" (did you mean '{by_lower_case[spelled.lower()]}'?)" if spelled.lower() in by_lower_case else ""
         raise InputError(
-            f"'{unit[:LONGEST_UNIT]}' is not a unit of {quantity} that dzdesign knows{hint or nearest(unit, known)}; "
+            f"'{shown}' is not a unit of {quantity} that dzdesign knows{hint or nearest(shown, known)}; "
             f"expected for example {EXAMPLES[quantity]}"
         ) from error
     return float(factor)
@@ -115,6 +115,8 @@ def parse_quantity(text: str, quantity: str, option: str) -> float:
     """
     example = EXAMPLES[quantity].split(",")[0]
     words = text.strip().replace(",", ".")
+    if len(text) > LONGEST_QUANTITY:
+        raise InputError(f"{option} is {quoted(text)}, expected a number and a unit such as '1 {example}'")
     number = NUMBER.match(words)
     unit = words[number.end() :].strip() if number else ""
     if number is None or unit[:1] == ".":

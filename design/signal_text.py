@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from math import floor
 
-from dzdesign.core.errors import InputError
+from dzdesign.core.errors import InputError, quoted
 from dzdesign.core.units import parse_quantity, si_factor
 from dzdesign.design.signals import CommandSignal, PressureSignal
 
@@ -20,6 +20,8 @@ SIGNAL = re.compile(
     rf"(?:\s*\+\s*(?P<offset>\d+(?:\.\d+)?)\s*(?P<volt>[A-Za-z]+))?"
     r"(?:\s*=\s*(?P<span>.+?))?\s*"
 )
+#: Beyond this it is none, and matching it would take the square of its length.
+LONGEST = 120
 EXAMPLE = "'0..10 V x 0.3', '-10..10 V x 0.15 + 1.5 V' or '4..20 mA on 150 ohm = 25 MPa'"
 
 
@@ -120,9 +122,9 @@ def parse_signal(text: str, option: str) -> PinSignal:
     >>> float(parse_signal("4..20 mA on 150 ohm = 25 MPa", "--pressure-a").volts_per_unit)
     150.0
     """
-    match = SIGNAL.fullmatch(text)
+    match = SIGNAL.fullmatch(text) if len(text) <= LONGEST else None
     if not match:
-        raise InputError(f"{option}: '{text}' is no signal, expected one such as {EXAMPLE}")
+        raise InputError(f"{option}: {quoted(text)} is no signal, expected one such as {EXAMPLE}")
     current = match["shunt"] is not None
     factor = Fraction(repr(si_factor(match["unit"], "current" if current else "voltage")))
     low, high = (Fraction(match[end]) * factor for end in ("low", "high"))

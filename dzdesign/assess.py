@@ -1,15 +1,21 @@
 """`dzdesign assess`: ramps recorded without and with the compensator, side by side, and the limits of the latter."""
 
 import argparse
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dzdesign.commands import say
 from dzdesign.core.artefacts import check_file_may_be_written, to_json, write_file, write_files
-from dzdesign.core.errors import InputError
+from dzdesign.core.errors import InputError, one_line
 from dzdesign.core.units import parse_quantity
-from dzdesign.recordings import check_plots, knee_window, optional_quantity, read_recordings, refuse_copies
+from dzdesign.recordings import (
+    check_plots,
+    knee_window,
+    optional_quantity,
+    read_recordings,
+    refuse_copies,
+    two_per_cents,
+)
 
 if TYPE_CHECKING:
     from dzdesign.verify.assessment import AssessOptions
@@ -48,7 +54,7 @@ def run_assess(args: argparse.Namespace) -> int:
         print(to_json(document), end="")
     else:
         print_assessment(found)
-        print(f"Written: {args.output}" + (f", plots in {args.plots}" if args.plots else ""))
+        print(one_line(f"Written: {args.output}" + (f", plots in {args.plots}" if args.plots else "")))
     return 0 if found.holds else 1
 
 
@@ -73,7 +79,7 @@ def _options(args: argparse.Namespace) -> "AssessOptions":
         after_u_max=after_u_max,
         level=level,
         level_share=share,
-        window=_window(args.linearity_window),
+        window=two_per_cents(args.linearity_window, "--linearity-window", "full command such as '10-90'"),
         limits=parse_limits(args.limits, after_u_max or reading.u_max) if args.limits is not None else {},
     )
 
@@ -85,10 +91,3 @@ def _level(text: str | None) -> tuple[float | None, float | None]:
     if text.rstrip().endswith("%"):
         return None, parse_quantity(text, "ratio", "--level")
     return parse_quantity(text, "flow", "--level"), None
-
-
-def _window(text: str) -> tuple[float, float]:
-    ends = re.fullmatch(r"\s*(\d+\.?\d*)\s*%?\s*-\s*(\d+\.?\d*)\s*%?\s*", text, re.ASCII)
-    if ends is None:
-        raise InputError(f"--linearity-window is '{text}', expected two per cents of full command such as '10-90'")
-    return float(ends[1]) / 100, float(ends[2]) / 100

@@ -12,7 +12,7 @@ from importlib import import_module
 from typing import NoReturn
 
 from dzdesign import __version__
-from dzdesign.core.errors import DzdesignError, InputError, RequirementError, nearest, one_line
+from dzdesign.core.errors import DzdesignError, InputError, RequirementError, clear_line, nearest
 
 DOES_NOT_HOLD, BAD_INPUT, INTERRUPTED, PIPE_CLOSED = 1, 2, 130, 141
 
@@ -378,10 +378,10 @@ def main(argv: list[str] | None = None) -> int:
         module, function = args.run.split(":")
         return getattr(import_module(module), function)(args)
     except RequirementError as error:
-        print(f"dzdesign: does not hold: {one_line(str(error))}", file=sys.stderr)
+        print(f"dzdesign: does not hold: {clear_line(str(error))}", file=sys.stderr)
         return DOES_NOT_HOLD
     except DzdesignError as error:
-        print(f"dzdesign: {one_line(str(error))}", file=sys.stderr)
+        print(f"dzdesign: {clear_line(str(error))}", file=sys.stderr)
         return BAD_INPUT
     except KeyboardInterrupt:
         print("dzdesign: interrupted; nothing half-written was left", file=sys.stderr)

@@ -17,7 +17,7 @@ from dzdesign.core.artefacts import (
     write_files,
     write_folder,
 )
-from dzdesign.core.errors import InputError
+from dzdesign.core.errors import InputError, clear_line, one_line
 from dzdesign.core.units import parse_quantity
 from dzdesign.identify_options import identify_options
 from dzdesign.recordings import check_plots, read_recordings, refuse_copies
@@ -25,7 +25,7 @@ from dzdesign.recordings import check_plots, read_recordings, refuse_copies
 
 def say(text: str) -> None:
     """Tell of progress, on stderr: stdout is for results."""
-    print(f"dzdesign: {text}", file=sys.stderr)
+    print(f"dzdesign: {clear_line(text)}", file=sys.stderr)
 
 
 def _seed(text: str) -> int:
@@ -58,7 +58,7 @@ def run_identify(args: argparse.Namespace) -> int:
         print(to_json(document), end="")
     else:
         print_valve(found.model)
-        print(f"Written: {args.output}" + (f", plots in {args.plots}" if args.plots else ""))
+        print(one_line(f"Written: {args.output}" + (f", plots in {args.plots}" if args.plots else "")))
     return 0
 
 
@@ -88,7 +88,7 @@ def run_design(args: argparse.Namespace) -> int:
         print(to_json(document), end="")
     else:
         print_compensator(compensator)
-        print(f"Written: {args.output}")
+        print(one_line(f"Written: {args.output}"))
     return 0
 
 
@@ -188,7 +188,7 @@ def run_verify(args: argparse.Namespace) -> int:
         print_verification(verification)
         if mutants:
             print_firmware_mutants(mutants)
-        print(f"Evidence: {output}")
+        print(one_line(f"Evidence: {output}"))
     return 0 if verification.holds else 1
 
 
@@ -220,7 +220,8 @@ def run_simulate(args: argparse.Namespace) -> int:
     firmware = Path(args.firmware) if args.firmware else None
     files, manifest = simulated_files(plant, pressures, ramp_s, bench, say=say, firmware=firmware)
     write_folder(Path(args.output), files, manifest)
-    print(to_json(manifest) if args.json else f"Written: {len(files)} simulated ramp tests in {args.output}")
+    said = one_line(f"Written: {len(files)} simulated ramp tests in {args.output}")
+    print(to_json(manifest) if args.json else said)
     return 0
 
 

@@ -5,8 +5,10 @@ from collections.abc import Collection
 from pathlib import Path
 
 from dzdesign.core.artefacts import read_bytes
-from dzdesign.core.errors import InputError, nearest
+from dzdesign.core.errors import InputError, nearest, quoted
 
+#: Characters of a key to which the nearest known one is looked for.
+LONGEST_KEY = 80
 #: Of an option in the file: text, a list of texts, or a table.
 Value = str | list[str] | dict[str, str]
 
@@ -41,8 +43,8 @@ def options_from_file(
     for key, value in document.items():
         name = key.replace("-", "_")
         if name not in known:
-            hint = nearest(name, known).replace("_", "-")
-            raise InputError(f"'{path}': there is no option '{key}'{hint}; see `dzdesign COMMAND --help`")
+            hint = nearest(name[:LONGEST_KEY], known).replace("_", "-")
+            raise InputError(f"'{path}': there is no option {quoted(key)}{hint}; see `dzdesign COMMAND --help`")
         if name in options:
             raise InputError(f"'{path}': option '{key}' is given twice, with - and with _; keep one")
         options[name] = _texts(path, key, value, name in repeatable, name in tables)
@@ -55,10 +57,15 @@ def _texts(path: str, key: str, value: object, repeatable: bool, table: bool) ->
         items = value
     else:
         items = list(value.values()) if table and isinstance(value, dict) else [value]
-    if not items or not all(isinstance(item, str | int | float) and not isinstance(item, bool) for item in items):
-        raise InputError(
-            f"'{path}': option '{key}' is {str(value)[:40]!r}, expected text such as \"1 MPa\" or a number"
-        )
+    if not items or not all(_is_text(item) for item in items):
+        raise InputError(f"'{path}': option '{key}' is {quoted(value)}, expected text such as \"1 MPa\" or a number")
     if isinstance(value, dict):
         return {name: str(item) for name, item in value.items()}
     return [str(item) for item in items] if isinstance(value, list) else str(value)
+
+
+def _is_text(item: object) -> bool:
+    """Tell whether an item is text, or a number that can be written as text: a hexadecimal one may be too long."""
+    if isinstance(item, int) and (isinstance(item, bool) or item.bit_length() > 64):
+        return False
+    return isinstance(item, str | int | float)

@@ -156,4 +156,4 @@ def _report(args: argparse.Namespace, recording: "Recording", reader: "FrameRead
         f"wrong CRC, {reader.skipped} octets skipped, {recording.restarts} restarts of the firmware"
     )
     print(f"Faults: {', '.join(faults) if faults else 'none'}")
-    print(f"Written: {args.output}; add a column Q_Lmin from your flow meter for `dzdesign identify`")
+    print(one_line(f"Written: {args.output}; add a column Q_Lmin from your flow meter for `dzdesign identify`"))

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dzdesign.core.artefacts import check_place_of_files
-from dzdesign.core.errors import InputError, nearest
+from dzdesign.core.errors import InputError, nearest, quoted
 from dzdesign.core.units import parse_quantity
 from dzdesign.progress import with_bar
 
@@ -60,7 +60,8 @@ def expand(patterns: list[str]) -> list[Path]:
     """Return the files that the patterns name; cmd.exe leaves ``*.csv`` to the program."""
     paths = []
     for pattern in patterns:
-        matches = sorted(glob.glob(pattern)) if glob.has_magic(pattern) and not os.path.exists(pattern) else [pattern]
+        magic = glob.has_magic(pattern) and "\0" not in pattern and not os.path.exists(pattern)
+        matches = sorted(glob.glob(pattern)) if magic else [pattern]
         if not matches:
             raise InputError(f"no file matches '{pattern}'; check the name and the folder")
         paths += [Path(match) for match in matches]
@@ -69,9 +70,24 @@ def expand(patterns: list[str]) -> list[Path]:
 
 def knee_window(text: str) -> tuple[float, float]:
     """Return the two shares of the largest flow that --knee-window names."""
-    ends = re.fullmatch(r"\s*(\d+\.?\d*)\s*%?\s*-\s*(\d+\.?\d*)\s*%?\s*", text, re.ASCII)
+    return two_per_cents(text, "--knee-window", "the largest flow such as '12-50'")
+
+
+def two_per_cents(text: str, option: str, example: str) -> tuple[float, float]:
+    """Return two per cents such as ``12-50`` as shares.
+
+    Parameters
+    ----------
+    text : str
+        As given.
+    option, example : str
+        Where, and what they are of; for the message.
+    """
+    # Digits and blanks without an end would be matched in the square of their number.
+    digits = r"\s{0,9}(\d{1,9}(?:\.\d{0,15})?)\s{0,9}%?\s{0,9}"
+    ends = re.fullmatch(f"{digits}-{digits}", text, re.ASCII)
     if ends is None:
-        raise InputError(f"--knee-window is '{text}', expected two per cents of the largest flow such as '12-50'")
+        raise InputError(f"{option} is {quoted(text)}, expected two per cents of {example}")
     return float(ends[1]) / 100, float(ends[2]) / 100
 
 

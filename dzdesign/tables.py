@@ -1,7 +1,9 @@
 """Results as tables on stdout, by rich; plain where stdout is no terminal."""
 
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from dzdesign.core.errors import one_line
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -25,7 +27,14 @@ def new_console() -> "Console":
     """Return stdout as a page: as wide as the terminal, or `FILE_WIDTH` columns."""
     from rich.console import Console
 
-    return Console(highlight=False, width=None if sys.stdout.isatty() else FILE_WIDTH)
+    class Page(Console):
+        """Prints every text as it is: a file's name is no markup, no emoji, and steers no terminal."""
+
+        def render_str(self, text: str, **options: Any) -> Any:
+            """Return the text for a cell, a title or a line."""
+            return super().render_str(one_line(text), **{**options, "markup": False, "emoji": False})
+
+    return Page(highlight=False, width=None if sys.stdout.isatty() else FILE_WIDTH)
 
 
 def new_table(title: str, *columns: str) -> "Table":
@@ -146,7 +155,7 @@ def print_compensator(compensator: "Compensator") -> None:
 
 def print_firmware(firmware: "Firmware", folder: str) -> None:
     """Print the files of a firmware folder."""
-    print(f"Firmware for {firmware.manifest['target']}, law {firmware.manifest['law']}, in {folder}:")
+    print(one_line(f"Firmware for {firmware.manifest['target']}, law {firmware.manifest['law']}, in {folder}:"))
     for name in firmware.files:
         print(f"  {name}")
 

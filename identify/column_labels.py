@@ -22,6 +22,8 @@ QUANTITY_OF_COLUMN = {"time": "time", "u": "voltage", "dP": "pressure", "pA": "p
 #: How a column is best named, for the messages.
 EXAMPLE_LABELS = {"time": "time_s", "u": "u_V", "dP": "dP_MPa", "pA": "pA_MPa", "pB": "pB_MPa", "Q": "Q_Lmin"}
 EXAMPLE_UNITS = {"time": "s", "u": "V", "dP": "MPa", "pA": "MPa", "pB": "MPa", "Q": "L/min"}
+#: Labels among which the one that was meant is looked for.
+MOST_MEANT = 200
 #: Units of a command that is a share of u_max.
 PER_CENT = ("%", "pct", "percent")
 
@@ -145,10 +147,13 @@ def split_label(label: str) -> tuple[str | None, str]:
     (('dP', 'MPa'), ('Q', 'L/min'), ('u', 'V'), ('u', ''))
     """
     bare = clean_label(label)
-    match = re.fullmatch(r"(.+?)\s*[\[(]\s*(.*?)\s*[\])]", bare)
-    if match is None:  # the unit follows the last underscore; L_min, as artefacts spell it, has one itself
+    # By hand: a regular expression for both brackets takes the cube of the label's length.
+    bracket = re.compile(r"[\[(]").search(bare, 1)
+    if bracket and bare[-1] in "])":
+        name, unit = bare[: bracket.start()].rstrip(), bare[bracket.end() : -1].strip()
+    else:  # the unit follows the last underscore; L_min, as artefacts spell it, has one itself
         match = re.fullmatch(r"(.+?)_([lL]_min|[^_]*)", bare)
-    name, unit = match.groups() if match else ("", bare)
+        name, unit = match.groups() if match else ("", bare)
     for candidate, its_unit in ((name, unit), (bare, "")):
         quantity = COLUMN_NAMES.get(re.sub(r"[\s_]", "", candidate).lower())
         if quantity:
@@ -158,7 +163,7 @@ def split_label(label: str) -> tuple[str | None, str]:
 
 def _missing_column(quantity: str, table: Table, columns: Collection[str]) -> InputError:
     """Return the error that names the columns found, and the one that may have been meant."""
-    unused = [label for label in table.labels if split_label(label)[0] not in columns]
+    unused = [label for label in table.labels[:MOST_MEANT] if split_label(label)[0] not in columns]
     bare = {re.split(r"[_\[(]", label)[0].strip().lower(): label for label in unused}
     spellings = [name for name, its in COLUMN_NAMES.items() if its == quantity]
     meant = [bare[near] for name in spellings for near in get_close_matches(name, bare, n=1)]

@@ -106,6 +106,8 @@ def _numbers(column: Any) -> Callable[[int, int], np.ndarray]:
 def _seconds(column: Any) -> Callable[[int, int], np.ndarray]:
     def read(start: int, stop: int) -> np.ndarray:
         series = column.slice(start, stop - start).collect().to_series()
+        if str(series.dtype) == "Time":  # of a day, in ns; a recording over midnight goes back and is refused
+            return series.to_physical().cast(float).to_numpy() / 1e9
         if str(series.dtype).startswith(("Date", "Datetime")):
             series = series - column.slice(0, 1).collect().to_series()[0]
         return series.dt.total_microseconds().cast(float).to_numpy() / 1e6

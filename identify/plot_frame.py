@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from dzdesign.core.errors import one_line
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -58,6 +60,8 @@ def new_figure(height: float, *title: str) -> "Figure":
     figure = Figure(figsize=(WIDTH, height), layout="constrained")
     FigureCanvasAgg(figure)
     figure.get_layout_engine().set(w_pad=0.08, h_pad=0.06)
+    # What can't be printed can't stand in XML either, and half a character ends the drawing.
+    title = tuple(one_line(line) for line in title)
     lines = [part for line in title for part in textwrap.wrap(line, TITLE_WIDTH, max_lines=2, placeholder=" ...")]
     figure.suptitle("\n".join(lines), parse_math=False)
     return figure

@@ -5,7 +5,8 @@ A file is read block by block, and a long one thinned on the way: see `thinning`
 
 import gzip
 import io
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Mapping
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, final
@@ -94,12 +95,13 @@ def read_ramp_file(
     found: dict[str, Column] = {}
     with open_bytes(path, "ramp file") as file:
         sha256 = sha256_of_file(file)
-        for table in read_tables(file, path):
-            if not found:
-                found = find_columns(table, columns or {})
-                _refuse_two_pressures(table, found, dp)
-                _refuse_unequal_lengths(table, found)
-            thinner.add(_complete_rows(table, found, clock, u_max, dp))
+        with closing(read_tables(file, path)) as tables:
+            for table in tables:
+                if not found:
+                    found = find_columns(table, columns or {})
+                    _refuse_two_pressures(table, found, dp)
+                    _refuse_unequal_lengths(table, found)
+                thinner.add(_complete_rows(table, found, clock, u_max, dp))
     if thinner.read < MIN_ROWS:
         raise InputError(f"'{path}' has {thinner.read} complete rows, expected at least {MIN_ROWS} of a ramp test")
     time, u, q, *measured = (column.copy() for column in thinner.rows())
@@ -116,7 +118,7 @@ def read_ramp_file(
     )
 
 
-def read_tables(file: BinaryIO, path: Path) -> Iterator[Table]:
+def read_tables(file: BinaryIO, path: Path) -> Generator[Table, None, None]:
     """Read a table of any known format, block by block; its first bytes tell which, not its name.
 
     Parameters
@@ -203,7 +205,8 @@ class _Clock:
 def _si_numbers(table: Table, quantity: str, column: Column, u_max: float) -> np.ndarray:
     """Return one column in SI, NaN where a sample is missing; refuse what no valve gives."""
     factor = _factor(table, quantity, column, u_max)
-    numbers = table.numbers(column.label) * factor
+    with np.errstate(over="ignore", invalid="ignore"):  # an infinity is refused below
+        numbers = table.numbers(column.label) * factor
     far = np.flatnonzero(np.abs(numbers) > LARGEST[QUANTITY_OF_COLUMN[quantity]])
     if far.size:
         row = int(far[0])

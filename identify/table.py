@@ -11,10 +11,12 @@ from typing import final
 
 import numpy as np
 
-from dzdesign.core.errors import InputError, nearest
+from dzdesign.core.errors import InputError, nearest, one_line
 
 #: Characters of a cell, and columns of a file, that a message quotes.
 QUOTED_CHARACTERS, QUOTED_COLUMNS = 40, 12
+#: Characters of a library's own error that are quoted.
+LONGEST_REASON = 200
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,10 +122,7 @@ class ArrayTable(Table):
         return f"sample {self.start + row + 1}"
 
     def _read(self, label: str, start: int, stop: int) -> np.ndarray:
-        try:
-            return self.columns[label].read(start, stop)
-        except Exception as error:  # each library raises kinds of its own
-            raise unreadable(self.path, self.format, error) from error
+        return self.columns[label].read(start, stop)
 
 
 def unreadable(path: Path, name: str, error: Exception) -> InputError:
@@ -138,5 +137,5 @@ def unreadable(path: Path, name: str, error: Exception) -> InputError:
     error : Exception
         The library's own.
     """
-    reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+    reason = one_line(str(error).strip().partition("\n")[0])[:LONGEST_REASON] or type(error).__name__
     return InputError(f"'{path}' is not a {name} file that can be read ({reason}); save it again, or export it as CSV")

@@ -5,6 +5,7 @@ A file is read `BLOCK_BYTES` at a time, cut at an end of line: one longer than m
 
 import csv
 import gzip
+import os
 import re
 import zlib
 from collections.abc import Iterator, Sequence
@@ -25,6 +26,13 @@ Lines = list[tuple[int, str]]
 
 #: Bytes of text that are read at a time.
 BLOCK_BYTES = 1 << 23
+#: A recording has some ten columns; a header beyond this is no table, and would take minutes to be searched.
+MOST_COLUMNS, LONGEST_HEADER = 4096, 1 << 20
+#: A gzip file that holds more than this many times its bytes, and `FREE_BYTES`, is made to fill a memory or a day:
+#: of a recording, whose clock runs and whose meter is noisy, some five to fifteen times are usual.
+LARGEST_RATIO, FREE_BYTES = 64, 1 << 26
+#: A line that is neither a comment nor blank; what a spreadsheet makes of either has quotes or separators.
+TABLE_LINE = re.compile(rb'^(?![ \t,;"]*$)(?![ \t"]*#).+', re.MULTILINE)
 #: Joins the cells of a line inside: no cell of a text file holds it.
 CELL_END = "\x1f"
 #: A cell with a date or a time of day.
@@ -132,6 +140,11 @@ def text_tables(file: BinaryIO, path: Path) -> Iterator[TextTable]:
     for block in _blocks(file, path):
         if header is None:
             header, rows = _find_header(block, number, path)
+            if header is None and len(block) >= LONGEST_HEADER:
+                raise InputError(
+                    f"'{path}' begins with {len(block)} bytes of comments and blank lines; expected a header row such "
+                    "as time_s,u_V,dP_MPa,Q_Lmin near its beginning"
+                )
         else:
             rows = block
         if header is not None:
@@ -147,12 +160,18 @@ def _blocks(file: BinaryIO, path: Path) -> Iterator[bytes]:
     packed = file.read(2) == b"\x1f\x8b"
     file.seek(0)
     stream = gzip.GzipFile(fileobj=file) if packed else file
+    most = FREE_BYTES + LARGEST_RATIO * _size(file) if packed else None
     rest, offset = b"", 0
     while True:
         try:
             data = stream.read(BLOCK_BYTES)
         except (gzip.BadGzipFile, EOFError, zlib.error) as error:
             raise InputError(f"'{path}' is not a whole gzip file ({error}); copy it again") from error
+        if most is not None and offset + len(rest) + len(data) > most:
+            raise InputError(
+                f"'{path}' unpacks to more than {LARGEST_RATIO} times its size, as no recording does; give the "
+                "recording itself, not packed"
+            )
         block, last = rest + data, len(data) < BLOCK_BYTES
         # The last end of line may be half of one: a carriage return whose line feed is still to come.
         end = len(block) if last else max(block.rfind(b"\n"), block.rfind(b"\r", 0, -1)) + 1
@@ -165,6 +184,13 @@ def _blocks(file: BinaryIO, path: Path) -> Iterator[bytes]:
         if last:
             return
         rest, offset = block[end:], offset + end
+
+
+def _size(file: BinaryIO) -> int:
+    """Return how many bytes a file has, and go back to its beginning."""
+    size = file.seek(0, os.SEEK_END)
+    file.seek(0)
+    return size
 
 
 def _refuse_no_text(data: bytes, offset: int, path: Path) -> None:
@@ -184,21 +210,24 @@ def _refuse_no_text(data: bytes, offset: int, path: Path) -> None:
 
 def _find_header(block: bytes, number: int, path: Path) -> tuple[Header | None, bytes]:
     """Return the first line that is neither a comment nor blank, read as the header, and what follows it."""
-    start = 0
-    while start < len(block):
-        end = (block.find(b"\n", start) + 1) or len(block)
-        lines = _table_lines(block[start:end].decode().removesuffix("\n"), number)
-        if lines:
-            return _header(*lines[0], path), block[end:]
-        start, number = end, number + 1
-    return None, b""
+    found = TABLE_LINE.search(block)
+    if found is None:
+        return None, b""
+    number += block.count(b"\n", 0, found.start())
+    return _header(number, found[0].decode(), path), block[found.end() + 1 :]
 
 
 def _header(number: int, line: str, path: Path) -> Header:
     """Return the header that a line holds; refuse a line of numbers."""
     separator = max(SEPARATORS, key=line.count)
     separator = separator if separator in line else BLANKS
-    labels = tuple(clean_label(label) for label in _labels(line, separator))
+    columns = len(line.split()) if separator == BLANKS else line.count(separator) + 1
+    if columns > MOST_COLUMNS or len(line) > LONGEST_HEADER:
+        raise InputError(
+            f"'{path}' row {number} has {columns} cells, expected the columns of a ramp test, at most {MOST_COLUMNS}; "
+            "export only those"
+        )
+    labels = tuple(clean_label(label) for label in _labels(line, separator, number, path))
     if all(re.fullmatch(r"[-+\d.,eE\s]*", label) for label in labels):
         raise InputError(
             f"'{path}' has no header row (row {number} is '{line[:QUOTED_CHARACTERS]}'); "
@@ -283,20 +312,24 @@ def clean_label(label: str) -> str:
     return label.strip(' \t"')
 
 
-def _labels(header: str, separator: str) -> list[str]:
+def _labels(header: str, separator: str, number: int, path: Path) -> list[str]:
     """Return the labels of the header; between blanks, a unit in brackets belongs to the label before it."""
     if separator == BLANKS:
-        return re.findall(r"[^\s\[(]+(?:\s*[\[(][^\])]*[\])])?", header)
-    return _split(header, separator)
+        # Of a bracket that is never closed only so much is looked at: a long header of them would take hours.
+        return re.findall(r"[^\s\[(]+(?:\s{0,40}[\[(][^\])]{0,80}[\])])?", header)
+    return _split(header, separator, number, path)
 
 
-def _split(line: str, separator: str) -> list[str]:
+def _split(line: str, separator: str, number: int, path: Path) -> list[str]:
     """Return the cells of a line; inside quotes the separator is a character as any other."""
     if separator == BLANKS:
         return line.split()
     if '"' not in line:
         return line.split(separator)
-    return next(csv.reader([line], delimiter=separator, skipinitialspace=True))
+    try:
+        return next(csv.reader([line], delimiter=separator, skipinitialspace=True))
+    except csv.Error as error:  # a cell longer than 128 KiB, as after a quote that is never closed
+        raise InputError(f"'{path}' row {number} has a cell that can't be read ({error}); mind its quotes") from error
 
 
 def _read_cells(lines: Lines, header: Header, path: Path) -> "pl.DataFrame":
@@ -306,7 +339,7 @@ def _read_cells(lines: Lines, header: Header, path: Path) -> "pl.DataFrame":
     separator, width = header.separator, len(header.labels)
     table = [CELL_END.join(f"c{index}" for index in range(width))]
     for number, line in lines:
-        cells = _split(line, separator) if '"' in line or separator == BLANKS else None
+        cells = _split(line, separator, number, path) if '"' in line or separator == BLANKS else None
         count = line.count(separator) + 1 if cells is None else len(cells)
         if count != width:
             comma = separator == "," and count == 2 * width

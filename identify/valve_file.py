@@ -167,6 +167,14 @@ def _later_shape(side: dict[str, Any]) -> dict[str, Any]:
     return shape
 
 
+def _check_ramps(tests: list[dict[str, Any]], place: str, source: str) -> None:
+    """Check the names of the recordings of those tests that say which they were pooled from."""
+    for index, test in enumerate(tests):
+        if "ramps" in test:
+            key = f"{place}[{index}]"
+            check_shape({key: test}, {key: {"ramps": {"sources": [str]}}}, source, REMEDY)
+
+
 def valve_from_document(content: bytes, source: str) -> ValveModel:
     """Read valve.json; a missing or misshapen key is named.
 
@@ -181,6 +189,7 @@ def valve_from_document(content: bytes, source: str) -> ValveModel:
         if name in document["sides"]:
             check_shape(document, {"sides": {name: SIDE_SHAPE}}, source, REMEDY)
             check_shape(document, {"sides": {name: _later_shape(document["sides"][name])}}, source, REMEDY)
+            _check_ramps(document["sides"][name]["tests"], f"sides.{name}.tests", source)
     try:
         return ValveModel(
             u_max_V=document["u_max_V"],

@@ -12,6 +12,7 @@ import pytest
 from synthetic import needs_compiler
 
 from dzdesign.cli import main
+from dzdesign.core import exchange
 
 HEADER = "time_s,u_V,dP_MPa,Q_Lmin"
 #: What is told on stderr of the work under way, before it is found that it can't be done.
@@ -229,11 +230,11 @@ def test_a_bad_command_line(refusal, argv, words):
         ("seed = " + "9" * 5000, "'options.toml' is not TOML"),
         ("u-max = 10", "--u-max is '10' without a unit; write for example '10 V'"),
         ("u-max = '10 bar'", "--u-max is '10 bar': 'bar' is not a unit of voltage"),
-        ("u-max = ['10 V']", "option 'u-max' is \"['10 V']\", expected text"),
-        ("u-max = true", "option 'u-max' is 'True', expected text"),
+        ("u-max = ['10 V']", "option 'u-max' is ['10 V'], expected text"),
+        ("u-max = true", "option 'u-max' is True, expected text"),
         ("u-max = {V = 10}", "option 'u-max' is"),
         ("u-max = 1979-05-27", "option 'u-max' is"),
-        ("dp = []", "option 'dp' is '[]', expected text"),
+        ("dp = []", "option 'dp' is [], expected text"),
         ("dp = [['1 MPa']]", "option 'dp' is"),
         ("u-max = '10 V'\nu_max = '9 V'", "option 'u_max' is given twice"),
         ("confidence = nan", "the confidence is nan"),
@@ -327,6 +328,9 @@ VALVES = [
     ((*SIDE, "guards", "opening", "u_lower_V", 0), 9, "'guards.opening': a lower bound lies above the threshold"),
     ((*SIDE, "guards", "closing", "u_min0_V"), 4, "'guards.closing' is not the curve of 'reference', 'beta'"),
     ((*SIDE, "certificate", "guard"), "shut", "expected the guard among them, and no others than closing, mean, open"),
+    ((*SIDE, "tests", 1, "ramps", "sources"), None, "lacks the key 'sides.positive.tests[1].ramps.sources'"),
+    ((*SIDE, "tests", 1, "ramps"), [], "'sides.positive.tests[1].ramps' is [], expected an object with sources"),
+    ((*SIDE, "tests", 1, "ramps", "sources"), "a.csv", "'sides.positive.tests[1].ramps.sources' is 'a.csv'"),
     ((*SIDE, "opening_curve"), [], "'sides.positive.opening_curve' is [], expected an object"),
     ((*SIDE, "opening_curve", "u_V"), None, "lacks the key 'sides.positive.opening_curve.u_V'"),
     ((*SIDE, "opening_curve", "u_V", 0), None, "the opening curve has 1 thresholds and 2 errors at 2 pressure drops"),
@@ -465,7 +469,7 @@ def test_a_full_disk_leaves_the_old_output(refusal, monkeypatch):
         with monkeypatch.context() as patched:
             patched.setattr(os, name, full)
             assert "No space left on device" in refusal("identify", "a.csv", "-o", "valve.json")
-    monkeypatch.setattr(os, "replace", full)
+    monkeypatch.setattr(exchange, "exchanged", full)
     assert "No space left on device" in refusal("codegen", "compensator.json", "-o", "firmware")
 
 

@@ -10,12 +10,13 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from xml.etree import ElementTree
 
-from dzdesign.core.artefacts import MANIFEST_NAME, parse_document, read_bytes
+from dzdesign.core.artefacts import MANIFEST_NAME, read_bytes
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.shape import check_shape
 from dzdesign.verify.checks import Check
+from dzdesign.verify.firmware_folder import read_firmware_manifest
 from dzdesign.verify.host_compiler import check_strictly, host_compiler
-from dzdesign.verify.verification import FIRMWARE_SCHEMA, Verification
+from dzdesign.verify.verification import Verification
 
 TARGET = "f28335"
 DEVICE = "device_support/f2833x"
@@ -67,9 +68,9 @@ def check_against_c2000ware(folder: Path, ware: Path, say: Callable[[str], None]
     InputError
         If either folder is none of its kind, or there is no C compiler.
     """
-    path = folder / MANIFEST_NAME
-    manifest = parse_document(read_bytes(path, "firmware manifest"), str(path), (FIRMWARE_SCHEMA,))
-    check_shape(manifest, {"files": dict, "target": str}, str(path), "make it again with `dzdesign codegen`")
+    _, manifest = read_firmware_manifest(folder)
+    remedy = "make it again with `dzdesign codegen`"
+    check_shape(manifest, {"target": str}, str(folder / MANIFEST_NAME), remedy)
     if manifest["target"] != TARGET:
         raise InputError(f"--c2000ware checks firmware for {TARGET}, and '{folder}' is for {manifest['target']}")
     for headers in HEADERS:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dzdesign.core.artefacts import read_bytes
-from dzdesign.core.errors import InputError, nearest
+from dzdesign.core.errors import InputError, nearest, quoted
 from dzdesign.identify.model import SideModel
 
 if TYPE_CHECKING:
@@ -23,6 +23,8 @@ PWM_PERIOD_S = 400e-6
 MPA, L_MIN = 1e6, 1e-3 / 60
 #: Beyond any plant in the units of the names; an integer of TOML has no end.
 LARGEST_PARAMETER = 1e12
+#: Characters of a key to which the nearest known one is looked for.
+LONGEST_KEY = 80
 #: Faster than this is no valve's spool, and would take the integrator a thousand steps a phase.
 FASTEST_RAD_S = 1e6
 #: Of a hydraulic system, for the flow force.
@@ -77,8 +79,7 @@ class Plant:
         for field in fields(self):
             value = getattr(self, field.name)
             if type(value) not in (int, float) or not 0 <= value <= LARGEST_PARAMETER:
-                found = repr(value)[:40]
-                raise InputError(f"plant parameter {field.name} is {found}, expected a number of zero or more")
+                raise InputError(f"plant parameter {field.name} is {quoted(value)}, expected a number of zero or more")
         for name in ("u_max_V", "K_a", "R_c_ohm", "L_c_H", "K_i_N_A", "m_e_kg", "K_et_N_m", "rho_kg_m3", "C_d_W_mm"):
             if getattr(self, name) <= 0:
                 raise InputError(f"plant parameter {name} is {getattr(self, name)}, expected a positive number")
@@ -134,8 +135,11 @@ def read_plant(path: Path, say: Callable[[str], None] = lambda _: None) -> Plant
     known = [field.name for field in fields(Plant)]
     for key in values:
         if key not in known:
-            raise InputError(f"'{path}': there is no plant parameter '{key}'{nearest(key, known)}")
-    plant = Plant(**values)
+            raise InputError(f"'{path}': there is no plant parameter {quoted(key)}{nearest(key[:LONGEST_KEY], known)}")
+    try:
+        plant = Plant(**values)
+    except InputError as error:
+        raise InputError(f"'{path}': {error}") from error
     missing = [name for name in known if name not in values]
     if missing:
         say(f"'{path}' leaves {', '.join(missing)} as the default plant has them")

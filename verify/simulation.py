@@ -13,6 +13,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.identify.ramp_files import ramp_file_bytes
 from dzdesign.verify.closed_loop import RECORD_S, ClosedLoop, RampSequence
+from dzdesign.verify.firmware_folder import check_firmware_inside
 from dzdesign.verify.plant import Plant, plant_document
 
 
@@ -122,6 +123,7 @@ def simulated_files(
 
 def _loop_of(plant: Plant, firmware: Path) -> tuple[ClosedLoop, dict[str, Any]]:
     """Return the loop of a plant with a firmware's core, and what the manifest says of it."""
+    check_firmware_inside(firmware)
     path = firmware / "compensator.json"
     content = read_bytes(path, "compensator of the firmware")
     compensator_from_document(content, str(path))  # every key that the loop reads is there

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from dzdesign.core.artefacts import read_bytes
-from dzdesign.core.errors import InputError, nearest
+from dzdesign.core.errors import InputError, nearest, quoted
 from dzdesign.verify.closed_loop import FLOW_SHARE, NO_FLOW_L_MIN, ClosedLoop, RampSequence, dead_zone
-from dzdesign.verify.plant import Plant
+from dzdesign.verify.plant import LONGEST_KEY, Plant
 
 PARAMETERS = tuple(field.name for field in fields(Plant))
 #: Ramps quick enough for hundreds of plants; the lag of a spool is a thousandth of them.
@@ -75,7 +75,8 @@ def read_tolerances(path: Path) -> Tolerances:
     counts = {name: _count(path, name, values.pop(name)) for name in ("plants", "seed") if name in values}
     for name in values:
         if name not in PARAMETERS:
-            raise InputError(f"'{path}': there is no plant parameter '{name}'{nearest(name, PARAMETERS)}")
+            near = nearest(name[:LONGEST_KEY], PARAMETERS)
+            raise InputError(f"'{path}': there is no plant parameter {quoted(name)}{near}")
     if not values:
         raise InputError(f"'{path}' names no plant parameter; write one such as preload_N = \"3 %\"")
     return Tolerances(spreads={name: _spread(path, name, value) for name, value in values.items()}, **counts)
@@ -84,8 +85,7 @@ def read_tolerances(path: Path) -> Tolerances:
 def _count(path: Path, name: str, value: Any) -> int:
     least = 1 if name == "plants" else 0
     if type(value) is not int or not least <= value <= MOST_PLANTS:
-        found = str(value)[:40]
-        raise InputError(f"'{path}': {name} is '{found}', expected a whole number from {least} to {MOST_PLANTS}")
+        raise InputError(f"'{path}': {name} is {quoted(value)}, expected a whole number from {least} to {MOST_PLANTS}")
     return value
 
 
@@ -94,7 +94,7 @@ def _spread(path: Path, name: str, value: Any) -> tuple[float, str]:
     found = re.fullmatch(r"\s*(\d{1,3}(?:\.\d{1,6})?)\s*%\s*(sd)?\s*", text, re.ASCII)
     if found is None or not 0 < float(found[1]) < 100:
         raise InputError(
-            f"'{path}': {name} is '{str(value)[:40]}', expected plus and minus some per cent such as \"3 %\", or a "
+            f"'{path}': {name} is {quoted(value)}, expected plus and minus some per cent such as \"3 %\", or a "
             'standard deviation such as "1 % sd"'
         )
     return float(found[1]) / 100, "normal" if found[2] else "uniform"

@@ -7,9 +7,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from dzdesign.core.artefacts import MANIFEST_NAME, TOOL, parse_document, read_bytes, sha256_of, to_json
+from dzdesign.core.artefacts import MANIFEST_NAME, TOOL, read_bytes, sha256_of, to_json
 from dzdesign.core.errors import InputError, RequirementError
-from dzdesign.core.shape import check_shape
 from dzdesign.core.shown import ShownInNotebooks
 from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.identify.valve_file import valve_from_document
@@ -27,6 +26,7 @@ from dzdesign.verify.checks import (
     shut_after_scenarios,
 )
 from dzdesign.verify.closed_loop import ClosedLoop, LoopComparison, RampSequence, compare_at_pressure
+from dzdesign.verify.firmware_folder import read_firmware_manifest
 from dzdesign.verify.host_compiler import host_compiler
 from dzdesign.verify.loop_plot import plot_loops
 from dzdesign.verify.plant import Plant, plant_document, plants_from_tests
@@ -34,7 +34,6 @@ from dzdesign.verify.scenarios import ScenarioResult, Scene, run_scenarios
 from dzdesign.verify.tolerances import Scatter, Tolerances, scatter, scatter_document
 
 SCHEMA = "dzdesign.evidence/1"
-FIRMWARE_SCHEMA = "dzdesign.firmware/1"
 #: Runs side by side.
 WORKERS = 2
 
@@ -108,11 +107,7 @@ def verify(
     if tolerances and plant is None:
         raise InputError("tolerances are about a plant; give it with --plant PLANT.toml")
     folder = Path(folder)
-    manifest_bytes = read_bytes(folder / MANIFEST_NAME, "firmware manifest")
-    manifest = parse_document(manifest_bytes, str(folder / MANIFEST_NAME), (FIRMWARE_SCHEMA,))
-    check_shape(
-        manifest, {"files": dict, "core": [str]}, str(folder / MANIFEST_NAME), "make it again with `dzdesign codegen`"
-    )
+    manifest_bytes, manifest = read_firmware_manifest(folder)
     content = read_bytes(folder / "compensator.json", "compensator")
     compensator = compensator_from_document(content, str(folder / "compensator.json"))  # every key that is read below
     document = json.loads(content)

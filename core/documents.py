@@ -1,0 +1,79 @@
+"""Artefacts as documents: JSON to and fro, hash, schema."""
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping
+from typing import Any, BinaryIO
+
+from dzdesign.core.errors import InputError
+
+#: Lists and objects in one another; dzdesign's own artefacts have eight. Beyond some hundred, what reads or prints the
+#: value would end in the interpreter's own limit, at a depth that depends on who called.
+DEEPEST = 32
+
+
+def sha256_of(content: bytes) -> str:
+    """Return the SHA-256 of `content` in hex."""
+    return hashlib.sha256(content).hexdigest()
+
+
+def sha256_of_file(file: BinaryIO) -> str:
+    """Return the SHA-256 of a whole file in hex, read piece by piece; the file is at its beginning again then."""
+    file.seek(0)
+    digest = hashlib.file_digest(file, "sha256").hexdigest()
+    file.seek(0)
+    return digest
+
+
+def to_json(document: Mapping[str, Any]) -> str:
+    """Return the document as JSON text; a NaN or an infinity is an error, never written."""
+    return json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _no_number(word: str) -> float:
+    raise ValueError(f"{word} is not a number of JSON")
+
+
+def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        seen: set[str] = set()
+        twice = next(key for key, _ in pairs if key in seen or seen.add(key))
+        raise ValueError(f"the key {twice[:40]!r} is there twice")
+    return found
+
+
+def parse_document(content: bytes, source: str, schemas: tuple[str, ...]) -> dict[str, Any]:
+    """Read a JSON artefact and check that its schema is one of `schemas`.
+
+    Raises
+    ------
+    InputError
+        If it is no JSON object in UTF-8, holds what can't be written again (NaN, half a character) or a key twice, or
+        has another schema.
+    """
+    expected = " or ".join(schemas)
+    try:
+        # JSON in UTF-16, or after a byte order mark, would be read here and stumbled over later.
+        document = json.loads(content.decode("utf-8"), parse_constant=_no_number, object_pairs_hook=_unique_keys)
+        _refuse_deep(document)
+        to_json(document).encode()
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"'{source}' is not JSON ({error}); expected an artefact of schema {expected}") from error
+    found = document.get("schema") if isinstance(document, dict) else None
+    if found not in schemas:
+        raise InputError(f"'{source}' has the schema {str(found)[:40]!r}, expected {expected}; give another file")
+    return document
+
+
+def _refuse_deep(document: Any) -> None:
+    level = [document]
+    for _ in range(DEEPEST):
+        level = [item for value in level if isinstance(value, dict | list) for item in _items(value)]
+        if not level:
+            return
+    raise ValueError(f"it nests lists and objects more than {DEEPEST} deep")
+
+
+def _items(value: dict[str, Any] | list[Any]) -> Iterable[Any]:
+    return value.values() if isinstance(value, dict) else value

@@ -1,0 +1,111 @@
+"""Putting a finished folder in the place of another, so that at every moment one of the two stands there whole."""
+
+import contextlib
+import ctypes
+import errno
+import os
+import secrets
+import shutil
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+#: Of renameat2 (Linux) and renamex_np (macOS); both systems number it so. Paths are relative to the working folder.
+EXCHANGE, HERE = 2, -100
+#: What a system or a file system says that has no such step.
+UNKNOWN = (errno.EINVAL, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP)
+#: Another dzdesign holds a folder for less than this.
+LOCK_PATIENCE_S = 30.0
+
+
+def beside(path: Path, kind: str = "new") -> Path:
+    """Return a name beside `path` that nothing has; hidden, and short, for a file's name may be as long as can be."""
+    return path.parent / f".dzdesign-{kind}-{secrets.token_hex(6)}"
+
+
+@contextlib.contextmanager
+def alone_in(folder: Path) -> Iterator[None]:
+    """Keep other processes of dzdesign from exchanging folders in `folder` meanwhile, where the system has such locks.
+
+    The lock goes with the process, however it ends; no file is made for it.
+
+    Raises
+    ------
+    OSError
+        If another one holds it for `LOCK_PATIENCE_S`.
+    """
+    try:
+        import fcntl
+    except ImportError:  # Windows: of two writers, one is refused by the system or the later one stays
+        yield
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        end = time.monotonic() + LOCK_PATIENCE_S
+        while True:
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except BlockingIOError as error:
+                if time.monotonic() > end:
+                    raise OSError(errno.EBUSY, f"another dzdesign is writing in '{folder}'") from error
+                time.sleep(0.02)
+            except OSError:  # a network's file system without locks
+                break
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def put_in_place(staging: Path, folder: Path) -> None:
+    """Put `staging` in the place of `folder`, which exists; what was there stands at `staging` then, or is gone.
+
+    In one step where the system has one. Elsewhere in two, and between them a kill leaves the old folder beside its
+    place, from where `bring_back` fetches it.
+    """
+    if exchanged(staging, folder):
+        return
+    retired = folder.parent / f".{folder.name}.old"
+    old = retired / "old"
+    retired.mkdir(exist_ok=True)
+    try:
+        os.replace(folder, old)
+        os.replace(staging, folder)
+    except BaseException:
+        if old.exists() and not folder.exists():
+            os.replace(old, folder)
+        with contextlib.suppress(OSError):  # not empty if the old one could not come back: then it stays there
+            retired.rmdir()
+        raise
+    shutil.rmtree(retired, ignore_errors=True)
+
+
+def bring_back(folder: Path) -> None:
+    """Undo the first of two steps, if a process was killed between them; clear away what is left of the second."""
+    retired = folder.parent / f".{folder.name}.old"
+    if not retired.is_dir():
+        return
+    if not os.path.lexists(folder) and (retired / "old").is_dir():
+        os.replace(retired / "old", folder)
+    shutil.rmtree(retired, ignore_errors=True)
+
+
+def exchanged(one: Path, other: Path) -> bool:
+    """Exchange two folders in one step; return False, with nothing done, where the system has no such step."""
+    if sys.platform == "win32":
+        return False
+    library = ctypes.CDLL(None, use_errno=True)
+    first, second = os.fsencode(one), os.fsencode(other)
+    if hasattr(library, "renameat2"):
+        failed = library.renameat2(HERE, first, HERE, second, EXCHANGE)
+    elif hasattr(library, "renamex_np"):
+        failed = library.renamex_np(first, second, EXCHANGE)
+    else:
+        return False
+    if not failed:
+        return True
+    number = ctypes.get_errno()
+    if number in UNKNOWN:
+        return False
+    raise OSError(number, os.strerror(number), str(other))

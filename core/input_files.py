@@ -1,0 +1,137 @@
+"""Files that somebody gives: opened or read, or one sentence why not; never a hang, never more memory than stated.
+
+What is no regular file can be read only once. A pipe is held in memory, `MOST_PIPED` bytes of it; a device is refused,
+for it may have no end.
+"""
+
+import contextlib
+import io
+import os
+import stat
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+from dzdesign.core.errors import InputError
+
+#: Largest file of options, plant or artefact, some hundred times the largest that dzdesign writes; read as JSON it
+#: takes at most some thirty times as much memory.
+MOST_DOCUMENT = 1 << 24
+#: Largest recording from a pipe.
+MOST_PIPED = 1 << 28
+#: A pipe that gives nothing for so long has nobody at its other end.
+PIPE_PATIENCE_S = 30.0
+PIECE = 1 << 20
+
+
+def read_bytes(path: Path, what: str) -> bytes:
+    """Read a whole file, or say in one sentence why it can't be read.
+
+    Parameters
+    ----------
+    path : Path
+        Of a document: options, plant, an artefact.
+    what : str
+        What it is to be, for the message.
+
+    Raises
+    ------
+    InputError
+        If it is not there, no file, or larger than `MOST_DOCUMENT`.
+    """
+    with _refusing(path, what):
+        if _is_pipe(path, what):
+            return _piped(path, what, MOST_DOCUMENT)
+        with open(path, "rb") as file:
+            content = file.read(MOST_DOCUMENT + 1)
+    if len(content) > MOST_DOCUMENT:
+        raise InputError(
+            f"{what} '{path}' is larger than {MOST_DOCUMENT >> 20} MiB, which none is; check that it is the right file"
+        )
+    return content
+
+
+@contextlib.contextmanager
+def open_bytes(path: Path, what: str) -> Iterator[BinaryIO]:
+    """Open a file that may be larger than memory; or say in one sentence why it can't be read.
+
+    Parameters
+    ----------
+    path : Path
+        Of a recording.
+    what : str
+        What it is to be, for the message.
+
+    Raises
+    ------
+    InputError
+        If it can't be read, or was changed until the context is left: what was computed of it is then of no one file.
+    """
+    with _refusing(path, what):
+        piped = _is_pipe(path, what)
+        file = io.BytesIO(_piped(path, what, MOST_PIPED)) if piped else open(path, "rb")  # noqa: SIM115
+    with file:
+        before = None if piped else _stamp(file)
+        try:
+            yield file
+        except OSError as error:  # a disk that fails, a share that is gone
+            raise InputError(f"{what} '{path}' can't be read: {error.strerror or error}") from error
+        if before is not None and _stamp(file) != before:
+            raise InputError(f"{what} '{path}' was changed while it was read; wait until it is written, then try again")
+
+
+def _stamp(file: BinaryIO) -> tuple[int, int]:
+    found = os.fstat(file.fileno())
+    return found.st_size, found.st_mtime_ns
+
+
+def _is_pipe(path: Path, what: str) -> bool:
+    """Tell a pipe from a regular file; refuse what is neither."""
+    mode = os.stat(path).st_mode
+    if stat.S_ISREG(mode) or stat.S_ISDIR(mode):  # opening a folder says that it is one
+        return False
+    if stat.S_ISFIFO(mode):
+        return True
+    raise InputError(f"{what} '{path}' is a device or a socket, expected a file")
+
+
+def _piped(path: Path, what: str, most: int) -> bytes:
+    """Return what a pipe gives until its end."""
+    if os.name != "posix":
+        return Path(path).read_bytes()
+    import select
+
+    pieces, size = [], 0
+    # Opened without waiting for a writer, so that the wait can have an end.
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+    try:
+        end = time.monotonic() + PIPE_PATIENCE_S
+        while select.select([descriptor], [], [], max(end - time.monotonic(), 0))[0]:
+            piece = os.read(descriptor, PIECE)
+            if not piece:
+                return b"".join(pieces)
+            pieces.append(piece)
+            size += len(piece)
+            if size > most:
+                raise InputError(
+                    f"{what} '{path}' is a pipe with more than {most >> 20} MiB; write that to a file and give the file"
+                )
+            end = time.monotonic() + PIPE_PATIENCE_S
+    finally:
+        os.close(descriptor)
+    raise InputError(f"{what} '{path}' is a pipe that gave nothing for {PIPE_PATIENCE_S:g} s; check who writes into it")
+
+
+@contextlib.contextmanager
+def _refusing(path: Path, what: str) -> Iterator[None]:
+    try:
+        yield
+    except (FileNotFoundError, NotADirectoryError) as error:
+        raise InputError(f"{what} '{path}' does not exist; check the name and the folder") from error
+    except OSError as error:
+        if os.path.isdir(path):  # Windows calls reading a folder a lack of permission
+            raise InputError(f"{what} '{path}' is a folder, expected a file") from error
+        raise InputError(f"{what} '{path}' can't be read: {error.strerror}") from error
+    except ValueError as error:  # a name with a NUL, from a TOML file
+        raise InputError(f"{what} '{path}' can't be a file's name ({error})") from error
