@@ -4,6 +4,7 @@ import contextlib
 import hashlib
 import io
 import json
+import logging
 import os
 import shutil
 import tempfile
@@ -12,11 +13,14 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from dzdesign import __version__
-from dzdesign.core.errors import InputError
+from dzdesign.core.errors import InputError, neighbour
 
 #: File by which a folder is known as made by dzdesign, so that it may be made anew.
 MANIFEST_NAME = "manifest.json"
 TOOL = {"name": "dzdesign", "version": __version__}
+
+
+logger = logging.getLogger(__name__)
 
 
 def sha256_of(content: bytes) -> str:
@@ -35,7 +39,9 @@ def sha256_of_file(file: BinaryIO) -> str:
 def read_bytes(path: Path, what: str) -> bytes:
     """Read a whole file, or say in one sentence why it can't be read."""
     with _refusing(path, what):
-        return Path(path).read_bytes()
+        content = Path(path).read_bytes()
+    logger.debug("read %s '%s', %d bytes", what, path, len(content))
+    return content
 
 
 @contextlib.contextmanager
@@ -47,6 +53,7 @@ def open_bytes(path: Path, what: str) -> Iterator[BinaryIO]:
     with _refusing(path, what):
         file = open(path, "rb") if os.path.isfile(path) else io.BytesIO(Path(path).read_bytes())  # noqa: SIM115
     with file:
+        logger.debug("reading %s '%s'", what, path)
         try:
             yield file
         except OSError as error:  # a disk that fails, a share that is gone
@@ -58,7 +65,7 @@ def _refusing(path: Path, what: str) -> Iterator[None]:
     try:
         yield
     except (FileNotFoundError, NotADirectoryError) as error:
-        raise InputError(f"{what} '{path}' does not exist; check the name and the folder") from error
+        raise InputError(f"{what} '{path}' does not exist{neighbour(path)}; check the name and the folder") from error
     except OSError as error:
         if os.path.isdir(path):  # Windows calls reading a folder a lack of permission
             raise InputError(f"{what} '{path}' is a folder, expected a file") from error
@@ -225,6 +232,7 @@ def write_file(path: Path, content: str | bytes, schema: str | None = None, opti
             os.fsync(handle.fileno())
         os.chmod(temporary, 0o644)
         os.replace(temporary, path)
+        logger.debug("wrote '%s', %d bytes", path, len(data))
         temporary = None
     except (OSError, ValueError) as error:
         raise InputError(f"'{path}' can't be written: {_reason(error)}; choose another place with {option}") from error
@@ -346,6 +354,7 @@ def write_folder(folder: Path, files: Mapping[str, str | bytes], manifest: Mappi
             _exchange(folder, staging)
         else:
             os.replace(staging, folder)
+        logger.debug("wrote '%s', %d files", folder, len(contents))
     except (OSError, ValueError) as error:
         raise InputError(
             f"the folder '{folder}' can't be written: {_reason(error)}; choose another place with -o"
