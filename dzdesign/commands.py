@@ -176,7 +176,7 @@ def run_verify(args: argparse.Namespace) -> int:
     firmware = Path(args.firmware)
     ware = check_against_c2000ware(firmware, Path(args.c2000ware), say) if args.c2000ware else None
     with stages() as stage:
-        verification = verify(firmware, plant, source, tolerances=tolerances, say=stage)
+        verification = verify(firmware, plant, source, tolerances=tolerances, say=stage, watch=stage.each)
     added = [ware] if ware else []
     if args.machine_code:
         from dzdesign.verify.machine_code import machine_code_checks

@@ -46,7 +46,7 @@ def run_demo(args: argparse.Namespace) -> int:
         write_file(folder / "compensator.json", compensator_json)
         firmware = generate(compensator, "f28335", compensator_json.encode())
         write_folder(folder / "firmware", firmware.files, firmware.manifest)
-        verification = verify(folder / "firmware", plant, "plant.toml of the example", say=stage)
+        verification = verify(folder / "firmware", plant, "plant.toml of the example", say=stage, watch=stage.each)
     manifest = {"schema": SCHEMA, "tool": TOOL, "made_from": verification.document["made_from"]}
     write_folder(folder / "evidence", evidence_files(verification), manifest)
     if args.json:

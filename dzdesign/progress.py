@@ -10,6 +10,8 @@ from dzdesign.core.errors import one_line
 
 #: Work that is done sooner shows no bar, s.
 PATIENCE = 1.0
+#: Time between two looks at how far a stage is, s.
+REFRESH = 0.1
 
 
 class _Talk:
@@ -81,43 +83,62 @@ def is_watched() -> bool:
 
 
 @contextlib.contextmanager
-def stages() -> Iterator[Callable[[str], None]]:
+def stages() -> "Iterator[Stages]":
     """Give a `say` after which, once a stage has taken `PATIENCE`, a bar moves until the next stage, with the time."""
-    with contextlib.ExitStack() as running:
-
-        def stage(text: str) -> None:
-            running.close()
-            say(text)
-            running.enter_context(_moving(text))
-
+    stage = Stages()
+    try:
         yield stage
+    finally:
+        stage.end()
 
 
-@contextlib.contextmanager
-def _moving(text: str) -> Iterator[None]:
-    """Show a bar of unknown end while work lasts that takes longer than `PATIENCE`."""
-    if not is_watched():
-        yield
-        return
-    import threading
+class Stages:
+    """A `say` for the stages of long work; rich is driven by a thread of its own, as the work may be one call of C."""
 
-    over = threading.Event()
+    def __init__(self) -> None:
+        self._end: Callable[[], None] | None = None
+        self._done, self._total = 0, None
 
-    def show() -> None:
+    def __call__(self, text: str) -> None:
+        """Begin a stage."""
+        self.end()
+        say(text)
+        self._done, self._total = 0, None
+        if is_watched():
+            import threading
+
+            over = threading.Event()
+            thread = threading.Thread(target=self._show, args=(text, over), daemon=True)
+            thread.start()
+            self._end = lambda: (over.set(), thread.join())
+
+    def each(self, items: Iterable, total: int) -> Iterator:
+        """Return the items one by one: the bar of this stage knows its end then.
+
+        Parameters
+        ----------
+        items : iterable
+            Pieces of work, of about the same size.
+        total : int
+            How many.
+        """
+        self._total = total
+        for self._done, item in enumerate(items):
+            yield item
+
+    def end(self) -> None:
+        """End the stage, if there is one: its bar is gone."""
+        if self._end:
+            self._end()
+        self._end = None
+
+    def _show(self, text: str, over: "threading.Event") -> None:  # noqa: F821
         if over.wait(PATIENCE):
             return
-        bar = _new_bar(known_end=False)
-        bar.add_task(text, total=None)
-        with bar:
-            over.wait()
-
-    thread = threading.Thread(target=show, daemon=True)
-    thread.start()
-    try:
-        yield
-    finally:
-        over.set()
-        thread.join()
+        with _new_bar(known_end=False) as bar:
+            task = bar.add_task(text, total=None)
+            while not over.wait(REFRESH):
+                bar.update(task, total=self._total, completed=self._done)
 
 
 def with_bar(

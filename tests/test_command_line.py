@@ -223,6 +223,29 @@ def test_a_long_stage_moves_a_bar_for_a_person(monkeypatch, stream, quiet, term,
     assert ("dzdesign: fitting\n" in page.getvalue()) == (not quiet)
 
 
+def test_a_stage_of_known_pieces_shows_how_far_it_is(monkeypatch):
+    page = Terminal()
+    monkeypatch.setattr(sys, "stderr", page)
+    monkeypatch.setattr(progress, "PATIENCE", 0.0)
+    monkeypatch.setattr(progress, "REFRESH", 0.001)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.delenv("NO_COLOR", raising=False)
+
+    def half_is_done():
+        """A bar of known end is two stretches of one colour each; one of unknown end changes it at every step."""
+        until = time.monotonic() + 5
+        while "━" * 20 not in page.getvalue() and time.monotonic() < until:
+            time.sleep(0.01)
+        return "━" * 20 in page.getvalue()
+
+    with progress.talking(quiet=False, verbose=False), progress.stages() as stage:
+        stage("running the closed loop")
+        for piece in stage.each(iter(range(4)), 4):
+            if piece == 2:
+                assert half_is_done()
+    assert list(stage.each("abc", 3)) == ["a", "b", "c"]
+
+
 def test_colour_is_for_terminals_and_for_who_asks(monkeypatch):
     def printed(**environment):
         page = io.StringIO()
