@@ -46,7 +46,7 @@ def put_line(console: "Console", text: str) -> None:
     console.print(text, markup=False, soft_wrap=True)
 
 
-def new_table(title: str, *columns: str, words: "Sequence[int]" = (0,)) -> "Grid":
+def new_table(title: str, *columns: str, words: "Sequence[int]" = (0,), keys: int = 1) -> "Grid":
     """Return an empty table.
 
     Parameters
@@ -57,19 +57,21 @@ def new_table(title: str, *columns: str, words: "Sequence[int]" = (0,)) -> "Grid
         Headers.
     words : sequence of int
         Columns of words, which may be wrapped at blanks; the others are numbers, which are not.
+    keys : int
+        Columns, from the first on, that tell the rows apart.
     """
-    return Grid(title=title, headers=columns, words=tuple(words))
+    return Grid(title=title, headers=columns, words=tuple(words), keys=keys)
 
 
 @dataclass(slots=True, kw_only=True)
 class Grid:
     """A table that rich prints to fit: headers are wrapped at blanks; what is still too wide becomes two tables.
 
-    The second repeats the first column, as R and pandas do it, so that nothing is lost and no word is broken.
+    The second repeats the columns that tell the rows apart, as R and pandas do it: nothing is lost, no word broken.
 
     Attributes
     ----------
-    title, headers, words
+    title, headers, words, keys
         As for `new_table`.
     rows : list of tuple of str
         Cells, as many as headers.
@@ -78,6 +80,7 @@ class Grid:
     title: str
     headers: tuple[str, ...]
     words: tuple[int, ...]
+    keys: int = 1
     rows: list[tuple[str, ...]] = field(default_factory=list)
 
     def add_row(self, *cells: str) -> None:
@@ -106,11 +109,14 @@ class Grid:
         return [(columns, gap, self._widths(columns, gap, room)) for columns in parts]
 
     def _parted(self, gap: int, room: int) -> list[list[int]]:
-        """Return the columns of each table: the first in all of them, and as many others as there is room for."""
-        parts = [[0]]
-        for column in range(1, len(self.headers)):
-            if len(parts[-1]) > 1 and self._least_width([*parts[-1], column], gap) > room:
-                parts.append([0])
+        """Return the columns of each table: the keys in all of them, and as many others as there is room for."""
+        keys = list(range(self.keys))
+        # Words in few columns fill many lines: where there is a choice, up to a third of the page is theirs.
+        comfort = max(0, min(self._wanted(0), room // 3) - self._least(0))
+        parts = [[*keys]]
+        for column in range(self.keys, len(self.headers)):
+            if len(parts[-1]) > self.keys and self._least_width([*parts[-1], column], gap) + comfort > room:
+                parts.append([*keys])
             parts[-1].append(column)
         return parts
 
@@ -120,11 +126,15 @@ class Grid:
     def _widths(self, columns: list[int], gap: int, room: int) -> list[int]:
         """Return a width for each column: no less than its longest word, and of what is left all the same."""
         widths = [self._least(column) for column in columns]
-        wanted = [max(map(len, self._cells(column))) for column in columns]
+        wanted = [self._wanted(column) for column in columns]
         spare = room - sum(widths) - gap * len(columns) - 1
         if spare < 0:  # one word is longer than the page, such as a path: it alone is folded
             longest = widths.index(max(widths))
             widths[longest] = max(widths[longest] + spare, NARROWEST)
+        if spare > 0 and 0 in self.words:
+            more = min(spare, max(0, min(wanted[0], room // 3) - widths[0]))
+            widths[0] += more
+            spare -= more
         while spare > 0 and widths != wanted:
             for index, width in enumerate(widths):
                 if spare > 0 and width < wanted[index]:
@@ -134,6 +144,10 @@ class Grid:
 
     def _cells(self, column: int) -> list[str]:
         return [self.headers[column], *(row[column] for row in self.rows)]
+
+    def _wanted(self, column: int) -> int:
+        """Return the longest header or cell of a column."""
+        return max(map(len, self._cells(column)))
 
     def _least(self, column: int) -> int:
         """Return the longest word of a header or of words, or the longest number."""

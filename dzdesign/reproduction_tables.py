@@ -18,7 +18,7 @@ def print_reproduction(rows: "Sequence[Row]", valves: "Sequence[RecoveredValve]"
     for name in dict.fromkeys(row.valve for row in rows):
         table = new_table(
             f"The paper's numbers and ours: {name}", "", "MPa", "published", "in the fit", "valve", "paper's law",
-            "product", "within", "", "why",
+            "product", "within", "", "why", keys=2,
         )  # fmt: skip
         for row in rows:
             if row.valve == name:

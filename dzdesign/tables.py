@@ -207,7 +207,7 @@ def print_scatter(series: "Sequence[Scatter]") -> None:
         return
     table = new_table(
         f"Series of {series[0].plants} plants: median (1 to 99 %)", "side", "dP (MPa)", "dead zone opening (%)",
-        "closing (%)", "Q max (L/min)", "Q at zero (L/min)", "plants that leak",
+        "closing (%)", "Q max (L/min)", "Q at zero (L/min)", "plants that leak", keys=2,
     )  # fmt: skip
 
     def spread(quantiles: dict[str, float], by: float, digits: int) -> str:
