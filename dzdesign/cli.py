@@ -1,18 +1,15 @@
 """The command line: what can be said, and what an error or a failed requirement becomes.
 
 Exit status: 0 holds, 1 a requirement does not hold (said which), 2 bad input or usage. Every heavy import happens
-inside the command that needs it (`dzdesign.commands`), so that `--help` costs no more than argparse; how the words are
-parsed stands in `dzdesign.parsing`.
+inside the command that needs it (`dzdesign.commands`), and argparse only once there is something to parse
+(`dzdesign.parsing`), so that `--help` costs next to nothing.
 """
 
-import argparse
 import os
 import sys
-from importlib import import_module
 
-from dzdesign import parsing
 from dzdesign.core.errors import DzdesignError, RequirementError, one_line
-from dzdesign.progress import talking
+from dzdesign.front_page import front_page
 
 DOES_NOT_HOLD, BAD_INPUT, INTERRUPTED, PIPE_CLOSED = 1, 2, 130, 141
 
@@ -357,14 +354,16 @@ EXAMPLES = {
 }
 
 
-def language() -> parsing.Language:
+def language() -> "parsing.Language":  # noqa: F821
     """Return all that can be said."""
+    from dzdesign import parsing
+
     return parsing.Language(
         commands=COMMANDS, command_groups=COMMAND_GROUPS, option_groups=OPTION_GROUPS, examples=EXAMPLES, tables=TABLES
     )
 
 
-def parse(argv: list[str]) -> argparse.Namespace:
+def parse(argv: list[str]) -> "argparse.Namespace":  # noqa: F821
     """Parse the command line; what a TOML file says stands in for the defaults.
 
     Raises
@@ -372,6 +371,8 @@ def parse(argv: list[str]) -> argparse.Namespace:
     InputError
         If the command line is wrong, or the file can't be read or names no option.
     """
+    from dzdesign import parsing
+
     return parsing.parse(argv, language())
 
 
@@ -383,7 +384,15 @@ def main(argv: list[str] | None = None) -> int:
         if hasattr(stream, "reconfigure"):  # a console that can't print a character prints a ? instead
             stream.reconfigure(errors="replace")
     try:
-        args = parse(sys.argv[1:] if argv is None else argv)
+        argv = sys.argv[1:] if argv is None else argv
+        if argv in (["--help"], ["-h"]):
+            print(front_page(COMMANDS, COMMAND_GROUPS, EXAMPLES[""]), end="")
+            return 0
+        args = parse(argv)
+        from importlib import import_module
+
+        from dzdesign.progress import talking
+
         module, function = args.run.split(":")
         with talking(quiet=args.quiet, verbose=args.verbose):
             return getattr(import_module(module), function)(args)

@@ -1,34 +1,14 @@
 """The words of a command line: help in groups with examples, and errors of one line that name the nearest word."""
 
 import argparse
-import os
-import sys
 from collections import namedtuple
 from collections.abc import Mapping
 
 from dzdesign import __version__
 from dzdesign.core.errors import InputError, nearest
+from dzdesign.front_page import ABOUT, COMMON, front_page, page_width
 
-#: The widest that help is set, in columns: longer lines are hard to read.
-WIDEST = 100
-EXIT_STATUS = """exit status:
-  0    every requirement holds
-  1    one does not, or could not be checked (said which)
-  2    bad input or usage
-  130  interrupted"""
-#: Of every command, before it or after it.
-COMMON = (
-    (("--config",), {"metavar": "TOML", "help": "file with options of the same names (dzdesign init writes one)"}),
-    (("--json",), {"action": "store_true", "help": "print the result as JSON"}),
-    (("-q", "--quiet"), {"action": "store_true", "help": "print results and errors only"}),
-    (
-        ("-v", "--verbose"),
-        {"action": "store_true", "help": "say what is done, with times, files and the solver's words"},
-    ),
-)
-
-
-#: All that can be said, as `dzdesign.cli` declares it. No dataclass: importing those takes half as long as `--help`.
+#: All that can be said, as `dzdesign.cli` declares it. No dataclass: importing those takes longer than all the parsing.
 #:
 #: commands: command -> (one line of help, function that runs it, its options)
 #: command_groups: heading -> commands under it; one that is nowhere stands under the last
@@ -38,22 +18,11 @@ COMMON = (
 Language = namedtuple("Language", "commands command_groups option_groups examples tables")
 
 
-def _width() -> int:
-    """Return the columns of the terminal, or what COLUMNS says, at most `WIDEST`."""
-    columns = os.environ.get("COLUMNS", "")
-    if not columns.isdecimal() or columns == "0":
-        try:
-            columns = os.get_terminal_size(sys.__stdout__.fileno()).columns
-        except (AttributeError, ValueError, OSError):
-            columns = 80
-    return min(max(int(columns), 40) - 2, WIDEST)
-
-
 class _Help(argparse.RawDescriptionHelpFormatter):
     """Help as wide as the terminal, or as COLUMNS says, but no wider than can be read."""
 
     def __init__(self, prog: str) -> None:
-        super().__init__(prog, max_help_position=26, width=_width())
+        super().__init__(prog, max_help_position=26, width=page_width())
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
         """Wrap what is one line, and leave alone what has lines of its own: examples."""
@@ -70,32 +39,16 @@ class _Help(argparse.RawDescriptionHelpFormatter):
 class Parser(argparse.ArgumentParser):
     """A parser whose errors are one line, as every other error."""
 
-    #: Heading -> commands under it, of `dzdesign` itself.
-    headings: Mapping[str, tuple[str, ...]] | None = None
+    #: The help, where argparse does not make it.
+    page = ""
 
     def error(self, message: str) -> None:
         """Raise instead of printing the usage."""
         raise InputError(f"{message}; see `{self.prog} --help`")
 
     def format_help(self) -> str:
-        """Return the help; that of `dzdesign` itself names the commands in groups."""
-        if self.headings is None or self._subparsers is None:
-            return super().format_help()
-        page = self._get_formatter()
-        page.add_usage("%(prog)s COMMAND [OPTIONS]", (), ())
-        page.add_text(self.description)
-        lines = {action.dest: action for action in self._subparsers._group_actions[0]._get_subactions()}
-        named = {name for names in self.headings.values() for name in names}
-        for heading, names in self.headings.items():
-            rest = [name for name in lines if name not in named] if heading == list(self.headings)[-1] else []
-            page.start_section(heading)
-            page.add_arguments([lines[name] for name in (*names, *rest) if name in lines])
-            page.end_section()
-        page.start_section("options")
-        page.add_arguments([action for action in self._actions if action.option_strings])
-        page.end_section()
-        page.add_text(self.epilog)
-        return page.format_help()
+        """Return the help: that of `dzdesign` itself is a page of its own."""
+        return self.page or super().format_help()
 
 
 def build_parser(language: Language, only: str | None = None) -> tuple[Parser, dict[str, Parser]]:
@@ -108,14 +61,8 @@ def build_parser(language: Language, only: str | None = None) -> tuple[Parser, d
     only : str, optional
         The one command whose options are wanted: the others' would cost half of the start. None: all of them.
     """
-    parser = Parser(
-        prog="dzdesign",
-        formatter_class=_Help,
-        description="Dead-zone compensators for proportional valves without a spool sensor: from ramp tests to "
-        "checked C.",
-        epilog=f"{_examples(language.examples[''])}\n\n{EXIT_STATUS}\n\n`dzdesign COMMAND --help` says more of each.",
-    )
-    parser.headings = language.command_groups
+    parser = Parser(prog="dzdesign", description=ABOUT)
+    parser.page = front_page(language.commands, language.command_groups, language.examples[""])
     parser.add_argument("--version", action="version", version=f"dzdesign {__version__}", help="print the version")
     for names, keywords in COMMON:
         parser.add_argument(*names, **keywords)
