@@ -303,7 +303,7 @@ OPTION_GROUPS = {
         "--command-signal", "--polarity", "--pressure-span", "--pressure-a", "--pressure-b", "--negative-dp",
     ),
     "beside the law": ("--zero-window", "--ramp-up", "--ramp-down", "--dither"),
-    "further checks": ("--tolerances", "--c2000ware", "--mutate", "--machine-code"),
+    "further checks": ("--tolerances", "--c2000ware", "--mutate", "--machine-code", "--proof"),
     "of every command": ("--config", "--json", "--quiet", "--verbose", "--help"),
 }  # fmt: skip
 #: Printed at the end of the help; "" is that of dzdesign itself.

@@ -48,6 +48,8 @@ OPTIONAL = (
          macos="brew install osx-cross/avr/avr-gcc", windows="winget install ZakKemble.avr-gcc"),
     Tool(name="simavr", ask=("--help",), purpose="verify --machine-code: AVR", debian="apt install simavr",
          macos="brew install osx-cross/avr/simavr", windows="only in WSL: apt install simavr"),
+    Tool(name="frama-c", purpose="verify --proof", debian="apt install frama-c-base", macos="opam install frama-c",
+         windows="only in WSL: apt install frama-c-base"),
     Tool(name="cl2000", ask=("-version",), purpose="to build for f28335 and f280049c; dzdesign does not call it",
          debian=TI, macos=TI, windows=TI),
     Tool(name="make", purpose="make demo, make test", debian="apt install make", macos="xcode-select --install",
