@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import logging
 import os
 import shutil
 from collections.abc import Iterable, Mapping
@@ -23,6 +24,9 @@ __all__ = [
 #: File by which a folder is known as made by dzdesign, so that it may be made anew.
 MANIFEST_NAME = "manifest.json"
 TOOL = {"name": "dzdesign", "version": __version__}
+
+
+logger = logging.getLogger(__name__)
 
 
 def _family(schema: object) -> str:
@@ -142,6 +146,7 @@ def write_file(path: Path, content: str | bytes, schema: str | None = None, opti
             os.fsync(handle.fileno())
         os.chmod(temporary, 0o644)
         os.replace(temporary, path)
+        logger.debug("wrote '%s', %d bytes", path, len(data))
     except (OSError, ValueError) as error:
         raise InputError(f"'{path}' can't be written: {_reason(error)}; choose another place with {option}") from error
     finally:  # an interrupt, too, leaves no half-written file behind
@@ -323,6 +328,7 @@ def write_folder(folder: Path, files: Mapping[str, str | bytes], manifest: Mappi
                 put_in_place(staging, folder)
             else:
                 os.replace(staging, folder)
+        logger.debug("wrote '%s', %d files", folder, len(contents))
     except (OSError, ValueError) as error:
         raise InputError(
             f"the folder '{folder}' can't be written: {_reason(error)}; choose another place with -o"

@@ -1,8 +1,11 @@
 """One root exception; each message is one sentence: what, expected, got, where, what to do."""
 
-import difflib
+import os
 import reprlib
 from collections.abc import Iterable
+
+#: Names in a folder among which a mistyped one is looked for.
+MOST_NEIGHBOURS = 10_000
 
 
 class DzdesignError(Exception):
@@ -20,12 +23,22 @@ class RequirementError(DzdesignError):
 def nearest(name: str, known: Iterable[str]) -> str:
     """Return `` (did you mean 'x'?)`` for the known name nearest to `name`, or an empty string.
 
+    Capitals count for little: ``COMAND`` is near to ``command``.
+
     Examples
     --------
     >>> nearest("f28334", ["f28335", "host"])
     " (did you mean 'f28335'?)"
+    >>> nearest("HOST", ["f28335", "host"])
+    " (did you mean 'host'?)"
     """
-    matches = difflib.get_close_matches(name, list(known), n=1, cutoff=0.6)
+    import difflib  # here, because a start without an error does not need it
+
+    known = list(known)
+    by_lower_case = {each.lower(): each for each in reversed(known)}
+    matches = difflib.get_close_matches(name, known, n=1, cutoff=0.6)
+    near = difflib.get_close_matches(name.lower(), by_lower_case, n=1, cutoff=0.6)
+    matches = [by_lower_case[near[0]]] if near and (not matches or near[0] == name.lower()) else matches
     return f" (did you mean '{matches[0]}'?)" if matches else ""
 
 
@@ -59,6 +72,29 @@ def clear_line(text: str) -> str:
     text = one_line(text)
     half = LONGEST_MESSAGE // 2
     return text if len(text) <= LONGEST_MESSAGE else f"{text[:half]} ... {text[-half:]}"
+
+
+def neighbour(path: str | os.PathLike[str]) -> str:
+    """Return `` (did you mean 'x'?)`` for what lies in the same folder under nearly that name, or an empty string.
+
+    Parameters
+    ----------
+    path : path-like
+        What does not exist; where its folder does not either, that folder's neighbours are looked at.
+    """
+    place, below = os.fspath(path), ""
+    while place and not os.path.lexists(place):
+        folder, name = os.path.split(place)
+        if name and os.path.isdir(folder or "."):
+            try:
+                with os.scandir(folder or ".") as entries:
+                    names = [entry.name for entry, _ in zip(entries, range(MOST_NEIGHBOURS), strict=False)]
+            except OSError:
+                return ""
+            hint, before = nearest(name, names), os.path.join(folder, "")
+            return hint.replace("mean '", f"mean '{before}").replace("'?)", f"{below}'?)")
+        place, below = folder, os.path.join(os.sep, name) + below
+    return ""
 
 
 def one_line(text: str) -> str:

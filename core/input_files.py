@@ -6,6 +6,7 @@ for it may have no end.
 
 import contextlib
 import io
+import logging
 import os
 import stat
 import time
@@ -13,7 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-from dzdesign.core.errors import InputError
+from dzdesign.core.errors import InputError, neighbour
 
 #: Largest file of options, plant or artefact, some hundred times the largest that dzdesign writes; read as JSON it
 #: takes at most some thirty times as much memory.
@@ -23,6 +24,8 @@ MOST_PIPED = 1 << 28
 #: A pipe that gives nothing for so long has nobody at its other end.
 PIPE_PATIENCE_S = 30.0
 PIECE = 1 << 20
+
+logger = logging.getLogger(__name__)
 
 
 def read_bytes(path: Path, what: str) -> bytes:
@@ -49,6 +52,7 @@ def read_bytes(path: Path, what: str) -> bytes:
         raise InputError(
             f"{what} '{path}' is larger than {MOST_DOCUMENT >> 20} MiB, which none is; check that it is the right file"
         )
+    logger.debug("read %s '%s', %d bytes", what, path, len(content))
     return content
 
 
@@ -72,6 +76,7 @@ def open_bytes(path: Path, what: str) -> Iterator[BinaryIO]:
         piped = _is_pipe(path, what)
         file = io.BytesIO(_piped(path, what, MOST_PIPED)) if piped else open(path, "rb")  # noqa: SIM115
     with file:
+        logger.debug("reading %s '%s'", what, path)
         before = None if piped else _stamp(file)
         try:
             yield file
@@ -128,7 +133,7 @@ def _refusing(path: Path, what: str) -> Iterator[None]:
     try:
         yield
     except (FileNotFoundError, NotADirectoryError) as error:
-        raise InputError(f"{what} '{path}' does not exist; check the name and the folder") from error
+        raise InputError(f"{what} '{path}' does not exist{neighbour(path)}; check the name and the folder") from error
     except OSError as error:
         if os.path.isdir(path):  # Windows calls reading a folder a lack of permission
             raise InputError(f"{what} '{path}' is a folder, expected a file") from error

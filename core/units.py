@@ -44,6 +44,8 @@ SPELLINGS = {
 FACTOR = r"[^\W\d]\w*(?:(?:\*\*|\^)-?\d)?"
 UNIT = re.compile(rf"{FACTOR}(?:\s*[*/·\s]\s*{FACTOR})*")
 LONGEST_UNIT, LONGEST_QUANTITY = 40, 200
+#: Of units in which valves are measured; a mistyped one is looked for under each.
+PREFIXES = ("", "m", "k", "M", "milli", "kilo", "mega")
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", re.ASCII)
 
 
@@ -74,21 +76,61 @@ def si_factor(unit: str, quantity: str) -> float:
     >>> round(si_factor("bar", "pressure"))
     100000
     """
-    spelled = SPELLINGS.get(unit.strip().lower(), unit.strip())
     try:
-        if len(spelled) > LONGEST_UNIT or not UNIT.fullmatch(spelled):
-            raise ValueError(f"{spelled!r} is not a product of units")
-        # A unit scales from zero: gauge offsets (degC, dBm) have no place in these quantities.
-        factor = _registry().Quantity(1.0, spelled).to(SI_UNIT[quantity]).magnitude
+        return _factor(unit, quantity)
     except Exception as error:  # pint and its tokenizer raise many kinds; all mean "not this unit"
-        shown, known = unit[:LONGEST_UNIT], EXAMPLES[quantity].split(", ")
-        by_lower_case = {name.lower(): name for name in known}  # BAR, Mpa: the commonest slip
-        hint = f" (did you mean '{by_lower_case[spelled.lower()]}'?)" if spelled.lower() in by_lower_case else ""
+        known = EXAMPLES[quantity].split(", ")
+        hint = nearest(unit, known) or _near_unit(unit[:LONGEST_UNIT], quantity)
         raise InputError(
-            f"'{shown}' is not a unit of {quantity} that dzdesign knows{hint or nearest(shown, known)}; "
+            f"'{unit[:LONGEST_UNIT]}' is not a unit of {quantity} that dzdesign knows{hint}; "
             f"expected for example {EXAMPLES[quantity]}"
         ) from error
-    return float(factor)
+
+
+def measures(unit: str, quantity: str) -> bool:
+    """Tell whether a text is a unit of a quantity.
+
+    Parameters
+    ----------
+    unit : str
+        As for `si_factor`.
+    quantity : str
+        A key of `SI_UNIT`.
+
+    Examples
+    --------
+    >>> measures("bar", "pressure"), measures("bar", "flow")
+    (True, False)
+    """
+    try:
+        return bool(_factor(unit, quantity))
+    except Exception:  # as in si_factor
+        return False
+
+
+def _factor(unit: str, quantity: str) -> float:
+    spelled = SPELLINGS.get(unit.strip().lower(), unit.strip())
+    if len(spelled) > LONGEST_UNIT or not UNIT.fullmatch(spelled):
+        raise ValueError(f"{spelled!r} is not a product of units")
+    # A unit scales from zero: gauge offsets (degC, dBm) have no place in these quantities.
+    return float(_registry().Quantity(1.0, spelled).to(SI_UNIT[quantity]).magnitude)
+
+
+def _near_unit(unit: str, quantity: str) -> str:
+    """Return a hint where one factor of a unit is mistyped and the nearest name that pint knows measures `quantity`.
+
+    ``megapascl`` is near to ``megapascal``, ``L/mim`` to ``L/min``; ``mbarr`` is ``mbar`` with an r too many.
+    """
+    import difflib
+
+    names = _registry()._units
+    for factor in re.findall(r"[^\W\d]\w*", unit):
+        prefixed = [prefix + name for prefix in PREFIXES for name in names if name.isascii()]
+        for near in difflib.get_close_matches(factor, prefixed, n=5, cutoff=0.75):
+            meant = re.sub(rf"\b{re.escape(factor)}\b", near, unit, count=1)
+            if near != factor and measures(meant, quantity):
+                return f" (did you mean '{meant}'?)"
+    return ""
 
 
 def parse_quantity(text: str, quantity: str, option: str) -> float:

@@ -4,10 +4,10 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dzdesign.commands import say
 from dzdesign.core.artefacts import check_file_may_be_written, to_json, write_file, write_files
 from dzdesign.core.errors import InputError, one_line
 from dzdesign.core.units import parse_quantity
+from dzdesign.progress import stages
 from dzdesign.recordings import (
     check_plots,
     knee_window,
@@ -41,15 +41,18 @@ def run_assess(args: argparse.Namespace) -> int:
         )
     }
     refuse_copies([*sets["before"], *sets["after"]])
-    say(f"comparing {len(sets['before'])} recordings before with {len(sets['after'])} after")
-    found = assess(sets["before"], sets["after"], options)
+    with stages() as stage:
+        stage(f"comparing {len(sets['before'])} recordings before with {len(sets['after'])} after")
+        found = assess(sets["before"], sets["after"], options)
     document = assessment_document(found)
     write_file(output, to_json(document), SCHEMA)
     if args.plots:
         from dzdesign.verify.assessment_plots import plot_files
 
-        say("drawing")
-        write_files(Path(args.plots), plot_files(found), "--plots")
+        with stages() as stage:
+            stage("drawing")
+            drawn = plot_files(found)
+        write_files(Path(args.plots), drawn, "--plots")
     if args.json:
         print(to_json(document), end="")
     else:

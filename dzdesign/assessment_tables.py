@@ -2,11 +2,10 @@
 
 from typing import TYPE_CHECKING
 
-from dzdesign.tables import new_console, new_table
+from dzdesign.page import new_console, new_table, put_line
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
+    from dzdesign.page import Grid
     from dzdesign.verify.assessment import Assessment, PressureAssessment
     from dzdesign.verify.valve_quantities import Reading
 
@@ -22,7 +21,7 @@ def print_assessment(assessment: "Assessment") -> None:
     page = new_console()
 
     def say(text: str) -> None:
-        page.print(text, markup=False, soft_wrap=True)
+        put_line(page, text)
 
     for item in _shown_pressures(assessment):
         page.print(_table_of(item))
@@ -42,7 +41,7 @@ def print_assessment(assessment: "Assessment") -> None:
         say(text)
 
 
-def _table_of(item: "PressureAssessment") -> "Table":
+def _table_of(item: "PressureAssessment") -> "Grid":
     from dzdesign.verify.valve_quantities import QUANTITIES
 
     where = "pressure drop unknown" if item.dp is None else f"{item.dp / 1e6:.2f} MPa"

@@ -1,24 +1,21 @@
 """The command line: what can be said, and what an error or a failed requirement becomes.
 
 Exit status: 0 holds, 1 a requirement does not hold (said which), 2 bad input or usage. Every heavy import happens
-inside the command that needs it (`dzdesign.commands`), so that `--help` costs no more than argparse.
+inside the command that needs it (`dzdesign.commands`), and argparse only once there is something to parse
+(`dzdesign.parsing`), so that `--help` costs next to nothing.
 """
 
-import argparse
 import os
-import re
 import sys
-from importlib import import_module
-from typing import NoReturn
 
-from dzdesign import __version__
-from dzdesign.core.errors import DzdesignError, InputError, RequirementError, clear_line, nearest
+from dzdesign.core.errors import DzdesignError, RequirementError, clear_line
+from dzdesign.front_page import front_page
 
 DOES_NOT_HOLD, BAD_INPUT, INTERRUPTED, PIPE_CLOSED = 1, 2, 130, 141
 
 #: Options that may be a table in the TOML file.
 TABLES = ("columns", "dp", "after_columns", "limits")
-#: Command -> (one line of help, function that runs it, its options). An option is (names, keywords of add_argument).
+#: (names, keywords of add_argument).
 Option = tuple[tuple[str, ...], dict]
 
 
@@ -119,6 +116,7 @@ DESIGN = (
 TARGET = _given("--target", default="f28335", metavar="NAME", help="microcontroller, see codegen --list-targets")
 PLANT = _given("--plant", metavar="PLANT.toml", help="plant, like examples/paper_valve/plant.toml")
 
+#: Command -> (one line of help, function that runs it, its options).
 COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
     "demo": (
         "run the whole pipeline on the bundled example",
@@ -278,6 +276,26 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
         "dzdesign.reproduce:run_reproduce",
         (_given(*OUTPUT, default="reproduction", metavar="DIR", help="folder to write"),),
     ),
+    "init": (
+        "look at recordings, write a commented dzdesign.toml with what was seen",
+        "dzdesign.init:run_init",
+        (
+            _given("ramps", nargs="*", metavar="RAMP", help="recordings, as for identify (default: ramps/*, or *.csv)"),
+            _given(*OUTPUT, default="dzdesign.toml", metavar="FILE", help="file to write; one that exists stays"),
+            COLUMNS,
+            DP,
+        ),
+    ),
+    "doctor": (
+        "which compilers, simulators and packages are there, and how to get the rest",
+        "dzdesign.doctor:run_doctor",
+        (),
+    ),
+    "completion": (
+        "print the script by which a shell completes commands, options and targets",
+        "dzdesign.completion:run_completion",
+        (_given("shell", metavar="SHELL", help="bash, zsh, fish, powershell or tcsh"),),
+    ),
     "simulate": (
         "ramp tests of a simulated valve, marked as such",
         "dzdesign.commands:run_simulate",
@@ -293,46 +311,88 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
 }
 
 
-class _Parser(argparse.ArgumentParser):
-    """A parser whose errors are one line, as every other error, and name the nearest word that is known."""
+#: Where a command stands in `dzdesign --help`; one that is not named stands under the last.
+COMMAND_GROUPS = {
+    "from ramps to firmware": ("init", "identify", "design", "codegen", "verify", "batch"),
+    "evidence": ("assess", "report", "derive", "reproduce"),
+    "to try it, and the machine": ("demo", "doctor", "completion"),
+    "more": (),
+}
+#: Where an option stands in `dzdesign COMMAND --help`; one that is not named stands first, under "options".
+OPTION_GROUPS = {
+    "the recordings": ("--columns", "--after-columns", "--dp", "--u-max", "--after-u-max"),
+    "the flow meter": ("--meter-floor", "--meter-lag", "--meter-zero"),
+    "how it is fitted": ("--knee-window", "--confidence", "--flat-below", "--linearity-window"),
+    "the law": ("--law", "--guard", "--edge", "--below-dp0", "--output-max"),
+    "what the firmware is connected to": (
+        "--command-signal", "--polarity", "--pressure-span", "--pressure-a", "--pressure-b", "--negative-dp",
+    ),
+    "beside the law": ("--zero-window", "--ramp-up", "--ramp-down", "--dither"),
+    "further checks": ("--tolerances", "--c2000ware", "--mutate", "--machine-code", "--proof"),
+    "of every command": ("--config", "--json", "--quiet", "--verbose", "--help"),
+}  # fmt: skip
+#: Printed at the end of the help; "" is that of dzdesign itself.
+EXAMPLES = {
+    "": (
+        "dzdesign demo demo                       all of it on the bundled example",
+        "dzdesign init ramps/*.csv                look at recordings, write dzdesign.toml",
+        "dzdesign identify ramps/*.csv --config dzdesign.toml",
+        "dzdesign codegen valve.json --target f28335",
+        "dzdesign verify firmware",
+    ),
+    "init": ("dzdesign init ramps/*.csv", "dzdesign init ramps/*.tdms -o bench2.toml"),
+    "identify": (
+        'dzdesign identify ramps/*.csv --meter-lag "0.1 s"',
+        "dzdesign identify ramps/*.csv --config dzdesign.toml --plots plots",
+        'dzdesign identify ramp.csv --dp "1 MPa" --columns "u=AO0:V, Q=Flow (L/min)"',
+    ),
+    "design": ("dzdesign design valve.json", 'dzdesign design valve.json --edge "1 %" --target cortex-m4'),
+    "codegen": (
+        "dzdesign codegen compensator.json -o firmware",
+        "dzdesign codegen valve.json --target host",
+        "dzdesign codegen --list-targets",
+    ),
+    "verify": (
+        "dzdesign verify firmware",
+        "dzdesign verify firmware --plant plant.toml --tolerances tolerances.toml",
+        "dzdesign verify firmware --machine-code --mutate --proof",
+    ),
+    "batch": (
+        'dzdesign batch lot -o calibrated --jobs 4 --meter-lag "0.1 s"',
+        "dzdesign batch lot.csv -o calibrated --verify --dask tcp://10.0.0.5:8786",
+    ),
+    "assess": (
+        'dzdesign assess before/*.csv --after after/*.csv --limits "dead_zone_opening = 5 %"',
+        "dzdesign assess before/*.csv --after after/*.csv --config dzdesign.toml --plots plots",
+    ),
+    "derive": ("dzdesign derive --equation 18", "dzdesign derive --format html -o derivation.html"),
+    "demo": ("dzdesign demo demo",),
+    "monitor": ("dzdesign monitor COM5 --firmware firmware --seconds 100 -o ramp.csv",),
+    "reproduce": ("dzdesign reproduce -o reproduction",),
+    "simulate": (
+        'dzdesign simulate --dp "1 MPa" --dp "5 MPa" -o ramps',
+        "dzdesign simulate --firmware firmware -o after",
+    ),
+    "doctor": ("dzdesign doctor", "dzdesign doctor --json"),
+    "completion": (
+        'eval "$(dzdesign completion bash)"                       # in ~/.bashrc',
+        "dzdesign completion zsh > ~/.zfunc/_dzdesign             # a folder of fpath",
+        "dzdesign completion fish > ~/.config/fish/completions/dzdesign.fish",
+        "dzdesign completion powershell | Out-String | Invoke-Expression   # in $PROFILE",
+    ),
+}
 
-    #: Commands and options that a mistyped word is compared with.
-    known: tuple[str, ...] = ()
 
-    def error(self, message: str) -> NoReturn:
-        """Raise instead of printing the usage."""
-        wrong = re.search(r"unrecognized arguments: ([^\s=]+)|invalid choice: '([^']*)'", message)
-        hint = nearest(wrong[1] or wrong[2], self.known) if wrong else ""
-        raise InputError(f"{message}{hint}; see `{self.prog} --help`")
+def language() -> "parsing.Language":  # noqa: F821
+    """Return all that can be said."""
+    from dzdesign import parsing
 
-
-def build_parser() -> tuple[argparse.ArgumentParser, dict[str, argparse.ArgumentParser]]:
-    """Return the parser and those of its commands."""
-    parser = _Parser(
-        prog="dzdesign",
-        description="Dead-zone compensators for proportional valves without a spool sensor: "
-        "from ramp tests to checked C.",
-        epilog="Example: dzdesign identify ramps/*.csv -o valve.json",
+    return parsing.Language(
+        commands=COMMANDS, command_groups=COMMAND_GROUPS, option_groups=OPTION_GROUPS, examples=EXAMPLES, tables=TABLES
     )
-    parser.add_argument("--version", action="version", version=f"dzdesign {__version__}")
-    choices = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    commands = {}
-    for name, (help_line, run, options) in COMMANDS.items():
-        command = choices.add_parser(name, help=help_line, description=help_line[0].upper() + help_line[1:] + ".")
-        for names, keywords in options:
-            command.add_argument(*names, **keywords)
-        command.add_argument("--config", metavar="TOML", help="file with options of the same names")
-        command.add_argument("--json", action="store_true", help="print the result as JSON")
-        command.set_defaults(run=run)
-        commands[name] = command
-    parser.known = (
-        *COMMANDS,
-        *sorted({word for command in commands.values() for word in command._option_string_actions}),
-    )
-    return parser, commands
 
 
-def parse(argv: list[str]) -> argparse.Namespace:
+def parse(argv: list[str]) -> "argparse.Namespace":  # noqa: F821
     """Parse the command line; what a TOML file says stands in for the defaults.
 
     Raises
@@ -340,30 +400,9 @@ def parse(argv: list[str]) -> argparse.Namespace:
     InputError
         If the command line is wrong, or the file can't be read or names no option.
     """
-    parser, commands = build_parser()
-    args = parser.parse_args(argv)
-    if not args.config:
-        return args
-    from dzdesign.config import options_from_file
+    from dzdesign import parsing
 
-    every = [action for command in commands.values() for action in command._actions if action.option_strings]
-    repeatable = {action.dest for action in every if isinstance(action, argparse._AppendAction)}
-    known = {action.dest for action in every if action.nargs != 0} - {"config"}  # no flags
-    command = commands[args.command]
-    mine = {action.dest: isinstance(action, argparse._AppendAction) for action in command._actions}
-    values = options_from_file(args.config, known, repeatable, TABLES)
-    values = {key: value for key, value in values.items() if key in mine and _is_meant(value, mine[key])}
-    command.set_defaults(**{key: value for key, value in values.items() if not mine[key]})
-    given, args = args, parser.parse_args(argv)
-    for key, value in values.items():
-        if mine[key]:  # argparse would add to a default instead of standing in for it
-            setattr(args, key, getattr(given, key) or ([value] if isinstance(value, str) else value))
-    return args
-
-
-def _is_meant(value: str | list[str] | dict[str, str], repeatable: bool) -> bool:
-    """Tell whether a value of the file is for this command: `dp` is a list for simulate, a table for identify."""
-    return not isinstance(value, dict if repeatable else list)
+    return parsing.parse(argv, language())
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -374,9 +413,18 @@ def main(argv: list[str] | None = None) -> int:
         if hasattr(stream, "reconfigure"):  # a console that can't print a character prints a ? instead
             stream.reconfigure(errors="replace")
     try:
-        args = parse(sys.argv[1:] if argv is None else argv)
+        argv = sys.argv[1:] if argv is None else argv
+        if argv in (["--help"], ["-h"]):
+            print(front_page(COMMANDS, COMMAND_GROUPS, EXAMPLES[""]), end="")
+            return 0
+        args = parse(argv)
+        from importlib import import_module
+
+        from dzdesign.progress import talking
+
         module, function = args.run.split(":")
-        return getattr(import_module(module), function)(args)
+        with talking(quiet=args.quiet, verbose=args.verbose):
+            return getattr(import_module(module), function)(args)
     except RequirementError as error:
         print(f"dzdesign: does not hold: {clear_line(str(error))}", file=sys.stderr)
         return DOES_NOT_HOLD

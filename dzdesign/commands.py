@@ -2,7 +2,6 @@
 
 import argparse
 import re
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -17,15 +16,11 @@ from dzdesign.core.artefacts import (
     write_files,
     write_folder,
 )
-from dzdesign.core.errors import InputError, clear_line, one_line
+from dzdesign.core.errors import InputError, one_line
 from dzdesign.core.units import parse_quantity
 from dzdesign.identify_options import identify_options
+from dzdesign.progress import say, stages, with_bar
 from dzdesign.recordings import check_plots, read_recordings, refuse_copies
-
-
-def say(text: str) -> None:
-    """Tell of progress, on stderr: stdout is for results."""
-    print(f"dzdesign: {clear_line(text)}", file=sys.stderr)
 
 
 def _seed(text: str) -> int:
@@ -45,15 +40,18 @@ def run_identify(args: argparse.Namespace) -> int:
     check_plots(args.plots, Path(args.output))
     tests = read_recordings(args.ramps, u_max=options.u_max, columns=args.columns, dp=args.dp)
     refuse_copies(tests)
-    say(f"fitting {len(tests)} recording{'s' if len(tests) > 1 else ''}")
-    found = identify_sides(tests, options)
+    with stages() as stage:
+        stage(f"fitting {len(tests)} recording{'s' if len(tests) > 1 else ''}")
+        found = identify_sides(tests, options)
     document = found.model.to_document()
     write_file(Path(args.output), to_json(document), SCHEMA)
     if args.plots:
         from dzdesign.identify.plots import plot_files
 
-        say("drawing")
-        write_files(Path(args.plots), plot_files(found), "--plots")
+        with stages() as stage:
+            stage("drawing")
+            drawn = plot_files(found)
+        write_files(Path(args.plots), drawn, "--plots")
     if args.json:
         print(to_json(document), end="")
     else:
@@ -159,18 +157,21 @@ def run_verify(args: argparse.Namespace) -> int:
     tolerances = read_tolerances(Path(args.tolerances)) if args.tolerances else None
     firmware = Path(args.firmware)
     ware = check_against_c2000ware(firmware, Path(args.c2000ware), say) if args.c2000ware else None
-    verification = verify(firmware, plant, source, tolerances=tolerances, say=say)
+    with stages() as stage:
+        verification = verify(firmware, plant, source, tolerances=tolerances, say=stage, watch=stage.each)
     added = [ware] if ware else []
     if args.machine_code:
         from dzdesign.verify.machine_code import machine_code_checks
 
-        say("comparing the machine code of other processors with the exact law, in simulators")
-        added += machine_code_checks(firmware, verification.inputs)
+        with stages() as stage:
+            stage("comparing the machine code of other processors with the exact law, in simulators")
+            added += machine_code_checks(firmware, verification.inputs)
     if args.proof:
         from dzdesign.verify.proof import proof_check
 
-        say("reading the core's C for all inputs, with Frama-C: some minutes")
-        added.append(proof_check(firmware))
+        with stages() as stage:
+            stage("reading the core's C for all inputs, with Frama-C: some minutes")
+            added.append(proof_check(firmware))
     mutants = _firmware_mutants(firmware) if args.mutate else None
     if mutants:
         from dzdesign.verify.mutation import mutation_check
@@ -194,7 +195,6 @@ def run_verify(args: argparse.Namespace) -> int:
 
 def _firmware_mutants(firmware: Path) -> dict[str, Any]:
     """Make the firmware's core wrong in every place, and return what verify says to each."""
-    from dzdesign.progress import with_bar
     from dzdesign.verify.mutation import MutationBench, all_mutants, judge_all, mutation_document
 
     bench = MutationBench(firmware)
@@ -218,7 +218,8 @@ def run_simulate(args: argparse.Namespace) -> int:
     bench = Bench(seed=_seed(args.seed))
     check_folder_may_be_written(Path(args.output))
     firmware = Path(args.firmware) if args.firmware else None
-    files, manifest = simulated_files(plant, pressures, ramp_s, bench, say=say, firmware=firmware)
+    with stages() as stage:
+        files, manifest = simulated_files(plant, pressures, ramp_s, bench, say=stage, firmware=firmware)
     write_folder(Path(args.output), files, manifest)
     said = one_line(f"Written: {len(files)} simulated ramp tests in {args.output}")
     print(to_json(manifest) if args.json else said)
@@ -239,7 +240,9 @@ def run_derive(args: argparse.Namespace) -> int:
             raise InputError("--mutate counts over all equations; leave out --equation")
         return _run_mutations(args)
     shown = closure(account.STATEMENTS, args.equation) if args.equation else None
-    verdicts = account.verify_statements()
+    with stages() as stage:
+        stage("re-deriving the paper's equations")
+        verdicts = account.verify_statements()
     text = render(verdicts, format, shown)
     if args.output:
         write_file(Path(args.output), text)
@@ -255,7 +258,9 @@ def _run_mutations(args: argparse.Namespace) -> int:
     from dzdesign.derivation.mutation import mutation_document, score_mutations
     from dzdesign.tables import print_mutations
 
-    document = mutation_document(score_mutations(verify_statements()))
+    with stages() as stage:
+        stage("making every equation wrong in every small way")
+        document = mutation_document(score_mutations(verify_statements()))
     if args.output:
         write_file(Path(args.output), to_json(document))
     elif args.json:

@@ -4,9 +4,9 @@ import argparse
 from importlib.resources import as_file, files
 from pathlib import Path
 
-from dzdesign.commands import say
 from dzdesign.core.artefacts import TOOL, check_folder_may_be_written, to_json, write_file, write_folder
 from dzdesign.core.errors import InputError
+from dzdesign.progress import say, stages
 
 
 def run_demo(args: argparse.Namespace) -> int:
@@ -28,23 +28,25 @@ def run_demo(args: argparse.Namespace) -> int:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"the folder '{folder}' can't be made: {error.strerror}") from error
-    verdicts = verify_statements()
-    expected = sum(verdict.as_expected for verdict in verdicts)
-    say(f"derivation: {expected} of {len(verdicts)} statements have the verdict expected of them")
-    with as_file(files("dzdesign.example")) as example:
-        tests = [read_ramp_file(path) for path in sorted((example / "ramps").glob("*.csv.gz"))]
-        plant = read_plant(example / "plant.toml")
-    say(f"identifying the valve from {len(tests)} simulated ramp tests")
-    valve = identify(tests)
-    valve_json = to_json(valve.to_document())
-    write_file(folder / "valve.json", valve_json)
-    say("designing the compensator")
-    compensator = design(valve, valve_bytes=valve_json.encode())
-    compensator_json = to_json(compensator_document(compensator))
-    write_file(folder / "compensator.json", compensator_json)
-    firmware = generate(compensator, "f28335", compensator_json.encode())
-    write_folder(folder / "firmware", firmware.files, firmware.manifest)
-    verification = verify(folder / "firmware", plant, "plant.toml of the example", say=say)
+    with stages() as stage:
+        stage("re-deriving the paper's equations")
+        verdicts = verify_statements()
+        expected = sum(verdict.as_expected for verdict in verdicts)
+        say(f"derivation: {expected} of {len(verdicts)} statements have the verdict expected of them")
+        with as_file(files("dzdesign.example")) as example:
+            tests = [read_ramp_file(path) for path in sorted((example / "ramps").glob("*.csv.gz"))]
+            plant = read_plant(example / "plant.toml")
+        stage(f"identifying the valve from {len(tests)} simulated ramp tests")
+        valve = identify(tests)
+        valve_json = to_json(valve.to_document())
+        write_file(folder / "valve.json", valve_json)
+        stage("designing the compensator")
+        compensator = design(valve, valve_bytes=valve_json.encode())
+        compensator_json = to_json(compensator_document(compensator))
+        write_file(folder / "compensator.json", compensator_json)
+        firmware = generate(compensator, "f28335", compensator_json.encode())
+        write_folder(folder / "firmware", firmware.files, firmware.manifest)
+        verification = verify(folder / "firmware", plant, "plant.toml of the example", say=stage, watch=stage.each)
     manifest = {"schema": SCHEMA, "tool": TOOL, "made_from": verification.document["made_from"]}
     write_folder(folder / "evidence", evidence_files(verification), manifest)
     if args.json:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from dzdesign.core.artefacts import check_file_may_be_written, to_json, write_file
 from dzdesign.core.errors import InputError, one_line
+from dzdesign.progress import say
 
 if TYPE_CHECKING:
     import serial
@@ -38,14 +39,14 @@ def run_monitor(args: argparse.Namespace) -> int:
     baud = _positive(args.baud, "--baud", "115200") or scalings.link.baud
     recording, reader = Recording(scalings), FrameReader()
     with _open_port(args.port, baud) as port, _until_interrupted() as stop:
-        _say(f"listening to {args.port} at {baud:g} bit/s; Ctrl-C ends the recording")
+        say(f"listening to {args.port} at {baud:g} bit/s; Ctrl-C ends the recording")
         broken = _record(port, recording, reader, stop, seconds)
     if not recording:
         raise _nothing(args.port, baud, reader)
     write_file(output, recording.to_csv(reader))
     _report(args, recording, reader)
     if broken:
-        _say(f"the recording ended because {broken}; what came until then is written")
+        say(f"the recording ended because {broken}; what came until then is written")
     return 1 if broken else 0
 
 
@@ -56,10 +57,6 @@ def _positive(text: str | None, option: str, example: str) -> float | None:
         if 0 < (value := float(text)) < 1e9:
             return value
     raise InputError(f"{option} is '{text}', expected a positive number such as {example}")
-
-
-def _say(text: str) -> None:
-    print(f"dzdesign: {one_line(text)}", file=sys.stderr, flush=True)
 
 
 @contextlib.contextmanager
@@ -104,7 +101,7 @@ def _record(
             break
         if first is None and not hint and now - begin > FIRST_FRAME_S:
             hint = True
-            _say("no frame yet; is the firmware running, and GPIO29 on the adapter's input?")
+            say("no frame yet; is the firmware running, and GPIO29 on the adapter's input?")
         try:
             octets = port.read(max(port.in_waiting, 1))
         except OSError as error:  # the adapter was pulled out

@@ -4,11 +4,12 @@ import fnmatch
 import glob
 import os
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dzdesign.core.artefacts import check_place_of_files
-from dzdesign.core.errors import InputError, nearest, quoted
+from dzdesign.core.errors import InputError, nearest, neighbour, quoted
 from dzdesign.core.units import parse_quantity
 from dzdesign.progress import with_bar
 
@@ -48,9 +49,11 @@ def read_recordings(
     from dzdesign.identify.ramp_files import read_ramp_file
 
     chosen = parse_columns(columns) if columns else {}
+    paths = expand(patterns)
+    names = told_apart(paths)
     tests = [
-        read_ramp_file(path, u_max, columns=chosen, dp=_declared_dp(path, dp))
-        for path in with_bar(expand(patterns), what)
+        replace(read_ramp_file(path, u_max, columns=chosen, dp=_declared_dp(name, dp)), source=name)
+        for path, name in with_bar(list(zip(paths, names, strict=True)), what)
     ]
     _refuse_unnamed(tests, dp)
     return tests
@@ -63,9 +66,32 @@ def expand(patterns: list[str]) -> list[Path]:
         magic = glob.has_magic(pattern) and "\0" not in pattern and not os.path.exists(pattern)
         matches = sorted(glob.glob(pattern)) if magic else [pattern]
         if not matches:
-            raise InputError(f"no file matches '{pattern}'; check the name and the folder")
+            near = neighbour(os.path.dirname(pattern)) if not glob.has_magic(os.path.dirname(pattern)) else ""
+            raise InputError(f"no file matches '{pattern}'{near}; check the name and the folder")
         paths += [Path(match) for match in matches]
     return paths
+
+
+def told_apart(paths: list[Path]) -> list[str]:
+    """Return the files' names, with as many of their folders as tell those of one name apart.
+
+    Examples
+    --------
+    >>> told_apart([Path("a/x/ramp.csv"), Path("b/x/ramp.csv"), Path("b/x/other.csv")])
+    ['a/x/ramp.csv', 'b/x/ramp.csv', 'other.csv']
+    """
+    of_one_name: dict[str, list[Path]] = {}
+    for path in paths:
+        of_one_name.setdefault(path.name, []).append(path)
+    names = []
+    for path in paths:
+        others = [other.parts for other in of_one_name[path.name] if other != path]
+        shown = next(
+            (count for count in range(1, len(path.parts)) if all(o[-count:] != path.parts[-count:] for o in others)),
+            len(path.parts),
+        )
+        names.append("/".join(path.parts[-shown:]).replace("//", "/").encode(errors="replace").decode())
+    return names
 
 
 def knee_window(text: str) -> tuple[float, float]:
@@ -96,12 +122,16 @@ def optional_quantity(text: str | None, quantity: str, option: str) -> float | N
     return None if text is None else parse_quantity(text, quantity, option)
 
 
-def _declared_dp(path: Path, declared: str | dict[str, str] | None) -> float | None:
-    """Return the pressure drop that --dp or [dp] declares for a file, in Pa; a name goes before a pattern."""
+def _declared_dp(name: str, declared: str | dict[str, str] | None) -> float | None:
+    """Return the pressure drop that --dp or [dp] declares for a file, in Pa; a name goes before a pattern.
+
+    The name may have folders before it, where they tell two files apart; [dp] may leave them out.
+    """
     if declared is None or isinstance(declared, str):
         return optional_quantity(declared, "pressure", "--dp")
-    patterns = [name for name in declared if name == path.name]
-    patterns += [name for name in declared if fnmatch.fnmatchcase(path.name, name)]
+    last = name.rpartition("/")[2]
+    patterns = [known for known in (name, last) if known in declared]
+    patterns += [each for each in declared if fnmatch.fnmatchcase(name, each) or fnmatch.fnmatchcase(last, each)]
     return parse_quantity(declared[patterns[0]], "pressure", f"[dp] '{patterns[0]}'") if patterns else None
 
 

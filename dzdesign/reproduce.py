@@ -7,9 +7,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dzdesign.commands import say
 from dzdesign.core.artefacts import TOOL, check_folder_may_be_written, sha256_of, to_json, write_folder
 from dzdesign.core.errors import InputError
+from dzdesign.progress import stages
 
 if TYPE_CHECKING:
     from dzdesign.verify.paper_runs import ValveRuns
@@ -45,9 +45,12 @@ def run_reproduce(args: argparse.Namespace) -> int:
         raise InputError("-o is empty, expected the name of a folder, such as reproduction")
     check_folder_may_be_written(folder, SCHEMA)
     host_compiler()
-    say("recovering the valves' parameters from the printed figures")
-    chains = [run_chain(valve, say=say) for valve in recover_valves()]
-    rows = rows_of([chain.runs for chain in chains])
+    with stages() as stage:
+        stage("recovering the valves' parameters from the printed figures")
+        chains = [run_chain(valve, say=stage) for valve in recover_valves()]
+        rows = rows_of([chain.runs for chain in chains])
+        stage("drawing")
+        figures = figure_files([chain.runs for chain in chains])
     document = {
         "schema": SCHEMA,
         "tool": TOOL,
@@ -56,9 +59,8 @@ def run_reproduce(args: argparse.Namespace) -> int:
         "rows": [row.to_document() for row in rows],
         "valves": [chain.document for chain in chains],
     }
-    say("drawing")
     files: dict[str, str | bytes] = {"reproduction.json": to_json(document)}
-    files |= figure_files([chain.runs for chain in chains])
+    files |= figures
     for chain in chains:
         files |= chain.files
     write_folder(folder, files, {"schema": SCHEMA, "tool": TOOL})

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from dzdesign.tables import new_console, new_table
+from dzdesign.page import new_console, new_table, put_line
 
 if TYPE_CHECKING:
     from dzdesign.verify.paper_row import Row
@@ -18,26 +18,26 @@ def print_reproduction(rows: "Sequence[Row]", valves: "Sequence[RecoveredValve]"
     for name in dict.fromkeys(row.valve for row in rows):
         table = new_table(
             f"The paper's numbers and ours: {name}", "", "MPa", "published", "in the fit", "valve", "paper's law",
-            "product", "within", "", "why",
+            "product", "within", "", "why", keys=2,
         )  # fmt: skip
         for row in rows:
             if row.valve == name:
                 letter = tolerances.setdefault(row.tolerance, chr(ord("a") + len(tolerances))) if row.tolerance else ""
                 note = f"[{reasons.setdefault(row.why, len(reasons) + 1)}]" if row.why else ""
                 table.add_row(*_reproduced(row, letter, note))
-        console.print(table, markup=False)
+        console.print(table)
     for tolerance, letter in tolerances.items():
-        console.print(f"({letter}) {tolerance}", markup=False, soft_wrap=True)
+        put_line(console, f"({letter}) {tolerance}")
     for why, number in reasons.items():
-        console.print(f"[{number}] {why}", markup=False, soft_wrap=True)
+        put_line(console, f"[{number}] {why}")
     for valve in valves:
         entries = valve.to_document()["parameters"].items()
         recovered = ", ".join(f"{name} {entry['value']:g}" for name, entry in entries if entry["recovered"])
-        console.print(f"{valve.published.name}, recovered parameters: {recovered}", markup=False, soft_wrap=True)
+        put_line(console, f"{valve.published.name}, recovered parameters: {recovered}")
     required = [row for row in rows if row.holds is not None]
     missed = sum(not row.holds for row in required)
     verdict = f"{missed} DO NOT" if missed else "all do"
-    console.print(f"{len(rows)} numbers, of which {len(required)} must agree: {verdict}.", markup=False)
+    put_line(console, f"{len(rows)} numbers, of which {len(required)} must agree: {verdict}.")
 
 
 def _reproduced(row: "Row", letter: str, note: str) -> tuple[str, ...]:

@@ -1,51 +1,21 @@
 """Results as tables on stdout, by rich; plain where stdout is no terminal."""
 
-import sys
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dzdesign.core.errors import one_line
+from dzdesign.page import new_console, new_table, put_line
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from fractions import Fraction
 
-    from rich.console import Console
-    from rich.table import Table
-
     from dzdesign.codegen.project import Firmware
     from dzdesign.design.compensator import Compensator
     from dzdesign.identify.model import SideModel, ValveModel
+    from dzdesign.page import Grid
     from dzdesign.verify.scenarios import ScenarioResult
     from dzdesign.verify.tolerances import Scatter
     from dzdesign.verify.verification import Verification
-
-#: Columns of a page when stdout is a file or a pipe.
-FILE_WIDTH = 140
-
-
-def new_console() -> "Console":
-    """Return stdout as a page: as wide as the terminal, or `FILE_WIDTH` columns."""
-    from rich.console import Console
-
-    class Page(Console):
-        """Prints every text as it is: a file's name is no markup, no emoji, and steers no terminal."""
-
-        def render_str(self, text: str, **options: Any) -> Any:
-            """Return the text for a cell, a title or a line."""
-            return super().render_str(one_line(text), **{**options, "markup": False, "emoji": False})
-
-    return Page(highlight=False, width=None if sys.stdout.isatty() else FILE_WIDTH)
-
-
-def new_table(title: str, *columns: str) -> "Table":
-    """Return an empty table; its first column is of words, the others of numbers."""
-    from rich import box
-    from rich.table import Table
-
-    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left", title_style="bold")
-    for index, column in enumerate(columns):
-        table.add_column(column, justify="left" if index == 0 else "right", overflow="fold")
-    return table
 
 
 def _volts(value: float | None) -> str:
@@ -67,22 +37,21 @@ def print_valve(valve: "ValveModel") -> None:
         title = "Thresholds (V)" if len(valve.sides) == 1 else f"Thresholds (V), {name} side"
         console.print(_thresholds(side, title))
         for line in _side_lines(side):
-            console.print(line, markup=False, soft_wrap=True)
+            put_line(console, line)
     if "positive" not in valve.sides:
         console.print("positive commands: not tested")
     how = {"declared": "declared", "identified": "from ramps of two rates", "unknown": "none declared"}
-    console.print(
+    put_line(
+        console,
         f"meter floor: {valve.meter_floor_L_min:.2f} L/min; lag taken as {valve.meter_lag_s:.3g} s "
         f"({how.get(valve.meter_lag_is, valve.meter_lag_is)})",
-        markup=False,
-        soft_wrap=True,
     )
     for warning in valve.warnings:
         source = f"{warning.source}: " if warning.source else ""
-        console.print(f"warning [{warning.code}] {source}{warning.text}", markup=False, soft_wrap=True)
+        put_line(console, f"warning [{warning.code}] {source}{warning.text}")
 
 
-def _thresholds(side: "SideModel", title: str) -> "Table":
+def _thresholds(side: "SideModel", title: str) -> "Grid":
     table = new_table(
         title, "ramp test", "dP (MPa)", "knee opening", "knee closing", "s.e. of knee", "onset closing",
          "bound", "beta", "Q max (L/min)",
@@ -150,7 +119,7 @@ def print_compensator(compensator: "Compensator") -> None:
         lines.append(f"edge: from the {guard} to the opening threshold over the first {share:.2%} of command")
     console = new_console()
     for line in (*lines, *(f"cost: {line}" for line in compensator.costs)):
-        console.print(line, markup=False, soft_wrap=True)
+        put_line(console, line)
 
 
 def print_firmware(firmware: "Firmware", folder: str) -> None:
@@ -165,19 +134,19 @@ def print_verification(verification: "Verification") -> None:
     console = new_console()
     for check in verification.checks:
         verdict = {True: "holds", False: "FAILS", None: "NOT CHECKED"}[check.holds]
-        console.print(f"{verdict}  {check.name}: {check.text}", markup=False, soft_wrap=True)
+        put_line(console, f"{verdict}  {check.name}: {check.text}")
     if verification.loops:
         console.print(_closed_loop(verification))
     print_scenarios(verification.scenarios)
     print_scatter(verification.scatter)
-    console.print(_verdict(verification), markup=False, soft_wrap=True)
+    put_line(console, _verdict(verification))
 
 
-def _closed_loop(verification: "Verification") -> "Table":
+def _closed_loop(verification: "Verification") -> "Grid":
     table = new_table(
         f"Closed loop (plant: {verification.plant_source}); dead zones in per cent of full command, onset of flow",
-        "dP (MPa)", "without: opening", "closing", "with: opening", "closing", "Q at zero, no beta", "with beta",
-        "Q max without", "with (L/min)",
+        "dP (MPa)", "without: opening", "without: closing", "with: opening", "with: closing", "Q at zero, no beta",
+        "Q at zero, beta", "Q max without", "Q max with (L/min)",
     )  # fmt: skip
     both = len({loop.result.side for loop in verification.loops}) > 1
     for loop in verification.loops:
@@ -209,9 +178,8 @@ def print_scenarios(scenarios: "Sequence[ScenarioResult]") -> None:
         return
     table = new_table(
         "Scenarios with the compensator, worst of all pressure drops", "scenario", "dP (MPa)",
-        "Q at zero, at the end (L/min)", "on the way, at most (L/min)", "figures there",
+        "Q at zero, at the end (L/min)", "on the way, at most (L/min)", "figures there", words=(0, 4),
     )  # fmt: skip
-    table.columns[-1].justify = "left"
     for name in dict.fromkeys(each.name for each in scenarios):
         group = [each for each in scenarios if each.name == name]
         worst = max(group, key=lambda each: (each.q_zero_L_min, each.q_peak_at_zero_L_min, each.dp_MPa))
@@ -240,7 +208,7 @@ def print_scatter(series: "Sequence[Scatter]") -> None:
         return
     table = new_table(
         f"Series of {series[0].plants} plants: median (1 to 99 %)", "side", "dP (MPa)", "dead zone opening (%)",
-        "closing (%)", "Q max (L/min)", "Q at zero (L/min)", "plants that leak",
+        "closing (%)", "Q max (L/min)", "Q at zero (L/min)", "plants that leak", keys=2,
     )  # fmt: skip
 
     def spread(quantiles: dict[str, float], by: float, digits: int) -> str:
@@ -263,11 +231,10 @@ def print_scatter(series: "Sequence[Scatter]") -> None:
     worst = at.worst["q_zero_L_min"]
     if worst["value"] > 0:
         plant = ", ".join(f"{name} {value:.4g}" for name, value in worst["plant"].items())
-        console.print(
+        put_line(
+            console,
             f"Most at zero command: {worst['value']:.2f} L/min at {at.dp_MPa:.2f} MPa, by the plant with {plant}. "
             "A series is no requirement: the compensator is certified for the valve of its ramp tests.",
-            markup=False,
-            soft_wrap=True,
         )
 
 
@@ -294,9 +261,9 @@ def print_demo(valve: "ValveModel", verification: "Verification", folder: str) -
     console = new_console()
     console.print(table)
     checked, wrong = (sum(getattr(each, name) for each in verification.inputs) for name in ("inputs", "wrong"))
-    console.print(f"Inputs checked: {checked}, wrong: {wrong}", markup=False, soft_wrap=True)
-    console.print(_verdict(verification), markup=False, soft_wrap=True)
-    console.print(f"Artefacts: {folder}", markup=False, soft_wrap=True)
+    put_line(console, f"Inputs checked: {checked}, wrong: {wrong}")
+    put_line(console, _verdict(verification))
+    put_line(console, f"Artefacts: {folder}")
 
 
 def print_mutations(document: dict) -> None:
@@ -308,16 +275,16 @@ def print_mutations(document: dict) -> None:
     console.print(table)
     for row in document["statements"]:
         for survivor in row["survivors"]:
-            console.print(f"not caught, {row['number']}: {survivor}", markup=False)
+            put_line(console, f"not caught, {row['number']}: {survivor}")
         for text in row["equivalent"]:
-            console.print(f"same meaning, {row['number']}: {text}", markup=False)
+            put_line(console, f"same meaning, {row['number']}: {text}")
     console.print(f"{document['caught']} of {document['mutants']} wrong equations are caught.")
 
 
 def print_firmware_mutants(document: dict) -> None:
     """Print what of the wrong C was not killed, and why."""
     console = new_console()
-    console.print(f"Mutants that were not killed; equivalent: {document['equivalent_means']}", markup=False)
+    put_line(console, f"Mutants that were not killed; equivalent: {document['equivalent_means']}")
     for row in document["not_killed"]:
         place = f"{row['file']} line {row['line']}"
-        console.print(f"{row['verdict']}, {place}: {row['change']}", markup=False, soft_wrap=True)
+        put_line(console, f"{row['verdict']}, {place}: {row['change']}")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 
 from dzdesign.core.errors import InputError, nearest
-from dzdesign.core.units import si_factor
+from dzdesign.core.units import measures
 from dzdesign.identify.table import Table
 from dzdesign.identify.text_tables import clean_label
 
@@ -168,7 +168,7 @@ def _missing_column(quantity: str, table: Table, columns: Collection[str]) -> In
     spellings = [name for name, its in COLUMN_NAMES.items() if its == quantity]
     meant = [bare[near] for name in spellings for near in get_close_matches(name, bare, n=1)]
     kind = QUANTITY_OF_COLUMN[quantity]
-    meant += [label for label in unused if _measures(table.units.get(label, "") or split_label(label)[1], kind)]
+    meant += [label for label in unused if measures(table.units.get(label, "") or split_label(label)[1], kind)]
     hint = f" (did you mean '{meant[0]}'? name it {EXAMPLE_LABELS[quantity]})" if meant else ""
     return InputError(
         f"'{table.path}' has no column of {quantity} (columns found: {table.found()}){hint}; "
@@ -178,11 +178,4 @@ def _missing_column(quantity: str, table: Table, columns: Collection[str]) -> In
 
 def fits(unit: str, column: str) -> bool:
     """Tell whether a column of that quantity may be in that unit."""
-    return _measures(unit, QUANTITY_OF_COLUMN[column]) or (column == "u" and unit.lower() in PER_CENT)
-
-
-def _measures(unit: str, quantity: str) -> bool:
-    try:
-        return bool(si_factor(unit, quantity))
-    except InputError:
-        return False
+    return measures(unit, QUANTITY_OF_COLUMN[column]) or (column == "u" and unit.lower() in PER_CENT)

@@ -479,7 +479,10 @@ def test_a_full_disk_leaves_the_old_output(refusal, monkeypatch):
 def test_no_compiler_says_what_to_do(refusal, monkeypatch):
     monkeypatch.setenv("PATH", "")
     monkeypatch.delenv("CC", raising=False)
-    assert "no C compiler was found (tried $CC, cc, gcc, clang); install one" in refusal("verify", "firmware")
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)  # no ziglang either
+    said = refusal("verify", "firmware")
+    assert "no C compiler was found (tried $CC, cc, gcc, clang, zig); install one" in said
+    assert "pip install dzdesign[zig]" in said
 
 
 @pytest.mark.parametrize(

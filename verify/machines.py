@@ -3,10 +3,13 @@
 The core's C is compiled by itself, with nothing of the check in sight, and only linked with it: a black box.
 """
 
+import logging
 import re
+import shlex
 import shutil
 import subprocess
 import sys
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib.resources import files
@@ -15,11 +18,12 @@ from threading import Lock
 
 from dzdesign.core.artefacts import sha256_of
 from dzdesign.core.errors import RequirementError
-from dzdesign.verify.host_compiler import build_folder, host_compiler
+from dzdesign.verify.host_compiler import build_folder, host_compiler, run_compiler, words_of
+
+logger = logging.getLogger(__name__)
 
 #: Of the core where its target's makefile says nothing else.
 HOST_FLAGS = ("-std=c99", "-O2")
-BUILD_TIMEOUT_S = 120
 #: simavr colours what the UART says.
 COLOUR = re.compile(r"\x1b\[[0-9]*m")
 
@@ -154,7 +158,8 @@ def compile_object(
         folder.mkdir(exist_ok=True)
         for each, text in sources.items():
             (folder / each).write_bytes(text)
-        _build([compiler, *flags, "-c", name, "-o", f"{name}.new"], folder, f"{what} ({Path(compiler).name})")
+        command = [*words_of(compiler), *flags, "-c", name, "-o", f"{name}.new"]
+        _build(command, folder, f"{what} ({Path(compiler).name})")
         (folder / f"{name}.new").replace(target)
     return target
 
@@ -174,7 +179,7 @@ def link_program(machine: Machine, objects: list[Path], what: str) -> Path:
             return program
         flags = [flag.replace("{programs}", str(programs_folder())) for flag in machine.link_flags]
         compiler = machine.compiler or host_compiler()
-        _build([compiler, *map(str, objects), *flags, "-o", str(program)], build_folder(), what)
+        _build([*words_of(compiler), *map(str, objects), *flags, "-o", str(program)], build_folder(), what)
     return program
 
 
@@ -199,9 +204,7 @@ def _alone(file: Path) -> Lock:
 
 def _build(command: list[str], folder: Path, what: str) -> None:
     try:
-        done = subprocess.run(
-            command, cwd=folder, capture_output=True, text=True, errors="replace", timeout=BUILD_TIMEOUT_S, check=False
-        )
+        done = run_compiler(command, folder)
     except (OSError, subprocess.TimeoutExpired) as error:
         raise RequirementError(f"{what} could not be built: {error}") from error
     if done.returncode:
@@ -218,6 +221,7 @@ def run_program(machine: Machine, program: Path, arguments: list[str], what: str
         If it fails, hangs, or prints something else.
     """
     command = [*machine.runner, str(program), *arguments]
+    begin = time.perf_counter()
     try:
         done = subprocess.run(
             command, capture_output=True, text=True, errors="replace", stdin=subprocess.DEVNULL,
@@ -225,6 +229,7 @@ def run_program(machine: Machine, program: Path, arguments: list[str], what: str
         )  # fmt: skip
     except (OSError, subprocess.TimeoutExpired) as error:
         raise RequirementError(f"{what} on the {machine.name} did not end: {error}") from error
+    logger.debug("%s (%.3f s)", shlex.join(command), time.perf_counter() - begin)
     if done.returncode:
         reason = f"signal {-done.returncode}" if done.returncode < 0 else f"exit status {done.returncode}"
         raise RequirementError(f"{what} on the {machine.name} ended with {reason}: {done.stderr.strip()[:200]}")

@@ -1,7 +1,7 @@
 """`verify`: a firmware folder in, evidence out: strict compilation, every input, closed loop."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -34,6 +34,8 @@ from dzdesign.verify.scenarios import ScenarioResult, Scene, run_scenarios
 from dzdesign.verify.tolerances import Scatter, Tolerances, scatter, scatter_document
 
 SCHEMA = "dzdesign.evidence/1"
+#: Shows how far a stage is: pieces and their number in, the pieces out.
+Watch = Callable[[Iterable[Any], int], Iterable[Any]]
 #: Runs side by side.
 WORKERS = 2
 
@@ -81,6 +83,7 @@ def verify(
     sequence: RampSequence | None = None,
     tolerances: Tolerances | None = None,
     say: Callable[[str], None] = lambda _: None,
+    watch: Watch = lambda items, _: items,
 ) -> Verification:
     """Verify a firmware folder.
 
@@ -98,6 +101,8 @@ def verify(
         Of a series of plants about `plant`, which is then needed.
     say : callable
         Told each stage before it begins.
+    watch : callable
+        Handed the pieces of a long stage and their number; gives them back one by one, as they are done.
 
     Raises
     ------
@@ -131,16 +136,17 @@ def verify(
         checks.append(drive_follows(folder, compensator))
         say("running the closed loop")
         scenes = _scenes(folder, document, plant)
-        loops = _run_loops(scenes, sequence or RampSequence())
+        loops = _run_loops(scenes, sequence or RampSequence(), watch)
         say("running the scenarios")
-        scenarios = tuple(result for scene in scenes for result in run_scenarios(scene))
+        scenarios = tuple(result for scene in watch(scenes, len(scenes)) for result in run_scenarios(scene))
         shut = no_flow_at_zero(loops, document, plant)
         valve = valve_from_document(to_json(document["valve"]).encode(), "compensator.json")
         checks += [plant_opens(loops), plant_is_the_valve(loops, valve), shut, shut_after_scenarios(scenarios, shut)]
         if tolerances and plant:
             say(f"running {tolerances.plants} plants at {len(scenes)} pressure drops")
             scattered = tuple(
-                scatter(scene.loop, plant, tolerances, scene.dp_MPa, scene.side) for scene in scenes
+                scatter(scene.loop, plant, tolerances, scene.dp_MPa, scene.side)
+                for scene in watch(scenes, len(scenes))
             )
     checks.append(certificate_follows(compensator))
     source = plant_source or "made from the identified thresholds"
@@ -191,14 +197,14 @@ def _scenes(folder: Path, document: dict[str, Any], plant: Plant | None) -> tupl
     return tuple(scenes)
 
 
-def _run_loops(scenes: tuple[Scene, ...], sequence: RampSequence) -> tuple[LoopComparison, ...]:
+def _run_loops(scenes: tuple[Scene, ...], sequence: RampSequence, watch: Watch) -> tuple[LoopComparison, ...]:
     """Run the ramps of every scene, two at a time."""
     with ThreadPoolExecutor(WORKERS) as pool:
         runs = pool.map(
             lambda scene: compare_at_pressure(scene.loop, scene.dp_MPa, scene.reference_MPa, sequence, scene.side),
             scenes,
         )
-        return tuple(runs)
+        return tuple(watch(runs, len(scenes)))
 
 
 def evidence_files(verification: Verification) -> dict[str, str | bytes]:

@@ -13,7 +13,7 @@ from dzdesign.batch.runners import run_local, run_on_cluster
 from dzdesign.batch.summary import print_batch, summary_of
 from dzdesign.batch.table import Calibrated, read_back, rows_of, table_files
 from dzdesign.batch.valves import Valve, valves_of
-from dzdesign.commands import say
+from dzdesign.progress import say
 from dzdesign.core.artefacts import read_bytes, to_json, write_files
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design_options import DEFAULTS, design_options

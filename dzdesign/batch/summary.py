@@ -77,7 +77,7 @@ def print_batch(document: Mapping[str, Any], folder: str) -> None:
     folder : str
         Where it was written.
     """
-    from dzdesign.tables import new_console, new_table
+    from dzdesign.page import new_console, new_table, put_line
 
     console = new_console()
     table = new_table(f"{document['calibrated']} valves", "", "least", "5 %", "median", "95 %", "largest")
@@ -91,14 +91,13 @@ def print_batch(document: Mapping[str, Any], folder: str) -> None:
             table.add_row(f"{words} ({unit})" if unit else words, *shown)
     console.print(table)
     for line in _common_lines(document):
-        console.print(line, markup=False, soft_wrap=True)
+        put_line(console, line)
     for each in document["failed"]:
-        console.print(f"{each['status']}  {each['name']}: {each['reason']}", markup=False, soft_wrap=True)
-    console.print(
+        put_line(console, f"{each['status']}  {each['name']}: {each['reason']}")
+    put_line(
+        console,
         f"{document['calibrated']} of {document['valves']} valves calibrated, {len(document['failed'])} not. "
         f"Table: {folder}/valves.csv, valves.parquet",
-        markup=False,
-        soft_wrap=True,
     )
 
 

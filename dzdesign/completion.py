@@ -1,0 +1,56 @@
+"""`dzdesign completion SHELL`: the script by which a shell completes commands, options, targets and files, by shtab."""
+
+import argparse
+
+from dzdesign.core.errors import InputError, nearest
+
+#: How the help calls a value that is a file.
+FILES = ("FILE", "AFTER", "TOML", "PLANT.toml", "TOL.toml")
+
+
+def run_completion(args: argparse.Namespace) -> int:
+    """Print the script of a shell."""
+    import shtab
+
+    shells = shtab.SUPPORTED_SHELLS
+    if args.shell not in shells:
+        raise InputError(
+            f"there is no completion for '{args.shell}'{nearest(args.shell, shells)}; known: {', '.join(shells)}"
+        )
+    print(shtab.complete(_parser(), shell=args.shell), end="")
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    """Return the parser of the command line, each option with the words or files that it takes."""
+    import shtab
+
+    from dzdesign.cli import language
+    from dzdesign.codegen.project import TARGET_NAMES
+    from dzdesign.derivation.law import LAW_NAMES
+    from dzdesign.derivation.report import FORMATS
+    from dzdesign.design.options import GUARDS
+    from dzdesign.design_options import CHOICES
+    from dzdesign.parsing import build_parser
+
+    words = {
+        "--target": TARGET_NAMES,
+        "--law": LAW_NAMES,
+        "--guard": GUARDS,
+        "--format": FORMATS,
+        "--below-dp0": ("hold", "extend"),
+        **{f"--{name.replace('_', '-')}": known for name, known in CHOICES.items()},
+    }
+    parser, commands = build_parser(language())
+    for command in commands.values():
+        for action in command._actions:
+            name = action.option_strings[-1] if action.option_strings else action.dest
+            if action.nargs == 0:
+                continue
+            if name in words or name == "shell":
+                action.choices = tuple(words.get(name, shtab.SUPPORTED_SHELLS))
+            elif action.metavar == "DIR":
+                action.complete = shtab.DIRECTORY
+            elif not action.option_strings or action.metavar in FILES:
+                action.complete = shtab.FILE
+    return parser

@@ -1,0 +1,227 @@
+"""A first look at recordings: which column is what, which sides, ramps and pressures there are, what the meter shows.
+
+For a person who has yet to declare anything: what the recordings tell is kept apart from what they can't.
+"""
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from dzdesign.core.artefacts import open_bytes
+from dzdesign.core.errors import InputError, nearest
+from dzdesign.identify.column_labels import (
+    COLUMN_NAMES,
+    EXAMPLE_UNITS,
+    PER_CENT,
+    QUANTITY_OF_COLUMN,
+    Column,
+    find_columns,
+    fits,
+    split_label,
+)
+from dzdesign.identify.described_tests import L_MIN, MPA, DescribedTests, describe_tests
+from dzdesign.identify.model import SIDES
+from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.ramp_files import RampTest, read_tables
+from dzdesign.identify.ramp_splitting import despiked
+from dzdesign.identify.sides import tests_of_side
+from dzdesign.identify.table import Table
+
+#: Full commands that amplifiers have, V: the smallest that the recordings do not exceed by 5 % is proposed.
+USUAL_U_MAX = (1.0, 2.5, 3.3, 5.0, 10.0, 12.0, 15.0, 20.0, 24.0, 48.0)
+#: A pressure drop in the name of a file.
+PRESSURE_IN_NAME = re.compile(r"(?<![\d.])(\d+(?:[.,]\d+)?)[\s_]*(MPa|bar|kPa|psi)(?![A-Za-z])", re.IGNORECASE)
+UNITS_IN_NAMES = {"mpa": "MPa", "bar": "bar", "kpa": "kPa", "psi": "psi"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GuessedColumns:
+    """How the columns of a recording may be read.
+
+    Attributes
+    ----------
+    labels : tuple of str
+        All of the file's.
+    understood : dict
+        Quantity -> `Column` whose label says what it is.
+    chosen : dict
+        Quantity -> label (with a colon and its unit, where it lacks one) that is the only one it can be.
+    unclear : dict
+        Quantity -> why it could not be told.
+    """
+
+    labels: tuple[str, ...]
+    understood: dict[str, Column]
+    chosen: dict[str, str]
+    unclear: dict[str, str]
+
+
+def guess_columns(path: Path) -> GuessedColumns:
+    """Tell which column of a recording is which quantity, by the labels or else by the units.
+
+    Parameters
+    ----------
+    path : Path
+        As for `read_ramp_file`.
+
+    Raises
+    ------
+    InputError
+        If the file can't be read, or its labels contradict one another.
+    """
+    with open_bytes(Path(path), "ramp file") as file:
+        table = next(iter(read_tables(file, Path(path))), None)
+        if table is None:
+            raise InputError(f"'{path}' holds no table; expected a recording of a ramp test")
+        try:
+            understood = find_columns(table, {})
+        except InputError:
+            return _guess(table)
+    bare = {quantity: column for quantity, column in understood.items() if not column.unit}
+    return GuessedColumns(
+        labels=table.labels,
+        understood={quantity: column for quantity, column in understood.items() if column.unit},
+        chosen={},
+        unclear={
+            quantity: f"'{column.label}' has no unit; give it after a colon, such as {EXAMPLE_UNITS[quantity]}"
+            for quantity, column in bare.items()
+        },
+    )
+
+
+def _guess(table: Table) -> GuessedColumns:
+    """Take labels for what they say, and give each of the other quantities the one column that is left in its unit."""
+    understood: dict[str, Column] = {}
+    for label in table.labels:
+        quantity, unit = split_label(label)
+        unit = unit or table.units.get(label, "")
+        if quantity and quantity not in understood and fits(unit, quantity):
+            understood[quantity] = Column(label=label, unit=unit)
+    taken = {column.label for column in understood.values()}
+    chosen, unclear = {}, {}
+    for quantity in ("time", "u", "Q"):
+        if quantity in understood:
+            continue
+        left = [label for label in table.labels if label not in taken and _fits(table, label, quantity)]
+        named = [label for label in left if nearest(re.split(r"[_\[( ]", label)[0], _names_of(quantity))]
+        if len(left) == 1 or len(named) == 1:
+            chosen[quantity] = (left if len(left) == 1 else named)[0]
+            taken.add(chosen[quantity])
+        elif left:
+            unclear[quantity] = f"{' and '.join(map(repr, left))} could each be it, by their units"
+        else:
+            unclear[quantity] = f"no column has a unit of {QUANTITY_OF_COLUMN[quantity]}"
+    if not {"dP"} & understood.keys() and not {"pA", "pB"} <= understood.keys():
+        left = [label for label in table.labels if label not in taken and _fits(table, label, "dP")]
+        if left:
+            unclear["dP"] = f"{' and '.join(map(repr, left))}: a pressure, but is it the drop, pA or pB?"
+    return GuessedColumns(labels=table.labels, understood=understood, chosen=chosen, unclear=unclear)
+
+
+def _fits(table: Table, label: str, quantity: str) -> bool:
+    return fits(table.units.get(label) or split_label(label)[1], quantity)
+
+
+def _names_of(quantity: str) -> list[str]:
+    return [name for name, its in COLUMN_NAMES.items() if its == quantity and len(name) > 1]
+
+
+def pressure_in_name(name: str) -> str | None:
+    """Return the one pressure that a file's name states, such as ``4 MPa``, or None.
+
+    Examples
+    --------
+    >>> pressure_in_name("ramp_4MPa_2.csv"), pressure_in_name("ramp_2.csv")
+    ('4 MPa', None)
+    """
+    stated = PRESSURE_IN_NAME.findall(name)
+    found = {(number.replace(",", "."), UNITS_IN_NAMES[unit.lower()]) for number, unit in stated}
+    return " ".join(found.pop()) if len(found) == 1 else None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SeenSide:
+    """What the recordings of one side show.
+
+    Attributes
+    ----------
+    dp_MPa : tuple of float or None
+        Nominal pressure drops; None: not known.
+    ramps : int
+        Ramps of the command.
+    rate_V_s : float or None
+        Fastest pace of the command; None if it is not known.
+    q_max_L_min, floor_L_min : float
+        Largest flow, and the flow at which the meter starts.
+    lag_s, lag_is : float, str
+        Of the meter, as `MeterLag` says it.
+    zero_L_min : dict
+        Recording -> reading at zero command, where it is not zero.
+    """
+
+    dp_MPa: tuple[float | None, ...]
+    ramps: int
+    rate_V_s: float | None
+    q_max_L_min: float
+    floor_L_min: float
+    lag_s: float
+    lag_is: str
+    zero_L_min: dict[str, float]
+
+
+def proposed_u_max(tests: Sequence[RampTest]) -> tuple[float, float]:
+    """Return the full command to declare, and the largest command seen, both in V.
+
+    Parameters
+    ----------
+    tests : sequence of RampTest
+        All recordings.
+    """
+    seen = max(float(np.abs(despiked(test.u)).max()) for test in tests)
+    return next((usual for usual in USUAL_U_MAX if seen <= 1.02 * usual), math.ceil(seen)), seen
+
+
+def look_at_sides(tests: Sequence[RampTest], u_max: float) -> tuple[dict[str, SeenSide], dict[str, str]]:
+    """Return what each side shows, and for a side that `identify` would refuse the reason.
+
+    Parameters
+    ----------
+    tests : sequence of RampTest
+        All recordings.
+    u_max : float
+        Full command, V.
+    """
+    seen, refused = {}, {}
+    options = IdentifyOptions(u_max=u_max)
+    for name, sign in SIDES.items():
+        mine = tests_of_side(tests, sign, u_max)
+        if not mine:
+            continue
+        try:
+            seen[name] = _seen(describe_tests(mine, options))
+        except InputError as error:
+            refused[name] = str(error)
+    return seen, refused
+
+
+def _seen(group: DescribedTests) -> SeenSide:
+    rates = [branch.rate for item in group.tests for branch in item.branches if branch and math.isfinite(branch.rate)]
+    return SeenSide(
+        dp_MPa=tuple(None if item.dp is None else item.dp / MPA for item in group.tests),
+        ramps=sum(len(item.ramps) for item in group.tests),
+        rate_V_s=max(rates, default=None),
+        q_max_L_min=max(item.q_max for item in group.tests) / L_MIN,
+        floor_L_min=group.floor / L_MIN,
+        lag_s=group.lag.seconds,
+        lag_is=group.lag.origin,
+        zero_L_min=group.zero_L_min,
+    )
+
+
+def is_per_cent(column: Column | None) -> bool:
+    """Tell whether a command was recorded as a share of full command."""
+    return column is not None and column.unit.lower() in PER_CENT

@@ -1,0 +1,168 @@
+"""`dzdesign init`: the file that it writes is accepted, and identify runs with it on these recordings as they are."""
+
+import json
+import shutil
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from synthetic import L_MIN, MPA, Truth, synthetic_ramp
+
+from dzdesign.cli import main
+from dzdesign.identify.first_look import guess_columns, pressure_in_name
+
+LABELS = "Zeit (s),AO0 [V],Durchfluss [L/min],Temp [degC]"
+
+
+def columns_of(dp_MPa, *, sign=1, ramp_s=20, knee=5.4, rate_Hz=25):
+    test = synthetic_ramp(dp_MPa, Truth(noise=0.02, knee_rising=knee), ramp_s=ramp_s, rate_Hz=rate_Hz)
+    return test.time, sign * test.u, test.dp / MPA, sign * test.q / L_MIN
+
+
+def write(path, labels, *columns):
+    rows = "\n".join(",".join(f"{value:.4f}" for value in row) for row in np.column_stack(columns))
+    Path(path).parent.mkdir(exist_ok=True)
+    Path(path).write_text(f"{labels}\n{rows}\n")
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def init_then_identify(*ramps, more=()):
+    """Run init, then identify with its file; return init's report and the valve."""
+    assert main(["-q", "init", *ramps, *more]) == 0
+    text = Path("dzdesign.toml").read_text("utf-8")
+    assert main(["-q", "identify", *ramps, "--config", "dzdesign.toml"]) == 0
+    return text, json.loads(Path("valve.json").read_text())
+
+
+def test_the_bundled_recordings(here, example_folder, capsys):
+    for path in (example_folder / "ramps").glob("*.csv.gz"):
+        if any(dp in path.name for dp in ("dP1.", "dP4.")):
+            shutil.copy(path, here)
+    text, valve = init_then_identify("*.csv.gz")
+    said = capsys.readouterr().out
+    assert tomllib.loads(text) == {"u-max": "10 V"}  # what identify finds by itself stays a comment
+    assert "positive commands: 4 ramps at 0.999, 4 MPa, at most 0.1" in text and "negative" not in text
+    assert f"identify finds {valve['meter']['floor_L_min']:.2f} L/min" in text
+    assert "the recordings can't tell it (it takes ramps of two rates)" in text
+    assert '# u = "u_V"  (in V; understood by its label)' in text
+    assert "Written: dzdesign.toml" in said and "dzdesign identify *.csv.gz --config dzdesign.toml" in said
+
+
+def test_labels_of_another_program_and_pressures_in_the_names(here):
+    for dp_MPa, knee in ((1.0, 5.4), (4.0, 5.2)):
+        time, u, _, q = columns_of(dp_MPa, knee=knee)
+        write(f"ramp_{10 * dp_MPa:.0f}bar.csv", LABELS, time, u, q, 0 * q + 40)
+    text, valve = init_then_identify("ramp_*.csv")
+    assert tomllib.loads(text) == {
+        "u-max": "10 V",
+        "columns": {"time": "Zeit (s)", "u": "AO0 [V]", "Q": "Durchfluss [L/min]"},
+        "dp": {"ramp_10bar.csv": "10 bar", "ramp_40bar.csv": "40 bar"},
+    }
+    assert [test["dp_MPa"] for test in valve["sides"]["positive"]["tests"]] == [1.0, 4.0]
+
+
+def test_both_signs_and_a_smaller_command(here):
+    for sign, name in ((1, "up.csv"), (-1, "down.csv")):
+        time, u, dp, q = columns_of(1.0, sign=sign, knee=5.0)
+        write(name, "t_s,u_V,dP_MPa,Q_Lmin", time, u / 2, dp, q)
+    text, valve = init_then_identify("up.csv", "down.csv")
+    assert tomllib.loads(text) == {"u-max": "5 V"}
+    assert "# Full command: the ramps end at 5.00 V." in text
+    assert "positive commands: 1 ramp at 1 MPa" in text and "negative commands: 1 ramp at 1 MPa" in text
+    assert set(valve["sides"]) == {"positive", "negative"}
+
+
+def test_a_command_in_per_cent_says_that_full_command_was_not_seen(here):
+    time, u, dp, q = columns_of(1.0)
+    write("ramp.csv", "t_s,u_%,dP_MPa,Q_Lmin", time, 10 * u, dp, q)
+    text, _ = init_then_identify("ramp.csv")
+    assert "# Full command; not seen (the command is in per cent" in text
+
+
+def test_ramps_that_stop_short_make_full_command_a_guess(here):
+    time, u, dp, q = columns_of(1.0)
+    write("ramp.csv", "t_s,u_V,dP_MPa,Q_Lmin", *(column[u <= 8] for column in (time, u, dp, q)))
+    text, _ = init_then_identify("ramp.csv")
+    assert tomllib.loads(text) == {"u-max": "10 V"}
+    assert "# Full command: a guess, for the ramps end at 8.00 V." in text
+
+
+def test_two_rates_tell_the_lag(here):
+    for ramp_s in (20, 60):
+        time, u, dp, q = columns_of(1.0, ramp_s=ramp_s)
+        write(f"ramp_{ramp_s}.csv", "t_s,u_V,dP_MPa,Q_Lmin", time, u, dp, q)
+    text, valve = init_then_identify("ramp_20.csv", "ramp_60.csv")
+    assert valve["meter"]["lag_is"] == "identified"
+    assert "from ramps of two rates. Declared, it is taken as exact." in text
+    assert "2 ramps at 1 MPa, at most 0.501 V/s" in text
+
+
+@pytest.mark.parametrize(
+    ("labels", "reason"),
+    [
+        ("t_s,u_V,Q1 [L/min],Q2 [L/min]", "Q: 'Q1 [L/min]' and 'Q2 [L/min]' could each be it"),
+        ("t_s,AO0,p [bar],Q_Lmin", "u: no column has a unit of voltage"),
+        ("t_s,u,dP [bar],Q_Lmin", "u: 'u' has no unit; give it after a colon, such as V"),
+    ],
+)
+def test_what_can_not_be_told_is_left_open_with_the_reason(here, capsys, labels, reason):
+    time, u, dp, q = columns_of(1.0)
+    write("ramp.csv", labels, time, u, dp, q)
+    assert main(["init", "ramp.csv"]) == 1
+    assert f"open: column of {reason}" in capsys.readouterr().out
+    text = Path("dzdesign.toml").read_text()
+    assert f"# OPEN: column of {reason}" in text and f'# {reason[0]} = "LABEL"' in text
+    assert "columns" not in tomllib.loads(text)
+
+
+def test_several_recordings_without_a_pressure_are_open(here, capsys):
+    for number in (1, 2):
+        time, u, _, q = columns_of(float(number))
+        write(f"r{number}.csv", "t_s,u_V,Q_Lmin", time, u, q)
+    assert main(["init", "r1.csv", "r2.csv"]) == 1
+    assert "open: pressure drop of 'r1.csv': no column, and none in its name" in capsys.readouterr().out
+    text = Path("dzdesign.toml").read_text()
+    assert '# "r2.csv" = "1 MPa"' in text and tomllib.loads(text) == {"u-max": "10 V"}
+
+
+def test_a_file_that_exists_stays(here, capsys):
+    Path("dzdesign.toml").write_text("mine")
+    time, u, dp, q = columns_of(1.0)
+    write("ramp.csv", "t_s,u_V,dP_MPa,Q_Lmin", time, u, dp, q)
+    assert main(["init", "ramp.csv"]) == 2
+    assert "'dzdesign.toml' exists, and init never writes over a file" in capsys.readouterr().err
+    assert Path("dzdesign.toml").read_text() == "mine"
+    assert main(["-q", "init", "ramp.csv", "-o", "other.toml"]) == 0
+
+
+def test_without_names_it_looks_in_ramps_then_here(here, capsys):
+    assert main(["init"]) == 2
+    assert "there are no recordings in ./ramps or in this folder" in capsys.readouterr().err
+    time, u, dp, q = columns_of(1.0)
+    write("ramps/ramp.csv", "t_s,u_V,dP_MPa,Q_Lmin", time, u, dp, q)
+    write("other.csv", "nothing", time)
+    assert main(["init", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["recordings"] == ["ramps/ramp.csv"] and said["open"] == [] and said["sides"]["positive"]["ramps"] == 1
+
+
+def test_hostile_labels_stay_strings_of_toml(here):
+    time, u, dp, q = columns_of(1.0)
+    write("ramp.csv", 't_s,"A ""0\\x\x7f [V]",dP_MPa,Q_Lmin,"] = 1\x1b[2J #"', time, u, dp, q, q)
+    text, _ = init_then_identify("ramp.csv")
+    assert set(tomllib.loads(text)) == {"u-max", "columns"} and "\x1b" not in text
+
+
+def test_the_look_is_of_labels_and_units(here):
+    time, u, dp, q = columns_of(1.0)
+    write("ramp.csv", "Time (s),Vin (V),p1 (bar),p2 (bar),Flow (L/min)", time, u, dp, dp, q)
+    found = guess_columns(Path("ramp.csv"))
+    assert found.chosen == {"u": "Vin (V)"} and set(found.understood) == {"time", "Q"}
+    assert "is it the drop, pA or pB?" in found.unclear["dP"]
+    assert pressure_in_name("a_1.5MPa_40bar.csv") is None and pressure_in_name("ramp 12,5 Bar up.csv") == "12.5 bar"
