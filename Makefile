@@ -60,7 +60,7 @@ $(STAMP): requirements.lock pyproject.toml
 
 # Re-resolve the ranges of pyproject.toml (needs uv); commit the result.
 lock:
-	uv pip compile pyproject.toml --extra test --universal --python-version 3.11 \
+	uv pip compile pyproject.toml --extra test --extra docs --universal --python-version 3.11 \
 	    --generate-hashes --no-annotate --no-header --quiet --upgrade -o requirements.lock
 
 clean:

@@ -78,6 +78,15 @@ def test_what_was_fitted_and_what_is_predicted_is_told_apart(reproduced):
         assert (row["tolerance"] != "") == (row["holds"] is not None)
 
 
+def test_the_document_fits_its_schema(reproduced):
+    from schema_checks import problems
+
+    document = json.loads((reproduced[0] / "reproduction.json").read_text())
+    assert problems("reproduction", document) == []
+    del document["rows"][0]["outcomes"][0]["by"]
+    assert problems("reproduction", document) != []
+
+
 def test_the_readme_shows_what_is_printed(reproduced, monkeypatch, tmp_path, capsys):
     assert again(reproduced, monkeypatch, tmp_path) == 0
     printed = [line.strip() for line in capsys.readouterr().out.splitlines()]
