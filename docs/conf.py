@@ -35,6 +35,8 @@ autodoc_member_order = "bysource"
 add_module_names = False
 default_role = "code"  # the docstrings' `name` is a name, not a reference
 
+smartquotes = False  # what is copied from a page is typed as it stands
+
 html_theme = "furo"
 html_title = f"dzdesign {version}"
 html_static_path = ["_static"]
@@ -55,8 +57,10 @@ def _insert(app, page: str, source: list[str]) -> None:
 
 
 def _escape(app, what, name, obj, options, lines: list[str]) -> None:
-    """A name that ends in an underscore is no reference: reStructuredText would look for its target."""
-    lines[:] = [re.sub(r"\b([A-Za-z]\w*)_(?![\w`])", r"\1\\_", line) for line in lines]
+    """Keep reStructuredText from taking names for markup: one that ends in an underscore, several before a colon."""
+    for index, line in enumerate(lines):
+        line = re.sub(r"\b([A-Za-z]\w*)_(?![\w`])", r"\1\\_", line)
+        lines[index] = re.sub(r"^:(ivar|vartype) ([^:]+):", lambda found: found[0].replace(", ", ","), line)
 
 
 def _publish(app, error: Exception | None) -> None:

@@ -43,7 +43,8 @@ def _command(name: str, parser: ArgumentParser) -> str:
     shown = " ".join(
         (f"[{a.metavar}]" if a.nargs == "?" else a.metavar + (" ..." if a.nargs == "+" else "")) for a in arguments
     )
-    lines += ["```text", f"dzdesign {name} {shown} [options]" if options else f"dzdesign {name} {shown}", "```", ""]
+    usage = " ".join(part for part in ("dzdesign", name, shown, "[options]" if options else "") if part)
+    lines += ["```text", usage, "```", ""]
     for action in (*arguments, *options):
         value = "" if not action.option_strings or action.nargs == 0 else f" {action.metavar}"
         names = ", ".join(f"`{each}{value}`" for each in action.option_strings) or f"`{action.metavar}`"
@@ -75,9 +76,6 @@ def _file(name: str) -> str:
             f"{schema['description']} Schema: `{schema['$id']}`,",
             f'<a href="../schemas/{name}.schema.json">as a file</a>, or `dzdesign schema {name}`. Made by '
             f"`dzdesign {command}`.",
-            "",
-            ":::{rst-class} keys",
-            ":::",
             "",
             "| key | type | unit | what it is |",
             "|---|---|---|---|",

@@ -1,6 +1,7 @@
 """The documentation's site: it builds without a warning, loads nothing from elsewhere, and leaves nothing out."""
 
 import ast
+import html
 import os
 import re
 import subprocess
@@ -13,7 +14,7 @@ import pytest
 from synthetic import needs_compiler
 
 from dzdesign.cli import COMMANDS
-from dzdesign.schema_files import SCHEMAS, schema_text
+from dzdesign.schema_files import SCHEMAS, schema_document, schema_text
 
 pytest.importorskip("sphinx", reason="the site needs the packages of the extra `docs`")
 pytest.importorskip("myst_parser", reason="the site needs the packages of the extra `docs`")
@@ -108,18 +109,22 @@ def test_the_reference_has_every_command_with_every_option(site):
 
 def test_the_schemas_are_published_and_every_key_is_in_the_reference(site):
     page = (site / "reference" / "files.html").read_text(encoding="utf-8")
-    text = re.sub(r"<[^>]+>", "", page)
+    text = html.unescape(re.sub(r"<[^>]+>", "", page))
     for name in SCHEMAS:
         assert (site / "schemas" / f"{name}.schema.json").read_text(encoding="utf-8") == schema_text(name)
-        described = re.findall(r'"description": "((?:[^"\\]|\\.){30,60})"', schema_text(name))
-        assert described
-        assert [words for words in described if words.replace('\\"', '"').replace("`", "") not in unescaped(text)] == []
+        described = list(described_keys(schema_document(name)))
+        assert len(described) > 15
+        missing = [key for key, words in described if key not in text or words.replace("`", "") not in text]
+        assert missing == [], name
 
 
-def unescaped(text):
-    import html
-
-    return html.unescape(text).replace("“", '"').replace("”", '"').replace("’", "'").replace("‘", "'")
+def described_keys(schema):
+    """Yield every key of a schema with its description."""
+    for key, value in schema.items():
+        if key == "properties":
+            yield from ((name, given["description"]) for name, given in value.items() if "description" in given)
+        if isinstance(value, dict):
+            yield from described_keys(value)
 
 
 def codes_in(*sources):
@@ -172,8 +177,24 @@ def test_a_figure_is_drawn_again_with_the_same_bytes(site, tmp_path):
 def test_the_pages_name_no_file_that_is_not_there():
     """Paths of the repository in the pages, in CONTRIBUTING and in CHANGELOG."""
     for page in (*DOCS.rglob("*.md"), *ROOT.glob("C*.md")):
+        text = page.read_text(encoding="utf-8")
         for path in re.findall(
-            r"`((?:core|derivation|identify|design|codegen|verify|tests|examples|docs)/[\w./-]+)`", page.read_text()
+            r"`((?:core|derivation|identify|design|codegen|verify|tests|examples|docs)/[\w./-]+)`", text
         ):
             made = path.startswith(("docs/_", "docs/derivation")) or "mychip" in path
             assert made or (ROOT / path).exists(), f"{page.name}: {path}"
+
+
+def test_the_citation_is_of_the_format_and_of_this_version():
+    """The keys that Citation File Format 1.2.0 requires, and the paper by its DOI."""
+    import tomllib
+
+    yaml = pytest.importorskip("yaml", reason="PyYAML comes with the extra `docs`")
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert citation["cff-version"] == "1.2.0" and {"message", "title", "authors"} <= set(citation)
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert (citation["version"], citation["license"]) == (project["version"], project["license"])
+    (paper,) = citation["references"]
+    assert paper["doi"] == "10.11916/j.issn.1005-9113.20063" and (paper["start"], paper["end"]) == (45, 56)
+    assert [author["family-names"] for author in paper["authors"]] == ["Wu", "Ji", "Wang", "Hao", "Huang"]
+    assert "Apache License" in (ROOT / "LICENSE").read_text(encoding="utf-8")
