@@ -52,7 +52,7 @@ docs: $(STAMP)
 	$(BIN)/dzdesign derive --format html -o $(DOCS)/index.html
 	$(BIN)/dzdesign derive --format latex -o $(DOCS)/derivation.tex
 	$(BIN)/dzdesign derive --format json -o $(DOCS)/derivation.json
-	OPENBLAS_NUM_THREADS=1 $(BIN)/sphinx-build -q -W --keep-going -b html docs $(SITE)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/sphinx-build -q -E -W --keep-going -b html docs $(SITE)
 
 $(STAMP): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit("dzdesign needs Python 3.11 or newer; this is " + sys.version.split()[0] + ". Try: make PYTHON=python3.12") if sys.version_info < (3, 11) else None'

@@ -92,7 +92,7 @@ def test_make_docs_builds_the_account_that_the_pages_link_to():
     text = (DOCS / "derivation.md").read_text()
     linked = re.findall(r'href="derivation/([^"]+)"', text)
     assert len(linked) == 3 and [name for name in linked if f"$(DOCS)/{name}" not in recipe] == []
-    assert "sphinx-build -q -W" in recipe
+    assert "sphinx-build -q -E -W" in recipe
     ignored = (ROOT / ".gitignore").read_text().splitlines()
     assert {"/docs/_build/", "/docs/_made/", "/docs/derivation/"} <= set(ignored)
 
