@@ -4,6 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 DOCS   := docs/derivation
+SITE   := docs/_build/html
 
 .PHONY: demo test lint docs goldens lock clean fuzz bench bench-batch bench-identify bench-isr bench-verify
 
@@ -55,12 +56,14 @@ $(VENV)/.fuzz: $(STAMP)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation -e '.[fuzz]'
 	touch $@
 
-# The account of the paper as a page, for LaTeX and for machines; built, never committed.
+# The pages, in $(SITE), a warning an error; a part of them is the account of the paper as a page, for LaTeX and for
+# machines. Built, never committed.
 docs: $(STAMP)
 	mkdir -p $(DOCS)
 	$(BIN)/dzdesign derive --format html -o $(DOCS)/index.html
 	$(BIN)/dzdesign derive --format latex -o $(DOCS)/derivation.tex
 	$(BIN)/dzdesign derive --format json -o $(DOCS)/derivation.json
+	OPENBLAS_NUM_THREADS=1 $(BIN)/sphinx-build -q -E -W --keep-going -b html docs $(SITE)
 
 $(STAMP): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit("dzdesign needs Python 3.11 or newer; this is " + sys.version.split()[0] + ". Try: make PYTHON=python3.12") if sys.version_info < (3, 11) else None'
@@ -71,8 +74,8 @@ $(STAMP): requirements.lock pyproject.toml
 
 # Re-resolve the ranges of pyproject.toml (needs uv); commit the result.
 lock:
-	uv pip compile pyproject.toml --extra test --universal --python-version 3.11 \
+	uv pip compile pyproject.toml --extra test --extra docs --universal --python-version 3.11 \
 	    --generate-hashes --no-annotate --no-header --quiet --upgrade -o requirements.lock
 
 clean:
-	rm -rf $(VENV) $(DOCS) build *.egg-info .pytest_cache .ruff_cache
+	rm -rf $(VENV) $(DOCS) docs/_build docs/_made build *.egg-info .pytest_cache .ruff_cache

@@ -308,6 +308,11 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
             _given("--seed", default="1", metavar="N", help="of the noise"),
         ),
     ),
+    "schema": (
+        "the JSON Schema of an artefact: its keys, what they mean, their units",
+        "dzdesign.schema_files:run_schema",
+        (_given("name", nargs="?", metavar="NAME", help="valve, compensator, firmware, ... (default: list them)"),),
+    ),
 }
 
 

@@ -16,6 +16,7 @@ from dzdesign.identify.ramp_files import read_ramp_file
 
 def pytest_addoption(parser):
     parser.addoption("--update-goldens", action="store_true", help="write tests/goldens anew, from its valve.json")
+    parser.addoption("--update-docs", action="store_true", help="write what commands print into the pages of docs/")
 
 
 @pytest.fixture(scope="session")

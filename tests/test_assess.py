@@ -595,10 +595,9 @@ def test_dead_zones_at_a_level_on_recordings_that_the_project_did_not_make():
 
 
 @needs_compiler
-def test_the_readme_shows_what_the_commands_print(firmware_folder, tmp_path, monkeypatch, capsys):
+def test_the_page_shows_what_the_commands_print(firmware_folder, tmp_path, monkeypatch, capsys):
     root = Path(__file__).parents[1]
-    readme = (root / "README.md").read_text(encoding="utf-8")
-    section = readme.partition("## Before and after")[2].partition("\n## ")[0]
+    section = (root / "docs" / "before-after.md").read_text(encoding="utf-8")
     block = section.replace("\\\n", " ").replace("demo/firmware", str(firmware_folder))
     block = block.replace("examples/paper_valve", str(root / "examples" / "paper_valve"))
     simulate, compare = (shlex.split(line) for line in block.splitlines() if line.startswith("    dzdesign "))

@@ -549,6 +549,14 @@ def test_examples_in_the_docstrings_run(module):
     assert outcome.failed == 0
 
 
+def test_the_json_fits_its_schema(rendered):
+    from schema_checks import overlooked, problems
+
+    document = json.loads(rendered["json"])
+    assert problems("derivation", document) == []
+    assert overlooked("derivation", document) == []
+
+
 def test_every_symbol_is_explained(rendered):
     table = json.loads(rendered["json"])["symbols"]
     assert [name for name, row in table.items() if not row["meaning"] and name != "f"] == []

@@ -78,16 +78,25 @@ def test_what_was_fitted_and_what_is_predicted_is_told_apart(reproduced):
         assert (row["tolerance"] != "") == (row["holds"] is not None)
 
 
-def test_the_readme_shows_what_is_printed(reproduced, monkeypatch, tmp_path, capsys):
+def test_the_document_fits_its_schema(reproduced):
+    from schema_checks import problems
+
+    document = json.loads((reproduced[0] / "reproduction.json").read_text())
+    assert problems("reproduction", document) == []
+    del document["rows"][0]["outcomes"][0]["by"]
+    assert problems("reproduction", document) != []
+
+
+def test_the_page_shows_what_is_printed(reproduced, monkeypatch, tmp_path, capsys):
     assert again(reproduced, monkeypatch, tmp_path) == 0
     printed = [line.strip() for line in capsys.readouterr().out.splitlines()]
-    readme = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
-    rows = [line.strip() for line in readme.splitlines() if re.search(r" (yes|predicted)  +", line)]
+    page = (Path(__file__).parents[1] / "docs" / "reproduction.md").read_text(encoding="utf-8")
+    rows = [line.strip() for line in page.splitlines() if re.search(r" (yes|predicted)  +", line)]
     assert len(rows) > 10
     assert [row for row in rows if row not in printed] == []
     assert "39 numbers, of which 31 must agree: all do." in printed
     onsets = [chain.runs.onset_percent(Drive(PRODUCT), dp_MPa) for chain in reproduced[1] for dp_MPa in (1.0, 5.0)]
-    assert max(onsets) < 0.6, "the README says so"
+    assert max(onsets) < 0.6, "the page says so"
 
 
 def test_same_valve_same_bytes(reproduced):

@@ -1,0 +1,83 @@
+"""Sphinx's settings: `make docs` builds the site. Everything that a page loads is local: no web font, no CDN.
+
+Sphinx because it reads the docstrings as they are (numpydoc) and makes a reference that leads nowhere a warning, which
+the build takes as an error; Furo because it loads nothing from elsewhere, and is readable on a telephone.
+"""
+
+import os
+import re
+import shutil
+import sys
+from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+sys.path.insert(0, str(Path(__file__).parent))
+
+from figures.draw import draw_all
+from generated import MADE
+
+from dzdesign import __version__
+from dzdesign.schema_files import SCHEMAS, schema_text
+
+HERE = Path(__file__).parent
+
+project, author, copyright = "dzdesign", "the authors of dzdesign", "the authors of dzdesign, Apache-2.0"
+version = release = __version__
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+exclude_patterns = ["derivation/*", "_build"]
+suppress_warnings = ["config.cache"]
+myst_enable_extensions = ["colon_fence", "deflist"]
+myst_heading_anchors = 3
+napoleon_google_docstring = False
+napoleon_use_ivar = True
+autodoc_typehints = "none"  # the docstrings name types and units
+autodoc_member_order = "bysource"
+add_module_names = False
+default_role = "code"  # the docstrings' `name` is a name, not a reference
+
+smartquotes = False  # what is copied from a page is typed as it stands
+
+html_theme = "furo"
+html_title = f"dzdesign {version}"
+html_static_path = ["_static"]
+html_css_files = ["pages.css"]
+html_show_sphinx = html_copy_source = html_show_sourcelink = False
+html_last_updated_fmt = None
+pygments_style, pygments_dark_style = "friendly", "github-dark"
+#: The account of the paper, where `make docs` has built it.
+ACCOUNT = HERE / "derivation"
+
+
+def _draw(app) -> None:
+    draw_all(HERE / "_made" / "figures")
+
+
+def _insert(app, page: str, source: list[str]) -> None:
+    source[0] = re.sub(r"<!-- made: (\w+) -->", lambda found: MADE[found[1]](), source[0])
+
+
+def _escape(app, what, name, obj, options, lines: list[str]) -> None:
+    """Keep reStructuredText from taking names for markup: one that ends in an underscore, several before a colon."""
+    for index, line in enumerate(lines):
+        line = re.sub(r"\b([A-Za-z]\w*)_(?![\w`])", r"\1\\_", line)
+        lines[index] = re.sub(r"^:(ivar|vartype) ([^:]+):", lambda found: found[0].replace(", ", ","), line)
+
+
+def _publish(app, error: Exception | None) -> None:
+    """Put the schemas and the derivation's account beside the pages."""
+    if error or app.builder.format != "html":
+        return
+    schemas = Path(app.outdir) / "schemas"
+    schemas.mkdir(exist_ok=True)
+    for name in SCHEMAS:
+        (schemas / f"{name}.schema.json").write_text(schema_text(name), encoding="utf-8")
+    if ACCOUNT.is_dir():
+        shutil.copytree(ACCOUNT, Path(app.outdir) / "derivation", dirs_exist_ok=True)
+
+
+def setup(app) -> None:
+    """Tell Sphinx when to draw, to insert what is made, and to publish."""
+    app.connect("builder-inited", _draw)
+    app.connect("source-read", _insert)
+    app.connect("autodoc-process-docstring", _escape, priority=900)
+    app.connect("build-finished", _publish)

@@ -1,0 +1,155 @@
+"""Reference text that is made when the pages are built: commands, files and API, each from its one source."""
+
+import importlib
+import inspect
+from argparse import ArgumentParser
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from dzdesign.cli import COMMANDS, build_parser
+from dzdesign.schema_files import SCHEMAS, schema_document
+
+#: What a caller of the rooms needs; `dzdesign.api` stands first as soon as there is one.
+API = (
+    ("dzdesign.api", None),
+    ("dzdesign.identify.ramp_files", ("RampTest", "read_ramp_file")),
+    ("dzdesign.identify.options", ("IdentifyOptions",)),
+    ("dzdesign.identify.identification", ("identify",)),
+    ("dzdesign.identify.model", ("ValveModel", "SideModel", "TestResult")),
+    ("dzdesign.design.options", ("DesignOptions",)),
+    ("dzdesign.design.designing", ("design",)),
+    ("dzdesign.design.compensator", ("Compensator",)),
+    ("dzdesign.codegen.project", ("generate",)),
+    ("dzdesign.verify.plant", ("Plant", "read_plant")),
+    ("dzdesign.verify.verification", ("verify", "Verification")),
+    ("dzdesign.core.errors", ("DzdesignError", "InputError", "RequirementError")),
+)
+
+
+def commands() -> str:
+    """Return a section for each command: its usage, arguments, options and defaults, as argparse has them."""
+    parsers = build_parser()[1]
+    return "\n\n".join(_command(name, parsers[name]) for name in COMMANDS)
+
+
+def _command(name: str, parser: ArgumentParser) -> str:
+    lines = [f"({name})=", f"## {name}", "", parser.description or "", ""]
+    arguments = [action for action in parser._actions if not action.option_strings]
+    options = [
+        action
+        for action in parser._actions
+        if action.option_strings and not {"--help", "--config", "--json"} & set(action.option_strings)
+    ]
+    shown = " ".join(
+        (f"[{a.metavar}]" if a.nargs == "?" else a.metavar + (" ..." if a.nargs == "+" else "")) for a in arguments
+    )
+    usage = " ".join(part for part in ("dzdesign", name, shown, "[options]" if options else "") if part)
+    lines += ["```text", usage, "```", ""]
+    for action in (*arguments, *options):
+        value = "" if not action.option_strings or action.nargs == 0 else f" {action.metavar}"
+        names = ", ".join(f"`{each}{value}`" for each in action.option_strings) or f"`{action.metavar}`"
+        required = " Required." if action.required and action.option_strings else ""
+        text = parser._get_formatter()._expand_help(action)
+        lines += [names, f": {_sentence(text)}{required}", ""]
+    return "\n".join(lines)
+
+
+def _sentence(text: str) -> str:
+    text = text.replace("*", r"\*").replace("[", r"\[").replace("<", "&lt;")
+    return text[0].upper() + text[1:] + ("" if text.endswith(".") else ".")
+
+
+def files() -> str:
+    """Return a section for each schema: a table of its keys, with type, unit and description."""
+    return "\n\n".join(_file(name) for name in SCHEMAS)
+
+
+def _file(name: str) -> str:
+    schema = schema_document(name)
+    _, artefact, command = SCHEMAS[name]
+    rows = [f"| `{key}` | {kind} | {unit} | {text} |" for key, kind, unit, text in _rows(schema, schema, "", set())]
+    return "\n".join(
+        (
+            f"({name})=",
+            f"## {artefact}",
+            "",
+            f"{schema['description']} Schema: `{schema['$id']}`,",
+            f'<a href="../schemas/{name}.schema.json">as a file</a>, or `dzdesign schema {name}`. Made by '
+            f"`dzdesign {command}`.",
+            "",
+            "| key | type | unit | what it is |",
+            "|---|---|---|---|",
+            *rows,
+        )
+    )
+
+
+def _rows(
+    schema: dict[str, Any], whole: dict[str, Any], place: str, seen: set[str]
+) -> Iterator[tuple[str, str, str, str]]:
+    """Yield key, type, unit and description of everything inside; what stands for several keys is opened once."""
+    for key, given in schema.get("properties", {}).items():
+        value, nullable = _resolved(given, whole)
+        path = f"{place}{key}" if key in schema.get("required", ()) else f"{place}[{key}]"
+        name = given.get("$ref") or next((each["$ref"] for each in given.get("anyOf", ()) if "$ref" in each), "")
+        text = given.get("description") or value.get("description", "")
+        known = " As above." if name in seen and "properties" in value else ""
+        yield path, _kind(value, nullable), given.get("unit", ""), text.replace("|", r"\|") + known
+        if name not in seen:
+            yield from _inside(value, whole, path, seen)
+        seen |= {name} - {""}
+
+
+def _inside(
+    value: dict[str, Any], whole: dict[str, Any], path: str, seen: set[str]
+) -> Iterator[tuple[str, str, str, str]]:
+    yield from _rows(value, whole, f"{path}.", seen)
+    for part, mark in (("items", "[]"), ("additionalProperties", ".*")):
+        if isinstance(value.get(part), dict):
+            yield from _inside(_resolved(value[part], whole)[0], whole, f"{path}{mark}", seen)
+
+
+def _resolved(schema: dict[str, Any], whole: dict[str, Any]) -> tuple[dict[str, Any], bool]:
+    """Return the schema behind a reference, and whether null stands for it too."""
+    nullable = {"type": "null"} in schema.get("anyOf", ())
+    if nullable:
+        schema = next(each for each in schema["anyOf"] if each != {"type": "null"})
+    return (whole["$defs"][schema["$ref"].rpartition("/")[2]] if "$ref" in schema else schema), nullable
+
+
+def _kind(value: dict[str, Any], nullable: bool) -> str:
+    if "const" in value:
+        return f"`{value['const']}`"
+    kinds = value.get("type", "number or table")
+    kinds = [kinds] if isinstance(kinds, str) else list(kinds)
+    if "enum" in value:
+        kinds = [f"`{each}`" for each in value["enum"] if each is not None] + ["null"] * (None in value["enum"])
+    return " or ".join([*kinds, *(["null"] if nullable and "null" not in kinds else [])])
+
+
+def api() -> str:
+    """Return directives for the documented names of each module that there is."""
+    parts = []
+    for module, names in API:
+        try:
+            found = importlib.import_module(module)
+        except ModuleNotFoundError as error:
+            if error.name != module:
+                raise
+            continue
+        names = names or [
+            name
+            for name, value in vars(found).items()
+            if not name.startswith("_") and getattr(value, "__module__", None) == module and callable(value)
+        ]
+        parts.append(f"## {module}\n\n```{{eval-rst}}\n.. currentmodule:: {module}\n")
+        for name in names:
+            kind = "autofunction" if inspect.isfunction(getattr(found, name)) else "autoclass"
+            members = "\n   :members:" if kind == "autoclass" else ""
+            parts.append(f"\n.. {kind}:: {name}{members}\n")
+        parts.append("\n```\n")
+    return "\n".join(parts)
+
+
+#: What a page asks for by ``<!-- made: NAME -->``.
+MADE: dict[str, Callable[[], str]] = {"commands": commands, "files": files, "api": api}
