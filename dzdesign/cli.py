@@ -222,6 +222,14 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
             *DESIGN,
         ),
     ),
+    "report": (
+        "artefacts in, report.html out: the verdict, figures, every requirement, where each number came from",
+        "dzdesign.report:run_report",
+        (
+            _given("folder", metavar="DIR", help="of demo, verify, codegen, or with valve.json or compensator.json"),
+            _given(*OUTPUT, metavar="FILE", help="file to write (default: report.html with the evidence, or in DIR)"),
+        ),
+    ),
     "assess": (
         "ramp tests without and with the compensator, side by side; limits for the latter",
         "dzdesign.assess:run_assess",
