@@ -1,7 +1,7 @@
 """Which files a report is of: found by the SHA-256 that the chain states, never by a name alone.
 
-From the evidence back to the recordings each artefact states the hash of what it was made from. A file of the right name
-whose hash is another is said in the report, and not used.
+From the evidence back to the recordings each artefact states the hash of what it was made from. A file of the right
+name whose hash is another is said in the report, and not used.
 """
 
 import contextlib

@@ -2,11 +2,15 @@
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dzdesign.verify.report_figure import CYCLE, LIGHT, ReportFigure, csv_text, label_ends, new_figure, svg_of
+from dzdesign.verify.report_table import whole
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 #: Where the enlarged panel of the closed loop ends, per cent of full command.
 NEAR_ZERO = 15.0
@@ -14,7 +18,12 @@ Curves = Mapping[str, np.ndarray]
 
 
 def map_figure(
-    curves: Curves, text: str, compensator: dict[str, Any], side: str, inputs: dict[str, Any] | None
+    curves: Curves,
+    text: str,
+    compensator: dict[str, Any],
+    side: str,
+    inputs: dict[str, Any],
+    zero: Curves | None,
 ) -> ReportFigure:
     """Draw what the core gives over command and pressure drop, and where it falls back or is wrong.
 
@@ -28,8 +37,10 @@ def map_figure(
         compensator.json.
     side : str
         ``positive`` or ``negative``.
-    inputs : dict or None
+    inputs : dict
         The side's entry of verification.json's ``inputs``.
+    zero : mapping of str to array, or None
+        Of zero_command_<side>.csv: where the valve is over-compensated.
     """
     from matplotlib.colors import ListedColormap
 
@@ -48,10 +59,10 @@ def map_figure(
     low, high = (float(Fraction(*end)) for end in compensator["sides"][side]["certificate"]["dp_MPa"])
     room = 0.14 * (high - low)
     figure = new_figure(4.3)
-    whole, tested = figure.subplots(1, 2, width_ratios=(1, 2.1))
-    for axes, limits in ((whole, (dp.min(), dp.max())), (tested, (low - room, high + room))):
-        mesh = axes.pcolormesh(u, dp, volt * output, cmap="cividis", shading="nearest", rasterized=True,
-                               vmin=0, vmax=volt * signals["compare_max"])  # fmt: skip
+    left, tested = figure.subplots(1, 2, width_ratios=(1, 2.1))
+    volts = volt * output
+    for axes, limits in ((left, (dp.min(), dp.max())), (tested, (low - room, high + room))):
+        mesh = axes.pcolormesh(u, dp, volts, cmap="cividis", shading="nearest", rasterized=True)
         fallen = np.ma.masked_equal(np.asarray(status != 0, dtype=float), 0)
         if fallen.count():
             axes.pcolormesh(u, dp, fallen, cmap=ListedColormap(["#ffffff"]), alpha=0.35, shading="nearest",
@@ -63,25 +74,49 @@ def map_figure(
         axes.plot(u[wrong[:, 1]], dp[wrong[:, 0]], "x", color="#ff2d2d", ms=4.5, mew=1.6, zorder=5)
         axes.set(xlim=(u.min(), u.max()), ylim=limits, xlabel="command u_i (% of full)")
         axes.grid(False)
-    whole.set(ylabel="pressure drop dP (MPa)", title="every difference of codes")
+    levels = _levels(volts)
+    lines = tested.contour(u, dp, volts, levels=levels, linewidths=0.8,
+                           colors=["#f2f2f2" if level < volts.mean() else "#101418" for level in levels])  # fmt: skip
+    over = _draw_zero_strip(tested, zero, float(u.min()), float(np.ptp(u)))
+    left.set(ylabel="pressure drop dP (MPa)", title="every difference of codes")
     tested.set_title("the tested interval, dashed, and around it")
     bar = figure.colorbar(mesh, ax=tested, pad=0.02)
     bar.set_label("output u_O of the C (V)")
     bar.outline.set_visible(False)
-    count = f"{inputs['inputs']:,} pairs checked, {inputs['wrong']:,} wrong" if inputs else "pairs were not counted"
+    bar.add_lines(lines)
     description = (
-        f"Map of the output over command and pressure drop. {count}. On the drawn grid {len(wrong)} of {output.size} "
-        f"points are wrong, and {int((status != 0).sum())} fall back to the safe value."
+        f"Map of the output over command and pressure drop. {whole(inputs['inputs'])} pairs checked, "
+        f"{whole(inputs['wrong'])} wrong. On the drawn grid {len(wrong)} of {output.size} points are wrong, "
+        f"{int((status != 0).sum())} fall back to the safe value; {over} codes are over-compensated at zero command."
     )
     return ReportFigure(
         name=f"map-{side}",
-        caption="What the compiled C puts out, on a coarse grid of the pairs that were checked. Hatched: codes that are "
-        "not sound, a command or a pressure drop that can't be, where the C falls back to the safe value. Red crosses: "
-        f"points where it is not the exactly rounded law; here {len(wrong)}.",
+        caption="What the compiled C puts out, on a coarse grid of the pairs that were checked. Hatched: a command or "
+        "a pressure drop that can't be, where the C falls back to the safe value. Red crosses: points where it is not "
+        f"the exactly rounded law; on this grid {len(wrong)}, of all pairs {whole(inputs['wrong'])}. Strip at zero "
+        f"command: green where the drive is below the threshold's bound, red and hatched where not ({over} codes).",
         description=description,
         svg=svg_of(figure, f"map-{side}", description),
         csv=text,
     )
+
+
+def _levels(volts: np.ndarray) -> np.ndarray:
+    """Return whole or half volts between the least and the largest, at most some ten."""
+    low, high = float(volts.min()), float(volts.max())
+    step = next((step for step in (0.1, 0.25, 0.5, 1.0, 2.5) if (high - low) / step <= 12), 10.0)
+    return step * np.arange(np.floor(low / step) + 1, np.ceil(high / step))
+
+
+def _draw_zero_strip(axes: "Axes", zero: Curves | None, at: float, width: float) -> int:
+    """Draw along zero command where the drive is certified and where not; return at how many codes it is not."""
+    if zero is None:
+        return 0
+    dp, above = zero["dp_MPa"], zero["drive_V"] > zero["bound_V"]
+    ends = [at, at + 0.02 * width]
+    axes.fill_betweenx(dp, *ends, where=~above, color=LIGHT["green"], lw=0, zorder=4)
+    axes.fill_betweenx(dp, *ends, where=above, facecolor="#ff2d2d", edgecolor="#ffffff", hatch="xxxx", lw=0, zorder=4)
+    return int(above.sum())
 
 
 def zero_figure(curves: Curves, text: str, side: str, guard: str) -> ReportFigure:
@@ -111,8 +146,8 @@ def zero_figure(curves: Curves, text: str, side: str, guard: str) -> ReportFigur
                           hatch="xxxx", lw=1, label="OVER-COMPENSATED")  # fmt: skip
     least = int(np.argmin(bound - drive))
     axes.plot(dp[least], drive[least], "o", ms=9, mfc="none", mec=LIGHT["ink"], mew=1.3)
-    axes.annotate(f"{1e3 * (bound - drive)[least]:.2f} mV", (dp[least], drive[least]), xytext=(0, -14),
-                  textcoords="offset points", ha="center", va="top", fontsize=8.5)  # fmt: skip
+    axes.annotate(f"{1e3 * (bound - drive)[least]:.2f} mV", (dp[least], drive[least]), xytext=(9, 7),
+                  textcoords="offset points", ha="left", va="bottom", fontsize=8.5)  # fmt: skip
     axes.margins(y=0.14)
     axes.set(xlabel="pressure drop dP (MPa)", ylabel="command u (V)")
     figure.legend(loc="outside lower center", ncols=4)
@@ -145,34 +180,38 @@ def loop_figure(curves: Curves, text: str, side: str, both: bool) -> ReportFigur
         Whether the valve has two sides.
     """
     command = curves["command_percent"]
-    pressures = [name.removeprefix("q_with_").removesuffix("_MPa_L_min") for name in curves if name.startswith("q_with_")]
+    columns = [name for name in curves if name.startswith("q_with_")]
+    pressures = [name.removeprefix("q_with_").removesuffix("_MPa_L_min") for name in columns]
     figure = new_figure(3.9)
-    whole, near = figure.subplots(1, 2, width_ratios=(1.35, 1))
-    labels, top = [], 0.0
+    wide, near = figure.subplots(1, 2, width_ratios=(1.35, 1))
+    labels, top, peak = [], 0.0, int(np.argmax(command))
     starts: dict[str, list[float]] = {"without": [], "with": []}
     for index, dp in enumerate(pressures):
         colour = LIGHT[CYCLE[index % len(CYCLE)]]
         bare, driven = (curves[f"q_{which}_{dp}_MPa_L_min"] for which in ("without", "with"))
-        whole.plot(command, bare, ":", color=colour, lw=1.4)
-        whole.plot(command, driven, "-", color=colour, lw=1.5)
-        inside = command <= NEAR_ZERO
-        near.plot(command[inside], driven[inside], "-", color=colour, lw=1.5, label=f"{float(dp):.2f} MPa")
-        top = max(top, float(driven[inside].max()))
+        wide.plot(command, bare, ":", color=colour, lw=1.4)
+        wide.plot(command, driven, "-", color=colour, lw=1.5)
+        for dash, branch in (("-", np.arange(command.size) <= peak), ("--", np.arange(command.size) > peak)):
+            inside = branch & (command <= NEAR_ZERO)
+            label = f"{float(dp):.2f} MPa" if dash == "-" else None
+            near.plot(command[inside], driven[inside], dash, color=colour, lw=1.5, label=label)
+            top = max(top, float(driven[inside].max()))
         for which, flow in (("without", bare), ("with", driven)):
             flowing = command[flow > 0]
             starts[which].append(float(flowing[0]) if flowing.size else 100.0)
         labels.append((100.0, float(driven.max()), f"{float(dp):.2f}", colour))
-    label_ends(whole, labels)
-    whole.plot([], [], "-", color=LIGHT["soft"], label="with")
-    whole.plot([], [], ":", color=LIGHT["soft"], label="without")
-    whole.legend(loc="upper left", title="the compensator", alignment="left")
-    near.legend(loc="upper left", title="dP, both branches", alignment="left")
-    whole.set(xlabel="command (% of full)", ylabel="flow Q (L/min)", xlim=(0, 100), ylim=(0, None),
+    label_ends(wide, labels)
+    wide.plot([], [], "-", color=LIGHT["soft"], label="with")
+    wide.plot([], [], ":", color=LIGHT["soft"], label="without")
+    wide.legend(loc="upper left", title="the compensator", alignment="left")
+    near.plot([], [], "--", color=LIGHT["soft"], label="closing")
+    near.legend(loc="upper left", title="opening at", alignment="left")
+    wide.set(xlabel="command (% of full)", ylabel="flow Q (L/min)", xlim=(0, 100), ylim=(0, None),
               title="whole range; dP in MPa at the end")  # fmt: skip
-    near.set(xlabel="command (% of full)", ylabel="flow Q (L/min)", xlim=(0, NEAR_ZERO), ylim=(0, 1.05 * top or 1),
+    near.set(xlabel="command (% of full)", ylabel="flow Q (L/min)", xlim=(0, NEAR_ZERO), ylim=(0, 1.1 * top or 1),
              title="with the compensator, near zero")  # fmt: skip
-    description = f"Flow over command at {len(pressures)} pressure drops. First flow on the ramp up: without the compensator "
-    description += f"at {_span(starts['without'])}, with it at {_span(starts['with'])} of full command."
+    description = f"Flow over command at {len(pressures)} pressure drops. First flow on the ramp up: without the "
+    description += f"compensator at {_span(starts['without'])}, with it at {_span(starts['with'])} of full command."
     return ReportFigure(
         name=f"loop-{side}",
         caption="Closed loop: a ramp up and down, the generated C driving the simulated valve"
@@ -223,7 +262,8 @@ def dead_zone_figure(pressures: Sequence[dict[str, Any]], side: str, both: bool)
     )
     return ReportFigure(
         name=f"dead-zone-{side}",
-        caption="Dead zone in the closed loop, without and with the compensator" + (f", {side} commands." if both else "."),
+        caption="Dead zone in the closed loop, without and with the compensator"
+        + (f", {side} commands." if both else "."),
         description=description,
         svg=svg_of(figure, f"dead-zone-{side}", description),
         csv=csv_text(

@@ -1,7 +1,8 @@
 """A figure of the report: SVG that takes its colours from the page, and its numbers as CSV.
 
-Matplotlib draws in the light theme's colours; each is then replaced by a variable of the page, so that a dark page has a
-dark figure and a printed one a light figure, from one drawing. Lines differ in dash or marker too, never in colour alone.
+Matplotlib draws in the light theme's colours; each is then replaced by a variable of the page, so that a dark page has
+a dark figure and a printed one a light figure, from one drawing. Lines differ in dash, marker or a label at their end,
+never in colour alone.
 """
 
 import csv
@@ -166,8 +167,8 @@ def label_ends(axes: "Axes", labels: Sequence[tuple[float, float, str, str]]) ->
     below = -room
     for x, y, text, colour in sorted(labels, key=lambda label: label[1]):
         if y - below >= room:
-            axes.annotate(text, (x, y), xytext=(5, 0), textcoords="offset points", va="center", fontsize=8, color=colour,
-                          annotation_clip=False)  # fmt: skip
+            axes.annotate(text, (x, y), xytext=(5, 0), textcoords="offset points", va="center", fontsize=8,
+                          color=colour, annotation_clip=False)  # fmt: skip
             below = y
 
 
@@ -192,7 +193,7 @@ def svg_of(figure: "Figure", name: str, description: str) -> str:
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
     text = re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
     text = re.sub(r'\b(id|xlink:href|clip-path)="(url\()?(#?)(?!data:)', rf'\1="\2\3{name}-', text)
-    text = re.sub(r"url\(#(?!%s-)" % re.escape(name), f"url(#{name}-", text)
+    text = re.sub(rf"url\(#(?!{re.escape(name)}-)", f"url(#{name}-", text)
     for variable, (light, _) in PALETTE.items():
         text = text.replace(light, f"var(--fig-{variable})")
     width, height = (float(size) for size in re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', text).groups())

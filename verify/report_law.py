@@ -3,17 +3,14 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING
 
 from dzdesign.derivation.account import STATEMENTS, verify_statements
 from dzdesign.derivation.law import law
+from dzdesign.derivation.prose import Words, parse_prose
 from dzdesign.derivation.report import closure, compose
 from dzdesign.derivation.report_content import Entry, Term
 from dzdesign.derivation.report_html import Page
 from dzdesign.derivation.statement import Outcome
-
-if TYPE_CHECKING:
-    import markupsafe
 
 #: The statement of the account that ends the derivation of each law: Eq. (18), and that the other meets the target.
 STATED_AS = {"paper": "(18)", "target": "T1d"}
@@ -25,7 +22,7 @@ class LawAccount:
 
     Attributes
     ----------
-    note : str
+    note : Words
         What the law does and does not achieve.
     main : tuple of Entry
         The law, and before it what it rests on directly; with their steps.
@@ -37,7 +34,7 @@ class LawAccount:
         Writes words and formulas.
     """
 
-    note: str
+    note: Words
     main: tuple[Entry, ...]
     rest: tuple[Entry, ...]
     glossary: tuple[Term, ...]
@@ -76,7 +73,7 @@ def account_of(law_name: str) -> LawAccount:
     entries = [entry for _, section in content.sections for entry in section]
     direct = {ground.number for ground in statements[-1].grounds} | {number}
     return LawAccount(
-        note=law(law_name).note,
+        note=parse_prose(law(law_name).note),
         main=_in(entries, direct),
         rest=_in(entries, set(numbers) - direct),
         glossary=content.glossary,

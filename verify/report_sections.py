@@ -64,13 +64,11 @@ def constants_table(firmware: dict[str, Any]) -> Table:
         value = entry.get("value")
         cells.append(
             (
-                Cell(text=entry["symbol"], kind="code"),
-                Cell(text=_value(value), kind="number"),
-                Cell(text=entry["engineering"]),
+                Cell(text=entry["symbol"], kind="symbol", more=entry["file"]),
+                Cell(text=_value(value)),
+                Cell(text=entry["engineering"], more=f"rounding: {entry['rounding']}"),
                 Cell(text=entry["equation"]),
-                Cell(text=entry["rounding"]),
-                Cell(text=_origin(entry)),
-                Cell(text=f"{entry['file']}; {entry['generator']}"),
+                Cell(text="", more=f"{_origin(entry)}; by {entry['generator']}"),
             )
         )
         rows += [
@@ -79,7 +77,7 @@ def constants_table(firmware: dict[str, Any]) -> Table:
         ]
     return Table(
         caption="Every number in the core, in the order of the files",
-        columns=("symbol", "value", "in engineering units", "what it is", "rounding", "computed from", "in; by"),
+        columns=("symbol", "value", "in engineering units", "what it is", "where it comes from"),
         rows=tuple(cells),
         csv=csv_text(("file", "symbol", "row", "value", "engineering", "rounding"), rows),
         name="constants",
@@ -130,7 +128,10 @@ def rounding_table(compensator: dict[str, Any]) -> Table:
         of = f" ({name})" if compensator["sides"]["negative"] else ""
         rows += [
             ("u_min0" + of, f"{float(offset):.6f} V", f"{float(wanted):.6f} V", 1e3 * float(offset - wanted)),
-            ("one step of a node of β" + of, f"1/{compensator['beta_denominator']}", "rounded down", -1e3 * float(node)),
+            (
+                "one step of a node of β" + of, f"1/{compensator['beta_denominator']}", "rounded down",
+                -1e3 * float(node),
+            ),
             (
                 "offset under the certified curve, mean" + of, "few nodes, rounding, the converter's error",
                 f"largest {1e3 * certificate['largest_loss_V']:.2f} mV", -1e3 * certificate["mean_loss_V"],
@@ -157,7 +158,9 @@ def checks_table(evidence: dict[str, Any]) -> Table:
     evidence : dict
         verification.json.
     """
-    rows = [(verdict(check["holds"]), Cell(text=check["name"]), Cell(text=check["text"])) for check in evidence["checks"]]
+    rows = [
+        (verdict(check["holds"]), Cell(text=check["name"]), Cell(text=check["text"])) for check in evidence["checks"]
+    ]
     return Table(
         caption="Every requirement that was tried",
         columns=("verdict", "requirement", "figures"),
@@ -251,8 +254,8 @@ def provenance_table(chain: Chain) -> Table:
         )
     valve = chain.document("valve")
     for test in valve["made_from"] if valve else []:
-        row = ("recording", test["source"]), (test["sha256"], "–", "the bench")
-        rows.append((*text_row(row[0]), Cell(text=row[1][0], kind="code"), *text_row(row[1][1:])))
+        row = text_row(("recording", test["source"]))
+        rows.append((*row, Cell(text=test["sha256"], kind="code"), *text_row(("–", "–"))))
     return Table(
         caption="Each artefact with the SHA-256 of its bytes, and what it was made from",
         columns=("artefact", "file", "SHA-256", "made by", "made from"),

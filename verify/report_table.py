@@ -15,12 +15,15 @@ class Cell:
     ----------
     text : str
         What stands in it.
-    kind : {"text", "number", "code", "good", "bad", "open"}
-        How it is set; the last three are verdicts.
+    kind : {"text", "number", "code", "symbol", "good", "bad", "open"}
+        How it is set; the last three are verdicts; a symbol is code on one line.
+    more : str
+        A second line, smaller.
     """
 
     text: str
     kind: str = "text"
+    more: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -34,17 +34,19 @@ def lines_figure(side: dict[str, Any], name: str, both: bool) -> ReportFigure:
     rows, labels = [], []
     for index, test in enumerate(side["tests"]):
         colour = LIGHT[CYCLE[index % len(CYCLE)]]
+        far = (0.0, 0.0)
         for branch, word, marker, dash, _ in BRANCHES:
             knee, share = test[f"u_knee_{branch}_V"], test[f"straight_{branch}"]
             if knee is None:
                 continue
             flows = np.array(share or [0.0, 0.5]) * test["q_max_L_min"]
             ends = knee + flows / test["slope_L_min_V"]
+            far = max(far, (float(ends[1]), float(flows[1])))
             axes.plot([knee, ends[0]], [0, flows[0]], ":", color=colour, lw=1.2)
             axes.plot(ends, flows, dash, color=colour, lw=1.8)
             axes.plot(knee, 0, marker, color=colour, ms=5, clip_on=False, zorder=4)
             rows.append([test["dp_MPa"], word, knee, *ends.round(4).tolist(), *flows.round(4).tolist()])
-        labels.append((ends[1], flows[1], _dp_text(test), colour))
+        labels.append((*far, _dp_text(test), colour))
     label_ends(axes, labels)
     for _, word, marker, dash, _ in BRANCHES:
         axes.plot([], [], dash, marker=marker, color=LIGHT["soft"], label=word)
@@ -52,14 +54,14 @@ def lines_figure(side: dict[str, Any], name: str, both: bool) -> ReportFigure:
     axes.legend(loc="upper left")
     axes.set(xlabel="valve command u (V)", ylabel="flow Q (L/min)", ylim=(0, None))
     description = (
-        f"Straight lines of flow over command of {len(side['tests'])} pressure drops; they meet zero flow at the knees, "
-        f"{_span([row[2] for row in rows], 'V', 3)}."
+        f"Straight lines of flow over command of {len(side['tests'])} pressure drops; they meet zero flow at the "
+        f"knees, {_span([row[2] for row in rows], 'V', 3)}."
     )
     return ReportFigure(
         name=f"fit-{name}",
         caption="The straight part of each branch, where the fit looked, and its extrapolation to zero flow: the knee"
         + _side_words(name, both)
-        + ". Samples and residuals are drawn by `dzdesign identify --plots`: the recordings are not part of an "
+        + ". Samples and residuals are drawn by dzdesign identify --plots: the recordings are not part of an "
         "artefact folder.",
         description=description,
         svg=svg_of(figure, f"fit-{name}", description),
@@ -198,20 +200,25 @@ def beta_figure(
     figure.legend(loc="outside lower center", ncols=3, columnspacing=1.2)
     low, high = min(curve["beta"]), max(curve["beta"])
     description = (
-        f"Beta falls between {high:.4f} and {low:.4f} over {dp[0]:.2f} to {dp[-1]:.2f} MPa, below the certified staircase."
-        if curve["beta"][0] > curve["beta"][-1]
-        else f"Beta lies between {low:.4f} and {high:.4f} over {dp[0]:.2f} to {dp[-1]:.2f} MPa, below the certified "
-        "staircase."
+        f"Beta lies between {low:.4f} and {high:.4f} over {dp[0]:.2f} to {dp[-1]:.2f} MPa, the certified staircase "
+        f"at {_span(steps, '', 4).strip()}."
     )
     return ReportFigure(
         name=f"beta-{name}",
         caption=f"β over the pressure drop{_side_words(name, both)}: the share of u_min0 that the law puts out at zero "
-        "command. Up to dP0 the paper holds β = 1; the table in the C is rounded down, so that it stays below the "
-        "staircase.",
+        "command."
+        + _of_the_table(compensator),
         description=description,
         svg=svg_of(figure, f"beta-{name}", description),
         csv=csv_text(("of", "dp_MPa", "beta"), rows),
     )
+
+
+def _of_the_table(compensator: dict[str, Any] | None) -> str:
+    if compensator is None:
+        return ""
+    held = " Up to dP0 the C holds β = 1, as the paper does." if compensator["below_dp0"] == "hold" else ""
+    return f"{held} The table in the C is rounded down, so that it stays below the staircase."
 
 
 def _beta_table(compensator: dict[str, Any], name: str) -> tuple[np.ndarray, np.ndarray]:
