@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from sympy.core.function import AppliedUndef
 
 from dzdesign.core.errors import InputError, RequirementError, nearest
-from dzdesign.derivation.account import PAPER_NUMBERS
+from dzdesign.derivation.equations import PAPER_NUMBERS
 from dzdesign.derivation.glossary import MEANINGS
 from dzdesign.derivation.proof import Verdict
 from dzdesign.derivation.prose import Formula, Words, parse_prose

@@ -17,11 +17,10 @@ from dzdesign.design.compensator_file import SCHEMA as COMPENSATOR_SCHEMA
 from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.identify.model import SCHEMA as VALVE_SCHEMA
 from dzdesign.identify.valve_file import valve_from_document
-from dzdesign.verify.assessment_file import SCHEMA as ASSESSMENT_SCHEMA
 from dzdesign.verify.report_shapes import ASSESSMENT, CONSTANTS, FIRMWARE, REPRODUCTION, VERIFICATION
 
 EVIDENCE_SCHEMA, FIRMWARE_SCHEMA = "dzdesign.evidence/1", "dzdesign.firmware/1"
-REPRODUCTION_SCHEMA = "dzdesign.reproduction/1"
+ASSESSMENT_SCHEMA, REPRODUCTION_SCHEMA = "dzdesign.assessment/1", "dzdesign.reproduction/1"
 VERIFICATION_NAME = "verification.json"
 #: No larger file is read, and no more of them in a folder: an artefact is far smaller.
 LARGEST, MOST = 32 * 2**20, 500
@@ -117,11 +116,15 @@ def shelf_of(folder: Path) -> dict[str, bytes]:
         inner = (folder / MANIFEST_NAME).is_file() or (folder / VERIFICATION_NAME).is_file()
         root = folder.parent if inner else folder
         within = sorted(place for place in root.iterdir() if place.is_dir() and not place.name.startswith("."))
-        shelf = _files_in(folder, root)
+        named = _files_in(folder, root)
     except OSError as error:
         raise InputError(f"'{folder}' can't be read: {error.strerror or error}") from error
-    for place in (root, *within[:MOST]):  # the folder that was named comes first
-        if place != folder:
+    evidence = (folder / VERIFICATION_NAME).is_file()
+    shelf: dict[str, bytes] = {}
+    for place in (root, *within[:MOST]):  # in one order whichever of them was named: same bytes
+        if place == folder:
+            shelf |= named
+        elif not (evidence and (place / VERIFICATION_NAME).is_file()):  # of evidence that was named no other counts
             with contextlib.suppress(OSError):  # a neighbour that is not ours to read
                 shelf |= _files_in(place, root)
     if not any(name.endswith(".json") for name in shelf):
@@ -175,7 +178,7 @@ def chain_of(shelf: Mapping[str, bytes]) -> Chain:
     Raises
     ------
     InputError
-        If an artefact that fits is none: a key is missing.
+        If there are two pieces of evidence, or an artefact that fits is none: a key is missing.
     """
     return _Search(shelf).chain()
 
@@ -213,10 +216,13 @@ class _Search:
 
     def _evidence(self) -> str | None:
         """Return the name of verification.json, if it is what `verify` wrote."""
-        name = next((name for name in self.shelf if name.rpartition("/")[2] == VERIFICATION_NAME), None)
-        if name is None:
+        names = [name for name in self.shelf if name.rpartition("/")[2] == VERIFICATION_NAME]
+        if len(names) > 1:
+            raise InputError(f"there is more than one piece of evidence, {', '.join(names)}; name the folder of one")
+        if not names:
             self._miss("verification")
             return None
+        name = names[0]
         stated = self._stated(name)
         if stated is not None and stated != self.hashes[name]:
             self.faults.append(

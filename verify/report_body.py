@@ -200,7 +200,8 @@ def _inputs_section(chain: Chain) -> Section:
         lines.append(
             f"{side.capitalize()} commands: {whole(each['inputs'])} pairs of command and pressure-difference code "
             f"compared with the exactly rounded law, {whole(each['wrong'])} wrong, largest error "
-            f"{each['largest_error']} counts; {each['over_compensated']} pressure codes over-compensated, smallest margin {1e3 * each['smallest_margin_V']:.3f} mV."
+            f"{each['largest_error']} counts; {each['over_compensated']} pressure codes over-compensated, smallest "
+            f"margin {1e3 * each['smallest_margin_V']:.3f} mV."
         )
         if each["first_wrong"]:
             lines.append(f"First wrong: {each['first_wrong']}.")

@@ -6,7 +6,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dzdesign.verify.report_figure import CYCLE, LIGHT, ReportFigure, csv_text, label_ends, new_figure, svg_of
+from dzdesign.verify.report_figure import (
+    CYCLE,
+    LIGHT,
+    ReportFigure,
+    csv_text,
+    label_ends,
+    legend_below,
+    new_figure,
+    svg_of,
+)
 from dzdesign.verify.report_table import whole
 
 if TYPE_CHECKING:
@@ -58,8 +67,8 @@ def map_figure(
     u, dp = 100 * (codes - command["zero_code"]) / (full - command["zero_code"]), dp_codes * code_MPa
     low, high = (float(Fraction(*end)) for end in compensator["sides"][side]["certificate"]["dp_MPa"])
     room = 0.14 * (high - low)
-    figure = new_figure(4.3)
-    left, tested = figure.subplots(1, 2, width_ratios=(1, 2.1))
+    figure = new_figure(4.3, right=0.1, top=0.3)
+    left, tested = figure.subplots(1, 2, width_ratios=(1, 2.7), gridspec_kw={"wspace": 0.16})
     volts = volt * output
     for axes, limits in ((left, (dp.min(), dp.max())), (tested, (low - room, high + room))):
         mesh = axes.pcolormesh(u, dp, volts, cmap="cividis", shading="nearest", rasterized=True)
@@ -135,7 +144,7 @@ def zero_figure(curves: Curves, text: str, side: str, guard: str) -> ReportFigur
     """
     dp, drive, bound = (curves[name] for name in ("dp_MPa", "drive_V", "bound_V"))
     above = drive > bound
-    figure = new_figure(3.1)
+    figure = new_figure(3.2, legend_rows=1)
     axes = figure.subplots()
     axes.fill_between(dp, drive, bound, where=~above, step="mid", color=LIGHT["green"], alpha=0.16, lw=0,
                       label="margin")  # fmt: skip
@@ -150,7 +159,7 @@ def zero_figure(curves: Curves, text: str, side: str, guard: str) -> ReportFigur
                   textcoords="offset points", ha="left", va="bottom", fontsize=8.5)  # fmt: skip
     axes.margins(y=0.14)
     axes.set(xlabel="pressure drop dP (MPa)", ylabel="command u (V)")
-    figure.legend(loc="outside lower center", ncols=4)
+    legend_below(figure, 4)
     description = (
         f"At {int(above.sum())} of {dp.size} codes of the pressure drop the drive at zero command lies above the "
         f"threshold's lower bound; the smallest margin is {1e3 * (bound - drive)[least]:.2f} mV at {dp[least]:.2f} MPa."
@@ -182,9 +191,9 @@ def loop_figure(curves: Curves, text: str, side: str, both: bool) -> ReportFigur
     command = curves["command_percent"]
     columns = [name for name in curves if name.startswith("q_with_")]
     pressures = [name.removeprefix("q_with_").removesuffix("_MPa_L_min") for name in columns]
-    figure = new_figure(3.9)
-    wide, near = figure.subplots(1, 2, width_ratios=(1.35, 1))
-    labels, top, peak = [], 0.0, int(np.argmax(command))
+    figure = new_figure(3.9, top=0.3, right=0.5)
+    wide, near = figure.subplots(1, 2, width_ratios=(1.35, 1), gridspec_kw={"wspace": 0.36})
+    labels, near_labels, top, peak = [], [], 0.0, int(np.argmax(command))
     starts: dict[str, list[float]] = {"without": [], "with": []}
     for index, dp in enumerate(pressures):
         colour = LIGHT[CYCLE[index % len(CYCLE)]]
@@ -193,9 +202,10 @@ def loop_figure(curves: Curves, text: str, side: str, both: bool) -> ReportFigur
         wide.plot(command, driven, "-", color=colour, lw=1.5)
         for dash, branch in (("-", np.arange(command.size) <= peak), ("--", np.arange(command.size) > peak)):
             inside = branch & (command <= NEAR_ZERO)
-            label = f"{float(dp):.2f} MPa" if dash == "-" else None
-            near.plot(command[inside], driven[inside], dash, color=colour, lw=1.5, label=label)
+            near.plot(command[inside], driven[inside], dash, color=colour, lw=1.5)
             top = max(top, float(driven[inside].max()))
+            if dash == "-":
+                near_labels.append((NEAR_ZERO, float(driven[inside][-1]), f"{float(dp):.2f}", colour))
         for which, flow in (("without", bare), ("with", driven)):
             flowing = command[flow > 0]
             starts[which].append(float(flowing[0]) if flowing.size else 100.0)
@@ -204,8 +214,10 @@ def loop_figure(curves: Curves, text: str, side: str, both: bool) -> ReportFigur
     wide.plot([], [], "-", color=LIGHT["soft"], label="with")
     wide.plot([], [], ":", color=LIGHT["soft"], label="without")
     wide.legend(loc="upper left", title="the compensator", alignment="left")
-    near.plot([], [], "--", color=LIGHT["soft"], label="closing")
-    near.legend(loc="upper left", title="opening at", alignment="left")
+    label_ends(near, near_labels)
+    for dash, word in (("-", "opening, dP in MPa at the end"), ("--", "closing")):
+        near.plot([], [], dash, color=LIGHT["soft"], label=word)
+    near.legend(loc="upper left")
     wide.set(xlabel="command (% of full)", ylabel="flow Q (L/min)", xlim=(0, 100), ylim=(0, None),
               title="whole range; dP in MPa at the end")  # fmt: skip
     near.set(xlabel="command (% of full)", ylabel="flow Q (L/min)", xlim=(0, NEAR_ZERO), ylim=(0, 1.1 * top or 1),
@@ -240,7 +252,7 @@ def dead_zone_figure(pressures: Sequence[dict[str, Any]], side: str, both: bool)
     both : bool
         Whether the valve has two sides.
     """
-    figure = new_figure(2.9)
+    figure = new_figure(3.0, legend_rows=1)
     axes = figure.subplots()
     dp = [each["dp_MPa"] for each in pressures]
     lines = (
@@ -253,7 +265,7 @@ def dead_zone_figure(pressures: Sequence[dict[str, Any]], side: str, both: bool)
         values = [100 * each[key] for each in pressures]
         axes.plot(dp, values, dash, marker=marker, ms=5.5, lw=1.6, color=LIGHT[colour], label=label)
     axes.set(xlabel="pressure drop dP (MPa)", ylabel="dead zone (% of command)", ylim=(0, None))
-    figure.legend(loc="outside lower center", ncols=4)
+    legend_below(figure, 4)
     worst = {key: 100 * max(each[key] for each in pressures) for key, *_ in lines}
     description = (
         f"The dead zone on opening falls from at most {worst['dead_zone_opening']:.1f} % to at most "

@@ -137,21 +137,40 @@ def figure_style() -> AbstractContextManager[None]:
     )
 
 
-def new_figure(height: float) -> "Figure":
-    """Return an empty figure.
+def new_figure(height: float, *, legend_rows: int = 0, right: float = 0.2, top: float = 0.12) -> "Figure":
+    """Return an empty figure; its margins are stated, because laying it out by itself takes as long as drawing it.
 
     Parameters
     ----------
     height : float
         Inches; all are `WIDTH` wide.
+    legend_rows : int
+        Of a legend below the axes.
+    right, top : float
+        Margins, inches: for labels at the lines' ends, and for titles.
     """
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(WIDTH, height), layout="constrained", facecolor="none")
+    figure = Figure(figsize=(WIDTH, height), facecolor="none")
     FigureCanvasSVG(figure)
-    figure.get_layout_engine().set(w_pad=0.06, h_pad=0.06)
+    bottom = 0.5 + (0.1 + 0.2 * legend_rows if legend_rows else 0.0)
+    figure.subplots_adjust(
+        left=0.6 / WIDTH, right=1 - right / WIDTH, bottom=bottom / height, top=1 - top / height
+    )
     return figure
+
+
+def legend_below(figure: "Figure", columns: int) -> None:
+    """Put a legend of all axes at the figure's foot.
+
+    Parameters
+    ----------
+    figure : Figure
+        Made with `legend_rows`.
+    columns : int
+    """
+    figure.legend(loc="lower center", ncols=columns, columnspacing=1.2, borderpad=0.1, borderaxespad=0.1)
 
 
 def label_ends(axes: "Axes", labels: Sequence[tuple[float, float, str, str]]) -> None:

@@ -7,7 +7,16 @@ from typing import Any
 import numpy as np
 
 from dzdesign.verify.reference import ExactLaw
-from dzdesign.verify.report_figure import CYCLE, LIGHT, ReportFigure, csv_text, label_ends, new_figure, svg_of
+from dzdesign.verify.report_figure import (
+    CYCLE,
+    LIGHT,
+    ReportFigure,
+    csv_text,
+    label_ends,
+    legend_below,
+    new_figure,
+    svg_of,
+)
 from dzdesign.verify.zero_command import bounds_of
 
 BRANCHES = (("rising", "opening", "^", "-", "blue"), ("falling", "closing", "v", "--", "vermilion"))
@@ -29,7 +38,7 @@ def lines_figure(side: dict[str, Any], name: str, both: bool) -> ReportFigure:
     both : bool
         Whether the valve has two sides.
     """
-    figure = new_figure(3.5)
+    figure = new_figure(3.5, right=0.65)
     axes = figure.subplots()
     rows, labels = [], []
     for index, test in enumerate(side["tests"]):
@@ -93,7 +102,7 @@ def thresholds_figure(side: dict[str, Any], guard: str, name: str, both: bool) -
     """
     curve = _guard_curve(side, guard)
     dp = np.array([test["dp_MPa"] or 0.0 for test in side["tests"]])
-    figure = new_figure(3.7)
+    figure = new_figure(3.8, legend_rows=2)
     axes = figure.subplots()
     for branch, word, marker, _, colour in BRANCHES:
         for what, face, size in (("knee", LIGHT[colour], 5.5), ("onset", "none", 8.5)):
@@ -111,7 +120,7 @@ def thresholds_figure(side: dict[str, Any], guard: str, name: str, both: bool) -
     offset = curve["u_min0_V"] * np.array(curve["beta"] or [1.0])
     axes.plot(dp, offset, "D-.", ms=4, lw=1.3, color=LIGHT["purple"], label="law's offset β u_min0", zorder=6)
     axes.set(xlabel="pressure drop dP (MPa)", ylabel="command u (V)")
-    figure.legend(loc="outside lower center", ncols=4, columnspacing=1.2)
+    legend_below(figure, 4)
     description = (
         f"Thresholds over the pressure drop: the {guard} threshold lies at {_span(curve['u_threshold_V'], 'V', 3)}, "
         f"its lower bound at {_span(curve['u_lower_V'], 'V', 3)}, the law's offset at {_span(offset, 'V', 3)}."
@@ -183,7 +192,7 @@ def beta_figure(
     steps, lower, threshold = (
         np.array(curve[key]) / u_min0 for key in ("certified_steps_V", "u_lower_V", "u_threshold_V")
     )
-    figure = new_figure(3.5)
+    figure = new_figure(3.6, legend_rows=2)
     axes = figure.subplots()
     axes.fill_between(dp, lower, threshold, color=LIGHT["sky"], alpha=0.25, lw=0,
                       label="band: lower bound to threshold, over u_min0")  # fmt: skip
@@ -197,7 +206,7 @@ def beta_figure(
         axes.plot(where[near], table[near], ".-", color=LIGHT["ink"], ms=4, lw=1, label="β in the C, its nodes")
         rows += [["C", round(float(x), 6), round(float(y), 7)] for x, y in zip(where, table, strict=True)]
     axes.set(xlabel="pressure drop dP (MPa)", ylabel="β (no unit)")
-    figure.legend(loc="outside lower center", ncols=3, columnspacing=1.2)
+    legend_below(figure, 3)
     low, high = min(curve["beta"]), max(curve["beta"])
     description = (
         f"Beta lies between {low:.4f} and {high:.4f} over {dp[0]:.2f} to {dp[-1]:.2f} MPa, the certified staircase "
