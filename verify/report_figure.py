@@ -18,22 +18,23 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Name of a variable of the page -> (light, dark). Okabe and Ito, darker or lighter where the page's contrast asks.
+#: Name of a variable of the page -> (light, dark). Hues of Okabe and Ito, darker or lighter where a label's contrast
+#: (4.5 to 1) asks for it; `sky` fills areas only.
 PALETTE = {
     "ink": ("#1b2128", "#e3e7ec"),
     "soft": ("#5a6570", "#a5b0bb"),
     "grid": ("#d9dee4", "#333c46"),
     "face": ("#fefefe", "#161b21"),
     "blue": ("#0072b2", "#56b4e9"),
-    "vermilion": ("#c85000", "#f0883e"),
+    "vermilion": ("#c44e00", "#f0883e"),
     "green": ("#008060", "#2fc496"),
     "purple": ("#a0467a", "#dd8fc0"),
-    "orange": ("#b07a00", "#e6b422"),
+    "orange": ("#8f6200", "#e6b422"),
     "sky": ("#3b8fc4", "#9ad0f5"),
 }
 LIGHT = {name: light for name, (light, _) in PALETTE.items()}
 #: For a series over the pressure drop: hues in turn.
-CYCLE = ("blue", "vermilion", "green", "purple", "orange", "sky")
+CYCLE = ("blue", "vermilion", "green", "purple", "orange", "ink")
 WIDTH = 7.4
 
 
