@@ -374,3 +374,14 @@ def test_the_headline_is_good_only_if_all_was_checked(copied):
     assert headline(chain_of(shelf_of(copied))).kind == "good"
     change_evidence(copied, lambda evidence: evidence.update(checks=[]))
     assert headline(chain_of(shelf_of(copied))).kind == "open"
+
+
+def test_a_series_of_plants_is_shown(copied):
+    spread = {"0.5": 0.021, "0.01": 0.01, "0.99": 0.0345}
+    one = {
+        "side": "positive", "dp_MPa": 1.0, "plants": 200, "leaking": 3,
+        "quantiles": {"residual_opening": spread, "residual_closing": spread, "q_zero_L_min": spread},
+    }  # fmt: skip
+    change_evidence(copied, lambda evidence: evidence.update(monte_carlo={"pressures": [one]}))
+    html = report_of_folder(copied).html
+    assert "2.10 (1.00 to 3.45)" in html and "3 of 200" in html

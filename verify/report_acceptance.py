@@ -16,33 +16,33 @@ def paper_tables(document: dict[str, Any]) -> tuple[Table, ...]:
     document : dict
         reproduction.json.
     """
-    tables = []
-    for valve in dict.fromkeys(row["valve"] for row in document["rows"]):
-        rows = []
-        for row in document["rows"]:
-            if row["valve"] == valve:
-                ours = {each["by"]: _ours(each) for each in row["outcomes"]}
-                rows.append(
-                    (
-                        Cell(text=row["quantity"]),
-                        number(row["dp_MPa"], 0) if row["dp_MPa"] is not None else Cell(text="–", kind="number"),
-                        Cell(text=f"{row['published']} {row['unit']}", kind="number"),
-                        *(Cell(text=ours.get(by, "–"), kind="number") for by in ("valve", "paper's law", "product")),
-                        Cell(text="not required") if row["holds"] is None else verdict(row["holds"]),
-                        Cell(text=" ".join(part for part in (row["tolerance"], row["why"]) if part) or "–"),
-                    )
-                )
-        tables.append(
-            Table(
-                caption=f"The paper's {valve}",
-                columns=(
-                    "quantity", "dP (MPa)", "published", "bare valve", "paper's law", "product", "agrees",
-                    "tolerance; why it differs",
-                ),
-                rows=tuple(rows),
+    valves = dict.fromkeys(row["valve"] for row in document["rows"])
+    return tuple(_paper_table(valve, [row for row in document["rows"] if row["valve"] == valve]) for valve in valves)
+
+
+def _paper_table(valve: str, rows: list[dict[str, Any]]) -> Table:
+    """Return the numbers of one valve; why each may differ stands below, once."""
+    notes: dict[str, str] = {}
+    cells = []
+    for row in rows:
+        ours = {each["by"]: _ours(each) for each in row["outcomes"]}
+        marks = [notes.setdefault(text, f"[{len(notes) + 1}]") for text in (row["tolerance"], row["why"]) if text]
+        cells.append(
+            (
+                Cell(text=row["quantity"]),
+                Cell(text="–" if row["dp_MPa"] is None else f"{row['dp_MPa']:g}", kind="number"),
+                Cell(text=f"{row['published']} {'' if row['unit'] == '1' else row['unit']}".strip(), kind="number"),
+                *(Cell(text=ours.get(by, "–"), kind="number") for by in ("valve", "paper's law", "product")),
+                Cell(text="not required") if row["holds"] is None else verdict(row["holds"]),
+                Cell(text=" ".join(marks), kind="number"),
             )
-        )  # fmt: skip
-    return tuple(tables)
+        )
+    return Table(
+        caption=f"The paper's {valve}",
+        columns=("quantity", "dP (MPa)", "published", "bare valve", "paper's law", "product", "agrees", "notes"),
+        rows=tuple(cells),
+        notes=tuple(f"{mark} {text}" for text, mark in notes.items()),
+    )
 
 
 def _ours(outcome: dict[str, Any]) -> str:
@@ -87,10 +87,11 @@ def assessed_table(document: dict[str, Any]) -> Table:
         assessment.json.
     """
     rows = []
-    for item in document["pressures"]:
+    compared = [item for item in document["pressures"] if any(_is_after(sets) for sets in item["quantities"].values())]
+    for item in compared or document["pressures"]:
         for key, sets in item["quantities"].items():
             before, after = (_reading(document, key, sets.get(name)) for name in ("before", "after"))
-            if (before, after) != ("–", "–"):
+            if {before, after} - {"–", "not seen"}:
                 rows.append(
                     (
                         number(item["dp_MPa"], 2),
@@ -102,10 +103,14 @@ def assessed_table(document: dict[str, Any]) -> Table:
                     )
                 )
     return Table(
-        caption="Recordings without and with the compensator",
+        caption="Recordings without and with the compensator, at the pressure drops that have both",
         columns=("dP (MPa)", "commands", "quantity", "before", "after", "unit"),
         rows=tuple(rows),
     )
+
+
+def _is_after(sets: Any) -> bool:
+    return isinstance(sets, dict) and isinstance(sets.get("after"), dict)
 
 
 def _entry(document: dict[str, Any], key: str, what: str) -> str:

@@ -21,6 +21,7 @@ from dzdesign.verify.report_sections import (
     provenance_table,
     rounding_table,
     scenarios_table,
+    series_table,
     thresholds_table,
 )
 from dzdesign.verify.report_table import Table, whole
@@ -237,7 +238,9 @@ def _loop_section(chain: Chain) -> Section:
             missing = f"{closed_loop_name(side)} is missing, so the ramps are not drawn; `dzdesign verify` makes it."
         else:
             figures.append(loop_figure(curves, chain.curves[closed_loop_name(side)], side, len(sides) > 1))
-    tables = (loops_table(loop["pressures"]), scenarios_table(evidence["scenarios"]))
+    tables = (
+        loops_table(loop["pressures"]), scenarios_table(evidence["scenarios"]), series_table(evidence["monte_carlo"]),
+    )  # fmt: skip
     return Section(
         figures=tuple(figures),
         tables=tuple(table for table in tables if table),

@@ -144,7 +144,7 @@ def zero_figure(curves: Curves, text: str, side: str, guard: str) -> ReportFigur
     """
     dp, drive, bound = (curves[name] for name in ("dp_MPa", "drive_V", "bound_V"))
     above = drive > bound
-    figure = new_figure(3.2, legend_rows=1)
+    figure = new_figure(3.4, legend_rows=2)
     axes = figure.subplots()
     axes.fill_between(dp, drive, bound, where=~above, step="mid", color=LIGHT["green"], alpha=0.16, lw=0,
                       label="margin")  # fmt: skip
@@ -159,7 +159,7 @@ def zero_figure(curves: Curves, text: str, side: str, guard: str) -> ReportFigur
                   textcoords="offset points", ha="left", va="bottom", fontsize=8.5)  # fmt: skip
     axes.margins(y=0.14)
     axes.set(xlabel="pressure drop dP (MPa)", ylabel="command u (V)")
-    legend_below(figure, 4)
+    legend_below(figure, 2)
     description = (
         f"At {int(above.sum())} of {dp.size} codes of the pressure drop the drive at zero command lies above the "
         f"threshold's lower bound; the smallest margin is {1e3 * (bound - drive)[least]:.2f} mV at {dp[least]:.2f} MPa."

@@ -227,6 +227,37 @@ def scenarios_table(scenarios: list[dict[str, Any]]) -> Table | None:
     )
 
 
+def series_table(series: dict[str, Any] | None) -> Table | None:
+    """Return the quantiles of a series of plants; None if none was run.
+
+    Parameters
+    ----------
+    series : dict or None
+        verification.json's ``monte_carlo``.
+    """
+    if not series:
+        return None
+    rows = []
+    for each in series["pressures"]:
+        spreads = [
+            [by * each["quantiles"][key][quantile] for quantile in ("0.5", "0.01", "0.99")]
+            for key, by in (("residual_opening", 100), ("residual_closing", 100), ("q_zero_L_min", 1))
+        ]
+        rows.append(
+            (
+                Cell(text=each["side"]),
+                number(each["dp_MPa"], 2),
+                *(Cell(text=f"{mid:.2f} ({low:.2f} to {high:.2f})", kind="number") for mid, low, high in spreads),
+                Cell(text=f"{each['leaking']} of {each['plants']}", kind="number"),
+            )
+        )
+    return Table(
+        caption="Series of plants: median (1 to 99 %). No requirement: the certificate is of the valve of the ramp tests",
+        columns=("side", "dP (MPa)", "opening with (%)", "closing with (%)", "at zero (L/min)", "plants that leak"),
+        rows=tuple(rows),
+    )
+
+
 def provenance_table(chain: Chain) -> Table:
     """Return which file made which, from the firmware's evidence back to the recordings.
 

@@ -4,6 +4,7 @@ from types import NoneType
 
 TEXT_OR_NONE = (str, NoneType)
 TRUTH = (bool, NoneType)
+SPREAD = {"0.5": float, "0.01": float, "0.99": float}
 MADE_FROM = [{"source": str, "sha256": str}]
 
 #: verification.json.
@@ -53,7 +54,20 @@ VERIFICATION = {
             "must_shut": bool,
         }
     ],
-    "monte_carlo": (dict, NoneType),
+    "monte_carlo": (
+        {
+            "pressures": [
+                {
+                    "side": str,
+                    "dp_MPa": float,
+                    "plants": int,
+                    "leaking": int,
+                    "quantiles": {"residual_opening": SPREAD, "residual_closing": SPREAD, "q_zero_L_min": SPREAD},
+                }
+            ]
+        },
+        NoneType,
+    ),
 }
 #: manifest.json of a firmware folder; `constants` came later.
 FIRMWARE = {

@@ -105,7 +105,7 @@ def key_figures(chain: Chain) -> tuple[Figure, ...]:
     if not loops and valve:
         figures.append(_threshold(valve))
     if compensator:
-        figures.append(_certificate(compensator))
+        figures.append(_certificate(compensator, evidence["inputs"] if evidence else []))
     if evidence:
         figures.append(_inputs(evidence["inputs"]))
     return tuple(figures)
@@ -146,26 +146,38 @@ def _threshold(valve: dict[str, Any]) -> Figure:
     )
 
 
-def _certificate(compensator: dict[str, Any]) -> Figure:
+def _certificate(compensator: dict[str, Any], inputs: list[dict[str, Any]]) -> Figure:
     sides = [side for side in compensator["sides"].values() if side]
     worst = min(sides, key=lambda side: Fraction(*side["certificate"]["smallest_margin_V"]))["certificate"]
     low, high = (float(Fraction(*end)) for end in worst["dp_MPa"])
     margin = 1e3 * float(Fraction(*worst["smallest_margin_V"]))
+    exceeded = sum(each["over_compensated"] for each in inputs)
+    if exceeded:
+        least = 1e3 * min(each["smallest_margin_V"] for each in inputs)
+        return Figure(
+            label="Certificate",
+            value="EXCEEDED",
+            note=f"at {whole(exceeded)} pressure codes the C drives the valve at zero command above the "
+            f"{worst['guard']} threshold's {100 * worst['confidence']:g} % bound, by up to {-least:.2f} mV",
+            kind="bad",
+        )
     return Figure(
         label="Certificate",
         value=f"{100 * worst['confidence']:g} %",
         note=f"confidence that the drive at zero command stays below the {worst['guard']} threshold from {low:.2f} to "
-        f"{high:.2f} MPa; smallest margin to its bound {margin:.2f} mV",
+        f"{high:.2f} MPa; smallest margin to its bound, by design, {margin:.2f} mV",
     )
 
 
 def _inputs(inputs: list[dict[str, Any]]) -> Figure:
     if not inputs:
         return Figure(label="Inputs checked", value="NOT CHECKED", note="the C did not get so far", kind="open")
-    wrong = sum(each["wrong"] for each in inputs)
+    wrong, every = (sum(each[key] for each in inputs) for key in ("wrong", "inputs"))
+    if wrong:
+        note = f"of {whole(every)} pairs of command and pressure-difference code"
+        return Figure(label="Inputs checked", value=f"{whole(wrong)} wrong", note=note, kind="bad")
     return Figure(
         label="Inputs checked",
-        value=whole(sum(each["inputs"] for each in inputs)),
-        note=f"pairs of command and pressure-difference code, {whole(wrong)} wrong",
-        kind="bad" if wrong else "text",
+        value=whole(every),
+        note="pairs of command and pressure-difference code, none wrong",
     )

@@ -41,6 +41,8 @@ class Table:
         The same to be downloaded; empty if it is not offered.
     name : str
         Of the CSV file.
+    notes : tuple of str
+        Below it, what marks in its cells point to.
     """
 
     caption: str
@@ -48,6 +50,7 @@ class Table:
     rows: tuple[tuple[Cell, ...], ...]
     csv: str = ""
     name: str = ""
+    notes: tuple[str, ...] = ()
 
 
 def number(value: float | None, digits: int, sign: str = "") -> Cell:
