@@ -42,7 +42,7 @@ def run_report(args: argparse.Namespace) -> int:
 def _beside_evidence(folder: Path) -> Path:
     """Return where `verify` leaves its report, or a place in the folder where there is no evidence."""
     from dzdesign.verify.report import REPORT_NAME
-    from dzdesign.verify.report_artefacts import VERIFICATION_NAME
+    from dzdesign.verify.report_shelf import VERIFICATION_NAME
 
     if not folder.is_dir():
         raise InputError(f"'{folder}' is no folder, expected one with artefacts of dzdesign; check the name")

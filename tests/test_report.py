@@ -14,9 +14,10 @@ from dzdesign.cli import main
 from dzdesign.core.artefacts import MANIFEST_NAME, sha256_of, to_json
 from dzdesign.core.errors import InputError
 from dzdesign.verify.report import REPORT_NAME, report_of_folder
-from dzdesign.verify.report_artefacts import chain_of, shelf_of
+from dzdesign.verify.report_artefacts import chain_of
 from dzdesign.verify.report_body import SECTIONS
 from dzdesign.verify.report_figure import PALETTE, csv_text
+from dzdesign.verify.report_shelf import shelf_of
 from dzdesign.verify.report_summary import headline
 
 pytestmark = needs_compiler

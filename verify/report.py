@@ -10,10 +10,11 @@ from pathlib import Path
 
 from dzdesign.core.artefacts import TOOL
 from dzdesign.derivation.report_html import anchor
-from dzdesign.verify.report_artefacts import VERIFICATION_NAME, Chain, chain_of, shelf_of
+from dzdesign.verify.report_artefacts import Chain, chain_of
 from dzdesign.verify.report_body import SECTIONS, sections_of
 from dzdesign.verify.report_figure import PALETTE, data_uri, figure_style
 from dzdesign.verify.report_law import account_of
+from dzdesign.verify.report_shelf import VERIFICATION_NAME, shelf_of
 from dzdesign.verify.report_summary import headline, key_figures
 
 REPORT_NAME = "report.html"

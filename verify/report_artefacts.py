@@ -4,10 +4,8 @@ From the evidence back to the recordings each artefact states the hash of what i
 name whose hash is another is said in the report, and not used.
 """
 
-import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 from dzdesign.core.artefacts import MANIFEST_NAME, parse_document, sha256_of, to_json
@@ -18,14 +16,15 @@ from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.identify.model import SCHEMA as VALVE_SCHEMA
 from dzdesign.identify.valve_file import valve_from_document
 from dzdesign.verify.report_shapes import ASSESSMENT, CONSTANTS, FIRMWARE, REPRODUCTION, VERIFICATION
+from dzdesign.verify.report_shelf import (
+    EVIDENCE_SCHEMA,
+    FIRMWARE_SCHEMA,
+    HEAD,
+    VERIFICATION_NAME,
+    listing,
+)
 
-EVIDENCE_SCHEMA, FIRMWARE_SCHEMA = "dzdesign.evidence/1", "dzdesign.firmware/1"
 ASSESSMENT_SCHEMA, REPRODUCTION_SCHEMA = "dzdesign.assessment/1", "dzdesign.reproduction/1"
-VERIFICATION_NAME = "verification.json"
-#: No larger file is read, and no more of them in a folder: an artefact is far smaller.
-LARGEST, MOST = 32 * 2**20, 500
-#: The schema stands in the first bytes of an artefact.
-HEAD = 512
 #: Kinds of artefact, from the evidence back to the recordings.
 ROLES = {
     "verification": "evidence",
@@ -93,87 +92,13 @@ class Chain:
         return None if found is None else found.document
 
 
-def shelf_of(folder: Path) -> dict[str, bytes]:
-    """Return what dzdesign made in a folder and in the folders in it, by name below it.
-
-    Of an evidence or firmware folder the folder around it is looked at too: what it was made from lies there.
-
-    Parameters
-    ----------
-    folder : Path
-        Of artefacts.
-
-    Raises
-    ------
-    InputError
-        If it is no folder, can't be read, or has nothing of dzdesign's.
-    """
-    folder = Path(folder)
-    if not folder.is_dir():
-        raise InputError(f"'{folder}' is no folder, expected one with artefacts of dzdesign; check the name")
-    try:
-        folder = folder.resolve()
-        inner = (folder / MANIFEST_NAME).is_file() or (folder / VERIFICATION_NAME).is_file()
-        root = folder.parent if inner else folder
-        within = sorted(place for place in root.iterdir() if place.is_dir() and not place.name.startswith("."))
-        named = _files_in(folder, root)
-    except OSError as error:
-        raise InputError(f"'{folder}' can't be read: {error.strerror or error}") from error
-    evidence = (folder / VERIFICATION_NAME).is_file()
-    shelf: dict[str, bytes] = {}
-    for place in (root, *within[:MOST]):  # in one order whichever of them was named: same bytes
-        if place == folder:
-            shelf |= named
-        elif not (evidence and (place / VERIFICATION_NAME).is_file()):  # of evidence that was named no other counts
-            with contextlib.suppress(OSError):  # a neighbour that is not ours to read
-                shelf |= _files_in(place, root)
-    if not any(name.endswith(".json") for name in shelf):
-        raise InputError(
-            f"'{folder}' has no artefact of dzdesign, expected verification.json, firmware, compensator.json or "
-            "valve.json; give the folder that `dzdesign demo`, `verify` or `codegen` wrote"
-        )
-    return shelf
-
-
-def _files_in(place: Path, root: Path) -> dict[str, bytes]:
-    """Return JSON of this tool, the evidence's CSV and what a manifest lists, by name below `root`."""
-    evidence = (place / VERIFICATION_NAME).is_file()
-    suffixes = (".json", ".csv") if evidence else (".json",)
-    paths = [path for path in sorted(place.iterdir()) if path.suffix in suffixes]
-    files = {}
-    for path in paths[:MOST]:
-        if path.is_file() and path.stat().st_size <= LARGEST:
-            content = path.read_bytes()
-            if path.suffix == ".csv" or b'"dzdesign.' in content[:HEAD]:
-                files[path.relative_to(root).as_posix()] = content
-    listed = _listing(files.get((place / MANIFEST_NAME).relative_to(root).as_posix()))
-    for name in list(listed)[:MOST]:
-        path = place / name
-        inside = path.resolve().is_relative_to(place)  # a name in a manifest is somebody's text
-        if inside and path.is_file() and path.stat().st_size <= LARGEST:
-            files[path.relative_to(root).as_posix()] = path.read_bytes()
-    return files
-
-
-def _listing(manifest: bytes | None) -> dict[str, str]:
-    """Return the files that a manifest lists, with their hashes; none of what is no manifest."""
-    if manifest is None:
-        return {}
-    try:
-        files = parse_document(manifest, MANIFEST_NAME, (EVIDENCE_SCHEMA, FIRMWARE_SCHEMA)).get("files")
-    except InputError:
-        return {}
-    listed = files.items() if isinstance(files, dict) else ()
-    return {name: str(digest) for name, digest in listed if ".." not in name.split("/") and "\0" not in name}
-
-
 def chain_of(shelf: Mapping[str, bytes]) -> Chain:
     """Follow the chain from the evidence back to the valve, as far as the files go.
 
     Parameters
     ----------
     shelf : mapping of str to bytes
-        Files by name, such as `shelf_of` returns; of two of a kind the first one counts.
+        Files by name, such as `report_shelf.shelf_of` returns; of two of a kind the first one counts.
 
     Raises
     ------
@@ -323,7 +248,7 @@ class _Search:
     def _stated(self, name: str) -> str | None:
         """Return the hash that the manifest beside a file states."""
         place, slash, leaf = name.rpartition("/")
-        return _listing(self.shelf.get(place + slash + MANIFEST_NAME)).get(leaf)
+        return listing(self.shelf.get(place + slash + MANIFEST_NAME)).get(leaf)
 
     def _by_hash(self, stated: str | None) -> str | None:
         return next((name for name, digest in self.hashes.items() if digest == stated), None)

@@ -252,7 +252,7 @@ def series_table(series: dict[str, Any] | None) -> Table | None:
             )
         )
     return Table(
-        caption="Series of plants: median (1 to 99 %). No requirement: the certificate is of the valve of the ramp tests",
+        caption="Series of plants: median (1 to 99 %). No requirement: the certificate is of the tests' valve",
         columns=("side", "dP (MPa)", "opening with (%)", "closing with (%)", "at zero (L/min)", "plants that leak"),
         rows=tuple(rows),
     )
