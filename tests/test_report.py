@@ -27,6 +27,7 @@ HOSTILE = (
     '"><img src=x onerror=alert(1)>',
     "*/ x {{ 7*7 }} {% raw %}",
     "a\nb\rc\x0b<b>",
+    "`<i>` `x",
 )
 
 

@@ -4,9 +4,11 @@ The page needs no network and no script: figures are SVG in it, their numbers ar
 from a file is escaped by the template engine; only figures and formulas, made here, are markup.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from dzdesign.core.artefacts import TOOL
 from dzdesign.derivation.report_html import anchor
@@ -16,6 +18,9 @@ from dzdesign.verify.report_figure import PALETTE, data_uri, figure_style
 from dzdesign.verify.report_law import account_of
 from dzdesign.verify.report_shelf import VERIFICATION_NAME, shelf_of
 from dzdesign.verify.report_summary import headline, key_figures
+
+if TYPE_CHECKING:
+    import markupsafe
 
 REPORT_NAME = "report.html"
 
@@ -101,7 +106,7 @@ def make_report(chain: Chain) -> Report:
         lstrip_blocks=True,
         autoescape=True,
     )
-    environment.filters.update(data_uri=data_uri, anchor=anchor)
+    environment.filters.update(data_uri=data_uri, anchor=anchor, words=_words)
     verdict = headline(chain)
     compensator = chain.document("compensator")
     with figure_style():
@@ -119,6 +124,13 @@ def make_report(chain: Chain) -> Report:
         missing=chain.missing,
     )
     return Report(html=html, kind=verdict.kind, verdict=verdict.text, faults=chain.faults, missing=chain.missing)
+
+
+def _words(text: str) -> "markupsafe.Markup":
+    """Return a sentence for the page: what stands between backticks is a command."""
+    from markupsafe import Markup, escape
+
+    return Markup(re.sub(r"`([^`<>]+)`", r"<code>\1</code>", str(escape(text))))
 
 
 def _title(chain: Chain) -> str:

@@ -57,7 +57,6 @@ def headline(chain: Chain) -> Headline:
             text="NOT VERIFIED: there is no evidence here, only a design"
             if "compensator" in chain.artefacts
             else "NOT VERIFIED: there is no evidence here, only an identified valve",
-            reasons=chain.missing,
         )
     checks = [*evidence["checks"], *_limits(chain)]
     missed = [check for check in checks if check["holds"] is False]
