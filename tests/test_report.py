@@ -315,6 +315,13 @@ def test_evidence_of_an_earlier_version_without_curves(copied):
     assert "closed_loop_positive.csv is missing" in html and html.count("<figure") == 5
 
 
+def test_a_neighbour_that_can_not_be_read_does_not_hinder_the_rest(copied):
+    (copied / "assessment.json").write_text('{"schema": "dzdesign.assessment/1", "holds": 3}')
+    chain = chain_of(shelf_of(copied))
+    assert headline(chain).kind == "good"
+    assert [line for line in chain.missing if "assessment.json' lacks the key 'tool'" in line]
+
+
 def test_of_two_pieces_of_evidence_one_must_be_named(copied):
     chain = chain_of(shelf_of(copied))
     shutil.copytree(copied / "evidence", copied / "evidence of May")

@@ -116,6 +116,7 @@ class _Search:
         self.hashes = {name: sha256_of(content) for name, content in shelf.items()}
         self.faults: list[str] = []
         self.missing: list[str] = []
+        self.unreadable: list[str] = []
         self.found: dict[str, Artefact] = {}
 
     def chain(self) -> Chain:
@@ -133,6 +134,9 @@ class _Search:
                 self._take(role, name)
         if "assessment" in self.found:
             self._assessment_fits()
+        if self.unreadable and not self.found:
+            raise InputError("; ".join(self.unreadable))
+        self.missing += self.unreadable
         return Chain(
             artefacts=self.found, curves=curves, faults=tuple(self.faults), missing=tuple(self.missing)
         )
@@ -176,7 +180,8 @@ class _Search:
         name = self._by_hash(stated) if stated else self._first(FIRMWARE_SCHEMA)
         if name:
             self._take("firmware", name)
-            self._firmware_files(name.removesuffix(MANIFEST_NAME))
+            if "firmware" in self.found:
+                self._firmware_files(name.removesuffix(MANIFEST_NAME))
             return
         self._miss("firmware", stated)
         self._say_other(stated, FIRMWARE_SCHEMA, "the evidence is of")
@@ -270,7 +275,12 @@ class _Search:
         self.missing.append(f"{ROLES[role]}{by}: made by {MAKES[role]}")
 
     def _take(self, role: str, name: str) -> None:
-        document = _checked(role, self.shelf[name], name)
+        """Keep an artefact; one that can't be read is missing, and the rest is reported without it."""
+        try:
+            document = _checked(role, self.shelf[name], name)
+        except InputError as error:
+            self.unreadable.append(f"{ROLES[role]}: {error}")
+            return
         self.found[role] = Artefact(role=role, name=name, sha256=self.hashes[name], document=document)
 
 

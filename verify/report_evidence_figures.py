@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 #: Where the enlarged panel of the closed loop ends, per cent of full command.
 NEAR_ZERO = 15.0
+#: How far the map of the tested interval reaches into commands of the other sign, per cent.
+OTHER_SIGN = 8.0
 Curves = Mapping[str, np.ndarray]
 
 
@@ -81,12 +83,14 @@ def map_figure(
             axes.axhline(end, color="#ffffff", lw=1.6, ls="--")
         wrong = np.argwhere(error != 0)
         axes.plot(u[wrong[:, 1]], dp[wrong[:, 0]], "x", color="#ff2d2d", ms=4.5, mew=1.6, zorder=5)
-        axes.set(xlim=(u.min(), u.max()), ylim=limits, xlabel="command u_i (% of full)")
+        axes.set(ylim=limits, xlabel="command u_i (% of full)")
         axes.grid(False)
     levels = _levels(volts)
     lines = tested.contour(u, dp, volts, levels=levels, linewidths=0.8,
                            colors=["#f2f2f2" if level < volts.mean() else "#101418" for level in levels])  # fmt: skip
-    over = _draw_zero_strip(tested, zero, float(u.min()), float(np.ptp(u)))
+    over = _draw_zero_strip(tested, zero)
+    left.set_xlim(u.min(), u.max())
+    tested.set_xlim(max(u.min(), -OTHER_SIGN), u.max())
     left.set(ylabel="pressure drop dP (MPa)", title="every difference of codes")
     tested.set_title("the tested interval, dashed, and around it")
     bar = figure.colorbar(mesh, ax=tested, pad=0.02)
@@ -100,8 +104,9 @@ def map_figure(
     )
     return ReportFigure(
         name=f"map-{side}",
-        caption="What the compiled C puts out, on a coarse grid of the pairs that were checked. Hatched: a command or "
-        "a pressure drop that can't be, where the C falls back to the safe value. Red crosses: points where it is not "
+        caption=f"What the compiled C puts out for {side} commands, on a coarse grid of the pairs that were checked. "
+        "Hatched: a command or a pressure drop that can't be, where the C falls back to the safe value. "
+        "Red crosses: points where it is not "
         f"the exactly rounded law; on this grid {len(wrong)}, of all pairs {whole(inputs['wrong'])}. Strip at zero "
         f"command: green where the drive is below the threshold's bound, red and hatched where not ({over} codes).",
         description=description,
@@ -117,12 +122,12 @@ def _levels(volts: np.ndarray) -> np.ndarray:
     return step * np.arange(np.floor(low / step) + 1, np.ceil(high / step))
 
 
-def _draw_zero_strip(axes: "Axes", zero: Curves | None, at: float, width: float) -> int:
+def _draw_zero_strip(axes: "Axes", zero: Curves | None) -> int:
     """Draw along zero command where the drive is certified and where not; return at how many codes it is not."""
     if zero is None:
         return 0
     dp, above = zero["dp_MPa"], zero["drive_V"] > zero["bound_V"]
-    ends = [at, at + 0.02 * width]
+    ends = (0.0, 2.0)  # per cent of command: wide enough to be seen
     axes.fill_betweenx(dp, *ends, where=~above, color=LIGHT["green"], lw=0, zorder=4)
     axes.fill_betweenx(dp, *ends, where=above, facecolor="#ff2d2d", edgecolor="#ffffff", hatch="xxxx", lw=0, zorder=4)
     return int(above.sum())
@@ -166,8 +171,8 @@ def zero_figure(curves: Curves, text: str, side: str, guard: str) -> ReportFigur
     )
     return ReportFigure(
         name=f"zero-{side}",
-        caption="Zero command, where it matters most: the drive against what is certified, at every code of the tested "
-        "interval. Ringed: the smallest margin. Outside the interval nothing is certified.",
+        caption=f"Zero command, {side} side, where it matters most: the drive against what is certified, at "
+        "every code of the tested interval. Ringed: the smallest margin. Outside the interval nothing is certified.",
         description=description,
         svg=svg_of(figure, f"zero-{side}", description),
         csv=text,

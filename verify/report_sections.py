@@ -122,12 +122,14 @@ def rounding_table(compensator: dict[str, Any]) -> Table:
             continue
         certificate = side["certificate"]
         valve = compensator["valve"]["sides"][name]
-        wanted = Fraction(repr(_wanted_offset(valve, certificate["guard"])))
         offset = Fraction(*side["u_min0_over_u_max"]) * u_max
         node = offset / compensator["beta_denominator"]
         of = f" ({name})" if compensator["sides"]["negative"] else ""
+        if not compensator["edge_codes"]:  # an edge counts from the opening threshold, the valve's curve does not
+            wanted = Fraction(repr(_wanted_offset(valve, certificate["guard"])))
+            volts = (f"{float(offset):.6f} V", f"{float(wanted):.6f} V")
+            rows.append(("u_min0" + of, *volts, 1e3 * float(offset - wanted)))
         rows += [
-            ("u_min0" + of, f"{float(offset):.6f} V", f"{float(wanted):.6f} V", 1e3 * float(offset - wanted)),
             (
                 "one step of a node of β" + of, f"1/{compensator['beta_denominator']}", "rounded down",
                 -1e3 * float(node),

@@ -195,16 +195,21 @@ def beta_figure(
     figure = new_figure(3.6, legend_rows=2)
     axes = figure.subplots()
     axes.fill_between(dp, lower, threshold, color=LIGHT["sky"], alpha=0.25, lw=0,
-                      label="band: lower bound to threshold, over u_min0")  # fmt: skip
+                      label="from bound to threshold, over u_min0")  # fmt: skip
     axes.plot(dp, threshold, ":", color=LIGHT["blue"], lw=1.4, label="threshold / u_min0")
     axes.stairs(steps, dp, baseline=None, color=LIGHT["green"], lw=2, label="certified staircase / u_min0")
     axes.plot(dp, curve["beta"], "D-.", color=LIGHT["purple"], ms=4.5, lw=1.4, label="β(dP) of the valve")
-    rows = [["valve", *pair] for pair in zip(dp.tolist(), curve["beta"], strict=True)]
+    pairs = zip(dp.tolist(), curve["beta"], strict=True)
+    rows = [["valve", at, value, round(value * u_min0, 7)] for at, value in pairs]
     if compensator:
-        where, table = _beta_table(compensator, name)
+        where, nodes, of_the_C = _beta_table(compensator, name)
+        table = nodes * of_the_C / u_min0  # with an edge the C counts from the opening threshold
         near = (where >= dp[0] - 0.1 * np.ptp(dp)) & (where <= dp[-1] + 0.1 * np.ptp(dp))
-        axes.plot(where[near], table[near], ".-", color=LIGHT["ink"], ms=4, lw=1, label="β in the C, its nodes")
-        rows += [["C", round(float(x), 6), round(float(y), 7)] for x, y in zip(where, table, strict=True)]
+        axes.plot(where[near], table[near], ".-", color=LIGHT["ink"], ms=4, lw=1, label="the C's offset / u_min0")
+        rows += [
+            ["C", round(float(x), 6), round(float(y), 7), round(float(y * of_the_C), 7)]
+            for x, y in zip(where, nodes, strict=True)
+        ]
     axes.set(xlabel="pressure drop dP (MPa)", ylabel="β (no unit)")
     legend_below(figure, 3)
     low, high = min(curve["beta"]), max(curve["beta"])
@@ -219,23 +224,26 @@ def beta_figure(
         + _of_the_table(compensator),
         description=description,
         svg=svg_of(figure, f"beta-{name}", description),
-        csv=csv_text(("of", "dp_MPa", "beta"), rows),
+        csv=csv_text(("of", "dp_MPa", "beta", "offset_V"), rows),
     )
 
 
 def _of_the_table(compensator: dict[str, Any] | None) -> str:
     if compensator is None:
         return ""
-    held = " Up to dP0 the C holds β = 1, as the paper does." if compensator["below_dp0"] == "hold" else ""
+    held = " Up to dP0 the C holds what it has there, as the paper does." if compensator["below_dp0"] == "hold" else ""
     return f"{held} The table in the C is rounded down, so that it stays below the staircase."
 
 
-def _beta_table(compensator: dict[str, Any], name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return pressure drops (MPa) and betas at the nodes of the compensator's table."""
+def _beta_table(compensator: dict[str, Any], name: str) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return pressure drops (MPa) and betas at the nodes of the compensator's table, and its u_min0 (V)."""
     sensor = compensator["signals"]["pressure_a"]
     code_MPa = float(Fraction(*sensor["span_MPa"])) / (sensor["full_code"] - sensor["zero_code"])
-    nodes = np.array(compensator["sides"][name]["beta"])
-    return np.arange(nodes.size) * compensator["beta_step_codes"] * code_MPa, nodes / compensator["beta_denominator"]
+    side = compensator["sides"][name]
+    nodes = np.array(side["beta"])
+    where = np.arange(nodes.size) * compensator["beta_step_codes"] * code_MPa
+    u_min0 = float(Fraction(*side["u_min0_over_u_max"]) * Fraction(*compensator["u_max_V"]))
+    return where, nodes / compensator["beta_denominator"], u_min0
 
 
 def law_figure(compensator: dict[str, Any], name: str, both: bool) -> ReportFigure:
