@@ -373,6 +373,7 @@ EXAMPLES = {
         'dzdesign assess before/*.csv --after after/*.csv --limits "dead_zone_opening = 5 %"',
         "dzdesign assess before/*.csv --after after/*.csv --config dzdesign.toml --plots plots",
     ),
+    "report": ("dzdesign report demo", "dzdesign report evidence -o for_review.html"),
     "derive": ("dzdesign derive --equation 18", "dzdesign derive --format html -o derivation.html"),
     "demo": ("dzdesign demo demo",),
     "monitor": ("dzdesign monitor COM5 --firmware firmware --seconds 100 -o ramp.csv",),

@@ -3,9 +3,9 @@
 import argparse
 from pathlib import Path
 
-from dzdesign.commands import say
 from dzdesign.core.artefacts import MANIFEST_NAME, parse_document, read_bytes, to_json, write_file, write_folder
 from dzdesign.core.errors import InputError
+from dzdesign.progress import say
 
 
 def run_report(args: argparse.Namespace) -> int:
