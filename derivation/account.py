@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from dzdesign.derivation.equations import APPROACH, AT_REFERENCE, OFF_REFERENCE
+from dzdesign.derivation.equations import APPROACH, AT_REFERENCE, OFF_REFERENCE, PAPER_NUMBERS
 from dzdesign.derivation.flow_over_pressure import FLOW_OVER_PRESSURE
 from dzdesign.derivation.identifiability import IDENTIFIABILITY
 from dzdesign.derivation.implementation import CODES, IMPLEMENTATION
@@ -36,8 +36,7 @@ STATEMENTS = tuple(
     replace(statement, section=section) for section, statements in SECTIONS.items() for statement in statements
 )
 
-#: The numbers of the paper's equations.
-PAPER_NUMBERS = tuple(f"({number})" for number in range(1, 33))
+__all__ = ["PAPER_NUMBERS", "SECTIONS", "STATEMENTS", "verify_statements"]
 
 
 def verify_statements(statements: Sequence[Statement] = STATEMENTS) -> tuple[Verdict, ...]:

@@ -36,6 +36,9 @@ from dzdesign.derivation.symbols import (
     x_max,
 )
 
+#: The numbers of the paper's equations; the later ones stand in other modules.
+PAPER_NUMBERS = tuple(f"({number})" for number in range(1, 33))
+
 _ORIFICE = C_d * W * sympy.sqrt(2 * dP / rho)
 
 #: Section 1 up to Eq. (7), with the readings of its figures that the rest needs.

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from sympy.core.function import AppliedUndef
 
 from dzdesign.core.errors import InputError, RequirementError, nearest
-from dzdesign.derivation.account import PAPER_NUMBERS
+from dzdesign.derivation.equations import PAPER_NUMBERS
 from dzdesign.derivation.glossary import MEANINGS
 from dzdesign.derivation.proof import Verdict
 from dzdesign.derivation.prose import Formula, Words, parse_prose
@@ -80,7 +80,7 @@ def render(verdicts: Sequence[Verdict], format: str, only: Sequence[str] | None 
     missing = [number for number in PAPER_NUMBERS if number not in numbers]
     if only is None and missing:
         raise RequirementError(f"the account leaves out {', '.join(missing)} of the paper's equations")
-    return _WRITERS[format](_compose(verdicts, numbers if only is None else only))
+    return _WRITERS[format](compose(verdicts, numbers if only is None else only))
 
 
 def closure(statements: Sequence[Statement], wanted: Sequence[str]) -> tuple[str, ...]:
@@ -138,8 +138,20 @@ def _number(text: str, numbers: dict[str, str]) -> str:
 # --- what the report says of the whole ------------------------------------------------------------------------
 
 
-def _compose(verdicts: Sequence[Verdict], shown: Sequence[str]) -> Content:
-    """Say what the account found, of the statements to show."""
+def compose(verdicts: Sequence[Verdict], shown: Sequence[str]) -> Content:
+    """Say what the account found, of the statements to show.
+
+    Parameters
+    ----------
+    verdicts : sequence of Verdict
+        What `verify_statements` returns.
+    shown : sequence of str
+        Numbers of the statements to show.
+
+    Returns
+    -------
+    Content
+    """
     book = {verdict.number: verdict for verdict in verdicts}
     entries = {number: describe(book[number], book) for number in shown}
     sections: dict[str, list[Entry]] = {}

@@ -43,7 +43,7 @@ def write_html(content: Content) -> str:
         lstrip_blocks=True,
         autoescape=True,
     )
-    page = _Page({entry.number for _, entries in content.sections for entry in entries})
+    page = Page({entry.number for _, entries in content.sections for entry in entries})
     environment.filters.update(words=page.words, display=page.display, anchor=anchor, css=_css_class)
     template = environment.get_template("derivation.html.jinja")
     return template.render(
@@ -86,20 +86,36 @@ def _css_class(entry: Entry) -> str:
     return entry.verdict.outcome.value.replace(" ", "-")
 
 
-class _Page:
-    """Writes words and formulas; knows which statements there are to point to."""
+class Page:
+    """Writes words and formulas; knows which statements there are to point to.
+
+    Parameters
+    ----------
+    shown : set of str
+        Numbers of the statements on the page.
+    """
 
     def __init__(self, shown: set[str]) -> None:
         self.shown = shown
 
     def words(self, words: Words) -> "markupsafe.Markup":
-        """Return words as HTML."""
+        """Return words as HTML.
+
+        Parameters
+        ----------
+        words : Words
+        """
         from markupsafe import Markup
 
         return Markup(_TIED.sub(_tie, "".join(map(self._part, words))))
 
     def display(self, formula: Formula) -> "markupsafe.Markup":
-        """Return a formula on a line of its own; a chain has one member a line."""
+        """Return a formula on a line of its own; a chain has one member a line.
+
+        Parameters
+        ----------
+        formula : Formula
+        """
         from markupsafe import Markup
 
         first, *members = (typeset(side, MATHML) for side in formula.sides)

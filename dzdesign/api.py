@@ -270,6 +270,7 @@ def verify(
     """
     from dzdesign.codegen.project import Firmware
     from dzdesign.verify.plant import read_plant
+    from dzdesign.verify.report import with_report
     from dzdesign.verify.tolerances import read_tolerances
     from dzdesign.verify.verification import SCHEMA, evidence_files
     from dzdesign.verify.verification import verify as verify_folder
@@ -286,7 +287,8 @@ def verify(
             Path(plant).name if plant is not None else "",
             tolerances=read_tolerances(Path(tolerances)) if tolerances is not None else None,
         )
-    if output is not None:
-        manifest = {"schema": SCHEMA, "tool": TOOL, "made_from": verification.document["made_from"]}
-        write_folder(Path(output), evidence_files(verification), manifest)
+        if output is not None:
+            manifest = {"schema": SCHEMA, "tool": TOOL, "made_from": verification.document["made_from"]}
+            files = with_report(evidence_files(verification), folder, Path(output))
+            write_folder(Path(output), files, manifest)
     return verification

@@ -222,6 +222,14 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
             *DESIGN,
         ),
     ),
+    "report": (
+        "artefacts in, report.html out: the verdict, figures, every requirement, where each number came from",
+        "dzdesign.report:run_report",
+        (
+            _given("folder", metavar="DIR", help="of demo, verify, codegen, or with valve.json or compensator.json"),
+            _given(*OUTPUT, metavar="FILE", help="file to write (default: report.html with the evidence, or in DIR)"),
+        ),
+    ),
     "assess": (
         "ramp tests without and with the compensator, side by side; limits for the latter",
         "dzdesign.assess:run_assess",
@@ -370,6 +378,7 @@ EXAMPLES = {
         'dzdesign assess before/*.csv --after after/*.csv --limits "dead_zone_opening = 5 %"',
         "dzdesign assess before/*.csv --after after/*.csv --config dzdesign.toml --plots plots",
     ),
+    "report": ("dzdesign report demo", "dzdesign report evidence -o for_review.html"),
     "derive": ("dzdesign derive --equation 18", "dzdesign derive --format html -o derivation.html"),
     "demo": ("dzdesign demo demo",),
     "monitor": ("dzdesign monitor COM5 --firmware firmware --seconds 100 -o ramp.csv",),

@@ -147,6 +147,7 @@ def run_verify(args: argparse.Namespace) -> int:
     from dzdesign.tables import print_firmware_mutants, print_verification
     from dzdesign.verify.c2000ware import check_against_c2000ware, with_check
     from dzdesign.verify.plant import read_plant
+    from dzdesign.verify.report import REPORT_NAME, with_report
     from dzdesign.verify.tolerances import read_tolerances
     from dzdesign.verify.verification import SCHEMA, evidence_files, verify
 
@@ -182,14 +183,14 @@ def run_verify(args: argparse.Namespace) -> int:
     if mutants:
         verification.document["mutants"] = mutants
     manifest = {"schema": SCHEMA, "tool": TOOL, "made_from": verification.document["made_from"]}
-    write_folder(output, evidence_files(verification), manifest)
+    write_folder(output, with_report(evidence_files(verification), firmware, output), manifest)
     if args.json:
         print(to_json(verification.document), end="")
     else:
         print_verification(verification)
         if mutants:
             print_firmware_mutants(mutants)
-        print(one_line(f"Evidence: {output}"))
+        print(one_line(f"Evidence: {output}, to be read: {output / REPORT_NAME}"))
     return 0 if verification.holds else 1
 
 

@@ -19,6 +19,7 @@ def run_demo(args: argparse.Namespace) -> int:
     from dzdesign.identify.ramp_files import read_ramp_file
     from dzdesign.tables import print_demo
     from dzdesign.verify.plant import read_plant
+    from dzdesign.verify.report import with_report
     from dzdesign.verify.verification import SCHEMA, evidence_files, verify
 
     folder = Path(args.folder)
@@ -48,7 +49,8 @@ def run_demo(args: argparse.Namespace) -> int:
         write_folder(folder / "firmware", firmware.files, firmware.manifest)
         verification = verify(folder / "firmware", plant, "plant.toml of the example", say=stage, watch=stage.each)
     manifest = {"schema": SCHEMA, "tool": TOOL, "made_from": verification.document["made_from"]}
-    write_folder(folder / "evidence", evidence_files(verification), manifest)
+    evidence = with_report(evidence_files(verification), folder / "firmware", folder / "evidence")
+    write_folder(folder / "evidence", evidence, manifest)
     if args.json:
         print(to_json(verification.document), end="")
     else:

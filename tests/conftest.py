@@ -56,3 +56,29 @@ def firmware_folder(example_firmware, tmp_path):
     folder = tmp_path / "firmware"
     write_folder(folder, example_firmware.files, example_firmware.manifest)
     return folder
+
+
+@pytest.fixture(scope="session")
+def reported_demo(example_valve, tmp_path_factory):
+    """A folder as `dzdesign demo` leaves it, with quicker ramps: valve.json, compensator.json, firmware, evidence."""
+    from dzdesign.codegen.project import generate
+    from dzdesign.core.artefacts import TOOL
+    from dzdesign.design.compensator_file import compensator_document
+    from dzdesign.design.designing import design
+    from dzdesign.verify.closed_loop import RampSequence
+    from dzdesign.verify.report import with_report
+    from dzdesign.verify.verification import SCHEMA, evidence_files, verify
+
+    folder = tmp_path_factory.mktemp("reported")
+    valve_json = to_json(example_valve.to_document())
+    compensator = design(example_valve, valve_bytes=valve_json.encode())
+    compensator_json = to_json(compensator_document(compensator))
+    (folder / "valve.json").write_text(valve_json, encoding="utf-8", newline="")
+    (folder / "compensator.json").write_text(compensator_json, encoding="utf-8", newline="")
+    firmware = generate(compensator, "f28335", compensator_json.encode())
+    write_folder(folder / "firmware", firmware.files, firmware.manifest)
+    evidence = verify(folder / "firmware", sequence=RampSequence(rest=0.5, ramp=10.0, top=0.5))
+    files = with_report(evidence_files(evidence), folder / "firmware", folder / "evidence")
+    manifest = {"schema": SCHEMA, "tool": TOOL, "made_from": evidence.document["made_from"]}
+    write_folder(folder / "evidence", files, manifest)
+    return folder

@@ -38,7 +38,7 @@ def verdicts():
 @pytest.fixture(scope="module", autouse=True)
 def words_made_once():
     """Compose the words for the same verdicts once: a report takes seconds to derive its steps, none to write."""
-    made, compose = {}, report._compose
+    made, compose = {}, report.compose
 
     def compose_once(verdicts, shown):
         key = id(verdicts), tuple(shown)
@@ -47,7 +47,7 @@ def words_made_once():
         return made[key][1]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(report, "_compose", compose_once)
+        patch.setattr(report, "compose", compose_once)
         yield
 
 
@@ -58,7 +58,7 @@ def rendered(verdicts):
 
 @pytest.fixture(scope="module")
 def entries(verdicts):
-    content = report._compose(verdicts, [verdict.number for verdict in verdicts])
+    content = report.compose(verdicts, [verdict.number for verdict in verdicts])
     return {entry.number: entry for _, members in content.sections for entry in members}
 
 

@@ -26,8 +26,10 @@ from dzdesign.verify.checks import (
     shut_after_scenarios,
 )
 from dzdesign.verify.closed_loop import ClosedLoop, LoopComparison, RampSequence, compare_at_pressure
+from dzdesign.verify.evidence_curves import curve_files
 from dzdesign.verify.firmware_folder import read_firmware_manifest
 from dzdesign.verify.host_compiler import host_compiler
+from dzdesign.verify.input_map import InputMap, map_inputs
 from dzdesign.verify.loop_plot import plot_loops
 from dzdesign.verify.plant import Plant, plant_document, plants_from_tests
 from dzdesign.verify.scenarios import ScenarioResult, Scene, run_scenarios
@@ -50,6 +52,8 @@ class Verification(ShownInNotebooks):
         Every requirement that was tried; the firmware holds if all of them do.
     inputs : tuple of InputCheck
         Figures of the input check, one a sign of command; empty if the core did not compile.
+    maps : tuple of InputMap
+        What the core gives over its inputs, one a sign of command, to be drawn.
     loops : tuple of LoopComparison
         Closed loop, one a tested pressure drop.
     scenarios : tuple of ScenarioResult
@@ -64,6 +68,7 @@ class Verification(ShownInNotebooks):
 
     checks: tuple[Check, ...]
     inputs: tuple[InputCheck, ...]
+    maps: tuple[InputMap, ...]
     loops: tuple[LoopComparison, ...]
     scenarios: tuple[ScenarioResult, ...]
     scatter: tuple[Scatter, ...]
@@ -120,6 +125,7 @@ def verify(
     say("compiling the core with every warning an error")
     checks = [files_unchanged(folder, manifest), compiles_strictly(folder, manifest)]
     inputs: tuple[InputCheck, ...] = ()
+    maps: tuple[InputMap, ...] = ()
     loops: tuple[LoopComparison, ...] = ()
     scenarios: tuple[ScenarioResult, ...] = ()
     scattered: tuple[Scatter, ...] = ()
@@ -133,6 +139,7 @@ def verify(
     if inputs:
         for each in inputs:
             checks += input_checks(each, len(inputs) > 1)
+        maps = tuple(map_inputs(folder, document, sign) for sign in signs)
         checks.append(drive_follows(folder, compensator))
         say("running the closed loop")
         scenes = _scenes(folder, document, plant)
@@ -153,6 +160,7 @@ def verify(
     return Verification(
         checks=tuple(checks),
         inputs=inputs,
+        maps=maps,
         loops=loops,
         scenarios=scenarios,
         scatter=scattered,
@@ -208,8 +216,9 @@ def _run_loops(scenes: tuple[Scene, ...], sequence: RampSequence, watch: Watch) 
 
 
 def evidence_files(verification: Verification) -> dict[str, str | bytes]:
-    """Return the files of the evidence folder: verification.json and the plot of the closed loop."""
+    """Return the files of the evidence folder: verification.json, the plot of the closed loop, curves to draw."""
     contents: dict[str, str | bytes] = {"verification.json": to_json(verification.document)}
+    contents |= curve_files(verification.loops, verification.maps)
     if verification.loops:
         contents["closed_loop.svg"] = plot_loops(verification.loops)
     return contents

@@ -34,6 +34,33 @@ def zero_command_margins(
     at_zero : (D,) array
         Compare values that the core gives at zero command.
     """
+    largest: dict[Fraction, int] = {}  # the largest drive for which each bound is what is known
+    counts: dict[Fraction, list[int]] = {}
+    for bound, compare in zip(bounds_at(document, exact, found), at_zero.tolist(), strict=True):
+        if bound is not None:
+            largest[bound] = max(largest.get(bound, 0), compare)
+            counts.setdefault(bound, []).append(compare)
+    u_max, peak = Fraction(*document["u_max_V"]), document["amplifier"]["dither_counts"]
+    margins = {bound: bound - u_max * (compare + peak) / exact.compare_max for bound, compare in largest.items()}
+    above = 0
+    for bound in (bound for bound, margin in margins.items() if margin < 0):
+        limit = bound * exact.compare_max / u_max - peak
+        above += sum(compare > limit for compare in counts[bound])
+    return above, min(margins.values())
+
+
+def bounds_at(document: dict[str, Any], exact: ExactLaw, found: Differences) -> list[Fraction | None]:
+    """Return the threshold's lower bound in V at every difference; None where none is known, or no codes make it.
+
+    Parameters
+    ----------
+    document : dict
+        compensator.json.
+    exact : ExactLaw
+        The side's law.
+    found : Differences
+        All differences.
+    """
     side = document["valve"]["sides"][exact.side]
     bounds = bounds_of(side, document["sides"][exact.side]["certificate"]["guard"])
     tests = sorted(
@@ -49,24 +76,15 @@ def zero_command_margins(
         best = [min(values)] * len(values)
     scale, lowest, highest = pressure_drops(exact, found, [dp.denominator for dp in pressures])
     ends = [int(dp * scale) for dp in pressures]
-    largest: dict[int, int] = {}  # the largest drive for which each test's bound is what is known
-    counts: dict[int, list[int]] = {}
-    for low, high, compare, made in zip(lowest, highest, at_zero.tolist(), found.made.tolist(), strict=True):
+    known: list[Fraction | None] = []
+    for low, high, made in zip(lowest, highest, found.made.tolist(), strict=True):
         if not made or high < ends[0] or low > ends[-1]:
-            continue
-        if side["trend"] == "decreasing":
-            test = bisect_left(ends, min(high, ends[-1]))
+            known.append(None)
+        elif side["trend"] == "decreasing":
+            known.append(best[bisect_left(ends, min(high, ends[-1]))])
         else:
-            test = bisect_right(ends, max(low, ends[0])) - 1
-        largest[test] = max(largest.get(test, 0), compare)
-        counts.setdefault(test, []).append(compare)
-    u_max, peak = Fraction(*document["u_max_V"]), document["amplifier"]["dither_counts"]
-    margins = {test: best[test] - u_max * (compare + peak) / exact.compare_max for test, compare in largest.items()}
-    above = 0
-    for test in (test for test, margin in margins.items() if margin < 0):
-        limit = best[test] * exact.compare_max / u_max - peak
-        above += sum(compare > limit for compare in counts[test])
-    return above, min(margins.values())
+            known.append(best[bisect_right(ends, max(low, ends[0])) - 1])
+    return known
 
 
 def bounds_of(side: dict[str, Any], guard: str) -> list[float]:

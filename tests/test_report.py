@@ -1,0 +1,396 @@
+"""report.html: what it leads with, where its files come from, and that nobody's text becomes markup."""
+
+import json
+import re
+import shutil
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote
+
+import pytest
+from synthetic import needs_compiler
+
+from dzdesign.cli import main
+from dzdesign.core.artefacts import MANIFEST_NAME, sha256_of, to_json
+from dzdesign.core.errors import InputError
+from dzdesign.verify.report import REPORT_NAME, report_of_folder
+from dzdesign.verify.report_artefacts import chain_of
+from dzdesign.verify.report_body import SECTIONS
+from dzdesign.verify.report_figure import PALETTE, csv_text
+from dzdesign.verify.report_shelf import shelf_of
+from dzdesign.verify.report_summary import headline
+
+pytestmark = needs_compiler
+
+HOSTILE = (
+    "</script><script>alert(1)</script>",
+    '"><img src=x onerror=alert(1)>',
+    "*/ x {{ 7*7 }} {% raw %}",
+    "a\nb\rc\x0b<b>",
+    "`<i>` `x",
+)
+
+
+class Page(HTMLParser):
+    """Tags and attributes of a page, ids, links, and its text."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict]] = []
+        self.text = ""
+        self.feed(html)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+
+    handle_startendtag = handle_starttag
+
+    def handle_data(self, data):
+        self.text += data
+
+    def of(self, tag: str) -> list[dict]:
+        return [attributes for name, attributes in self.tags if name == tag]
+
+
+@pytest.fixture
+def copied(reported_demo, tmp_path):
+    folder = tmp_path / "demo"
+    shutil.copytree(reported_demo, folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def html(reported_demo):
+    return (reported_demo / "evidence" / REPORT_NAME).read_text(encoding="utf-8")
+
+
+def change_json(path: Path, change) -> bytes:
+    document = json.loads(path.read_bytes())
+    change(document)
+    content = to_json(document).encode()
+    path.write_bytes(content)
+    return content
+
+
+def change_evidence(folder: Path, change) -> None:
+    """Change verification.json as if `verify` had found it so: the folder's manifest fits."""
+    content = change_json(folder / "evidence" / "verification.json", change)
+    change_json(
+        folder / "evidence" / MANIFEST_NAME,
+        lambda manifest: manifest["files"].update({"verification.json": sha256_of(content)}),
+    )
+
+
+def test_the_verdict_and_the_numbers_that_matter_come_first(html, reported_demo):
+    evidence = json.loads((reported_demo / "evidence" / "verification.json").read_bytes())
+    loops = evidence["closed_loop"]["pressures"]
+    head = html[: html.index('<section id="data">')]
+    assert f"Every requirement holds, all {len(evidence['checks'])}" in head
+    before, after = (100 * max(each[key] for each in loops) for key in ("dead_zone_opening", "residual_opening"))
+    assert f"{before:.1f} % → {after:.1f} %" in head
+    assert "33\u202f550\u202f336" in head and "99 %" in head and "Flow at zero command" in head
+
+
+def test_every_section_is_there_with_its_figures_and_tables(html):
+    page = Page(html)
+    ids = [attributes["id"] for _, attributes in page.tags if "id" in attributes]
+    assert len(ids) == len(set(ids))
+    assert [name for name, _ in SECTIONS] == [name for name in ids if name in dict(SECTIONS)]
+    figures = ("fit", "thresholds", "beta", "law", "map", "zero", "dead-zone", "loop")
+    assert [f"figure-{name}-positive" for name in figures] == [name for name in ids if name.startswith("figure-")]
+    links = [each["href"] for each in page.of("a")]
+    assert {link[1:] for link in links if link.startswith("#")} <= set(ids)
+    manifest_symbols = re.findall(r"<code>(\w+)</code><small>core/dz_comp.c", html)
+    assert {"FACTOR_SLOPE", "FACTOR_OFFSET", "law_segment"} <= set(manifest_symbols)
+
+
+def test_the_page_needs_nothing_from_outside_and_runs_nothing(html):
+    page = Page(html)
+    assert not page.of("script") and not page.of("iframe")
+    outside = [
+        value
+        for _, attributes in page.tags
+        for key, value in attributes.items()
+        if key in ("src", "href", "xlink:href", "action", "data") and not value.startswith(("#", "data:"))
+    ]
+    assert outside == []
+    assert not [key for _, attributes in page.tags for key in attributes if key.startswith("on")]
+    assert "@import" not in html and re.findall(r"url\((?!#)", html) == []
+
+
+def test_the_numbers_of_every_figure_can_be_downloaded(html, reported_demo):
+    links = {each["download"]: each["href"] for each in Page(html).of("a") if "download" in each}
+    assert len(links) == 9  # eight figures, and the constants
+    tables = {name: unquote(link.removeprefix("data:text/csv;charset=utf-8,")) for name, link in links.items()}
+    evidence = reported_demo / "evidence"
+    assert tables["loop-positive.csv"] == (evidence / "closed_loop_positive.csv").read_text()
+    assert tables["map-positive.csv"] == (evidence / "input_map_positive.csv").read_text()
+    for name, text in tables.items():
+        lines = text.splitlines()
+        assert len(lines) > 2, name
+        assert name == "constants.csv" or len({line.count(",") for line in lines}) == 1, name
+
+
+def test_figures_take_their_colours_from_the_page(html):
+    drawings = re.findall(r'<svg class="drawing".*?</svg>', html, re.DOTALL)
+    assert len(drawings) == 8
+    light = {shade for shade, _ in PALETTE.values()}
+    for drawing in drawings:
+        assert not {shade for shade in light if shade in drawing}
+        assert "var(--fig-ink)" in drawing and 'aria-label="' in drawing
+    assert html.count("--fig-ink: ") == 2  # light and dark
+
+
+def test_same_input_same_bytes_whichever_folder_is_named(reported_demo, html, copied):
+    assert report_of_folder(copied).html == html
+    chain = chain_of(shelf_of(copied))
+    for folder in (reported_demo, reported_demo / "evidence", reported_demo / "firmware"):
+        assert chain_of(shelf_of(folder)) == chain
+
+
+def test_report_makes_the_page_again_and_the_folder_still_fits(copied, capsys):
+    page = copied / "evidence" / REPORT_NAME
+    before = page.read_bytes()
+    assert main(["report", str(copied / "evidence")]) == 0
+    assert page.read_bytes() == before
+    (copied / "assessment.json").write_text("{}")  # no artefact: not looked at
+    change_evidence(copied, lambda evidence: evidence["checks"][0].update(text="17 files, seen again"))
+    assert main(["report", str(copied)]) == 0
+    assert "seen again" in page.read_text(encoding="utf-8")
+    listed = json.loads((copied / "evidence" / MANIFEST_NAME).read_bytes())["files"]
+    assert listed[REPORT_NAME] == sha256_of(page.read_bytes())
+    assert main(["report", str(copied), "-o", str(copied / "other.html"), "--json"]) == 0
+    out = capsys.readouterr().out
+    assert json.loads(out[out.index("{") :])["holds"] is True
+    assert (copied / "other.html").read_bytes() == page.read_bytes()
+
+
+# --- a verdict that is not good ---------------------------------------------------------------------------------
+
+
+def test_a_requirement_that_does_not_hold_is_loud(copied):
+    def fail(evidence):
+        evidence["holds"] = False
+        evidence["checks"][2].update(holds=False, text="33550336 inputs checked, 7 wrong")
+        evidence["inputs"][0].update(wrong=7, first_wrong="command code 9")
+
+    change_evidence(copied, fail)
+    assert main(["report", str(copied)]) == 1
+    html = (copied / "evidence" / REPORT_NAME).read_text(encoding="utf-8")
+    assert '<div class="verdict bad"' in html and "DOES NOT HOLD: 1 of" in html
+    assert "First wrong: command code 9" in html
+    assert "Every requirement holds" not in html
+
+
+def test_what_was_not_checked_is_not_green(copied):
+    def leave_open(evidence):
+        evidence["holds"] = False
+        evidence["checks"][-2].update(holds=None, text="no falling branch was recorded")
+
+    change_evidence(copied, leave_open)
+    assert main(["report", str(copied)]) == 1
+    html = (copied / "evidence" / REPORT_NAME).read_text(encoding="utf-8")
+    assert '<div class="verdict open"' in html and 'class="verdict good"' not in html
+    assert "NOT CHECKED: no flow at zero command after any scenario: no falling branch was recorded" in html
+    assert '<td class="open">? NOT CHECKED</td>' in html
+
+
+def test_a_missed_limit_of_recordings_does_not_hold(copied):
+    valve = json.loads((copied / "valve.json").read_bytes())
+    assessment = {
+        "schema": "dzdesign.assessment/1", "tool": valve["tool"], "made_from": valve["made_from"], "holds": False,
+        "quantities": {"hysteresis": {"name": "hysteresis", "unit": "%", "formula": "f"}},
+        "pressures": [{"side": "positive", "dp_MPa": 1.0, "quantities": {"hysteresis": {"before": None, "after": {
+            "value": 4.5, "se": None, "at_most": None}}}}],
+        "limits": [{"quantity": "hysteresis", "place": "1 MPa", "limit": 4.0, "unit": "%", "holds": False,
+                    "text": "4.5 %, more than 4 %"}],
+        "notes": [],
+    }  # fmt: skip
+    (copied / "assessment.json").write_text(to_json(assessment))
+    report = report_of_folder(copied)
+    assert report.kind == "bad" and "4.5 %, more than 4 %" in report.html
+    assessment["made_from"] = [{"source": "other.csv", "sha256": "0" * 64}]
+    (copied / "assessment.json").write_text(to_json(assessment))
+    report = report_of_folder(copied)  # of another valve: said, and not shown
+    assert any("none is among those of the valve" in fault for fault in report.faults)
+    assert "4.5 %, more than 4 %" not in report.html
+
+
+def test_the_papers_numbers_are_shown_where_they_lie(copied):
+    row = {
+        "valve": "first valve", "quantity": "dead zone", "unit": "%", "dp_MPa": 1.0, "published": "53.9",
+        "outcomes": [{"by": "product", "value": 54.1, "difference": 0.2, "holds": False}], "tolerance": "0.1",
+        "why": "because", "holds": False,
+    }  # fmt: skip
+    tool = {"name": "dzdesign", "version": "0"}
+    document = {"schema": "dzdesign.reproduction/1", "tool": tool, "paper": "doi", "holds": False, "rows": [row]}
+    (copied / "reproduction.json").write_text(to_json({**document, "valves": []}))
+    html = report_of_folder(copied).html
+    assert "54.10 (+0.20)" in html and "The paper&#39;s first valve" in html
+    assert html.count('<td class="bad">✗ DOES NOT HOLD</td>') == 1
+
+
+# --- files that do not fit ----------------------------------------------------------------------------------------
+
+
+def spoil(path: Path) -> None:
+    path.write_bytes(path.read_bytes().replace(b"5", b"6", 1))
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("evidence/verification.json", "was changed since `dzdesign verify` wrote it"),
+        ("evidence/closed_loop_positive.csv", "closed_loop_positive.csv was changed"),
+        ("firmware/core/dz_comp.c", "firmware/core/dz_comp.c was changed since it was generated"),
+        ("firmware/manifest.json", "but the evidence is of one of"),
+    ],
+)
+def test_a_file_that_was_changed_is_said_and_no_verdict_stands(copied, name, said):
+    spoil(copied / name)
+    chain = chain_of(shelf_of(copied))
+    assert any(said in fault for fault in chain.faults), chain.faults
+    assert headline(chain).kind == "bad" and "No verdict stands" in headline(chain).text
+
+
+def test_a_page_of_files_that_do_not_fit_says_so_first(copied):
+    spoil(copied / "firmware" / "core" / "dz_drive.c")
+    assert main(["report", str(copied), "-o", str(copied / "r.html")]) == 1
+    html = (copied / "r.html").read_text(encoding="utf-8")
+    assert "THE FILES DO NOT BELONG TOGETHER" in html[: html.index('<dl class="numbers">')]
+    assert "Every requirement holds" not in html
+
+
+def test_artefacts_are_found_by_their_hash_and_not_by_their_name(copied):
+    (copied / "valve.json").rename(copied / "bench_7.json")
+    found = chain_of(shelf_of(copied)).artefacts["valve"]
+    assert found.name == "bench_7.json"
+    other = json.loads((copied / "bench_7.json").read_bytes())
+    other["u_max_V"] = 11.0
+    (copied / "bench_7.json").unlink()
+    (copied / "valve.json").write_text(to_json(other))
+    chain = chain_of(shelf_of(copied))  # the compensator holds its valve; the file beside it is another
+    assert chain.document("valve")["u_max_V"] == 10.0
+    assert [fault for fault in chain.faults if "valve.json has the SHA-256" in fault]
+
+
+def test_a_manifest_reaches_no_file_outside_its_folder(copied, tmp_path):
+    (tmp_path / "secret.txt").write_text("secret")
+    outside = {"../../secret.txt": "0", str(tmp_path / "secret.txt"): "0"}
+    change_json(copied / "firmware" / MANIFEST_NAME, lambda manifest: manifest["files"].update(outside))
+    assert not [name for name in shelf_of(copied) if "secret" in name]
+
+
+# --- parts of a chain ------------------------------------------------------------------------------------------------
+
+
+def test_a_valve_alone_is_reported_and_what_is_missing_said(copied, tmp_path):
+    folder = tmp_path / "valve only"
+    folder.mkdir()
+    shutil.copy(copied / "valve.json", folder)
+    report = report_of_folder(folder)
+    assert report.kind == "open" and "only an identified valve" in report.verdict
+    assert [line.partition(":")[0] for line in report.missing] == ["evidence", "firmware", "compensator"]
+    assert report.html.count("<figure") == 3
+    shutil.copy(copied / "compensator.json", folder)
+    report = report_of_folder(folder)
+    assert report.html.count("<figure") == 4 and "only a design" in report.verdict
+    assert main(["report", str(folder)]) == 1
+    assert (folder / REPORT_NAME).read_text(encoding="utf-8") == report.html
+
+
+def test_evidence_alone_shows_its_figures_and_misses_the_rest(copied, tmp_path):
+    alone = tmp_path / "elsewhere" / "evidence"
+    shutil.copytree(copied / "evidence", alone)
+    report = report_of_folder(alone)
+    assert any(line.startswith("firmware of SHA-256") for line in report.missing)
+    assert report.kind == "good"  # all that the evidence says, and it fits its manifest
+    assert "missing or not used" in report.html
+
+
+def test_evidence_of_an_earlier_version_without_curves(copied):
+    for path in (copied / "evidence").glob("*.csv"):
+        path.unlink()
+    html = report_of_folder(copied).html
+    assert "closed_loop_positive.csv is missing" in html and html.count("<figure") == 5
+
+
+def test_a_neighbour_that_can_not_be_read_does_not_hinder_the_rest(copied):
+    (copied / "assessment.json").write_text('{"schema": "dzdesign.assessment/1", "holds": 3}')
+    chain = chain_of(shelf_of(copied))
+    assert headline(chain).kind == "good"
+    assert [line for line in chain.missing if "assessment.json' lacks the key 'tool'" in line]
+
+
+def test_of_two_pieces_of_evidence_one_must_be_named(copied):
+    chain = chain_of(shelf_of(copied))
+    shutil.copytree(copied / "evidence", copied / "evidence of May")
+    with pytest.raises(InputError, match=r"more than one piece of evidence, .* evidence of May/verification\.json"):
+        report_of_folder(copied)
+    assert chain_of(shelf_of(copied / "evidence")) == chain
+
+
+def test_a_folder_without_artefacts_is_refused(tmp_path):
+    with pytest.raises(InputError, match="has no artefact of dzdesign"):
+        report_of_folder(tmp_path)
+    with pytest.raises(InputError, match="is no folder"):
+        report_of_folder(tmp_path / "missing")
+    assert main(["report", str(tmp_path)]) == 2
+    (tmp_path / "valve.json").write_text('{"schema": "dzdesign.valve/1"}')
+    assert main(["report", str(tmp_path)]) == 2
+    assert not (tmp_path / REPORT_NAME).exists()
+
+
+# --- hostile text -------------------------------------------------------------------------------------------------
+
+
+def test_nobodys_text_becomes_markup(copied, html):
+    name = " ".join(HOSTILE)
+
+    def poison(evidence):
+        evidence["closed_loop"]["plant_source"] = name
+        evidence["checks"][0].update(name=name, text=name)
+        evidence["scenarios"][0]["name"] = name
+        evidence["inputs"][0]["first_wrong"] = name
+
+    def poison_valve(valve):
+        valve["made_from"][0]["source"] = name
+        valve["warnings"].append({"code": name, "text": name, "source": name})
+        for test in valve["sides"]["positive"]["tests"]:
+            test["source"] = name
+
+    clean = Page(html)
+    change_evidence(copied, poison)
+    page = Page(report_of_folder(copied).html)
+    folder = copied / "alone"
+    folder.mkdir()
+    shutil.copy(copied / "valve.json", folder)
+    clean_valve = Page(report_of_folder(folder).html)
+    change_json(folder / "valve.json", poison_valve)
+    valve = Page(report_of_folder(folder).html)
+    for dirty, before in ((page, clean), (valve, clean_valve)):
+        words = [tag for tag, _ in dirty.tags if tag not in ("li", "ul", "p", "tr", "td", "small")]
+        assert words == [tag for tag, _ in before.tags if tag not in ("li", "ul", "p", "tr", "td", "small")]
+        assert not [key for _, attributes in dirty.tags for key in attributes if key.startswith("on")]
+        assert " ".join(name.split()) in " ".join(dirty.text.split())
+
+
+def test_numbers_of_a_figure_are_a_table_whatever_stands_in_them():
+    assert csv_text(("a", "b"), [[1, 'x"\n,'], [None, 2.5]]) == 'a,b\n1,"x""\n,"\n,2.5\n'
+
+
+def test_the_headline_is_good_only_if_all_was_checked(copied):
+    assert headline(chain_of(shelf_of(copied))).kind == "good"
+    change_evidence(copied, lambda evidence: evidence.update(checks=[]))
+    assert headline(chain_of(shelf_of(copied))).kind == "open"
+
+
+def test_a_series_of_plants_is_shown(copied):
+    spread = {"0.5": 0.021, "0.01": 0.01, "0.99": 0.0345}
+    one = {
+        "side": "positive", "dp_MPa": 1.0, "plants": 200, "leaking": 3,
+        "quantiles": {"residual_opening": spread, "residual_closing": spread, "q_zero_L_min": spread},
+    }  # fmt: skip
+    change_evidence(copied, lambda evidence: evidence.update(monte_carlo={"pressures": [one]}))
+    html = report_of_folder(copied).html
+    assert "2.10 (1.00 to 3.45)" in html and "3 of 200" in html

@@ -1,0 +1,142 @@
+"""report.html: one page, from the verdict to the hashes, of whatever artefacts there are.
+
+The page needs no network and no script: figures are SVG in it, their numbers are data: addresses. Every text that comes
+from a file is escaped by the template engine; only figures and formulas, made here, are markup.
+"""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dzdesign.core.artefacts import TOOL
+from dzdesign.derivation.report_html import anchor
+from dzdesign.verify.report_artefacts import Chain, chain_of
+from dzdesign.verify.report_body import SECTIONS, sections_of
+from dzdesign.verify.report_figure import PALETTE, data_uri, figure_style
+from dzdesign.verify.report_law import account_of
+from dzdesign.verify.report_shelf import VERIFICATION_NAME, shelf_of
+from dzdesign.verify.report_summary import headline, key_figures
+
+if TYPE_CHECKING:
+    import markupsafe
+
+REPORT_NAME = "report.html"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Report:
+    """A finished report.
+
+    Attributes
+    ----------
+    html : str
+        The page.
+    kind : {"good", "bad", "open"}
+        Of its verdict.
+    verdict : str
+        In words.
+    faults, missing : tuple of str
+        What does not fit, and what is not there.
+    """
+
+    html: str
+    kind: str
+    verdict: str
+    faults: tuple[str, ...]
+    missing: tuple[str, ...]
+
+
+def report_of_folder(folder: Path) -> Report:
+    """Make the report of an artefact folder.
+
+    Parameters
+    ----------
+    folder : Path
+        Of `dzdesign demo`, of evidence, of firmware, or with valve.json or compensator.json.
+
+    Raises
+    ------
+    InputError
+        If there is nothing to report, or an artefact is none.
+    """
+    return make_report(chain_of(shelf_of(folder)))
+
+
+def with_report(files: Mapping[str, str | bytes], firmware: Path, output: Path) -> dict[str, str | bytes]:
+    """Return the files of an evidence folder with the report of them.
+
+    Parameters
+    ----------
+    files : mapping
+        Of the evidence folder, not written yet: name to content.
+    firmware : Path
+        The firmware folder that it is of; what that was made from is looked for beside it.
+    output : Path
+        The evidence folder.
+    """
+    name = Path(output).resolve().name
+    new = {
+        f"{name}/{file}": content.encode() if isinstance(content, str) else content
+        for file, content in files.items()
+    }
+    around = shelf_of(firmware)
+    # Evidence that is older is another firmware's, or about to be replaced.
+    older = {place for place, _, leaf in (file.rpartition("/") for file in around) if leaf == VERIFICATION_NAME}
+    kept = {file: content for file, content in around.items() if file.rpartition("/")[0] not in older | {name}}
+    return {**files, REPORT_NAME: make_report(chain_of(new | kept)).html}
+
+
+def make_report(chain: Chain) -> Report:
+    """Make the report of a chain of artefacts.
+
+    Parameters
+    ----------
+    chain : Chain
+        Of `chain_of`.
+    """
+    import jinja2
+
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("dzdesign.verify", "templates"),
+        undefined=jinja2.StrictUndefined,
+        keep_trailing_newline=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        autoescape=True,
+    )
+    environment.filters.update(data_uri=data_uri, anchor=anchor, words=_words)
+    verdict = headline(chain)
+    compensator = chain.document("compensator")
+    with figure_style():
+        sections = sections_of(chain)
+    html = environment.get_template("report.html.jinja").render(
+        title=_title(chain),
+        tool=TOOL,
+        verdict=verdict,
+        figures=key_figures(chain),
+        sections=sections,
+        headings=SECTIONS,
+        law=account_of(compensator["law"]) if compensator else None,
+        palette=PALETTE,
+        faults=chain.faults,
+        missing=chain.missing,
+    )
+    return Report(html=html, kind=verdict.kind, verdict=verdict.text, faults=chain.faults, missing=chain.missing)
+
+
+def _words(text: str) -> "markupsafe.Markup":
+    """Return a sentence for the page: what stands between backticks is a command."""
+    from markupsafe import Markup, escape
+
+    return Markup(re.sub(r"`([^`<>]+)`", r"<code>\1</code>", str(escape(text))))
+
+
+def _title(chain: Chain) -> str:
+    firmware, valve = chain.document("firmware"), chain.document("valve")
+    if firmware:
+        return f"Dead-zone compensator for {firmware['target']}, law “{firmware['law']}”"
+    if "compensator" in chain.artefacts:
+        return "Dead-zone compensator"
+    return "Valve, identified from ramp tests" if valve else "Evidence of a dead-zone compensator"

@@ -1,0 +1,299 @@
+"""What stands in each section of the report: sentences, figures and tables, and what is missing for them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from dzdesign.core.artefacts import to_json
+from dzdesign.core.errors import InputError
+from dzdesign.design.compensator_file import compensator_from_document
+from dzdesign.design.signals_in_words import signals_in_words
+from dzdesign.verify.evidence_curves import closed_loop_name, input_map_name, read_curves, zero_command_name
+from dzdesign.verify.report_acceptance import assessed_table, limits_table, paper_tables
+from dzdesign.verify.report_artefacts import Chain
+from dzdesign.verify.report_evidence_figures import dead_zone_figure, loop_figure, map_figure, zero_figure
+from dzdesign.verify.report_figure import ReportFigure
+from dzdesign.verify.report_sections import (
+    checks_table,
+    constants_table,
+    hashes_table,
+    loops_table,
+    provenance_table,
+    rounding_table,
+    scenarios_table,
+    series_table,
+    thresholds_table,
+)
+from dzdesign.verify.report_table import Table, whole
+from dzdesign.verify.report_valve_figures import beta_figure, law_figure, lines_figure, thresholds_figure
+
+#: A probability below this is said to be below it.
+SMALLEST_P = 1e-9
+#: Anchor and heading of every section, in their order.
+SECTIONS = (
+    ("data", "Data and fit"),
+    ("thresholds", "Thresholds"),
+    ("beta", "β over the pressure drop"),
+    ("law", "The law and where it comes from"),
+    ("integers", "The integers and their error"),
+    ("inputs", "Every input"),
+    ("loop", "Closed loop"),
+    ("acceptance", "Acceptance"),
+    ("checks", "All requirements"),
+    ("warnings", "Warnings, and what is not covered"),
+    ("provenance", "Provenance"),
+)
+#: Of every report, whatever it finds.
+NOT_PROVED = (
+    "Pressure drops beyond the tested interval: the nearest tested β is held there, and nothing is certified.",
+    "Commands above code 0: one code more is 1 to 2 mV more drive, and the law has no dead band.",
+    "A leak or a soft edge below the flow that counts as flow; a meter's zero error that does not show at rest.",
+    "Errors of the pressure sensors beyond their converters', and failures that their signals hide.",
+    "Oil temperature and the spread between valves of a type: the compensator is certified for the valve of its tests.",
+    "The target's compiler and silicon: the C was compiled and tried on the host that made the evidence.",
+    "The closed loop is a simulation of the stated plant; it is no measurement.",
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Section:
+    """What a section holds, in the order in which it is shown.
+
+    Attributes
+    ----------
+    figures : tuple of ReportFigure
+    tables : tuple of Table
+    lines : tuple of str
+        Sentences of figures.
+    groups : tuple of (str, tuple of str)
+        Further sentences, each group under a heading of its own.
+    missing : str
+        What it lacks and which command makes that; empty if nothing.
+    optional : bool
+        Whether the chain is whole without it.
+    """
+
+    figures: tuple[ReportFigure, ...] = ()
+    tables: tuple[Table, ...] = ()
+    lines: tuple[str, ...] = ()
+    groups: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    missing: str = ""
+    optional: bool = False
+
+
+def sections_of(chain: Chain) -> dict[str, Section]:
+    """Return every section by its anchor; figures are drawn under `figure_style`.
+
+    Parameters
+    ----------
+    chain : Chain
+        Of `chain_of`.
+    """
+    valve, compensator = chain.document("valve"), chain.document("compensator")
+    made = {
+        **_valve_sections(valve, compensator),
+        "law": _law_section(compensator),
+        "integers": _integers_section(chain),
+        "inputs": _inputs_section(chain),
+        "loop": _loop_section(chain),
+        "acceptance": _acceptance_section(chain),
+        "checks": _checks_section(chain),
+        "warnings": _warnings_section(chain),
+        "provenance": _provenance_section(chain),
+    }
+    return {name: made[name] for name, _ in SECTIONS}
+
+
+def _valve_sections(valve: dict[str, Any] | None, compensator: dict[str, Any] | None) -> dict[str, Section]:
+    if valve is None:
+        gap = Section(missing="The valve is not here: `dzdesign identify` makes valve.json.")
+        return {"data": gap, "thresholds": gap, "beta": gap}
+    both = len(valve["sides"]) > 1
+    fits, thresholds, tables, betas = [], [], [], []
+    for name, side in valve["sides"].items():
+        designed = compensator["sides"][name] if compensator and name in compensator["sides"] else None
+        guard = designed["certificate"]["guard"] if designed else side["certificate"]["guard"]
+        fits.append(lines_figure(side, name, both))
+        thresholds.append(thresholds_figure(side, guard, name, both))
+        tables.append(thresholds_table(side, guard, f"Thresholds, {name} commands"))
+        betas.append(beta_figure(side, guard, name, both, compensator if designed else None))
+    drawn = tuple(figure for figure in betas if figure)
+    lag = {"declared": "declared", "identified": "from ramps of two rates", "unknown": "none declared"}
+    meter = valve["meter"]
+    return {
+        "data": Section(
+            figures=tuple(fits),
+            lines=(
+                f"{sum(len(side['tests']) for side in valve['sides'].values())} ramp tests; full command "
+                f"{valve['u_max_V']:g} V.",
+                f"Flow meter: floor {meter['floor_L_min']:.2f} L/min; lag taken as {meter['lag_s']:.3g} s "
+                f"({lag.get(meter['lag_is'], meter['lag_is'])}).",
+                *(_trend(name, side) for name, side in valve["sides"].items()),
+                *(f"{name.capitalize()} commands: not tested." for name in valve.get("untested_sides", [])),
+            ),
+        ),
+        "thresholds": Section(figures=tuple(thresholds), tables=tuple(tables)),
+        "beta": Section(
+            figures=drawn,
+            missing="" if drawn else "One pressure drop was tested, so β is 1 and its trend is not known.",
+        ),
+    }
+
+
+def _trend(name: str, side: dict[str, Any]) -> str:
+    stroke = f"{name.capitalize()} commands: k x_max/u_max = {side['k_x_max_over_u_max']:.4f}"
+    if side["trend"] is None:
+        return f"{stroke}; how the threshold moves with the pressure drop can't be said from one ramp test."
+    change, error = 1e3 * side["trend_change_V"], 1e3 * side["trend_change_se_V"]
+    chance = f"= {side['trend_p']:.2g}" if side["trend_p"] > SMALLEST_P else f"below {SMALLEST_P:g}"
+    return (
+        f"{stroke}; trend of the threshold with the pressure drop: {side['trend']}, {change:+.1f} ± {error:.1f} mV "
+        f"over the tested range (p {chance})."
+    )
+
+
+def _law_section(compensator: dict[str, Any] | None) -> Section:
+    if compensator is None:
+        return Section(missing="No compensator is here: `dzdesign design` makes compensator.json.")
+    names = [name for name, side in compensator["sides"].items() if side]
+    below = {"hold": "β = 1, as in the paper", "extend": "β as tested"}[compensator["below_dp0"]]
+    lines = [f"Up to dP0: {below}."]
+    for name in names:
+        side = compensator["sides"][name]
+        (k_top, k_under), (u_top, u_under) = side["k_x_max_over_u_max"], side["u_min0_over_u_max"]
+        lines.append(
+            f"{name.capitalize()} commands: k x_max/u_max = {k_top}/{k_under} = {k_top / k_under:.5f} (from the offset "
+            f"to full flow), u_min0/u_max = {u_top}/{u_under} = {u_top / u_under:.5f}, β: {len(side['beta'])} nodes "
+            f"over {compensator['beta_denominator']}, {compensator['beta_step_codes']} pressure codes apart."
+        )
+    return Section(
+        figures=tuple(law_figure(compensator, name, len(names) > 1) for name in names), lines=tuple(lines)
+    )
+
+
+def _integers_section(chain: Chain) -> Section:
+    firmware, compensator = chain.document("firmware"), chain.document("compensator")
+    tables = (rounding_table(compensator),) if compensator else ()
+    if firmware is None:
+        return Section(tables=tables, missing="No firmware is here: `dzdesign codegen` makes it, and its constants.")
+    if not firmware.get("constants"):
+        return Section(tables=tables, missing="This firmware's manifest has no constants; make it again with codegen.")
+    return Section(tables=(*tables, constants_table(firmware)))
+
+
+def _curves(chain: Chain, name: str) -> Mapping[str, Any] | None:
+    """Return a CSV file of the evidence as columns; None if it is not there."""
+    if name not in chain.curves:
+        return None
+    try:
+        return read_curves(chain.curves[name])
+    except ValueError as error:
+        raise InputError(f"'{name}' is no table of numbers ({error}); make it again with `dzdesign verify`") from error
+
+
+def _inputs_section(chain: Chain) -> Section:
+    evidence, compensator = chain.document("verification"), chain.document("compensator")
+    if evidence is None:
+        return Section(missing="No evidence is here: `dzdesign verify` tries every input of the C.")
+    figures, lines, missing = [], [], ""
+    for each in evidence["inputs"]:
+        side = "positive" if each["sign"] > 0 else "negative"
+        lines.append(
+            f"{side.capitalize()} commands: {whole(each['inputs'])} pairs of command and pressure-difference code "
+            f"compared with the exactly rounded law, {whole(each['wrong'])} wrong, largest error "
+            f"{each['largest_error']} counts; {each['over_compensated']} pressure codes over-compensated, smallest "
+            f"margin {1e3 * each['smallest_margin_V']:.3f} mV."
+        )
+        if each["first_wrong"]:
+            lines.append(f"First wrong: {each['first_wrong']}.")
+        for name, draw in ((input_map_name(side), map_figure), (zero_command_name(side), zero_figure)):
+            curves = _curves(chain, name)
+            if curves is None or compensator is None or not compensator["sides"][side]:
+                missing = f"{name} or its compensator is missing; `dzdesign verify` makes it."
+            elif draw is map_figure:
+                zero = _curves(chain, zero_command_name(side))
+                figures.append(map_figure(curves, chain.curves[name], compensator, side, each, zero))
+            else:
+                guard = compensator["sides"][side]["certificate"]["guard"]
+                figures.append(zero_figure(curves, chain.curves[name], side, guard))
+    if not evidence["inputs"]:
+        missing = "NOT CHECKED: the C did not compile or did not run, see the requirements."
+    return Section(figures=tuple(figures), lines=tuple(lines), missing=missing)
+
+
+def _loop_section(chain: Chain) -> Section:
+    evidence = chain.document("verification")
+    if evidence is None:
+        return Section(missing="No evidence is here: `dzdesign verify` runs the closed loop.")
+    loop = evidence["closed_loop"]
+    if not loop["pressures"]:
+        return Section(missing="NOT CHECKED: the closed loop did not run, see the requirements.")
+    sides = list(dict.fromkeys(each["side"] for each in loop["pressures"]))
+    figures, missing = [], ""
+    for side in sides:
+        of_side = [each for each in loop["pressures"] if each["side"] == side]
+        figures.append(dead_zone_figure(of_side, side, len(sides) > 1))
+        curves = _curves(chain, closed_loop_name(side))
+        if curves is None:
+            missing = f"{closed_loop_name(side)} is missing, so the ramps are not drawn; `dzdesign verify` makes it."
+        else:
+            figures.append(loop_figure(curves, chain.curves[closed_loop_name(side)], side, len(sides) > 1))
+    tables = (
+        loops_table(loop["pressures"]), scenarios_table(evidence["scenarios"]), series_table(evidence["monte_carlo"]),
+    )  # fmt: skip
+    return Section(
+        figures=tuple(figures),
+        tables=tuple(table for table in tables if table),
+        lines=(f"A simulation. Plant: {loop['plant_source']}.",),
+        missing=missing,
+    )
+
+
+def _acceptance_section(chain: Chain) -> Section:
+    assessment, reproduction = chain.document("assessment"), chain.document("reproduction")
+    tables: list[Table] = []
+    if assessment:
+        limits = limits_table(assessment)
+        tables += [*([limits] if limits else []), assessed_table(assessment)]
+    if reproduction:
+        tables += paper_tables(reproduction)
+    missing = (
+        ""
+        if tables
+        else "No acceptance table is here: `dzdesign assess` compares recordings with limits, `dzdesign reproduce` the "
+        "paper's numbers."
+    )
+    return Section(tables=tuple(tables), missing=missing, optional=True)
+
+
+def _checks_section(chain: Chain) -> Section:
+    evidence = chain.document("verification")
+    if evidence is None:
+        return Section(missing="NOT CHECKED: no evidence is here; `dzdesign verify` makes it.")
+    return Section(tables=(checks_table(evidence),))
+
+
+def _warnings_section(chain: Chain) -> Section:
+    valve, compensator = chain.document("valve"), chain.document("compensator")
+    warnings = []
+    for warning in valve.get("warnings", []) if valve else []:
+        source = f"{warning['source']}: " if warning["source"] else ""
+        warnings.append(f"[{warning['code']}] {source}{warning['text']}")
+    signals = []
+    if compensator:
+        one = compensator_from_document(to_json(compensator).encode(), "compensator.json")
+        signals = signals_in_words(one.signals, float(one.u_max_V))
+    return Section(
+        groups=(
+            ("Warnings of the recordings", tuple(warnings) or (("None.",) if valve else ())),
+            ("What the design costs", tuple(compensator["costs"]) if compensator else ()),
+            ("What the codes stand for", tuple(signals)),
+            ("What this report does not prove", NOT_PROVED),
+        )
+    )
+
+
+def _provenance_section(chain: Chain) -> Section:
+    evidence, firmware = chain.document("verification"), chain.document("firmware")
+    hashes = hashes_table(evidence["inputs"] if evidence else [], firmware)
+    return Section(tables=tuple(table for table in (provenance_table(chain), hashes) if table))

@@ -1,0 +1,225 @@
+"""A figure of the report: SVG that takes its colours from the page, and its numbers as CSV.
+
+Matplotlib draws in the light theme's colours; each is then replaced by a variable of the page, so that a dark page has
+a dark figure and a printed one a light figure, from one drawing. Lines differ in dash, marker or a label at their end,
+never in colour alone.
+"""
+
+import csv
+import io
+import re
+from collections.abc import Iterable, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+from urllib.parse import quote
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+#: Name of a variable of the page -> (light, dark). Hues of Okabe and Ito, darker or lighter where a label's contrast
+#: (4.5 to 1) asks for it; `sky` fills areas only.
+PALETTE = {
+    "ink": ("#1b2128", "#e3e7ec"),
+    "soft": ("#5a6570", "#a5b0bb"),
+    "grid": ("#d9dee4", "#333c46"),
+    "face": ("#fefefe", "#161b21"),
+    "blue": ("#0072b2", "#56b4e9"),
+    "vermilion": ("#c44e00", "#f0883e"),
+    "green": ("#008060", "#2fc496"),
+    "purple": ("#a0467a", "#dd8fc0"),
+    "orange": ("#8f6200", "#e6b422"),
+    "sky": ("#3b8fc4", "#9ad0f5"),
+}
+LIGHT = {name: light for name, (light, _) in PALETTE.items()}
+#: For a series over the pressure drop: hues in turn.
+CYCLE = ("blue", "vermilion", "green", "purple", "orange", "ink")
+WIDTH = 7.4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReportFigure:
+    """A figure as the page shows it.
+
+    Attributes
+    ----------
+    name : str
+        Of its anchor and of the CSV file.
+    caption : str
+        What it shows and how to read it.
+    description : str
+        The same for who can't see it: what is found there.
+    svg : str
+        Markup, safe to stand in a page: every text in it is escaped.
+    csv : str
+        The numbers that were drawn.
+    """
+
+    name: str
+    caption: str
+    description: str
+    svg: str
+    csv: str
+
+    @property
+    def href(self) -> str:
+        """The numbers as an address that needs no network."""
+        return data_uri(self.csv)
+
+
+def data_uri(text: str) -> str:
+    """Return CSV text as a data: address.
+
+    Parameters
+    ----------
+    text : str
+        Of a file.
+
+    Examples
+    --------
+    >>> data_uri("a,b")
+    'data:text/csv;charset=utf-8,a,b'
+    """
+    return "data:text/csv;charset=utf-8," + quote(text, safe=",.:;-_()=+/")
+
+
+def csv_text(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """Return rows as CSV; None is an empty cell.
+
+    Parameters
+    ----------
+    header : sequence of str
+        Names of the columns, units in them.
+    rows : iterable of sequence
+        Cells.
+    """
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows(["" if cell is None else cell for cell in row] for row in rows)
+    return out.getvalue()
+
+
+def figure_style() -> AbstractContextManager[None]:
+    """Return the style under which the report's figures are drawn."""
+    from matplotlib import rc_context
+
+    return rc_context(
+        {
+            "font.family": "DejaVu Sans",
+            "font.size": 9,
+            "axes.labelsize": 9,
+            "axes.titlesize": 9.5,
+            "axes.titlelocation": "left",
+            "xtick.labelsize": 8.5,
+            "ytick.labelsize": 8.5,
+            "legend.fontsize": 8.5,
+            "legend.frameon": False,
+            "axes.grid": True,
+            "axes.axisbelow": True,
+            "grid.color": LIGHT["grid"],
+            "grid.linewidth": 0.7,
+            "axes.edgecolor": LIGHT["soft"],
+            "axes.labelcolor": LIGHT["ink"],
+            "text.color": LIGHT["ink"],
+            "xtick.color": LIGHT["soft"],
+            "ytick.color": LIGHT["soft"],
+            "xtick.labelcolor": LIGHT["ink"],
+            "ytick.labelcolor": LIGHT["ink"],
+            "axes.facecolor": "none",
+            "axes.spines.top": False,
+            "axes.spines.right": False,
+            "hatch.linewidth": 0.8,
+            "text.parse_math": False,
+            "svg.fonttype": "none",  # text stays text: to be searched, read out, and set in the page's own font
+            "svg.hashsalt": "dzdesign",  # ids follow from the content: same input, same bytes
+        }
+    )
+
+
+def new_figure(height: float, *, legend_rows: int = 0, right: float = 0.2, top: float = 0.12) -> "Figure":
+    """Return an empty figure; its margins are stated, because laying it out by itself takes as long as drawing it.
+
+    Parameters
+    ----------
+    height : float
+        Inches; all are `WIDTH` wide.
+    legend_rows : int
+        Of a legend below the axes.
+    right, top : float
+        Margins, inches: for labels at the lines' ends, and for titles.
+    """
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(WIDTH, height), facecolor="none")
+    FigureCanvasSVG(figure)
+    bottom = 0.5 + (0.1 + 0.2 * legend_rows if legend_rows else 0.0)
+    figure.subplots_adjust(
+        left=0.6 / WIDTH, right=1 - right / WIDTH, bottom=bottom / height, top=1 - top / height
+    )
+    return figure
+
+
+def legend_below(figure: "Figure", columns: int) -> None:
+    """Put a legend of all axes at the figure's foot.
+
+    Parameters
+    ----------
+    figure : Figure
+        Made with `legend_rows`.
+    columns : int
+    """
+    figure.legend(loc="lower center", ncols=columns, columnspacing=1.2, borderpad=0.1, borderaxespad=0.1)
+
+
+def label_ends(axes: "Axes", labels: Sequence[tuple[float, float, str, str]]) -> None:
+    """Write each line's name at its end, where none covers another.
+
+    Parameters
+    ----------
+    axes : Axes
+    labels : sequence of (x, y, text, colour)
+        In the axes' units.
+    """
+    room = 0.055 * max((label[1] for label in labels), default=1.0)
+    below = -room
+    for x, y, text, colour in sorted(labels, key=lambda label: label[1]):
+        if y - below >= room:
+            axes.annotate(text, (x, y), xytext=(5, 0), textcoords="offset points", va="center", fontsize=8,
+                          color=colour, annotation_clip=False)  # fmt: skip
+            below = y
+
+
+def svg_of(figure: "Figure", name: str, description: str) -> str:
+    """Return a figure as markup of a page.
+
+    Parameters
+    ----------
+    figure : Figure
+        Drawn in the colours of `LIGHT`.
+    name : str
+        Set before all ids, which would else be those of another figure too.
+    description : str
+        For who can't see it.
+    """
+    from markupsafe import escape
+
+    out = io.StringIO()
+    figure.savefig(out, format="svg", metadata={"Date": None, "Creator": None}, transparent=True)
+    text = out.getvalue()
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+    text = re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
+    text = re.sub(r'\b(id|xlink:href|clip-path)="(url\()?(#?)(?!data:)', rf'\1="\2\3{name}-', text)
+    text = re.sub(rf"url\(#(?!{re.escape(name)}-)", f"url(#{name}-", text)
+    for variable, (light, _) in PALETTE.items():
+        text = text.replace(light, f"var(--fig-{variable})")
+    width, height = (float(size) for size in re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', text).groups())
+    head = (
+        f'<svg class="drawing" role="img" aria-label="{escape(description)}" viewBox="0 0 {width:g} {height:g}" '
+        f'width="{width:g}" height="{height:g}" xmlns="http://www.w3.org/2000/svg" '
+        'xmlns:xlink="http://www.w3.org/1999/xlink">'
+    )
+    return head + re.sub(r"\n\s*", "\n", text[text.index(">") + 1 :])

@@ -1,0 +1,182 @@
+"""What the report leads with: the verdict, and the few numbers that matter."""
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from dzdesign.verify.report_artefacts import Chain
+from dzdesign.verify.report_table import whole
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Headline:
+    """The verdict.
+
+    Attributes
+    ----------
+    kind : {"good", "bad", "open"}
+        All holds; something does not; something could not be checked, or nothing was.
+    sign, text : str
+        As on the page.
+    reasons : tuple of str
+        What does not hold or was not checked.
+    """
+
+    kind: str
+    sign: str
+    text: str
+    reasons: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Figure:
+    """One number that matters: its label, the number itself and what it is of."""
+
+    label: str
+    value: str
+    note: str
+    kind: str = "text"
+
+
+def headline(chain: Chain) -> Headline:
+    """Return the verdict on a chain: good only if every requirement was checked and holds, and every file fits.
+
+    Parameters
+    ----------
+    chain : Chain
+    """
+    evidence = chain.document("verification")
+    if chain.faults:
+        return Headline(
+            kind="bad", sign="✗", text="THE FILES DO NOT BELONG TOGETHER. No verdict stands.", reasons=chain.faults
+        )
+    if evidence is None:
+        return Headline(
+            kind="open",
+            sign="?",
+            text="NOT VERIFIED: there is no evidence here, only a design"
+            if "compensator" in chain.artefacts
+            else "NOT VERIFIED: there is no evidence here, only an identified valve",
+        )
+    checks = [*evidence["checks"], *_limits(chain)]
+    missed = [check for check in checks if check["holds"] is False]
+    unknown = [check for check in checks if check["holds"] is None]
+    reasons = tuple(
+        f"{word}: {check['name']}: {check['text']}"
+        for word, group in (("does not hold", missed), ("NOT CHECKED", unknown))
+        for check in group
+    )
+    if missed:
+        text = f"DOES NOT HOLD: {len(missed)} of {len(checks)} requirements not met"
+        return Headline(kind="bad", sign="✗", text=text, reasons=reasons)
+    if unknown or not checks or not evidence["holds"]:
+        text = f"NOT CHECKED in full: {len(unknown)} of {len(checks)} requirements are open"
+        return Headline(kind="open", sign="?", text=text, reasons=reasons)
+    return Headline(kind="good", sign="✓", text=f"Every requirement holds, all {len(checks)}")
+
+
+def _limits(chain: Chain) -> list[dict[str, Any]]:
+    """Return the user's limits on recordings as requirements, if there are any."""
+    assessment = chain.document("assessment")
+    if assessment is None:
+        return []
+    return [
+        {"name": f"limit of {each['quantity']}, {each['place']}", "holds": each["holds"], "text": each["text"]}
+        for each in assessment["limits"]
+    ]
+
+
+def key_figures(chain: Chain) -> tuple[Figure, ...]:
+    """Return the numbers that matter; what they are read from decides which of them there are.
+
+    Parameters
+    ----------
+    chain : Chain
+    """
+    evidence, compensator = chain.document("verification"), chain.document("compensator")
+    figures: list[Figure] = []
+    loops = evidence["closed_loop"]["pressures"] if evidence else []
+    if loops:
+        for word in ("opening", "closing"):
+            figures.append(_dead_zone(loops, word))
+        figures.append(_at_zero(loops))
+    valve = chain.document("valve")
+    if not loops and valve:
+        figures.append(_threshold(valve))
+    if compensator:
+        figures.append(_certificate(compensator, evidence["inputs"] if evidence else []))
+    if evidence:
+        figures.append(_inputs(evidence["inputs"]))
+    return tuple(figures)
+
+
+def _dead_zone(loops: list[dict[str, Any]], word: str) -> Figure:
+    before = [100 * each[f"dead_zone_{word}"] for each in loops]
+    after = [100 * each[f"residual_{word}"] for each in loops]
+    return Figure(
+        label=f"Dead zone on {word}",
+        value=f"{max(before):.1f} % → {max(after):.1f} %",
+        note=f"of command, without → with; the worst of {len(loops)} pressure drops. "
+        f"With: {min(after):.1f} to {max(after):.1f} %",
+    )
+
+
+def _at_zero(loops: list[dict[str, Any]]) -> Figure:
+    worst = max(loops, key=lambda each: each["q_zero_L_min"])
+    flow = worst["q_zero_L_min"]
+    bare = max(each["q_zero_without_beta_L_min"] for each in loops)
+    return Figure(
+        label="Flow at zero command",
+        value="none" if flow <= 1e-9 else f"{flow:.3g} L/min",
+        note=f"after closing, the worst of {len(loops)} pressure drops; without β it were {bare:.2f} L/min",
+        kind="text" if flow <= 1e-9 else "bad",
+    )
+
+
+def _threshold(valve: dict[str, Any]) -> Figure:
+    name, side = next(iter(valve["sides"].items()))
+    opens = [test["u_knee_rising_V"] or test["u_guard_V"] for test in side["tests"]]
+    share = 100 / valve["u_max_V"]
+    return Figure(
+        label="Dead zone of the valve",
+        value=f"{share * max(opens):.1f} %",
+        note=f"of {valve['u_max_V']:g} V, on opening, {name} commands; {share * min(opens):.1f} to "
+        f"{share * max(opens):.1f} % over {len(opens)} pressure drops",
+    )
+
+
+def _certificate(compensator: dict[str, Any], inputs: list[dict[str, Any]]) -> Figure:
+    sides = [side for side in compensator["sides"].values() if side]
+    worst = min(sides, key=lambda side: Fraction(*side["certificate"]["smallest_margin_V"]))["certificate"]
+    low, high = (float(Fraction(*end)) for end in worst["dp_MPa"])
+    margin = 1e3 * float(Fraction(*worst["smallest_margin_V"]))
+    exceeded = sum(each["over_compensated"] for each in inputs)
+    if exceeded:
+        least = 1e3 * min(each["smallest_margin_V"] for each in inputs)
+        return Figure(
+            label="Certificate",
+            value="EXCEEDED",
+            note=f"at {whole(exceeded)} pressure codes the C drives the valve at zero command above the "
+            f"{worst['guard']} threshold's {100 * worst['confidence']:g} % bound, by up to {-least:.2f} mV",
+            kind="bad",
+        )
+    return Figure(
+        label="Certificate",
+        value=f"{100 * worst['confidence']:g} %",
+        note=f"confidence that the drive at zero command stays below the {worst['guard']} threshold from {low:.2f} to "
+        f"{high:.2f} MPa; smallest margin to its bound, by design, {margin:.2f} mV",
+    )
+
+
+def _inputs(inputs: list[dict[str, Any]]) -> Figure:
+    if not inputs:
+        return Figure(label="Inputs checked", value="NOT CHECKED", note="the C did not get so far", kind="open")
+    wrong, every = (sum(each[key] for each in inputs) for key in ("wrong", "inputs"))
+    if wrong:
+        note = f"of {whole(every)} pairs of command and pressure-difference code"
+        return Figure(label="Inputs checked", value=f"{whole(wrong)} wrong", note=note, kind="bad")
+    return Figure(
+        label="Inputs checked",
+        value=whole(every),
+        note="pairs of command and pressure-difference code, none wrong",
+    )
