@@ -13,12 +13,11 @@ from dzdesign.batch.runners import run_local, run_on_cluster
 from dzdesign.batch.summary import print_batch, summary_of
 from dzdesign.batch.table import Calibrated, read_back, rows_of, table_files
 from dzdesign.batch.valves import Valve, valves_of
-from dzdesign.progress import say
 from dzdesign.core.artefacts import read_bytes, to_json, write_files
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design_options import DEFAULTS, design_options
 from dzdesign.identify_options import IDENTIFY_NAMES, identify_options
-from dzdesign.progress import with_bar
+from dzdesign.progress import say, with_bar
 
 if TYPE_CHECKING:
     from dzdesign.design.common import CommonSetting
