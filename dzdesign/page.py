@@ -63,7 +63,8 @@ def new_table(title: str, *columns: str, words: "Sequence[int]" = (0,), keys: in
     keys : int
         Columns, from the first on, that tell the rows apart.
     """
-    return Grid(title=title, headers=columns, words=tuple(words), keys=keys)
+    headers = tuple(one_line(column) for column in columns)
+    return Grid(title=one_line(title), headers=headers, words=tuple(words), keys=keys)
 
 
 @dataclass(slots=True, kw_only=True)
@@ -164,7 +165,7 @@ class Grid:
         from rich.text import Text
 
         table = Table(
-            title=None if title is None else Text(one_line(title)),
+            title=None if title is None else Text(title),
             box=box.SIMPLE_HEAD,
             title_justify="left",
             title_style="bold",
