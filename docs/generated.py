@@ -6,8 +6,9 @@ from argparse import ArgumentParser
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from dzdesign.cli import COMMANDS, build_parser
+from dzdesign.parsing import COMMON, build_parser
 from dzdesign.schema_files import SCHEMAS, schema_document
+from dzdesign.vocabulary import COMMANDS, EXAMPLES, language
 
 #: What a caller of the rooms needs; `dzdesign.api` stands first as soon as there is one.
 API = (
@@ -28,17 +29,16 @@ API = (
 
 def commands() -> str:
     """Return a section for each command: its usage, arguments, options and defaults, as argparse has them."""
-    parsers = build_parser()[1]
+    parsers = build_parser(language())[1]
     return "\n\n".join(_command(name, parsers[name]) for name in COMMANDS)
 
 
 def _command(name: str, parser: ArgumentParser) -> str:
     lines = [f"({name})=", f"## {name}", "", parser.description or "", ""]
     arguments = [action for action in parser._actions if not action.option_strings]
+    common = {"--help", *(name for names, _ in COMMON for name in names)}
     options = [
-        action
-        for action in parser._actions
-        if action.option_strings and not {"--help", "--config", "--json"} & set(action.option_strings)
+        action for action in parser._actions if action.option_strings and not common & set(action.option_strings)
     ]
     shown = " ".join(
         (f"[{a.metavar}]" if a.nargs == "?" else a.metavar + (" ..." if a.nargs == "+" else "")) for a in arguments
@@ -51,7 +51,7 @@ def _command(name: str, parser: ArgumentParser) -> str:
         required = " Required." if action.required and action.option_strings else ""
         text = parser._get_formatter()._expand_help(action)
         lines += [names, f": {_sentence(text)}{required}", ""]
-    return "\n".join(lines)
+    return "\n".join([*lines, "```text", *EXAMPLES[name], "```"])
 
 
 def _sentence(text: str) -> str:

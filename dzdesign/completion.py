@@ -25,13 +25,13 @@ def _parser() -> argparse.ArgumentParser:
     """Return the parser of the command line, each option with the words or files that it takes."""
     import shtab
 
-    from dzdesign.cli import language
     from dzdesign.codegen.project import TARGET_NAMES
     from dzdesign.derivation.law import LAW_NAMES
     from dzdesign.derivation.report import FORMATS
     from dzdesign.design.options import GUARDS
     from dzdesign.design_options import CHOICES
     from dzdesign.parsing import build_parser
+    from dzdesign.vocabulary import language
 
     words = {
         "--target": TARGET_NAMES,

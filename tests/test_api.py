@@ -14,9 +14,10 @@ from nbclient import NotebookClient
 from synthetic import needs_compiler
 
 from dzdesign import api
-from dzdesign.cli import COMMANDS, main
+from dzdesign.cli import main
 from dzdesign.design_options import DEFAULTS
 from dzdesign.identify.model import ValveModel
+from dzdesign.vocabulary import COMMANDS
 
 ROOT = Path(__file__).parents[1]
 NOTEBOOK = ROOT / "examples" / "notebook" / "ramps_to_firmware.ipynb"

@@ -20,11 +20,12 @@ from rich.console import Console
 from synthetic import L_MIN, MPA, Truth, synthetic_ramp
 
 from dzdesign import progress
-from dzdesign.cli import COMMAND_GROUPS, COMMANDS, EXAMPLES, OPTION_GROUPS, main, parse
+from dzdesign.cli import main, parse
 from dzdesign.core.errors import InputError, nearest, neighbour
 from dzdesign.core.units import si_factor
 from dzdesign.page import FILE_WIDTH, new_console, new_table, put_line
 from dzdesign.recordings import told_apart
+from dzdesign.vocabulary import COMMAND_GROUPS, COMMANDS, EXAMPLES, OPTION_GROUPS
 
 
 def run(*words, **environment):
@@ -432,8 +433,8 @@ def test_help_imports_next_to_nothing():
 
 
 def test_options_of_other_commands_are_not_built():
-    from dzdesign.cli import language
     from dzdesign.parsing import build_parser
+    from dzdesign.vocabulary import language
 
     _, commands = build_parser(language(), only="verify")
     assert len(commands["verify"]._actions) > 5 and not commands["design"]._actions

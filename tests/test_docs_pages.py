@@ -8,7 +8,8 @@ import pytest
 from page_runner import agrees, commands_of, leaves_out, run, with_outputs
 from synthetic import needs_compiler
 
-from dzdesign.cli import build_parser
+from dzdesign.parsing import build_parser
+from dzdesign.vocabulary import language
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -59,7 +60,7 @@ def test_a_how_to_page_prints_what_it_shows(after_tutorial, page, tmp_path, requ
 
 def test_every_command_of_every_page_and_of_the_readme_is_one_that_dzdesign_knows():
     """Those that are not run, too: in code blocks of any kind, options and all."""
-    tried, parser = 0, build_parser()[0]
+    tried, parser = 0, build_parser(language())[0]
     for page in (ROOT / "README.md", *DOCS.rglob("*.md")):
         text = page.read_text(encoding="utf-8").replace("\\\n", " ")
         for line in re.findall(r"^ *(?:\$ |\.venv\\Scripts\\|uv run )?(dzdesign [a-z].*)$", text, re.MULTILINE):

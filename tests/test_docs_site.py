@@ -13,8 +13,8 @@ from urllib.parse import unquote
 import pytest
 from synthetic import needs_compiler
 
-from dzdesign.cli import COMMANDS
 from dzdesign.schema_files import SCHEMAS, schema_document, schema_text
+from dzdesign.vocabulary import COMMANDS
 
 pytest.importorskip("sphinx", reason="the site needs the packages of the extra `docs`")
 pytest.importorskip("myst_parser", reason="the site needs the packages of the extra `docs`")

@@ -11,10 +11,11 @@ from pathlib import Path
 import pytest
 from golden_firmware import FULL, GOLDENS
 
-from dzdesign.cli import COMMANDS, main
+from dzdesign.cli import main
 from dzdesign.codegen.project import target_named
 from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.design.signal_text import Converter, command_signal, parse_signal
+from dzdesign.vocabulary import COMMANDS
 
 C2000 = ("f28335", "f280049c")
 BOTH = "-10..10 V x 0.15 + 1.5 V"
