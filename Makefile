@@ -6,13 +6,17 @@ STAMP  := $(VENV)/.installed
 DOCS   := docs/derivation
 SITE   := docs/_build/html
 
-.PHONY: demo test lint docs goldens lock clean fuzz bench bench-batch bench-identify bench-isr bench-verify
+.PHONY: demo test coverage lint docs goldens lock clean fuzz bench bench-batch bench-identify bench-isr bench-verify
 
 demo: $(STAMP)
 	$(BIN)/dzdesign demo demo
 
 test: lint
 	$(BIN)/pytest --numprocesses auto --dist loadfile
+
+# The tests once more, with the lines and branches of each file that no test runs in its own process.
+coverage: $(STAMP)
+	$(BIN)/pytest --numprocesses auto --dist loadfile --cov --cov-report=term
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

@@ -14,7 +14,7 @@ for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "POLARS_MAX_THREADS"
 sys.path.insert(0, str(Path(__file__).parents[1]))  # for the scoreboard that all benchmarks share
 
 from accuracy import print_accuracy  # noqa: E402
-from coverage import print_coverage, print_over_compensation, print_residual  # noqa: E402
+from bound_coverage import print_coverage, print_over_compensation, print_residual  # noqa: E402
 from measured import print_measured  # noqa: E402
 from random_valves import print_random_valves  # noqa: E402
 from reading import print_reading  # noqa: E402
