@@ -8,7 +8,7 @@ from dzdesign import __version__
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.front_page import ABOUT, COMMON, front_page, page_width
 
-#: All that can be said, as `dzdesign.vocabulary` declares it. No dataclass: importing those takes longer than all the parsing.
+#: All that can be said, as `dzdesign.vocabulary` declares it. No dataclass: to import those takes longer than to parse.
 #:
 #: commands: command -> (one line of help, function that runs it, its options)
 #: command_groups: heading -> commands under it; one that is nowhere stands under the last
