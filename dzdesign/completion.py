@@ -17,7 +17,7 @@ def run_completion(args: argparse.Namespace) -> int:
         raise InputError(
             f"there is no completion for '{args.shell}'{nearest(args.shell, shells)}; known: {', '.join(shells)}"
         )
-    print(shtab.complete(_parser(), shell=args.shell), end="")
+    print(shtab.complete(_parser(), args.shell), end="")
     return 0
 
 

@@ -1,10 +1,11 @@
 """The constrained fits in CasADi: knees and slopes of all ramp tests jointly; the offset curve under its bounds."""
 
 import logging
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -118,7 +119,7 @@ def fit_knees(
     variables = ca.vertcat(slopes, knees)
     solver = ca.nlpsol("knees", "ipopt", {"x": variables, "f": cost, "g": order}, IPOPT)
     solution = solver(x0=start, lbg=0.0, ubg=ca.inf)
-    _log(solver)
+    _log("knees", solver.stats())
     if not solver.stats()["success"]:
         raise InputError(
             f"the joint fit did not converge ({solver.stats()['return_status']}); "
@@ -147,10 +148,9 @@ def fit_knees(
     )
 
 
-def _log(solver: "ca.Function") -> None:
-    said = solver.stats()
-    logger.debug("%s: %s after %d iterations, %.3f s", solver.name(), said["return_status"], said["iter_count"],
-                 said.get("t_wall_total", 0.0))  # fmt: skip
+def _log(name: str, said: Mapping[str, Any]) -> None:
+    status, seconds = said["return_status"], said.get("t_wall_total", 0.0)
+    logger.debug("%s: %s after %d iterations, %.3f s", name, status, said.get("iter_count", 0), seconds)
 
 
 def _hessian_of_cost(solver: "ca.Function", at: np.ndarray) -> np.ndarray:
@@ -307,7 +307,7 @@ def fit_offset(
     # Not CasADi's qrqp: where ceilings are equal, it may call a curve solved that runs both ways.
     solver = ca.nlpsol("offset", "ipopt", {"x": given_up, "f": cost, "g": step}, IPOPT | EXACT)
     solution = solver(x0=0.1, lbx=0.0, lbg=low, ubg=high)
-    _log(solver)
+    _log("offset", solver.stats())
     slack = np.maximum(np.asarray(solution["x"]).ravel(), 0.0) / 1e3
     found = ceiling - slack
     wrong_way = {"decreasing": np.diff(found), "increasing": -np.diff(found), "flat": np.abs(np.diff(found))}[trend]

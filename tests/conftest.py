@@ -19,6 +19,12 @@ def pytest_addoption(parser):
     parser.addoption("--update-docs", action="store_true", help="write what commands print into the pages of docs/")
 
 
+@pytest.fixture(autouse=True)
+def page_of_a_file(monkeypatch):
+    """Print as into a file, whatever the terminal or CI that runs the tests says of its width."""
+    monkeypatch.delenv("COLUMNS", raising=False)
+
+
 @pytest.fixture(scope="session")
 def example_folder() -> Path:
     return Path(str(files("dzdesign.example")))

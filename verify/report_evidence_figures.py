@@ -68,7 +68,7 @@ def map_figure(
     )
     u, dp = 100 * (codes - command["zero_code"]) / (full - command["zero_code"]), dp_codes * code_MPa
     low, high = (float(Fraction(*end)) for end in compensator["sides"][side]["certificate"]["dp_MPa"])
-    room = 0.14 * (high - low)
+    room = max(0.14 * (high - low), 0.01 * float(np.ptp(dp)))  # of one tested pressure drop, too, a strip is shown
     figure = new_figure(4.3, right=0.1, top=0.3)
     left, tested = figure.subplots(1, 2, width_ratios=(1, 2.7), gridspec_kw={"wspace": 0.16})
     volts = volt * output
