@@ -70,10 +70,15 @@ def run_init(args: argparse.Namespace) -> int:
         print(line)
     for line in opens:
         print(f"open: {line}")
-    names = " ".join(args.ramps) if 0 < len(args.ramps) <= 3 else "RAMP..."
+    names = " ".join(map(_word, args.ramps)) if 0 < len(args.ramps) <= 3 else "RAMP..."
     print(f"Written: {output}" + ("; fill in what is open, then" if opens else "; read it, then"))
-    print(f"  dzdesign identify {names} --config {output}")
+    print(f"  dzdesign identify {names} --config {_word(str(output))}")
     return 1 if opens else 0
+
+
+def _word(name: str) -> str:
+    """Return a name as one word of any shell; a pattern stays one."""
+    return f'"{name}"' if " " in name else name
 
 
 def _found_recordings() -> list[Path]:
@@ -241,7 +246,7 @@ def _column_lines(look: Look, opens: list[str]) -> list[str]:
         lines += ["# Each is the only column that is left in a unit of its quantity, or as you said."]
         lines += ["[columns]", *body]
     elif opens and open_ones:
-        lines += ["# [columns]", *(f'# {name} = "LABEL"' for name in open_ones)]
+        lines += ["# [columns]", *(f'# {name} = "LABEL:UNIT"' for name in open_ones)]
     return [*lines, ""]
 
 

@@ -117,7 +117,7 @@ def test_what_can_not_be_told_is_left_open_with_the_reason(here, capsys, labels,
     assert main(["init", "ramp.csv"]) == 1
     assert f"open: column of {reason}" in capsys.readouterr().out
     text = Path("dzdesign.toml").read_text()
-    assert f"# OPEN: column of {reason}" in text and f'# {reason[0]} = "LABEL"' in text
+    assert f"# OPEN: column of {reason}" in text and f'# {reason[0]} = "LABEL:UNIT"' in text
     assert "columns" not in tomllib.loads(text)
 
 
