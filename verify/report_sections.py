@@ -280,7 +280,7 @@ def provenance_table(chain: Chain) -> Table:
             (
                 Cell(text=label),
                 Cell(text=one.name),
-                Cell(text=one.sha256, kind="code"),
+                Cell(text=one.sha256, kind="hash"),
                 Cell(text=f"{tool['name']} {tool['version']}"),
                 Cell(text=made_from or "–"),
             )
@@ -288,7 +288,7 @@ def provenance_table(chain: Chain) -> Table:
     valve = chain.document("valve")
     for test in valve["made_from"] if valve else []:
         row = text_row(("recording", test["source"]))
-        rows.append((*row, Cell(text=test["sha256"], kind="code"), *text_row(("–", "–"))))
+        rows.append((*row, Cell(text=test["sha256"], kind="hash"), *text_row(("–", "–"))))
     return Table(
         caption="Each artefact with the SHA-256 of its bytes, and what it was made from",
         columns=("artefact", "file", "SHA-256", "made by", "made from"),

@@ -15,8 +15,8 @@ class Cell:
     ----------
     text : str
         What stands in it.
-    kind : {"text", "number", "code", "symbol", "good", "bad", "open"}
-        How it is set; the last three are verdicts; a symbol is code on one line.
+    kind : {"text", "number", "code", "symbol", "hash", "good", "bad", "open"}
+        How it is set; the last three are verdicts; a symbol is code on one line, a hash on two.
     more : str
         A second line, smaller.
     """
