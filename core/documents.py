@@ -10,6 +10,13 @@ from dzdesign.core.errors import InputError
 #: Lists and objects in one another; dzdesign's own artefacts have eight. Beyond some hundred, what reads or prints the
 #: value would end in the interpreter's own limit, at a depth that depends on who called.
 DEEPEST = 32
+#: What writes the artefacts that are given to another command, by the schema's name without its version.
+WRITTEN_BY = {
+    "dzdesign.valve": "dzdesign identify",
+    "dzdesign.compensator": "dzdesign design",
+    "dzdesign.firmware": "dzdesign codegen",
+    "dzdesign.evidence": "dzdesign verify",
+}
 
 
 def sha256_of(content: bytes) -> str:
@@ -52,7 +59,7 @@ def parse_document(content: bytes, source: str, schemas: tuple[str, ...]) -> dic
         If it is no JSON object in UTF-8, holds what can't be written again (NaN, half a character) or a key twice, or
         has another schema.
     """
-    expected = " or ".join(schemas)
+    expected = " or ".join(f"{schema}{_writer(schema)}" for schema in schemas)
     try:
         # JSON in UTF-16, or after a byte order mark, would be read here and stumbled over later.
         document = json.loads(content.decode("utf-8"), parse_constant=_no_number, object_pairs_hook=_unique_keys)
@@ -64,6 +71,11 @@ def parse_document(content: bytes, source: str, schemas: tuple[str, ...]) -> dic
     if found not in schemas:
         raise InputError(f"'{source}' has the schema {str(found)[:40]!r}, expected {expected}; give another file")
     return document
+
+
+def _writer(schema: str) -> str:
+    command = WRITTEN_BY.get(schema.partition("/")[0])
+    return f" (which `{command}` writes)" if command else ""
 
 
 def _refuse_deep(document: Any) -> None:

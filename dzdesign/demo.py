@@ -6,7 +6,11 @@ from pathlib import Path
 
 from dzdesign.core.artefacts import TOOL, check_folder_may_be_written, to_json, write_file, write_folder
 from dzdesign.core.errors import InputError
+from dzdesign.core.units import parse_quantity
 from dzdesign.progress import say, stages
+
+#: The flow meter of the bundled recordings, as their first lines tell it.
+METER_LAG, METER_FLOOR = "0.1 s", "0.6 L/min"
 
 
 def run_demo(args: argparse.Namespace) -> int:
@@ -16,6 +20,7 @@ def run_demo(args: argparse.Namespace) -> int:
     from dzdesign.design.compensator_file import compensator_document
     from dzdesign.design.designing import design
     from dzdesign.identify.identification import identify
+    from dzdesign.identify.options import IdentifyOptions
     from dzdesign.identify.ramp_files import read_ramp_file
     from dzdesign.tables import print_demo
     from dzdesign.verify.plant import read_plant
@@ -37,8 +42,12 @@ def run_demo(args: argparse.Namespace) -> int:
         with as_file(files("dzdesign.example")) as example:
             tests = [read_ramp_file(path) for path in sorted((example / "ramps").glob("*.csv.gz"))]
             plant = read_plant(example / "plant.toml")
+        meter = IdentifyOptions(
+            meter_lag=parse_quantity(METER_LAG, "time", "lag"),
+            meter_floor=parse_quantity(METER_FLOOR, "flow", "floor"),
+        )
         stage(f"identifying the valve from {len(tests)} simulated ramp tests")
-        valve = identify(tests)
+        valve = identify(tests, meter)
         valve_json = to_json(valve.to_document())
         write_file(folder / "valve.json", valve_json)
         stage("designing the compensator")

@@ -211,7 +211,7 @@ def test_a_file_name_in_another_encoding(bench, capsys):
         ("simulate --ramp-time 0s", "the ramp time is 0 s, expected 1 to 1000 s"),
         ("simulate --dp 1MPa --dp 10bar", "--dp repeats a pressure drop"),
         ("verify nowhere", "firmware manifest 'nowhere/manifest.json' does not exist"),
-        ("verify a.csv", "firmware manifest 'a.csv/manifest.json' does not exist"),
+        ("verify a.csv", "'a.csv' is a file, expected the firmware folder that `dzdesign codegen` writes"),
         ("identify a.csv --config nowhere.toml", "config file 'nowhere.toml' does not exist"),
     ],
 )

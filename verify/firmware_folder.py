@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from dzdesign.core.artefacts import MANIFEST_NAME, check_inside, parse_document, read_bytes
+from dzdesign.core.errors import InputError
 from dzdesign.core.shape import check_shape
 
 FIRMWARE_SCHEMA = "dzdesign.firmware/1"
@@ -21,6 +22,9 @@ def read_firmware_manifest(folder: Path) -> tuple[bytes, dict[str, Any]]:
         If the folder is no firmware, or leads elsewhere.
     """
     path = folder / MANIFEST_NAME
+    if folder.is_file() or (folder.is_dir() and not path.exists()):
+        found = "is a file" if folder.is_file() else f"has no {MANIFEST_NAME}"
+        raise InputError(f"'{folder}' {found}, expected the firmware folder that `dzdesign codegen` writes; name that")
     content = read_bytes(path, "firmware manifest")
     manifest = parse_document(content, str(path), (FIRMWARE_SCHEMA,))
     check_shape(manifest, {"files": dict, "core": [str]}, str(path), "make it again with `dzdesign codegen`")

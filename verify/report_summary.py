@@ -151,8 +151,8 @@ def _certificate(compensator: dict[str, Any], inputs: list[dict[str, Any]]) -> F
     low, high = (float(Fraction(*end)) for end in worst["dp_MPa"])
     margin = 1e3 * float(Fraction(*worst["smallest_margin_V"]))
     exceeded = sum(each["over_compensated"] for each in inputs)
+    least = min((1e3 * each["smallest_margin_V"] for each in inputs), default=margin)
     if exceeded:
-        least = 1e3 * min(each["smallest_margin_V"] for each in inputs)
         return Figure(
             label="Certificate",
             value="EXCEEDED",
@@ -164,7 +164,8 @@ def _certificate(compensator: dict[str, Any], inputs: list[dict[str, Any]]) -> F
         label="Certificate",
         value=f"{100 * worst['confidence']:g} %",
         note=f"confidence that the drive at zero command stays below the {worst['guard']} threshold from {low:.2f} to "
-        f"{high:.2f} MPa; smallest margin to its bound, by design, {margin:.2f} mV",
+        f"{high:.2f} MPa; smallest margin to its bound {margin:.2f} mV at any pressure"
+        + (f", {least:.2f} mV at those that the converter can tell apart" if inputs else ""),
     )
 
 

@@ -17,7 +17,7 @@ from dzdesign.verify.host_compiler import load_library
 from dzdesign.verify.machine_code import check_on_machine
 from dzdesign.verify.machines import AVR, CORTEX_M4, HOST, compile_object, link_program, run_program
 
-ROUNDS, QUICK_ROUNDS, SIMULATED_ROUNDS = 9, 3, 5
+ROUNDS, QUICK_ROUNDS, SIMULATED_ROUNDS = 25, 3, 5
 #: Inputs of the comparison with ctypes and Fraction, of which the whole is extrapolated.
 STATED_PART = 20_000
 TIMES_BARE, TIMES_SLOWER, TIMES_HOST = 2.0, 2000.0, 8.0
