@@ -128,7 +128,7 @@ def _at_zero(loops: list[dict[str, Any]]) -> Figure:
     return Figure(
         label="Flow at zero command",
         value="none" if flow <= 1e-9 else f"{flow:.3g} L/min",
-        note=f"after closing, the worst of {len(loops)} pressure drops; without β it were {bare:.2f} L/min",
+        note=f"after closing, the worst of {len(loops)} pressure drops; without β it would be {bare:.2f} L/min",
         kind="text" if flow <= 1e-9 else "bad",
     )
 
