@@ -8,7 +8,7 @@ import numpy as np
 
 from dzdesign.identify.branches import Bins, bin_branch
 from dzdesign.identify.noise import colour_factor, measure_roughness, robust_sigma
-from dzdesign.identify.profile import crossing, flow_at_top, smooth_profile
+from dzdesign.identify.profile import crossing, flow_at_top, hole_within, smooth_profile
 from dzdesign.identify.straight_lines import find_straight_parts
 from dzdesign.identify.straight_part import GATE, GatedLine, ReadBranch, colour_of_blocks, fit_line
 
@@ -36,6 +36,8 @@ class Tail:
         m³/(s V).
     at_level, at_level_se : float
         Command at which it reaches the flow that counts as flow, and the standard error, V.
+    hole : tuple of float or None
+        Commands between which rows are missing, if flow begins there, V: then `zero` is the lower of them.
     """
 
     zero: float
@@ -43,6 +45,7 @@ class Tail:
     slope: float
     at_level: float
     at_level_se: float
+    hole: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -125,7 +128,7 @@ def _describe(
     read: ReadBranch, line: GatedLine, level: float, noise: float, correlation: float, u_max: float
 ) -> BranchShape:
     branch = read.branch
-    tail = _find_tail(read, level, line, noise, correlation)
+    tail = _find_tail(read, level, line, noise, correlation, u_max)
     onset, onset_se = _find_onset(read, tail, level, noise)
     return BranchShape(
         rising=branch.rising,
@@ -147,11 +150,12 @@ def _describe(
     )
 
 
-def find_meter_floor(u: np.ndarray, q: np.ndarray, u_max: float) -> float:
-    """Return the flow at which the meter wakes up, m³/s, or 0 if it shows no floor.
+def find_meter_floor(u: np.ndarray, q: np.ndarray, u_max: float) -> float | None:
+    """Return the flow at which the meter wakes up, m³/s, or 0 if it shows no floor; None if that can't be told.
 
     A meter with a floor reads (about) zero, then jumps: between its noise and its floor there are next to no
-    readings, although the ramp sweeps those flows at the same pace as the flows above.
+    readings, although the ramp sweeps those flows at the same pace as the flows above. Where rows are missing the ramp
+    did not sweep them, and the flows that nobody recorded look like a floor.
     """
     u_profile, q_profile = smooth_profile(u, q, u_max)
     q_max = flow_at_top(u_profile, q_profile)
@@ -169,7 +173,9 @@ def find_meter_floor(u: np.ndarray, q: np.ndarray, u_max: float) -> float:
     readings = np.sort(q[near & (q > lowest) & (q < 0.5 * q_max)])
     expected = density * (readings - lowest)
     gap = np.flatnonzero((np.arange(readings.size) < 0.1 * expected) & (expected > 20))
-    return float(readings[gap[-1]]) if gap.size else 0.0
+    floor = float(readings[gap[-1]]) if gap.size else 0.0
+    swept = (crossing(u_profile, q_profile, flow) for flow in (lowest, floor))
+    return None if floor and hole_within(u_profile, *swept, u_max) else floor
 
 
 def _without_outliers(u: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -228,7 +234,9 @@ def _find_onset(read: ReadBranch, tail: Tail, level: float, noise: float) -> tup
     return first, float(u[at] - u[at - 1])
 
 
-def _find_tail(read: ReadBranch, level: float, line: GatedLine, noise: float, correlation: float) -> Tail:
+def _find_tail(
+    read: ReadBranch, level: float, line: GatedLine, noise: float, correlation: float, u_max: float
+) -> Tail:
     """Extrapolate the first flow seen to zero: the valve opens (or closes) no later than this, as far as can be seen.
 
     A soft edge passes flow below the knee. What the meter sees of it is the tail from `level` to `TAIL` times it; the
@@ -236,6 +244,9 @@ def _find_tail(read: ReadBranch, level: float, line: GatedLine, noise: float, co
     """
     u, profile = read.branch.u, read.profile
     first, last = crossing(*profile, level), crossing(*profile, TAIL * level)
+    hole = hole_within(profile[0], first, first, u_max)
+    if hole:
+        return _tail_in_a_hole(profile[0], first, level, hole)
     tail = (u >= first) & (u <= last)
     seen = tail & (read.branch.q >= 0.5 * read.floor)
     if seen.sum() >= TAIL_SAMPLES and np.unique(u[seen]).size >= TAIL_LEVELS:
@@ -263,3 +274,12 @@ def _find_tail(read: ReadBranch, level: float, line: GatedLine, noise: float, co
     error = gap + noise / chord
     # At the level before, less flows than counts, so the zero is not below it.
     return Tail(max(first - level / chord, float(profile[0][at - 1])), error, chord, first, error)
+
+
+def _tail_in_a_hole(u: np.ndarray, first: float, level: float, hole: tuple[float, float]) -> Tail:
+    """Return what can be said where rows are missing in which the flow begins: no sooner than at their lower end.
+
+    What lies above them may be straight, and its zero far above a soft edge that nobody recorded.
+    """
+    low, high = hole
+    return Tail(low, float(np.median(np.diff(u))), level / (high - low), first, high - low, hole)

@@ -188,7 +188,7 @@ def _refuse_what_shows_no_dead_zone(pooled: list[PooledTest], options: IdentifyO
 
 
 def found_floor(pooled: list[PooledTest], options: IdentifyOptions) -> float:
-    """Return the largest meter floor that any branch shows (one meter, so one floor), m³/s.
+    """Return the largest meter floor that any branch shows (one meter, so one floor), m³/s; 0 if none can tell.
 
     Parameters
     ----------
@@ -197,12 +197,9 @@ def found_floor(pooled: list[PooledTest], options: IdentifyOptions) -> float:
     options : IdentifyOptions
         Choices of the engineer.
     """
-    return max(
-        find_meter_floor(branch.u, branch.q, options.u_max)
-        for item in pooled
-        for branch in item.branches
-        if branch is not None
-    )
+    branches = (branch for item in pooled for branch in item.branches if branch is not None)
+    floors = (find_meter_floor(branch.u, branch.q, options.u_max) for branch in branches)
+    return max((floor for floor in floors if floor is not None), default=0.0)
 
 
 def _read(item: PooledTest, floor: float, u_max: float) -> Iterator[ReadBranch]:

@@ -6,6 +6,9 @@ from dzdesign.identify.branches import bin_index
 
 #: Share of the command's range, from the top, over which the largest flow is read.
 TOP = 0.05
+#: A step between two points of a profile is a hole, rows that are missing, beyond so many usual steps, and this share
+#: of u_max.
+USUAL_STEPS, SMALLEST_HOLE = 4.0, 2e-3
 
 
 def smooth_profile(u: np.ndarray, y: np.ndarray, u_max: float) -> tuple[np.ndarray, np.ndarray]:
@@ -34,6 +37,29 @@ def crossing(u: np.ndarray, y: np.ndarray, level: float) -> float:
         return float(u[-1])
     share = (level - y[last]) / (y[last + 1] - y[last])
     return float(u[last] + share * (u[last + 1] - u[last]))
+
+
+def hole_within(u: np.ndarray, low: float, high: float, u_max: float) -> tuple[float, float] | None:
+    """Return the widest stretch without samples that shares a command with [low, high], or None; V.
+
+    Parameters
+    ----------
+    u : (P,) array
+        Commands of a profile, rising, V. Where all steps are wide, as of a staircase, none is a hole.
+    low, high : float
+        Commands between which it matters, V.
+    u_max : float
+        Full command, V.
+    """
+    steps = np.diff(u)
+    if not steps.size:
+        return None
+    wide = steps > max(USUAL_STEPS * float(np.median(steps)), SMALLEST_HOLE * u_max)
+    here = np.flatnonzero(wide & (u[:-1] <= high) & (u[1:] >= low))
+    if not here.size:
+        return None
+    at = here[np.argmax(steps[here])]
+    return float(u[at]), float(u[at + 1])
 
 
 def flow_at_top(u_profile: np.ndarray, y_profile: np.ndarray) -> float:

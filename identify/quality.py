@@ -216,12 +216,14 @@ def _about_the_edge(side: SideModel, group: DescribedTests, u_max: float) -> Ite
         )
     for test, item in zip(side.tests, group.tests, strict=True):
         knee = test.u_knee_falling_V if test.u_knee_falling_V is not None else test.u_knee_rising_V
-        if knee - test.u_guard_V > SOFT_EDGE * u_max:
+        shape = item.shapes[1] or item.shapes[0]
+        if knee - test.u_guard_V > SOFT_EDGE * u_max and not shape.tail.hole:
             yield Warning_(
                 code="soft-edge",
                 text=(
-                    f"flow is seen {1e3 * (knee - test.u_guard_V):.0f} mV below the knee: the edge is soft, and the "
-                    "tail's zero is guarded instead of the knee, at the price of that much residual dead zone"
+                    "the edge is soft: the first flows that count lie on a line that comes to zero "
+                    f"{1e3 * (knee - test.u_guard_V):.0f} mV below the knee. Its zero is guarded instead of the knee, "
+                    "at the price of that much residual dead zone"
                 ),
                 source=test.source,
             )

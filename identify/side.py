@@ -213,6 +213,13 @@ def _not_observable(group: DescribedTests, row: int) -> dict[str, str]:
         if shape is None:
             for name in ("knee", "level", "onset"):
                 reasons[f"u_{name}_{direction}_V"] = f"there is no {direction} branch"
+        elif shape.tail.hole:
+            low, high = shape.tail.hole
+            for name in ("level", "onset"):
+                reasons[f"u_{name}_{direction}_V"] = (
+                    f"rows are missing from {low:.3f} to {high:.3f} V, where the flow begins; the onset's value is the "
+                    "lower end"
+                )
         elif group.floor > 0:
             reasons[f"u_onset_{direction}_V"] = (
                 f"the meter shows nothing below {group.floor / L_MIN:.2f} L/min; the value is the tail above that "

@@ -34,6 +34,7 @@ def about_sweeps(side: SideModel, tests: tuple[DescribedTest, ...], u_max: float
     """
     for test, item in zip(side.tests, tests, strict=True):
         yield from _about_branches(test)
+        yield from _about_holes(test, item, side.guard)
         yield from _about_the_command(test, item, side.guard, u_max)
         yield from _about_the_flow(test, item)
     if not any(test.saturates for test in side.tests):
@@ -71,6 +72,22 @@ def _about_branches(test: TestResult) -> Iterator[Warning_]:
                 f"the valve closes ({falling:.3f} V) above where it opens ({rising:.3f} V): is the meter's lag "
                 "over-corrected, or the time column wrong? The certificate guards the closing threshold, here the "
                 "higher one, so flow at zero command is possible"
+            ),
+            source=test.source,
+        )
+
+
+def _about_holes(test: TestResult, item: DescribedTest, guard: str) -> Iterator[Warning_]:
+    for way, shape in zip(("opening", "closing"), item.shapes, strict=True):
+        if shape is None or not shape.tail.hole:
+            continue
+        low, high = shape.tail.hole
+        bound = f", so the {guard} threshold's bound is lowered below {low:.3f} V" if way == guard else ""
+        yield Warning_(
+            code="gap",
+            text=(
+                f"rows are missing on the {way} branch, from {low:.3f} to {high:.3f} V, where the flow begins; a soft "
+                f"edge there would not be seen{bound}. Record this ramp again, without losing rows"
             ),
             source=test.source,
         )
