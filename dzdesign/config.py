@@ -1,5 +1,6 @@
 """Options in a TOML file: the names of the command line, one file for all commands."""
 
+import datetime
 import tomllib
 from collections.abc import Collection
 from pathlib import Path
@@ -13,8 +14,24 @@ LONGEST_KEY = 80
 Value = str | list[str] | dict[str, str]
 
 
+class _AsWritten(float):
+    """A number with a point that is text as it stands in the file: an oil of viscosity 46.10 stays one."""
+
+    def __new__(cls, text: str) -> "_AsWritten":
+        made = super().__new__(cls, text)
+        made.text = text.replace("_", "")
+        return made
+
+    def __str__(self) -> str:
+        return self.text
+
+
 def options_from_file(
-    path: str, known: Collection[str], repeatable: Collection[str], tables: Collection[str] = ()
+    path: str,
+    known: Collection[str],
+    repeatable: Collection[str],
+    tables: Collection[str] = (),
+    by_entry: Collection[str] = (),
 ) -> dict[str, Value]:
     """Read options; a key may be written ``meter-floor`` or ``meter_floor``, values as on the command line.
 
@@ -28,6 +45,8 @@ def options_from_file(
         Those of them that may be a list.
     tables : collection of str
         Those of them that may be a table of texts.
+    by_entry : collection of str
+        Those of them whose table may be empty, with all its entries still to be written.
 
     Raises
     ------
@@ -36,7 +55,7 @@ def options_from_file(
     """
     content = read_bytes(Path(path), "config file")
     try:
-        document = tomllib.loads(content.decode("utf-8-sig"))
+        document = tomllib.loads(content.decode("utf-8-sig"), parse_float=_AsWritten)
     except (ValueError, RecursionError) as error:
         raise InputError(f"'{path}' is not TOML: {error}; expected lines such as u-max = \"10 V\"") from error
     options: dict[str, Value] = {}
@@ -47,6 +66,8 @@ def options_from_file(
             raise InputError(f"'{path}': there is no option {quoted(key)}{hint}; see `dzdesign COMMAND --help`")
         if name in options:
             raise InputError(f"'{path}': option '{key}' is given twice, with - and with _; keep one")
+        if name in by_entry and value == {}:
+            continue
         options[name] = _texts(path, key, value, name in repeatable, name in tables)
     return options
 
@@ -65,7 +86,7 @@ def _texts(path: str, key: str, value: object, repeatable: bool, table: bool) ->
 
 
 def _is_text(item: object) -> bool:
-    """Tell whether an item is text, or a number that can be written as text: a hexadecimal one may be too long."""
+    """Tell whether an item is text, or a number or date that can be written as text; a long hexadecimal one can't."""
     if isinstance(item, int) and (isinstance(item, bool) or item.bit_length() > 64):
         return False
-    return isinstance(item, str | int | float)
+    return isinstance(item, str | int | float | datetime.date | datetime.time)

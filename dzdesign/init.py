@@ -23,6 +23,18 @@ PLACES = tuple(
 )
 
 
+#: Who and what; last in the file, for in TOML a table ends where the next one begins.
+RECORD_LINES = (
+    "# Who and what, for the head of the report: any names. Nothing is computed from it.",
+    "# What is of one valve alone may stand on the command line: --record \"serial = 4711\"",
+    "# [record]",
+    *(f"# {line}" for line in (
+        'serial = "4711"', 'type = "4/3 proportional, 10 V"', 'operator = "K. Muster"', "date = 2026-01-31",
+        'oil = "HLP 46"', 'oil-temperature = "40 °C"', 'bench = "bench 2"', 'meter = "gear meter, no. 12"',
+    )),
+)  # fmt: skip
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Look:
     """What was seen of all recordings; the maps are None or empty where the files need none.
@@ -189,6 +201,7 @@ def _toml(look: Look, opens: list[str]) -> str:
         "",
         *_column_lines(look, opens),
         *_dp_lines(look, opens),
+        *RECORD_LINES,
     ]
     return "\n".join(one_line(line) for line in lines).rstrip() + "\n"
 
@@ -258,7 +271,8 @@ def _dp_lines(look: Look, opens: list[str]) -> list[str]:
     missing = [line.split("'")[1] for line in opens if line.startswith("pressure drop of")]
     if missing and not look.dp:
         lines = ["# Pressure drop of recordings without a column of it.", "# [dp]"]
-    return [*lines, *(f'# {_quoted(name)} = "1 MPa"' for name in missing)]
+    lines += [f'# {_quoted(name)} = "1 MPa"' for name in missing]
+    return [*lines, ""] if lines else []
 
 
 def _quoted(text: str) -> str:

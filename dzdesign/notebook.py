@@ -39,7 +39,7 @@ def _knee(branch: "BranchResult | None") -> str:
 
 def valve_html(valve: "ValveModel") -> str:
     """Return the thresholds with their standard errors, the trend and every warning of a valve."""
-    parts = []
+    parts = [_table("Record", ("entry", "text"), valve.record.items(), words=(0, 1))] if valve.record else []
     for name, side in valve.sides.items():
         rows = []
         for test, beta in zip(side.tests, side.beta or (None,), strict=True):

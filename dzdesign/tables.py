@@ -33,6 +33,8 @@ def _percent(share: float) -> str:
 def print_valve(valve: "ValveModel") -> None:
     """Print thresholds per ramp test, the law's parameters and every warning."""
     console = new_console()
+    if valve.record:
+        put_line(console, "record: " + "; ".join(f"{name} {text}" for name, text in valve.record.items()))
     for name, side in valve.sides.items():
         title = "Thresholds (V)" if len(valve.sides) == 1 else f"Thresholds (V), {name} side"
         console.print(_thresholds(side, title))

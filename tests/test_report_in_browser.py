@@ -81,7 +81,9 @@ def pages(reported_demo, tmp_path_factory):
     (failing / "evidence" / MANIFEST_NAME).write_text(to_json(manifest))
     alone = folder / "alone"
     alone.mkdir()
-    shutil.copy(reported_demo / "valve.json", alone)
+    valve = json.loads((reported_demo / "valve.json").read_bytes())
+    valve["record"] = {"serial": "4711", "n" * 60: "unbroken" * 25, "oil": "HLP 46, 40 °C"}
+    (alone / "valve.json").write_text(to_json(valve))
     for place in (failing, alone):
         (place / REPORT_NAME).write_text(report_of_folder(place).html, encoding="utf-8")
     return {
@@ -150,7 +152,10 @@ def test_a_failing_verdict_is_larger_than_a_good_one(browser, pages):
 
 def test_it_prints_on_light_paper_without_what_only_a_screen_needs(browser, pages, tmp_path):
     with opened(browser, pages["demo"], scheme="dark") as (page, heard):
+        shown = "getComputedStyle(document.querySelector('.signatures')).display"
+        assert page.evaluate(shown) == "none"
         page.emulate_media(media="print")
+        assert page.evaluate(shown) == "grid"
         assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
         assert page.evaluate("getComputedStyle(document.querySelector('nav')).display") == "none"
         assert [found for found in page.evaluate(CONTRASTS) if found[0] < CONTRAST] == []

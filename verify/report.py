@@ -115,6 +115,7 @@ def make_report(chain: Chain) -> Report:
         title=_title(chain),
         tool=TOOL,
         verdict=verdict,
+        record=_record(chain),
         figures=key_figures(chain),
         sections=sections,
         headings=SECTIONS,
@@ -131,6 +132,12 @@ def _words(text: str) -> "markupsafe.Markup":
     from markupsafe import Markup, escape
 
     return Markup(re.sub(r"`([^`<>]+)`", r"<code>\1</code>", str(escape(text))))
+
+
+def _record(chain: Chain) -> tuple[tuple[str, str], ...]:
+    """Return who and what, as valve.json has it: the engineer's words, escaped by the template as all others."""
+    valve = chain.document("valve")
+    return tuple(valve.get("record", {}).items()) if valve else ()
 
 
 def _title(chain: Chain) -> str:
