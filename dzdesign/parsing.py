@@ -165,6 +165,7 @@ def parse(argv: list[str], language: Language) -> argparse.Namespace:
             setattr(args, key, [*(value if isinstance(value, list) else [value]), *(getattr(given, key) or [])])
         elif mine[key]:  # argparse would add to a default instead of standing in for it
             setattr(args, key, getattr(given, key) or ([value] if isinstance(value, str) else value))
+    args.from_file = {key: value for key, value in values.items() if getattr(args, key) == value}
     return args
 
 
