@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from dzdesign.notebook import valve_html
 from dzdesign.tables import print_compensator, print_scenarios, print_valve
 
 ROOT = Path(__file__).parents[1]
@@ -45,12 +46,12 @@ def test_numbers_of_the_law_are_put_into_words(example_valve, example_compensato
     nodes = len(example_compensator.positive.beta_numerators)
     assert f"beta(dP): straight between {nodes} nodes, each a whole number of 1/32768" in design
     assert "both as shares of full command" in design
-    assert re.search(r"drive range k x_max/u_max = 0\.\d{4}: command", example_valve._repr_html_())
+    assert re.search(r"drive range k x_max/u_max = 0\.\d{4}: command", valve_html(example_valve))
 
 
 def test_no_output_calls_a_code_sound():
     """The word stays in the code, where its meaning stands beside it; a reader of an output has no such place."""
-    for path in ("verify/checks.py", "verify/machine_code.py", "codegen/telemetry.py"):
+    for path in ("verify/checks.py", "verify/machine_code.py", "codegen/telemetry.py", "design/signals_in_words.py"):
         strings = re.findall(r'f?"[^"\n]*"', re.sub(r'"""(?s:.*?)"""', "", (ROOT / path).read_text("utf-8")))
         assert [text for text in strings if "sound" in text] == [], path
 
@@ -65,8 +66,9 @@ def test_every_word_of_the_outputs_is_in_the_glossary():
     said = {
         "knee", "onset", "level", "s.e.", "bound", "beta", "dP0", "u_min0", "drive range", "k x_max/u_max", "trend",
         "cost", "certificate", "guard", "edge", "over-compensation", "residual dead zone", "staircase", "offset",
-        "drive", "code", "valid range", "compare value", "exactly rounded law", "monotone", "closed loop", "plant", "scenario",
-        "mutant", "holds", "DOES NOT HOLD", "NOT CHECKED", "SHA-256", "record", "calibrated", "common setting", "saturates",
+        "drive", "code", "valid range", "compare value", "exactly rounded law", "monotone", "closed loop", "plant",
+        "scenario", "mutant", "holds", "DOES NOT HOLD", "NOT CHECKED", "SHA-256", "record", "calibrated",
+        "common setting", "saturates",
     }  # fmt: skip
     assert said <= known, said - known
     assert len(known) == sum(len(term.split(", ")) for term in terms), "a word stands there twice"
