@@ -64,10 +64,12 @@ $(VENV)/.fuzz: $(STAMP)
 # machines. Built, never committed.
 docs: $(STAMP)
 	mkdir -p $(DOCS)
+	@echo "docs: the account of the paper's equations; then figures and pages: two minutes in all"
 	$(BIN)/dzdesign derive --format html -o $(DOCS)/index.html
 	$(BIN)/dzdesign derive --format latex -o $(DOCS)/derivation.tex
 	$(BIN)/dzdesign derive --format json -o $(DOCS)/derivation.json
 	OPENBLAS_NUM_THREADS=1 $(BIN)/sphinx-build -q -E -W --keep-going -b html docs $(SITE)
+	@echo "docs: $(SITE)/index.html"
 
 $(STAMP): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit("dzdesign needs Python 3.11 or newer; this is " + sys.version.split()[0] + ". Try: make PYTHON=python3.12") if sys.version_info < (3, 11) else None'

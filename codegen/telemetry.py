@@ -53,9 +53,9 @@ STATUS_BITS = {
     0x0002: "trip input went low",
     0x0004: "watchdog reset",
     0x0008: "crystal or PLL not as expected",
-    0x0100: "command not sound",
-    0x0200: "pressure A not sound",
-    0x0400: "pressure B not sound",
+    0x0100: "command outside its valid range",
+    0x0200: "pressure A outside its valid range",
+    0x0400: "pressure B outside its valid range",
     0x0800: "pressure drop not plausible",
 }
 #: The output is in use; without it the trip zone holds the pin low, whatever the compare value.

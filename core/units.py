@@ -168,7 +168,8 @@ def parse_quantity(text: str, quantity: str, option: str) -> float:
     try:
         value = float(number.group()) * si_factor(unit, quantity)
     except InputError as error:
-        raise InputError(f"{option} is '{text}': {error}") from error
+        meant = f"; write for example '{number.group()} {example}'"
+        raise InputError(f"{option} is '{text}': {error}{meant}") from error
     if not math.isfinite(value):
         raise InputError(f"{option} is '{text}', more than a number can hold; expected for example '1 {example}'")
     return value

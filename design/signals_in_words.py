@@ -9,11 +9,11 @@ def signals_in_words(signals: Signals, u_max_V: float) -> list[str]:
     text = f"command: code {command.zero_code} is zero, {command.full_code} is {u_max_V:g} V"
     if command.negative_full_code is not None:
         text += f", {command.negative_full_code} is -{u_max_V:g} V"
-    lines = [f"{text}; {_sound(command.valid_codes)}"]
+    lines = [f"{text}; {_valid(command.valid_codes)}"]
     for name, sensor in _sensors(signals).items():
         lines.append(
             f"pressure {name}: code {sensor.zero_code} is none, {sensor.full_code} is {float(sensor.span_MPa):g} MPa; "
-            + _sound(sensor.valid_codes)
+            + _valid(sensor.valid_codes)
         )
     if signals.swapped:
         lines.append("the pressure drop of negative commands is B less A")
@@ -45,5 +45,5 @@ def _sensors(signals: Signals) -> dict[str, PressureSignal]:
     return {"A": signals.pressure_a, "B": signals.pressure_b}
 
 
-def _sound(codes: tuple[int, int]) -> str:
-    return f"{codes[0]} to {codes[1]} are sound"
+def _valid(codes: tuple[int, int]) -> str:
+    return f"{codes[0]} to {codes[1]} are valid"

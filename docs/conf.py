@@ -48,8 +48,21 @@ pygments_style, pygments_dark_style = "friendly", "github-dark"
 ACCOUNT = HERE / "derivation"
 
 
+def _say(text: str) -> None:
+    """Say what comes next: a build takes two minutes, and Sphinx is told to be quiet but for warnings."""
+    print(f"docs: {text}", flush=True)
+
+
 def _draw(app) -> None:
-    draw_all(HERE / "_made" / "figures")
+    draw_all(HERE / "_made" / "figures", _say)
+
+
+def _say_reading(app, env, pages: list[str]) -> None:
+    _say(f"reading {len(pages)} pages, with the reference of commands, files and Python")
+
+
+def _say_writing(app, env) -> None:
+    _say("writing the pages")
 
 
 def _insert(app, page: str, source: list[str]) -> None:
@@ -78,6 +91,8 @@ def _publish(app, error: Exception | None) -> None:
 def setup(app) -> None:
     """Tell Sphinx when to draw, to insert what is made, and to publish."""
     app.connect("builder-inited", _draw)
+    app.connect("env-before-read-docs", _say_reading)
+    app.connect("env-updated", _say_writing)
     app.connect("source-read", _insert)
     app.connect("autodoc-process-docstring", _escape, priority=900)
     app.connect("build-finished", _publish)

@@ -60,6 +60,7 @@ def identify(
     confidence: float | str = 0.99,
     knee_window: str = "12-50",
     flat_below: float | str = 0.1,
+    record: Mapping[str, object] | None = None,
     output: AnyPath | None = None,
 ) -> "ValveModel":
     """Identify a valve from ramp tests; the options are those of `dzdesign identify`.
@@ -86,6 +87,8 @@ def identify(
         Per cent of the largest flow between which the characteristic is straight.
     flat_below : float
         Per cent of full command: a threshold that changes by less over the tests is flat.
+    record : mapping, optional
+        Who and what: name to text, number or date, such as ``{"serial": "4711"}``. Nothing is computed from it.
     output : path, optional
         Also write valve.json here.
 
@@ -96,7 +99,7 @@ def identify(
     """
     from dzdesign.identify.identification import identify as identify_tests
     from dzdesign.identify.model import SCHEMA
-    from dzdesign.identify_options import identify_options
+    from dzdesign.identify_options import identify_options, record_of
     from dzdesign.recordings import read_recordings, refuse_copies
 
     options = identify_options(
@@ -105,6 +108,7 @@ def identify(
             confidence=confidence, knee_window=knee_window, flat_below=flat_below,
         )
     )  # fmt: skip
+    said = record_of(record)
     if output is not None:
         check_file_may_be_written(Path(output), SCHEMA, "output")
     patterns = [ramps] if isinstance(ramps, str | os.PathLike) else list(ramps)
@@ -115,7 +119,7 @@ def identify(
         dp=dict(dp) if isinstance(dp, Mapping) else dp,
     )
     refuse_copies(tests)
-    valve = identify_tests(tests, options)
+    valve = identify_tests(tests, options, said)
     if output is not None:
         write_file(Path(output), to_json(valve.to_document()), SCHEMA, "output")
     return valve

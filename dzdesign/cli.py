@@ -35,6 +35,7 @@ def main(argv: list[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # a console that can't print a character prints a ? instead
             stream.reconfigure(errors="replace")
+    args = None
     try:
         argv = sys.argv[1:] if argv is None else argv
         if argv in (["--help"], ["-h"]):
@@ -52,7 +53,7 @@ def main(argv: list[str] | None = None) -> int:
         print(f"dzdesign: does not hold: {clear_line(str(error))}", file=sys.stderr)
         return DOES_NOT_HOLD
     except DzdesignError as error:
-        print(f"dzdesign: {clear_line(str(error))}", file=sys.stderr)
+        print(f"dzdesign: {clear_line(_said(error, args))}", file=sys.stderr)
         return BAD_INPUT
     except KeyboardInterrupt:
         print("dzdesign: interrupted; nothing half-written was left", file=sys.stderr)
@@ -60,3 +61,13 @@ def main(argv: list[str] | None = None) -> int:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return PIPE_CLOSED
+
+
+def _said(error: DzdesignError, args: "argparse.Namespace | None") -> str:  # noqa: F821
+    """Return what an error says; an option that stands in the TOML file is named as it stands there."""
+    values = getattr(args, "from_file", None)
+    if not values:
+        return str(error)
+    from dzdesign.config import in_words_of_the_file
+
+    return in_words_of_the_file(str(error), args.config, values)

@@ -18,7 +18,7 @@ from dzdesign.core.artefacts import (
 )
 from dzdesign.core.errors import InputError, one_line
 from dzdesign.core.units import parse_quantity
-from dzdesign.identify_options import identify_options
+from dzdesign.identify_options import identify_options, record_of
 from dzdesign.progress import say, stages, with_bar
 from dzdesign.recordings import check_plots, read_recordings, refuse_copies
 
@@ -35,14 +35,14 @@ def run_identify(args: argparse.Namespace) -> int:
     from dzdesign.identify.model import SCHEMA
     from dzdesign.tables import print_valve
 
-    options = identify_options(args)
+    options, record = identify_options(args), record_of(args.record)
     check_file_may_be_written(Path(args.output), SCHEMA)
     check_plots(args.plots, Path(args.output))
     tests = read_recordings(args.ramps, u_max=options.u_max, columns=args.columns, dp=args.dp)
     refuse_copies(tests)
     with stages() as stage:
         stage(f"fitting {len(tests)} recording{'s' if len(tests) > 1 else ''}")
-        found = identify_sides(tests, options)
+        found = identify_sides(tests, options, record)
     document = found.model.to_document()
     write_file(Path(args.output), to_json(document), SCHEMA)
     if args.plots:

@@ -1,14 +1,14 @@
 """`dzdesign init RAMP...`: look at recordings, write a commented dzdesign.toml with what was seen and what was not."""
 
 import argparse
-import json
 import os
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dzdesign.core.artefacts import check_file_may_be_written, to_json, write_file
-from dzdesign.core.errors import InputError, one_line
+from dzdesign.core.errors import InputError
+from dzdesign.init_file import options_file
 from dzdesign.progress import say, stages, with_bar
 from dzdesign.recordings import expand, read_recordings
 
@@ -39,6 +39,8 @@ class Look:
         Full command to declare and the largest seen, V.
     sides, refused : dict
         As `look_at_sides` gives them.
+    notes : tuple of str
+        What was seen and is not used, or comes from elsewhere than a column.
     """
 
     paths: "list[Path]"
@@ -49,6 +51,7 @@ class Look:
     u_seen: float | None = None
     sides: "dict[str, SeenSide]"
     refused: dict[str, str]
+    notes: tuple[str, ...] = ()
 
 
 def run_init(args: argparse.Namespace) -> int:
@@ -61,7 +64,7 @@ def run_init(args: argparse.Namespace) -> int:
     check_file_may_be_written(output)
     paths = expand(args.ramps) if args.ramps else _found_recordings()
     look, opens = _look(paths, args)
-    text = _toml(look, opens)
+    text = options_file(look, _summary(look), opens)
     write_file(output, text)
     if args.json:
         print(to_json(_document(look, opens, args.output)), end="")
@@ -108,6 +111,8 @@ def _look(paths: list[Path], args: argparse.Namespace) -> tuple[Look, list[str]]
         reason = next((guess.unclear[quantity] for guess in guesses if quantity in guess.unclear), None)
         if reason and quantity not in given:
             opens.append(f"column of {quantity}: {reason}")
+    undeclared, notes = _pressures(guesses, columns)
+    opens += undeclared
     nothing = Look(paths=paths, guesses=guesses, columns=columns, dp={}, sides={}, refused={})
     if opens:
         return nothing, list(dict.fromkeys(opens))
@@ -117,8 +122,9 @@ def _look(paths: list[Path], args: argparse.Namespace) -> tuple[Look, list[str]]
     lacking = [test.source for test in tests if test.dp is None]
     if lacking:
         dp = {source: text for source in lacking if (text := pressure_in_name(source))}
-        if len(dp) == len(lacking) and len(tests) > 1:
+        if len(dp) == len(lacking):
             tests = read_recordings(names, u_max=10.0, columns=columns or None, dp=dp)
+            notes.append(f"pressure drop by the files' names: {', '.join(dict.fromkeys(dp.values()))}")
         elif len(tests) > 1:
             unsaid = [source for source in lacking if source not in dp]
             opens = [f"pressure drop of '{source}': no column, and none in its name" for source in unsaid]
@@ -135,10 +141,30 @@ def _look(paths: list[Path], args: argparse.Namespace) -> tuple[Look, list[str]]
     return (
         Look(
             paths=paths, guesses=guesses, columns=columns, dp=dp, u_max=u_max, u_seen=u_seen, sides=sides,
-            refused=refused,
+            refused=refused, notes=tuple(notes),
         ),
         opens,
     )  # fmt: skip
+
+
+def _pressures(guesses: "list[GuessedColumns]", columns: dict[str, str]) -> tuple[list[str], list[str]]:
+    """Return what is open of columns that look like a pressure and have no unit, and what is only to be said."""
+    opens, notes = [], []
+    if "dP" in columns or {"pA", "pB"} <= columns.keys():
+        return opens, notes
+    for guess in guesses:
+        labels = {label: says for label, says in guess.bare_pressures.items() if says not in columns}
+        if labels:
+            quantities = [label for label in labels.values() if label] or (["pA", "pB"] if len(labels) > 1 else ["dP"])
+            said = ", ".join(f"{name}={label}:bar" for name, label in zip(quantities, labels, strict=False))
+            seen = "looks like a pressure" if len(labels) == 1 else "look like pressures"
+            line = f'{" and ".join(map(repr, labels))} {seen}, without a unit; declare by --columns "{said}"'
+            # A label that says pA is read as that, and refused; any other is passed over.
+            opens += [f"pressure: {line}"] if any(labels.values()) else []
+            notes += [] if any(labels.values()) else [f"not used: {line}"]
+        elif "dP" in guess.unclear:
+            notes.append(f"not used: {guess.unclear['dP']}")
+    return list(dict.fromkeys(opens)), list(dict.fromkeys(notes))
 
 
 def _summary(look: Look) -> list[str]:
@@ -146,6 +172,7 @@ def _summary(look: Look) -> list[str]:
     lines = [f"recordings: {len(look.paths)}, columns {', '.join(look.guesses[0].labels[:12])}"]
     if look.u_seen is not None:
         lines.append(f"largest command: {look.u_seen:.2f} V")
+    lines += look.notes
     return lines + [_said(name, side) for name, side in look.sides.items()] + _refusals(look)
 
 
@@ -154,116 +181,14 @@ def _refusals(look: Look) -> list[str]:
 
 
 def _said(name: str, side: "SeenSide") -> str:
-    pressures = ", ".join("unknown" if dp is None else f"{dp:.3g}" for dp in side.dp_MPa)
+    pressures = ", ".join(f"{dp:.3g}" for dp in side.dp_MPa if dp is not None)
+    where = f"{pressures} MPa" if pressures else "an unknown pressure drop"
     rate = "" if side.rate_V_s is None else f", at most {side.rate_V_s:.3g} V/s"
     floor = f"the meter starts at {side.floor_L_min:.2f} L/min" if side.floor_L_min else "the meter has no floor"
     return (
-        f"{name} commands: {side.ramps} ramp{'s' if side.ramps > 1 else ''} at {pressures} MPa{rate}, "
+        f"{name} commands: {side.ramps} ramp{'s' if side.ramps > 1 else ''} at {where}{rate}, "
         f"up to {side.q_max_L_min:.3g} L/min; {floor}"
     )
-
-
-def _toml(look: Look, opens: list[str]) -> str:
-    """Return the file: what identify is told, and as comments what it finds or takes by itself, with the reason."""
-    lines = [
-        "# Options of dzdesign, made by `dzdesign init` from a look at the recordings; one file for all commands:",
-        "#   dzdesign identify RAMP... --config dzdesign.toml",
-        "# What the command line says goes before what stands here. A line that begins with # says nothing.",
-        "#",
-        *(f"# {line}" for line in _summary(look)),
-        *(f"# OPEN: {line}" for line in opens),
-        "",
-        *_command_lines(look),
-        "",
-        *_meter_lines(look),
-        "",
-        "# Reference pressure drop (default: the test nearest to 1 MPa).",
-        '# dp0 = "1 MPa"',
-        "# Stroke of the spool: gives k in V/mm; the recordings can't tell it.",
-        '# x-max = "1.8 mm"',
-        "# Of all lower bounds together.",
-        "# confidence = 0.99",
-        "# Processor, and the threshold that the certificate protects (closing, mean or opening).",
-        '# target = "f28335"',
-        '# guard = "closing"',
-        "",
-        *_column_lines(look, opens),
-        *_dp_lines(look, opens),
-    ]
-    return "\n".join(one_line(line) for line in lines).rstrip() + "\n"
-
-
-def _command_lines(look: Look) -> list[str]:
-    value = f'u-max = "{look.u_max:g} V"'
-    if look.u_seen is None:
-        return ["# Full command; not seen (the command is in per cent, or was not read), so correct it.", value]
-    if look.u_seen < 0.97 * look.u_max:
-        return [f"# Full command: a guess, for the ramps end at {look.u_seen:.2f} V. Correct it if it is wrong.", value]
-    return [f"# Full command: the ramps end at {look.u_seen:.2f} V.", value]
-
-
-def _meter_lines(look: Look) -> list[str]:
-    sides = list(look.sides.values())
-    floor = max((side.floor_L_min for side in sides), default=None)
-    found = "" if not floor else f"; identify finds {floor:.2f} L/min in the recordings"
-    lines = [
-        f"# Flow below which the meter reads zero{found}.",
-        "# Declare the data sheet's, where that is larger.",
-        f'# meter-floor = "{floor or 0.6:.2f} L/min"',
-    ]
-    if any(side.lag_is == "identified" for side in sides):
-        lag = next(side.lag_s for side in sides if side.lag_is == "identified")
-        lines += [
-            f"# Lag of the meter: identify finds {lag:.3g} s, from ramps of two rates. Declared, it is taken as exact.",
-            f'# meter-lag = "{lag:.3g} s"',
-        ]
-    else:
-        rate = max((side.rate_V_s or 0.1 for side in sides), default=0.1)
-        lines += [
-            "# Lag of the meter: the recordings can't tell it (it takes ramps of two rates); see the data sheet. At",
-            f"# {rate:.3g} V/s each 0.1 s of it moves the opening knee up, the closing knee down, {100 * rate:.3g} mV.",
-            '# meter-lag = "0.1 s"',
-        ]
-    zeros = [abs(zero) for side in sides for zero in side.zero_L_min.values()]
-    seen = f"; at rest it reads up to {max(zeros):.2g} L/min, which identify takes off" if zeros else ""
-    return [*lines, f"# Bound of the meter's zero error beyond what shows at rest{seen}.", '# meter-zero = "0 L/min"']
-
-
-def _column_lines(look: Look, opens: list[str]) -> list[str]:
-    lines = ["# Which column is which quantity; after a colon the unit that a label lacks."]
-    first = look.guesses[0]
-    lines += [f"# Labels in '{look.paths[0].name}': {', '.join(first.labels[:40])}"]
-    lines += [
-        f"# {quantity} = {_quoted(column.label)}  (in {column.unit}; understood by its label)"
-        for quantity, column in first.understood.items()
-        if quantity not in look.columns
-    ]
-    open_ones = {name: why for guess in look.guesses for name, why in guess.unclear.items() if name not in look.columns}
-    for quantity, why in open_ones.items():
-        lines += [f"# {quantity} = ?  ({why})"]
-    body = [f"{quantity} = {_quoted(label)}" for quantity, label in look.columns.items()]
-    if body:
-        lines += ["# Each is the only column that is left in a unit of its quantity, or as you said."]
-        lines += ["[columns]", *body]
-    elif opens and open_ones:
-        lines += ["# [columns]", *(f'# {name} = "LABEL:UNIT"' for name in open_ones)]
-    return [*lines, ""]
-
-
-def _dp_lines(look: Look, opens: list[str]) -> list[str]:
-    lines = []
-    if look.dp:
-        lines = ["# Pressure drop of recordings without a column of it, as their names (or you) say.", "[dp]"]
-        lines += [f"{_quoted(name)} = {_quoted(text)}" for name, text in look.dp.items()]
-    missing = [line.split("'")[1] for line in opens if line.startswith("pressure drop of")]
-    if missing and not look.dp:
-        lines = ["# Pressure drop of recordings without a column of it.", "# [dp]"]
-    return [*lines, *(f'# {_quoted(name)} = "1 MPa"' for name in missing)]
-
-
-def _quoted(text: str) -> str:
-    """Return a string of TOML: as in JSON, and without DEL."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _document(look: Look, opens: list[str], output: str) -> dict:

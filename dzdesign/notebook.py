@@ -39,7 +39,7 @@ def _knee(branch: "BranchResult | None") -> str:
 
 def valve_html(valve: "ValveModel") -> str:
     """Return the thresholds with their standard errors, the trend and every warning of a valve."""
-    parts = []
+    parts = [_table("Record", ("entry", "text"), valve.record.items(), words=(0, 1))] if valve.record else []
     for name, side in valve.sides.items():
         rows = []
         for test, beta in zip(side.tests, side.beta or (None,), strict=True):
@@ -68,7 +68,8 @@ def _side_lines(side: "SideModel") -> list[str]:
     lines = [
         f"u_min0 = {side.u_min0_V:.4f} V{at}, under the {side.confidence:.0%} lower bound of the {side.guard} "
         "threshold, for all tests together",
-        f"k x_max/u_max = {side.k_x_max_over_u_max:.4f}",
+        f"drive range k x_max/u_max = {side.k_x_max_over_u_max:.4f}: command from the threshold to full stroke, as a "
+        "share of full command",
     ]
     if side.trend_change_V is None or side.trend_change_se_V is None:
         return [*lines, "trend with dP: can't be said from one ramp test"]

@@ -15,7 +15,8 @@ from dzdesign.front_page import ABOUT, COMMON, front_page, page_width
 #: option_groups: heading -> options under it
 #: examples: command -> lines; "" for dzdesign itself
 #: tables: options that may be a table in the TOML file
-Language = namedtuple("Language", "commands command_groups option_groups examples tables")
+#: by_entry: of them those that are given an entry at a time, which goes before the file's of the same name
+Language = namedtuple("Language", "commands command_groups option_groups examples tables by_entry")
 
 
 class _Help(argparse.RawDescriptionHelpFormatter):
@@ -151,13 +152,20 @@ def parse(argv: list[str], language: Language) -> argparse.Namespace:
     }
     command = commands[args.command]
     mine = {action.dest: isinstance(action, argparse._AppendAction) for action in command._actions}
-    values = options_from_file(args.config, known, repeatable, language.tables)
-    values = {key: value for key, value in values.items() if key in mine and _is_meant(value, mine[key])}
+    values = options_from_file(args.config, known, repeatable, language.tables, language.by_entry)
+    values = {
+        key: value
+        for key, value in values.items()
+        if key in mine and (key in language.by_entry or _is_meant(value, mine[key]))
+    }
     command.set_defaults(**{key: value for key, value in values.items() if not mine[key]})
     given, args = args, _parsed(parser, commands, argv, language)
     for key, value in values.items():
-        if mine[key]:  # argparse would add to a default instead of standing in for it
+        if key in language.by_entry:
+            setattr(args, key, [*(value if isinstance(value, list) else [value]), *(getattr(given, key) or [])])
+        elif mine[key]:  # argparse would add to a default instead of standing in for it
             setattr(args, key, getattr(given, key) or ([value] if isinstance(value, str) else value))
+    args.from_file = {key: value for key, value in values.items() if getattr(args, key) == value}
     return args
 
 

@@ -6,7 +6,7 @@ from dzdesign.core.errors import one_line
 from dzdesign.page import new_console, new_table, put_line
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from fractions import Fraction
 
     from dzdesign.codegen.project import Firmware
@@ -33,6 +33,8 @@ def _percent(share: float) -> str:
 def print_valve(valve: "ValveModel") -> None:
     """Print thresholds per ramp test, the law's parameters and every warning."""
     console = new_console()
+    if valve.record:
+        put_line(console, "record: " + "; ".join(f"{name} {text}" for name, text in valve.record.items()))
     for name, side in valve.sides.items():
         title = "Thresholds (V)" if len(valve.sides) == 1 else f"Thresholds (V), {name} side"
         console.print(_thresholds(side, title))
@@ -80,8 +82,9 @@ def _side_lines(side: "SideModel") -> tuple[str, ...]:
         "noise, or 0.5 % of the largest flow) counts as none",
         f"u_min0 = {side.u_min0_V:.4f} V{at}: the law's offset. Between two tests only the lower of their bounds is "
         "certain, so each offset stays under the neighbour's; more tests raise it",
-        f"k x_max/u_max = {side.k_x_max_over_u_max:.4f}"
-        + (f", k = {side.k_V_mm:.4f} V/mm" if side.k_V_mm is not None else ""),
+        f"drive range k x_max/u_max = {side.k_x_max_over_u_max:.4f}: command from the threshold to full stroke, as a "
+        "share of full command"
+        + (f"; k = {side.k_V_mm:.4f} V/mm" if side.k_V_mm is not None else ""),
         "trend with dP: can't be said from one ramp test"
         if side.trend is None
         else f"trend with dP: {side.trend} ({1e3 * side.trend_change_V:+.1f} ± {1e3 * side.trend_change_se_V:.1f} mV "
@@ -105,9 +108,10 @@ def print_compensator(compensator: "Compensator") -> None:
         low, high = (float(end) for end in certificate.dp_MPa)
         label = "" if compensator.negative is None else "positive: " if sign > 0 else "negative: "
         lines += [
-            f"{label}k x_max/u_max = {_rational(side.k_x_max_over_u_max)} (from the offset to full flow), "
-            f"u_min0/u_max = {_rational(side.u_min0_over_u_max)}, "
-            f"beta: {len(side.beta_numerators)} nodes over {compensator.beta_denominator}",
+            f"{label}drive range k x_max/u_max = {_rational(side.k_x_max_over_u_max)} (from the offset to full flow), "
+            f"offset at dP0 u_min0/u_max = {_rational(side.u_min0_over_u_max)}, both as shares of full command; "
+            f"beta(dP): straight between {len(side.beta_numerators)} nodes, each a whole number of 1/"
+            f"{compensator.beta_denominator}",
             f"{label}certificate: the offset stays below the {certificate.confidence:.0%} lower bound of the "
             f"{certificate.guard} threshold from {low:.3f} to {high:.3f} MPa, at every pressure code; flow below "
             f"{certificate.level_L_min:.2f} L/min (meter's floor, its noise, or 0.5 % of the largest flow) counts as "
@@ -173,25 +177,43 @@ def _verdict(verification: "Verification") -> str:
 
 
 def print_scenarios(scenarios: "Sequence[ScenarioResult]") -> None:
-    """Print every scenario once: its worst over the pressure drops, and the figures there."""
+    """Print every scenario once: its worst over the pressure drops, and below the table what else was read there."""
     if not scenarios:
         return
     table = new_table(
         "Scenarios with the compensator, worst of all pressure drops", "scenario", "dP (MPa)",
-        "Q at zero, at the end (L/min)", "on the way, at most (L/min)", "figures there", words=(0, 4),
+        "Q at zero, at the end (L/min)", "on the way, at most (L/min)",
     )  # fmt: skip
+    lines = []
     for name in dict.fromkeys(each.name for each in scenarios):
         group = [each for each in scenarios if each.name == name]
         worst = max(group, key=lambda each: (each.q_zero_L_min, each.q_peak_at_zero_L_min, each.dp_MPa))
-        figures = ", ".join(_figure(key, value) for key, value in worst.figures.items())
         table.add_row(
             name + ("" if worst.must_shut else " (no core can know)"),
             f"{worst.dp_MPa:.2f}",
             f"{worst.q_zero_L_min:.2f}",
             f"{worst.q_peak_at_zero_L_min:.2f}",
-            figures,
         )
-    new_console().print(table)
+        if worst.figures:
+            lines.append(f"{name}: {_figures(worst.figures)}")
+    console = new_console()
+    console.print(table)
+    for line in lines:  # words of many lines in a narrow column are no table
+        put_line(console, line)
+
+
+#: How a figure's name begins -> of which valve it is.
+VALVES = {"compensated_": "with the compensator ", "direct_": "without it "}
+
+
+def _figures(figures: "Mapping[str, float]") -> str:
+    """Return figures as words, those of one valve together."""
+    groups = {
+        words: [_figure(key.removeprefix(start), value) for key, value in figures.items() if key.startswith(start)]
+        for start, words in VALVES.items()
+    }
+    groups[""] = [_figure(key, value) for key, value in figures.items() if not key.startswith(tuple(VALVES))]
+    return "; ".join(words + ", ".join(each) for words, each in groups.items() if each)
 
 
 def _figure(key: str, value: float) -> str:

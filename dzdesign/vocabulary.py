@@ -4,7 +4,9 @@ An option is declared as argparse takes it, but argparse is only imported once t
 """
 
 #: Options that may be a table in the TOML file.
-TABLES = ("columns", "dp", "after_columns", "limits")
+TABLES = ("columns", "dp", "after_columns", "limits", "record")
+#: Of them those that are given an entry at a time on the command line, which goes before the file's of the same name.
+BY_ENTRY = ("record",)
 #: (names, keywords of add_argument).
 Option = tuple[tuple[str, ...], dict]
 
@@ -50,6 +52,13 @@ IDENTIFY = (
         default="0.1",
         metavar="C",
         help="per cent of full command: a threshold that changes by less over the tests is flat, beta is 1",
+    ),
+    _given(
+        "--record",
+        action="append",
+        metavar="ENTRY",
+        help='who and what, such as "serial = 4711", repeatable: kept in valve.json and shown in the report, nothing '
+        "is computed from it; in the TOML file a table [record]",
     ),
 )
 #: Of `design`, and of `codegen` where it designs first; their defaults stand in `dzdesign.design_options`.
@@ -199,7 +208,7 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
                 "source",
                 metavar="FOLDER",
                 help="one subfolder of recordings a valve; or a CSV file with a row a valve: name, files (patterns, "
-                "parted by ;) and any option below that is different for it",
+                "parted by ;), record.NAME, and any option below that is different for it",
             ),
             _given(*OUTPUT, default="batch", metavar="DIR", help="folder to write; an earlier run there is taken up"),
             _given("--jobs", metavar="N", help="processes of this machine (default: as many as it has processors)"),
@@ -323,7 +332,7 @@ COMMAND_GROUPS = {
 }
 #: Where an option stands in `dzdesign COMMAND --help`; one that is not named stands first, under "options".
 OPTION_GROUPS = {
-    "the recordings": ("--columns", "--after-columns", "--dp", "--u-max", "--after-u-max"),
+    "the recordings": ("--record", "--columns", "--after-columns", "--dp", "--u-max", "--after-u-max"),
     "the flow meter": ("--meter-floor", "--meter-lag", "--meter-zero"),
     "how it is fitted": ("--knee-window", "--confidence", "--flat-below", "--linearity-window"),
     "the law": ("--law", "--guard", "--edge", "--below-dp0", "--output-max"),
@@ -393,5 +402,6 @@ def language() -> "parsing.Language":  # noqa: F821
     from dzdesign import parsing
 
     return parsing.Language(
-        commands=COMMANDS, command_groups=COMMAND_GROUPS, option_groups=OPTION_GROUPS, examples=EXAMPLES, tables=TABLES
-    )
+        commands=COMMANDS, command_groups=COMMAND_GROUPS, option_groups=OPTION_GROUPS, examples=EXAMPLES,
+        tables=TABLES, by_entry=BY_ENTRY,
+    )  # fmt: skip

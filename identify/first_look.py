@@ -5,7 +5,7 @@ For a person who has yet to declare anything: what the recordings tell is kept a
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -35,6 +35,11 @@ from dzdesign.identify.table import Table
 USUAL_U_MAX = (1.0, 2.5, 3.3, 5.0, 10.0, 12.0, 15.0, 20.0, 24.0, 48.0)
 #: A pressure drop in the name of a file.
 PRESSURE_IN_NAME = re.compile(r"(?<![\d.])(\d+(?:[.,]\d+)?)[\s_]*(MPa|bar|kPa|psi)(?![A-Za-z])", re.IGNORECASE)
+#: A label that may be a pressure's, and has no unit: p1, P_in, Druck A, but neither pos nor PWM.
+PRESSURE_LIKE = re.compile(
+    r"(?:[dΔδ]|delta|diff)?[\s_.-]?p[\s_.-]?(?:[abpst]|in|out|\d{1,2})?|[^\[(]{0,20}(?:press|druck)[^\[(]{0,20}",
+    re.IGNORECASE,
+)
 UNITS_IN_NAMES = {"mpa": "MPa", "bar": "bar", "kpa": "kPa", "psi": "psi"}
 
 
@@ -52,12 +57,16 @@ class GuessedColumns:
         Quantity -> label (with a colon and its unit, where it lacks one) that is the only one it can be.
     unclear : dict
         Quantity -> why it could not be told.
+    bare_pressures : dict
+        Label that looks like a pressure and has no unit -> the quantity that it says ("" if none), where no pressure
+        drop was understood.
     """
 
     labels: tuple[str, ...]
     understood: dict[str, Column]
     chosen: dict[str, str]
     unclear: dict[str, str]
+    bare_pressures: dict[str, str]
 
 
 def guess_columns(path: Path) -> GuessedColumns:
@@ -90,6 +99,7 @@ def guess_columns(path: Path) -> GuessedColumns:
             quantity: f"'{column.label}' has no unit; give it after a colon, such as {EXAMPLE_UNITS[quantity]}"
             for quantity, column in bare.items()
         },
+        bare_pressures=_bare_pressures(table, understood.keys() - bare.keys()),
     )
 
 
@@ -119,7 +129,23 @@ def _guess(table: Table) -> GuessedColumns:
         left = [label for label in table.labels if label not in taken and _fits(table, label, "dP")]
         if left:
             unclear["dP"] = f"{' and '.join(map(repr, left))}: a pressure, but is it the drop, pA or pB?"
-    return GuessedColumns(labels=table.labels, understood=understood, chosen=chosen, unclear=unclear)
+    return GuessedColumns(
+        labels=table.labels, understood=understood, chosen=chosen, unclear=unclear,
+        bare_pressures=_bare_pressures(table, understood.keys()),
+    )  # fmt: skip
+
+
+def _bare_pressures(table: Table, known: Collection[str]) -> dict[str, str]:
+    """Return the labels that look like a pressure and have no unit, unless the pressure drop is known without them."""
+    if "dP" in known or {"pA", "pB"} <= set(known):
+        return {}
+    found = {}
+    for label in table.labels:
+        quantity, unit = split_label(label)
+        says = quantity if quantity in ("dP", "pA", "pB") and not unit else ""
+        if (says or PRESSURE_LIKE.fullmatch(label)) and not table.units.get(label):
+            found[label] = says
+    return found
 
 
 def _fits(table: Table, label: str, quantity: str) -> bool:

@@ -1,6 +1,6 @@
 """`identify`: ramp tests in, `ValveModel` out, each side of the valve on its own."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from dzdesign.core.errors import InputError
@@ -21,7 +21,9 @@ class Identified:
     sides: dict[str, IdentifiedSide]
 
 
-def identify(tests: Sequence[RampTest], options: IdentifyOptions | None = None) -> ValveModel:
+def identify(
+    tests: Sequence[RampTest], options: IdentifyOptions | None = None, record: Mapping[str, str] | None = None
+) -> ValveModel:
     """Identify k x_max/u_max, the thresholds and beta(dP) of a valve from ramp tests.
 
     Parameters
@@ -31,6 +33,8 @@ def identify(tests: Sequence[RampTest], options: IdentifyOptions | None = None) 
         recording may lack the pressure drop. A bipolar valve's recordings may hold both sides or one each.
     options : IdentifyOptions, optional
         Choices of the engineer.
+    record : mapping of str to str, optional
+        Who and what; it is handed on as it is.
 
     Returns
     -------
@@ -42,10 +46,12 @@ def identify(tests: Sequence[RampTest], options: IdentifyOptions | None = None) 
     InputError
         Where no threshold can be given, with the reason.
     """
-    return identify_sides(tests, options).model
+    return identify_sides(tests, options, record).model
 
 
-def identify_sides(tests: Sequence[RampTest], options: IdentifyOptions | None = None) -> Identified:
+def identify_sides(
+    tests: Sequence[RampTest], options: IdentifyOptions | None = None, record: Mapping[str, str] | None = None
+) -> Identified:
     """Identify a valve as `identify` does, and return beside it what each side was found from."""
     options = options or IdentifyOptions()
     if not tests:
@@ -78,5 +84,6 @@ def identify_sides(tests: Sequence[RampTest], options: IdentifyOptions | None = 
         made_from=tuple(
             dict.fromkeys(file for side in sides.values() for item in side.described.tests for file in item.files)
         ),
+        record=record or {},
     )
     return Identified(model=model, sides=sides)

@@ -1,13 +1,14 @@
 """`ValveModel`: what identification found, as the artefact valve.json (schema dzdesign.valve/1)."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from dzdesign.core.artefacts import TOOL
 from dzdesign.core.errors import InputError
 from dzdesign.core.shown import ShownInNotebooks
 from dzdesign.identify.guard_curve import GUARDS, ROUNDING_V, GuardCurve, OpeningCurve
+from dzdesign.identify.record import checked_record
 
 SCHEMA = "dzdesign.valve/1"
 #: Both sides, and the sign of the command that opens each.
@@ -282,6 +283,8 @@ class ValveModel(ShownInNotebooks):
         In the order in which they matter.
     made_from : tuple of (str, str)
         Source file and its SHA-256.
+    record : mapping of str to str
+        Who and what, as the engineer says it: serial number, operator, oil. Nothing is computed from it.
     """
 
     u_max_V: float
@@ -293,10 +296,12 @@ class ValveModel(ShownInNotebooks):
     sides: Mapping[str, SideModel]
     warnings: tuple[Warning_, ...]
     made_from: tuple[tuple[str, str], ...]
+    record: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not self.sides or not set(self.sides) <= set(SIDES):
             raise InputError(f"the sides are {', '.join(self.sides) or 'none'}, expected {' or '.join(SIDES)}")
+        object.__setattr__(self, "record", checked_record(self.record.items(), "the record"))
 
     @property
     def positive(self) -> SideModel:
@@ -317,6 +322,7 @@ class ValveModel(ShownInNotebooks):
             "schema": SCHEMA,
             "tool": TOOL,
             "made_from": [{"source": source, "sha256": digest} for source, digest in self.made_from],
+            **({"record": dict(self.record)} if self.record else {}),
             "u_max_V": self.u_max_V,
             "meter": {
                 "floor_L_min": self.meter_floor_L_min,

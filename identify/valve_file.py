@@ -190,6 +190,8 @@ def valve_from_document(content: bytes, source: str) -> ValveModel:
             check_shape(document, {"sides": {name: SIDE_SHAPE}}, source, REMEDY)
             check_shape(document, {"sides": {name: _later_shape(document["sides"][name])}}, source, REMEDY)
             _check_ramps(document["sides"][name]["tests"], f"sides.{name}.tests", source)
+    if "record" in document:  # it came later
+        check_shape(document, {"record": dict}, source, REMEDY)
     try:
         return ValveModel(
             u_max_V=document["u_max_V"],
@@ -203,6 +205,7 @@ def valve_from_document(content: bytes, source: str) -> ValveModel:
                 Warning_(**{key: item[key] for key in ("code", "text", "source")}) for item in document["warnings"]
             ),
             made_from=tuple((item["source"], item["sha256"]) for item in document["made_from"]),
+            record=document.get("record", {}),
         )
     except InputError as error:
         raise InputError(f"'{source}': {error}; {REMEDY}") from error

@@ -228,8 +228,13 @@ def test_a_bad_command_line(refusal, argv, words):
         ("u-max = ", "'options.toml' is not TOML"),
         ("a = " + "[" * 5000, "'options.toml' is not TOML"),
         ("seed = " + "9" * 5000, "'options.toml' is not TOML"),
-        ("u-max = 10", "--u-max is '10' without a unit; write for example '10 V'"),
-        ("u-max = '10 bar'", "--u-max is '10 bar': 'bar' is not a unit of voltage"),
+        ("u-max = 10", "'options.toml': u-max is '10' without a unit; write for example u-max = \"10 V\""),
+        ("meter_lag = 0.1", "meter-lag is '0.1' without a unit; write for example meter-lag = \"0.1 s\""),
+        ("dp0 = 'one'", "dp0 is 'one', expected a number and a unit such as dp0 = \"1 MPa\""),
+        ("u-max = '10 bar'", "u-max is '10 bar': 'bar' is not a unit of voltage"),
+        ("u-max = '10 bar'", "expected for example V, mV; write for example u-max = \"10 V\""),
+        ("knee-window = '12'", "expected two per cents of the largest flow such as knee-window = \"12-50\""),
+        ("confidence = 'high'", "'options.toml': confidence is 'high', expected a number such as 0.99"),
         ("u-max = ['10 V']", "option 'u-max' is ['10 V'], expected text"),
         ("u-max = true", "option 'u-max' is True, expected text"),
         ("u-max = {V = 10}", "option 'u-max' is"),
@@ -247,6 +252,21 @@ def test_a_bad_command_line(refusal, argv, words):
 def test_a_bad_file_of_options(refusal, bench, text, words):
     (bench / "options.toml").write_text(text)
     assert words in refusal("identify", "a.csv", "b.csv", "--config", "options.toml")
+
+
+def test_what_the_command_line_says_is_not_blamed_on_the_file(refusal, bench):
+    (bench / "options.toml").write_text("u-max = '10 V'\nmeter-lag = '0.1 s'\n")
+    said = refusal("identify", "a.csv", "--config", "options.toml", "--u-max", "9")
+    assert said.endswith("--u-max is '9' without a unit; write for example '9 V'") and "options.toml" not in said
+
+
+def test_an_example_for_a_part_of_a_value_is_none_for_the_whole():
+    from dzdesign.config import in_words_of_the_file
+
+    values = {"ramp_up": "0.5 s / 0.8", "ramp": "1"}
+    said = in_words_of_the_file("--ramp-up is '0.8' without a unit; write for example '0.8 s'", "dz.toml", values)
+    assert said == "'dz.toml': ramp-up is '0.8' without a unit; write for example '0.8 s'"
+    assert in_words_of_the_file("'a.csv' has no column of u", "dz.toml", values) == "'a.csv' has no column of u"
 
 
 def test_a_file_of_options_that_is_no_text(refusal, bench):
@@ -493,6 +513,7 @@ def test_no_compiler_says_what_to_do(refusal, monkeypatch):
         ("K_a = nan", "plant parameter K_a is nan"),
         ("K_a = 0", "plant parameter K_a is 0"),
         ("K_a = 'big'", "plant parameter K_a is 'big'"),
+        ("preload_N = '27.6 N'", "that its name ends in, without quotes; write for example preload_N = 27.6"),
         ("K_a = true", "plant parameter K_a is True"),
         ("K_a = " + "9" * 400, "plant parameter K_a is 999"),
         ("K_a = " + "9" * 5000, "'plant.toml' is not TOML"),

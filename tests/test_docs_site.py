@@ -36,7 +36,21 @@ def site(tmp_path_factory):
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
     assert (done.returncode, done.stderr) == (0, ""), done.stderr
+    (folder / "said.txt").write_text(done.stdout, encoding="utf-8")
     return folder / "html"
+
+
+def test_the_build_says_what_it_does(site):
+    """It takes two minutes, most of them for the figures."""
+    listed = (DOCS / "figures" / "draw.py").read_text(encoding="utf-8").partition("FIGURES = {")[2].partition("}")[0]
+    names = re.findall(r'"(\w+)":', listed)
+    said = (site.parent / "said.txt").read_text(encoding="utf-8").splitlines()
+    figures = [f"docs: figure {n} of {len(names)}: {name.replace('_', ' ')}" for n, name in enumerate(names, 1)]
+    pages = sum(1 for path in DOCS.rglob("*.md") if "_build" not in path.parts)
+    assert len(names) > 5 and said[:-2] == ["docs: identifying the bundled example", *figures]
+    assert said[-2:] == [
+        f"docs: reading {pages} pages, with the reference of commands, files and Python", "docs: writing the pages",
+    ]  # fmt: skip
 
 
 class Page(HTMLParser):

@@ -121,6 +121,51 @@ def test_what_can_not_be_told_is_left_open_with_the_reason(here, capsys, labels,
     assert "columns" not in tomllib.loads(text)
 
 
+@pytest.mark.parametrize(
+    ("labels", "declared", "status"),
+    [
+        ("t_s,u_V,pA,pB,Q_Lmin", "pA=pA:bar, pB=pB:bar", 1),  # identify would refuse these
+        ("t_s,u_V,pA (bar),pB,Q_Lmin", "pB=pB:bar", 1),
+        ("t_s,u_V,p_1,p_2,Q_Lmin", "pA=p_1:bar, pB=p_2:bar", 0),
+        ("t_s,u_V,Druck vor,Druck nach,Q_Lmin", "pA=Druck vor:bar, pB=Druck nach:bar", 0),
+        ("t_s,u_V,pos,PWM,Q_Lmin", "", 0),
+        ("t_s,u_V,p1 [bar],power (W),Q_Lmin", "", 0),
+    ],
+)
+def test_pressures_without_a_unit_are_seen_and_can_be_declared_as_said(here, capsys, labels, declared, status):
+    time, u, dp, q = columns_of(1.0)
+    write("ramp.csv", labels, time, u, 10 * dp + 3, 0 * dp + 3, q)
+    assert main(["-q", "init", "ramp.csv"]) == status
+    said, text = capsys.readouterr().out, Path("dzdesign.toml").read_text("utf-8")
+    assert ("without a unit" in said) == ("without a unit" in text) == bool(declared)
+    assert "unknown MPa" not in said and ("at an unknown pressure drop" in said) == (status == 0)
+    if declared:
+        assert f'declare by --columns "{declared}"' in said
+        Path("dzdesign.toml").unlink()
+        init_then_identify("ramp.csv", more=("--columns", declared))
+        assert "at 1 MPa" in capsys.readouterr().out
+
+
+def test_a_pressure_drop_without_a_unit_is_open(here, capsys):
+    time, u, dp, q = columns_of(1.0)
+    write("ramp.csv", "t_s,u_V,dP,Q_Lmin", time, u, dp, q)
+    assert main(["init", "ramp.csv"]) == 1
+    assert "open: pressure: 'dP' looks like a pressure, without a unit; declare by --columns \"dP=dP:bar\"" in (
+        capsys.readouterr().out
+    )
+
+
+def test_a_pressure_from_a_name_is_said_and_units_as_people_write_them(here, capsys):
+    time, u, _, q = columns_of(4.0)
+    write("ramp_4MPa.csv", "t_s,u_V,Q_Lmin", time, u, q)
+    text, valve = init_then_identify("ramp_4MPa.csv")
+    said = capsys.readouterr().out
+    assert "pressure drop by the files' names: 4 MPa" in said and "1 ramp at 4 MPa" in said
+    assert tomllib.loads(text)["dp"] == {"ramp_4MPa.csv": "4 MPa"}
+    assert valve["sides"]["positive"]["tests"][0]["dp_MPa"] == 4.0
+    assert '# Q = "Q_Lmin"  (in L/min; understood by its label)' in text
+
+
 def test_several_recordings_without_a_pressure_are_open(here, capsys):
     for number in (1, 2):
         time, u, _, q = columns_of(float(number))

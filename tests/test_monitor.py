@@ -172,7 +172,7 @@ def test_an_output_that_is_held_low_is_zero_and_faults_are_named(bench):
     bench.send([bench.frame(500), bench.frame(501, status=0), bench.frame(502, status=0x0103)])
     _, result, _ = bench.stop()
     assert list(table(bench.output)[:, 4] > 0) == [True, False, False]
-    assert result["faults"] == ["no usable sample in time", "trip input went low", "command not sound"]
+    assert result["faults"] == ["no usable sample in time", "trip input went low", "command outside its valid range"]
 
 
 def test_identify_reads_the_recording_with_the_flow_meters_column(bench):

@@ -53,6 +53,28 @@ BEYOND = """() => [...document.querySelectorAll('main *, nav *')].filter(e =>
     !e.closest('.scroll, .formula, .long')).map(e => e.tagName + ' ' + e.textContent.slice(0, 40))"""
 
 
+#: Words of a table or of a number that matters which stand on two lines, unless they may be broken: names, hashes.
+SPLIT = """() => {
+  const found = [], range = document.createRange();
+  for (const e of document.querySelectorAll('td, th, .numbers')) {
+    const walker = document.createTreeWalker(e, NodeFilter.SHOW_TEXT);
+    while (walker.nextNode()) {
+      const text = walker.currentNode;
+      if (text.parentElement.closest('math, .breaks, .hash')) continue;
+      for (const word of text.data.matchAll(/[\\p{L}\\p{N}]{2,}/gu)) {
+        range.setStart(text, word.index);
+        range.setEnd(text, word.index + word[0].length);
+        const tops = [...range.getClientRects()].filter(box => box.width).map(box => Math.round(box.top));
+        if (new Set(tops).size > 1) found.push(word[0]);
+      }
+    }
+  }
+  return found;
+}"""
+#: CSS pixels between the margins of the page that the style sheet prints on: 210 mm less 2 x 14 mm.
+PAPER = 688
+
+
 @pytest.fixture(scope="module")
 def browser():
     # Imported where a browser is: the driver starts a process of its own.
@@ -81,7 +103,9 @@ def pages(reported_demo, tmp_path_factory):
     (failing / "evidence" / MANIFEST_NAME).write_text(to_json(manifest))
     alone = folder / "alone"
     alone.mkdir()
-    shutil.copy(reported_demo / "valve.json", alone)
+    valve = json.loads((reported_demo / "valve.json").read_bytes())
+    valve["record"] = {"serial": "4711", "n" * 60: "unbroken" * 25, "oil": "HLP 46, 40 °C"}
+    (alone / "valve.json").write_text(to_json(valve))
     for place in (failing, alone):
         (place / REPORT_NAME).write_text(report_of_folder(place).html, encoding="utf-8")
     return {
@@ -112,7 +136,7 @@ def opened(browser, path: Path, width: int = 1280, scheme: str = "light"):
 def test_a_page_is_quiet_whole_and_readable(browser, pages, name, width, scheme):
     with opened(browser, pages[name], width, scheme) as (page, heard):
         assert page.evaluate("document.documentElement.scrollWidth") <= width
-        assert page.evaluate(BEYOND) == []
+        assert page.evaluate(BEYOND) == [] and page.evaluate(SPLIT) == []
         sizes = page.evaluate(SIZES)
         assert len(sizes) == {"demo": 8, "failing": 8, "valve alone": 3}[name]
         assert all(wide > 300 and high > 100 for wide, high in sizes)
@@ -150,13 +174,24 @@ def test_a_failing_verdict_is_larger_than_a_good_one(browser, pages):
 
 def test_it_prints_on_light_paper_without_what_only_a_screen_needs(browser, pages, tmp_path):
     with opened(browser, pages["demo"], scheme="dark") as (page, heard):
+        shown = "getComputedStyle(document.querySelector('.signatures')).display"
+        assert page.evaluate(shown) == "none"
         page.emulate_media(media="print")
+        assert page.evaluate(shown) == "grid"
         assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
         assert page.evaluate("getComputedStyle(document.querySelector('nav')).display") == "none"
         assert [found for found in page.evaluate(CONTRASTS) if found[0] < CONTRAST] == []
         paper = page.pdf(path=tmp_path / "report.pdf", prefer_css_page_size=True)
-        assert paper.startswith(b"%PDF") and 6 <= paper.count(b"/Type /Page\n") <= 30
+        assert paper.startswith(b"%PDF") and 6 <= paper.count(b"/Type /Page\n") <= 12, "a page is left half empty"
         assert heard == []
+
+
+@pytest.mark.parametrize("name", ["demo", "failing", "valve alone"])
+def test_nothing_runs_off_the_paper(browser, pages, name):
+    with opened(browser, pages[name], width=PAPER) as (page, _):
+        page.emulate_media(media="print")
+        assert page.evaluate(BEYOND.replace("!e.closest('.scroll, .formula, .long')", "true")) == []
+        assert page.evaluate(SPLIT) == []
 
 
 def test_the_checks_see_what_they_must(browser, pages, tmp_path):
@@ -165,6 +200,7 @@ def test_the_checks_see_what_they_must(browser, pages, tmp_path):
     broken = text.replace(
         "</main>",
         '<p style="width:3000px;color:#ddd">wide and pale</p><a href="#nowhere">x</a>'
+        '<table style="width:1px"><td style="overflow-wrap:anywhere;min-width:0">headroom</td></table>'
         '<img src="missing.png"><script>console.log(1)</script></main>',
     )
     path = tmp_path / "broken.html"
@@ -172,6 +208,7 @@ def test_the_checks_see_what_they_must(browser, pages, tmp_path):
     with opened(browser, path) as (page, heard):
         assert page.evaluate("document.documentElement.scrollWidth") > 1280
         assert page.evaluate(BEYOND)
+        assert page.evaluate(SPLIT) == ["headroom"]
         assert [found for found in page.evaluate(CONTRASTS) if found[0] < CONTRAST]
         assert page.evaluate(LOST_LINKS) == ["#nowhere"]
         assert min(wide for wide, _ in page.evaluate(SIZES)) < 300

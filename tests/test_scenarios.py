@@ -173,6 +173,7 @@ class TestSeries:
             ("preload_N = 3", "expected plus and minus some per cent"),
             ('preload_N = "300 %"', "expected plus and minus some per cent"),
             ('preload_N = "-3 %"', "expected plus and minus some per cent"),
+            ("stroke_mm = 0.03", 'write for example stroke_mm = "3 %", or stroke_mm = "1 % sd"'),
             ('plants = 0\npreload_N = "3 %"', "expected a whole number from 1"),
             ('plants = true\npreload_N = "3 %"', "expected a whole number"),
             ("plants = 3", "names no plant parameter"),

@@ -121,12 +121,13 @@ def input_checks(inputs: InputCheck, both: bool) -> list[Check]:
             name="depends on the pressures by their difference only",
             holds=inputs.odd_pairs == 0,
             text=f"{inputs.odd_pairs} of {inputs.pressure_pairs} pairs of pressure codes differ (the commands of each "
-            "difference take its pairs in turn; at zero command all pairs that the law follows or that are not sound)",
+            "difference take its pairs in turn; at zero command all pairs that the law follows or that lie outside the "
+            "sensors' valid range)",
         ),
         Check(
-            name="codes that are not sound fall back",
+            name="codes outside their signal's valid range fall back",
             holds=not (inputs.bad_fallbacks or inputs.bad_status or inputs.bad_betas),
-            text=f"{inputs.bad_fallbacks} codes outside the sound ones without the safe value, {inputs.bad_status} "
+            text=f"{inputs.bad_fallbacks} such codes without the safe value, {inputs.bad_status} "
             f"status words that say otherwise, {inputs.bad_betas} values of dz_beta() that are not the law's",
         ),
     ]

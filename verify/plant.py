@@ -79,7 +79,10 @@ class Plant:
         for field in fields(self):
             value = getattr(self, field.name)
             if type(value) not in (int, float) or not 0 <= value <= LARGEST_PARAMETER:
-                raise InputError(f"plant parameter {field.name} is {quoted(value)}, expected a number of zero or more")
+                raise InputError(
+                    f"plant parameter {field.name} is {quoted(value)}, expected a number of zero or more, in "
+                    f"the unit that its name ends in, without quotes; write for example {field.name} = {field.default}"
+                )
         for name in ("u_max_V", "K_a", "R_c_ohm", "L_c_H", "K_i_N_A", "m_e_kg", "K_et_N_m", "rho_kg_m3", "C_d_W_mm"):
             if getattr(self, name) <= 0:
                 raise InputError(f"plant parameter {name} is {getattr(self, name)}, expected a positive number")

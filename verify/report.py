@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     import markupsafe
 
 REPORT_NAME = "report.html"
+#: Characters of a word of the language; what is longer is a name or a hash.
+LONGEST_WORD = 18
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,7 +108,7 @@ def make_report(chain: Chain) -> Report:
         lstrip_blocks=True,
         autoescape=True,
     )
-    environment.filters.update(data_uri=data_uri, anchor=anchor, words=_words)
+    environment.filters.update(data_uri=data_uri, anchor=anchor, words=_words, cell=_cell)
     verdict = headline(chain)
     compensator = chain.document("compensator")
     with figure_style():
@@ -115,6 +117,7 @@ def make_report(chain: Chain) -> Report:
         title=_title(chain),
         tool=TOOL,
         verdict=verdict,
+        record=_record(chain),
         figures=key_figures(chain),
         sections=sections,
         headings=SECTIONS,
@@ -131,6 +134,25 @@ def _words(text: str) -> "markupsafe.Markup":
     from markupsafe import Markup, escape
 
     return Markup(re.sub(r"`([^`<>]+)`", r"<code>\1</code>", str(escape(text))))
+
+
+def _cell(text: str) -> "markupsafe.Markup":
+    """Return the text of a cell, in which only a word too long for a column may be broken: after a sign, if it can."""
+    from markupsafe import Markup, escape
+
+    def broken(word: str) -> Markup:
+        return Markup("<wbr>").join(escape(part) for part in re.findall(r"[^/._,=]*[/._,=]*", word) if part)
+
+    return Markup("").join(
+        Markup('<span class="breaks">{}</span>').format(broken(word)) if len(word) > LONGEST_WORD else escape(word)
+        for word in re.split(r"(\s+)", text)
+    )
+
+
+def _record(chain: Chain) -> tuple[tuple[str, str], ...]:
+    """Return who and what, as valve.json has it: the engineer's words, escaped by the template as all others."""
+    valve = chain.document("valve")
+    return tuple(valve.get("record", {}).items()) if valve else ()
 
 
 def _title(chain: Chain) -> str:

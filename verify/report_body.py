@@ -141,7 +141,10 @@ def _valve_sections(valve: dict[str, Any] | None, compensator: dict[str, Any] | 
 
 
 def _trend(name: str, side: dict[str, Any]) -> str:
-    stroke = f"{name.capitalize()} commands: k x_max/u_max = {side['k_x_max_over_u_max']:.4f}"
+    stroke = (
+        f"{name.capitalize()} commands: drive range k x_max/u_max = {side['k_x_max_over_u_max']:.4f}, the command from "
+        "the threshold to full stroke as a share of full command"
+    )
     if side["trend"] is None:
         return f"{stroke}; how the threshold moves with the pressure drop can't be said from one ramp test."
     change, error = 1e3 * side["trend_change_V"], 1e3 * side["trend_change_se_V"]
@@ -162,9 +165,11 @@ def _law_section(compensator: dict[str, Any] | None) -> Section:
         side = compensator["sides"][name]
         (k_top, k_under), (u_top, u_under) = side["k_x_max_over_u_max"], side["u_min0_over_u_max"]
         lines.append(
-            f"{name.capitalize()} commands: k x_max/u_max = {k_top}/{k_under} = {k_top / k_under:.5f} (from the offset "
-            f"to full flow), u_min0/u_max = {u_top}/{u_under} = {u_top / u_under:.5f}, β: {len(side['beta'])} nodes "
-            f"over {compensator['beta_denominator']}, {compensator['beta_step_codes']} pressure codes apart."
+            f"{name.capitalize()} commands: drive range k x_max/u_max = {k_top}/{k_under} = {k_top / k_under:.5f} "
+            f"(from the offset to full flow), offset at dP0 u_min0/u_max = {u_top}/{u_under} = {u_top / u_under:.5f}, "
+            f"both as shares of full command; β is straight between {len(side['beta'])} nodes, "
+            f"{compensator['beta_step_codes']} pressure codes apart, each a whole number of "
+            f"1/{compensator['beta_denominator']}."
         )
     return Section(
         figures=tuple(law_figure(compensator, name, len(names) > 1) for name in names), lines=tuple(lines)

@@ -94,8 +94,8 @@ def _spread(path: Path, name: str, value: Any) -> tuple[float, str]:
     found = re.fullmatch(r"\s*(\d{1,3}(?:\.\d{1,6})?)\s*%\s*(sd)?\s*", text, re.ASCII)
     if found is None or not 0 < float(found[1]) < 100:
         raise InputError(
-            f"'{path}': {name} is {quoted(value)}, expected plus and minus some per cent such as \"3 %\", or a "
-            'standard deviation such as "1 % sd"'
+            f"'{path}': {name} is {quoted(value)}, expected plus and minus some per cent, or a standard deviation; "
+            f'write for example {name} = "3 %", or {name} = "1 % sd"'
         )
     return float(found[1]) / 100, "normal" if found[2] else "uniform"
 

@@ -2,6 +2,7 @@
 
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -25,13 +26,15 @@ FIGURES = {
 }
 
 
-def draw_all(folder: Path) -> list[Path]:
+def draw_all(folder: Path, say: Callable[[str], None] = lambda _: None) -> list[Path]:
     """Draw every figure as SVG in a folder.
 
     Parameters
     ----------
     folder : Path
         Made if it is not there.
+    say : callable
+        Told what comes next.
 
     Returns
     -------
@@ -39,10 +42,12 @@ def draw_all(folder: Path) -> list[Path]:
         The files.
     """
     folder.mkdir(parents=True, exist_ok=True)
+    say("identifying the bundled example")
     example = read_example()
     paths = []
     with style():
-        for name, draw in FIGURES.items():
+        for number, (name, draw) in enumerate(FIGURES.items(), start=1):
+            say(f"figure {number} of {len(FIGURES)}: {name.replace('_', ' ')}")
             paths.append(folder / f"{name}.svg")
             save(draw(example), paths[-1])
     return paths

@@ -16,7 +16,7 @@ from dzdesign.batch.valves import Valve, valves_of
 from dzdesign.core.artefacts import read_bytes, to_json, write_files
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design_options import DEFAULTS, design_options
-from dzdesign.identify_options import IDENTIFY_NAMES, identify_options
+from dzdesign.identify_options import IDENTIFY_NAMES, identify_options, record_of
 from dzdesign.progress import say, with_bar
 
 if TYPE_CHECKING:
@@ -81,6 +81,7 @@ def _check_options(args: argparse.Namespace) -> None:
     from dzdesign.identify.column_labels import parse_columns
 
     identify_options(args)
+    record_of(args.record)
     design_options(args, target_named(args.target).inputs())
     if args.columns:
         parse_columns(args.columns)
@@ -101,6 +102,7 @@ def _plant(args: argparse.Namespace) -> tuple[str, bytes] | None:
 def _task(valve: Valve, args: argparse.Namespace, plant: tuple[str, bytes] | None) -> Task:
     """Read a valve's recordings; where they can't be read the task says why."""
     options = {**vars(args), **valve.overrides}
+    record = {**record_of(args.record), **valve.record}
     recordings, refused = [], ""
     try:
         recordings = [(path.name, read_bytes(path, "ramp file")) for path in valve.recordings()]
@@ -109,7 +111,9 @@ def _task(valve: Valve, args: argparse.Namespace, plant: tuple[str, bytes] | Non
     return Task(
         name=valve.name,
         recordings=tuple(recordings),
-        identify={name: options[name] for name in IDENTIFY if options[name] is not None},
+        # Without a record the task is what it was before there were records: an earlier run is taken up.
+        identify={name: options[name] for name in IDENTIFY if options[name] is not None}
+        | ({"record": record} if record else {}),
         design={name: options[name] for name in DEFAULTS if options[name] is not None},
         target=options["target"],
         verify=args.verify,

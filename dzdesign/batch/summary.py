@@ -80,7 +80,9 @@ def print_batch(document: Mapping[str, Any], folder: str) -> None:
     from dzdesign.page import new_console, new_table, put_line
 
     console = new_console()
-    table = new_table(f"{document['calibrated']} valves", "", "least", "5 %", "median", "95 %", "largest")
+    count = document["calibrated"]
+    title = f"{count} calibrated valve{'' if count == 1 else 's'} of {document['valves']}"
+    table = new_table(title, "", "least", "5 %", "median", "95 %", "largest")
     for column, quantiles in document["quantiles"].items():
         if quantiles:
             name, _, unit = column.rpartition("_")

@@ -8,10 +8,13 @@ from pathlib import Path
 
 from dzdesign.core.artefacts import read_bytes
 from dzdesign.core.errors import InputError, nearest
+from dzdesign.identify.record import checked_record
 from dzdesign.recordings import expand
 
 #: What recordings are called in a valve's folder where no --pattern says so; notes and photographs may lie beside them.
 RECORDINGS = ("csv", "txt", "tsv", "dat", "gz", "tdms", "mat", "h5", "hdf5", "parquet", "feather", "arrow")
+#: A column of the CSV file that is an entry of each valve's record: record.serial.
+RECORD = "record."
 #: A name is a folder's on every system and a cell's in every spreadsheet.
 NAME = re.compile(r"[^\W_][\w .+-]{0,99}(?<![. ])")
 RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
@@ -29,11 +32,14 @@ class Valve:
         Names of its recordings, or patterns.
     overrides : mapping of str to str
         Options that are different for this valve, as on the command line.
+    record : mapping of str to str
+        Entries of its record, beside those of all valves.
     """
 
     name: str
     patterns: tuple[str, ...]
     overrides: Mapping[str, str] = field(default_factory=dict)
+    record: Mapping[str, str] = field(default_factory=dict)
 
     def recordings(self) -> list[Path]:
         """Return its recordings.
@@ -54,7 +60,7 @@ def valves_of(source: Path, pattern: str | None, options: Collection[str]) -> li
     Parameters
     ----------
     source : Path
-        A folder with one subfolder a valve, or a CSV file with the columns name, files and any option.
+        A folder with one subfolder a valve, or a CSV file with the columns name, files, any option, and record.NAME.
     pattern : str or None
         Of the recordings in a subfolder; None takes all that are called as recordings are.
     options : collection of str
@@ -94,14 +100,16 @@ def _of_table(path: Path, options: Collection[str]) -> list[Valve]:
         rows = list(csv.reader(lines, strict=True))
     except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"'{path}' is no CSV in UTF-8: {error}; first row name,files") from error
-    heading = [label.strip().replace("-", "_") for label in rows[0]] if rows else []
+    heading = [_heading(label.strip()) for label in rows[0]] if rows else []
     known = ("name", "files", *options)
     for label in heading:
-        if label not in known:
+        if label not in known and not label.startswith(RECORD):
             raise InputError(
-                f"'{path}' has a column '{label[:40]}'{nearest(label, known)}, expected name, files, and options of "
-                "identify and design"
+                f"'{path}' has a column '{label[:40]}'{nearest(label, known)}, expected name, files, options of "
+                "identify and design, and entries of the record such as record.serial"
             )
+    names = [label.removeprefix(RECORD) for label in heading if label.startswith(RECORD)]
+    checked_record(((name, "-") for name in names), f"'{path}', its columns {RECORD}NAME")
     if len(set(heading)) < len(heading) or not {"name", "files"} <= set(heading):
         raise InputError(f"'{path}' has the columns {', '.join(heading)}, expected name and files, each column once")
     valves = []
@@ -113,9 +121,16 @@ def _of_table(path: Path, options: Collection[str]) -> list[Valve]:
         cells = {label: cell.strip() for label, cell in zip(heading, row, strict=True)}
         name, files = cells.pop("name"), cells.pop("files")
         patterns = [str(path.parent / part.strip()) for part in files.split(";") if part.strip()]
-        overrides = {label: cell for label, cell in cells.items() if cell}
-        valves.append(Valve(name=name, patterns=tuple(patterns), overrides=overrides))
+        filled = {label: cell for label, cell in cells.items() if cell}
+        record = {label.removeprefix(RECORD): cell for label, cell in filled.items() if label.startswith(RECORD)}
+        overrides = {label: cell for label, cell in filled.items() if not label.startswith(RECORD)}
+        valves.append(Valve(name=name, patterns=tuple(patterns), overrides=overrides, record=record))
     return valves
+
+
+def _heading(label: str) -> str:
+    """Return a column's name as options are spelt inside; an entry of the record keeps its own spelling."""
+    return label if label.startswith(RECORD) else label.replace("-", "_")
 
 
 def _check_names(names: Sequence[str], source: Path) -> None:
