@@ -3,11 +3,11 @@
 import json
 import re
 import shutil
-from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote
 
 import pytest
+from page_reader import HOSTILE, Page
 from synthetic import needs_compiler
 
 from dzdesign.cli import main
@@ -21,35 +21,6 @@ from dzdesign.verify.report_shelf import shelf_of
 from dzdesign.verify.report_summary import headline
 
 pytestmark = needs_compiler
-
-HOSTILE = (
-    "</script><script>alert(1)</script>",
-    '"><img src=x onerror=alert(1)>',
-    "*/ x {{ 7*7 }} {% raw %}",
-    "a\nb\rc\x0b<b>",
-    "`<i>` `x",
-)
-
-
-class Page(HTMLParser):
-    """Tags and attributes of a page, ids, links, and its text."""
-
-    def __init__(self, html: str) -> None:
-        super().__init__()
-        self.tags: list[tuple[str, dict]] = []
-        self.text = ""
-        self.feed(html)
-
-    def handle_starttag(self, tag, attrs):
-        self.tags.append((tag, dict(attrs)))
-
-    handle_startendtag = handle_starttag
-
-    def handle_data(self, data):
-        self.text += data
-
-    def of(self, tag: str) -> list[dict]:
-        return [attributes for name, attributes in self.tags if name == tag]
 
 
 @pytest.fixture
