@@ -94,6 +94,17 @@ def test_the_json_of_the_command_names_the_report(made, capsys):
     assert "report" not in json.loads((made / "batch.json").read_bytes())  # where it lies is no content
 
 
+def test_a_lot_without_a_report_has_its_table(made, tmp_path, monkeypatch, capsys):
+    def too_large(_folder):
+        raise InputError("valves.csv is larger than 16 MiB")
+
+    monkeypatch.setattr("dzdesign.batch.lot_report.report_of_lot", too_large)
+    out = shutil.copytree(made, tmp_path / "out")
+    assert main(["batch", str(made.parent / "lot"), "-o", str(out), *OPTIONS, "--json"]) == 1
+    said = capsys.readouterr()
+    assert json.loads(said.out)["report"] is None and "no report.html: valves.csv is larger" in said.err
+
+
 def test_every_valve_not_calibrated_has_its_reason_and_what_to_do(made):
     text = " ".join(Page((made / "report.html").read_text(encoding="utf-8")).text.split())
     assert "valve 'V0001' has no recording" in text and "expected files such as ramp_1MPa.csv" in text

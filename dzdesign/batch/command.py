@@ -55,7 +55,7 @@ def run_batch(args: argparse.Namespace) -> int:
     results.write_summary(document)
     report = _write_report(output)
     if args.json:
-        print(to_json({**document, "report": str(report)}), end="")
+        print(to_json({**document, "report": report and str(report)}), end="")
     else:
         print_batch(document, str(output))
     if document["failed"]:
@@ -66,13 +66,17 @@ def run_batch(args: argparse.Namespace) -> int:
     return 0
 
 
-def _write_report(output: Path) -> Path:
-    """Write the report of the lot from the files, as `dzdesign report` does, and return its place."""
+def _write_report(output: Path) -> Path | None:
+    """Write the report of the lot from the files, as `dzdesign report` does; a lot too large for one has its table."""
     from dzdesign.batch.lot_report import report_of_lot
     from dzdesign.verify.report import REPORT_NAME
 
     path = output / REPORT_NAME
-    write_file(path, report_of_lot(output).html)
+    try:
+        write_file(path, report_of_lot(output).html)
+    except InputError as error:
+        say(f"no {REPORT_NAME}: {error}")
+        return None
     return path
 
 
