@@ -2,19 +2,21 @@
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from dzdesign.core.artefacts import MANIFEST_NAME, parse_document, read_bytes, to_json, write_file, write_folder
 from dzdesign.core.errors import InputError
 from dzdesign.progress import say
 
+if TYPE_CHECKING:
+    from dzdesign.verify.report import Report
+
 
 def run_report(args: argparse.Namespace) -> int:
     """Make report.html; 1 if a requirement does not hold or was not checked, or the files do not belong together."""
-    from dzdesign.verify.report import report_of_folder
-
     folder = Path(args.folder)
     output = Path(args.output) if args.output else _beside_evidence(folder)
-    report = report_of_folder(folder)
+    report = _report_of(folder)
     for line in report.missing:
         say(f"missing: {line}")
     for line in report.faults:
@@ -25,7 +27,7 @@ def run_report(args: argparse.Namespace) -> int:
             to_json(
                 {
                     "report": str(output),
-                    "holds": {"good": True, "bad": False, "open": None}[report.kind],
+                    "holds": report.holds,
                     "verdict": report.verdict,
                     "faults": list(report.faults),
                     "missing": list(report.missing),
@@ -37,6 +39,20 @@ def run_report(args: argparse.Namespace) -> int:
         print(report.verdict)
         print(f"Written: {output}")
     return 0 if report.kind == "good" else 1
+
+
+def _report_of(folder: Path) -> "Report":
+    """Return the report of a batch, or of one valve's artefacts."""
+    from dzdesign.batch.lot_files import is_lot, refuse_uncalibrated
+
+    if is_lot(folder):
+        from dzdesign.batch.lot_report import report_of_lot
+
+        return report_of_lot(folder)
+    from dzdesign.verify.report import report_of_folder
+
+    refuse_uncalibrated(folder)
+    return report_of_folder(folder)
 
 
 def _beside_evidence(folder: Path) -> Path:

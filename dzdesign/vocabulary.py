@@ -201,7 +201,7 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
         ),
     ),
     "batch": (
-        "many valves: identify, design, codegen for each; one table, and the cost of one common setting",
+        "many valves: identify, design, codegen for each; one table, one report, and the cost of one common setting",
         "dzdesign.batch.command:run_batch",
         (
             _given(
@@ -225,7 +225,9 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
         "artefacts in, report.html out: the verdict, figures, every requirement, where each number came from",
         "dzdesign.report:run_report",
         (
-            _given("folder", metavar="DIR", help="of demo, verify, codegen, or with valve.json or compensator.json"),
+            _given(
+                "folder", metavar="DIR", help="of demo, verify, codegen, batch, or with valve.json or compensator.json"
+            ),
             _given(*OUTPUT, metavar="FILE", help="file to write (default: report.html with the evidence, or in DIR)"),
         ),
     ),

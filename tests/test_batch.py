@@ -27,6 +27,8 @@ from dzdesign.core.artefacts import sha256_of
 from dzdesign.design.beta_table import DECIMALS
 from dzdesign.design.common import common_setting
 from dzdesign.design.compensator_file import compensator_from_document
+from dzdesign.verify.report_artefacts import chain_of
+from dzdesign.verify.report_shelf import shelf_of
 
 SEED, COUNT = 7, 12
 OPTIONS = ["--meter-lag", "0.1 s", "--target", "host"]
@@ -99,6 +101,16 @@ def test_a_valve_of_a_batch_has_the_bytes_of_the_commands(lot, made, tmp_path, m
     assert main(["codegen", "valve.json", "--target", "host"]) == 0
     assert Path("valve.json").read_bytes() == (made / "valves/V0001/valve.json").read_bytes()
     assert tree(Path("firmware")) == tree(made / "valves/V0001/firmware")
+
+
+def test_the_report_of_one_valve_is_of_that_valve(made):
+    """Its folder has a manifest, as firmware has; what lies beside it is of other valves, not what it was made from."""
+    folder = made / "valves" / "V0003"
+    chain = chain_of(shelf_of(folder))
+    hashes = {role: each.sha256 for role, each in chain.artefacts.items()}
+    files = {"firmware": "firmware/manifest.json", "compensator": "compensator.json", "valve": "valve.json"}
+    assert hashes == {role: sha256_of((folder / name).read_bytes()) for role, name in files.items()}
+    assert not chain.faults
 
 
 def test_only_what_changed_is_done_again(lot, copy, tmp_path, capsys):

@@ -6,7 +6,7 @@ from argparse import Namespace
 from pathlib import Path
 
 import pytest
-from report_page import Page
+from page_reader import Page
 from schema_checks import problems
 from synthetic import Truth, synthetic_ramp
 

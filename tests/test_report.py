@@ -7,7 +7,7 @@ from pathlib import Path
 from urllib.parse import unquote
 
 import pytest
-from report_page import Page
+from page_reader import HOSTILE, Page
 from synthetic import needs_compiler
 
 from dzdesign.cli import main
@@ -21,14 +21,6 @@ from dzdesign.verify.report_shelf import shelf_of
 from dzdesign.verify.report_summary import headline
 
 pytestmark = needs_compiler
-
-HOSTILE = (
-    "</script><script>alert(1)</script>",
-    '"><img src=x onerror=alert(1)>',
-    "*/ x {{ 7*7 }} {% raw %}",
-    "a\nb\rc\x0b<b>",
-    "`<i>` `x",
-)
 
 
 @pytest.fixture

@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 from synthetic import needs_compiler
+from synthetic_lots import lot_rows, write_lot_folder
 
+from dzdesign.batch.lot_report import report_of_lot
 from dzdesign.core.artefacts import MANIFEST_NAME, sha256_of, to_json
 from dzdesign.verify.report import REPORT_NAME, report_of_folder
 
@@ -88,7 +90,7 @@ def browser():
 
 @pytest.fixture(scope="module")
 def pages(reported_demo, tmp_path_factory):
-    """The report of the demo; of one that fails with long names; of a valve alone."""
+    """The report of the demo; of one that fails with long names; of a valve alone; of a lot with hostile names."""
     folder = tmp_path_factory.mktemp("pages")
     failing = folder / "failing"
     shutil.copytree(reported_demo, failing)
@@ -108,7 +110,14 @@ def pages(reported_demo, tmp_path_factory):
     (alone / "valve.json").write_text(to_json(valve))
     for place in (failing, alone):
         (place / REPORT_NAME).write_text(report_of_folder(place).html, encoding="utf-8")
+    rows = lot_rows(80, failed=(3, 4, 50))
+    rows[7] |= {"name": "unbroken" * 12, "offset_V": 4.2, "knee_opening_V": 4.4}
+    rows[8] |= {"name": "\u5f01 <b>7</b>", "offset_V": 4.25}
+    rows[3] |= {"name": "no-blank-in-it-" * 6, "reason": "unbroken" * 60}
+    write_lot_folder(folder / "lot", rows)
+    (folder / "lot" / REPORT_NAME).write_text(report_of_lot(folder / "lot").html, encoding="utf-8")
     return {
+        "lot": folder / "lot" / REPORT_NAME,
         "demo": reported_demo / "evidence" / REPORT_NAME,
         "failing": failing / REPORT_NAME,
         "valve alone": alone / REPORT_NAME,
@@ -131,14 +140,14 @@ def opened(browser, path: Path, width: int = 1280, scheme: str = "light"):
         context.close()
 
 
-@pytest.mark.parametrize("name", ["demo", "failing", "valve alone"])
+@pytest.mark.parametrize("name", ["demo", "failing", "valve alone", "lot"])
 @pytest.mark.parametrize(("width", "scheme"), VIEWS)
 def test_a_page_is_quiet_whole_and_readable(browser, pages, name, width, scheme):
     with opened(browser, pages[name], width, scheme) as (page, heard):
         assert page.evaluate("document.documentElement.scrollWidth") <= width
         assert page.evaluate(BEYOND) == [] and page.evaluate(SPLIT) == []
         sizes = page.evaluate(SIZES)
-        assert len(sizes) == {"demo": 8, "failing": 8, "valve alone": 3}[name]
+        assert len(sizes) == {"demo": 8, "failing": 8, "valve alone": 3, "lot": 4}[name]
         assert all(wide > 300 and high > 100 for wide, high in sizes)
         poor = [found for found in page.evaluate(CONTRASTS) if found[0] < CONTRAST]
         assert poor == []

@@ -1,30 +1,18 @@
-"""report.html: one page, from the verdict to the hashes, of whatever artefacts there are.
+"""report.html: one page, from the verdict to the hashes, of whatever artefacts there are."""
 
-The page needs no network and no script: figures are SVG in it, their numbers are data: addresses. Every text that comes
-from a file is escaped by the template engine; only figures and formulas, made here, are markup.
-"""
-
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from dzdesign.core.artefacts import TOOL
-from dzdesign.derivation.report_html import anchor
 from dzdesign.verify.report_artefacts import Chain, chain_of
 from dzdesign.verify.report_body import SECTIONS, sections_of
-from dzdesign.verify.report_figure import PALETTE, data_uri, figure_style
+from dzdesign.verify.report_figure import figure_style
 from dzdesign.verify.report_law import account_of
+from dzdesign.verify.report_page import render_page
 from dzdesign.verify.report_shelf import VERIFICATION_NAME, shelf_of
 from dzdesign.verify.report_summary import headline, key_figures
 
-if TYPE_CHECKING:
-    import markupsafe
-
 REPORT_NAME = "report.html"
-#: Characters of a word of the language; what is longer is a name or a hash.
-LONGEST_WORD = 18
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,6 +25,8 @@ class Report:
         The page.
     kind : {"good", "bad", "open"}
         Of its verdict.
+    holds : bool or None
+        None where something was not checked, or is not there.
     verdict : str
         In words.
     faults, missing : tuple of str
@@ -45,6 +35,7 @@ class Report:
 
     html: str
     kind: str
+    holds: bool | None
     verdict: str
     faults: tuple[str, ...]
     missing: tuple[str, ...]
@@ -98,54 +89,23 @@ def make_report(chain: Chain) -> Report:
     chain : Chain
         Of `chain_of`.
     """
-    import jinja2
-
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("dzdesign.verify", "templates"),
-        undefined=jinja2.StrictUndefined,
-        keep_trailing_newline=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        autoescape=True,
-    )
-    environment.filters.update(data_uri=data_uri, anchor=anchor, words=_words, cell=_cell)
     verdict = headline(chain)
     compensator = chain.document("compensator")
     with figure_style():
         sections = sections_of(chain)
-    html = environment.get_template("report.html.jinja").render(
+    html = render_page(
         title=_title(chain),
-        tool=TOOL,
         verdict=verdict,
         record=_record(chain),
         figures=key_figures(chain),
-        sections=sections,
         headings=SECTIONS,
-        law=account_of(compensator["law"]) if compensator else None,
-        palette=PALETTE,
-        faults=chain.faults,
+        sections=sections,
         missing=chain.missing,
+        law=account_of(compensator["law"]) if compensator else None,
     )
-    return Report(html=html, kind=verdict.kind, verdict=verdict.text, faults=chain.faults, missing=chain.missing)
-
-
-def _words(text: str) -> "markupsafe.Markup":
-    """Return a sentence for the page: what stands between backticks is a command."""
-    from markupsafe import Markup, escape
-
-    return Markup(re.sub(r"`([^`<>]+)`", r"<code>\1</code>", str(escape(text))))
-
-
-def _cell(text: str) -> "markupsafe.Markup":
-    """Return the text of a cell, in which only a word too long for a column may be broken: after a sign, if it can."""
-    from markupsafe import Markup, escape
-
-    def broken(word: str) -> Markup:
-        return Markup("<wbr>").join(escape(part) for part in re.findall(r"[^/._,=]*[/._,=]*", word) if part)
-
-    return Markup("").join(
-        Markup('<span class="breaks">{}</span>').format(broken(word)) if len(word) > LONGEST_WORD else escape(word)
-        for word in re.split(r"(\s+)", text)
+    holds = {"good": True, "bad": False, "open": None}[verdict.kind]
+    return Report(
+        html=html, kind=verdict.kind, holds=holds, verdict=verdict.text, faults=chain.faults, missing=chain.missing
     )
 
 

@@ -1,7 +1,6 @@
 """What stands in each section of the report: sentences, figures and tables, and what is missing for them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from dzdesign.core.artefacts import to_json
@@ -12,7 +11,7 @@ from dzdesign.verify.evidence_curves import closed_loop_name, input_map_name, re
 from dzdesign.verify.report_acceptance import assessed_table, limits_table, paper_tables
 from dzdesign.verify.report_artefacts import Chain
 from dzdesign.verify.report_evidence_figures import dead_zone_figure, loop_figure, map_figure, zero_figure
-from dzdesign.verify.report_figure import ReportFigure
+from dzdesign.verify.report_page import Section
 from dzdesign.verify.report_sections import (
     checks_table,
     constants_table,
@@ -53,32 +52,6 @@ NOT_PROVED = (
     "The target's compiler and silicon: the C was compiled and tried on the host that made the evidence.",
     "The closed loop is a simulation of the stated plant; it is no measurement.",
 )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Section:
-    """What a section holds, in the order in which it is shown.
-
-    Attributes
-    ----------
-    figures : tuple of ReportFigure
-    tables : tuple of Table
-    lines : tuple of str
-        Sentences of figures.
-    groups : tuple of (str, tuple of str)
-        Further sentences, each group under a heading of its own.
-    missing : str
-        What it lacks and which command makes that; empty if nothing.
-    optional : bool
-        Whether the chain is whole without it.
-    """
-
-    figures: tuple[ReportFigure, ...] = ()
-    tables: tuple[Table, ...] = ()
-    lines: tuple[str, ...] = ()
-    groups: tuple[tuple[str, tuple[str, ...]], ...] = ()
-    missing: str = ""
-    optional: bool = False
 
 
 def sections_of(chain: Chain) -> dict[str, Section]:

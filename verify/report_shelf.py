@@ -7,6 +7,8 @@ from dzdesign.core.artefacts import MANIFEST_NAME, parse_document
 from dzdesign.core.errors import InputError
 
 EVIDENCE_SCHEMA, FIRMWARE_SCHEMA = "dzdesign.evidence/1", "dzdesign.firmware/1"
+#: Of a folder around evidence and firmware, beside those of other valves.
+BATCH_VALVE_SCHEMA = "dzdesign.batch-valve/1"
 VERIFICATION_NAME = "verification.json"
 #: No larger file is read, and no more of them in a folder: an artefact is far smaller.
 LARGEST, MOST = 32 * 2**20, 500
@@ -34,8 +36,7 @@ def shelf_of(folder: Path) -> dict[str, bytes]:
         raise InputError(f"'{folder}' is no folder, expected one with artefacts of dzdesign; check the name")
     try:
         folder = folder.resolve()
-        inner = (folder / MANIFEST_NAME).is_file() or (folder / VERIFICATION_NAME).is_file()
-        root = folder.parent if inner else folder
+        root = folder.parent if _is_one_stage(folder) else folder
         within = sorted(place for place in root.iterdir() if place.is_dir() and not place.name.startswith("."))
         named = _files_in(folder, root)
     except OSError as error:
@@ -54,6 +55,20 @@ def shelf_of(folder: Path) -> dict[str, bytes]:
             "valve.json; give the folder that `dzdesign demo`, `verify` or `codegen` wrote"
         )
     return shelf
+
+
+def _is_one_stage(folder: Path) -> bool:
+    """Tell evidence and firmware from a folder that holds them; a valve's of a batch has a manifest too."""
+    if (folder / VERIFICATION_NAME).is_file():
+        return True
+    path = folder / MANIFEST_NAME
+    if not path.is_file():
+        return False
+    try:
+        parse_document(path.read_bytes(), MANIFEST_NAME, (BATCH_VALVE_SCHEMA,))
+    except InputError:
+        return True
+    return False
 
 
 def _files_in(place: Path, root: Path) -> dict[str, bytes]:

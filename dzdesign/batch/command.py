@@ -3,24 +3,21 @@
 import argparse
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from dzdesign.batch.calibration import Outcome, Task
+from dzdesign.batch.common import common_of, without_binding
 from dzdesign.batch.results import Results
 from dzdesign.batch.runners import run_local, run_on_cluster
 from dzdesign.batch.summary import print_batch, summary_of
-from dzdesign.batch.table import Calibrated, read_back, rows_of, table_files
+from dzdesign.batch.table import read_back, rows_of, table_files
 from dzdesign.batch.valves import Valve, valves_of
-from dzdesign.core.artefacts import read_bytes, to_json, write_files
+from dzdesign.core.artefacts import read_bytes, to_json, write_file, write_files
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design_options import DEFAULTS, design_options
 from dzdesign.identify_options import IDENTIFY_NAMES, identify_options, record_of
 from dzdesign.progress import say, with_bar
-
-if TYPE_CHECKING:
-    from dzdesign.design.common import CommonSetting
 
 #: Options of `identify` that a valve may have of its own, beside those of `design` and the target.
 IDENTIFY = (*IDENTIFY_NAMES, "columns", "dp")
@@ -43,10 +40,11 @@ def run_batch(args: argparse.Namespace) -> int:
     outcomes = run_on_cluster(tasks, args.dask) if args.dask else run_local(tasks, jobs)
     unwritten = _write_all(results, outcomes, len(waiting))
     found = {valve.name: read_back(results, valve.name, unwritten) for valve in with_bar(valves, "making the table")}
-    common, why_not = _common(found)
+    common, why_not = common_of(found)
     rows = rows_of(found, common)
-    document = summary_of(rows, common, why_not)
     files = table_files(rows)
+    without = without_binding(found, common)
+    document = summary_of(rows, common, why_not, files=files, verified=args.verify, without_binding=without)
     if common is not None:
         from dzdesign.design.compensator_file import compensator_document
 
@@ -55,13 +53,31 @@ def run_batch(args: argparse.Namespace) -> int:
         (output / "common_compensator.json").unlink(missing_ok=True)  # of an earlier run with other valves
     write_files(output, files, "-o")
     results.write_summary(document)
-    print(to_json(document), end="") if args.json else print_batch(document, str(output))
+    report = _write_report(output)
+    if args.json:
+        print(to_json({**document, "report": report and str(report)}), end="")
+    else:
+        print_batch(document, str(output))
     if document["failed"]:
         raise RequirementError(
             f"{len(document['failed'])} of {len(valves)} valves are not calibrated; their reasons are in "
             f"'{output / 'valves.csv'}'"
         )
     return 0
+
+
+def _write_report(output: Path) -> Path | None:
+    """Write the report of the lot from the files, as `dzdesign report` does; a lot too large for one has its table."""
+    from dzdesign.batch.lot_report import report_of_lot
+    from dzdesign.verify.report import REPORT_NAME
+
+    path = output / REPORT_NAME
+    try:
+        write_file(path, report_of_lot(output).html)
+    except InputError as error:
+        say(f"no {REPORT_NAME}: {error}")
+        return None
+    return path
 
 
 def _jobs(text: str | None, dask: str | None) -> int:
@@ -135,14 +151,3 @@ def _write_all(results: Results, outcomes: Iterator[Outcome], count: int) -> dic
         except InputError as error:
             unwritten[outcome.name] = str(error)
     return unwritten
-
-
-def _common(found: Mapping[str, Calibrated]) -> "tuple[CommonSetting | None, str]":
-    """Return the common setting of the valves that are calibrated, or why there is none."""
-    from dzdesign.design.common import common_setting
-
-    designed = {name: each.designed for name, each in found.items() if each.designed is not None}
-    try:
-        return common_setting(designed), ""
-    except (InputError, RequirementError) as error:
-        return None, str(error)

@@ -13,6 +13,8 @@ from dzdesign.core.errors import InputError
 SCHEMA = "dzdesign.batch/1"
 VALVE_SCHEMA = "dzdesign.batch-valve/1"
 SUMMARY = "batch.json"
+#: What to do about a file that is not as it was written.
+AGAIN = "run the batch again, which takes up what is done"
 
 
 class Results:
@@ -49,7 +51,7 @@ class Results:
 
     def begin(self, names: Collection[str]) -> None:
         """Mark the folder as a batch's, and take away what a killed run left half-written of these valves."""
-        self.write_summary({"complete": False})
+        self.write_summary({"complete": False, "names": list(names)})
         left = re.compile(r"\.(.+)\.[a-z0-9_]{8}")
         for path in (self.folder / "valves").iterdir():
             found = left.fullmatch(path.name)

@@ -4,21 +4,21 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from dzdesign.batch.calibration import OK
+from dzdesign.batch.spread import QUANTITIES, quantiles
 from dzdesign.core.artefacts import sha256_of, to_json
 
 if TYPE_CHECKING:
     from dzdesign.design.common import CommonSetting
 
-QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
-#: Columns of the table whose quantiles tell of the batch.
-SPREAD = (
-    *("knee_opening_V", "knee_closing_V", "offset_V", "beta_at_highest_dp", "k_x_max_over_u_max"),
-    *("dead_zone_opening_percent", "dead_zone_closing_percent", "common_extra_dead_zone_percent"),
-)
-
 
 def summary_of(
-    rows: Sequence[Mapping[str, Any]], common: "CommonSetting | None", why_not: str
+    rows: Sequence[Mapping[str, Any]],
+    common: "CommonSetting | None",
+    why_not: str,
+    *,
+    files: Mapping[str, bytes],
+    verified: bool,
+    without_binding: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Return batch.json but for schema and tool.
 
@@ -30,24 +30,28 @@ def summary_of(
         Of the valves that are calibrated.
     why_not : str
         The reason where there is none.
+    files : mapping of str to bytes
+        Of the table, by name.
+    verified : bool
+        Whether each valve's firmware was verified too.
+    without_binding : mapping, optional
+        What the common setting would cost without the valves that hold it down.
     """
     failed = [{key: row[key] for key in ("name", "status", "reason")} for row in rows if row["status"] != OK]
-    columns = [column for column in rows[0] if column.removeprefix("positive_").removeprefix("negative_") in SPREAD]
+    columns = [column for column in rows[0] if column.removeprefix("positive_").removeprefix("negative_") in QUANTITIES]
     return {
         "complete": True,
         "made_from": [{"source": row["name"], "inputs_sha256": row["inputs_sha256"]} for row in rows],
         "valves": len(rows),
         "calibrated": len(rows) - len(failed),
         "failed": failed,
-        "quantiles": {column: _quantiles([row[column] for row in rows]) for column in columns},
-        "common_setting": _common_document(common) if common else {"why_not": why_not},
+        "verified": verified,
+        "files": {name: sha256_of(content) for name, content in files.items()},
+        "quantiles": {column: quantiles([row[column] for row in rows]) for column in columns},
+        "common_setting": (
+            {**_common_document(common), "without_binding": without_binding} if common else {"why_not": why_not}
+        ),
     }
-
-
-def _quantiles(values: Sequence[float | None]) -> dict[str, float]:
-    """Return quantiles by the nearest rank: each is the value of a valve that is there."""
-    known = sorted(value for value in values if value is not None)
-    return {f"{q:g}": known[round(q * (len(known) - 1))] for q in QUANTILES} if known else {}
 
 
 def _common_document(common: "CommonSetting") -> dict[str, Any]:
@@ -83,13 +87,13 @@ def print_batch(document: Mapping[str, Any], folder: str) -> None:
     count = document["calibrated"]
     title = f"{count} calibrated valve{'' if count == 1 else 's'} of {document['valves']}"
     table = new_table(title, "", "least", "5 %", "median", "95 %", "largest")
-    for column, quantiles in document["quantiles"].items():
-        if quantiles:
+    for column, at in document["quantiles"].items():
+        if at:
             name, _, unit = column.rpartition("_")
             words, unit = (name.replace("_", " "), {"V": "V", "percent": "%"}[unit]) if unit in ("V", "percent") else (
                 column.replace("_", " "), "",
             )  # fmt: skip
-            shown = [f"{quantiles[q]:.3f}" for q in ("0", "0.05", "0.5", "0.95", "1")]
+            shown = [f"{at[q]:.3f}" for q in ("0", "0.05", "0.5", "0.95", "1")]
             table.add_row(f"{words} ({unit})" if unit else words, *shown)
     console.print(table)
     for line in _common_lines(document):
@@ -99,7 +103,8 @@ def print_batch(document: Mapping[str, Any], folder: str) -> None:
     put_line(
         console,
         f"{document['calibrated']} of {document['valves']} valves calibrated, {len(document['failed'])} not. "
-        f"Table: {folder}/valves.csv, valves.parquet",
+        f"Table: {folder}/valves.csv, valves.parquet; "
+        f"to be read: {folder}/report.html",
     )
 
 

@@ -1,15 +1,17 @@
-"""The table of a batch: one row a valve, made from the valves' folders alone, whenever they were written."""
+"""The table of a batch: one row a valve, made from the valves' folders alone, whenever they were written; read back."""
 
+import csv
 import io
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from dzdesign.batch.calibration import FAILED, OK
-from dzdesign.batch.results import Results
+from dzdesign.batch.results import AGAIN, Results
 from dzdesign.core.artefacts import read_bytes, sha256_of
-from dzdesign.core.errors import InputError
+from dzdesign.core.errors import InputError, quoted
 
 if TYPE_CHECKING:
     from dzdesign.design.common import CommonSetting, Designed
@@ -26,6 +28,9 @@ HASHED = {
     "compensator_json_sha256": "compensator.json",
     "firmware_manifest_sha256": "firmware/manifest.json",
 }
+TABLE = "valves.csv"
+#: No number of the table is larger: volts, MPa, per cent, shares.
+LARGEST = 1e6
 TEXTS = ("name", "status", "reason", "warnings", "inputs_sha256", *HASHED)
 
 
@@ -156,6 +161,17 @@ def extra_dead_zone(designed: "Designed", common: "CommonSetting", sign: int) ->
     return round(100 * max(shared - own for shared, own in left), 5)
 
 
+def is_text(column: str) -> bool:
+    """Tell a column of words from one of numbers.
+
+    Parameters
+    ----------
+    column : str
+        Its name.
+    """
+    return column in TEXTS or column.endswith("trend")
+
+
 def table_files(rows: Sequence[Mapping[str, Any]]) -> dict[str, bytes]:
     """Return valves.csv and valves.parquet, the same rows in both.
 
@@ -166,9 +182,54 @@ def table_files(rows: Sequence[Mapping[str, Any]]) -> dict[str, bytes]:
     """
     import polars
 
-    text = [column for column in rows[0] if column in TEXTS or column.endswith("trend")]
-    schema = {column: polars.String if column in text else polars.Float64 for column in rows[0]}
+    schema = {column: polars.String if is_text(column) else polars.Float64 for column in rows[0]}
     frame = polars.DataFrame([dict(row) for row in rows], schema=schema)
     parquet = io.BytesIO()
     frame.write_parquet(parquet)
-    return {"valves.csv": frame.write_csv().encode(), "valves.parquet": parquet.getvalue()}
+    return {TABLE: frame.write_csv().encode(), "valves.parquet": parquet.getvalue()}
+
+
+def rows_from(content: bytes, source: str) -> list[dict[str, Any]]:
+    """Read the rows back from valves.csv; a number is finite and of a size that a valve can have.
+
+    Parameters
+    ----------
+    content : bytes
+        Of the file.
+    source : str
+        Its name, for the message.
+
+    Raises
+    ------
+    InputError
+        If it is no such table.
+    """
+    try:
+        reader = csv.reader(io.StringIO(content.decode("utf-8"), newline=""), strict=True)
+        heading, *lines = [*reader] or [[]]
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"'{source}' is no table in UTF-8: {error}; {AGAIN}") from error
+    sides = ("positive_", "negative_") if f"positive_{SIDE_COLUMNS[0]}" in heading else ("",)
+    wanted = [*TEXTS, *(side + column for side in sides for column in SIDE_COLUMNS)]
+    lost = [column for column in wanted if column not in heading]
+    if lost or not lines:
+        what = f"lacks the column '{lost[0]}'" if lost else "has no valve"
+        raise InputError(f"'{source}' {what}; {AGAIN}")
+    return [_row(heading, line, f"'{source}' row {number}") for number, line in enumerate(lines, start=2)]
+
+
+def _row(heading: Sequence[str], line: Sequence[str], where: str) -> dict[str, Any]:
+    if len(line) != len(heading):
+        raise InputError(f"{where} has {len(line)} cells, expected {len(heading)}; {AGAIN}")
+    row: dict[str, Any] = {}
+    for column, cell in zip(heading, line, strict=True):
+        if is_text(column):
+            row[column] = cell
+            continue
+        try:
+            row[column] = float(cell) if cell else None
+        except ValueError:
+            row[column] = math.nan
+        if row[column] is not None and not abs(row[column]) <= LARGEST:
+            raise InputError(f"{where}, column '{column}' is {quoted(cell)}, expected a number; {AGAIN}")
+    return row

@@ -1,6 +1,14 @@
-"""A page of HTML as a test looks at it."""
+"""A page of a report as its reader has it, and names that must not become markup in it."""
 
 from html.parser import HTMLParser
+
+HOSTILE = (
+    "</script><script>alert(1)</script>",
+    '"><img src=x onerror=alert(1)>',
+    "*/ x {{ 7*7 }} {% raw %}",
+    "a\nb\rc\x0b<b>",
+    "`<i>` `x",
+)
 
 
 class Page(HTMLParser):

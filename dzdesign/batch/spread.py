@@ -1,0 +1,180 @@
+"""How a quantity scatters over a lot, and which valves lie far from the rest of it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from statistics import median
+from typing import Any
+
+QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
+#: Beyond so many robust standard deviations a valve is far from the rest: the limit that Iglewicz and Hoaglin (1993)
+#: recommend. Of a normal lot one valve in 2000 lies there, which keeps a list of a thousand valves short.
+FAR = 3.5
+#: Median absolute deviation -> standard deviation, of a normal distribution: 1 over its upper quartile.
+PER_MAD = 1.4826
+#: In a smaller lot the deviation itself is not known well enough to call a valve far.
+FEWEST = 8
+#: Characters of a valve's name in a figure or a narrow cell; names may have a hundred.
+SHOWN_NAME = 18
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Quantity:
+    """A column of the table that scatters.
+
+    Attributes
+    ----------
+    column : str
+        Its name, but for the side.
+    label, unit : str
+        In words; the unit is empty of a ratio.
+    digits : int
+        Decimals.
+    judged : bool
+        Whether a valve can be far from the rest in it. The cost of the common setting follows from the offsets, and
+        its least is no merit.
+    """
+
+    column: str
+    label: str
+    unit: str
+    digits: int
+    judged: bool = True
+
+    @property
+    def heading(self) -> str:
+        """Label and unit, as on an axis."""
+        return f"{self.label} ({self.unit})" if self.unit else self.label
+
+
+#: Columns of the table whose quantiles tell of the batch, by name.
+QUANTITIES = {
+    each.column: each
+    for each in (
+        Quantity(column="knee_opening_V", label="knee on opening", unit="V", digits=3),
+        Quantity(column="knee_closing_V", label="knee on closing", unit="V", digits=3),
+        Quantity(column="offset_V", label="offset at dP0", unit="V", digits=3),
+        Quantity(column="beta_at_highest_dp", label="β at the highest dP", unit="", digits=4),
+        Quantity(column="k_x_max_over_u_max", label="k x_max/u_max", unit="", digits=4),
+        Quantity(column="dead_zone_opening_percent", label="dead zone left on opening", unit="%", digits=2),
+        Quantity(column="dead_zone_closing_percent", label="dead zone left on closing", unit="%", digits=2),
+        Quantity(
+            column="common_extra_dead_zone_percent", label="extra dead zone of the common setting", unit="%",
+            digits=2, judged=False,
+        ),
+    )
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Spread:
+    """A quantity over the lot.
+
+    Attributes
+    ----------
+    quantity : Quantity
+    side : str
+        ``positive_``, ``negative_`` or empty.
+    names : tuple of str
+        Of the valves that have it, in the order of the table.
+    values : tuple of float
+        One each.
+    at : mapping of str to float
+        Quantiles, as in batch.json.
+    median, deviation : float
+        Deviation: robust, in the quantity's unit; 0 where it says nothing.
+    """
+
+    quantity: Quantity
+    side: str
+    names: tuple[str, ...]
+    values: tuple[float, ...]
+    at: Mapping[str, float]
+    median: float
+    deviation: float
+
+    @property
+    def heading(self) -> str:
+        """What stands on its axis."""
+        side = f"{self.side.rstrip('_')} side: " if self.side else ""
+        return side + self.quantity.heading
+
+    @property
+    def limits(self) -> tuple[float, float] | None:
+        """Beyond which a valve is far from the rest; None where the lot is too small or has no spread."""
+        if not self.deviation or not self.quantity.judged:
+            return None
+        return self.median - FAR * self.deviation, self.median + FAR * self.deviation
+
+    def distance(self, value: float) -> float:
+        """Return how many robust standard deviations a value lies from the median."""
+        return (value - self.median) / self.deviation
+
+    def far(self) -> tuple[tuple[str, float], ...]:
+        """Return name and value of the valves far from the rest, the farthest first."""
+        if self.limits is None:
+            return ()
+        found = [one for one in zip(self.names, self.values, strict=True) if abs(self.distance(one[1])) > FAR]
+        return tuple(sorted(found, key=lambda one: (-abs(self.distance(one[1])), one[0])))
+
+    def name_at(self, quantile: str) -> str:
+        """Return a valve that has the least (``0``) or the largest (``1``) value."""
+        return self.names[self.values.index(self.at[quantile])]
+
+
+def quantiles(values: Sequence[float | None]) -> dict[str, float]:
+    """Return quantiles by the nearest rank: each is the value of a valve that is there.
+
+    Parameters
+    ----------
+    values : sequence of float or None
+        None of a valve that has none.
+    """
+    known = sorted(value for value in values if value is not None)
+    return {f"{q:g}": known[round(q * (len(known) - 1))] for q in QUANTILES} if known else {}
+
+
+def short(name: str) -> str:
+    """Return a valve's name for a narrow place.
+
+    Parameters
+    ----------
+    name : str
+        Somebody's text.
+
+    Examples
+    --------
+    >>> short("V0001"), short("a" * 30)
+    ('V0001', 'aaaaaaaaaaaaaaaaa…')
+    """
+    shown = "".join(letter if letter.isprintable() else "·" for letter in name)
+    return shown if len(shown) <= SHOWN_NAME else f"{shown[: SHOWN_NAME - 1]}…"
+
+
+def spread_of(rows: Sequence[Mapping[str, Any]], column: str, side: str) -> Spread | None:
+    """Return how a column scatters; None where no valve has it.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Of the table.
+    column : str
+        A key of `QUANTITIES`.
+    side : str
+        What stands before it.
+    """
+    known = [(row["name"], row[side + column]) for row in rows if row[side + column] is not None]
+    if not known:
+        return None
+    names, values = zip(*known, strict=True)
+    at = quantiles(values)
+    middle = at["0.5"]
+    deviation = PER_MAD * median(abs(value - middle) for value in values)
+    return Spread(
+        quantity=QUANTITIES[column],
+        side=side,
+        names=names,
+        values=values,
+        at=at,
+        median=middle,
+        deviation=deviation if len(values) >= FEWEST else 0.0,
+    )
