@@ -171,7 +171,7 @@ def certificate_lines(compensator: Compensator, sign: int = 1) -> list[str]:
     low, high = (float(end) for end in certificate.dp_MPa)
     text = (
         f"Certificate: from {low:.2f} to {high:.2f} MPa, between the tests too, that lies below the "
-        f"{certificate.confidence:.0%} lower bound of the {certificate.guard} threshold, by "
+        f"{100 * certificate.confidence:.6g}% lower bound of the {certificate.guard} threshold, by "
         f"{1e3 * float(certificate.smallest_margin_V):.3g} mV at the least beyond {_counted(compensator)}"
     )
     if certificate.guard == "closing":

@@ -11,6 +11,7 @@ from dzdesign.progress import say, stages
 
 #: The flow meter of the bundled recordings, as their first lines tell it.
 METER_LAG, METER_FLOOR = "0.1 s", "0.6 L/min"
+RECORD = {"valve": "simulated by dzdesign, no measurement"}
 
 
 def run_demo(args: argparse.Namespace) -> int:
@@ -47,7 +48,7 @@ def run_demo(args: argparse.Namespace) -> int:
             meter_floor=parse_quantity(METER_FLOOR, "flow", "floor"),
         )
         stage(f"identifying the valve from {len(tests)} simulated ramp tests")
-        valve = identify(tests, meter)
+        valve = identify(tests, meter, RECORD)
         valve_json = to_json(valve.to_document())
         write_file(folder / "valve.json", valve_json)
         stage("designing the compensator")

@@ -66,7 +66,7 @@ def _side_lines(side: "SideModel") -> list[str]:
     """Say what the law takes from a side."""
     at = "" if side.reference_dp_MPa is None else f" at dP0 = {side.reference_dp_MPa:.3f} MPa"
     lines = [
-        f"u_min0 = {side.u_min0_V:.4f} V{at}, under the {side.confidence:.0%} lower bound of the {side.guard} "
+        f"u_min0 = {side.u_min0_V:.4f} V{at}, under the {100 * side.confidence:.6g}% lower bound of the {side.guard} "
         "threshold, for all tests together",
         f"drive range k x_max/u_max = {side.k_x_max_over_u_max:.4f}: command from the threshold to full stroke, as a "
         "share of full command",
@@ -92,7 +92,7 @@ def compensator_html(compensator: "Compensator") -> str:
                 "positive" if sign > 0 else "negative",
                 f"{float(side.k_x_max_over_u_max):.5f}",
                 f"{float(side.u_min0_over_u_max):.5f}",
-                f"{certificate.confidence:.0%} bound of the {certificate.guard} threshold",
+                f"{100 * certificate.confidence:.6g}% bound of the {certificate.guard} threshold",
                 f"{low:.3f} to {high:.3f}",
                 f"{1e3 * float(certificate.smallest_margin_V):.3f}",
             ]

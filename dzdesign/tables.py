@@ -77,9 +77,9 @@ def _thresholds(side: "SideModel", title: str) -> "Grid":
 def _side_lines(side: "SideModel") -> tuple[str, ...]:
     at = "" if side.reference_dp_MPa is None else f" at dP0 = {side.reference_dp_MPa:.3f} MPa"
     return (
-        f"bound: {side.confidence:.0%} lower bound, for all tests together, of the {side.guard} threshold (the knee, "
-        f"or the tail's zero where the edge is soft); flow below {side.level_L_min:.2f} L/min (meter's floor, its "
-        "noise, or 0.5 % of the largest flow) counts as none",
+        f"bound: {100 * side.confidence:.6g}% lower bound, for all tests together, of the {side.guard} threshold (the "
+        f"knee, or the tail's zero where the edge is soft); flow below {side.level_L_min:.2f} L/min (meter's floor, "
+        "its noise, or 0.5 % of the largest flow) counts as none",
         f"u_min0 = {side.u_min0_V:.4f} V{at}: the law's offset. Between two tests only the lower of their bounds is "
         "certain, so each offset stays under the neighbour's; more tests raise it",
         f"drive range k x_max/u_max = {side.k_x_max_over_u_max:.4f}: command from the threshold to full stroke, as a "
@@ -112,7 +112,7 @@ def print_compensator(compensator: "Compensator") -> None:
             f"offset at dP0 u_min0/u_max = {_rational(side.u_min0_over_u_max)}, both as shares of full command; "
             f"beta(dP): straight between {len(side.beta_numerators)} nodes, each a whole number of 1/"
             f"{compensator.beta_denominator}",
-            f"{label}certificate: the offset stays below the {certificate.confidence:.0%} lower bound of the "
+            f"{label}certificate: the offset stays below the {100 * certificate.confidence:.6g}% lower bound of the "
             f"{certificate.guard} threshold from {low:.3f} to {high:.3f} MPa, at every pressure code; flow below "
             f"{certificate.level_L_min:.2f} L/min (meter's floor, its noise, or 0.5 % of the largest flow) counts as "
             "none",

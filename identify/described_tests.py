@@ -24,8 +24,10 @@ L_MIN = 1e-3 / 60
 SMALLEST_SWEEP = 0.1
 #: A recording that comes to this share of the largest command is whole: the valve must have opened in it.
 FULL_SWEEP = 0.95
-#: Commands within this share of u_max are at rest.
-AT_REST = 0.01
+#: Commands within this share of u_max are at rest; a wider one is taken where so few readings would be left.
+AT_REST, FEWEST_AT_REST = (0.01, 0.03, 0.1), 20
+#: Share of the largest flow that is a flow for certain, and share of the command there that lies far below it.
+FIRST_FLOW, FAR_BELOW = 0.2, 0.5
 #: A reading at rest below this share of the largest flow is no zero error.
 ZERO_SHARE = 2e-3
 
@@ -60,12 +62,15 @@ class DescribedTests:
         Of the meter, declared or found.
     zero_L_min : dict
         Source -> flow read at zero command, where it is not zero; it has been subtracted.
+    zero_se : tuple of float
+        Standard error of what was subtracted from each of `tests`, as of white noise, m³/s; 0 where nothing was.
     """
 
     tests: tuple[DescribedTest, ...]
     floor: float
     lag: MeterLag
     zero_L_min: dict[str, float]
+    zero_se: tuple[float, ...]
 
 
 def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> DescribedTests:
@@ -86,7 +91,8 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
     if not tests:
         raise InputError("no ramp tests were given; expected at least one file")
     zeros = [_reading_at_zero(test, options.u_max) for test in tests]
-    tests = [replace(test, q=test.q - zero) for test, zero in zip(tests, zeros, strict=True)]
+    zero_se = {test.source: se for test, (_, se) in zip(tests, zeros, strict=True)}
+    tests = [replace(test, q=test.q - zero) for test, (zero, _) in zip(tests, zeros, strict=True)]
     ramps = split_recordings(tests, options, options.meter_lag or 0.0)
     lag = find_lag(ramps, options)
     pooled = pool_ramps(ramps if lag.origin != "identified" else split_recordings(tests, options, lag.seconds))
@@ -103,27 +109,38 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
         tests=tuple(described),
         floor=floor,
         lag=lag,
-        zero_L_min={test.source: zero / L_MIN for test, zero in zip(tests, zeros, strict=True) if zero},
+        zero_L_min={test.source: zero / L_MIN for test, (zero, _) in zip(tests, zeros, strict=True) if zero},
+        # Of several recordings pooled to one test, the worst: each stands for its own part of the ramp.
+        zero_se=tuple(max(zero_se.get(name, 0.0) for name, _ in item.files) for item in described),
     )
 
 
-def _reading_at_zero(test: RampTest, u_max: float) -> float:
-    """Return what the meter reads at zero command where that is not zero, m³/s: its zero error, or a leak.
+def _reading_at_zero(test: RampTest, u_max: float) -> tuple[float, float]:
+    """Return what the meter reads at zero command where that is not zero, and its standard error, m³/s.
 
-    Thousands of readings at rest tell it far better than any declared bound; 0 is returned where it does not stand out.
-    Of the hold before the first ramp only the later half counts, and none of it if it still drifts: hoses and meter
-    may be filling.
+    It is the meter's zero error, or a leak. Thousands of readings at rest tell it far better than any declared bound;
+    zeros are returned where it does not stand out. Of the hold before the first ramp only the later half counts, and
+    none of it if it still drifts: hoses and meter may be filling. Where the command hardly rests, what the meter reads
+    far below the first flow serves as well.
     """
-    at_rest = np.abs(test.u) <= AT_REST * u_max
+    near = np.abs(test.u[np.abs(test.q) > FIRST_FLOW * np.abs(test.q).max()])
+    for share in AT_REST:
+        at_rest = np.abs(test.u) <= share * u_max
+        if share > AT_REST[0] and share * u_max > FAR_BELOW * np.quantile(near, 0.01):
+            break  # the valve may be open there
+        rest = _readings_at_rest(test, at_rest)
+        if rest.size >= FEWEST_AT_REST:
+            zero, error = float(np.median(rest)), _error_of_median(rest)
+            stands_out = abs(zero) > max(5 * error, ZERO_SHARE * float(np.abs(test.q).max()))
+            return (zero, float(error)) if stands_out else (0.0, 0.0)
+    return 0.0, 0.0
+
+
+def _readings_at_rest(test: RampTest, at_rest: np.ndarray) -> np.ndarray:
     before = int(np.argmin(at_rest)) if not at_rest.all() else 0
     third, fourth = test.q[before // 2 : 3 * before // 4], test.q[3 * before // 4 : before]
     drifts = third.size >= 5 and abs(np.median(third) - np.median(fourth)) > 5 * _error_of_median(fourth)
-    rest = test.q[at_rest & (np.arange(at_rest.size) >= (before if drifts else before // 2))]
-    if rest.size < 20:
-        return 0.0
-    zero = float(np.median(rest))
-    error = _error_of_median(rest)
-    return zero if abs(zero) > max(5 * error, ZERO_SHARE * float(np.abs(test.q).max())) else 0.0
+    return test.q[at_rest & (np.arange(at_rest.size) >= (before if drifts else before // 2))]
 
 
 def _error_of_median(values: np.ndarray) -> float:

@@ -111,6 +111,10 @@ def bound_threshold(group: DescribedTests, knees: OrderedKnees, options: Identif
     zero = np.array([shape.tail.zero for shape in shapes])
     zero_se = np.array([shape.tail.zero_se for shape in shapes])
     shared = knees.departure.max() + _lag_budget(group, knees.column)
+    # What was subtracted as the meter's zero has an error of its own, which moves all readings of a test together.
+    subtracted = np.array([se * math.sqrt(shape.colour) for se, shape in zip(group.zero_se, shapes, strict=True)])
+    knee_se = np.hypot(knee_se, subtracted / [shape.slope for shape in shapes])
+    zero_se = np.hypot(zero_se, subtracted / [shape.tail.slope for shape in shapes])
     # A zero error of the meter moves each zero by the error over the slope of the line that was extrapolated.
     knee_budget = shared + np.array([options.meter_zero / shape.slope for shape in shapes])
     zero_budget = shared + np.array([options.meter_zero / shape.tail.slope for shape in shapes])

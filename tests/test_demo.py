@@ -9,6 +9,8 @@ from synthetic import needs_compiler
 
 from dzdesign.cli import main
 
+RECORD = ("--record", "valve = simulated by dzdesign, no measurement")
+
 
 @pytest.fixture(scope="module")
 def demo(tmp_path_factory):
@@ -51,7 +53,7 @@ def test_demo_prints_the_table_and_where_things_are(demo, capsys):
 def test_the_chain_of_commands_gives_the_same_bytes_as_the_demo(demo, example_folder, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     ramps = sorted(str(path) for path in (example_folder / "ramps").glob("*.csv.gz"))
-    assert main(["identify", *ramps, "--meter-lag", "0.1 s", "--meter-floor", "0.6 L/min"]) == 0
+    assert main(["identify", *ramps, "--meter-lag", "0.1 s", "--meter-floor", "0.6 L/min", *RECORD]) == 0
     assert main(["design", "valve.json"]) == 0
     assert main(["codegen", "compensator.json", "--target", "f28335"]) == 0
     assert (tmp_path / "valve.json").read_bytes() == (demo / "valve.json").read_bytes()

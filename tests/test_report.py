@@ -182,9 +182,40 @@ def test_a_missed_limit_of_recordings_does_not_hold(copied):
     assert report.kind == "bad" and "4.5 %, more than 4 %" in report.html
     assessment["made_from"] = [{"source": "other.csv", "sha256": "0" * 64}]
     (copied / "assessment.json").write_text(to_json(assessment))
-    report = report_of_folder(copied)  # of another valve: said, and not shown
-    assert any("none is among those of the valve" in fault for fault in report.faults)
-    assert "4.5 %, more than 4 %" not in report.html
+    report = report_of_folder(copied)  # of another valve that lies about: said, not shown, and no fault of this one
+    assert any("compares others, so it is not shown" in line for line in report.missing)
+    assert report.kind == "good" and "4.5 %, more than 4 %" not in report.html
+
+
+def test_evidence_without_its_manifest_is_said(copied):
+    (copied / "evidence" / MANIFEST_NAME).unlink()
+    assert any("nothing tells whether that is as written" in line for line in report_of_folder(copied).missing)
+
+
+def test_counts_that_no_requirement_speaks_of_stand_out(copied):
+    change_evidence(copied, lambda evidence: evidence["inputs"][0].update(wrong=1234, over_compensated=99))
+    report = report_of_folder(copied)
+    assert report.kind == "bad" and "CONTRADICTS ITSELF" in report.verdict and "333" in report.verdict
+
+
+def test_a_valve_that_was_edited_within_the_compensator_is_found(copied):
+    """The hash that it states is the genuine one's."""
+
+    def higher(compensator):
+        for test in compensator["valve"]["sides"]["positive"]["tests"]:
+            test["q_max_L_min"] *= 2
+
+    content = change_json(copied / "compensator.json", higher)
+    (copied / "firmware" / "compensator.json").write_bytes(content)
+    manifest = change_json(
+        copied / "firmware" / MANIFEST_NAME,
+        lambda each: (each["origin"].update(compensator_json=sha256_of(content)),
+                      each["files"].update({"compensator.json": sha256_of(content)})),
+    )  # fmt: skip
+    change_evidence(copied, lambda each: each["made_from"][0].update(sha256=sha256_of(manifest)))
+    report = report_of_folder(copied)
+    assert any("holds another valve than" in fault for fault in report.faults), (report.faults, report.missing)
+    assert report.kind == "bad"
 
 
 def test_the_papers_numbers_are_shown_where_they_lie(copied):

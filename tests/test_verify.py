@@ -16,7 +16,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.compensator_file import compensator_document
 from dzdesign.verify import motion
 from dzdesign.verify.all_inputs import check_all_inputs
-from dzdesign.verify.checks import certificate_follows
+from dzdesign.verify.checks import certificate_follows, files_unchanged
 from dzdesign.verify.closed_loop import PERIODS_PER_RECORD, ClosedLoop, RampSequence, dead_zone
 from dzdesign.verify.plant import Plant, plants_from_tests
 from dzdesign.verify.reference import ExactLaw
@@ -118,6 +118,16 @@ def test_a_changed_file_fails_the_verification(firmware_folder):
     readme.write_text(readme.read_text() + "\n")
     result = verify(firmware_folder, sequence=QUICK)
     assert [check.name for check in result.checks if not check.holds] == ["files as generated"]
+
+
+def test_c_that_was_added_is_said_and_refused_where_it_may_be_taken_for_ours(firmware_folder):
+    manifest = json.loads((firmware_folder / "manifest.json").read_text())
+    (firmware_folder / "f28335" / "extra.c").write_text("int extra;\n")
+    added = files_unchanged(firmware_folder, manifest)
+    assert added.holds and "not checked: f28335/extra.c" in added.text
+    (firmware_folder / "f28335" / "dz_comp.h").write_text("#define DZ_COMPARE_MAX 1u\n")  # goes before core's
+    shadowed = files_unchanged(firmware_folder, manifest)
+    assert shadowed.holds is False and "f28335/dz_comp.h" in shadowed.text
 
 
 def test_a_manifest_that_names_no_file_is_no_evidence(firmware_folder):

@@ -1,7 +1,7 @@
 """The requirements that verification consists of, each with the figures in a sentence."""
 
 from dataclasses import dataclass, replace
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from dzdesign.core.artefacts import sha256_of
@@ -38,13 +38,22 @@ def files_unchanged(folder: Path, manifest: dict[str, Any]) -> Check:
     ]
     unlisted = [f"core/{path.name}" for path in sorted((folder / "core").glob("*.[ch]"))]
     unlisted = [name for name in unlisted if name not in manifest["files"] or name not in manifest["core"]]
+    ours = {PurePosixPath(name).name for name in manifest["files"]}
+    others = [path.relative_to(folder).as_posix() for path in sorted(folder.rglob("*.[ch]"))]
+    others = [name for name in others if name not in manifest["files"]]
+    shadows = [name for name in others if PurePosixPath(name).name in ours]
     if changed:
-        text = f"changed or missing: {', '.join(changed)}"
+        fault = f"changed or missing: {', '.join(changed)}"
     elif unlisted or not manifest["core"]:
-        text = f"the manifest does not name {', '.join(unlisted) or 'any file of the core'}"
+        fault = f"the manifest does not name {', '.join(unlisted) or 'any file of the core'}"
+    elif shadows:
+        fault = f"{', '.join(shadows)}: not generated, but named as a generated file, for which it may be taken"
     else:
-        text = f"{len(manifest['files'])} files as generated"
-    return Check(name="files as generated", holds=text.endswith("as generated"), text=text)
+        fault = ""
+    text = fault or f"{len(manifest['files'])} files as generated"
+    if others and not fault:
+        text += f"; not generated, and not checked: {', '.join(others)}"
+    return Check(name="files as generated", holds=not fault, text=text)
 
 
 def certificate_follows(compensator: Compensator) -> Check:
@@ -58,7 +67,7 @@ def certificate_follows(compensator: Compensator) -> Check:
     return Check(
         name=name,
         holds=True,
-        text=f"the {certificate.guard} threshold's {certificate.confidence:.0%} lower bound, from "
+        text=f"the {certificate.guard} threshold's {100 * certificate.confidence:.6g}% lower bound, from "
         f"{float(certificate.dp_MPa[0]):.2f} to {float(certificate.dp_MPa[1]):.2f} MPa, proved again at every "
         "difference of pressure codes",
     )

@@ -92,27 +92,29 @@ class Chain:
         return None if found is None else found.document
 
 
-def chain_of(shelf: Mapping[str, bytes]) -> Chain:
+def chain_of(shelf: Mapping[str, bytes], *, sealed: bool = True) -> Chain:
     """Follow the chain from the evidence back to the valve, as far as the files go.
 
     Parameters
     ----------
     shelf : mapping of str to bytes
         Files by name, such as `report_shelf.shelf_of` returns; of two of a kind the first one counts.
+    sealed : bool
+        False of evidence that is not written yet, so that no manifest states its hash.
 
     Raises
     ------
     InputError
         If there are two pieces of evidence, or an artefact that fits is none: a key is missing.
     """
-    return _Search(shelf).chain()
+    return _Search(shelf, sealed).chain()
 
 
 class _Search:
     """Follows hashes over a shelf."""
 
-    def __init__(self, shelf: Mapping[str, bytes]) -> None:
-        self.shelf = shelf
+    def __init__(self, shelf: Mapping[str, bytes], sealed: bool) -> None:
+        self.shelf, self.sealed = shelf, sealed
         self.hashes = {name: sha256_of(content) for name, content in shelf.items()}
         self.faults: list[str] = []
         self.missing: list[str] = []
@@ -153,6 +155,10 @@ class _Search:
             return None
         name = names[0]
         stated = self._stated(name)
+        if stated is None and self.sealed:
+            self.missing.append(
+                f"{MANIFEST_NAME} that `dzdesign verify` wrote beside {name}: nothing tells whether that is as written"
+            )
         if stated is not None and stated != self.hashes[name]:
             self.faults.append(
                 f"{name} was changed since `dzdesign verify` wrote it (SHA-256 {self.hashes[name]}, the folder's "
@@ -227,6 +233,10 @@ class _Search:
         name = self._by_hash(stated)
         if name:
             self._take("valve", name)
+            if "valve" in self.found and self.found["valve"].document != compensator.document["valve"]:
+                self.faults.append(
+                    f"{compensator.name} holds another valve than {name}, whose SHA-256 it states: it was edited"
+                )
             return
         content = to_json(compensator.document["valve"]).encode()
         self._say_other(stated, VALVE_SCHEMA, "the compensator was made from")
@@ -244,8 +254,8 @@ class _Search:
         made_from = {each["sha256"] for each in self.found["assessment"].document["made_from"]}
         if known and not known & made_from:
             one = self.found.pop("assessment")
-            self.faults.append(
-                f"{one.name} compares recordings of which none is among those of the valve: not shown"
+            self.missing.append(
+                f"assessment of recordings of this valve: {one.name} compares others, so it is not shown"
             )
 
     # small steps --------------------------------------------------------------------------------------------------

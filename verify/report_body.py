@@ -46,6 +46,8 @@ SECTIONS = (
 NOT_PROVED = (
     "Pressure drops beyond the tested interval: the nearest tested β is held there, and nothing is certified.",
     "Commands above code 0: one code more is 1 to 2 mV more drive, and the law has no dead band.",
+    "What the certificate rests on: a threshold that runs one way with the pressure drop, also between the tests, and "
+    "a meter's lag that is as declared or found.",
     "A leak or a soft edge below the flow that counts as flow; a meter's zero error that does not show at rest.",
     "Errors of the pressure sensors beyond their converters', and failures that their signals hide.",
     "Oil temperature and the spread between valves of a type: the compensator is certified for the valve of its tests.",

@@ -7,6 +7,12 @@ from typing import Any
 from dzdesign.verify.report_artefacts import Chain
 from dzdesign.verify.report_table import whole
 
+#: What the check of the inputs counts, each of which a requirement has to say.
+COUNTS = (
+    *("wrong", "out_of_range", "not_monotone_in_u", "not_monotone_in_dp", "over_compensated", "odd_pairs"),
+    *("bad_fallbacks", "bad_status", "bad_betas"),
+)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Headline:
@@ -49,6 +55,13 @@ def headline(chain: Chain) -> Headline:
     if chain.faults:
         return Headline(
             kind="bad", sign="✗", text="THE FILES DO NOT BELONG TOGETHER. No verdict stands.", reasons=chain.faults
+        )
+    counted = sum(each.get(key, 0) for each in evidence["inputs"] for key in COUNTS) if evidence else 0
+    if counted and all(check["holds"] is not False for check in evidence["checks"]):
+        return Headline(
+            kind="bad",
+            sign="✗",
+            text=f"THE EVIDENCE CONTRADICTS ITSELF: {whole(counted)} faults counted, and every check holds",
         )
     if evidence is None:
         return Headline(
@@ -128,7 +141,8 @@ def _at_zero(loops: list[dict[str, Any]]) -> Figure:
     return Figure(
         label="Flow at zero command",
         value="none" if flow <= 1e-9 else f"{flow:.3g} L/min",
-        note=f"after closing, the worst of {len(loops)} pressure drops; without β it would be {bare:.2f} L/min",
+        note=f"in the simulated loop, after closing, the worst of {len(loops)} pressure drops; without β it would be "
+        f"{bare:.2f} L/min",
         kind="text" if flow <= 1e-9 else "bad",
     )
 
@@ -165,7 +179,8 @@ def _certificate(compensator: dict[str, Any], inputs: list[dict[str, Any]]) -> F
         value=f"{100 * worst['confidence']:g} %",
         note=f"confidence that the drive at zero command stays below the {worst['guard']} threshold from {low:.2f} to "
         f"{high:.2f} MPa; smallest margin to its bound {margin:.2f} mV at any pressure"
-        + (f", {least:.2f} mV at those that the converter can tell apart" if inputs else ""),
+        + (f", {least:.2f} mV at those that the converter can tell apart" if inputs else "")
+        + f". Flow below {worst['level_L_min']:.2f} L/min counts as none",
     )
 
 
