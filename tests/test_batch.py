@@ -120,12 +120,17 @@ def test_only_what_changed_is_done_again(lot, copy, tmp_path, capsys):
 
     def again(*options: str) -> str:
         assert main(["batch", str(folder), "-o", str(copy), "--jobs", "1", *OPTIONS, *options]) == 1
-        return capsys.readouterr().err
+        read = capsys.readouterr()
+        return read.err + read.out
 
     assert "12 valves, 12 of them done before" in again()
     assert tree(copy) == before and stamps == {path: path.stat().st_ino for path in stamps}
     shutil.copy(folder / "V0003" / "ramp_dP1.csv", folder / "V0001" / "ramp_dP1.csv")
-    assert "12 valves, 11 of them done before" in again()
+    (copy / "valves" / "V9999").mkdir()
+    said = again()
+    assert "12 valves, 11 of them done before" in said and "odd: V0001, V0003 share a recording" in said
+    assert "holds V9999, not of this lot" in " ".join(said.split())
+    (copy / "valves" / "V9999").rmdir()
     changed = {name.split("/")[1] for name, digest in tree(copy).items() if before.get(name) != digest and "/" in name}
     assert changed == {"V0001"}
     (copy / "valves" / "V0004" / "valve.json").write_text("{}")  # somebody's, so it is not written over

@@ -78,5 +78,7 @@ def test_the_headline_of_a_batch_counts_calibrated_valves(capsys):
     from dzdesign.batch.summary import print_batch
 
     document = {"valves": 4, "calibrated": 3, "failed": [], "quantiles": {}, "common_setting": {"why_not": "none"}}
+    document["oddities"] = ["two share a recording"]
     print_batch(document, "out")
-    assert "3 calibrated valves of 4" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "3 calibrated valves of 4" in said and "odd: two share a recording" in said

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from dzdesign.batch.calibration import Outcome, Task
 from dzdesign.batch.common import common_of, without_binding
+from dzdesign.batch.oddities import oddities_of
 from dzdesign.batch.results import Results
 from dzdesign.batch.runners import run_local, run_on_cluster
 from dzdesign.batch.summary import print_batch, summary_of
@@ -45,6 +46,7 @@ def run_batch(args: argparse.Namespace) -> int:
     files = table_files(rows)
     without = without_binding(found, common)
     document = summary_of(rows, common, why_not, files=files, verified=args.verify, without_binding=without)
+    document["oddities"] = oddities_of(found, output)
     if common is not None:
         from dzdesign.design.compensator_file import compensator_document
 

@@ -100,6 +100,8 @@ def print_batch(document: Mapping[str, Any], folder: str) -> None:
         put_line(console, line)
     for each in document["failed"]:
         put_line(console, f"{each['status']}  {each['name']}: {each['reason']}")
+    for line in document["oddities"]:
+        put_line(console, f"odd: {line}")
     put_line(
         console,
         f"{document['calibrated']} of {document['valves']} valves calibrated, {len(document['failed'])} not. "
