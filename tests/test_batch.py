@@ -139,6 +139,19 @@ def test_only_what_changed_is_done_again(lot, copy, tmp_path, capsys):
     assert "was changed since dzdesign wrote it" in reasons["V0004"]
 
 
+def test_two_batches_do_not_share_a_folder(lot, copy, monkeypatch, capsys):
+    fcntl = pytest.importorskip("fcntl", reason="this system has no such locks")
+    monkeypatch.setattr("dzdesign.core.exchange.LOCK_PATIENCE_S", 0.1)
+    before = tree(copy)
+    other = os.open(copy, os.O_RDONLY)
+    try:
+        fcntl.flock(other, fcntl.LOCK_EX)
+        assert main(["batch", str(lot[0]), "-o", str(copy), *OPTIONS]) == 2
+    finally:
+        os.close(other)
+    assert "another batch is writing into" in capsys.readouterr().err and tree(copy) == before
+
+
 def test_options_are_inputs_too(lot, copy, monkeypatch):
     seen = []
 

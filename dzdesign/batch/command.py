@@ -1,6 +1,7 @@
 """`dzdesign batch`: calibrate many valves, in one table with the reasons of those that could not be."""
 
 import argparse
+import contextlib
 import os
 import re
 from collections.abc import Iterator
@@ -16,6 +17,7 @@ from dzdesign.batch.table import read_back, rows_of, table_files
 from dzdesign.batch.valves import Valve, valves_of
 from dzdesign.core.artefacts import read_bytes, to_json, write_file, write_files
 from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.exchange import alone_in
 from dzdesign.design_options import DEFAULTS, design_options
 from dzdesign.identify_options import IDENTIFY_NAMES, identify_options, record_of
 from dzdesign.progress import say, with_bar
@@ -34,6 +36,27 @@ def run_batch(args: argparse.Namespace) -> int:
     valves = valves_of(source, args.pattern, (*IDENTIFY, *DEFAULTS, "target"))
     plant = _plant(args)
     results = Results(output)
+    with _only_batch(output):
+        return _calibrate(args, valves, plant, results, jobs)
+
+
+@contextlib.contextmanager
+def _only_batch(output: Path) -> Iterator[None]:
+    """Keep a second batch out of the folder: each would take up the other's half, with other options perhaps."""
+    with contextlib.ExitStack() as stack:
+        try:
+            stack.enter_context(alone_in(output))
+        except OSError as error:
+            raise InputError(
+                f"another batch is writing into '{output}'; wait until it has ended, or choose another folder with -o"
+            ) from error
+        yield
+
+
+def _calibrate(
+    args: argparse.Namespace, valves: list[Valve], plant: tuple[str, bytes] | None, results: Results, jobs: int
+) -> int:
+    output = results.folder
     results.begin([valve.name for valve in valves])
     waiting = [valve for valve in with_bar(valves, "reading") if not _is_done(results, _task(valve, args, plant))]
     say(f"{len(valves)} valves, {len(valves) - len(waiting)} of them done before")
