@@ -123,10 +123,11 @@ def _reading_at_zero(test: RampTest, u_max: float) -> tuple[float, float]:
     none of it if it still drifts: hoses and meter may be filling. Where the command hardly rests, what the meter reads
     far below the first flow serves as well.
     """
-    near = np.abs(test.u[np.abs(test.q) > FIRST_FLOW * np.abs(test.q).max()])
+    flowing = np.abs(test.q) > FIRST_FLOW * np.abs(test.q).max()
+    opens = float(np.quantile(np.abs(test.u[flowing]), 0.01)) if flowing.any() else 0.0
     for share in AT_REST:
         at_rest = np.abs(test.u) <= share * u_max
-        if share > AT_REST[0] and share * u_max > FAR_BELOW * np.quantile(near, 0.01):
+        if share > AT_REST[0] and share * u_max > FAR_BELOW * opens:
             break  # the valve may be open there
         rest = _readings_at_rest(test, at_rest)
         if rest.size >= FEWEST_AT_REST:
