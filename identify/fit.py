@@ -3,7 +3,6 @@
 import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +10,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.characteristic import BranchShape
+from dzdesign.identify.fit_problems import branch_numbers, offset_solver, solver_with_numbers
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -19,23 +19,6 @@ logger = logging.getLogger(__name__)
 
 #: A constraint is active when its slack is below this share of u_max.
 ACTIVE = 1e-7
-#: Unknowns and constraints are in standard errors, so nothing is left to scale. Bounds are not relaxed, or knees would
-#: run the wrong way. Slack times multiplier is met as tightly as the rest: IPOPT's own 1e-4 leaves knees 1e-5 V off.
-IPOPT = {
-    "print_time": False,
-    "ipopt.print_level": 0,
-    "ipopt.sb": "yes",
-    "ipopt.max_iter": 300,
-    "ipopt.tol": 1e-10,
-    "ipopt.compl_inf_tol": 1e-10,
-    "ipopt.bound_relax_factor": 0.0,
-    "ipopt.nlp_scaling_method": "none",
-}
-#: For a convex problem of a few unknowns in mV: to a millionth of a microvolt, and no bound overstepped.
-EXACT = {"ipopt.tol": 1e-12, "ipopt.bound_relax_factor": 0.0, "ipopt.mu_strategy": "adaptive"}
-#: Standard deviations from which the normal distribution's tail is a continued fraction, exact to 1e-13 with this many
-#: terms.
-TAIL_FROM, TAIL_TERMS = 3.0, 30
 #: No test outweighs another by more than this, however quiet its meter was.
 LARGEST_WEIGHT = 1e4
 
@@ -94,43 +77,25 @@ def fit_knees(
     InputError
         If the solver does not converge.
     """
-    import casadi as ca
-
     where = [(row, column) for row, pair in enumerate(shapes) for column, shape in enumerate(pair) if shape]
-    position = {place: index for index, place in enumerate(where)}
-    slopes, knees = ca.SX.sym("slope", len(where)), ca.SX.sym("knee", len(where))
-    scales = [_expected_errors(shapes[row][column]) for row, column in where]
-    cost = 0
-    for (row, column), index in position.items():
-        steeper, later = slopes[index] * scales[index][0], knees[index] * scales[index][1] / u_max
-        cost += _branch_cost(shapes[row][column], steeper, later, floor, u_max)
-    # Those whose knees must run one way, and in standard errors how far each lies from the next.
-    chain = [index for place, index in position.items() if place[1] == ordered and trend != "flat"]
-    start, order, unit = np.zeros(2 * len(where)), ca.SX(0, 1), np.zeros(0)
-    if len(chain) > 1:
-        mine = [shapes[where[index][0]][ordered] for index in chain]
-        slope_scale, knee_scale = np.array([scales[index] for index in chain]).T
-        steeper, later = _ordered_start(mine, increasing=trend == "increasing")
-        start[chain], start[len(where) + np.array(chain)] = steeper / slope_scale, later / knee_scale
-        unit = np.maximum(knee_scale[1:], knee_scale[:-1])
-        order = ca.DM(np.diff([shape.knee for shape in mine]) / unit)
-        order += ca.DM(knee_scale[1:] / unit) * knees[chain[1:]] - ca.DM(knee_scale[:-1] / unit) * knees[chain[:-1]]
-        order = order if trend == "increasing" else -order
-    variables = ca.vertcat(slopes, knees)
-    solver = ca.nlpsol("knees", "ipopt", {"x": variables, "f": cost, "g": order}, IPOPT)
-    solution = solver(x0=start, lbg=0.0, ubg=ca.inf)
+    mine = [shapes[row][column] for row, column in where]
+    scales = [_expected_errors(shape) for shape in mine]
+    numbers = [branch_numbers(shape, scale, floor, u_max) for shape, scale in zip(mine, scales, strict=True)]
+    chain = tuple(index for index, (_, column) in enumerate(where) if column == ordered and trend != "flat")
+    order = _order_knees(mine, scales, chain if len(chain) > 1 else (), increasing=trend == "increasing")
+    solver, known = solver_with_numbers(numbers, order.chain, order.steps)
+    solution = solver(x0=order.start, p=known, lbg=0.0, ubg=np.inf)
     _log("knees", solver.stats())
     if not solver.stats()["success"]:
         raise InputError(
             f"the joint fit did not converge ({solver.stats()['return_status']}); "
             "look at the ramp tests, and leave out the one that is unlike the others"
         )
-    best, slack = np.asarray(solution["x"]).ravel(), np.asarray(solution["g"]).ravel() * unit
-    hessian = _hessian_of_cost(solver, best)
+    best, slack = np.asarray(solution["x"]).ravel(), np.asarray(solution["g"]).ravel() * order.unit
+    hessian = _hessian_of_cost(solver, best, known)
     variance = np.diag(np.linalg.inv(hessian))
     knee, knee_se, slope = (np.full((len(shapes), 2), np.nan) for _ in range(3))
-    for (row, column), index in position.items():
-        shape, (slope_scale, knee_scale) = shapes[row][column], scales[index]
+    for index, ((row, column), shape, (slope_scale, knee_scale)) in enumerate(zip(where, mine, scales, strict=True)):
         last = len(where) + index
         knee[row, column] = shape.knee + best[last] * knee_scale
         knee_se[row, column] = np.sqrt(variance[last] * shape.colour) * knee_scale
@@ -141,7 +106,7 @@ def fit_knees(
         slope=slope,
         active=tuple(
             f"{'falling' if ordered else 'rising'} knee of test {where[index][0] + 1} to {where[following][0] + 1}"
-            for (index, following), gap in zip(pairwise(chain), slack, strict=True)
+            for (index, following), gap in zip(pairwise(order.chain), slack, strict=True)
             if gap < ACTIVE * u_max
         ),
         iterations=int(solver.stats()["iter_count"]),
@@ -153,12 +118,12 @@ def _log(name: str, said: Mapping[str, Any]) -> None:
     logger.debug("%s: %s after %d iterations, %.3f s", name, status, said.get("iter_count", 0), seconds)
 
 
-def _hessian_of_cost(solver: "ca.Function", at: np.ndarray) -> np.ndarray:
+def _hessian_of_cost(solver: "ca.Function", at: np.ndarray, known: np.ndarray) -> np.ndarray:
     """Return the second derivatives of a solver's objective, which it has for its own steps: the upper triangle."""
     import casadi as ca
 
     constraints = solver.size1_out("g")
-    upper = np.asarray(ca.DM(solver.get_function("nlp_hess_l")(at, [], 1, np.zeros(constraints))))
+    upper = np.asarray(ca.DM(solver.get_function("nlp_hess_l")(at, known, 1, np.zeros(constraints))))
     return upper + np.triu(upper, 1).T
 
 
@@ -167,6 +132,36 @@ def _expected_errors(shape: BranchShape) -> tuple[float, float]:
     n = max(float(shape.bins.n.sum()), 1.0)
     knee = shape.sigma / (shape.slope * np.sqrt(n))
     return knee * shape.slope / shape.y_max, knee
+
+
+@dataclass(frozen=True, slots=True)
+class _Order:
+    """Which knees must run one way; as `solver_with_numbers` takes it.
+
+    `chain` has their branches, `start` the unknowns (2B,) at which they do. Per step of the chain `unit` is in V what
+    its distance is measured in, and `steps` (S, 3) that distance where the lines have their zeros and by how much the
+    next knee and the one before add to it.
+    """
+
+    chain: tuple[int, ...]
+    start: np.ndarray
+    unit: np.ndarray
+    steps: np.ndarray
+
+
+def _order_knees(
+    shapes: list[BranchShape], scales: list[tuple[float, float]], chain: tuple[int, ...], *, increasing: bool
+) -> _Order:
+    start = np.zeros(2 * len(shapes))
+    if not chain:
+        return _Order(chain, start, np.zeros(0), np.zeros((0, 3)))
+    mine, slots = [shapes[index] for index in chain], np.array(chain)
+    slope_scale, knee_scale = np.array([scales[index] for index in chain]).T
+    steeper, later = _ordered_start(mine, increasing=increasing)
+    start[slots], start[len(shapes) + slots] = steeper / slope_scale, later / knee_scale
+    unit = np.maximum(knee_scale[1:], knee_scale[:-1])  # a standard error, of the worse of the two
+    steps = np.array([np.diff([shape.knee for shape in mine]), knee_scale[1:], -knee_scale[:-1]]) / unit
+    return _Order(chain, start, unit, (steps if increasing else -steps).T)
 
 
 def _ordered_start(shapes: list[BranchShape], *, increasing: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -192,61 +187,6 @@ def _ordered_start(shapes: list[BranchShape], *, increasing: bool) -> tuple[np.n
         rise = np.sum(bins.n * bins.y * (bins.u - knee) + bins.c_uy)
         steeper.append(rise / np.sum(bins.n * (bins.u - knee) ** 2 + bins.c_uu) / shape.slope - 1)
     return np.array(steeper), ordered - knees
-
-
-def _branch_cost(shape: BranchShape, steeper: "ca.SX", later: "ca.SX", floor: float, u_max: float) -> "ca.SX":
-    """Return the negative log-likelihood of one branch.
-
-    `steeper` is the slope's relative change from its start value, `later` the knee's over u_max. In changes, a quiet
-    meter's flow, 1e5 standard deviations large, is not subtracted from itself at every step.
-    """
-    import casadi as ca
-
-    bins, per_sigma = shape.bins, shape.slope * u_max / shape.sigma
-    # The line's change, in standard deviations, is tilt x + shift with x = (u - knee) / u_max.
-    tilt, shift = per_sigma * steeper, -per_sigma * later * (1 + steeper)
-    x = (bins.u - shape.knee) / u_max
-    miss = (bins.y - shape.slope * (bins.u - shape.knee)) / shape.sigma
-    # Its sum of squares is quadratic in both, so five sums are all that the solver ever sees: over the bins' means, and
-    # inside the bins sum (dy - line du)^2 about them, which only the tilt changes.
-    inside_xx = float(bins.c_uu.sum()) / u_max**2
-    inside_mx = float(np.sum(bins.c_uy - shape.slope * bins.c_uu)) / (u_max * shape.sigma)
-    n, n_x, n_xx, n_m, n_mx = (float(np.sum(bins.n * term)) for term in (np.ones_like(x), x, x * x, miss, miss * x))
-    squares, products = ca.DM([[n_xx + inside_xx, n_x], [n_x, n]]), ca.DM([n_mx + inside_mx, n_m])
-    change = ca.vertcat(tilt, shift)
-    cost = ca.bilin(squares, change, change) / 2 - ca.dot(products, change)
-    cut = bins.censored > 0
-    if cut.any():
-        u = bins.u_censored[cut]
-        depth = (floor - shape.slope * (u - shape.knee)) / shape.sigma
-        depth = ca.DM(depth) - tilt * ca.DM((u - shape.knee) / u_max) - shift
-        cost -= ca.dot(ca.DM(bins.censored[cut]), _log_below().map(depth.numel())(depth.T).T)
-    return cost
-
-
-@lru_cache(maxsize=1)
-def _log_below() -> "ca.Function":
-    """Return the logarithm of the normal distribution function, as a function of one number.
-
-    ``1 + erf`` has lost half of its digits at -6, where a drop-out may lie, and all of them at -8.3; the tail is the
-    continued fraction of Mills' ratio (Abramowitz and Stegun 26.2.14).
-    """
-    import casadi as ca
-
-    depth = ca.SX.sym("depth")
-    middle = ca.log((1 + ca.erf(ca.fmax(depth, -TAIL_FROM) / np.sqrt(2))) / 2)
-    away = ca.fmax(-depth, TAIL_FROM)
-    return ca.Function("log_below", [depth], [middle + _log_tail(away) - _log_tail(TAIL_FROM)])
-
-
-def _log_tail(away: "ca.SX | float") -> "ca.SX | float":
-    """Return the logarithm of the probability beyond `away` standard deviations, but for a constant."""
-    import casadi as ca
-
-    fraction = away
-    for term in range(TAIL_TERMS, 0, -1):
-        fraction = away + term / fraction
-    return -(away**2) / 2 - ca.log(fraction)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -286,27 +226,18 @@ def fit_offset(
     InputError
         If no positive offset meets the bounds.
     """
-    import casadi as ca
-
     if ceiling.min() <= 0:
         raise InputError(
             f"the threshold's lower bound is {ceiling.min():.3f} V, not above zero: no dead zone can be compensated "
             "without opening the valve at zero command; check the ramp tests and the meter's zero"
         )
-    size = guard.size
-    # In the offset itself, o = beta u_min0, the problem is a convex quadratic programme; beta(dP0) = 1 then makes
-    # u_min0 the offset at the reference. The unknown is what the offset gives up under its ceiling, in mV.
     lowest = float(ceiling.min())
-    given_up = ca.MX.sym("given_up", size)
-    offset = ca.DM((ceiling - lowest) * 1e3) - given_up
     largest = max(float(guard_se.max()), np.finfo(float).tiny)  # an exact table has no errors
     weight = (largest / np.maximum(guard_se, largest / np.sqrt(LARGEST_WEIGHT))) ** 2
-    cost = ca.sum1(ca.DM(weight / weight.max()) * (ca.DM((guard - lowest) * 1e3) - offset) ** 2)
-    step = offset[1:] - offset[:-1] if size > 1 else ca.MX(0, 1)
+    known = np.concatenate([(guard - lowest) * 1e3, (ceiling - lowest) * 1e3, weight / weight.max()])
     low, high = {"decreasing": (-np.inf, 0.0), "increasing": (0.0, np.inf), "flat": (0.0, 0.0)}[trend]
-    # Not CasADi's qrqp: where ceilings are equal, it may call a curve solved that runs both ways.
-    solver = ca.nlpsol("offset", "ipopt", {"x": given_up, "f": cost, "g": step}, IPOPT | EXACT)
-    solution = solver(x0=0.1, lbx=0.0, lbg=low, ubg=high)
+    solver = offset_solver(guard.size)
+    solution = solver(x0=0.1, p=known, lbx=0.0, lbg=low, ubg=high)
     _log("offset", solver.stats())
     slack = np.maximum(np.asarray(solution["x"]).ravel(), 0.0) / 1e3
     found = ceiling - slack

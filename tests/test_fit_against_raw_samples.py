@@ -19,7 +19,7 @@ from scipy.special import log_ndtr
 from synthetic import L_MIN, Truth, synthetic_ramp
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify import characteristic, fit
+from dzdesign.identify import characteristic, fit, fit_problems
 from dzdesign.identify.bounds import staircase
 from dzdesign.identify.branches import Bins, bin_branch
 from dzdesign.identify.described_tests import describe_tests
@@ -142,7 +142,7 @@ class TestOffset:
         assert found.u_min0 == pytest.approx(5.1, abs=SAME)
 
     @pytest.mark.parametrize("fault", ["direction reversed", "no ceiling", "no weights"])
-    def test_the_referee_sees_a_fault(self, fault, monkeypatch):
+    def test_the_referee_sees_a_fault(self, fault, monkeypatch, fresh_solvers):
         original = ca.nlpsol
 
         def faulty(*problem):
@@ -234,15 +234,41 @@ def over_pairs(function, pairs):
     return np.array([[function(item) for item in pair] for pair in pairs])
 
 
+def forget_solvers():
+    for build in (fit_problems.offset_solver, fit_problems._knee_solver):
+        build.cache_clear()
+
+
+@pytest.fixture
+def fresh_solvers():
+    """No solver of before in a test that seeds a fault in them, and none of it afterwards."""
+    forget_solvers()
+    yield
+    forget_solvers()
+
+
 def without(*names):
     """Return a cost of a branch that leaves out some of the statistics: a seeded fault."""
-    original = fit._branch_cost
+    original = fit.branch_numbers
 
     def faulty(shape, *others):
         dropped = {name: np.zeros_like(getattr(shape.bins, name)) for name in names}
         return original(replace(shape, bins=replace(shape.bins, **dropped)), *others)
 
     return faulty
+
+
+def test_a_solver_that_was_used_before_gives_what_a_new_one_gives():
+    """Solvers are kept, so nothing of one valve may be left in them for the next."""
+    quiet, loud = valve(1)[1], valve(2)[1]
+    forget_solvers()
+    for trend in ("flat", "decreasing", "increasing"):
+        first = fitted(quiet, trend)
+        fitted(loud, trend)
+        kept = fitted(quiet, trend)
+        forget_solvers()
+        assert np.array_equal(first.knee, kept.knee) and np.array_equal(first.knee_se, kept.knee_se)
+        assert np.array_equal(first.slope, kept.slope) and first.active == kept.active
 
 
 class TestLines:
@@ -283,7 +309,7 @@ class TestLines:
 
     @pytest.mark.parametrize("statistic", ["c_uy", "c_uu"])
     def test_the_referees_see_a_fault(self, statistic, monkeypatch):
-        monkeypatch.setattr(fit, "_branch_cost", without(statistic))
+        monkeypatch.setattr(fit, "branch_numbers", without(statistic))
         assert min(self.disagreement(0)) > 100 * SAME
 
 
@@ -350,14 +376,14 @@ class TestOrderedKnees:
             assert difference < SAME, name
 
     @pytest.mark.parametrize("fault", ["reversed", "left out", "c_uy", "sloppy"])
-    def test_the_referees_see_a_fault(self, fault, monkeypatch):
+    def test_the_referees_see_a_fault(self, fault, monkeypatch, fresh_solvers):
         original = ca.nlpsol
 
         def faulty(name, plugin, problem, options):
             solver = original(name, plugin, {**problem, "g": -problem["g"]}, options)
 
-            def solved(x0, lbg, ubg):
-                return solver(x0=x0, lbg=lbg if fault == "reversed" else -np.inf, ubg=ubg)
+            def solved(x0, p, lbg, ubg):
+                return solver(x0=x0, p=p, lbg=lbg if fault == "reversed" else -np.inf, ubg=ubg)
 
             solved.stats, solved.size1_out, solved.get_function = solver.stats, solver.size1_out, solver.get_function
             return solved
@@ -365,10 +391,10 @@ class TestOrderedKnees:
         if fault in ("reversed", "left out"):
             monkeypatch.setattr(ca, "nlpsol", faulty)
         if fault == "c_uy":
-            monkeypatch.setattr(fit, "_branch_cost", without("c_uy"))
+            monkeypatch.setattr(fit, "branch_numbers", without("c_uy"))
         if fault == "sloppy":  # a constraint met to a thousandth of a standard error
             for name, value in {"tol": 1e-3, "compl_inf_tol": 1e-3, "bound_relax_factor": 1e-3}.items():
-                monkeypatch.setitem(fit.IPOPT, f"ipopt.{name}", value)
+                monkeypatch.setitem(fit_problems.IPOPT, f"ipopt.{name}", value)
         seen = self.disagreement(1, "decreasing")
         assert seen["pooled"] > 10 * SAME
         if fault in ("reversed", "left out"):
@@ -473,7 +499,7 @@ class TestCensored:
     def test_the_referee_sees_a_fault(self, fault, monkeypatch):
         floor = 0.6 * L_MIN
         if fault in ("censored left out", "c_uy"):
-            monkeypatch.setattr(fit, "_branch_cost", without(fault.split()[0]))
+            monkeypatch.setattr(fit, "branch_numbers", without(fault.split()[0]))
         seen = []
         for seed in range(6):
             samples = opening(seed, n=400)

@@ -194,21 +194,21 @@ def test_bins_lose_nothing_against_all_samples(seed):
 
 
 def test_the_referee_sees_a_missing_term(monkeypatch):
-    straight = fit._branch_cost
+    straight = fit.branch_numbers
 
     def without_the_censored(shape, *others):
         return straight(replace(shape, bins=replace(shape.bins, censored=np.zeros_like(shape.bins.censored))), *others)
 
-    monkeypatch.setattr(fit, "_branch_cost", without_the_censored)
+    monkeypatch.setattr(fit, "branch_numbers", without_the_censored)
     assert worst_tobit_error(0)[0] > 1e-3
 
 
 def test_the_referee_sees_bins_that_forget_their_inside(monkeypatch):
-    monkeypatch.setattr(fit, "_branch_cost", lambda shape, *others: original(forgetful(shape), *others))
+    monkeypatch.setattr(fit, "branch_numbers", lambda shape, *others: original(forgetful(shape), *others))
     assert worst_tobit_error(0)[0] > 2e-5
 
 
-original = fit._branch_cost
+original = fit.branch_numbers
 
 
 def forgetful(shape):
