@@ -100,6 +100,28 @@ def shared_correlation(roughness: Sequence[Roughness]) -> float:
     return 1 - float(np.exp((low + high) / 2))
 
 
+def one_error_slower(correlation: float, roughness: Sequence[Roughness]) -> float:
+    """Return the correlation one standard error above the one found.
+
+    Of n samples, n (1 - r) / (1 + r) stretches are independent, and so many squares tell 1 - r, to sqrt(2 / stretches)
+    of itself. Slow noise in one or two short recordings leaves a dozen: noise may be half as quick as it looks there,
+    and a line's error that does not know of it is believed where it must not be.
+
+    Parameters
+    ----------
+    correlation : float
+        Of neighbouring samples, as `shared_correlation` finds it.
+    roughness : sequence of Roughness
+        What it was found from.
+    """
+    longest = max((item.n for item in roughness), default=0)
+    stretches = sum(item.n for item in roughness) * (1 - correlation) / (1 + correlation)
+    if stretches <= 0:
+        return correlation
+    slower = (1 - correlation) * float(np.exp(-np.sqrt(2 / stretches)))
+    return max(correlation, 1 - max(slower, LONGEST_MEMORY / longest))
+
+
 def colour_factor(correlation: float, roughness: Roughness, sigma: float) -> float:
     """Return the variance of a line's parameters over what white noise of the residuals' size would give.
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.branches import Branch
-from dzdesign.identify.noise import robust_sigma, shared_correlation
+from dzdesign.identify.noise import one_error_slower, robust_sigma, shared_correlation
 from dzdesign.identify.straight_part import LARGEST_SHIFT, GatedLine, ReadBranch, lay_line, widest_straight
 
 #: Flow below this share of the largest is no useful flow, however fine the meter.
@@ -29,7 +29,7 @@ class StraightParts:
     levels, noises : tuple of float
         Per branch the flow that counts as flow, and the noise of a reading while the valve is shut, m³/s.
     correlation : float
-        Of the noise of neighbouring samples, by all branches together.
+        Of the noise of neighbouring samples, by all branches together: at most, to one standard error.
     """
 
     lines: tuple[GatedLine, ...]
@@ -72,8 +72,9 @@ def find_straight_parts(reads: Sequence[ReadBranch], *, u_max: float, window: tu
     ]
     lowest = [ABOVE_LEVEL * level / read.y_max for read, level in zip(reads, levels, strict=True)]
     lines = widest_straight(reads, narrow, lowest, correlation, blocks, LARGEST_SHIFT * u_max)
-    # The wider windows know the noise better.
+    # The wider windows know the noise better. Errors that are believed must bear that it is not known exactly.
     correlation, blocks = _shared_noise(lines)
+    correlation = one_error_slower(correlation, [line.roughness for line in lines])
     return StraightParts(
         lines=tuple(line.coloured(correlation, blocks) for line in lines),
         levels=tuple(levels),

@@ -8,7 +8,13 @@ from scipy.signal import lfilter
 from synthetic import L_MIN, MPA
 
 from dzdesign.identify.identification import identify
-from dzdesign.identify.noise import colour_factor, measure_roughness, shared_correlation, taken_by_parabola
+from dzdesign.identify.noise import (
+    colour_factor,
+    measure_roughness,
+    one_error_slower,
+    shared_correlation,
+    taken_by_parabola,
+)
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramp_files import RampTest
 
@@ -31,6 +37,23 @@ def test_the_correlation_is_found_without_bias(correlation):
     ]
     rate, scatter = 1 - np.array(found), np.std(found) / math.sqrt(20)
     assert abs(rate.mean() - (1 - correlation)) < max(4 * scatter, 0.01 * (1 - correlation)), f"seed {SEED}"
+
+
+@pytest.mark.parametrize(("correlation", "least"), [(0.9, 0.75), (0.97, 0.75), (0.99, 0.55)])
+def test_one_standard_error_slower_covers_five_of_six(correlation, least):
+    """Two branches of 700 samples hold a few independent stretches of slow noise: how slow it is, they hardly tell.
+
+    Of the slowest the parabola takes half along, and fewer are covered.
+    """
+    rng, u = np.random.default_rng(SEED), np.linspace(6, 8, 700)
+    found, believed = [], []
+    for _ in range(100):
+        roughness = [measure_roughness(u, slow_noise(rng, correlation, u.size)) for _ in range(2)]
+        found.append(shared_correlation(roughness))
+        believed.append(one_error_slower(found[-1], roughness))
+    covered = np.mean(np.array(believed) >= correlation)
+    assert least < covered < 0.97, f"seed {SEED}"  # 84 % if errors are as claimed; 100 scatter by 4 %
+    assert np.mean(np.array(found) >= correlation) < least - 0.1
 
 
 def test_a_bend_is_not_slow_noise():
