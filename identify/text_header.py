@@ -15,7 +15,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.core.units import measures
 from dzdesign.identify.column_labels import TELLING, is_telling, split_label
 from dzdesign.identify.table import QUOTED_CHARACTERS, clean_label
-from dzdesign.identify.time_stamps import is_stamp
+from dzdesign.identify.time_stamps import is_stamp, is_unclear
 
 #: A recording has some ten columns; a header beyond this is no table, and would take minutes to be searched.
 MOST_COLUMNS, LONGEST_HEADER = 4096, 1 << 20
@@ -202,8 +202,8 @@ def _words(line: str) -> list[str]:
 
 
 def is_number(cell: str) -> bool:
-    """Tell whether a cell is a number, with any decimal mark, or a date."""
-    return NUMBER.fullmatch(cell[:LONGEST_LINE]) is not None or is_stamp(cell)
+    """Tell whether a cell is a number, with any decimal mark, a date or a time of day."""
+    return NUMBER.fullmatch(cell) is not None or is_stamp(cell) or is_unclear(cell)
 
 
 def _is_row(cells: list[str]) -> bool:
@@ -244,18 +244,25 @@ def _units(labels: tuple[str, ...], cells: list[str]) -> dict[str, str]:
 
 
 def _score(cells: list[str], lines: list[_Line], index: int, separator: str) -> int:
-    """Return how many labels of a line say a quantity or a unit, and whether units stand below it."""
-    said = sum(quantity is not None or is_telling(unit) for quantity, unit in map(split_label, cells[:MOST_COLUMNS]))
-    return said + (len(TELLING) if is_row_of_units(_cells(lines[index + 1].text, separator)) else 0)
+    """Return how many quantities and units the labels of a line say, and whether units stand below it."""
+    said = set()
+    for label in cells[:MOST_COLUMNS]:
+        quantity, unit = split_label(label)
+        said |= {quantity} if quantity else {unit} if unit != label and is_telling(unit) else set()
+    return len(said) + (len(TELLING) if is_row_of_units(_cells(lines[index + 1].text, separator)) else 0)
 
 
 def _usual_separator(line: str) -> str:
+    """Return what is most often in a line; in a row of numbers with decimal commas that is not what parts its cells."""
+    for separator in IN_DOUBT[:3]:
+        if len(line) <= LONGEST_LINE and separator in line and _is_row(_cells(line, separator)):
+            return separator
     separator = max(SEPARATORS, key=line.count)
     return separator if separator in line else BLANKS
 
 
 def _is_numbers(labels: list[str]) -> bool:
-    return all(re.fullmatch(r"[-+\d.,eE\s]*", label) for label in labels)
+    return all(not label.strip() or is_number(clean_label(label)) for label in labels)
 
 
 def _commented_header(block: bytes, number: int, row: _Line) -> _Line | None:
