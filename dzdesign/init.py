@@ -170,7 +170,9 @@ def _columns(
             if columns.setdefault(quantity, label) != label and quantity not in given:
                 opens.append(f"column of {quantity}: '{columns[quantity]}' in one file, '{label}' in another")
     for quantity in ("time", "u", "Q", *(() if has_pressure else ("dP",))):
-        reason = next((guess.unclear[quantity] for guess in guesses if quantity in guess.unclear), None)
+        # Of a pressure whose label says which and lacks a unit, `_pressures` says more.
+        unsaid = [guess for guess in guesses if quantity != "dP" or not any(guess.bare_pressures.values())]
+        reason = next((guess.unclear[quantity] for guess in unsaid if quantity in guess.unclear), None)
         if reason and quantity not in given:
             opens.append(f"column of {quantity}: {reason}")
     if "dP" in columns and "dP" not in given:

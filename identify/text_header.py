@@ -7,7 +7,7 @@ begins, and the header is the line above them that has as many cells and reads b
 import csv
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import final
 
@@ -23,6 +23,8 @@ MOST_COLUMNS, LONGEST_HEADER = 4096, 1 << 20
 MOST_LINES, LONGEST_LINE = 1000, 1 << 16
 #: Rows of numbers, one after the other, that are a table and no lines of a preamble; and their share of numbers.
 FEWEST_ROWS, SHARE_OF_NUMBERS = 5, 0.6
+#: Lines among which a cell in quotes is looked for that goes on in the next one, and of how many it may be.
+MOST_BROKEN = 40
 #: A line that is neither a comment nor blank; what a spreadsheet makes of either has quotes or separators.
 TABLE_LINE = re.compile(rb'^(?![ \t,;"]*$)(?![ \t"]*#).+', re.MULTILINE)
 #: What may stand between cells; where none of them is in the header, blanks do.
@@ -34,6 +36,8 @@ NUMBER = re.compile(r"[-+]?[\d.,]*\d[.,]?(?:[eE][-+]?\d+)?|nan|[-+]?inf(?:inity)
 COMMENT = "comment"
 #: An artefact of dzdesign begins with its schema.
 ARTEFACT = re.compile(rb'\s*\{\s*"(?:[^"{}]*"\s*:\s*"[^"]*",?\s*")*?schema"\s*:\s*"(dzdesign\.[\w.-]+/\d+)"')
+#: First characters of text that is no table.
+DOCUMENTS = {b"{": "JSON", b"<": "HTML or XML"}
 
 
 @final
@@ -106,13 +110,22 @@ def find_header(block: bytes, number: int, path: Path, *, told: bool) -> tuple[H
             return _fitted(header, lines), block[commented.end + 1 :]
     header = _header(line.number, line.text, separator, path)
     end, rows = line.end, lines[at + 1 :]
-    if rows and is_row_of_units(units := _cells(rows[0].text, separator)):
-        header = Header(
-            line=header.line, labels=header.labels, separator=separator, units=_units(header.labels, units),
-            repeats=header.repeats | {rows[0].text},
-        )  # fmt: skip
+    above = lines[at - 1] if at else None
+    if rows and is_row_of_units(_cells(rows[0].text, separator)):
+        header = _with_units(header, rows[0].text)
         end, rows = rows[0].end, rows[1:]
+    elif above and is_row_of_units(_cells(above.text, separator)):
+        header = _with_units(header, above.text)
     return _fitted(header, rows), block[end + 1 :]
+
+
+def _with_units(header: Header, line: str) -> Header:
+    """Return a header with what a row of units says."""
+    units: dict[str, str] = {}
+    for label, cell in zip(header.labels, _cells(line, header.separator), strict=False):
+        if _bare(cell):
+            units.setdefault(label, _bare(cell))
+    return replace(header, units=units, repeats=header.repeats | {line})
 
 
 def _lines(block: bytes, number: int) -> list[_Line]:
@@ -125,6 +138,19 @@ def _lines(block: bytes, number: int) -> list[_Line]:
         number += block.count(b"\n", before, match.start())
         before = match.start()
         lines.append(_Line(number=number, text=match[0].decode(), end=match.end()))
+    return _with_broken_ones_joined(lines)
+
+
+def _with_broken_ones_joined(lines: list[_Line]) -> list[_Line]:
+    """Return lines, of which those above the first row of numbers may be broken inside quotes: a cell of two lines."""
+    for first, line in enumerate(lines[:MOST_BROKEN]):
+        if line.text.count('"') % 2 == 0 or len(line.text) > LONGEST_LINE:
+            continue
+        for last in range(first + 1, min(first + MOST_BROKEN, len(lines))):
+            text = " ".join(each.text for each in lines[first : last + 1])
+            if text.count('"') % 2 == 0:
+                joined = _Line(number=line.number, text=text, end=lines[last].end)
+                return [*lines[:first], joined, *lines[last + 1 :]]
     return lines
 
 
@@ -136,6 +162,9 @@ def _refuse_a_document(block: bytes, path: Path) -> None:
             f"'{path}' is no recording but a file that dzdesign wrote ({artefact[1].decode()}); leave it out, for "
             "example by a pattern such as *.csv"
         )
+    document = DOCUMENTS.get(block.lstrip()[:1])
+    if document:
+        raise InputError(f"'{path}' is {document}, expected a table of numbers; export the recording as CSV")
 
 
 def _best(lines: list[_Line], path: Path) -> tuple[int, str] | None:
@@ -235,14 +264,6 @@ def _bare(unit: str) -> str:
     return unit.strip(" \t[](){}")
 
 
-def _units(labels: tuple[str, ...], cells: list[str]) -> dict[str, str]:
-    units: dict[str, str] = {}
-    for label, cell in zip(labels, cells, strict=False):
-        if _bare(cell):
-            units.setdefault(label, _bare(cell))
-    return units
-
-
 def _score(cells: list[str], lines: list[_Line], index: int, separator: str) -> int:
     """Return how many quantities and units the labels of a line say, and whether units stand below it."""
     said = set()
@@ -307,9 +328,7 @@ def _fitted(header: Header, rows: list[_Line]) -> Header:
         labels = labels[:-1]
     elif len(cells) == len(labels) + 1 and not cells[-1] and _is_row(cells):
         labels = (*labels, "")
-    return Header(
-        line=header.line, labels=labels, separator=header.separator, units=header.units, repeats=header.repeats
-    )
+    return replace(header, labels=labels)
 
 
 def labels_of(header: str, separator: str, number: int, path: Path) -> list[str]:

@@ -163,6 +163,15 @@ def din():
     return text("t/s;U/V;p_diff/bar;Q/(l/min)", *rows(TIME, U, 10 * DP, Q))
 
 
+def cells_of_two_lines():
+    """A spreadsheet whose headings have a line break inside."""
+    return text('"Zeit\n[s]";"u\n[V]";"dP\n[bar]";"Q\n[l/min]"', *rows(TIME, U, 10 * DP, Q), end="\r\n")
+
+
+def units_above():
+    return text("s;V;bar;l/min", "t;u;dP;Q", *rows(TIME, U, 10 * DP, Q))
+
+
 def many_words():
     """Sixty lines about the channels, each with as many cells as the table."""
     head = [f"Kanal {n};Typ {n};Bereich {n};Notiz {n}" for n in range(60)]
@@ -193,5 +202,7 @@ FILES: dict[str, tuple[Callable[[], bytes], tuple[str, ...]]] = {
     "Yokogawa": (yokogawa, ()),
     "blanks": (by_blanks, ()),
     "DIN": (din, ()),
+    "cells of two lines": (cells_of_two_lines, ()),
+    "units above": (units_above, ()),
     "many words": (many_words, ()),
 }  # fmt: skip

@@ -246,6 +246,11 @@ def test_a_range_may_fall_and_hold_other_signals(here):
 # what is no recording
 
 
+@pytest.mark.parametrize(("content", "words"), [(b'{"a": 1}', "is JSON, expected"), (b"<html>", "is HTML or XML")])
+def test_documents_are_no_recordings(here, content, words):
+    assert words in refusal(content)
+
+
 def test_artefacts_beside_recordings(here, capsys):
     Path("a.csv").write_text(csv(ROWS))
     assert main(["identify", "a.csv"]) == 0
