@@ -168,6 +168,11 @@ def cells_of_two_lines():
     return text('"Zeit\n[s]";"u\n[V]";"dP\n[bar]";"Q\n[l/min]"', *rows(TIME, U, 10 * DP, Q), end="\r\n")
 
 
+def rows_that_end_in_a_separator():
+    """Rows that end in a separator below a header that does not, and one padded word at the end."""
+    return text("t_s;u_V;dP_bar;Q_Lmin", *rows(TIME, U, 10 * DP, Q, end=";"), "Ende;;;;")
+
+
 def units_above():
     return text("s;V;bar;l/min", "t;u;dP;Q", *rows(TIME, U, 10 * DP, Q))
 
@@ -204,5 +209,6 @@ FILES: dict[str, tuple[Callable[[], bytes], tuple[str, ...]]] = {
     "DIN": (din, ()),
     "cells of two lines": (cells_of_two_lines, ()),
     "units above": (units_above, ()),
+    "rows that end in a separator": (rows_that_end_in_a_separator, ()),
     "many words": (many_words, ()),
 }  # fmt: skip

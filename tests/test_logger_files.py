@@ -208,9 +208,9 @@ def test_whole_numbers_without_a_unit_that_can_only_be_milliseconds(here, capsys
     assert_is_the_ramp(read(milliseconds()))
     assert main(["identify", "ramp.csv"]) == 0
     assert "warning [time-unit] ramp.csv: the column of time counts like milliseconds" in capsys.readouterr().out
-    # As seconds this is a ramp of two minutes: nothing is plain.
+    # As seconds these are ramps of 25 minutes: nothing is plain.
     few = milliseconds().split(b"\n")
-    slow = b"\n".join([few[0], *(b"%d,%s" % (n, line.split(b",", 1)[1]) for n, line in enumerate(few[1:-1]))])
+    slow = b"\n".join([few[0], *(b"%d,%s" % (3 * n, line.split(b",", 1)[1]) for n, line in enumerate(few[1:-1]))])
     assert "column 'time' has no unit; write for example time_s" in refusal(slow)
     assert read(milliseconds().replace(b"time", b"time_ms", 1)).clock_doubt == ""
     stated = read(milliseconds().replace(b"time", b"time_s", 1))
