@@ -129,7 +129,7 @@ def guarded_curve(side: SideModel, guard: str, below_reference: str) -> OffsetCu
     if not side.beta_dp_MPa:
         raise InputError(
             "the valve was identified without a pressure drop, so no offset can be certified at any pressure; "
-            "record the ramp test again with a column of dP (or pA and pB)"
+            "record the ramp test again with a column of dP (or pA and pB), or declare it: identify --dp \"1 MPa\""
         )
     curve = _curve_of(side, guard)
     u_min0 = Fraction(repr(curve.u_min0_V))

@@ -51,6 +51,7 @@ def identify(
     *,
     columns: str | Mapping[str, str] | None = None,
     dp: str | Mapping[str, str] | None = None,
+    skip_rows: int | str | None = None,
     dp0: str | None = None,
     u_max: str = "10 V",
     meter_floor: str | None = None,
@@ -73,6 +74,8 @@ def identify(
         Quantity (time, u, dP, pA, pB, Q) to its label and, after a colon, the unit that the label lacks.
     dp : str or mapping, optional
         Pressure drop of files without a column of it: one for all, or by name or pattern of the file.
+    skip_rows : int, optional
+        Rows that stand above the header of a file of text; found where not given.
     dp0 : str, optional
         Reference pressure drop; the test nearest to 1 MPa without it.
     u_max : str
@@ -117,6 +120,7 @@ def identify(
         u_max=options.u_max,
         columns=dict(columns) if isinstance(columns, Mapping) else columns,
         dp=dict(dp) if isinstance(dp, Mapping) else dp,
+        skip_rows=skip_rows,
     )
     refuse_copies(tests)
     valve = identify_tests(tests, options, said)

@@ -33,7 +33,8 @@ def run_assess(args: argparse.Namespace) -> int:
     check_plots(args.plots, output)
     sets = {
         name: read_recordings(
-            patterns, u_max=options.of_set(name).u_max, columns=columns, dp=args.dp, what=f"reading recordings {name}"
+            patterns, u_max=options.of_set(name).u_max, columns=columns, dp=args.dp, skip_rows=args.skip_rows,
+            what=f"reading recordings {name}",
         )
         for name, patterns, columns in (
             ("before", args.before, args.columns),

@@ -38,7 +38,9 @@ def run_identify(args: argparse.Namespace) -> int:
     options, record = identify_options(args), record_of(args.record)
     check_file_may_be_written(Path(args.output), SCHEMA)
     check_plots(args.plots, Path(args.output))
-    tests = read_recordings(args.ramps, u_max=options.u_max, columns=args.columns, dp=args.dp)
+    tests = read_recordings(
+        args.ramps, u_max=options.u_max, columns=args.columns, dp=args.dp, skip_rows=args.skip_rows
+    )
     refuse_copies(tests)
     with stages() as stage:
         stage(f"fitting {len(tests)} recording{'s' if len(tests) > 1 else ''}")

@@ -4,16 +4,19 @@ import argparse
 import os
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from statistics import median
 from typing import TYPE_CHECKING
 
 from dzdesign.core.artefacts import check_file_may_be_written, to_json, write_file
 from dzdesign.core.errors import InputError
-from dzdesign.init_file import options_file
+from dzdesign.core.units import parse_quantity
+from dzdesign.init_file import CHECK_DP, options_file
 from dzdesign.progress import say, stages, with_bar
-from dzdesign.recordings import expand, read_recordings
+from dzdesign.recordings import expand, read_recordings, rows_to_skip
 
 if TYPE_CHECKING:
     from dzdesign.identify.first_look import GuessedColumns, SeenSide
+    from dzdesign.identify.ramp_files import RampTest
 
 #: Where recordings are looked for if none are named.
 PLACES = tuple(
@@ -21,6 +24,8 @@ PLACES = tuple(
     for folder in ("ramps/", "")
     for ending in ("csv", "csv.gz", "txt", "tdms", "mat", "h5", "hdf5", "parquet", "feather")
 )
+#: A pressure in a file's name and one in its column that differ by no more than this factor are one.
+SAME_PRESSURE = 1.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,6 +46,8 @@ class Look:
         As `look_at_sides` gives them.
     notes : tuple of str
         What was seen and is not used, or comes from elsewhere than a column.
+    skip_rows : int or None
+        As declared.
     """
 
     paths: "list[Path]"
@@ -52,6 +59,7 @@ class Look:
     sides: "dict[str, SeenSide]"
     refused: dict[str, str]
     notes: tuple[str, ...] = ()
+    skip_rows: int | None = None
 
 
 def run_init(args: argparse.Namespace) -> int:
@@ -96,40 +104,41 @@ def _found_recordings() -> list[Path]:
 
 def _look(paths: list[Path], args: argparse.Namespace) -> tuple[Look, list[str]]:
     """Return what was seen, and what is open."""
-    from dzdesign.identify.column_labels import parse_columns
+    from dzdesign.identify.column_labels import PER_CENT, parse_columns
     from dzdesign.identify.first_look import guess_columns, is_per_cent, look_at_sides, pressure_in_name, proposed_u_max
 
     given = parse_columns(args.columns) if args.columns else {}
-    guesses = [guess_columns(path) for path in with_bar(paths, "looking at columns")]
-    columns = dict(given)
-    opens = []
-    for guess in guesses:
-        for quantity, label in guess.chosen.items():
-            if columns.setdefault(quantity, label) != label and quantity not in given:
-                opens.append(f"column of {quantity}: '{columns[quantity]}' in one file, '{label}' in another")
-    for quantity in ("time", "u", "Q"):
-        reason = next((guess.unclear[quantity] for guess in guesses if quantity in guess.unclear), None)
-        if reason and quantity not in given:
-            opens.append(f"column of {quantity}: {reason}")
-    undeclared, notes = _pressures(guesses, columns)
-    opens += undeclared
+    skip = rows_to_skip(args.skip_rows)
+    guesses = [guess_columns(path, skip) for path in with_bar(paths, "looking at columns")]
+    columns, opens, notes = _columns(guesses, given, declared=bool(args.dp))
+    undeclared, unused = _pressures(guesses, columns)
+    opens, notes = opens + undeclared, notes + unused
     nothing = Look(paths=paths, guesses=guesses, columns=columns, dp={}, sides={}, refused={})
     if opens:
         return nothing, list(dict.fromkeys(opens))
     names = [path.as_posix() for path in paths]
-    tests = read_recordings(names, u_max=10.0, columns=columns or None, dp=args.dp)
-    dp: dict[str, str] = args.dp if isinstance(args.dp, dict) else {}
+    tests = read_recordings(names, u_max=10.0, columns=columns or None, dp=args.dp, skip_rows=skip)
+    if "dP" in columns and "dP" not in given:
+        opens += _contradicted(tests, columns["dP"])
+    dp = args.dp if isinstance(args.dp, dict) else {test.source: args.dp for test in tests} if args.dp else {}
     lacking = [test.source for test in tests if test.dp is None]
     if lacking:
         dp = {source: text for source in lacking if (text := pressure_in_name(source))}
         if len(dp) == len(lacking):
-            tests = read_recordings(names, u_max=10.0, columns=columns or None, dp=dp)
+            tests = read_recordings(names, u_max=10.0, columns=columns or None, dp=dp, skip_rows=skip)
             notes.append(f"pressure drop by the files' names: {', '.join(dict.fromkeys(dp.values()))}")
         elif len(tests) > 1:
             unsaid = [source for source in lacking if source not in dp]
-            opens = [f"pressure drop of '{source}': no column, and none in its name" for source in unsaid]
+            opens += [
+                f"pressure drop of '{source}': no column, and none in its name; declare it by --dp or [dp]"
+                for source in unsaid
+            ]
+        else:
+            notes.append('no pressure drop, by a column or a file\'s name; declare it, if you know it, by --dp "1 MPa"')
     u_max, u_seen = proposed_u_max(tests)
-    if any(is_per_cent(guess.understood.get("u")) for guess in guesses):
+    # A label that was chosen ends in its unit: Sollwert [%]
+    chosen_in_per_cent = columns.get("u", "").rstrip(" ])").endswith(PER_CENT)
+    if chosen_in_per_cent or ("u" not in columns and any(is_per_cent(guess.understood.get("u")) for guess in guesses)):
         u_max, u_seen = 10.0, None
     sides, refused = {}, {}
     if not opens:
@@ -141,10 +150,51 @@ def _look(paths: list[Path], args: argparse.Namespace) -> tuple[Look, list[str]]
     return (
         Look(
             paths=paths, guesses=guesses, columns=columns, dp=dp, u_max=u_max, u_seen=u_seen, sides=sides,
-            refused=refused, notes=tuple(notes),
+            refused=refused, notes=tuple(notes), skip_rows=skip,
         ),
         opens,
     )  # fmt: skip
+
+
+def _columns(
+    guesses: "list[GuessedColumns]", given: dict[str, str], *, declared: bool
+) -> tuple[dict[str, str], list[str], list[str]]:
+    """Return the columns to write, what is open of them, and what is to be said; `declared`: --dp says the pressure."""
+    columns, opens, notes = dict(given), [], []
+    has_pressure = declared or "dP" in given or {"pA", "pB"} <= given.keys()
+    for guess in guesses:
+        for quantity, label in guess.chosen.items():
+            if quantity == "dP" and has_pressure:
+                notes += [f"not used: '{label}', as --dp says the pressure drop"] if declared else []
+                continue
+            if columns.setdefault(quantity, label) != label and quantity not in given:
+                opens.append(f"column of {quantity}: '{columns[quantity]}' in one file, '{label}' in another")
+    for quantity in ("time", "u", "Q", *(() if has_pressure else ("dP",))):
+        # Of a pressure whose label says which and lacks a unit, `_pressures` says more.
+        unsaid = [guess for guess in guesses if quantity != "dP" or not any(guess.bare_pressures.values())]
+        reason = next((guess.unclear[quantity] for guess in unsaid if quantity in guess.unclear), None)
+        if reason and quantity not in given:
+            opens.append(f"column of {quantity}: {reason}")
+    if "dP" in columns and "dP" not in given:
+        notes.append(f"pressure drop: '{columns['dP']}', the only column in a unit of pressure; {CHECK_DP}")
+    return columns, opens, list(dict.fromkeys(notes))
+
+
+def _contradicted(tests: "list[RampTest]", label: str) -> list[str]:
+    """Return what is open where a file's name says another pressure than its column."""
+    from dzdesign.identify.first_look import pressure_in_name
+
+    opens = []
+    for test in tests:
+        stated = pressure_in_name(test.source)
+        said = parse_quantity(stated, "pressure", "a file's name") if stated else None
+        found = float(median(test.dp.tolist())) if test.dp is not None else None
+        if said and found is not None and not said / SAME_PRESSURE < found < said * SAME_PRESSURE:
+            opens.append(
+                f"column of dP: '{test.source}' says {stated} in its name, and {found / 1e6:.3g} MPa in '{label}', the "
+                "only column in a unit of pressure; declare the one that is the drop, by --columns or --dp"
+            )
+    return opens
 
 
 def _pressures(guesses: "list[GuessedColumns]", columns: dict[str, str]) -> tuple[list[str], list[str]]:
@@ -162,8 +212,6 @@ def _pressures(guesses: "list[GuessedColumns]", columns: dict[str, str]) -> tupl
             # A label that says pA is read as that, and refused; any other is passed over.
             opens += [f"pressure: {line}"] if any(labels.values()) else []
             notes += [] if any(labels.values()) else [f"not used: {line}"]
-        elif "dP" in guess.unclear:
-            notes.append(f"not used: {guess.unclear['dP']}")
     return list(dict.fromkeys(opens)), list(dict.fromkeys(notes))
 
 

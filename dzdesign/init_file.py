@@ -19,6 +19,8 @@ RECORD_LINES = (
         'oil = "HLP 46"', 'oil-temperature = "40 °C"', 'bench = "bench 2"', 'meter = "gear meter, no. 12"',
     )),
 )  # fmt: skip
+#: Said where a pressure was taken for the drop because of its unit alone.
+CHECK_DP = "check that it is the drop over the valve, and not the pressure of one port or of the supply"
 
 
 def options_file(look: "Look", summary: list[str], opens: list[str]) -> str:
@@ -43,6 +45,7 @@ def options_file(look: "Look", summary: list[str], opens: list[str]) -> str:
         "",
         *_command_lines(look),
         "",
+        *_skip_lines(look),
         *_meter_lines(look),
         "",
         "# Reference pressure drop (default: the test nearest to 1 MPa).",
@@ -69,6 +72,13 @@ def _command_lines(look: "Look") -> list[str]:
     if look.u_seen < 0.97 * look.u_max:
         return [f"# Full command: a guess, for the ramps end at {look.u_seen:.2f} V. Correct it if it is wrong.", value]
     return [f"# Full command: the ramps end at {look.u_seen:.2f} V.", value]
+
+
+def _skip_lines(look: "Look") -> list[str]:
+    if look.skip_rows is None:
+        return []
+    said = "# Rows above the header of a file of text; without this line it is found."
+    return [said, f"skip-rows = {look.skip_rows}", ""]
 
 
 def _meter_lines(look: "Look") -> list[str]:
@@ -113,9 +123,11 @@ def _column_lines(look: "Look", opens: list[str]) -> list[str]:
     body = [f"{quantity} = {_quoted(label)}" for quantity, label in look.columns.items()]
     if body:
         lines += ["# Each is the only column that is left in a unit of its quantity, or as you said."]
+        if "dP" in look.columns and any("dP" in guess.chosen for guess in look.guesses):
+            lines += [f"# dP: {CHECK_DP}."]
         lines += ["[columns]", *body]
-    elif opens and open_ones:
-        lines += ["# [columns]", *(f'# {name} = "LABEL:UNIT"' for name in open_ones)]
+    if opens and open_ones:
+        lines += [*(() if body else ("# [columns]",)), *(f'# {name} = "LABEL:UNIT"' for name in open_ones)]
     return [*lines, ""]
 
 

@@ -8,10 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dzdesign.core.artefacts import check_place_of_files
+from dzdesign.core.artefacts import MANIFEST_NAME, check_place_of_files
 from dzdesign.core.errors import InputError, nearest, neighbour, quoted
 from dzdesign.core.units import parse_quantity
-from dzdesign.progress import with_bar
+from dzdesign.progress import say, with_bar
 
 if TYPE_CHECKING:
     from dzdesign.identify.ramp_files import RampTest
@@ -23,6 +23,7 @@ def read_recordings(
     u_max: float,
     columns: str | dict[str, str] | None,
     dp: str | dict[str, str] | None,
+    skip_rows: str | int | None = None,
     what: str = "reading recordings",
 ) -> "list[RampTest]":
     """Read the recordings that patterns name.
@@ -37,6 +38,8 @@ def read_recordings(
         Of --columns, or of the table in the file of options.
     dp : str or dict, optional
         Pressure drop that --dp declares for all files, or that [dp] declares for each.
+    skip_rows : str or int, optional
+        Of --skip-rows.
     what : str
         For the bar of progress.
 
@@ -48,15 +51,26 @@ def read_recordings(
     from dzdesign.identify.column_labels import parse_columns
     from dzdesign.identify.ramp_files import read_ramp_file
 
-    chosen = parse_columns(columns) if columns else {}
+    chosen, skip = parse_columns(columns) if columns else {}, rows_to_skip(skip_rows)
     paths = expand(patterns)
     names = told_apart(paths)
     tests = [
-        replace(read_ramp_file(path, u_max, columns=chosen, dp=_declared_dp(name, dp)), source=name)
+        replace(read_ramp_file(path, u_max, columns=chosen, dp=_declared_dp(name, dp), skip_rows=skip), source=name)
         for path, name in with_bar(list(zip(paths, names, strict=True)), what)
     ]
     _refuse_unnamed(tests, dp)
     return tests
+
+
+def rows_to_skip(text: str | int | None) -> int | None:
+    """Return the number that --skip-rows says, or None if it is not given."""
+    if text is None:
+        return None
+    if not re.fullmatch(r"\d{1,6}", str(text), re.ASCII):
+        raise InputError(
+            f"--skip-rows is {quoted(text)}, expected how many rows stand above the header, such as 12 (0: none)"
+        )
+    return int(text)
 
 
 def expand(patterns: list[str]) -> list[Path]:
@@ -69,7 +83,16 @@ def expand(patterns: list[str]) -> list[Path]:
             near = neighbour(os.path.dirname(pattern)) if not glob.has_magic(os.path.dirname(pattern)) else ""
             raise InputError(f"no file matches '{pattern}'{near}; check the name and the folder")
         paths += [Path(match) for match in matches]
-    return paths
+    return _without_manifests(paths)
+
+
+def _without_manifests(paths: list[Path]) -> list[Path]:
+    """Return the files without those that dzdesign itself puts into a folder of recordings; each is named."""
+    kept = [path for path in paths if path.name != MANIFEST_NAME]
+    for path in paths if kept else ():
+        if path.name == MANIFEST_NAME:
+            say(f"'{path}' is left out: a manifest that dzdesign writes beside recordings, and none itself")
+    return kept or paths
 
 
 def told_apart(paths: list[Path]) -> list[str]:

@@ -31,6 +31,11 @@ DP = _given(
     help='pressure drop of files without a column of it, such as "1 MPa"; in the TOML file also a table '
     "[dp] from file name (or pattern) to pressure",
 )
+SKIP_ROWS = _given(
+    "--skip-rows",
+    metavar="N",
+    help="rows that stand above the header of a file of text, such as a logger's words (default: found)",
+)
 U_MAX = _given("--u-max", default="10 V", metavar="U", help="full command")
 METER_LAG = _given("--meter-lag", metavar="T", help="lag of the flow meter (default: found from ramps of two rates)")
 METER_FLOOR = _given("--meter-floor", metavar="Q", help="flow below which the meter reads zero (default: found)")
@@ -39,6 +44,7 @@ KNEE_WINDOW = _given("--knee-window", default="12-50", metavar="A-B", help="per 
 IDENTIFY = (
     COLUMNS,
     DP,
+    SKIP_ROWS,
     _given("--dp0", metavar="P", help='reference pressure drop (default: the test nearest to "1 MPa")'),
     U_MAX,
     METER_FLOOR,
@@ -261,6 +267,7 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
             COLUMNS,
             _given("--after-columns", metavar="MAP", help="columns of the recordings after (default: as --columns)"),
             DP,
+            SKIP_ROWS,
             U_MAX,
             _given("--after-u-max", metavar="U", help="full command of the recordings after (default: as --u-max)"),
             METER_FLOOR,
@@ -293,6 +300,7 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
             _given(*OUTPUT, default="dzdesign.toml", metavar="FILE", help="file to write; one that exists stays"),
             COLUMNS,
             DP,
+            SKIP_ROWS,
         ),
     ),
     "doctor": (
@@ -334,7 +342,7 @@ COMMAND_GROUPS = {
 }
 #: Where an option stands in `dzdesign COMMAND --help`; one that is not named stands first, under "options".
 OPTION_GROUPS = {
-    "the recordings": ("--record", "--columns", "--after-columns", "--dp", "--u-max", "--after-u-max"),
+    "the recordings": ("--record", "--columns", "--after-columns", "--dp", "--skip-rows", "--u-max", "--after-u-max"),
     "the flow meter": ("--meter-floor", "--meter-lag", "--meter-zero"),
     "how it is fitted": ("--knee-window", "--confidence", "--flat-below", "--linearity-window"),
     "the law": ("--law", "--guard", "--edge", "--below-dp0", "--output-max"),

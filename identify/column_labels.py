@@ -7,8 +7,7 @@ from difflib import get_close_matches
 
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.units import measures
-from dzdesign.identify.table import Table
-from dzdesign.identify.text_tables import clean_label
+from dzdesign.identify.table import Table, clean_label
 
 #: Spelling in a header (lower case, letters only) -> quantity of a ramp test.
 COLUMN_NAMES = {
@@ -26,6 +25,9 @@ EXAMPLE_UNITS = {"time": "s", "u": "V", "dP": "MPa", "pA": "MPa", "pB": "MPa", "
 MOST_MEANT = 200
 #: Units of a command that is a share of u_max.
 PER_CENT = ("%", "pct", "percent")
+TELLING = ("time", "voltage", "pressure", "flow")
+#: Characters of a label in which a quantity is looked for.
+LONGEST_NAME = 80
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,6 +102,7 @@ def find_columns(table: Table, chosen: Mapping[str, str]) -> dict[str, Column]:
         if quantity is None or label in taken or quantity in chosen.keys() | pressures:
             continue
         unit = unit if unit and (fits(unit, quantity) or label not in table.units) else table.units.get(label, "")
+        unit = "s" if quantity == "time" and not fits(unit, "time") and table.is_clock(label) else unit
         if quantity in columns and not fits(unit, quantity):
             continue  # an oil temperature T_degC beside the time t_s, a set point Q_set beside Q_Lmin
         if quantity in columns and fits(columns[quantity].unit, quantity):
@@ -130,6 +133,8 @@ def _chosen_column(table: Table, quantity: str, text: str) -> Column:
     _, own = split_label(label)
     bracketed = bool(re.search(r"[\[(]", label))
     unit = unit or (own if bracketed or fits(own, quantity) else "") or table.units.get(label, "")
+    if quantity == "time" and not fits(unit, "time") and table.is_clock(label):
+        unit = "s"
     if not unit:
         raise InputError(
             f"'{table.path}' column '{label}' has no unit; write for example "
@@ -145,20 +150,41 @@ def split_label(label: str) -> tuple[str | None, str]:
     --------
     >>> split_label("dP_MPa"), split_label("Q [L/min]"), split_label("u (V)"), split_label("u")
     (('dP', 'MPa'), ('Q', 'L/min'), ('u', 'V'), ('u', ''))
+    >>> split_label("t/s"), split_label("p_diff/bar"), split_label("Flow in l/min")
+    (('time', 's'), (None, 'bar'), ('Q', 'l/min'))
     """
     bare = clean_label(label)
     # By hand: a regular expression for both brackets takes the cube of the label's length.
     bracket = re.compile(r"[\[(]").search(bare, 1)
     if bracket and bare[-1] in "])":
-        name, unit = bare[: bracket.start()].rstrip(), bare[bracket.end() : -1].strip()
+        name, unit = bare[: bracket.start()].rstrip(" /"), bare[bracket.end() : -1].strip()
     else:  # the unit follows the last underscore; L_min, as artefacts spell it, has one itself
         match = re.fullmatch(r"(.+?)_([lL]_min|[^_]*)", bare)
         name, unit = match.groups() if match else ("", bare)
     for candidate, its_unit in ((name, unit), (bare, "")):
-        quantity = COLUMN_NAMES.get(re.sub(r"[\s_]", "", candidate).lower())
+        quantity = _quantity_named(candidate)
         if quantity:
             return quantity, its_unit
-    return None, unit
+    return _after_a_blank_or_slash(bare) if not bracket else (None, unit)
+
+
+def _quantity_named(name: str) -> str | None:
+    return COLUMN_NAMES.get(re.sub(r"[\s_]", "", name[:LONGEST_NAME]).lower())
+
+
+def _after_a_blank_or_slash(label: str) -> tuple[str | None, str]:
+    """Split ``p / bar``, ``Druck in bar`` and ``flow l/min``; what follows must be a unit of a ramp test."""
+    for name, unit in (label.rpartition(" ")[::2], label.partition("/")[::2], label.rpartition("_")[::2]):
+        unit = unit.strip()
+        if name and is_telling(unit):
+            name = name.rstrip(" /,").removesuffix(" in")
+            return _quantity_named(name), unit
+    return None, label.rpartition("_")[2]
+
+
+def is_telling(unit: str) -> bool:
+    """Tell whether a unit says by itself which quantity of a ramp test it may be of."""
+    return unit.lower() in PER_CENT or any(measures(unit, quantity) for quantity in TELLING)
 
 
 def _missing_column(quantity: str, table: Table, columns: Collection[str]) -> InputError:

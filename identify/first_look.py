@@ -5,7 +5,7 @@ For a person who has yet to declare anything: what the recordings tell is kept a
 
 import math
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from dzdesign.core.artefacts import open_bytes
 from dzdesign.core.errors import InputError, nearest
+from dzdesign.core.units import measures
 from dzdesign.identify.column_labels import (
     COLUMN_NAMES,
     EXAMPLE_UNITS,
@@ -28,6 +29,7 @@ from dzdesign.identify.model import SIDES
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramp_files import RampTest, read_tables
 from dzdesign.identify.ramp_splitting import despiked
+from dzdesign.identify.scaling import range_example
 from dzdesign.identify.sides import tests_of_side
 from dzdesign.identify.table import Table
 
@@ -69,12 +71,12 @@ class GuessedColumns:
     bare_pressures: dict[str, str]
 
 
-def guess_columns(path: Path) -> GuessedColumns:
+def guess_columns(path: Path, skip_rows: int | None = None) -> GuessedColumns:
     """Tell which column of a recording is which quantity, by the labels or else by the units.
 
     Parameters
     ----------
-    path : Path
+    path, skip_rows
         As for `read_ramp_file`.
 
     Raises
@@ -83,7 +85,7 @@ def guess_columns(path: Path) -> GuessedColumns:
         If the file can't be read, or its labels contradict one another.
     """
     with open_bytes(Path(path), "ramp file") as file:
-        table = next(iter(read_tables(file, Path(path))), None)
+        table = next(iter(read_tables(file, Path(path), skip_rows)), None)
         if table is None:
             raise InputError(f"'{path}' holds no table; expected a recording of a ramp test")
         try:
@@ -91,11 +93,13 @@ def guess_columns(path: Path) -> GuessedColumns:
         except InputError:
             return _guess(table)
     bare = {quantity: column for quantity, column in understood.items() if not column.unit}
+    chosen, unclear = _foreign_pressures(table, understood)
     return GuessedColumns(
         labels=table.labels,
         understood={quantity: column for quantity, column in understood.items() if column.unit},
-        chosen={},
-        unclear={
+        chosen=chosen,
+        unclear=unclear
+        | {
             quantity: f"'{column.label}' has no unit; give it after a colon, such as {EXAMPLE_UNITS[quantity]}"
             for quantity, column in bare.items()
         },
@@ -117,6 +121,8 @@ def _guess(table: Table) -> GuessedColumns:
         if quantity in understood:
             continue
         left = [label for label in table.labels if label not in taken and _fits(table, label, quantity)]
+        if quantity == "time" and not left:
+            left = [label for label in table.labels if label not in taken and _is_clock(table, label)]
         named = [label for label in left if nearest(re.split(r"[_\[( ]", label)[0], _names_of(quantity))]
         if len(left) == 1 or len(named) == 1:
             chosen[quantity] = (left if len(left) == 1 else named)[0]
@@ -124,15 +130,56 @@ def _guess(table: Table) -> GuessedColumns:
         elif left:
             unclear[quantity] = f"{' and '.join(map(repr, left))} could each be it, by their units"
         else:
-            unclear[quantity] = f"no column has a unit of {QUANTITY_OF_COLUMN[quantity]}"
-    if not {"dP"} & understood.keys() and not {"pA", "pB"} <= understood.keys():
-        left = [label for label in table.labels if label not in taken and _fits(table, label, "dP")]
-        if left:
-            unclear["dP"] = f"{' and '.join(map(repr, left))}: a pressure, but is it the drop, pA or pB?"
+            unclear[quantity] = f"no column has a unit of {QUANTITY_OF_COLUMN[quantity]}{_or_a_signal(table, quantity)}"
+    its_pressure, its_doubt = _foreign_pressures(table, understood)
     return GuessedColumns(
-        labels=table.labels, understood=understood, chosen=chosen, unclear=unclear,
+        labels=table.labels, understood=understood, chosen=chosen | its_pressure, unclear=unclear | its_doubt,
         bare_pressures=_bare_pressures(table, understood.keys()),
     )  # fmt: skip
+
+
+def _foreign_pressures(table: Table, understood: Mapping[str, Column]) -> tuple[dict[str, str], dict[str, str]]:
+    """Return what is to be taken as the pressure drop, and what is unclear of it, where no label says it.
+
+    A column in a unit of pressure is never passed over: the one in the file's name may be another's.
+    """
+    if "dP" in understood or {"pA", "pB"} <= understood.keys():
+        return {}, {}
+    port = next((understood[name].label for name in ("pA", "pB") if name in understood), None)
+    labels = [column.label for column in understood.values()]
+    left = [label for label in table.labels if label not in labels and _fits(table, label, "dP")]
+    if port is not None:
+        return {}, {"dP": f"'{port}' is the pressure of one port; which column is that of the other, or the drop?"}
+    if len(left) == 1:
+        return {"dP": left[0]}, {}
+    if left:
+        return {}, {"dP": f"{' and '.join(map(repr, left))}: a pressure, but is it the drop, pA or pB?"}
+    signals = [label for label in _signals(table) if PRESSURE_LIKE.fullmatch(re.split(r"[\[(/]", label)[0].strip())]
+    if signals:
+        example = range_example("dP", signals[0], _unit_of(table, signals[0]))
+        return {}, {"dP": f"'{signals[0]}' is a current; say what it means, {example}"}
+    return {}, {}
+
+
+def _signals(table: Table) -> list[str]:
+    """Return the columns of currents."""
+    return [label for label in table.labels if measures(_unit_of(table, label), "current")]
+
+
+def _or_a_signal(table: Table, quantity: str) -> str:
+    """Return how a current is declared as a quantity, where there is one."""
+    signals = _signals(table)
+    if not signals or quantity == "time":
+        return ""
+    example = range_example(quantity, signals[0], _unit_of(table, signals[0]))
+    return f"; if {' or '.join(map(repr, signals))} is it, say what the current means, {example}"
+
+
+def _is_clock(table: Table, label: str) -> bool:
+    try:
+        return table.is_clock(label)
+    except InputError:  # a date without a time of day
+        return False
 
 
 def _bare_pressures(table: Table, known: Collection[str]) -> dict[str, str]:
@@ -148,8 +195,12 @@ def _bare_pressures(table: Table, known: Collection[str]) -> dict[str, str]:
     return found
 
 
+def _unit_of(table: Table, label: str) -> str:
+    return table.units.get(label) or split_label(label)[1]
+
+
 def _fits(table: Table, label: str, quantity: str) -> bool:
-    return fits(table.units.get(label) or split_label(label)[1], quantity)
+    return fits(_unit_of(table, label), quantity)
 
 
 def _names_of(quantity: str) -> list[str]:

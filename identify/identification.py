@@ -7,7 +7,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.identify.described_tests import L_MIN
 from dzdesign.identify.model import SIDES, ValveModel, Warning_
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.quality import about_thinning
+from dzdesign.identify.quality import about_clocks, about_thinning
 from dzdesign.identify.ramp_files import RampTest
 from dzdesign.identify.side import IdentifiedSide, identify_side
 from dzdesign.identify.sides import tests_of_side
@@ -57,7 +57,7 @@ def identify_sides(
     if not tests:
         raise InputError("no ramp tests were given; expected at least one file")
     sides: dict[str, IdentifiedSide] = {}
-    warnings: list[Warning_] = list(about_thinning(tests))
+    warnings: list[Warning_] = [*about_clocks(tests), *about_thinning(tests)]
     for name, sign in SIDES.items():
         mine = tests_of_side(tests, sign, options.u_max)
         if not mine:

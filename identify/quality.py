@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from dzdesign.identify.clock import ASSUMED_MS
 from dzdesign.identify.described_tests import L_MIN, DescribedTest, DescribedTests
 from dzdesign.identify.model import SideModel, TestResult, Warning_
 from dzdesign.identify.options import IdentifyOptions
@@ -62,6 +63,23 @@ def about_thinning(tests: Sequence[RampTest]) -> Iterator[Warning_]:
                     f"of {test.rows_read} rows every {test.run} in a row were averaged, without their spikes, to "
                     f"{test.time.size} samples, to which noise and outliers refer. The next one may be recorded at a "
                     "lower rate"
+                ),
+                source=test.source,
+            )
+
+
+def about_clocks(tests: Sequence[RampTest]) -> Iterator[Warning_]:
+    """Yield a warning for each recording whose time is plainly in milliseconds and does not say so."""
+    for test in tests:
+        if test.clock_doubt:
+            took = "was taken as" if test.clock_doubt == ASSUMED_MS else "was not taken as"
+            why = "says no unit" if test.clock_doubt == ASSUMED_MS else "says another unit"
+            yield Warning_(
+                code="time-unit",
+                text=(
+                    f"the column of time counts like milliseconds, in whole numbers by which a ramp in seconds would "
+                    f"take more than an hour, and {why}: it {took} milliseconds. Say its unit in its label, such as "
+                    'time_ms, or by --columns "time=LABEL:ms"'
                 ),
                 source=test.source,
             )
@@ -149,7 +167,7 @@ def _about_pressure(side: SideModel, tests: tuple[DescribedTest, ...]) -> Iterat
             text=(
                 "the ramp test has no pressure drop: the knee holds for the pressure of that test only; beta(dP), the "
                 "trend, k at another pressure and a certified interval can't be said. Record dP (or pA and pB), at two "
-                "or more pressure drops"
+                "or more pressure drops, or declare it by --dp"
             ),
             source=side.tests[0].source,
         )

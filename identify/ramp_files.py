@@ -9,23 +9,22 @@ from collections.abc import Generator, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO, final
+from typing import BinaryIO
 
 import numpy as np
 
 from dzdesign.core.artefacts import open_bytes, sha256_of_file
 from dzdesign.core.errors import InputError
-from dzdesign.core.units import si_factor
 from dzdesign.identify.binary_tables import binary_reader
-from dzdesign.identify.column_labels import EXAMPLE_LABELS, PER_CENT, QUANTITY_OF_COLUMN, Column, find_columns
+from dzdesign.identify.clock import ASSUMED_MS, Clock
+from dzdesign.identify.column_labels import QUANTITY_OF_COLUMN, Column, find_columns
+from dzdesign.identify.scaling import scaling_of
 from dzdesign.identify.table import QUOTED_CHARACTERS, Table
 from dzdesign.identify.text_tables import text_tables
 from dzdesign.identify.thinning import Thinner
 
 #: Fewest complete rows in which two branches with a threshold could stand.
 MIN_ROWS = 20
-#: Units of a command that is a current: what it means in volts, the file does not say.
-CURRENT = ("ma", "a")
 #: SI numbers beyond these are no measurement of a valve: a wrong unit, or what a logger writes for an overflow.
 LARGEST = {"time": 1e12, "voltage": 1e4, "pressure": 1e9, "flow": 10.0}
 
@@ -46,6 +45,8 @@ class RampTest:
         True if the pressure drop is the engineer's word (one constant) and not a recording.
     rows_read, run : int
         Complete rows in the file, and how many of them in a row were averaged to one sample (1: none were).
+    clock_doubt : str
+        What is doubtful about the unit of the time, as `Clock.doubt` gives it.
     """
 
     source: str
@@ -57,6 +58,7 @@ class RampTest:
     dp_is_declared: bool = False
     rows_read: int = 0
     run: int = 1
+    clock_doubt: str = ""
 
     def __post_init__(self) -> None:
         for array in (self.time, self.u, self.q, self.dp):
@@ -68,7 +70,12 @@ class RampTest:
 
 
 def read_ramp_file(
-    path: Path, u_max: float = 10.0, *, columns: Mapping[str, str] | None = None, dp: float | None = None
+    path: Path,
+    u_max: float = 10.0,
+    *,
+    columns: Mapping[str, str] | None = None,
+    dp: float | None = None,
+    skip_rows: int | None = None,
 ) -> RampTest:
     """Read one recording from a file.
 
@@ -84,6 +91,8 @@ def read_ramp_file(
         Quantity -> label in the file, as `column_labels.parse_columns` gives it; it goes before what labels say.
     dp : float, optional
         Pressure drop in Pa of a file that has no column of it.
+    skip_rows : int, optional
+        Lines above the header of a file of text. None: the header is found.
 
     Raises
     ------
@@ -91,11 +100,11 @@ def read_ramp_file(
         Naming file, and row and column where there is one.
     """
     path = Path(path)
-    thinner, clock = Thinner(u_max), _Clock()
+    thinner, clock = Thinner(u_max), Clock()
     found: dict[str, Column] = {}
     with open_bytes(path, "ramp file") as file:
         sha256 = sha256_of_file(file)
-        with closing(read_tables(file, path)) as tables:
+        with closing(read_tables(file, path, skip_rows)) as tables:
             for table in tables:
                 if not found:
                     found = find_columns(table, columns or {})
@@ -105,6 +114,11 @@ def read_ramp_file(
     if thinner.read < MIN_ROWS:
         raise InputError(f"'{path}' has {thinner.read} complete rows, expected at least {MIN_ROWS} of a ramp test")
     time, u, q, *measured = (column.copy() for column in thinner.rows())
+    doubt = clock.doubt(time, u)
+    if doubt == ASSUMED_MS:
+        time /= 1e3
+    elif not found["time"].unit:
+        scaling_of(path, "time", found["time"], u_max)  # says that it lacks one
     return RampTest(
         source=path.name.encode(errors="replace").decode(),
         sha256=sha256,
@@ -115,10 +129,11 @@ def read_ramp_file(
         dp_is_declared=dp is not None,
         rows_read=thinner.read,
         run=thinner.run,
+        clock_doubt=doubt,
     )
 
 
-def read_tables(file: BinaryIO, path: Path) -> Generator[Table, None, None]:
+def read_tables(file: BinaryIO, path: Path, skip_rows: int | None = None) -> Generator[Table, None, None]:
     """Read a table of any known format, block by block; its first bytes tell which, not its name.
 
     Parameters
@@ -127,6 +142,8 @@ def read_tables(file: BinaryIO, path: Path) -> Generator[Table, None, None]:
         CSV (plain or gzip), TDMS, MAT, HDF5, Parquet or Feather.
     path : Path
         For messages.
+    skip_rows : int, optional
+        Of `text_tables`.
 
     Raises
     ------
@@ -135,15 +152,15 @@ def read_tables(file: BinaryIO, path: Path) -> Generator[Table, None, None]:
     """
     start = file.read(32)
     file.seek(0)
-    read = binary_reader(start, path) or text_tables
-    return read(file, path)
+    read = binary_reader(start, path)
+    return read(file, path) if read else text_tables(file, path, skip_rows)
 
 
 def _complete_rows(
-    table: Table, found: Mapping[str, Column], clock: "_Clock", u_max: float, dp: float | None
+    table: Table, found: Mapping[str, Column], clock: Clock, u_max: float, dp: float | None
 ) -> np.ndarray:
     """Return time, command, flow and, if it is known, pressure drop of the rows of a block that lack none of them."""
-    data = {quantity: _si_numbers(table, quantity, column, u_max) for quantity, column in found.items()}
+    data = {quantity: _si_numbers(table, quantity, column, clock, u_max) for quantity, column in found.items()}
     measured = data["dP"] if "dP" in data else data["pA"] - data["pB"] if "pA" in data else None
     if measured is None and dp is not None:
         measured = np.full(data["time"].size, dp)
@@ -177,36 +194,17 @@ def _refuse_unequal_lengths(table: Table, found: Mapping[str, Column]) -> None:
             )
 
 
-@final
-class _Clock:
-    """The clock of a recording from block to block: where it jitters back by less than a sample it stands still."""
-
-    def __init__(self) -> None:
-        self._latest = np.empty(0)  # the last time of the block before, if there was one
-        self._usual = 0.0
-
-    def steady(self, table: Table, time: np.ndarray, complete: np.ndarray) -> np.ndarray:
-        """Return the times of the complete rows of a block, never going back; refuse a clock that was set back."""
-        time = np.concatenate([self._latest, time])
-        latest = np.maximum.accumulate(time)
-        steps = np.diff(time)
-        self._usual = float(np.median(steps[steps > 0])) if np.any(steps > 0) else self._usual
-        backwards = np.flatnonzero(latest - time > self._usual)
-        if backwards.size:
-            row = int(np.flatnonzero(complete)[backwards[0] - self._latest.size])
-            raise InputError(
-                f"'{table.path}' {table.place(row)}: the time goes back; expected one recording in the order it was "
-                "taken; where ramps with clocks of their own follow one another, make a file of each"
-            )
-        carried, self._latest = self._latest.size, latest[-1:]
-        return latest[carried:]
-
-
-def _si_numbers(table: Table, quantity: str, column: Column, u_max: float) -> np.ndarray:
+def _si_numbers(table: Table, quantity: str, column: Column, clock: Clock, u_max: float) -> np.ndarray:
     """Return one column in SI, NaN where a sample is missing; refuse what no valve gives."""
-    factor = _factor(table, quantity, column, u_max)
+    if quantity == "time":
+        seconds = clock.stamps(table, column)
+        if seconds is not None:
+            return seconds
+        if not column.unit and clock.may_be_ms(numbers := table.numbers(column.label)):
+            return numbers  # until the whole of it tells
+    scaling = scaling_of(table.path, quantity, column, u_max)
     with np.errstate(over="ignore", invalid="ignore"):  # an infinity is refused below
-        numbers = table.numbers(column.label) * factor
+        numbers = table.numbers(column.label) * scaling.gain + scaling.offset
     far = np.flatnonzero(np.abs(numbers) > LARGEST[QUANTITY_OF_COLUMN[quantity]])
     if far.size:
         row = int(far[0])
@@ -216,22 +214,6 @@ def _si_numbers(table: Table, quantity: str, column: Column, u_max: float) -> np
             "correct it, or leave the cell blank if the sample is missing"
         )
     return numbers
-
-
-def _factor(table: Table, quantity: str, column: Column, u_max: float) -> float:
-    """Return the factor from the column's unit to SI; a command may also be in per cent of u_max."""
-    if not column.unit:
-        raise InputError(
-            f"'{table.path}' column '{column.label}' has no unit; write for example {EXAMPLE_LABELS[quantity]}"
-        )
-    try:
-        if quantity == "u" and column.unit.lower() in PER_CENT:
-            return u_max * si_factor(column.unit, "ratio")
-        return si_factor(column.unit, QUANTITY_OF_COLUMN[quantity])
-    except InputError as error:
-        current = quantity == "u" and column.unit.lower() in CURRENT
-        hint = "; write a command in mA as per cent of full command, u_%, zero where the current means none"
-        raise InputError(f"'{table.path}' column '{column.label}': {error}{hint if current else ''}") from error
 
 
 def ramp_file_bytes(columns: Mapping[str, np.ndarray], comments: tuple[str, ...], *, compress: bool) -> bytes:

@@ -7,16 +7,24 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 
 from dzdesign.core.errors import InputError, nearest, one_line
 
+if TYPE_CHECKING:
+    from dzdesign.identify.time_stamps import Stamps
+
 #: Characters of a cell, and columns of a file, that a message quotes.
 QUOTED_CHARACTERS, QUOTED_COLUMNS = 40, 12
 #: Characters of a library's own error that are quoted.
 LONGEST_REASON = 200
+
+
+def clean_label(label: str) -> str:
+    """Return a column's label without the blanks and quotes around it."""
+    return label.strip(' \t"')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,6 +65,14 @@ class Table(ABC):
     def cell(self, label: str, row: int) -> str:
         """Return what stands in a cell, for messages."""
         return f"{self.numbers(label)[row]:g}"
+
+    def is_clock(self, label: str) -> bool:
+        """Tell whether a column holds dates or times of day, which `numbers` can't give and `seconds` can."""
+        return False
+
+    def seconds(self, label: str, stamps: "Stamps") -> np.ndarray:
+        """Return a column of dates or times of day as seconds since the first row of the file."""
+        raise NotImplementedError
 
     def found(self) -> str:
         """Return the labels for a message, the first `QUOTED_COLUMNS` of them."""

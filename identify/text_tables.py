@@ -1,13 +1,11 @@
 """Text tables: CSV of any delimiter, plain or gzip, with decimal point or comma; an open file in, `TextTable`s out.
 
-A file is read `BLOCK_BYTES` at a time, cut at an end of line: one longer than memory is a table like any other.
+A file is read block by block, see `text_blocks`: one longer than memory is a table like any other. Rows that all look
+alike are read at once; where one does not, each line of its block is looked at.
 """
 
-import csv
-import gzip
-import os
+import logging
 import re
-import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +14,20 @@ from typing import TYPE_CHECKING, BinaryIO, final
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.table import QUOTED_CHARACTERS, Table
+from dzdesign.identify.table import QUOTED_CHARACTERS, Table, clean_label
+from dzdesign.identify.text_blocks import text_blocks
+from dzdesign.identify.text_header import (
+    BLANKS,
+    LONGEST_HEADER,
+    LONGEST_LINE,
+    MOST_LINES,
+    TABLE_LINE,
+    Header,
+    find_header,
+    is_number,
+    split_line,
+)
+from dzdesign.identify.time_stamps import EXAMPLE, Stamps, is_stamp, is_unclear
 
 if TYPE_CHECKING:
     import polars as pl
@@ -24,31 +35,19 @@ if TYPE_CHECKING:
 #: The number of a line in its file (1 is the first), and the line.
 Lines = list[tuple[int, str]]
 
-#: Bytes of text that are read at a time.
-BLOCK_BYTES = 1 << 23
-#: A recording has some ten columns; a header beyond this is no table, and would take minutes to be searched.
-MOST_COLUMNS, LONGEST_HEADER = 4096, 1 << 20
-#: A gzip file that holds more than this many times its bytes, and `FREE_BYTES`, is made to fill a memory or a day:
-#: of a recording, whose clock runs and whose meter is noisy, some five to fifteen times are usual.
-LARGEST_RATIO, FREE_BYTES = 64, 1 << 26
-#: A line that is neither a comment nor blank; what a spreadsheet makes of either has quotes or separators.
-TABLE_LINE = re.compile(rb'^(?![ \t,;"]*$)(?![ \t"]*#).+', re.MULTILINE)
 #: Joins the cells of a line inside: no cell of a text file holds it.
 CELL_END = "\x1f"
-#: A cell with a date or a time of day.
+#: What a row of numbers may begin with.
+NUMERIC = "0123456789+-."
+#: A cell with a date.
 DATE = re.compile(r"\d[-/.:]\d+[-/.:]\d")
-#: What may stand between cells; where none of them is in the header, blanks do.
-SEPARATORS, BLANKS = ",;\t|", " "
+#: Numbers with a mark between thousands, by their decimal mark.
+GROUPED = {
+    ",": r"^[-+]?(?:\d{1,3}(?:\.\d{3})+|\d+)(?:,\d*)?$",
+    ".": r"^[-+]?(?:\d{1,3}(?:,\d{3})+|\d+)(?:\.\d*)?$",
+}
 
-
-@final
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Header:
-    """The header row: its number in the file, the labels, and what stands between two cells."""
-
-    line: int
-    labels: tuple[str, ...]
-    separator: str
+logger = logging.getLogger(__name__)
 
 
 @final
@@ -102,158 +101,200 @@ class TextTable(Table):
 
         numbers = self.cells.to_series(self.labels.index(label))
         if numbers.dtype != pl.Float64:
-            column = self._texts(label)
+            texts = self._texts(label)
+            column = self._with_points(label, texts)
             numbers = column.cast(pl.Float64, strict=False)
             bad = (~(column.is_null() | (column == "")) & numbers.is_null()).arg_true()
             if len(bad):
-                row = int(bad[0])
-                date = " (the time has to be in seconds, not a date)" if DATE.search(column[row]) else ""
-                raise InputError(
-                    f"'{self.path}' {self.place(row)}, column '{label}': '{column[row][:QUOTED_CHARACTERS]}' is not a "
-                    f"number{date}; correct it, or leave the cell blank if the sample is missing"
-                )
+                raise self._no_number(label, int(bad[0]), texts[int(bad[0])])
         return numbers.fill_null(np.nan).to_numpy().copy()
 
+    def is_clock(self, label: str) -> bool:
+        """Tell whether the first cell of a column that is not blank holds a time of day."""
+        import polars as pl
+
+        if self.cells.to_series(self.labels.index(label)).dtype == pl.Float64:
+            return False
+        cell = self._first(label)
+        if is_unclear(cell):
+            raise InputError(
+                f"'{self.path}' column '{label}': '{cell}' may be hours and minutes, minutes and seconds or a date, "
+                f"expected seconds as a number, or a time such as {EXAMPLE}"
+            )
+        return is_stamp(cell)
+
+    def seconds(self, label: str, stamps: Stamps) -> np.ndarray:
+        """Return a column of dates or times of day as seconds since the first row of the file."""
+        texts = self._texts(label)
+        seconds = stamps.seconds(texts, f"'{self.path}' column '{label}'")
+        bad = np.flatnonzero((~(texts.is_null() | (texts == ""))).to_numpy() & np.isnan(seconds))
+        if bad.size:
+            row = int(bad[0])
+            raise InputError(
+                f"'{self.path}' {self.place(row)}, column '{label}': '{texts[row][:QUOTED_CHARACTERS]}' is no time, "
+                f"expected one such as {EXAMPLE}, as above; correct it, or leave the cell blank if it is missing"
+            )
+        return seconds
+
+    def _first(self, label: str) -> str:
+        texts = self._texts(label)
+        filled = texts.filter(texts.is_not_null() & (texts != ""))
+        return filled[0] if len(filled) else ""
+
     def _texts(self, label: str) -> "pl.Series":
-        column = self.cells.to_series(self.labels.index(label)).str.strip_chars(' \t"')
+        import polars as pl
+
+        return self.cells.to_series(self.labels.index(label)).cast(pl.String).str.strip_chars(' \t"')
+
+    def _with_points(self, label: str, texts: "pl.Series") -> "pl.Series":
+        """Return numbers with a decimal point, whatever their decimal mark is, and without one between thousands."""
+        point = texts.str.contains(".", literal=True).fill_null(False)
+        comma = texts.str.contains(",", literal=True).fill_null(False) if point.any() else ~point
         # A decimal comma can only stand where the comma does not separate the cells.
-        return column.str.replace(",", ".", literal=True)
+        if not point.any() or not comma.any():
+            return texts.str.replace(",", ".", literal=True)
+        both = texts.filter(comma & point)
+        shown = both[0] if len(both) else texts.filter(comma)[0]
+        decimal = max(",.", key=shown.rfind)
+        other = "." if decimal == "," else ","
+        wrong = (~texts.str.contains(GROUPED[decimal]).fill_null(True) & (texts != "")).arg_true()
+        if not len(both) or len(wrong):
+            row = int(wrong[0]) if len(wrong) else int(point.arg_true()[0])
+            raise InputError(
+                f"'{self.path}' {self.place(row)}, column '{label}': '{texts[row][:QUOTED_CHARACTERS]}' stands in one "
+                f"column with '{shown[:QUOTED_CHARACTERS]}', so which mark is the decimal one can't be told; export "
+                "numbers with one mark and no separator of thousands"
+            )
+        return texts.str.replace_all(other, "", literal=True).str.replace(decimal, ".", literal=True)
+
+    def _no_number(self, label: str, row: int, cell: str) -> InputError:
+        date = f" (a column of the time may hold stamps such as {EXAMPLE})" if DATE.search(cell) else ""
+        return InputError(
+            f"'{self.path}' {self.place(row)}, column '{label}': '{cell[:QUOTED_CHARACTERS]}' is not a "
+            f"number{date}; correct it, or leave the cell blank if the sample is missing"
+        )
 
 
-def text_tables(file: BinaryIO, path: Path) -> Iterator[TextTable]:
+def text_tables(file: BinaryIO, path: Path, skip_rows: int | None = None) -> Iterator[TextTable]:
     """Read a table of text, block by block.
 
     Parameters
     ----------
     file : binary file
-        UTF-8, plain or gzip: a header row, then samples; lines that start with ``#`` are comments. Cells are parted
-        by comma, semicolon, tab or ``|``, or by blanks where the header has none of these.
+        UTF-8, UTF-16 with a byte order mark or Windows-1252, plain or gzip: a header row, then samples; lines that
+        start with ``#`` are comments. Cells are parted by comma, semicolon, tab or ``|``, or by blanks where the
+        header has none of these. What a logger writes above the header and below the samples is passed over.
     path : Path
         For messages.
+    skip_rows : int, optional
+        Lines of the file that stand above the header. None: the header is found.
 
     Raises
     ------
     InputError
         If it is no such text, or a row has not as many cells as the header.
     """
-    header, number = None, 1
-    for block in _blocks(file, path):
+    header, number, foot = None, 1, _Foot(path)
+    for block in text_blocks(file, path):
+        skipped = _end_of_lines(block, (skip_rows or 0) + 1 - number)
+        number += _count(block[:skipped], "\n")
+        block = block[skipped:]
         if header is None:
-            header, rows = _find_header(block, number, path)
+            header, rows = find_header(block, number, path, told=skip_rows is not None)
             if header is None and len(block) >= LONGEST_HEADER:
                 raise InputError(
                     f"'{path}' begins with {len(block)} bytes of comments and blank lines; expected a header row such "
                     "as time_s,u_V,dP_MPa,Q_Lmin near its beginning"
                 )
+            if header is not None and skip_rows is None:
+                _tell(header, block, number, path)
         else:
             rows = block
         if header is not None:
             first = number + block.count(b"\n", 0, len(block) - len(rows))
-            yield _table(rows, first, header, path)
+            yield _table(rows, first, header, foot)
         number += _count(block, "\n")
     if header is None:
-        raise InputError(f"'{path}' is empty; expected a header row such as time_s,u_V,dP_MPa,Q_Lmin and samples")
-
-
-def _blocks(file: BinaryIO, path: Path) -> Iterator[bytes]:
-    """Return whole lines that end in a line feed, some `BLOCK_BYTES` at a time, without a byte order mark."""
-    packed = file.read(2) == b"\x1f\x8b"
-    file.seek(0)
-    stream = gzip.GzipFile(fileobj=file) if packed else file
-    most = FREE_BYTES + LARGEST_RATIO * _size(file) if packed else None
-    rest, offset = b"", 0
-    while True:
-        try:
-            data = stream.read(BLOCK_BYTES)
-        except (gzip.BadGzipFile, EOFError, zlib.error) as error:
-            raise InputError(f"'{path}' is not a whole gzip file ({error}); copy it again") from error
-        if most is not None and offset + len(rest) + len(data) > most:
-            raise InputError(
-                f"'{path}' unpacks to more than {LARGEST_RATIO} times its size, as no recording does; give the "
-                "recording itself, not packed"
-            )
-        block, last = rest + data, len(data) < BLOCK_BYTES
-        # The last end of line may be half of one: a carriage return whose line feed is still to come.
-        end = len(block) if last else max(block.rfind(b"\n"), block.rfind(b"\r", 0, -1)) + 1
-        _refuse_no_text(block[:end] if end else block, offset, path)
-        if not end and not last:
-            raise InputError(f"'{path}' has a line of more than {len(block)} bytes; expected a table of numbers")
-        bare = block[:end] if offset else block[:end].removeprefix(b"\xef\xbb\xbf")
-        # Not splitlines(): to an editor, whose line numbers the messages give, a form feed or U+0085 ends no line.
-        yield bare.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in bare else bare
-        if last:
-            return
-        rest, offset = block[end:], offset + end
-
-
-def _size(file: BinaryIO) -> int:
-    """Return how many bytes a file has, and go back to its beginning."""
-    size = file.seek(0, os.SEEK_END)
-    file.seek(0)
-    return size
-
-
-def _refuse_no_text(data: bytes, offset: int, path: Path) -> None:
-    """Refuse what is no text in UTF-8; `offset` bytes stand before it in the file."""
-    if not offset and data.startswith(b"PK"):
-        raise InputError(f"'{path}' is an Excel workbook or a zip archive; save the table as 'CSV UTF-8'")
-    try:
-        if not data.isascii():
-            data.decode()
-    except UnicodeDecodeError as error:
+        below = f" below its first {skip_rows} rows (--skip-rows)" if skip_rows else ""
         raise InputError(
-            f"'{path}' is not a text file in UTF-8 (byte {offset + error.start + 1}); save the table as 'CSV UTF-8'"
-        ) from error
-    if b"\0" in data:
-        raise InputError(f"'{path}' is UTF-16 or no text at all, expected UTF-8; save the table as 'CSV UTF-8'")
-
-
-def _find_header(block: bytes, number: int, path: Path) -> tuple[Header | None, bytes]:
-    """Return the first line that is neither a comment nor blank, read as the header, and what follows it."""
-    found = TABLE_LINE.search(block)
-    if found is None:
-        return None, b""
-    number += block.count(b"\n", 0, found.start())
-    return _header(number, found[0].decode(), path), block[found.end() + 1 :]
-
-
-def _header(number: int, line: str, path: Path) -> Header:
-    """Return the header that a line holds; refuse a line of numbers."""
-    separator = max(SEPARATORS, key=line.count)
-    separator = separator if separator in line else BLANKS
-    columns = len(line.split()) if separator == BLANKS else line.count(separator) + 1
-    if columns > MOST_COLUMNS or len(line) > LONGEST_HEADER:
-        raise InputError(
-            f"'{path}' row {number} has {columns} cells, expected the columns of a ramp test, at most {MOST_COLUMNS}; "
-            "export only those"
+            f"'{path}' is empty{below}; expected a header row such as time_s,u_V,dP_MPa,Q_Lmin and samples"
         )
-    labels = tuple(clean_label(label) for label in _labels(line, separator, number, path))
-    if all(re.fullmatch(r"[-+\d.,eE\s]*", label) for label in labels):
-        raise InputError(
-            f"'{path}' has no header row (row {number} is '{line[:QUOTED_CHARACTERS]}'); "
-            "expected names with units such as time_s,u_V,dP_MPa,Q_Lmin"
-        )
-    return Header(line=number, labels=labels, separator=separator)
 
 
-def _table(rows: bytes, number: int, header: Header, path: Path) -> TextTable:
+def _end_of_lines(block: bytes, count: int) -> int:
+    """Return where the first `count` lines of a block end."""
+    end = 0
+    for _ in range(max(count, 0)):
+        end = block.find(b"\n", end) + 1
+        if not end:
+            return len(block)
+    return end
+
+
+def _tell(header: Header, block: bytes, number: int, path: Path) -> None:
+    """Log where the header was found, where something stands above it, and its units, where they stand below it."""
+    first = TABLE_LINE.search(block)
+    if first is not None and number + block.count(b"\n", 0, first.start()) < header.line:
+        logger.debug("'%s': the header was found in row %d; what stands above it is passed over", path, header.line)
+    if header.units:
+        logger.debug("'%s': the row below the header says units: %s", path, ", ".join(header.units.values()))
+
+
+@final
+class _Foot:
+    """What a logger writes below the samples: lines of text, after which no sample may follow."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._error: InputError | None = None
+        self._count = 0
+
+    def add(self, number: int, cells: Sequence[str], header: Header) -> None:
+        """Take a line of text."""
+        logger.debug("'%s' row %d is passed over: %s", self.path, number, " ".join(cells)[:QUOTED_CHARACTERS])
+        self._error = self._error or _wrong_row(cells, number, header, self.path)
+        self._count += 1
+        if self._count > MOST_LINES:
+            self.refuse_what_follows()
+
+    def refuse_what_follows(self) -> None:
+        """Refuse samples below lines of text."""
+        if self._error is not None:
+            raise self._error
+
+
+def _table(rows: bytes, number: int, header: Header, foot: _Foot) -> TextTable:
     """Return the table of rows; `number` is that of their first line in the file."""
-    cells = _plain_cells(rows, header.separator, len(header.labels))
+    cells = None if _has_other_lines(rows, header) else _plain_cells(rows, header.separator, len(header.labels))
     if cells is not None:
+        foot.refuse_what_follows()
         lines: Sequence[int] = range(number, number + cells.height)
     else:
-        kept = _table_lines(rows.decode(), number)
-        cells = _read_cells(kept, header, path)
-        lines, rows = [number for number, _ in kept], b""
+        kept = _table_lines(rows.decode(), number, header)
+        cells, numbers = _read_cells(kept, header, foot)
+        lines, rows = numbers, b""
     return TextTable(
-        path=path,
+        path=foot.path,
         labels=header.labels,
+        units=header.units,
         cells=cells,
         header_line=header.line,
         lines=lines,
         plain=rows,
         separator=header.separator,
     )
+
+
+def _has_other_lines(rows: bytes, header: Header) -> bool:
+    """Tell whether the header stands among rows once more, or a line of text at their end."""
+    last = rows[-LONGEST_LINE:].rstrip(b"\n").rpartition(b"\n")[2].decode(errors="replace")
+    return _is_text(last.split(header.separator)) or any(line.encode() in rows for line in header.repeats)
+
+
+def _is_text(cells: list[str]) -> bool:
+    """Tell whether a row is a word of the logger: nothing but text in its first cell."""
+    filled = [bare for cell in cells if (bare := clean_label(cell))]
+    return len(filled) == 1 and bool(clean_label(cells[0])) and not is_number(filled[0])
 
 
 def _plain_cells(rows: bytes, separator: str, width: int) -> "pl.DataFrame | None":
@@ -295,62 +336,56 @@ def _every_row_has(rows: bytes, separator: str, width: int) -> bool:
     return not np.any(np.add.reduceat(characters == ord(separator), starts, dtype=np.int32) != width - 1)
 
 
-def _table_lines(text: str, first: int) -> Lines:
-    """Return every line that is neither a comment nor blank; `first` is the number of the first line.
+def _table_lines(text: str, first: int, header: Header) -> Lines:
+    """Return every line that is neither comment, blank nor the header again; `first` is the number of the first line.
 
     A spreadsheet that has saved a file again leaves comments in quotes, and blank lines as a row of separators.
     """
     return [
         (number, line)
         for number, line in enumerate(text.split("\n"), start=first)
-        if line.strip(' \t,;"') and not line.lstrip(' \t"').startswith("#")
+        if line.strip(' \t,;"') and not line.lstrip(' \t"').startswith("#") and line not in header.repeats
     ]
 
 
-def clean_label(label: str) -> str:
-    """Return a column's label without the blanks and quotes around it."""
-    return label.strip(' \t"')
-
-
-def _labels(header: str, separator: str, number: int, path: Path) -> list[str]:
-    """Return the labels of the header; between blanks, a unit in brackets belongs to the label before it."""
-    if separator == BLANKS:
-        # Of a bracket that is never closed only so much is looked at: a long header of them would take hours.
-        return re.findall(r"[^\s\[(]+(?:\s{0,40}[\[(][^\])]{0,80}[\])])?", header)
-    return _split(header, separator, number, path)
-
-
-def _split(line: str, separator: str, number: int, path: Path) -> list[str]:
-    """Return the cells of a line; inside quotes the separator is a character as any other."""
-    if separator == BLANKS:
-        return line.split()
-    if '"' not in line:
-        return line.split(separator)
-    try:
-        return next(csv.reader([line], delimiter=separator, skipinitialspace=True))
-    except csv.Error as error:  # a cell longer than 128 KiB, as after a quote that is never closed
-        raise InputError(f"'{path}' row {number} has a cell that can't be read ({error}); mind its quotes") from error
-
-
-def _read_cells(lines: Lines, header: Header, path: Path) -> "pl.DataFrame":
-    """Return all cells as strings: numbers are read column by column, so that an error can name its row."""
+def _read_cells(lines: Lines, header: Header, foot: _Foot) -> tuple["pl.DataFrame", list[int]]:
+    """Return all cells as strings, and their rows' numbers: numbers are read column by column, to name a wrong row."""
     import polars as pl
 
     separator, width = header.separator, len(header.labels)
-    table = [CELL_END.join(f"c{index}" for index in range(width))]
+    table, numbers = [CELL_END.join(f"c{index}" for index in range(width))], []
     for number, line in lines:
-        cells = _split(line, separator, number, path) if '"' in line or separator == BLANKS else None
-        count = line.count(separator) + 1 if cells is None else len(cells)
-        if count != width:
-            comma = separator == "," and count == 2 * width
-            hint = "; decimal commas need ';' or a tab between the cells" if comma else ""
-            raise InputError(
-                f"'{path}' row {number} has {count} cells, expected {width} as in the header, row {header.line} "
-                f"('{', '.join(header.labels)[:QUOTED_CHARACTERS]}'){hint}; correct the row, or begin rows that stand "
-                "above the header with #"
-            )
-        table.append(line.replace(separator, CELL_END) if cells is None else CELL_END.join(cells))
+        if line[0] in NUMERIC and '"' not in line and separator != BLANKS and line.count(separator) == width - 1:
+            text = line.replace(separator, CELL_END)
+        else:
+            cells = split_line(line, separator, number, foot.path)
+            if len(cells) != width or _is_text(cells):
+                if is_number(clean_label(cells[0])):
+                    raise _wrong_row(cells, number, header, foot.path)
+                foot.add(number, cells, header)
+                continue
+            text = CELL_END.join(cells)
+        foot.refuse_what_follows()
+        table.append(text)
+        numbers.append(number)
     try:
-        return pl.read_csv("\n".join(table).encode(), separator=CELL_END, infer_schema=False, quote_char=None)
+        return (
+            pl.read_csv("\n".join(table).encode(), separator=CELL_END, infer_schema=False, quote_char=None),
+            numbers,
+        )
     except pl.exceptions.PolarsError as error:
-        raise InputError(f"'{path}' can't be read as a table: {str(error).splitlines()[0]}") from error
+        raise InputError(f"'{foot.path}' can't be read as a table: {str(error).splitlines()[0]}") from error
+
+
+def _wrong_row(cells: Sequence[str], number: int, header: Header, path: Path) -> InputError:
+    """Return the error for a row that has too many or too few cells, or is a word of the logger."""
+    width = len(header.labels)
+    comma = header.separator == "," and len(cells) == 2 * width
+    hint = "; decimal commas need ';' or a tab between the cells" if comma else ""
+    one = f"one cell that is filled, '{cells[0][:QUOTED_CHARACTERS]}'"
+    found = f"{len(cells)} cells" if len(cells) != width else one
+    return InputError(
+        f"'{path}' row {number} has {found}, expected {width} as in the header, row {header.line} "
+        f"('{', '.join(header.labels)[:QUOTED_CHARACTERS]}'){hint}; correct the row, or begin it with # if it is no "
+        "sample; --skip-rows says how many rows stand above the header"
+    )

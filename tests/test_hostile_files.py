@@ -23,7 +23,7 @@ from dzdesign.core.artefacts import parse_document, read_bytes, write_file
 from dzdesign.core.errors import InputError
 from dzdesign.core.units import SI_UNIT, parse_quantity, si_factor
 from dzdesign.design.signal_text import parse_signal
-from dzdesign.identify import separate_reader, text_tables
+from dzdesign.identify import separate_reader, text_blocks
 from dzdesign.identify.ramp_files import read_ramp_file
 
 #: More of what is random: make fuzz, or this many times as many examples.
@@ -60,7 +60,7 @@ def largest_memory(reset: bool = False) -> int:
 
 @pytest.mark.parametrize("name", [*TEXTS, *BINARIES])
 def test_a_hostile_recording(tmp_path, monkeypatch, name):
-    monkeypatch.setattr(text_tables, "FREE_BYTES", 1 << 22)  # a bomb is refused a little sooner
+    monkeypatch.setattr(text_blocks, "FREE_BYTES", 1 << 22)  # a bomb is refused a little sooner
     path, (_, words) = write(name, tmp_path), {**TEXTS, **BINARIES}[name]
     text = name in TEXTS
     memory = largest_memory(reset=True)

@@ -130,9 +130,9 @@ def test_thresholds_in_the_wrong_order_are_said_beyond_their_noise(hysteresis, s
     ("text", "message"),
     [
         ("Logger 3, made by hand\ntime_s,u_V,dP_MPa,Q_Lmin\n0,0,1,0\n", r"row 1 \('Logger 3, made by hand'\).*with #"),
-        ("time_s,u_V,dP_MPa,Q_Lmin\n12:00:01,0,1,0\n", "in seconds, not a date"),
-        ("time_s,u_V,dP_MPa,Q_Lmin\n2024-05-01 12:00:00,0,1,0\n", "in seconds, not a date"),
-        ("time_s,u_mA,dP_MPa,Q_Lmin\n0,4,1,0\n", "as per cent of full command"),
+        ("time_s,u_V,dP_MPa,Q_Lmin\n12:00,0,1,0\n", "'12:00' may be hours and minutes, minutes and seconds"),
+        ("time_s,u_V,dP_MPa,Q_Lmin\n0,0,1,0\n2024-05-01 12:00:00,0,1,0\n", "row 3.*is not a number .a column of the"),
+        ("time_s,u_mA,dP_MPa,Q_Lmin\n0,4,1,0\n", "u=u_mA:4..20 mA = 0..10 V"),
         ("time_s,u_V,dP_MPa,Q_Lmin\n0,4,1,0\n1,4,1,0\n2,4,1,0\n0,4,1,0\n", "make a file of each"),
         ("PK\x03\x04workbook", "Excel workbook"),
     ],

@@ -108,6 +108,7 @@ def test_two_rates_tell_the_lag(here):
     [
         ("t_s,u_V,Q1 [L/min],Q2 [L/min]", "Q: 'Q1 [L/min]' and 'Q2 [L/min]' could each be it"),
         ("t_s,AO0,p [bar],Q_Lmin", "u: no column has a unit of voltage"),
+        ("t_s,I_valve [mA],dP [bar],Q_Lmin", "u: no column has a unit of voltage; if 'I_valve [mA]' is it, say"),
         ("t_s,u,dP [bar],Q_Lmin", "u: 'u' has no unit; give it after a colon, such as V"),
     ],
 )
@@ -118,7 +119,7 @@ def test_what_can_not_be_told_is_left_open_with_the_reason(here, capsys, labels,
     assert f"open: column of {reason}" in capsys.readouterr().out
     text = Path("dzdesign.toml").read_text()
     assert f"# OPEN: column of {reason}" in text and f'# {reason[0]} = "LABEL:UNIT"' in text
-    assert "columns" not in tomllib.loads(text)
+    assert reason[0] not in tomllib.loads(text).get("columns", {})
 
 
 @pytest.mark.parametrize(
@@ -129,7 +130,7 @@ def test_what_can_not_be_told_is_left_open_with_the_reason(here, capsys, labels,
         ("t_s,u_V,p_1,p_2,Q_Lmin", "pA=p_1:bar, pB=p_2:bar", 0),
         ("t_s,u_V,Druck vor,Druck nach,Q_Lmin", "pA=Druck vor:bar, pB=Druck nach:bar", 0),
         ("t_s,u_V,pos,PWM,Q_Lmin", "", 0),
-        ("t_s,u_V,p1 [bar],power (W),Q_Lmin", "", 0),
+        ("t_s,u_V,power (W),x,Q_Lmin", "", 0),
     ],
 )
 def test_pressures_without_a_unit_are_seen_and_can_be_declared_as_said(here, capsys, labels, declared, status):
@@ -144,6 +145,61 @@ def test_pressures_without_a_unit_are_seen_and_can_be_declared_as_said(here, cap
         Path("dzdesign.toml").unlink()
         init_then_identify("ramp.csv", more=("--columns", declared))
         assert "at 1 MPa" in capsys.readouterr().out
+
+
+FOREIGN = ("Druckdifferenz [bar]", "Delta P (bar)", "p_diff/bar", "p1 [bar]", "Druck in bar", "Diff. pressure (bar)")
+
+
+@pytest.mark.parametrize("label", FOREIGN)
+@pytest.mark.parametrize("others", ["t_s,u_V", "Zeit/s,Sollwert [V]"])
+def test_a_pressure_with_a_foreign_name_is_used_and_not_that_of_the_files_name(here, capsys, label, others):
+    for dp_MPa, knee in ((1.0, 5.4), (4.0, 5.2)):
+        time, u, dp, q = columns_of(dp_MPa, knee=knee)
+        write(f"ramp_{10.5 * dp_MPa:.0f}bar.csv", f"{others},{label},Q_Lmin", time, u, 10 * dp, q)
+    text, valve = init_then_identify("ramp_*.csv")
+    table = tomllib.loads(text)
+    assert [test["dp_MPa"] for test in valve["sides"]["positive"]["tests"]] == pytest.approx([1.0, 4.0], rel=1e-3)
+    if label != "Delta P (bar)":  # that one is understood
+        assert table["columns"]["dP"] == label and "dp" not in table
+        assert "check that it is the drop over the valve" in text
+        assert f"pressure drop: '{label}', the only column in a unit of pressure" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("labels", "reason"),
+    [
+        ("t_s,u_V,p1 [bar],p2 [bar],Q_Lmin", "'p1 [bar]' and 'p2 [bar]': a pressure, but is it the drop, pA or pB?"),
+        ("Zeit [s],u_V,p1 [bar],p2 [bar],Q_Lmin", "'p1 [bar]' and 'p2 [bar]': a pressure, but is it the drop"),
+        ("t_s,u_V,pA [bar],x,Q_Lmin", "'pA [bar]' is the pressure of one port; which column is that of the other"),
+        ("t_s,u_V,Druck [mA],x,Q_Lmin", "'Druck [mA]' is a current; say what it means, for example --columns"),
+        ("t_s,u_V,Tank [bar],x,Q_Lmin", "'ramp_40bar.csv' says 40 bar in its name, and 1 MPa in 'Tank [bar]'"),
+    ],
+)
+def test_a_pressure_that_may_be_another_is_open(here, capsys, labels, reason):
+    time, u, dp, q = columns_of(1.0)
+    write("ramp_40bar.csv", labels, time, u, 10 * dp, 0 * dp + 3, q)
+    assert main(["init", "ramp_40bar.csv"]) == 1
+    assert f"open: column of dP: {reason}" in capsys.readouterr().out
+    assert "dp" not in tomllib.loads(Path("dzdesign.toml").read_text("utf-8"))
+    Path("dzdesign.toml").unlink()
+    if "pA" not in labels:
+        assert main(["init", "ramp_40bar.csv", "--dp", "40 bar"]) == 0  # the engineer's word
+        assert tomllib.loads(Path("dzdesign.toml").read_text("utf-8"))["dp"] == {"ramp_40bar.csv": "40 bar"}
+
+
+def test_a_declared_pressure_goes_before_a_column_with_a_foreign_name(here, capsys):
+    time, u, dp, q = columns_of(1.0)
+    write("ramp.csv", "t_s,u_V,Tank [bar],Q_Lmin", time, u, dp, q)
+    _, valve = init_then_identify("ramp.csv", more=("--dp", "40 bar"))
+    assert "not used: 'Tank [bar]', as --dp says the pressure drop" in capsys.readouterr().out
+    assert valve["sides"]["positive"]["tests"][0]["dp_MPa"] == 4.0
+
+
+def test_a_command_in_per_cent_under_another_name(here):
+    time, u, dp, q = columns_of(1.0)
+    write("ramp.csv", "t_s,Sollwert [%],dP_MPa,Q_Lmin", time, 10 * u, dp, q)
+    text, _ = init_then_identify("ramp.csv")
+    assert tomllib.loads(text)["columns"] == {"u": "Sollwert [%]"} and "(the command is in per cent" in text
 
 
 def test_a_pressure_drop_without_a_unit_is_open(here, capsys):

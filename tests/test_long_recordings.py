@@ -14,7 +14,7 @@ from test_file_formats import GOOD
 from test_ramp_files import assert_is_the_ramp, table
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify import binary_tables, text_tables, thinning
+from dzdesign.identify import binary_tables, text_blocks, thinning
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramp_files import RampTest, ramp_file_bytes, read_ramp_file
@@ -161,7 +161,7 @@ def test_text_read_in_blocks_is_text_read_at_once(tmp_path, monkeypatch, spoil, 
         at_once = read_ramp_file(tmp_path / name)
         for size in (64, 65, 66, 67, 301):
             with monkeypatch.context() as context:
-                context.setattr(text_tables, "BLOCK_BYTES", size)
+                context.setattr(text_blocks, "BLOCK_BYTES", size)
                 assert_same(read_ramp_file(tmp_path / name), at_once)
 
 
@@ -188,7 +188,7 @@ def test_binary_files_read_in_blocks_are_read_at_once(name, tmp_path, monkeypatc
 )
 @pytest.mark.parametrize("before", ["", "# one\r\n\r\n"])
 def test_a_fault_in_a_later_block_is_found_in_its_row(tmp_path, monkeypatch, spoil, words, before):
-    monkeypatch.setattr(text_tables, "BLOCK_BYTES", 128)
+    monkeypatch.setattr(text_blocks, "BLOCK_BYTES", 128)
     (tmp_path / "a.csv").write_bytes(before.encode() + "\n".join(spoil(table().splitlines())).encode())
     with pytest.raises(InputError) as caught:
         read_ramp_file(tmp_path / "a.csv")
@@ -222,7 +222,7 @@ def peak_of_reading(path) -> int:
 def test_memory_does_not_grow_with_the_file(tmp_path, monkeypatch):
     """Of what Python and NumPy take; `benchmarks/identify/reading.py` measures the whole process."""
     monkeypatch.setattr(thinning, "MOST_ROWS", 5_000)
-    monkeypatch.setattr(text_tables, "BLOCK_BYTES", 1 << 16)
+    monkeypatch.setattr(text_blocks, "BLOCK_BYTES", 1 << 16)
     test = long_ramp()
     peaks = []
     for rows in (20_000, 160_000):

@@ -268,10 +268,12 @@ def test_long_cells_and_many_columns_are_cut(refusal):
         (gzip.compress(table().encode(), mtime=0)[:-20], "is not a whole gzip file"),
         (gzip.compress(table().encode(), mtime=0)[:15] + b"\0" * 40, "is not a whole gzip file"),
         (b"\x1f\x8b", "is not a whole gzip file"),
-        (table().replace("u_V", "Δu_V").encode("utf-16"), "is not a text file in UTF-8 (byte 1)"),
-        (table().encode("utf-16-le"), "is UTF-16 or no text at all"),
-        ("# Öl bei 40 °C\n".encode("latin-1") + table().encode(), "is not a text file in UTF-8 (byte 3)"),
-        (b"PK\x03\x04\x14\x00\x06\x00\x08\x00\x00\x00!\x00\xff", "is an Excel workbook or a zip archive"),
+        (table().encode("utf-16")[:-1], "begins as UTF-16 and is not (truncated data)"),
+        (table().encode("utf-16-le"), "is UTF-16 without a byte order mark, or no text at all"),
+        (b"# \x81l\n" + table().encode(), "neither in UTF-8 nor in Windows-1252 (byte 3)"),
+        (b"\xef\xbb\xbf# \xd6l\n" + table().encode(), "is not a text file in UTF-8 throughout (byte 6)"),
+        (b"PK\x03\x04\x14\x00\x06\x00\x08\x00\x00\x00!\x00\xff", "is an Excel workbook (xlsx) or a zip archive; in "),
+        (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "is an Excel workbook (xls); in the spreadsheet program"),
     ],
 )  # fmt: skip
 def test_refused_with_the_reason_and_the_place(refusal, content, words):

@@ -21,9 +21,10 @@ from dzdesign.core.exchange import alone_in
 from dzdesign.design_options import DEFAULTS, design_options
 from dzdesign.identify_options import IDENTIFY_NAMES, identify_options, record_of
 from dzdesign.progress import say, with_bar
+from dzdesign.recordings import rows_to_skip
 
 #: Options of `identify` that a valve may have of its own, beside those of `design` and the target.
-IDENTIFY = (*IDENTIFY_NAMES, "columns", "dp")
+IDENTIFY = (*IDENTIFY_NAMES, "columns", "dp", "skip_rows")
 
 
 def run_batch(args: argparse.Namespace) -> int:
@@ -124,6 +125,7 @@ def _check_options(args: argparse.Namespace) -> None:
     identify_options(args)
     record_of(args.record)
     design_options(args, target_named(args.target).inputs())
+    rows_to_skip(args.skip_rows)
     if args.columns:
         parse_columns(args.columns)
 

@@ -1,0 +1,373 @@
+"""The header of a table of text: which line it is, the labels, and a row of units below it.
+
+A logger writes about itself above the table: operator, date, a line a channel. Rows of numbers tell where the table
+begins, and the header is the line above them that has as many cells and reads best as labels of a ramp test.
+"""
+
+import csv
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import final
+
+from dzdesign.core.errors import InputError
+from dzdesign.core.units import measures
+from dzdesign.identify.column_labels import TELLING, is_telling, split_label
+from dzdesign.identify.table import QUOTED_CHARACTERS, clean_label
+from dzdesign.identify.time_stamps import is_stamp, is_unclear
+
+#: A recording has some ten columns; a header beyond this is no table, and would take minutes to be searched.
+MOST_COLUMNS, LONGEST_HEADER = 4096, 1 << 20
+#: Lines in which the header is looked for, and the longest of them.
+MOST_LINES, LONGEST_LINE = 1000, 1 << 16
+#: Rows of numbers, one after the other, that are a table and no lines of a preamble; and their share of numbers.
+FEWEST_ROWS, SHARE_OF_NUMBERS = 5, 0.6
+#: Lines among which a cell in quotes is looked for that goes on in the next one, and of how many it may be.
+MOST_BROKEN = 40
+#: A line that is neither a comment nor blank; what a spreadsheet makes of either has quotes or separators.
+TABLE_LINE = re.compile(rb'^(?![ \t,;"]*$)(?![ \t"]*#).+', re.MULTILINE)
+#: What may stand between cells; where none of them is in the header, blanks do.
+SEPARATORS, BLANKS = ",;\t|", " "
+#: The same in the order in which rows of numbers are tried: a comma may be a decimal one, a blank part of a date.
+IN_DOUBT = ";\t|, "
+NUMBER = re.compile(r"[-+]?[\d.,]*\d[.,]?(?:[eE][-+]?\d+)?|nan|[-+]?inf(?:inity)?|[-+]?∞", re.IGNORECASE)
+#: The column that LabVIEW announces, and leaves out of rows that have no comment.
+COMMENT = "comment"
+#: An artefact of dzdesign begins with its schema.
+ARTEFACT = re.compile(rb'\s*\{\s*"(?:[^"{}]*"\s*:\s*"[^"]*",?\s*")*?schema"\s*:\s*"(dzdesign\.[\w.-]+/\d+)"')
+#: First characters of text that is no table.
+DOCUMENTS = {b"{": "JSON", b"<": "HTML or XML"}
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Header:
+    """The header row.
+
+    Attributes
+    ----------
+    line : int
+        Its number in the file.
+    labels : tuple of str
+        Of the columns.
+    separator : str
+        What stands between two cells.
+    units : mapping
+        Label -> unit, by a row of units below it.
+    repeats : frozenset of str
+        The header's line and that of the units: where they stand once more, they are no samples.
+    """
+
+    line: int
+    labels: tuple[str, ...]
+    separator: str
+    units: Mapping[str, str] = field(default_factory=dict)
+    repeats: frozenset[str] = frozenset()
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Line:
+    """A line that may belong to the table: its number in the file, its text, and where it ends in its block."""
+
+    number: int
+    text: str
+    end: int
+
+
+def find_header(block: bytes, number: int, path: Path, *, told: bool) -> tuple[Header | None, bytes]:
+    """Return the header and what follows it in the first block of a file; None if all is comments and blank lines.
+
+    Parameters
+    ----------
+    block : bytes
+        Whole lines, UTF-8.
+    number : int
+        Of the first of them in the file.
+    path : Path
+        For messages.
+    told : bool
+        True if the first line is the header by the engineer's word, comments and blank lines aside.
+
+    Raises
+    ------
+    InputError
+        If there is none, or two lines could each be it.
+    """
+    lines = _lines(block, number)
+    if not lines:
+        return None, b""
+    _refuse_a_document(block, path)
+    found = None if told or len(lines[0].text) > LONGEST_LINE else _best(lines, path)
+    at = found[0] if found else 0
+    line = lines[at]
+    separator = found[1] if found else _usual_separator(line.text)
+    if found is None and _is_numbers(labels_of(line.text, separator, line.number, path)):
+        commented = _commented_header(block, number, line)
+        if commented is not None:
+            header = _header(commented.number, commented.text, separator, path)
+            return _fitted(header, lines), block[commented.end + 1 :]
+    header = _header(line.number, line.text, separator, path)
+    end, rows = line.end, lines[at + 1 :]
+    above = lines[at - 1] if at else None
+    if rows and is_row_of_units(_cells(rows[0].text, separator)):
+        header = _with_units(header, rows[0].text)
+        end, rows = rows[0].end, rows[1:]
+    elif above and is_row_of_units(_cells(above.text, separator)):
+        header = _with_units(header, above.text)
+    return _fitted(header, rows), block[end + 1 :]
+
+
+def _with_units(header: Header, line: str) -> Header:
+    """Return a header with what a row of units says."""
+    units: dict[str, str] = {}
+    for label, cell in zip(header.labels, _cells(line, header.separator), strict=False):
+        if _bare(cell):
+            units.setdefault(label, _bare(cell))
+    return replace(header, units=units, repeats=header.repeats | {line})
+
+
+def _lines(block: bytes, number: int) -> list[_Line]:
+    """Return the first lines that are neither a comment nor blank."""
+    lines: list[_Line] = []
+    before = 0
+    for match in TABLE_LINE.finditer(block):
+        if lines and (len(lines) == MOST_LINES or match.end() - match.start() > LONGEST_LINE):
+            break
+        number += block.count(b"\n", before, match.start())
+        before = match.start()
+        lines.append(_Line(number=number, text=match[0].decode(), end=match.end()))
+    return _with_broken_ones_joined(lines)
+
+
+def _with_broken_ones_joined(lines: list[_Line]) -> list[_Line]:
+    """Return lines, of which those above the first row of numbers may be broken inside quotes: a cell of two lines."""
+    for first, line in enumerate(lines[:MOST_BROKEN]):
+        if line.text.count('"') % 2 == 0 or len(line.text) > LONGEST_LINE:
+            continue
+        for last in range(first + 1, min(first + MOST_BROKEN, len(lines))):
+            text = " ".join(each.text for each in lines[first : last + 1])
+            if text.count('"') % 2 == 0:
+                joined = _Line(number=line.number, text=text, end=lines[last].end)
+                return [*lines[:first], joined, *lines[last + 1 :]]
+    return lines
+
+
+def _refuse_a_document(block: bytes, path: Path) -> None:
+    """Refuse what a pattern such as ``ramps/*`` catches beside recordings."""
+    artefact = ARTEFACT.match(block[: LONGEST_LINE])
+    if artefact:
+        raise InputError(
+            f"'{path}' is no recording but a file that dzdesign wrote ({artefact[1].decode()}); leave it out, for "
+            "example by a pattern such as *.csv"
+        )
+    document = DOCUMENTS.get(block.lstrip()[:1])
+    if document:
+        raise InputError(f"'{path}' is {document}, expected a table of numbers; export the recording as CSV")
+
+
+def _best(lines: list[_Line], path: Path) -> tuple[int, str] | None:
+    """Return which line is the header, and what parts its cells; None if no rows of numbers tell."""
+    first = _usual_separator(lines[0].text)
+    if len(lines) > 1 and _could_be_labels(cells := _cells(lines[0].text, first)):
+        second = _cells(lines[1].text, first)
+        if len(cells) == len(second) and _is_row(second):
+            return 0, first
+    for separator in IN_DOUBT:
+        rows = _first_row(lines, separator)
+        if rows is None:
+            continue
+        width = len(_cells(lines[rows].text, separator))
+        fitting = [
+            (_score(cells, lines, index, separator), index)
+            for index in range(rows)
+            if _fits(cells := _cells(lines[index].text, separator), width)
+            and _could_be_labels(cells)
+            and not (index and is_row_of_units(cells))
+        ]
+        best = [index for score, index in fitting if score == max(fitting)[0]]
+        if len(best) > 1:
+            one, other = lines[best[0]], lines[best[-1]]
+            raise InputError(
+                f"'{path}': rows {one.number} ('{one.text[:QUOTED_CHARACTERS]}') and {other.number} "
+                f"('{other.text[:QUOTED_CHARACTERS]}') could each be the header; say how many rows stand above it by "
+                f"--skip-rows, for example --skip-rows {other.number - 1}"
+            )
+        return (best[0], separator) if best else None
+    return None
+
+
+def _first_row(lines: list[_Line], separator: str) -> int | None:
+    """Return the first of `FEWEST_ROWS` rows of numbers that have the same number of cells."""
+    run, width = 0, 0
+    for index, line in enumerate(lines):
+        cells = _cells(line.text, separator)
+        if not _is_row(cells):
+            run = 0
+            continue
+        run, width = (run + 1 if len(cells) == width else 1), len(cells)
+        if run == FEWEST_ROWS:
+            return index - run + 1
+    return None
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    """Return the cells of a line without blanks and quotes around them; never an error."""
+    if separator == BLANKS:
+        return _words(line)
+    if '"' in line:
+        try:
+            return [clean_label(cell) for cell in next(csv.reader([line], delimiter=separator, skipinitialspace=True))]
+        except csv.Error:
+            return []
+    return [clean_label(cell) for cell in line.split(separator)]
+
+
+def _words(line: str) -> list[str]:
+    """Return the words of a line; a unit in brackets belongs to the word before it."""
+    # Of a bracket that is never closed only so much is looked at: a long header of them would take hours.
+    return re.findall(r"[^\s\[(]+(?:\s{0,40}[\[(][^\])]{0,80}[\])])?", line)
+
+
+def is_number(cell: str) -> bool:
+    """Tell whether a cell is a number, with any decimal mark, a date or a time of day."""
+    return NUMBER.fullmatch(cell) is not None or is_stamp(cell) or is_unclear(cell)
+
+
+def _is_row(cells: list[str]) -> bool:
+    filled = [cell for cell in cells if cell]
+    numbers = sum(map(is_number, filled))
+    return numbers >= 2 and is_number(filled[0]) and numbers >= SHARE_OF_NUMBERS * len(filled)
+
+
+def _could_be_labels(cells: list[str]) -> bool:
+    texts = sum(bool(cell) and not is_number(cell) for cell in cells)
+    return texts >= 2 and 2 * texts >= len(cells)
+
+
+def _fits(cells: list[str], width: int) -> bool:
+    """Tell whether labels fit rows of some width: one cell more or less may be blank, or LabVIEW's comment."""
+    if len(cells) == width + 1:
+        return cells[-1].lower() in ("", COMMENT)
+    return len(cells) in (width, width - 1)
+
+
+def is_row_of_units(cells: list[str]) -> bool:
+    """Tell whether a row says the units of the columns, such as ``s;V;l/min;bar`` or ``(ms),(V),(V)``."""
+    filled = [_bare(cell) for cell in cells if cell]
+    known = sum(map(is_telling, filled)) + sum(measures(unit, "current") for unit in filled)
+    return known >= 2 and 2 * known >= len(filled) and not any(map(is_number, filled))
+
+
+def _bare(unit: str) -> str:
+    return unit.strip(" \t[](){}")
+
+
+def _score(cells: list[str], lines: list[_Line], index: int, separator: str) -> int:
+    """Return how many quantities and units the labels of a line say, and whether units stand below it."""
+    said = set()
+    for label in cells[:MOST_COLUMNS]:
+        quantity, unit = split_label(label)
+        said |= {quantity} if quantity else {unit} if unit != label and is_telling(unit) else set()
+    return len(said) + (len(TELLING) if is_row_of_units(_cells(lines[index + 1].text, separator)) else 0)
+
+
+def _usual_separator(line: str) -> str:
+    """Return what is most often in a line; in a row of numbers with decimal commas that is not what parts its cells."""
+    for separator in IN_DOUBT[:3]:
+        if len(line) <= LONGEST_LINE and separator in line and _is_row(_cells(line, separator)):
+            return separator
+    separator = max(SEPARATORS, key=line.count)
+    return separator if separator in line else BLANKS
+
+
+def _is_numbers(labels: list[str]) -> bool:
+    return all(not label.strip() or is_number(clean_label(label)) for label in labels)
+
+
+def _commented_header(block: bytes, number: int, row: _Line) -> _Line | None:
+    """Return the last comment above a table without a header, if it can be one: numpy.savetxt writes it so."""
+    above = block[: row.end].split(b"\n")[: row.number - number]
+    for back, line in enumerate(reversed(above), start=1):
+        text = line.decode(errors="replace").strip()
+        if not text:
+            continue
+        bare = text.lstrip('" \t#')
+        separator = _usual_separator(row.text)
+        names = _cells(bare, separator)
+        if not text.startswith("#") or len(names) != len(_cells(row.text, separator)) or not _could_be_labels(names):
+            return None
+        end = sum(len(each) + 1 for each in above[: len(above) - back + 1]) - 1
+        return _Line(number=row.number - back, text=bare, end=end)
+    return None
+
+
+def _header(number: int, line: str, separator: str, path: Path) -> Header:
+    """Return the header that a line holds; refuse a line of numbers."""
+    columns = len(line.split()) if separator == BLANKS else line.count(separator) + 1
+    if columns > MOST_COLUMNS or len(line) > LONGEST_HEADER:
+        raise InputError(
+            f"'{path}' row {number} has {columns} cells, expected the columns of a ramp test, at most {MOST_COLUMNS}; "
+            "export only those"
+        )
+    labels = tuple(clean_label(label) for label in labels_of(line, separator, number, path))
+    if _is_numbers(list(labels)):
+        raise InputError(
+            f"'{path}' has no header row (row {number} is '{line[:QUOTED_CHARACTERS]}'); "
+            "expected names with units such as time_s,u_V,dP_MPa,Q_Lmin"
+        )
+    return Header(line=number, labels=labels, separator=separator, repeats=frozenset({line}))
+
+
+def _fitted(header: Header, rows: list[_Line]) -> Header:
+    """Return the header with a label more or less where its rows end in a separator and it does not, or the reverse."""
+    cells = _cells(rows[0].text, header.separator) if rows else []
+    labels, few = header.labels, len(cells) == len(header.labels) - 1
+    if few and labels[-1].lower() in ("", COMMENT) and _is_row(cells):
+        labels = labels[:-1]
+    elif len(cells) == len(labels) + 1 and not cells[-1] and _is_row(cells):
+        labels = (*labels, "")
+    return replace(header, labels=labels)
+
+
+def labels_of(header: str, separator: str, number: int, path: Path) -> list[str]:
+    """Return the labels of a header.
+
+    Parameters
+    ----------
+    header, separator : str
+        The line, and what parts its cells.
+    number : int
+        Of the line, for messages.
+    path : Path
+        For messages.
+    """
+    return _words(header) if separator == BLANKS else split_line(header, separator, number, path)
+
+
+def split_line(line: str, separator: str, number: int, path: Path) -> list[str]:
+    """Return the cells of a line; inside quotes the separator is a character as any other.
+
+    Parameters
+    ----------
+    line, separator : str
+        A row, and what parts its cells.
+    number : int
+        Of the line, for messages.
+    path : Path
+        For messages.
+
+    Raises
+    ------
+    InputError
+        If a quote is never closed.
+    """
+    if separator == BLANKS:
+        return line.split()
+    if '"' not in line:
+        return line.split(separator)
+    try:
+        return next(csv.reader([line], delimiter=separator, skipinitialspace=True))
+    except csv.Error as error:  # a cell longer than 128 KiB, as after a quote that is never closed
+        raise InputError(f"'{path}' row {number} has a cell that can't be read ({error}); mind its quotes") from error

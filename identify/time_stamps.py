@@ -1,0 +1,168 @@
+"""Dates and times of day in a column of text, as seconds since the first row.
+
+``2026-11-22T03:04:05.123+01:00``, ``22.11.2026 03:04:05,123``, ``11/22/2026 03:04:05:123``, ``3:04:05.1 PM``,
+``03:04:05``. Which part of a date is the day and which the month matters only where a recording goes over midnight.
+"""
+
+import datetime
+import re
+from collections.abc import Callable
+from typing import TYPE_CHECKING, final
+
+import numpy as np
+
+from dzdesign.core.errors import InputError
+
+if TYPE_CHECKING:
+    import polars as pl
+
+#: A stamp: date (may lack), hours, minutes, seconds with their fraction, half of the day, zone.
+STAMP = (
+    r"^(?:(\d{1,4}[-./]\d{1,2}[-./]\d{1,4})[T ,]\s?)?(\d{1,3}):([0-5]?\d):([0-6]?\d(?:[.,:]\d{1,9})?)"
+    r"(?:\s?([AaPp])\.?[Mm]\.?)?\s?(Z|UTC|[-+]\d\d:?\d\d)?$"
+)
+#: What looks like one and lacks seconds or the time: which of the two numbers are minutes can't be told.
+UNCLEAR = re.compile(r"\d{1,3}:[0-5]?\d(?:[.,]\d+)?|\d{1,4}[-./]\d{1,2}[-./]\d{1,4}(?:[T ]\d{1,2}:\d\d)?")
+LONGEST_STAMP = 48
+DAY = 86_400.0
+#: A time of day that goes back by more than this is one of the next day, s.
+MIDNIGHT = DAY / 2
+EXAMPLE = "2026-11-22 03:04:05.123, 22.11.2026 03:04:05,123 or 03:04:05.123"
+
+
+def is_stamp(cell: str) -> bool:
+    """Tell whether a cell holds a time of day, with a date or without.
+
+    Examples
+    --------
+    >>> is_stamp("22.11.2026 03:04:05,123"), is_stamp("03:04:05"), is_stamp("03:04"), is_stamp("3.04")
+    (True, True, False, False)
+    """
+    return len(cell) <= LONGEST_STAMP and re.match(STAMP, cell) is not None
+
+
+def is_unclear(cell: str) -> bool:
+    """Tell whether a cell looks like a time whose parts can't be told: ``03:04``, or a date without a time."""
+    return len(cell) <= LONGEST_STAMP and UNCLEAR.fullmatch(cell) is not None
+
+
+@final
+class Stamps:
+    """The clock of one file, from block to block: what its stamps count from."""
+
+    def __init__(self) -> None:
+        self._first: float | None = None
+        self._latest = 0.0  # with the days that were added
+        self._days = 0.0
+        self._dates: dict[str, float] = {}
+
+    def seconds(self, cells: "pl.Series", where: str) -> np.ndarray:
+        """Return stamps as seconds since the first of the file, NaN where a cell is blank.
+
+        Parameters
+        ----------
+        cells : polars.Series
+            Strings without blanks around them, of the next rows.
+        where : str
+            File and column, for messages.
+
+        Raises
+        ------
+        InputError
+            If a date can't be told.
+        """
+        import polars as pl
+
+        parts = cells.str.extract_groups(STAMP).struct.unnest()
+        date, hour, minute, second, half, zone = (parts.to_series(index) for index in range(6))
+        number = pl.Float64
+        hours = hour.cast(number, strict=False)
+        if half.null_count() < half.len():  # 12 AM is midnight, 12 PM noon
+            afternoon = half.str.to_lowercase() == "p"
+            hours = (hours % 12) + 12.0 * afternoon.cast(number).fill_null(0.0)
+        point = second.str.replace(r"[,:]", ".").cast(number, strict=False)
+        seconds = (3600.0 * hours + 60.0 * minute.cast(number, strict=False) + point).fill_null(np.nan).to_numpy()
+        if zone.null_count() < zone.len():
+            seconds = seconds - self._replaced(zone, _zone)
+        if date.null_count() < date.len():
+            seconds = seconds + self._replaced(date, lambda text: self._day(text, where))
+        else:
+            seconds = self._over_midnight(seconds)
+        told = seconds[np.isfinite(seconds)]
+        if self._first is None and told.size:
+            self._first = float(told[0])
+        return seconds - (self._first or 0.0)
+
+    def _replaced(self, texts: "pl.Series", convert: Callable[[str], float]) -> np.ndarray:
+        """Return the number that each text means; there are few different ones."""
+        import polars as pl
+
+        known = {text: convert(text) for text in texts.unique(maintain_order=True).drop_nulls().to_list()}
+        return texts.replace_strict(known, default=0.0, return_dtype=pl.Float64).fill_null(0.0).to_numpy()
+
+    def _over_midnight(self, seconds: np.ndarray) -> np.ndarray:
+        """Return times of day that go on where they go back by more than half a day."""
+        told = np.flatnonzero(np.isfinite(seconds))
+        steps = np.diff(seconds[told], prepend=self._latest if self._first is not None else seconds[told[:1]])
+        days = self._days + DAY * np.cumsum(steps < -MIDNIGHT)
+        seconds = seconds.copy()
+        if told.size:
+            self._latest, self._days = float(seconds[told[-1]]), float(days[-1])
+            seconds[told] += days
+        return seconds
+
+    def _day(self, text: str, where: str) -> float:
+        """Return the seconds from the first date of the file to the midnight of another."""
+        if text not in self._dates:
+            readings = _days(text)
+            if self._dates:
+                first = next(iter(self._dates))
+                both = sorted({other - one for one, other in _alike(first, text)})
+                if len(both) != 1:
+                    count = " or ".join(map(str, both)) or "an unknown number of"
+                    raise InputError(
+                        f"{where}: from '{first}' to '{text}' it is {count} days, as it can't be told which number is "
+                        "the month; write dates as 2026-11-22, or the time in seconds"
+                    )
+                self._dates[text] = DAY * both[0]
+            elif readings:
+                self._dates[text] = 0.0
+            else:
+                raise InputError(f"{where}: '{text}' is no date; write dates as 2026-11-22, or the time in seconds")
+        return self._dates[text]
+
+
+def _alike(one: str, other: str) -> list[tuple[int, int]]:
+    """Return two dates as days, in each order of their parts that both can have."""
+    first, second = _days(one), _days(other)
+    return [(first[order], second[order]) for order in first if order in second]
+
+
+def _days(date: str) -> dict[str, int]:
+    """Return order of day, month and year -> days, for each order that a date can be read in."""
+    numbers = [int(part) for part in re.split(r"[-./]", date)]
+    if len(date.split(".")) == 3 and numbers[0] <= 31:
+        orders = ("dmy",)  # with points it is always this
+    elif numbers[0] > 31:
+        orders = ("ymd",)
+    elif numbers[2] > 31:
+        orders = ("dmy", "mdy")
+    else:
+        orders = ("dmy", "mdy", "ymd")
+    found = {}
+    for order in orders:
+        part = dict(zip(order, numbers, strict=True))
+        year = part["y"] + (2000 if part["y"] < 100 else 0)
+        try:
+            found[order] = datetime.date(year, part["m"], part["d"]).toordinal()
+        except ValueError:
+            continue
+    return found
+
+
+def _zone(text: str) -> float:
+    """Return by how many seconds a zone is ahead of UTC."""
+    if text[0] not in "+-":
+        return 0.0
+    digits = text[1:].replace(":", "")
+    return (1 if text[0] == "+" else -1) * (3600.0 * int(digits[:2]) + 60.0 * int(digits[2:]))
