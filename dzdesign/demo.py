@@ -16,10 +16,11 @@ RECORD = {"valve": "simulated by dzdesign, no measurement"}
 
 def run_demo(args: argparse.Namespace) -> int:
     """Run the pipeline on the bundled ramp tests and print the closing table."""
-    from dzdesign.codegen.project import generate
+    from dzdesign.codegen.project import DEFAULT_TARGET, generate, target_named
     from dzdesign.derivation.account import verify_statements
     from dzdesign.design.compensator_file import compensator_document
     from dzdesign.design.designing import design
+    from dzdesign.design.option_texts import options_of
     from dzdesign.identify.identification import identify
     from dzdesign.identify.options import IdentifyOptions
     from dzdesign.identify.ramp_files import read_ramp_file
@@ -52,10 +53,11 @@ def run_demo(args: argparse.Namespace) -> int:
         valve_json = to_json(valve.to_document())
         write_file(folder / "valve.json", valve_json)
         stage("designing the compensator")
-        compensator = design(valve, valve_bytes=valve_json.encode())
+        options = options_of({}, target_named(DEFAULT_TARGET).inputs())
+        compensator = design(valve, options, valve_json.encode())
         compensator_json = to_json(compensator_document(compensator))
         write_file(folder / "compensator.json", compensator_json)
-        firmware = generate(compensator, "f28335", compensator_json.encode())
+        firmware = generate(compensator, DEFAULT_TARGET, compensator_json.encode())
         write_folder(folder / "firmware", firmware.files, firmware.manifest)
         verification = verify(folder / "firmware", plant, "plant.toml of the example", say=stage, watch=stage.each)
     manifest = {"schema": SCHEMA, "tool": TOOL, "made_from": verification.document["made_from"]}

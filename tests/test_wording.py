@@ -51,7 +51,11 @@ def test_numbers_of_the_law_are_put_into_words(example_valve, example_compensato
 
 def test_no_output_calls_a_code_sound():
     """The word stays in the code, where its meaning stands beside it; a reader of an output has no such place."""
-    for path in ("verify/checks.py", "verify/machine_code.py", "codegen/telemetry.py", "design/signals_in_words.py"):
+    printed = ("codegen/**/*.jinja", "*/schemas/*.json", "tests/goldens*/*/core/*")
+    for path in (path for pattern in printed for path in ROOT.glob(pattern)):
+        assert not re.search(r"\b(un)?sound", path.read_text("utf-8")), path
+    outputs = ("verify/checks.py", "verify/machine_code.py", "design/signals.py", "design/signals_in_words.py")
+    for path in (*outputs, "codegen/telemetry.py", "codegen/drive_constants.py", "codegen/signal_constants.py"):
         strings = re.findall(r'f?"[^"\n]*"', re.sub(r'"""(?s:.*?)"""', "", (ROOT / path).read_text("utf-8")))
         assert [text for text in strings if "sound" in text] == [], path
 
