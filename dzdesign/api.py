@@ -24,6 +24,7 @@ from dzdesign.core.artefacts import (
     check_file_may_be_written,
     check_folder_may_be_written,
     read_bytes,
+    sha256_of,
     to_json,
     write_file,
     write_folder,
@@ -289,6 +290,7 @@ def verify(
             folder,
             read_plant(Path(plant)) if plant is not None else None,
             Path(plant).name if plant is not None else "",
+            sha256_of(read_bytes(Path(plant), "plant file")) if plant is not None else None,
             tolerances=read_tolerances(Path(tolerances)) if tolerances is not None else None,
         )
         if output is not None:

@@ -11,6 +11,7 @@ from dzdesign.core.artefacts import (
     check_folder_may_be_written,
     parse_document,
     read_bytes,
+    sha256_of,
     to_json,
     write_file,
     write_files,
@@ -158,11 +159,12 @@ def run_verify(args: argparse.Namespace) -> int:
     check_folder_may_be_written(output, SCHEMA)
     plant = read_plant(Path(args.plant), say) if args.plant else None
     source = Path(args.plant).name if args.plant else ""
+    digest = sha256_of(read_bytes(Path(args.plant), "plant file")) if args.plant else None
     tolerances = read_tolerances(Path(args.tolerances)) if args.tolerances else None
     firmware = Path(args.firmware)
     ware = check_against_c2000ware(firmware, Path(args.c2000ware), say) if args.c2000ware else None
     with stages() as stage:
-        verification = verify(firmware, plant, source, tolerances=tolerances, say=stage, watch=stage.each)
+        verification = verify(firmware, plant, source, digest, tolerances=tolerances, say=stage, watch=stage.each)
     added = [ware] if ware else []
     if args.machine_code:
         from dzdesign.verify.machine_code import machine_code_checks

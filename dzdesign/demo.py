@@ -4,7 +4,7 @@ import argparse
 from importlib.resources import as_file, files
 from pathlib import Path
 
-from dzdesign.core.artefacts import TOOL, check_folder_may_be_written, to_json, write_file, write_folder
+from dzdesign.core.artefacts import TOOL, check_folder_may_be_written, sha256_of, to_json, write_file, write_folder
 from dzdesign.core.errors import InputError
 from dzdesign.core.units import parse_quantity
 from dzdesign.progress import say, stages
@@ -44,6 +44,7 @@ def run_demo(args: argparse.Namespace) -> int:
         with as_file(files("dzdesign.example")) as example:
             tests = [read_ramp_file(path) for path in sorted((example / "ramps").glob("*.csv.gz"))]
             plant = read_plant(example / "plant.toml")
+            digest = sha256_of((example / "plant.toml").read_bytes())
         meter = IdentifyOptions(
             meter_lag=parse_quantity(METER_LAG, "time", "lag"),
             meter_floor=parse_quantity(METER_FLOOR, "flow", "floor"),
@@ -59,7 +60,8 @@ def run_demo(args: argparse.Namespace) -> int:
         write_file(folder / "compensator.json", compensator_json)
         firmware = generate(compensator, DEFAULT_TARGET, compensator_json.encode())
         write_folder(folder / "firmware", firmware.files, firmware.manifest)
-        verification = verify(folder / "firmware", plant, "plant.toml of the example", say=stage, watch=stage.each)
+        source = "plant.toml of the example"
+        verification = verify(folder / "firmware", plant, source, digest, say=stage, watch=stage.each)
     manifest = {"schema": SCHEMA, "tool": TOOL, "made_from": verification.document["made_from"]}
     evidence = with_report(evidence_files(verification), folder / "firmware", folder / "evidence")
     write_folder(folder / "evidence", evidence, manifest)

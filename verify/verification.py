@@ -88,6 +88,7 @@ def verify(
     folder: Path,
     plant: Plant | None = None,
     plant_source: str = "",
+    plant_sha256: str | None = None,
     sequence: RampSequence | None = None,
     tolerances: Tolerances | None = None,
     say: Callable[[str], None] = lambda _: None,
@@ -103,6 +104,8 @@ def verify(
         For the closed loop; without it one is made from the identified thresholds.
     plant_source : str
         Name of the plant's file, for the evidence.
+    plant_sha256 : str, optional
+        Its hash.
     sequence : RampSequence, optional
         The command over time; 0-10 V in 100 s and back by default.
     tolerances : Tolerances, optional
@@ -132,6 +135,7 @@ def verify(
     inputs: tuple[InputCheck, ...] = ()
     maps: tuple[InputMap, ...] = ()
     loops: tuple[LoopComparison, ...] = ()
+    plants: list[dict[str, Any]] = []
     scenarios: tuple[ScenarioResult, ...] = ()
     scattered: tuple[Scatter, ...] = ()
     signs = (1, -1) if document["sides"]["negative"] else (1,)
@@ -149,6 +153,9 @@ def verify(
         checks += [drive_follows(folder, compensator), keeps_no_state(folder)]
         say("running the closed loop")
         scenes = building.result()
+        plants = [
+            {"side": scene.side, "dp_MPa": scene.dp_MPa, "parameters": plant_document(scene.plant)} for scene in scenes
+        ]
         loops = _run_loops(scenes, sequence or RampSequence(), watch)
         say("running the scenarios")
         scenarios = _run_scenarios(scenes, watch)
@@ -182,6 +189,8 @@ def verify(
             "closed_loop": {
                 "plant": plant_document(plant) if plant else None,
                 "plant_source": source,
+                "plant_sha256": plant_sha256,
+                "plants": [] if plant else plants,
                 "pressures": [asdict(loop.result) for loop in loops],
             },
             "scenarios": [asdict(each) for each in scenarios],
