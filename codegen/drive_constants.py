@@ -8,10 +8,10 @@ HERE, OPTIONS, SIGNALS = "codegen/drive_constants.py", "design/options.py", "des
 INT32_MAX = 2**31 - 1
 #: Bits of the status word, and what each says.
 STATUS_BITS = {
-    "COMMAND": "command outside its sound codes, so the valve is let go",
-    "PRESSURE_A": "pressure A outside its sound codes, so the smallest beta is used",
-    "PRESSURE_B": "pressure B outside its sound codes, so the smallest beta is used",
-    "DIFFERENCE": "sound pressures, but their drop too far below zero, so the smallest beta is used",
+    "COMMAND": "command outside its valid codes, so the valve is let go",
+    "PRESSURE_A": "pressure A outside its valid codes, so the smallest beta is used",
+    "PRESSURE_B": "pressure B outside its valid codes, so the smallest beta is used",
+    "DIFFERENCE": "valid pressures, but their drop too far below zero, so the smallest beta is used",
 }
 
 

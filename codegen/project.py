@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 SCHEMA = "dzdesign.firmware/1"
 PACKAGE = "dzdesign.codegen"
+#: Where neither the compensator nor anybody else says which.
+DEFAULT_TARGET = "f28335"
 #: One file a sign of command, all from one template.
 CORE_SOURCES = {1: "dz_comp.c", -1: "dz_comp_negative.c"}
 
@@ -41,10 +43,11 @@ TARGET_NAMES = _found_targets()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Firmware(ShownInNotebooks):
-    """The files of a C project, path to text, and the manifest that names their origin."""
+    """The files of a C project, path to text, the manifest that names their origin, and what a person should know."""
 
     files: Mapping[str, str]
     manifest: Mapping[str, Any]
+    note: str = ""
 
 
 def target_named(name: str) -> Target:
@@ -65,25 +68,29 @@ def targets() -> tuple[Target, ...]:
     return tuple(target_named(name) for name in TARGET_NAMES)
 
 
-def generate(compensator: Compensator, target_name: str, compensator_bytes: bytes | None = None) -> Firmware:
+def generate(
+    compensator: Compensator, target_name: str | None = None, compensator_bytes: bytes | None = None
+) -> Firmware:
     """Generate the C project of a compensator for a target.
 
     Parameters
     ----------
     compensator : Compensator
         From `dzdesign.design.designing.design` or compensator.json.
-    target_name : str
-        One of `TARGET_NAMES`.
+    target_name : str, optional
+        One of `TARGET_NAMES`; by default the one that the compensator was designed for.
     compensator_bytes : bytes, optional
         The file it was read from; without it the document as it would be written.
 
     Raises
     ------
     InputError
-        If the target is unknown, or its converter or PWM differs from the compensator's signals.
+        If the target is unknown, or its converter or PWM differs from those that the compensator was designed for.
     """
-    target = target_named(target_name)
+    designed_for = compensator.request.target if compensator.request else None
+    target = target_named(target_name or (designed_for.name if designed_for else DEFAULT_TARGET))
     target.check_signals(compensator.signals)
+    note = target.check_designed_for(designed_for)
     document = compensator_bytes or to_json(compensator_document(compensator)).encode()
     digest = sha256_of(document)
     recordings = ramp_tests_of(compensator)
@@ -108,7 +115,7 @@ def generate(compensator: Compensator, target_name: str, compensator_bytes: byte
         "core": sorted(path for path in files if path.startswith("core/")),
         **origin_of_constants(compensator, digest, {path: plan.constants for path, _, plan in core}),
     }
-    return Firmware(files=files, manifest=manifest)
+    return Firmware(files=files, manifest=manifest, note=note)
 
 
 def _core_files(compensator: Compensator, target: Target, header: FilePlan) -> list[tuple[str, str, FilePlan]]:
@@ -139,10 +146,13 @@ def hardware_context(compensator: Compensator, target: Target, digest: str) -> d
         SHA-256 of compensator.json.
     """
     levels = compensator.signals.code_max + 1  # a target without a converter of its own takes any
+    full_V = target.adc_full_V
+    if target.takes_any_signals and compensator.request:
+        full_V = compensator.request.target.converter.full_V
     return {
         **target.context,
         **core_context(compensator.signals.signs),
-        "wiring": wiring_of(compensator, Converter(full_V=target.adc_full_V, levels=levels)),
+        "wiring": wiring_of(compensator, Converter(full_V=full_V, levels=levels)),
         "firmware_origin": f"0x{digest[:4].upper()}",
     }
 

@@ -20,7 +20,7 @@ class SignalConstants:
 
     @property
     def passes_full(self) -> bool:
-        """True if a sound command may lie beyond full command."""
+        """True if a valid command may lie beyond full command."""
         command = self.compensator.signals.command
         ends = (command.direction(self.sign) * (code - command.zero_code) for code in command.valid_codes)
         return max(ends) > command.span(self.sign)
@@ -38,12 +38,12 @@ class SignalConstants:
 
         low, high = command.valid_codes
         keys = ("signals.command.zero_code", f"signals.command.{full_key}", "u_max_V")
-        sound = ("signals.command.valid_codes", *keys)
+        valid = ("signals.command.valid_codes", *keys)
         full = self._signal("COMMAND_SPAN", span, "Eq. (29), codes from zero to full command", f"{u_max_V:g} V", keys)
         return [
             self._signal("COMMAND_ZERO", command.zero_code, "Eq. (29), code of zero command", "0 V", keys[:1], DOWN),
-            self._signal("COMMAND_LOW", low, "Eq. (29), least code of a sound command", volts(low), sound, DOWN),
-            self._signal("COMMAND_HIGH", high, "Eq. (29), largest code of a sound command", volts(high), sound, DOWN),
+            self._signal("COMMAND_LOW", low, "Eq. (29), least valid code of the command", volts(low), valid, DOWN),
+            self._signal("COMMAND_HIGH", high, "Eq. (29), largest valid code of the command", volts(high), valid, DOWN),
             *([full] if self.passes_full else []),
             *self._sensor("A", signals.pressure_a),
             *self._sensor("B", signals.pressure_b),
@@ -74,13 +74,13 @@ class SignalConstants:
             return f"{float((code - sensor.zero_code) * sensor.per_code_MPa):.4g} MPa"
 
         low, high = sensor.valid_codes
-        sound = (f"{key}.valid_codes", *codes)
+        valid = (f"{key}.valid_codes", *codes)
         what = f"text below Eq. (29), {{}} of sensor {name}, {float(sensor.per_code_MPa):.6g} MPa a code"
         return [
             self._signal(f"PRESSURE_{name}_ZERO", sensor.zero_code, what.format("code of no pressure"), "0 MPa",
                          codes[:1], DOWN),
-            self._signal(f"PRESSURE_{name}_LOW", low, what.format("least sound code"), pressure(low), sound, DOWN),
-            self._signal(f"PRESSURE_{name}_HIGH", high, what.format("largest sound code"), pressure(high), sound, DOWN),
+            self._signal(f"PRESSURE_{name}_LOW", low, what.format("least valid code"), pressure(low), valid, DOWN),
+            self._signal(f"PRESSURE_{name}_HIGH", high, what.format("largest valid code"), pressure(high), valid, DOWN),
         ]  # fmt: skip
 
     def _weights(self) -> list[Constant]:

@@ -9,6 +9,7 @@ from types import MappingProxyType
 
 from dzdesign.codegen.telemetry import Link
 from dzdesign.core.errors import DzdesignError, InputError
+from dzdesign.design.request import TargetInputs
 from dzdesign.design.signal_text import Converter
 from dzdesign.design.signals import Signals
 
@@ -19,16 +20,6 @@ RENDERER_NAMES = frozenset(
     {"banner", "project", "wiring", "firmware_origin", "bipolar", "core_sources", "core_headers"}
 )
 """Names that the renderer itself passes to every template; a target's context may not use them."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TargetInputs:
-    """What `design` needs to know of a target: its converter, its timer's counts, samples and PWM periods a second."""
-
-    converter: Converter
-    compare_max: int
-    sample_Hz: int
-    tick_Hz: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,9 +104,10 @@ class Target:
         """Name of the target's folder: an identifier, because it is a package."""
         return folder_of(self.name)
 
-    def inputs(self) -> "TargetInputs":
+    def inputs(self) -> TargetInputs:
         """Return the converter and timer that a compensator for this target is designed for."""
         return TargetInputs(
+            name=self.name,
             converter=Converter(full_V=self.adc_full_V, levels=self.adc_code_max + 1),
             compare_max=self.compare_max,
             sample_Hz=self.sample_Hz,
@@ -146,6 +138,46 @@ class Target:
                     f"the compensator's {what} is {asked}, but target {self.name} has {has}; "
                     f"design it again with `dzdesign design --target {self.name}`"
                 )
+
+    def check_designed_for(self, designed_for: TargetInputs | None) -> str:
+        """Refuse a compensator of another target whose codes are other voltages or times here.
+
+        Parameters
+        ----------
+        designed_for : TargetInputs or None
+            As the compensator states it; None if it does not.
+
+        Returns
+        -------
+        str
+            What a person should know of a harmless difference; empty if there is none.
+
+        Raises
+        ------
+        InputError
+            With the first number that differs.
+        """
+        if designed_for is None:
+            return ""
+        theirs, here = designed_for.converter, self.inputs()
+        word = f"the compensator was designed for target {designed_for.name}; {self.name} "
+        if self.takes_any_signals:
+            word += f"takes its codes as they are: {theirs.levels} codes over {float(theirs.full_V):g} V, "
+            word += f"{designed_for.compare_max} counts at full drive"
+            return "" if designed_for.name == self.name else word
+        for what, asked, has in (
+            ("a converter's range in V", theirs.full_V, here.converter.full_V),
+            ("a converter's codes", theirs.levels, here.converter.levels),
+            ("counts at full drive", designed_for.compare_max, here.compare_max),
+            ("samples a second", designed_for.sample_Hz, here.sample_Hz),
+            ("PWM periods a second", designed_for.tick_Hz, here.tick_Hz),
+        ):
+            if asked != has:
+                raise InputError(
+                    f"the compensator was designed for target {designed_for.name} ({what}: {float(asked):g}), but "
+                    f"{self.name} has {float(has):g}; design it again with `dzdesign design --target {self.name}`"
+                )
+        return "" if designed_for.name == self.name else word + "has the same converter and timer"
 
 
 def folder_of(name: str) -> str:

@@ -45,8 +45,8 @@ class PressureWiring:
     ----------
     name, span_MPa : str
         ``A`` or ``B``, and the pressure at the upper end.
-    zero_code, full_code, sound : str
-        Codes of no pressure and of the span, and from which to which code the signal is sound.
+    zero_code, full_code, valid : str
+        Codes of no pressure and of the span, and its valid codes.
     zero_volts, full_volts, zero_of_range, full_of_range : str
         Voltages at the pin, and their share of the converter's range.
     shunt_ohm : str
@@ -57,7 +57,7 @@ class PressureWiring:
     span_MPa: str
     zero_code: str
     full_code: str
-    sound: str
+    valid: str
     zero_volts: str
     full_volts: str
     zero_of_range: str
@@ -77,10 +77,10 @@ class Wiring:
         From full negative command (or zero) to full positive command.
     ends : tuple of CommandPoint
         Those of `commands` that are zero or full.
-    command_sound, command_shunt_ohm : str
+    command_valid, command_shunt_ohm : str
         Sound codes, and the shunt that makes the signal of 4-20 mA, or nothing.
     no_voltage : str
-        What 0 V at the command's pin commands; empty where that code is not sound.
+        What 0 V at the command's pin commands; empty where that code is not valid.
     no_voltage_drives : bool
         True if that is more than zero command.
     pressures : tuple of PressureWiring
@@ -102,7 +102,7 @@ class Wiring:
     u_max_V: str
     commands: tuple[CommandPoint, ...]
     ends: tuple[CommandPoint, ...]
-    command_sound: str
+    command_valid: str
     command_shunt_ohm: str
     no_voltage: str
     no_voltage_drives: bool
@@ -140,7 +140,7 @@ def wiring_of(compensator: Compensator, converter: Converter) -> Wiring:
         u_max_V=f"{float(compensator.u_max_V):g}",
         commands=tuple(points.values()),
         ends=tuple(point for share, point in points.items() if share in (-1, 0, 1)),
-        command_sound="{}..{}".format(*command.valid_codes),
+        command_valid="{}..{}".format(*command.valid_codes),
         command_shunt_ohm="" if both else _shunt_ohm(command.zero_code, command.full_code, converter),
         no_voltage=_no_voltage(command, signals.signs),
         no_voltage_drives=any(command.from_zero(0, sign) for sign in signals.signs) and command.valid_codes[0] == 0,
@@ -182,7 +182,7 @@ def _commands(compensator: Compensator, converter: Converter) -> dict[Fraction, 
 
 
 def _no_voltage(command: CommandSignal, signs: tuple[int, ...]) -> str:
-    """Say what command the code of 0 V is; nothing if it is not sound."""
+    """Say what command the code of 0 V is; nothing if it is not valid."""
     if command.valid_codes[0] > 0:
         return ""
     for sign in signs:
@@ -207,7 +207,7 @@ def _pressure(name: str, sensor: PressureSignal, converter: Converter) -> Pressu
         span_MPa=f"{float(sensor.span_MPa):g}",
         zero_code=str(zero),
         full_code=str(full),
-        sound="{}..{}".format(*sensor.valid_codes),
+        valid="{}..{}".format(*sensor.valid_codes),
         zero_volts=_volts(zero, converter),
         full_volts=_volts(full, converter),
         zero_of_range=_of_range(zero, converter),

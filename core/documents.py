@@ -74,8 +74,19 @@ def parse_document(content: bytes, source: str, schemas: tuple[str, ...]) -> dic
 
 
 def _writer(schema: str) -> str:
-    command = WRITTEN_BY.get(schema.partition("/")[0])
+    command = written_by(schema)
     return f" (which `{command}` writes)" if command else ""
+
+
+def written_by(schema: str) -> str | None:
+    """Return the command that writes artefacts of a schema, or None of one that no other command takes.
+
+    Examples
+    --------
+    >>> written_by("dzdesign.valve/1")
+    'dzdesign identify'
+    """
+    return WRITTEN_BY.get(schema.partition("/")[0])
 
 
 def _refuse_deep(document: Any) -> None:

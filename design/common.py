@@ -114,7 +114,9 @@ def common_setting(batch: Mapping[str, Designed]) -> CommonSetting:
     if best is None:
         raise InputError("no law of one direction lies under the least guarded offset of all valves")
     _, carrier, laws = best
-    compensator = replace(batch[carrier].own, positive=laws[1], negative=laws.get(-1), costs=())
+    compensator = replace(
+        batch[carrier].own, positive=laws[1], negative=laws.get(-1), costs=(), common_valves=len(batch)
+    )
     for side in sides:
         prove_monotone(compensator, side.sign)
     prove_certificates(compensator)

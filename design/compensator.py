@@ -9,6 +9,7 @@ from dzdesign.derivation.edge import evaluate_edge
 from dzdesign.derivation.law import law
 from dzdesign.derivation.scaling import drive, evaluate_line
 from dzdesign.design.amplifier import RAMPED_CODES, Amplifier
+from dzdesign.design.request import DesignRequest
 from dzdesign.design.signals import Signals
 from dzdesign.identify.guard_curve import GUARDS
 
@@ -119,6 +120,10 @@ class Compensator(ShownInNotebooks):
         What the safe choices cost, in a person's words.
     valve_document, valve_sha256 : str
         The valve.json it was designed from, whole, and its hash: provenance, and the plant for the closed loop.
+    request : DesignRequest or None
+        Target and options that it was designed with; None where nobody wrote them down.
+    common_valves : int
+        Of one setting for many valves: how many; 0 of a valve's own.
     """
 
     law_name: str
@@ -135,6 +140,8 @@ class Compensator(ShownInNotebooks):
     costs: tuple[str, ...]
     valve_document: str
     valve_sha256: str
+    request: DesignRequest | None = None
+    common_valves: int = 0
 
     def __post_init__(self) -> None:
         law(self.law_name)
@@ -161,6 +168,8 @@ class Compensator(ShownInNotebooks):
             and max(abs(code - command.zero_code) for code in command.valid_codes) > RAMPED_CODES
         ):
             raise InputError(f"a ramp counts up to {RAMPED_CODES} codes of command from zero on; use a shorter signal")
+        if self.common_valves == 1:
+            raise InputError("common_valves is 1, expected 0 of a valve's own setting, and two or more of a common one")
         for sign in self.signals.signs:
             self._check_side(sign)
 

@@ -5,11 +5,13 @@ from fractions import Fraction
 from types import NoneType
 from typing import Any
 
-from dzdesign.core.artefacts import TOOL, parse_document, to_json
+from dzdesign.core.artefacts import TOOL, parse_document, sha256_of, to_json
 from dzdesign.core.errors import InputError
 from dzdesign.core.shape import Exactly, Number, check_shape
 from dzdesign.design.amplifier import Amplifier
 from dzdesign.design.compensator import Certificate, Compensator, SideLaw
+from dzdesign.design.request import DesignRequest, TargetInputs
+from dzdesign.design.signal_text import Converter
 from dzdesign.design.signals import CommandSignal, PressureSignal, Signals
 from dzdesign.identify.valve_file import valve_from_document
 
@@ -80,15 +82,37 @@ SHAPE = {
     "costs": [str],
     "valve": dict,
 }
+#: What is checked where it is there. A file from before it was kept lacks what was asked for, and the valve's hash.
+LATER = {
+    "tool": {"name": str, "version": str},
+    "target": (
+        {
+            "name": str,
+            "converter_V": RATIONAL,
+            "converter_levels": Number(2, 65536, whole=True),
+            "compare_max": POSITIVE,
+            "sample_Hz": POSITIVE,
+            "tick_Hz": POSITIVE,
+        },
+        NoneType,
+    ),
+    "options": (dict, NoneType),
+    "common_valves": CODE,
+    "valve_sha256": str,
+}
 
 
 def compensator_document(compensator: Compensator) -> dict[str, Any]:
     """Return the JSON document of schema dzdesign.compensator/1."""
     c, signals, amplifier = compensator, compensator.signals, compensator.amplifier
+    valve = json.loads(c.valve_document)
     return {
         "schema": SCHEMA,
         "tool": TOOL,
         "made_from": [{"source": "valve.json", "sha256": c.valve_sha256}],
+        "target": _target_document(c.request.target) if c.request else None,
+        "options": dict(c.request.options) if c.request else None,
+        "common_valves": c.common_valves,
         "law": c.law_name,
         "below_dp0": c.below_reference,
         "u_max_V": _pair(c.u_max_V),
@@ -124,7 +148,24 @@ def compensator_document(compensator: Compensator) -> dict[str, Any]:
             "compare_limit": amplifier.compare_limit,
         },
         "costs": list(c.costs),
-        "valve": json.loads(c.valve_document),
+        "valve_sha256": _hash_of(valve),
+        "valve": valve,
+    }
+
+
+def _hash_of(valve: dict[str, Any]) -> str:
+    """Return the SHA-256 of the valve as it stands in compensator.json; that of its file depends on the spacing too."""
+    return sha256_of(to_json(valve).encode())
+
+
+def _target_document(target: TargetInputs) -> dict[str, Any]:
+    return {
+        "name": target.name,
+        "converter_V": _pair(target.converter.full_V),
+        "converter_levels": target.converter.levels,
+        "compare_max": target.compare_max,
+        "sample_Hz": target.sample_Hz,
+        "tick_Hz": target.tick_Hz,
     }
 
 
@@ -167,11 +208,17 @@ def compensator_from_document(content: bytes, source: str) -> Compensator:
     """
     document = parse_document(content, source, (SCHEMA,))
     check_shape(document, SHAPE, source, REMEDY)
+    check_shape(document, {key: shape for key, shape in LATER.items() if key in document}, source, REMEDY)
     if not document["made_from"]:
         raise InputError(f"'{source}': 'made_from' is empty, expected the valve's hash; {REMEDY}")
     valve = valve_from_document(to_json(document["valve"]).encode(), f"{source}: valve")
     if _fraction(document["u_max_V"], "u_max_V") != Fraction(repr(valve.u_max_V)):
         raise InputError(f"'{source}': 'u_max_V' is not that of its valve, {valve.u_max_V:g} V; {REMEDY}")
+    if document.get("valve_sha256", _hash_of(document["valve"])) != _hash_of(document["valve"]):
+        raise InputError(
+            f"'{source}': 'valve' was changed since the compensator was designed from it ('valve_sha256' is that of "
+            f"another); change valve.json, and {REMEDY}"
+        )
     try:
         amplifier, negative = document["amplifier"], document["sides"]["negative"]
         return Compensator(
@@ -196,9 +243,32 @@ def compensator_from_document(content: bytes, source: str) -> Compensator:
             costs=tuple(document["costs"]),
             valve_document=to_json(document["valve"]),
             valve_sha256=document["made_from"][0]["sha256"],
+            request=_request(document),
+            common_valves=document.get("common_valves", 0),
         )
     except InputError as error:
         raise InputError(f"'{source}': {error}; {REMEDY}") from error
+
+
+def _request(document: dict[str, Any]) -> DesignRequest | None:
+    """Return what was asked for; None of a file that does not say, as all from before it was kept."""
+    target, options = document.get("target"), document.get("options")
+    if target is None or options is None:
+        return None
+    check_shape(options, dict.fromkeys(options, str), "options", "")
+    full_V = _fraction(target["converter_V"], "target.converter_V")
+    if full_V <= 0:
+        raise InputError(f"'target.converter_V' is {float(full_V):g}, expected more than zero")
+    return DesignRequest(
+        target=TargetInputs(
+            name=target["name"],
+            converter=Converter(full_V=full_V, levels=target["converter_levels"]),
+            compare_max=target["compare_max"],
+            sample_Hz=target["sample_Hz"],
+            tick_Hz=target["tick_Hz"],
+        ),
+        options=tuple(options.items()),
+    )
 
 
 def _signals(document: dict[str, Any]) -> Signals:

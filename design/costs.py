@@ -17,7 +17,7 @@ def costs_of(compensator: Compensator, valve: ValveModel) -> tuple[str, ...]:
     InputError
         If the largest output does not open the valve.
     """
-    lines = []
+    lines = list(hidden_failures(compensator, valve))
     for sign in compensator.signals.signs:
         name = "positive" if sign > 0 else "negative"
         label = "" if compensator.negative is None else f"{name} side, "
@@ -34,7 +34,22 @@ def costs_of(compensator: Compensator, valve: ValveModel) -> tuple[str, ...]:
             "the valve's negative side is left out: the command has one sign; give a --command-signal of both to drive "
             "two solenoids"
         )
-    return tuple(lines + unseen_failures(compensator.signals) + _cost_of_options(compensator))
+    return tuple(lines + _cost_of_options(compensator))
+
+
+def hidden_failures(compensator: Compensator, valve: ValveModel) -> tuple[str, ...]:
+    """Return one line for each failure of a signal that the firmware can't see; the first of `costs_of`."""
+    lines = unseen_failures(compensator.signals)
+    for sign in compensator.signals.signs:
+        name = "positive" if sign > 0 else "negative"
+        label = "" if compensator.negative is None else f"{name} side, "
+        if valve.sides[name].trend == "increasing":
+            lines.append(
+                f"{label}the threshold grows with the pressure drop, so a pressure signal that reads too high raises "
+                "the offset: a broken wire of sensor B is not recognised unless it has a live zero; monitor the "
+                "sensors outside"
+            )
+    return tuple(lines)
 
 
 def _cost_of_test(compensator: Compensator, test: TestResult, sign: int) -> str:
@@ -110,11 +125,6 @@ def _residual(knee: float, offset: float, at_edge: float, full: float, edge: flo
 
 def _cost_of_side(compensator: Compensator, side: SideModel, sign: int) -> list[str]:
     lines = []
-    if side.trend == "increasing":
-        lines.append(
-            "the threshold grows with the pressure drop, so a pressure signal that reads too high raises the offset: a "
-            "broken wire of sensor B is not recognised unless it has a live zero; monitor the sensors outside"
-        )
     certificate = compensator.side(sign).certificate
     lines.append(
         f"the table's offset stays {1e3 * certificate.mean_loss_V:.2f} mV under the certified curve on average, "

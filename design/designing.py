@@ -73,6 +73,7 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
         costs=(),
         valve_document=document,
         valve_sha256=sha256_of(document.encode()),
+        request=options.request,
     )
     for sign in signals.signs:
         prove_monotone(compensator, sign)

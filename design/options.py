@@ -7,6 +7,7 @@ from math import ceil, floor
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.design.amplifier import RAMP_UNIT, Amplifier
 from dzdesign.design.compensator import BELOW_REFERENCE
+from dzdesign.design.request import DesignRequest
 from dzdesign.design.signals import Signals
 from dzdesign.identify.guard_curve import GUARDS
 
@@ -44,6 +45,8 @@ class DesignOptions:
         Frequency of the dither, a square wave, and its peak (half its height) over full drive; 0: none.
     output_max : Fraction
         Largest drive over full drive.
+    request : DesignRequest or None
+        The target and the texts that these were read from, to be kept in compensator.json.
     """
 
     law_name: str = "paper"
@@ -57,6 +60,7 @@ class DesignOptions:
     dither_Hz: float = 0.0
     dither_peak: Fraction = Fraction(0)
     output_max: Fraction = Fraction(1)
+    request: DesignRequest | None = None
 
     def __post_init__(self) -> None:
         for what, given, known in (

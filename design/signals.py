@@ -25,7 +25,7 @@ class CommandSignal:
     negative_full_code : int or None
         Code of full negative command, on the other side of zero; None for a command of one sign.
     valid_codes : tuple of int
-        First and last code of a sound signal: outside them the valve is de-energised.
+        First and last code of a valid signal: outside them the valve is de-energised.
     """
 
     zero_code: int = 0
@@ -40,7 +40,7 @@ class CommandSignal:
         for name in ("zero_code", "full_code", "negative_full_code"):
             code = getattr(self, name)
             if code is not None and not low <= code <= high:
-                raise InputError(f"the command's {name} is {code}, outside the sound codes {low} to {high}")
+                raise InputError(f"the command's {name} is {code}, outside the valid codes {low} to {high}")
         if self.negative_full_code is not None and self.direction(-1) != -self.direction(1):
             raise InputError(
                 f"full negative command has code {self.negative_full_code}, expected the other side of zero "
@@ -78,7 +78,7 @@ class PressureSignal:
     zero_code, full_code : int
         Codes of the ends of the span.
     valid_codes : tuple of int
-        First and last code of a sound signal: outside them the smallest beta is used.
+        First and last code of a valid signal: outside them the smallest beta is used.
     error_MPa : tuple of Fraction
         Least and largest distance from the pressure that a code is taken for to one that may have made it.
     """
@@ -96,7 +96,7 @@ class PressureSignal:
         if not low <= self.zero_code < self.full_code <= high:
             raise InputError(
                 f"a pressure sensor has codes {self.zero_code} to {self.full_code}, expected them to rise inside the "
-                f"sound codes {low} to {high}"
+                f"valid codes {low} to {high}"
             )
         if not self.error_MPa[0] <= 0 <= self.error_MPa[1]:
             raise InputError("the error of a pressure's code must span zero")
@@ -149,7 +149,7 @@ class Signals:
             low, high = getattr(self, name).valid_codes
             if not 0 <= low < high <= self.code_max:
                 raise InputError(
-                    f"{name}: sound codes {low} to {high} are outside the converter's 0 to {self.code_max}"
+                    f"{name}: valid codes {low} to {high} are outside the converter's 0 to {self.code_max}"
                 )
         # Either way round: a failed sensor makes any difference of sound codes.
         a, b = self.pressure_a.valid_codes, self.pressure_b.valid_codes

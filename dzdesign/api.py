@@ -24,6 +24,7 @@ from dzdesign.core.artefacts import (
     check_file_may_be_written,
     check_folder_may_be_written,
     read_bytes,
+    sha256_of,
     to_json,
     write_file,
     write_folder,
@@ -214,29 +215,29 @@ def design(
 
 
 def generate(
-    compensator: "Compensator | AnyPath", *, target: str = "f28335", output: AnyPath | None = None
+    compensator: "Compensator | AnyPath", *, target: str | None = None, output: AnyPath | None = None
 ) -> "Firmware":
-    """Generate the C project of a compensator, whose certificates are proved again first.
+    """Generate the C project of a compensator, whose numbers are derived again first.
 
     Parameters
     ----------
     compensator : Compensator or path
         From `design`, or compensator.json.
-    target : str
-        Microcontroller; its converter and timer must be those that `design` was told.
+    target : str, optional
+        Microcontroller, by default the one that `design` was told; of another the converter and timer must be the same.
     output : path, optional
         Also write the firmware folder here.
 
     Raises
     ------
     InputError
-        If the file can't be read, a certificate does not follow, or the target is another.
+        If the file can't be read, a number in it does not follow, or the target counts otherwise.
     """
     from dzdesign.codegen.project import SCHEMA
     from dzdesign.codegen.project import generate as generate_project
-    from dzdesign.design.certifying import prove_certificates
     from dzdesign.design.compensator import Compensator
     from dzdesign.design.compensator_file import compensator_from_document
+    from dzdesign.design.derived import prove_derived
 
     if output is not None:
         check_folder_may_be_written(Path(output), SCHEMA)
@@ -244,7 +245,7 @@ def generate(
     if not isinstance(compensator, Compensator):
         content = read_bytes(Path(compensator), "compensator file")
         compensator = compensator_from_document(content, os.fspath(compensator))
-    prove_certificates(compensator)
+    prove_derived(compensator)
     firmware = generate_project(compensator, target, content)
     if output is not None:
         write_folder(Path(output), firmware.files, firmware.manifest)
@@ -293,6 +294,7 @@ def verify(
             folder,
             read_plant(Path(plant)) if plant is not None else None,
             Path(plant).name if plant is not None else "",
+            sha256_of(read_bytes(Path(plant), "plant file")) if plant is not None else None,
             tolerances=read_tolerances(Path(tolerances)) if tolerances is not None else None,
         )
         if output is not None:

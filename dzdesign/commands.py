@@ -11,6 +11,7 @@ from dzdesign.core.artefacts import (
     check_folder_may_be_written,
     parse_document,
     read_bytes,
+    sha256_of,
     to_json,
     write_file,
     write_files,
@@ -94,10 +95,10 @@ def run_design(args: argparse.Namespace) -> int:
 
 def run_codegen(args: argparse.Namespace) -> int:
     """Generate the firmware of a compensator."""
-    from dzdesign.codegen.project import SCHEMA, generate, target_named
-    from dzdesign.design.certifying import prove_certificates
+    from dzdesign.codegen.project import DEFAULT_TARGET, SCHEMA, generate, target_named
     from dzdesign.design.compensator_file import SCHEMA as COMPENSATOR_SCHEMA
     from dzdesign.design.compensator_file import compensator_from_document
+    from dzdesign.design.derived import prove_derived
     from dzdesign.design_options import given_design_options
     from dzdesign.identify.model import SCHEMA as VALVE_SCHEMA
     from dzdesign.tables import print_firmware
@@ -106,22 +107,25 @@ def run_codegen(args: argparse.Namespace) -> int:
         return _list_targets(args)
     if args.source is None:
         raise InputError("codegen needs a COMPENSATOR.json or a VALVE.json; see `dzdesign codegen --help`")
-    target_named(args.target)
+    target_named(args.target or DEFAULT_TARGET)
     check_folder_may_be_written(Path(args.output), SCHEMA)
     path = Path(args.source)
     content = read_bytes(path, "compensator file")
     document = parse_document(content, str(path), (COMPENSATOR_SCHEMA, VALVE_SCHEMA))
     if document["schema"] == VALVE_SCHEMA:
+        args.target = args.target or DEFAULT_TARGET
         firmware = generate(_design(path, content, args), args.target)
     else:
         for option in given_design_options(args):
             raise InputError(f"{option} is an option of the design, and '{path}' is designed; use `dzdesign design`")
         compensator = compensator_from_document(content, str(path))
         try:
-            prove_certificates(compensator)
+            prove_derived(compensator)
         except InputError as error:
             raise InputError(f"'{path}': {error}") from error
         firmware = generate(compensator, args.target, content)
+    if firmware.note:
+        say(firmware.note)
     write_folder(Path(args.output), firmware.files, firmware.manifest)
     if args.json:
         print(to_json(firmware.manifest), end="")
@@ -157,11 +161,12 @@ def run_verify(args: argparse.Namespace) -> int:
     check_folder_may_be_written(output, SCHEMA)
     plant = read_plant(Path(args.plant), say) if args.plant else None
     source = Path(args.plant).name if args.plant else ""
+    digest = sha256_of(read_bytes(Path(args.plant), "plant file")) if args.plant else None
     tolerances = read_tolerances(Path(args.tolerances)) if args.tolerances else None
     firmware = Path(args.firmware)
     ware = check_against_c2000ware(firmware, Path(args.c2000ware), say) if args.c2000ware else None
     with stages() as stage:
-        verification = verify(firmware, plant, source, tolerances=tolerances, say=stage, watch=stage.each)
+        verification = verify(firmware, plant, source, digest, tolerances=tolerances, say=stage, watch=stage.each)
     added = [ware] if ware else []
     if args.machine_code:
         from dzdesign.verify.machine_code import machine_code_checks

@@ -4,7 +4,7 @@ import argparse
 from importlib.resources import as_file, files
 from pathlib import Path
 
-from dzdesign.core.artefacts import TOOL, check_folder_may_be_written, to_json, write_file, write_folder
+from dzdesign.core.artefacts import TOOL, check_folder_may_be_written, sha256_of, to_json, write_file, write_folder
 from dzdesign.core.errors import InputError
 from dzdesign.core.units import parse_quantity
 from dzdesign.progress import say, stages
@@ -16,10 +16,11 @@ RECORD = {"valve": "simulated by dzdesign, no measurement"}
 
 def run_demo(args: argparse.Namespace) -> int:
     """Run the pipeline on the bundled ramp tests and print the closing table."""
-    from dzdesign.codegen.project import generate
+    from dzdesign.codegen.project import DEFAULT_TARGET, generate, target_named
     from dzdesign.derivation.account import verify_statements
     from dzdesign.design.compensator_file import compensator_document
     from dzdesign.design.designing import design
+    from dzdesign.design.option_texts import options_of
     from dzdesign.identify.identification import identify
     from dzdesign.identify.options import IdentifyOptions
     from dzdesign.identify.ramp_files import read_ramp_file
@@ -43,6 +44,7 @@ def run_demo(args: argparse.Namespace) -> int:
         with as_file(files("dzdesign.example")) as example:
             tests = [read_ramp_file(path) for path in sorted((example / "ramps").glob("*.csv.gz"))]
             plant = read_plant(example / "plant.toml")
+            digest = sha256_of((example / "plant.toml").read_bytes())
         meter = IdentifyOptions(
             meter_lag=parse_quantity(METER_LAG, "time", "lag"),
             meter_floor=parse_quantity(METER_FLOOR, "flow", "floor"),
@@ -52,12 +54,14 @@ def run_demo(args: argparse.Namespace) -> int:
         valve_json = to_json(valve.to_document())
         write_file(folder / "valve.json", valve_json)
         stage("designing the compensator")
-        compensator = design(valve, valve_bytes=valve_json.encode())
+        options = options_of({}, target_named(DEFAULT_TARGET).inputs())
+        compensator = design(valve, options, valve_json.encode())
         compensator_json = to_json(compensator_document(compensator))
         write_file(folder / "compensator.json", compensator_json)
-        firmware = generate(compensator, "f28335", compensator_json.encode())
+        firmware = generate(compensator, DEFAULT_TARGET, compensator_json.encode())
         write_folder(folder / "firmware", firmware.files, firmware.manifest)
-        verification = verify(folder / "firmware", plant, "plant.toml of the example", say=stage, watch=stage.each)
+        source = "plant.toml of the example"
+        verification = verify(folder / "firmware", plant, source, digest, say=stage, watch=stage.each)
     manifest = {"schema": SCHEMA, "tool": TOOL, "made_from": verification.document["made_from"]}
     evidence = with_report(evidence_files(verification), folder / "firmware", folder / "evidence")
     write_folder(folder / "evidence", evidence, manifest)

@@ -68,8 +68,8 @@ def _side_lines(side: "SideModel") -> list[str]:
     lines = [
         f"u_min0 = {side.u_min0_V:.4f} V{at}, under the {100 * side.confidence:.6g}% lower bound of the {side.guard} "
         "threshold, for all tests together",
-        f"drive range k x_max/u_max = {side.k_x_max_over_u_max:.4f}: command from the threshold to full stroke, as a "
-        "share of full command",
+        f"drive range of the valve k x_max/u_max = {side.k_x_max_over_u_max:.4f}: command from the knee to full "
+        "stroke, as a share of full command; the law's counts from its offset, which lies lower",
     ]
     if side.trend_change_V is None or side.trend_change_se_V is None:
         return [*lines, "trend with dP: can't be said from one ramp test"]
@@ -97,7 +97,7 @@ def compensator_html(compensator: "Compensator") -> str:
                 f"{1e3 * float(certificate.smallest_margin_V):.3f}",
             ]
         )
-    headings = ("commands", "k x_max/u_max", "u_min0/u_max", "offset stays under", "dP (MPa)", "margin (mV)")
+    headings = ("commands", "k x_max/u_max of the law", "u_min0/u_max", "offset stays under", "dP (MPa)", "margin (mV)")
     caption = f"Compensator, law {chosen.name} {chosen.equation}: u_O = {chosen.output}"
     return _table(caption, headings, rows, words=(0, 3)) + _sentences(compensator.costs)
 

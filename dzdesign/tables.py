@@ -80,10 +80,10 @@ def _side_lines(side: "SideModel") -> tuple[str, ...]:
         f"bound: {100 * side.confidence:.6g}% lower bound, for all tests together, of the {side.guard} threshold (the "
         f"knee, or the tail's zero where the edge is soft); flow below {side.level_L_min:.2f} L/min (meter's floor, "
         "its noise, or 0.5 % of the largest flow) counts as none",
-        f"u_min0 = {side.u_min0_V:.4f} V{at}: the law's offset. Between two tests only the lower of their bounds is "
-        "certain, so each offset stays under the neighbour's; more tests raise it",
-        f"drive range k x_max/u_max = {side.k_x_max_over_u_max:.4f}: command from the threshold to full stroke, as a "
-        "share of full command"
+        f"u_min0 = {side.u_min0_V:.4f} V{at}: the largest certified offset. Between two tests only the lower of their "
+        "bounds is certain, so each offset stays under the neighbour's; more tests raise it",
+        f"drive range of the valve k x_max/u_max = {side.k_x_max_over_u_max:.4f}: command from the knee to full "
+        "stroke, as a share of full command; the law's counts from its offset, which lies lower"
         + (f"; k = {side.k_V_mm:.4f} V/mm" if side.k_V_mm is not None else ""),
         "trend with dP: can't be said from one ramp test"
         if side.trend is None
@@ -95,7 +95,9 @@ def _side_lines(side: "SideModel") -> tuple[str, ...]:
 def print_compensator(compensator: "Compensator") -> None:
     """Print the law, the certificate and what the choices cost."""
     from dzdesign.derivation.law import law
+    from dzdesign.design.costs import hidden_failures
     from dzdesign.design.signals_in_words import signals_in_words
+    from dzdesign.identify.valve_file import valve_from_document
 
     chosen = law(compensator.law_name)
     lines = [
@@ -108,10 +110,10 @@ def print_compensator(compensator: "Compensator") -> None:
         low, high = (float(end) for end in certificate.dp_MPa)
         label = "" if compensator.negative is None else "positive: " if sign > 0 else "negative: "
         lines += [
-            f"{label}drive range k x_max/u_max = {_rational(side.k_x_max_over_u_max)} (from the offset to full flow), "
-            f"offset at dP0 u_min0/u_max = {_rational(side.u_min0_over_u_max)}, both as shares of full command; "
-            f"beta(dP): straight between {len(side.beta_numerators)} nodes, each a whole number of 1/"
-            f"{compensator.beta_denominator}",
+            f"{label}drive range of the law k x_max/u_max = {_rational(side.k_x_max_over_u_max)} (from its offset, "
+            f"below the valve's knee, to full flow), offset at dP0 u_min0/u_max = {_rational(side.u_min0_over_u_max)}, "
+            f"both as shares of full command; beta(dP): straight between {len(side.beta_numerators)} nodes, each a "
+            f"whole number of 1/{compensator.beta_denominator}",
             f"{label}certificate: the offset stays below the {100 * certificate.confidence:.6g}% lower bound of the "
             f"{certificate.guard} threshold from {low:.3f} to {high:.3f} MPa, at every pressure code; flow below "
             f"{certificate.level_L_min:.2f} L/min (meter's floor, its noise, or 0.5 % of the largest flow) counts as "
@@ -121,8 +123,11 @@ def print_compensator(compensator: "Compensator") -> None:
         share = compensator.edge_codes / compensator.signals.command.span(1)
         guard = compensator.positive.certificate.guard
         lines.append(f"edge: from the {guard} to the opening threshold over the first {share:.2%} of command")
+    valve = valve_from_document(compensator.valve_document.encode(), "compensator.json: valve")
+    hidden = hidden_failures(compensator, valve)
+    costs = [line for line in compensator.costs if line not in hidden]
     console = new_console()
-    for line in (*lines, *(f"cost: {line}" for line in compensator.costs)):
+    for line in (*(f"warning: {line}" for line in hidden), *lines, *(f"cost: {line}" for line in costs)):
         put_line(console, line)
 
 
@@ -134,11 +139,15 @@ def print_firmware(firmware: "Firmware", folder: str) -> None:
 
 
 def print_verification(verification: "Verification") -> None:
-    """Print every check and the closed loop, per pressure drop."""
+    """Print every check, what was not tried, and the closed loop per pressure drop."""
+    from dzdesign.verify.required import untried_of
+
     console = new_console()
     for check in verification.checks:
         verdict = {True: "holds", False: "FAILS", None: "NOT CHECKED"}[check.holds]
         put_line(console, f"{verdict}  {check.name}: {check.text}")
+    for name in untried_of(verification.document):
+        put_line(console, f"NOT TRIED  {name}".replace("`", ""))
     if verification.loops:
         console.print(_closed_loop(verification))
     print_scenarios(verification.scenarios)

@@ -179,7 +179,11 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
                 help="or a VALVE.json: designed first, for the target, with the options below",
             ),
             _given(*OUTPUT, default="firmware", metavar="DIR", help="folder to write"),
-            TARGET,
+            _given(
+                "--target",
+                metavar="NAME",
+                help="microcontroller, see --list-targets (default: that of the design; of a VALVE.json f28335)",
+            ),
             _given("--list-targets", action="store_true", help="print name and description of every target"),
             *DESIGN,
         ),

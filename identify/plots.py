@@ -240,7 +240,7 @@ def _thresholds_figure(side: SideModel) -> "Figure":
     if len(dp) > 1:
         axes.stairs(side.certified_steps_V, dp, baseline=None, color=GREEN, lw=2, label="certified staircase")
     offset = side.u_min0_V * np.array(side.beta or (1.0,))
-    axes.plot(dp, offset, "D--", ms=4, lw=1.4, color=PURPLE, label="law's offset β u_min0", zorder=6)
+    axes.plot(dp, offset, "D--", ms=4, lw=1.4, color=PURPLE, label="largest certified offset", zorder=6)
     axes.set_ylabel("command u (V)")
     _label_pressure(axes, side)
     return finish(figure, 2)

@@ -42,11 +42,19 @@ def example_valve(example_tests):
     return identify(example_tests)
 
 
+def default_options():
+    """What `design` takes where no option is given."""
+    from dzdesign.codegen.project import DEFAULT_TARGET, target_named
+    from dzdesign.design.option_texts import options_of
+
+    return options_of({}, target_named(DEFAULT_TARGET).inputs())
+
+
 @pytest.fixture(scope="session")
 def example_compensator(example_valve):
     from dzdesign.design.designing import design
 
-    return design(example_valve)
+    return design(example_valve, default_options())
 
 
 @pytest.fixture(scope="session")
@@ -77,7 +85,7 @@ def reported_demo(example_valve, tmp_path_factory):
 
     folder = tmp_path_factory.mktemp("reported")
     valve_json = to_json(example_valve.to_document())
-    compensator = design(example_valve, valve_bytes=valve_json.encode())
+    compensator = design(example_valve, default_options(), valve_json.encode())
     compensator_json = to_json(compensator_document(compensator))
     (folder / "valve.json").write_text(valve_json, encoding="utf-8", newline="")
     (folder / "compensator.json").write_text(compensator_json, encoding="utf-8", newline="")

@@ -392,7 +392,7 @@ COMPENSATORS = [
     (("signals", "pressure_b", "zero_code"), 4095, "a pressure sensor has codes 4095 to 4095"),
     (("signals", "command", "full_code"), 0, "zero and full command have the same code, 0"),
     (("signals", "command", "negative_full_code"), 9, "expected the other side of zero"),
-    (("signals", "command", "valid_codes"), [0, 9], "full_code is 4095, outside the sound codes 0 to 9"),
+    (("signals", "command", "valid_codes"), [0, 9], "full_code is 4095, outside the valid codes 0 to 9"),
     (("amplifier", "dither_ticks"), 0, "'amplifier.dither_ticks' is 0"),
     ((*POSITIVE, "certificate", "dp_MPa"), [[1, 1]], "'sides.positive.certificate.dp_MPa' has 1 items, expected 2"),
 ]

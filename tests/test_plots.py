@@ -174,7 +174,7 @@ class TestOverPressure:
         steps, edges, _ = labelled(axes, "certified staircase").get_data()
         assert tuple(steps) == side.certified_steps_V
         assert tuple(edges) == side.beta_dp_MPa
-        offset = labelled(axes, "law's offset β u_min0").get_xydata()
+        offset = labelled(axes, "largest certified offset").get_xydata()
         assert offset[:, 1] == pytest.approx(side.u_min0_V * np.array(side.beta))
         for left, right, step in zip(offset, offset[1:], steps, strict=False):
             assert max(left[1], right[1]) <= step + 1e-9
@@ -203,7 +203,7 @@ class TestOneTest:
         axes = figures["thresholds"].axes[0]
         test = single.model.positive.tests[0]
         assert labelled(axes, "guarded threshold").get_ydata().tolist() == [test.u_guard_V]
-        assert labelled(axes, "law's offset β u_min0").get_ydata() == [single.model.positive.u_min0_V]
+        assert labelled(axes, "largest certified offset").get_ydata() == [single.model.positive.u_min0_V]
         assert axes.get_xticks().size == 0
         assert "not recorded" in axes.get_xlabel()
 

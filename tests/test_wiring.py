@@ -111,8 +111,8 @@ BROKEN = [
     ("0..10 V x 0.3", "inverted", False, "**Warning: 0 V at the command's pin is code 0: full command."),
     (BOTH, "normal", True, "**Warning: 0 V at the command's pin is code 0: full negative command."),
     (BOTH, "inverted", True, "**Warning: 0 V at the command's pin is code 0: full positive command."),
-    ("-10..10 V x 0.12 + 1.5 V", "normal", True, "code 0, which is not sound: the valve is let go"),
-    ("4..20 mA on 150 ohm", "inverted", False, "code 0, which is not sound: the valve is let go"),
+    ("-10..10 V x 0.12 + 1.5 V", "normal", True, "code 0, which is not valid: the valve is let go"),
+    ("4..20 mA on 150 ohm", "inverted", False, "code 0, which is not valid: the valve is let go"),
 ]
 
 
@@ -149,16 +149,16 @@ def test_the_wiring_table_is_that_of_the_signals(firmware, target):
     text, signals = readme(folder, target), compensator_of(folder).signals
     row = wiring_row(text, "command")
     assert "zero = 0.000 V, full = 2.500 V" in row
-    assert f"zero = 0, full = {signals.command.full_code}, sound 0..{signals.command.valid_codes[1]}" in row
+    assert f"zero = 0, full = {signals.command.full_code}, valid 0..{signals.command.valid_codes[1]}" in row
     a, b = signals.pressure_a, signals.pressure_b
     row = wiring_row(text, "pressure A")
     assert row.startswith("| pressure A, 0-25 MPa |") and "0 MPa = 0.596 V, 25 MPa = 2.980 V" in row
     assert "4-20 mA on a shunt of 149 ohm" in row
     low, high = a.valid_codes
-    assert f"0 MPa = {a.zero_code}, 25 MPa = {a.full_code}, sound {low}..{high}" in row
+    assert f"0 MPa = {a.zero_code}, 25 MPa = {a.full_code}, valid {low}..{high}" in row
     row = wiring_row(text, "pressure B")
     assert row.startswith("| pressure B, 0-10 MPa |") and "0 MPa = 0.000 V, 10 MPa = 3.000 V" in row
-    assert f"0 MPa = 0, 10 MPa = {b.full_code}, sound" in row and "shunt" not in row
+    assert f"0 MPa = 0, 10 MPa = {b.full_code}, valid" in row and "shunt" not in row
     assert f"`p_a_adc` near {a.zero_code}, `p_b_adc` near 0" in step(text, 4)
     assert not re.search(r"\bratio\b|sensor output 0-", text)
 

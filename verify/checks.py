@@ -4,10 +4,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from dzdesign.core.artefacts import sha256_of
+from dzdesign.core.artefacts import TOOL, sha256_of
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.certifying import prove_certificates
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.derived import prove_derived
 from dzdesign.identify.model import ValveModel
 from dzdesign.verify.all_inputs import InputCheck
 from dzdesign.verify.closed_loop import NO_FLOW_L_MIN, LoopComparison
@@ -71,6 +72,30 @@ def certificate_follows(compensator: Compensator) -> Check:
         f"{float(certificate.dp_MPa[0]):.2f} to {float(certificate.dp_MPa[1]):.2f} MPa, proved again at every "
         "difference of pressure codes",
     )
+
+
+def law_follows(compensator: Compensator, document: dict[str, Any]) -> list[Check]:
+    """Tell whether designing again gives the same numbers; nothing of a file from before options were kept in it.
+
+    Parameters
+    ----------
+    compensator : Compensator
+    document : dict
+        Its file. Another version of dzdesign may have chosen other tables, and none the worse.
+    """
+    name = "the law follows from the valve and the options"
+    if compensator.request is None:
+        return []
+    try:
+        prove_derived(compensator)
+    except InputError as error:
+        version = document.get("tool", {}).get("version")
+        known = version == TOOL["version"]
+        text = str(error) if known else f"designed by dzdesign {version}, and this is {TOOL['version']}: {error}"
+        return [Check(name=name, holds=False if known else None, text=text)]
+    target = compensator.request.target.name
+    text = f"designed again from the valve and the options in compensator.json, for {target}: every number the same"
+    return [Check(name=name, holds=True, text=text)]
 
 
 def drive_follows(folder: Path, compensator: Compensator) -> Check:

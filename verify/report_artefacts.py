@@ -8,11 +8,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from dzdesign.core.artefacts import MANIFEST_NAME, parse_document, sha256_of, to_json
+from dzdesign.core.artefacts import MANIFEST_NAME, TOOL, parse_document, sha256_of, to_json
+from dzdesign.core.documents import written_by
 from dzdesign.core.errors import InputError
 from dzdesign.core.shape import check_shape
 from dzdesign.design.compensator_file import SCHEMA as COMPENSATOR_SCHEMA
 from dzdesign.design.compensator_file import compensator_from_document
+from dzdesign.design.derived import prove_derived
 from dzdesign.identify.model import SCHEMA as VALVE_SCHEMA
 from dzdesign.identify.valve_file import valve_from_document
 from dzdesign.verify.report_shapes import ASSESSMENT, CONSTANTS, FIRMWARE, REPRODUCTION, VERIFICATION
@@ -34,14 +36,6 @@ ROLES = {
     "assessment": "assessment of recordings",
     "reproduction": "the paper's numbers",
 }
-#: What makes an artefact that is missing.
-MAKES = {
-    "verification": "`dzdesign verify`",
-    "firmware": "`dzdesign codegen`",
-    "compensator": "`dzdesign design`",
-    "valve": "`dzdesign identify`",
-}
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Artefact:
@@ -282,14 +276,15 @@ class _Search:
 
     def _miss(self, role: str, stated: str | None = None, hint: str = "") -> None:
         by = f" of SHA-256 {stated}" if stated else f" ({hint})" if hint else ""
-        self.missing.append(f"{ROLES[role]}{by}: made by {MAKES[role]}")
+        self.missing.append(f"{ROLES[role]}{by}: made by `{written_by(SCHEMAS[role][0])}`")
 
     def _take(self, role: str, name: str) -> None:
         """Keep an artefact; one that can't be read is missing, and the rest is reported without it."""
         try:
             document = _checked(role, self.shelf[name], name)
         except InputError as error:
-            self.unreadable.append(f"{ROLES[role]}: {error}")
+            # What the evidence rests on must not go missing without a word: its verdict would stand.
+            (self.faults if role == "compensator" and self.found else self.unreadable).append(f"{ROLES[role]}: {error}")
             return
         self.found[role] = Artefact(role=role, name=name, sha256=self.hashes[name], document=document)
 
@@ -302,7 +297,8 @@ def _origin(artefact: Artefact) -> str:
     return made_from[0]["sha256"]
 
 
-_SCHEMAS = {
+#: Schema and shape of each kind.
+SCHEMAS = {
     "verification": (EVIDENCE_SCHEMA, VERIFICATION),
     "firmware": (FIRMWARE_SCHEMA, FIRMWARE),
     "compensator": (COMPENSATOR_SCHEMA, {}),
@@ -314,13 +310,15 @@ _SCHEMAS = {
 
 def _checked(role: str, content: bytes, name: str) -> dict[str, Any]:
     """Return an artefact's content, with every key that the report reads."""
-    schema, shape = _SCHEMAS[role]
+    schema, shape = SCHEMAS[role]
     document = parse_document(content, name, (schema,))
     check_shape(document, shape, name, "make it again")
     if role == "firmware" and "constants" in document:
         check_shape(document, CONSTANTS, name, "make it again with `dzdesign codegen`")
     if role == "compensator":
-        compensator_from_document(content, name)
+        compensator = compensator_from_document(content, name)
+        if document.get("tool") == TOOL:  # another version may have chosen other tables
+            prove_derived(compensator)
     if role == "valve":
         valve_from_document(content, name)
     return document

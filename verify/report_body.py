@@ -17,6 +17,7 @@ from dzdesign.verify.report_sections import (
     constants_table,
     hashes_table,
     loops_table,
+    plant_table,
     provenance_table,
     rounding_table,
     scenarios_table,
@@ -25,6 +26,7 @@ from dzdesign.verify.report_sections import (
 )
 from dzdesign.verify.report_table import Table, whole
 from dzdesign.verify.report_valve_figures import beta_figure, law_figure, lines_figure, thresholds_figure
+from dzdesign.verify.required import required_of
 
 #: A probability below this is said to be below it.
 SMALLEST_P = 1e-9
@@ -117,8 +119,8 @@ def _valve_sections(valve: dict[str, Any] | None, compensator: dict[str, Any] | 
 
 def _trend(name: str, side: dict[str, Any]) -> str:
     stroke = (
-        f"{name.capitalize()} commands: drive range k x_max/u_max = {side['k_x_max_over_u_max']:.4f}, the command from "
-        "the threshold to full stroke as a share of full command"
+        f"{name.capitalize()} commands: drive range of the valve k x_max/u_max = {side['k_x_max_over_u_max']:.4f}, the "
+        "command from the knee to full stroke as a share of full command"
     )
     if side["trend"] is None:
         return f"{stroke}; how the threshold moves with the pressure drop can't be said from one ramp test."
@@ -135,13 +137,15 @@ def _law_section(compensator: dict[str, Any] | None) -> Section:
         return Section(missing="No compensator is here: `dzdesign design` makes compensator.json.")
     names = [name for name, side in compensator["sides"].items() if side]
     below = {"hold": "β = 1, as in the paper", "extend": "β as tested"}[compensator["below_dp0"]]
-    lines = [f"Up to dP0: {below}."]
+    lines, valves = [f"Up to dP0: {below}."], compensator["valve"]["sides"]
     for name in names:
         side = compensator["sides"][name]
         (k_top, k_under), (u_top, u_under) = side["k_x_max_over_u_max"], side["u_min0_over_u_max"]
         lines.append(
-            f"{name.capitalize()} commands: drive range k x_max/u_max = {k_top}/{k_under} = {k_top / k_under:.5f} "
-            f"(from the offset to full flow), offset at dP0 u_min0/u_max = {u_top}/{u_under} = {u_top / u_under:.5f}, "
+            f"{name.capitalize()} commands: drive range of the law k x_max/u_max = {k_top}/{k_under} = "
+            f"{k_top / k_under:.5f}, from its offset to full flow; the valve's, "
+            f"{valves[name]['k_x_max_over_u_max']:.4f}, counts from the knee, which lies higher; "
+            f"offset at dP0 u_min0/u_max = {u_top}/{u_under} = {u_top / u_under:.5f}, "
             f"both as shares of full command; β is straight between {len(side['beta'])} nodes, "
             f"{compensator['beta_step_codes']} pressure codes apart, each a whole number of "
             f"1/{compensator['beta_denominator']}."
@@ -220,13 +224,24 @@ def _loop_section(chain: Chain) -> Section:
             figures.append(loop_figure(curves, chain.curves[closed_loop_name(side)], side, len(sides) > 1))
     tables = (
         loops_table(loop["pressures"]), scenarios_table(evidence["scenarios"]), series_table(evidence["monte_carlo"]),
+        plant_table(loop),
     )  # fmt: skip
     return Section(
         figures=tuple(figures),
         tables=tuple(table for table in tables if table),
-        lines=(f"A simulation. Plant: {loop['plant_source']}.",),
+        lines=(_plant_line(loop),),
         missing=missing,
     )
+
+
+def _plant_line(loop: dict[str, Any]) -> str:
+    """Say which plant it was, and whether it stands in for the valve."""
+    line = f"A simulation. Plant: {loop['plant_source']}"
+    if loop.get("plant_sha256"):
+        return f"{line}, SHA-256 {loop['plant_sha256']}."
+    if loop.get("plant"):
+        return f"{line}."
+    return f"{line}, one for each pressure drop: this checks the design and the C, not the identification."
 
 
 def _acceptance_section(chain: Chain) -> Section:
@@ -250,7 +265,9 @@ def _checks_section(chain: Chain) -> Section:
     evidence = chain.document("verification")
     if evidence is None:
         return Section(missing="NOT CHECKED: no evidence is here; `dzdesign verify` makes it.")
-    return Section(tables=(checks_table(evidence),))
+    firmware = chain.document("firmware")
+    required = required_of(evidence, firmware["target"] if firmware else None)
+    return Section(tables=(checks_table(evidence, required),))
 
 
 def _warnings_section(chain: Chain) -> Section:

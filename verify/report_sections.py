@@ -4,9 +4,11 @@ from collections.abc import Iterator
 from fractions import Fraction
 from typing import Any
 
-from dzdesign.verify.report_artefacts import MAKES, ROLES, Chain
+from dzdesign.core.documents import written_by
+from dzdesign.verify.report_artefacts import ROLES, SCHEMAS, Chain
 from dzdesign.verify.report_figure import csv_text
 from dzdesign.verify.report_table import Cell, Table, number, text_row, verdict, whole
+from dzdesign.verify.required import Required
 
 #: Rows of a constant's table that stand in the page; all of them stand in the CSV.
 SHOWN_ROWS = 3
@@ -152,20 +154,54 @@ def _wanted_offset(valve_side: dict[str, Any], guard: str) -> float:
     return curves[guard]["u_min0_V"] if guard in curves else valve_side["reference"]["u_min_V"]
 
 
-def checks_table(evidence: dict[str, Any]) -> Table:
-    """Return every requirement with its verdict.
+def checks_table(evidence: dict[str, Any], required: tuple[Required, ...]) -> Table:
+    """Return every requirement with its verdict, then what was not tried.
 
     Parameters
     ----------
     evidence : dict
         verification.json.
+    required : tuple of Required
+        Of `required_of`.
     """
     rows = [
         (verdict(check["holds"]), Cell(text=check["name"]), Cell(text=check["text"])) for check in evidence["checks"]
     ]
+    untried = [each for each in required if not each.done]
+    rows += [
+        (Cell(text="– not tried", kind="open"), Cell(text=each.name), Cell(text=f"tried by dzdesign {each.how}"))
+        for each in untried
+    ]
     return Table(
-        caption="Every requirement that was tried",
+        caption=f"{len(evidence['checks'])} requirements tried, {len(untried)} not",
         columns=("verdict", "requirement", "figures"),
+        rows=tuple(rows),
+    )
+
+
+def plant_table(loop: dict[str, Any]) -> Table | None:
+    """Return the parameters of the closed loop's plant; from where to where, of one for each pressure drop.
+
+    Parameters
+    ----------
+    loop : dict
+        verification.json's ``closed_loop``.
+    """
+    plants = [loop["plant"]] if loop.get("plant") else [each["parameters"] for each in loop.get("plants") or []]
+    cells = []
+    for name in plants[0] if plants else ():
+        values = sorted(plant[name] for plant in plants)
+        ends = dict.fromkeys(f"{value:.6g}" for value in (values[0], values[-1]))
+        cells.append((Cell(text=name, kind="symbol"), Cell(text=" to ".join(ends), kind="number")))
+    if not cells:
+        return None
+    half = -(-len(cells) // 2)  # in two columns, or they would take a page of paper
+    right = [*cells[half:], (Cell(text=""), Cell(text=""))]
+    rows = [(*left, *beside) for left, beside in zip(cells[:half], right, strict=False)]
+    of = "" if len(plants) == 1 else f", from the least to the largest of {len(plants)} pressure drops"
+    return Table(
+        caption=f"The plant's parameters; the unit is in the name{of}",
+        columns=("parameter", "value", "parameter", "value"),
         rows=tuple(rows),
     )
 
@@ -271,7 +307,7 @@ def provenance_table(chain: Chain) -> Table:
     for role, label in ROLES.items():
         one = chain.artefacts.get(role)
         if one is None:
-            if role in MAKES:
+            if written_by(SCHEMAS[role][0]):
                 rows.append((Cell(text=label), Cell(text="missing or not used", kind="open"), *text_row(("", "", ""))))
             continue
         tool = one.document["tool"]

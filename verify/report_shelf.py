@@ -3,7 +3,7 @@
 import contextlib
 from pathlib import Path
 
-from dzdesign.core.artefacts import MANIFEST_NAME, parse_document
+from dzdesign.core.artefacts import MANIFEST_NAME, parse_document, sha256_of
 from dzdesign.core.errors import InputError
 
 EVIDENCE_SCHEMA, FIRMWARE_SCHEMA = "dzdesign.evidence/1", "dzdesign.firmware/1"
@@ -42,11 +42,12 @@ def shelf_of(folder: Path) -> dict[str, bytes]:
     except OSError as error:
         raise InputError(f"'{folder}' can't be read: {error.strerror or error}") from error
     evidence = (folder / VERIFICATION_NAME).is_file()
+    others = _evidence_of_others(folder, within)
     shelf: dict[str, bytes] = {}
     for place in (root, *within[:MOST]):  # in one order whichever of them was named: same bytes
         if place == folder:
             shelf |= named
-        elif not (evidence and (place / VERIFICATION_NAME).is_file()):  # of evidence that was named no other counts
+        elif place not in others and not (evidence and (place / VERIFICATION_NAME).is_file()):  # only the one named
             with contextlib.suppress(OSError):  # a neighbour that is not ours to read
                 shelf |= _files_in(place, root)
     if not any(name.endswith(".json") for name in shelf):
@@ -55,6 +56,23 @@ def shelf_of(folder: Path) -> dict[str, bytes]:
             "valve.json; give the folder that `dzdesign demo`, `verify` or `codegen` wrote"
         )
     return shelf
+
+
+def _evidence_of_others(folder: Path, within: list[Path]) -> set[Path]:
+    """Return the folders of evidence that are of another firmware than the one that was named, if one is of it."""
+    if not (folder / MANIFEST_NAME).is_file() or (folder / VERIFICATION_NAME).is_file():
+        return set()
+    digest = sha256_of((folder / MANIFEST_NAME).read_bytes()).encode()
+    evidence = [place for place in within if _is_small(place / VERIFICATION_NAME)]
+    # The hash stands in the file of what was made from it, and nowhere else.
+    ours = {place for place in evidence if digest in (place / VERIFICATION_NAME).read_bytes()}
+    return set(evidence) - ours if ours else set()
+
+
+def _is_small(path: Path) -> bool:
+    with contextlib.suppress(OSError):
+        return path.is_file() and path.stat().st_size <= LARGEST
+    return False
 
 
 def _is_one_stage(folder: Path) -> bool:

@@ -6,6 +6,7 @@ from typing import Any
 
 from dzdesign.verify.report_artefacts import Chain
 from dzdesign.verify.report_table import whole
+from dzdesign.verify.required import untried_of
 
 #: What the check of the inputs counts, each of which a requirement has to say.
 COUNTS = (
@@ -26,12 +27,15 @@ class Headline:
         As on the page.
     reasons : tuple of str
         What does not hold or was not checked.
+    untried : tuple of str
+        What nobody asked for, and the command that tries it: no requirement, but a reader should see it.
     """
 
     kind: str
     sign: str
     text: str
     reasons: tuple[str, ...] = ()
+    untried: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,7 +89,10 @@ def headline(chain: Chain) -> Headline:
     if unknown or not checks or not evidence["holds"]:
         text = f"NOT CHECKED in full: {len(unknown)} of {len(checks)} requirements are open"
         return Headline(kind="open", sign="?", text=text, reasons=reasons)
-    return Headline(kind="good", sign="✓", text=f"Every requirement holds, all {len(checks)}")
+    firmware = chain.document("firmware")
+    untried = untried_of(evidence, firmware["target"] if firmware else None)
+    text = f"Every requirement holds, all {len(checks)} that were tried"
+    return Headline(kind="good", sign="✓", text=text, untried=untried)
 
 
 def _limits(chain: Chain) -> list[dict[str, Any]]:

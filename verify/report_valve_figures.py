@@ -87,7 +87,7 @@ def _span(values: Sequence[float], unit: str, digits: int) -> str:
 
 
 def thresholds_figure(side: dict[str, Any], guard: str, name: str, both: bool) -> ReportFigure:
-    """Draw knees and onsets with their errors, the certified staircase and the law's offset over the pressure drop.
+    """Draw knees and onsets with their errors, the certified staircase and the largest offset over the pressure drop.
 
     Parameters
     ----------
@@ -118,12 +118,13 @@ def thresholds_figure(side: dict[str, Any], guard: str, name: str, both: bool) -
         axes.stairs(curve["certified_steps_V"], dp, baseline=None, color=LIGHT["green"], lw=2,
                     label="certified staircase")  # fmt: skip
     offset = curve["u_min0_V"] * np.array(curve["beta"] or [1.0])
-    axes.plot(dp, offset, "D-.", ms=4, lw=1.3, color=LIGHT["purple"], label="law's offset β u_min0", zorder=6)
+    axes.plot(dp, offset, "D-.", ms=4, lw=1.3, color=LIGHT["purple"], label="largest certified offset", zorder=6)
     axes.set(xlabel="pressure drop dP (MPa)", ylabel="command u (V)")
     legend_below(figure, 4)
     description = (
         f"Thresholds over the pressure drop: the {guard} threshold lies at {_span(curve['u_threshold_V'], 'V', 3)}, "
-        f"its lower bound at {_span(curve['u_lower_V'], 'V', 3)}, the law's offset at {_span(offset, 'V', 3)}."
+        f"its lower bound at {_span(curve['u_lower_V'], 'V', 3)}, the largest certified offset at "
+        f"{_span(offset, 'V', 3)}."
     )
     return ReportFigure(
         name=f"thresholds-{name}",

@@ -20,17 +20,20 @@ from dzdesign.verify.checks import (
     drive_follows,
     files_unchanged,
     input_checks,
+    law_follows,
     no_flow_at_zero,
     plant_is_the_valve,
     plant_opens,
     shut_after_scenarios,
 )
 from dzdesign.verify.closed_loop import ClosedLoop, LoopComparison, RampSequence, compare_at_pressure
+from dzdesign.verify.core_state import keeps_no_state
 from dzdesign.verify.evidence_curves import curve_files
 from dzdesign.verify.firmware_folder import read_firmware_manifest
 from dzdesign.verify.host_compiler import host_compiler
 from dzdesign.verify.input_map import InputMap, map_inputs
 from dzdesign.verify.loop_plot import plot_loops
+from dzdesign.verify.manifest_check import manifest_follows
 from dzdesign.verify.plant import Plant, plant_document, plants_from_tests
 from dzdesign.verify.scenarios import ScenarioResult, Scene, run_scenarios
 from dzdesign.verify.tolerances import Scatter, Tolerances, scatter, scatter_document
@@ -85,6 +88,7 @@ def verify(
     folder: Path,
     plant: Plant | None = None,
     plant_source: str = "",
+    plant_sha256: str | None = None,
     sequence: RampSequence | None = None,
     tolerances: Tolerances | None = None,
     say: Callable[[str], None] = lambda _: None,
@@ -100,6 +104,8 @@ def verify(
         For the closed loop; without it one is made from the identified thresholds.
     plant_source : str
         Name of the plant's file, for the evidence.
+    plant_sha256 : str, optional
+        Its hash.
     sequence : RampSequence, optional
         The command over time; 0-10 V in 100 s and back by default.
     tolerances : Tolerances, optional
@@ -123,14 +129,17 @@ def verify(
     document = json.loads(content)
     host_compiler()
     say("compiling the core with every warning an error")
-    checks = [files_unchanged(folder, manifest), compiles_strictly(folder, manifest)]
+    checks = [files_unchanged(folder, manifest), manifest_follows(folder, manifest)]
+    compiles = compiles_strictly(folder, manifest)
+    checks.append(compiles)
     inputs: tuple[InputCheck, ...] = ()
     maps: tuple[InputMap, ...] = ()
     loops: tuple[LoopComparison, ...] = ()
+    plants: list[dict[str, Any]] = []
     scenarios: tuple[ScenarioResult, ...] = ()
     scattered: tuple[Scatter, ...] = ()
     signs = (1, -1) if document["sides"]["negative"] else (1,)
-    if checks[1].holds:
+    if compiles.holds:
         say("comparing every input with the exact law")
         building = ThreadPoolExecutor(1).submit(_scenes, folder, document, plant)  # a compiler's time, not ours
         try:
@@ -141,9 +150,12 @@ def verify(
         for each in inputs:
             checks += input_checks(each, len(inputs) > 1)
         maps = tuple(map_inputs(folder, document, sign) for sign in signs)
-        checks.append(drive_follows(folder, compensator))
+        checks += [drive_follows(folder, compensator), keeps_no_state(folder)]
         say("running the closed loop")
         scenes = building.result()
+        plants = [
+            {"side": scene.side, "dp_MPa": scene.dp_MPa, "parameters": plant_document(scene.plant)} for scene in scenes
+        ]
         loops = _run_loops(scenes, sequence or RampSequence(), watch)
         say("running the scenarios")
         scenarios = _run_scenarios(scenes, watch)
@@ -157,7 +169,7 @@ def verify(
                 scatter(scene.loop, plant, tolerances, scene.dp_MPa, scene.side)
                 for scene in watch(scenes, len(scenes))
             )
-    checks.append(certificate_follows(compensator))
+    checks += [certificate_follows(compensator), *law_follows(compensator, document)]
     source = plant_source or "made from the identified thresholds"
     return Verification(
         checks=tuple(checks),
@@ -177,6 +189,8 @@ def verify(
             "closed_loop": {
                 "plant": plant_document(plant) if plant else None,
                 "plant_source": source,
+                "plant_sha256": plant_sha256,
+                "plants": [] if plant else plants,
                 "pressures": [asdict(loop.result) for loop in loops],
             },
             "scenarios": [asdict(each) for each in scenarios],

@@ -1,0 +1,109 @@
+"""The engineer's options as text, turned into `DesignOptions`."""
+
+import re
+from collections.abc import Mapping
+from fractions import Fraction
+
+from dzdesign.core.errors import InputError, nearest
+from dzdesign.core.units import parse_quantity
+from dzdesign.design.options import DesignOptions
+from dzdesign.design.request import CHOICES, DEFAULTS, DesignRequest, TargetInputs
+from dzdesign.design.signal_text import command_signal, parse_signal, pressure_signal
+from dzdesign.design.signals import Signals
+
+
+def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
+    """Return the engineer's choices.
+
+    Parameters
+    ----------
+    texts : mapping
+        Name of an option, of `DEFAULTS`, to how it was written; the default stands for one that is missing or empty.
+    target : TargetInputs
+        Converter and timer of the target that is designed for.
+
+    Raises
+    ------
+    InputError
+        If an option can't be read; it is named.
+    """
+    text = {name: texts.get(name) or default for name, default in DEFAULTS.items()}
+    for name, known in CHOICES.items():
+        if text[name] not in known:
+            option = option_name(name)
+            raise InputError(f"{option} is '{text[name]}'{nearest(text[name], known)}, expected {' or '.join(known)}")
+    converter = target.converter
+    full_V = float(converter.full_V)
+    text["command_signal"] = text["command_signal"] or f"0..10 V x {full_V / 10:.12g}"
+    for name in ("pressure_a", "pressure_b"):
+        text[name] = text[name] or f"0..{full_V:.12g} V"
+    span = Fraction(round(parse_quantity(text["pressure_span"], "pressure", "--pressure-span")), 10**6)
+    if span <= 0:
+        raise InputError(f"--pressure-span is '{text['pressure_span']}', expected more than zero")
+    sensors = {
+        name: pressure_signal(parse_signal(text[name], option_name(name)), converter, span)
+        for name in ("pressure_a", "pressure_b")
+    }
+    command = command_signal(
+        parse_signal(text["command_signal"], "--command-signal"), converter, inverted=text["polarity"] == "inverted"
+    )
+    dither_Hz, dither_peak = _dither(text["dither"])
+    return DesignOptions(
+        law_name=text["law"],
+        signals=Signals(
+            code_max=converter.code_max,
+            compare_max=target.compare_max,
+            sample_Hz=target.sample_Hz,
+            tick_Hz=target.tick_Hz,
+            command=command,
+            swapped=text["negative_dp"] == "swapped",
+            **sensors,
+        ),
+        guard=text["guard"],
+        below_reference=text["below_dp0"],
+        edge=_share(text["edge"], "--edge"),
+        window=_share(text["zero_window"], "--zero-window"),
+        ramp_up_s=_seconds(text["ramp_up"], "--ramp-up"),
+        ramp_down_s=_seconds(text["ramp_down"], "--ramp-down"),
+        dither_Hz=dither_Hz,
+        dither_peak=dither_peak,
+        output_max=_share(text["output_max"], "--output-max"),
+        request=DesignRequest(target=target, options=tuple(text.items())),
+    )
+
+
+def option_name(name: str) -> str:
+    """Return an option as it is written on the command line.
+
+    Examples
+    --------
+    >>> option_name("below_dp0")
+    '--below-dp0'
+    """
+    return f"--{name.replace('_', '-')}"
+
+
+def _share(text: str, option: str) -> Fraction:
+    value = parse_quantity(text, "ratio", option)
+    return Fraction(round(value * 10**9), 10**9)
+
+
+def _seconds(text: str, option: str) -> tuple[float, float]:
+    """Read one time, or two with a slash between: of positive and of negative commands."""
+    parts = [parse_quantity(part.strip(), "time", option) for part in text.split("/")]
+    if len(parts) > 2:
+        raise InputError(f"{option} is '{text}', expected a time, or two such as '0.5 s / 0.8 s'")
+    return parts[0], parts[-1]
+
+
+def _dither(text: str) -> tuple[float, Fraction]:
+    """Read ``off`` or a frequency and the peak of the wave."""
+    if text == "off":
+        return 0.0, Fraction(0)
+    parts = re.fullmatch(r"(.+?hz)\b(.+)", text.strip(), re.IGNORECASE)
+    if parts is None:
+        raise InputError(
+            f"--dither is '{text}', expected 'off', or a frequency in Hz and the wave's peak over full drive, such as "
+            "'150 Hz 1 %'"
+        )
+    return parse_quantity(parts[1], "frequency", "--dither"), _share(parts[2], "--dither")

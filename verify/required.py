@@ -1,0 +1,109 @@
+"""What a firmware can be tried for, and which of it an evidence has: a reader sees what is missing too.
+
+The names are those of the checks; a check of a name that is not here stands in the evidence all the same.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+VERIFY = "verify"
+#: What every `verify` tries.
+ALWAYS = (
+    "files as generated",
+    "the manifest says what is in the firmware",
+    "compiles without a warning",
+    "equals the exactly rounded law",
+    "within range, monotone",
+    "no over-compensation on the tested interval",
+    "depends on the pressures by their difference only",
+    "codes outside their signal's valid range fall back",
+    "the drive follows its model",
+    "the core keeps no state between calls",
+    "the plant of the closed loop opens",
+    "the plant opens where the identified valve does",
+    "no flow at zero command in the closed loop",
+    "no flow at zero command after any scenario",
+    "the certificate follows from the valve",
+    "the law follows from the valve and the options",
+)
+#: What is tried if it is asked for: how its checks' names begin, what it is, the option.
+ASKED_FOR = (
+    ("machine code of the ", "machine code of other processors, in simulators", "--machine-code"),
+    ("no undefined behaviour with an int of 16 bits", "no undefined behaviour with an int of 16 bits", "--proof"),
+    ("wrong C is caught", "wrong C is caught, a fault at every place", "--mutate"),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Required:
+    """One thing to try.
+
+    Attributes
+    ----------
+    name : str
+        What.
+    done : bool
+        Whether it was tried.
+    holds : bool or None
+        As found; None where it was not tried or could not be checked.
+    how : str
+        The command and the option that try it.
+    """
+
+    name: str
+    done: bool
+    holds: bool | None
+    how: str
+
+
+def required_of(evidence: dict[str, Any], target: str | None = None) -> tuple[Required, ...]:
+    """Return everything that can be tried, with what the evidence says of it.
+
+    Parameters
+    ----------
+    evidence : dict
+        verification.json.
+    target : str, optional
+        Of the firmware, where it is known.
+    """
+    checks = evidence["checks"]
+    found = [_tried(checks, name, name, VERIFY) for name in ALWAYS]
+    own = bool(evidence["closed_loop"].get("plant"))
+    found.append(_part("closed loop with a plant of the machine's own", own, f"{VERIFY} --plant"))
+    found.append(_part("load steps and frozen sensors in the closed loop", own, f"{VERIFY} --plant"))
+    series = bool(evidence["monte_carlo"])
+    found.append(_part("a series of plants, with tolerances", series, f"{VERIFY} --tolerances"))
+    found += [_tried(checks, begins, name, f"{VERIFY} {option}") for begins, name, option in ASKED_FOR]
+    if target in (None, "f28335"):
+        name = "compiles against C2000Ware"
+        found.append(_tried(checks, name, f"{name}, TI's headers", f"{VERIFY} --c2000ware"))
+    return tuple(found)
+
+
+def untried_of(evidence: dict[str, Any], target: str | None = None) -> tuple[str, ...]:
+    """Return what was not tried, each with the command that would.
+
+    Parameters
+    ----------
+    evidence : dict
+        verification.json.
+    target : str, optional
+        Of the firmware, where it is known.
+    """
+    return tuple(f"{each.name}: `{each.how}`" for each in required_of(evidence, target) if not each.done)
+
+
+def _tried(checks: list[dict[str, Any]], begins: str, name: str, how: str) -> Required:
+    """Return a requirement by the checks whose names begin so, of both signs of command."""
+    said = [check["holds"] for check in checks if _plain(check["name"]).startswith(begins)]
+    holds = False if False in said else None if None in said or not said else True
+    return Required(name=name, done=bool(said), holds=holds, how=how)
+
+
+def _part(name: str, done: bool, how: str) -> Required:
+    return Required(name=name, done=done, holds=True if done else None, how=how)
+
+
+def _plain(name: str) -> str:
+    """Return a check's name without the sign of command that it is of."""
+    return name.removeprefix("positive commands: ").removeprefix("negative commands: ")
