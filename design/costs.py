@@ -115,6 +115,12 @@ def _cost_of_side(compensator: Compensator, side: SideModel, sign: int) -> list[
             "the threshold grows with the pressure drop, so a pressure signal that reads too high raises the offset: a "
             "broken wire of sensor B is not recognised unless it has a live zero; monitor the sensors outside"
         )
+    crossed = [f"{test.dp_MPa:.2f}" for test in side.tests if test.closes_above_opening]
+    if crossed:
+        lines.append(
+            f"accepted, branch-order: at {', '.join(crossed)} MPa the valve seems to close above where it opens, so "
+            "flow at zero command is possible"
+        )
     certificate = compensator.side(sign).certificate
     lines.append(
         f"the table's offset stays {1e3 * certificate.mean_loss_V:.2f} mV under the certified curve on average, "

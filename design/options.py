@@ -17,6 +17,8 @@ LARGEST_WINDOW = Fraction(1, 10)
 #: Frequencies that a proportional valve's dither has, Hz.
 DITHER_HZ = (100.0, 300.0)
 LONGEST_RAMP_S = 600.0
+#: Warnings of `identify` for which a valve is refused unless they are accepted.
+ACCEPTABLE = ("branch-order",)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,6 +46,8 @@ class DesignOptions:
         Frequency of the dither, a square wave, and its peak (half its height) over full drive; 0: none.
     output_max : Fraction
         Largest drive over full drive.
+    accept : tuple of str
+        Codes of warnings, of `ACCEPTABLE`, for which the valve is not refused.
     """
 
     law_name: str = "paper"
@@ -57,6 +61,7 @@ class DesignOptions:
     dither_Hz: float = 0.0
     dither_peak: Fraction = Fraction(0)
     output_max: Fraction = Fraction(1)
+    accept: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for what, given, known in (
@@ -66,6 +71,12 @@ class DesignOptions:
             if given not in known:
                 raise InputError(
                     f"the {what} is '{given}'{nearest(given, known)}, expected {', '.join(known[:-1])} or {known[-1]}"
+                )
+        for code in self.accept:
+            if code not in ACCEPTABLE:
+                raise InputError(
+                    f"the warning to accept is '{code}'{nearest(code, ACCEPTABLE)}, expected "
+                    f"{' or '.join(ACCEPTABLE)}: no other one stops a design"
                 )
         for what, share, limit in (
             ("edge", self.edge, LARGEST_EDGE),

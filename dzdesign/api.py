@@ -144,6 +144,7 @@ def design(
     ramp_down: str | None = None,
     dither: str | None = None,
     output_max: str | None = None,
+    accept: str | None = None,
     output: AnyPath | None = None,
 ) -> "Compensator":
     """Design the compensator of a valve, certified; the options are those of `dzdesign design`, None is its default.
@@ -178,6 +179,8 @@ def design(
         Such as "150 Hz 1 %".
     output_max : str, optional
         Largest drive.
+    accept : str, optional
+        "branch-order": design though the knees stand in the wrong order.
     output : path, optional
         Also write compensator.json here.
 

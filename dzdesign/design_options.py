@@ -24,6 +24,7 @@ DEFAULTS = {
     "ramp_down": "0 s",
     "dither": "off",
     "output_max": "100 %",
+    "accept": "",
 }
 CHOICES = {"negative_dp": ("same", "swapped"), "polarity": ("normal", "inverted")}
 
@@ -95,6 +96,7 @@ def design_options(args: argparse.Namespace, target: "TargetInputs") -> "DesignO
         dither_Hz=dither_Hz,
         dither_peak=dither_peak,
         output_max=_share(text["output_max"], "--output-max"),
+        accept=tuple(text["accept"].replace(",", " ").split()),
     )
 
 

@@ -17,6 +17,8 @@ TRENDS = ("decreasing", "flat", "increasing")
 #: Of a branch: the thresholds with their standard errors.
 MEASURES = ("knee", "level", "onset")
 DIRECTIONS = ("rising", "falling")
+#: Standard errors by which closing must lie above opening to be no noise.
+ORDER_SIGNIFICANCE = 5.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,6 +98,12 @@ class TestResult:
     def u_knee_se_V(self) -> float:
         """The larger of the knees' standard errors, V."""
         return max(branch.knee_se_V for branch in (self.rising, self.falling) if branch)
+
+    @property
+    def closes_above_opening(self) -> bool:
+        """Whether the knees stand in an order that no valve has: then the lag or the time is wrong, and so are they."""
+        opens, closes = self.u_knee_rising_V, self.u_knee_falling_V
+        return opens is not None and closes is not None and closes - opens > ORDER_SIGNIFICANCE * self.u_knee_se_V
 
     def to_document(self) -> dict[str, Any]:
         """Return the entry of valve.json; of the ramps, how many and which."""

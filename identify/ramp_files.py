@@ -5,6 +5,7 @@ A file is read block by block, and a long one thinned on the way: see `thinning`
 
 import gzip
 import io
+import re
 from collections.abc import Generator, Mapping
 from contextlib import closing
 from dataclasses import dataclass
@@ -26,6 +27,8 @@ from dzdesign.identify.thinning import Thinner
 MIN_ROWS = 20
 #: Units of a command that is a current: what it means in volts, the file does not say.
 CURRENT = ("ma", "a")
+#: First word of the first comment line of a recording that is none: whoever makes one up writes it there.
+SIMULATED_MARK = "SIMULATED"
 #: SI numbers beyond these are no measurement of a valve: a wrong unit, or what a logger writes for an overflow.
 LARGEST = {"time": 1e12, "voltage": 1e4, "pressure": 1e9, "flow": 10.0}
 
@@ -46,6 +49,8 @@ class RampTest:
         True if the pressure drop is the engineer's word (one constant) and not a recording.
     rows_read, run : int
         Complete rows in the file, and how many of them in a row were averaged to one sample (1: none were).
+    simulated : bool
+        True if a comment line above the labels begins with `SIMULATED_MARK`.
     """
 
     source: str
@@ -57,6 +62,7 @@ class RampTest:
     dp_is_declared: bool = False
     rows_read: int = 0
     run: int = 1
+    simulated: bool = False
 
     def __post_init__(self) -> None:
         for array in (self.time, self.u, self.q, self.dp):
@@ -93,12 +99,14 @@ def read_ramp_file(
     path = Path(path)
     thinner, clock = Thinner(u_max), _Clock()
     found: dict[str, Column] = {}
+    simulated = False
     with open_bytes(path, "ramp file") as file:
         sha256 = sha256_of_file(file)
         with closing(read_tables(file, path)) as tables:
             for table in tables:
                 if not found:
                     found = find_columns(table, columns or {})
+                    simulated = _is_marked(table.comments)
                     _refuse_two_pressures(table, found, dp)
                     _refuse_unequal_lengths(table, found)
                 thinner.add(_complete_rows(table, found, clock, u_max, dp))
@@ -115,7 +123,13 @@ def read_ramp_file(
         dp_is_declared=dp is not None,
         rows_read=thinner.read,
         run=thinner.run,
+        simulated=simulated,
     )
+
+
+def _is_marked(comments: str) -> bool:
+    """Tell whether a comment line says that this is no measurement; a spreadsheet may have put it in quotes."""
+    return re.search(rf'^[ \t,;"]*#[ \t"]*{SIMULATED_MARK}\b', comments, re.MULTILINE) is not None
 
 
 def read_tables(file: BinaryIO, path: Path) -> Generator[Table, None, None]:

@@ -44,11 +44,12 @@ SEPARATORS, BLANKS = ",;\t|", " "
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Header:
-    """The header row: its number in the file, the labels, and what stands between two cells."""
+    """The header row: its number in the file, the labels, what stands between two cells, and the lines above it."""
 
     line: int
     labels: tuple[str, ...]
     separator: str
+    comments: str
 
 
 @final
@@ -214,10 +215,11 @@ def _find_header(block: bytes, number: int, path: Path) -> tuple[Header | None, 
     if found is None:
         return None, b""
     number += block.count(b"\n", 0, found.start())
-    return _header(number, found[0].decode(), path), block[found.end() + 1 :]
+    header = _header(number, found[0].decode(), path, comments=block[: found.start()].decode())
+    return header, block[found.end() + 1 :]
 
 
-def _header(number: int, line: str, path: Path) -> Header:
+def _header(number: int, line: str, path: Path, comments: str) -> Header:
     """Return the header that a line holds; refuse a line of numbers."""
     separator = max(SEPARATORS, key=line.count)
     separator = separator if separator in line else BLANKS
@@ -233,7 +235,7 @@ def _header(number: int, line: str, path: Path) -> Header:
             f"'{path}' has no header row (row {number} is '{line[:QUOTED_CHARACTERS]}'); "
             "expected names with units such as time_s,u_V,dP_MPa,Q_Lmin"
         )
-    return Header(line=number, labels=labels, separator=separator)
+    return Header(line=number, labels=labels, separator=separator, comments=comments)
 
 
 def _table(rows: bytes, number: int, header: Header, path: Path) -> TextTable:
@@ -248,6 +250,7 @@ def _table(rows: bytes, number: int, header: Header, path: Path) -> TextTable:
     return TextTable(
         path=path,
         labels=header.labels,
+        comments=header.comments,
         cells=cells,
         header_line=header.line,
         lines=lines,
