@@ -39,7 +39,7 @@ def _found_targets() -> tuple[str, ...]:
 TARGET_NAMES = _found_targets()
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Firmware(ShownInNotebooks):
     """The files of a C project, path to text, and the manifest that names their origin."""
 

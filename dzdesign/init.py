@@ -54,22 +54,61 @@ class Look:
     notes: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Proposal:
+    """What a look at recordings proposes.
+
+    Attributes
+    ----------
+    text : str
+        Of the file of options.
+    seen : tuple of str
+        What was seen, for a person.
+    opens : tuple of str
+        What is open: without it `identify` can't run.
+    look : Look
+        What was seen.
+    """
+
+    text: str
+    seen: tuple[str, ...]
+    opens: tuple[str, ...]
+    look: Look
+
+
+def propose(
+    ramps: list[str], *, columns: str | dict[str, str] | None, dp: str | dict[str, str] | None, output: str | None
+) -> Proposal:
+    """Look at recordings, and write the file of options that this gives; the arguments are those of the command.
+
+    Raises
+    ------
+    InputError
+        If a recording can't be read, or the file exists.
+    """
+    if output is not None:
+        if os.path.lexists(output):
+            raise InputError(
+                f"'{output}' exists, and init never writes over a file; give another name with -o, or move it away"
+            )
+        check_file_may_be_written(Path(output))
+    look, opens = _look(expand(ramps) if ramps else _found_recordings(), columns, dp)
+    seen = _summary(look)
+    text = options_file(look, seen, opens)
+    if output is not None:
+        write_file(Path(output), text)
+    return Proposal(text=text, seen=tuple(seen), opens=tuple(opens), look=look)
+
+
 def run_init(args: argparse.Namespace) -> int:
     """Write the file of options; 1 if it leaves something open without which `identify` can't run."""
     output = Path(args.output)
-    if os.path.lexists(output):
-        raise InputError(
-            f"'{output}' exists, and init never writes over a file; give another name with -o, or move it away"
-        )
-    check_file_may_be_written(output)
-    paths = expand(args.ramps) if args.ramps else _found_recordings()
-    look, opens = _look(paths, args)
-    text = options_file(look, _summary(look), opens)
-    write_file(output, text)
+    proposal = propose(args.ramps, columns=args.columns, dp=args.dp, output=args.output)
+    opens = proposal.opens
     if args.json:
-        print(to_json(_document(look, opens, args.output)), end="")
+        print(to_json(_document(proposal.look, list(opens), args.output)), end="")
         return 1 if opens else 0
-    for line in _summary(look):
+    for line in proposal.seen:
         print(line)
     for line in opens:
         print(f"open: {line}")
@@ -94,12 +133,14 @@ def _found_recordings() -> list[Path]:
     raise InputError("there are no recordings in ./ramps or in this folder; name them: dzdesign init RAMP...")
 
 
-def _look(paths: list[Path], args: argparse.Namespace) -> tuple[Look, list[str]]:
+def _look(
+    paths: list[Path], said_columns: str | dict[str, str] | None, said_dp: str | dict[str, str] | None
+) -> tuple[Look, list[str]]:
     """Return what was seen, and what is open."""
     from dzdesign.identify.column_labels import parse_columns
     from dzdesign.identify.first_look import guess_columns, is_per_cent, look_at_sides, pressure_in_name, proposed_u_max
 
-    given = parse_columns(args.columns) if args.columns else {}
+    given = parse_columns(said_columns) if said_columns else {}
     guesses = [guess_columns(path) for path in with_bar(paths, "looking at columns")]
     columns = dict(given)
     opens = []
@@ -117,8 +158,8 @@ def _look(paths: list[Path], args: argparse.Namespace) -> tuple[Look, list[str]]
     if opens:
         return nothing, list(dict.fromkeys(opens))
     names = [path.as_posix() for path in paths]
-    tests = read_recordings(names, u_max=10.0, columns=columns or None, dp=args.dp)
-    dp: dict[str, str] = args.dp if isinstance(args.dp, dict) else {}
+    tests = read_recordings(names, u_max=10.0, columns=columns or None, dp=said_dp)
+    dp: dict[str, str] = said_dp if isinstance(said_dp, dict) else {}
     lacking = [test.source for test in tests if test.dp is None]
     if lacking:
         dp = {source: text for source in lacking if (text := pressure_in_name(source))}

@@ -271,7 +271,7 @@ class Warning_:
     source: str | None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class ValveModel(ShownInNotebooks):
     """The identified valve.
 

@@ -71,7 +71,7 @@ def _common_document(common: "CommonSetting") -> dict[str, Any]:
     }
 
 
-def print_batch(document: Mapping[str, Any], folder: str) -> None:
+def print_batch(document: Mapping[str, Any], folder: str, has_report: bool) -> None:
     """Print the counts, the spread, the common setting's cost and the reasons.
 
     Parameters
@@ -80,6 +80,8 @@ def print_batch(document: Mapping[str, Any], folder: str) -> None:
         From `summary_of`.
     folder : str
         Where it was written.
+    has_report : bool
+        Whether the lot's report is there too.
     """
     from dzdesign.page import new_console, new_table, put_line
 
@@ -105,8 +107,7 @@ def print_batch(document: Mapping[str, Any], folder: str) -> None:
     put_line(
         console,
         f"{document['calibrated']} of {document['valves']} valves calibrated, {len(document['failed'])} not. "
-        f"Table: {folder}/valves.csv, valves.parquet; "
-        f"to be read: {folder}/report.html",
+        f"Table: {folder}/valves.csv, valves.parquet" + (f"; to be read: {folder}/report.html" if has_report else ""),
     )
 
 
