@@ -118,6 +118,7 @@ def _write_report(output: Path) -> Path | None:
     try:
         write_file(path, report_of_lot(output).html)
     except InputError as error:
+        path.unlink(missing_ok=True)  # of an earlier run: it would pass for one of this
         say(f"no {REPORT_NAME}: {error}")
         return None
     return path

@@ -262,9 +262,12 @@ def _valves_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
 
 def _recordings_section(lot: Lot) -> Section:
     table = warnings_table(lot)
+    odd = tuple(f"Odd: {text}." for text in lot.oddities)
     if table is None:
-        return Section(lines=("No recording of a calibrated valve has a warning.",) if lot.calibrated else ())
+        none = ("No recording of a calibrated valve has a warning.",) if lot.calibrated else ()
+        return Section(lines=(*odd, *none))
     return Section(
+        lines=odd,
         note="None of these stops a calibration. The text of each valve, with its numbers, stands in its report and in "
         "its valve.json; what to do about a code stands in the documentation under “Warning codes”.",
         tables=(table,),

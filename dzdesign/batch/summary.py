@@ -71,7 +71,7 @@ def _common_document(common: "CommonSetting") -> dict[str, Any]:
     }
 
 
-def print_batch(document: Mapping[str, Any], folder: str, has_report: bool) -> None:
+def print_batch(document: Mapping[str, Any], folder: str, has_report: bool = True) -> None:
     """Print the counts, the spread, the common setting's cost and the reasons.
 
     Parameters
@@ -107,7 +107,8 @@ def print_batch(document: Mapping[str, Any], folder: str, has_report: bool) -> N
     put_line(
         console,
         f"{document['calibrated']} of {document['valves']} valves calibrated, {len(document['failed'])} not. "
-        f"Table: {folder}/valves.csv, valves.parquet" + (f"; to be read: {folder}/report.html" if has_report else ""),
+        f"Table: {folder}/valves.csv, valves.parquet; "
+        + (f"to be read: {folder}/report.html" if has_report else "no report.html"),
     )
 
 
