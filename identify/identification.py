@@ -58,7 +58,7 @@ def identify_sides(
     if not tests:
         raise InputError("no ramp tests were given; expected at least one file")
     sides: dict[str, IdentifiedSide] = {}
-    warnings: list[Warning_] = list(about_recordings(tests))
+    warnings: list[Warning_] = []
     for name, sign in SIDES.items():
         mine = tests_of_side(tests, sign, options.u_max)
         if not mine:
@@ -75,8 +75,6 @@ def identify_sides(
             continue
         prefix = f"{name} side: " if len(sides) > 1 else ""
         warnings += [replace(item, text=prefix + item.text) for item in (*stuck, *clipped, *sides[name].warnings)]
-    if len(sides) > 1:
-        warnings.append(_about_two_sides())
     lag = next(iter(sides.values())).described.lag
     model = ValveModel(
         u_max_V=options.u_max,
@@ -86,7 +84,7 @@ def identify_sides(
         meter_zero_L_min=options.meter_zero / L_MIN,
         knee_window=options.knee_window,
         sides={name: side.model for name, side in sides.items()},
-        warnings=tuple(warnings),
+        warnings=(*about_recordings(tests), *([_about_two_sides()] if len(sides) > 1 else []), *warnings),
         made_from=tuple(
             dict.fromkeys(file for side in sides.values() for item in side.described.tests for file in item.files)
         ),

@@ -76,6 +76,9 @@ def lot_headline(lot: Lot) -> Headline:
     """
     more = len(lot.oddities) - ODD_IN_VERDICT
     odd = [f"odd: {text}" for text in lot.oddities[:ODD_IN_VERDICT]]
+    simulated = [row["name"] for row in lot.calibrated if "simulated" in row["warnings"].split()]
+    if simulated:
+        odd.insert(0, f"SIMULATED recordings, not of measured valves: {named(simulated, IN_VERDICT)}")
     odd += [f"odd: {more} more, under “What the recordings leave open”"] if more > 0 else []
     return replace(_verdict(lot), cautions=tuple(odd))
 

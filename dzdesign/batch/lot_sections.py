@@ -208,8 +208,9 @@ def _common_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
     costs = _of(spreads, "common_extra_dead_zone_percent")
     low, high = (f"{end:.3g}" for end in (common["dp_MPa"][0], common["dp_MPa"][-1]))
     lines = [
-        f"The largest offset that over-compensates none of the valves, certified for each of them from {low} to {high} "
-        f"MPa, is in {common['file']}; its trend is that of {common['carrier']}.",
+        "The largest offset that over-compensates none of the valves, certified for each of them "
+        + (f"from {low} to {high} MPa" if low != high else f"at {low} MPa only")
+        + f", is in {common['file']}; its trend is that of {common['carrier']}.",
         *(_cost_line(spread) for spread in costs),
         f"It is held down by {named(common['binding'])}.",
         *_without_lines(common.get("without_binding")),
