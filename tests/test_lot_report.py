@@ -65,6 +65,8 @@ def test_the_batch_writes_the_report_and_it_leads_with_the_verdict(made):
     document = json.loads((made / "batch.json").read_bytes())
     top = head(html)
     assert "4 of 6 valves calibrated, 2 NOT" in top and "2 failed: V0001, V0004" in top
+    assert "SIMULATED recordings, not of measured valves: V0000" in top
+    assert document["warnings"]["simulated"] == [f"V000{at}" for at in (0, 2, 3, 5)]
     for column in ("dead_zone_opening_percent", "dead_zone_closing_percent", "common_extra_dead_zone_percent"):
         at = document["quantiles"][column]
         assert f"{at['0.5']:.2f} %" in top and f"{at['0.05']:.2f} to {at['0.95']:.2f} %" in top

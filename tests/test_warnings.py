@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from synthetic import L_MIN, MPA, Truth, synthetic_ramp
 
+from dzdesign.cli import main
 from dzdesign.codegen.project import generate
 from dzdesign.core.artefacts import to_json
 from dzdesign.core.errors import InputError
@@ -17,6 +18,7 @@ from dzdesign.design.options import DesignOptions
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramp_files import ramp_file_bytes, read_ramp_file
+from dzdesign.verify.report import make_report
 from dzdesign.verify.report_artefacts import chain_of
 from dzdesign.verify.report_summary import headline
 
@@ -81,6 +83,8 @@ class TestSimulated:
             }
             cautions = headline(chain_of(shelf)).cautions
             assert [text.startswith("SIMULATED") for text in cautions] == [True] * simulated
+            html = make_report(chain_of(shelf)).html
+            assert ("SIMULATED recordings" in html[: html.index('<section id="data">')]) is simulated
 
 
 @pytest.fixture(scope="module")
@@ -103,6 +107,18 @@ class TestBranchOrder:
     def test_a_valve_in_order_costs_nothing_of_it(self):
         valve = identify([valve_at(dp) for dp in PRESSURES])
         assert not any("accepted" in line for line in design(valve, DesignOptions(accept=("branch-order",))).costs)
+
+    def test_the_command_line_and_a_file_of_options_accept_it(self, crossed, tmp_path, monkeypatch, capsys):
+        monkeypatch.chdir(tmp_path)
+        (tmp_path / "valve.json").write_text(to_json(crossed.to_document()))
+        (tmp_path / "options.toml").write_text('accept = "branch-order"\n')
+        assert main(["design", "valve.json"]) == 2 and not (tmp_path / "compensator.json").exists()
+        assert "--accept branch-order" in capsys.readouterr().err
+        assert main(["codegen", "valve.json", "--target", "host"]) == 2 and not (tmp_path / "firmware").exists()
+        assert main(["design", "valve.json", "--accept", "branch-ordr"]) == 2
+        assert main(["design", "valve.json", "--accept", "branch-order"]) == 0
+        assert "cost: accepted, branch-order" in capsys.readouterr().out
+        assert main(["codegen", "valve.json", "--target", "host", "--config", "options.toml"]) == 0
 
     def test_only_what_stops_a_design_can_be_accepted(self):
         with pytest.raises(InputError, match=r"'branch-ordr' \(did you mean 'branch-order'\?\)"):
