@@ -70,10 +70,11 @@ def files() -> str:
 def _file(name: str) -> str:
     schema = schema_document(name)
     _, artefact, command = SCHEMAS[name]
+    label = f"{name}-file" if name in COMMANDS else name  # a command's section has its name
     rows = [f"| `{key}` | {kind} | {unit} | {text} |" for key, kind, unit, text in _rows(schema, schema, "", set())]
     return "\n".join(
         (
-            f"({name})=",
+            f"({label})=",
             f"## {artefact}",
             "",
             f"{schema['description']} Schema: `{schema['$id']}`,",
