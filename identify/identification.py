@@ -69,8 +69,8 @@ def identify_sides(
             sides[name] = identify_side(mine, own)
         except InputError as error:
             if not sides:
-                # Ramps of several pressures taken for one test are refused for many a reason, and none is the cause.
-                raise InputError(stuck[0].text) if stuck else error from error
+                # Ramps of several pressures taken for one test may be refused for any reason: the cause is this.
+                raise InputError(f"{error}; it may be that {stuck[0].text}") if stuck else error from error
             warnings.append(Warning_(code="side-refused", text=f"the {name} side is missing: {error}", source=None))
             continue
         prefix = f"{name} side: " if len(sides) > 1 else ""
