@@ -17,8 +17,8 @@ TRENDS = ("decreasing", "flat", "increasing")
 #: Of a branch: the thresholds with their standard errors.
 MEASURES = ("knee", "level", "onset")
 DIRECTIONS = ("rising", "falling")
-#: Standard errors by which closing must lie above opening to be no noise.
-ORDER_SIGNIFICANCE = 5.0
+#: Standard errors by which closing must lie above opening to be no noise; and V, for a simulation has next to none.
+ORDER_SIGNIFICANCE, ORDER_LEAST_V = 5.0, 1e-3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,7 +103,8 @@ class TestResult:
     def closes_above_opening(self) -> bool:
         """Whether the knees stand in an order that no valve has: then the lag or the time is wrong, and so are they."""
         opens, closes = self.u_knee_rising_V, self.u_knee_falling_V
-        return opens is not None and closes is not None and closes - opens > ORDER_SIGNIFICANCE * self.u_knee_se_V
+        least = max(ORDER_SIGNIFICANCE * self.u_knee_se_V, ORDER_LEAST_V)
+        return opens is not None and closes is not None and closes - opens > least
 
     def to_document(self) -> dict[str, Any]:
         """Return the entry of valve.json; of the ramps, how many and which."""

@@ -100,6 +100,10 @@ class TestBranchOrder:
         with pytest.raises(InputError, match=words):
             design(crossed)
 
+    def test_a_simulation_without_noise_and_hysteresis_is_in_order(self):
+        side = identify([valve_at(1.0, hysteresis=-1e-4, noise=0.0)]).positive
+        assert not side.tests[0].closes_above_opening and side.tests[0].u_knee_se_V < 1e-5
+
     def test_accepted_it_goes_on_and_the_cost_is_said(self, crossed):
         compensator = design(crossed, DesignOptions(accept=("branch-order",)))
         assert any(line.startswith("accepted, branch-order: at 1.00, 2.00, 4.00 MPa") for line in compensator.costs)
