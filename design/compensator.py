@@ -90,7 +90,7 @@ class SideLaw:
         return self.beta_numerators if self.edge_numerators is None else self.edge_numerators
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Compensator(ShownInNotebooks):
     """The law ``u_O = g(dP) u_i + o(dP)`` on codes, every coefficient an exact rational number.
 

@@ -125,6 +125,12 @@ def _residual(knee: float, offset: float, at_edge: float, full: float, edge: flo
 
 def _cost_of_side(compensator: Compensator, side: SideModel, sign: int) -> list[str]:
     lines = []
+    crossed = [f"{test.dp_MPa:.2f}" for test in side.tests if test.closes_above_opening]
+    if crossed:
+        lines.append(
+            f"accepted, branch-order: at {', '.join(crossed)} MPa the valve seems to close above where it opens, so "
+            "flow at zero command is possible"
+        )
     certificate = compensator.side(sign).certificate
     lines.append(
         f"the table's offset stays {1e3 * certificate.mean_loss_V:.2f} mV under the certified curve on average, "

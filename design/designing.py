@@ -83,6 +83,8 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
 def _side_law(side: SideModel, options: DesignOptions, u_max: Fraction, sign: int, units: Units) -> SideLaw:
     """Choose the coefficients and tables of one side, and prove its certificate."""
     signals = options.signals
+    if "branch-order" not in options.accept:
+        _refuse_crossed_branches(side)
     certified = guarded_curve(side, options.guard, options.below_reference)
     opening = _opening_curve(side, options) if options.edge else None
     reference = Fraction(repr(side.reference_dp_MPa))
@@ -122,6 +124,18 @@ def _side_law(side: SideModel, options: DesignOptions, u_max: Fraction, sign: in
             denominator=units.beta,
         ),
     )
+
+
+def _refuse_crossed_branches(side: SideModel) -> None:
+    """Refuse knees in an order that no valve has: the guarded one is not where the valve closes."""
+    for test in side.tests:
+        if test.closes_above_opening:
+            raise InputError(
+                f"'{test.source}': the valve closes ({test.u_knee_falling_V:.3f} V) above where it opens "
+                f"({test.u_knee_rising_V:.3f} V), as no valve does, so flow at zero command is possible; run "
+                "`identify` again with the meter's true --meter-lag or a right column of time, or take it as it is by "
+                "--accept branch-order"
+            )
 
 
 def _refuse_two_signs(valve: ValveModel, guard: str) -> None:

@@ -68,6 +68,7 @@ def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
         dither_Hz=dither_Hz,
         dither_peak=dither_peak,
         output_max=_share(text["output_max"], "--output-max"),
+        accept=tuple(text["accept"].replace(",", " ").split()),
         request=DesignRequest(target=target, options=tuple(text.items())),
     )
 

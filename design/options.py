@@ -18,6 +18,8 @@ LARGEST_WINDOW = Fraction(1, 10)
 #: Frequencies that a proportional valve's dither has, Hz.
 DITHER_HZ = (100.0, 300.0)
 LONGEST_RAMP_S = 600.0
+#: Warnings of `identify` for which a valve is refused unless they are accepted.
+ACCEPTABLE = ("branch-order",)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,6 +47,8 @@ class DesignOptions:
         Frequency of the dither, a square wave, and its peak (half its height) over full drive; 0: none.
     output_max : Fraction
         Largest drive over full drive.
+    accept : tuple of str
+        Codes of warnings, of `ACCEPTABLE`, for which the valve is not refused.
     request : DesignRequest or None
         The target and the texts that these were read from, to be kept in compensator.json.
     """
@@ -60,6 +64,7 @@ class DesignOptions:
     dither_Hz: float = 0.0
     dither_peak: Fraction = Fraction(0)
     output_max: Fraction = Fraction(1)
+    accept: tuple[str, ...] = ()
     request: DesignRequest | None = None
 
     def __post_init__(self) -> None:
@@ -70,6 +75,12 @@ class DesignOptions:
             if given not in known:
                 raise InputError(
                     f"the {what} is '{given}'{nearest(given, known)}, expected {', '.join(known[:-1])} or {known[-1]}"
+                )
+        for code in self.accept:
+            if code not in ACCEPTABLE:
+                raise InputError(
+                    f"the warning to accept is '{code}'{nearest(code, ACCEPTABLE)}, expected "
+                    f"{' or '.join(ACCEPTABLE)}: no other one stops a design"
                 )
         for what, share, limit in (
             ("edge", self.edge, LARGEST_EDGE),

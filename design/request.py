@@ -26,6 +26,7 @@ DEFAULTS = {
     "ramp_down": "0 s",
     "dither": "off",
     "output_max": "100 %",
+    "accept": "",
 }
 CHOICES = {"negative_dp": ("same", "swapped"), "polarity": ("normal", "inverted")}
 

@@ -10,9 +10,12 @@ from dzdesign.parsing import COMMON, build_parser
 from dzdesign.schema_files import SCHEMAS, schema_document
 from dzdesign.vocabulary import COMMANDS, EXAMPLES, language
 
-#: What a caller of the rooms needs; `dzdesign.api` stands first as soon as there is one.
+#: What a caller of the rooms needs; of a module without names all that is its own.
 API = (
-    ("dzdesign.api", None),
+    ("dzdesign.api", ("identify", "design", "generate", "verify", "init", "simulate", "assess", "report", "batch")),
+    ("dzdesign.init", ("Proposal",)),
+    ("dzdesign.verify.assessment", ("Assessment",)),
+    ("dzdesign.verify.report", ("Report",)),
     ("dzdesign.identify.ramp_files", ("RampTest", "read_ramp_file")),
     ("dzdesign.identify.options", ("IdentifyOptions",)),
     ("dzdesign.identify.identification", ("identify",)),
@@ -67,10 +70,11 @@ def files() -> str:
 def _file(name: str) -> str:
     schema = schema_document(name)
     _, artefact, command = SCHEMAS[name]
+    label = f"{name}-file" if name in COMMANDS else name  # a command's section has its name
     rows = [f"| `{key}` | {kind} | {unit} | {text} |" for key, kind, unit, text in _rows(schema, schema, "", set())]
     return "\n".join(
         (
-            f"({name})=",
+            f"({label})=",
             f"## {artefact}",
             "",
             f"{schema['description']} Schema: `{schema['$id']}`,",

@@ -1,8 +1,9 @@
-"""The four stages for notebooks and scripts: `identify`, `design`, `generate`, `verify`.
+"""The four stages for notebooks and scripts, `identify`, `design`, `generate`, `verify`, and what stands around them.
 
-Each takes paths or the result of the stage before it, options in the words of the command line ("1 MPa", "0.1 s"), and
-returns the stage's frozen result, which a notebook shows as a table. With ``output`` it also writes the file or folder
-that the command of the same stage writes, byte for byte. What is heavy is imported when a stage is called.
+Each stage takes paths or the result of the stage before it, options in the words of the command line ("1 MPa", "0.1
+s"), and returns the stage's frozen result, which `print` sums up and a notebook shows as a table. With ``output`` it
+also writes the file or folder that the command of the same stage writes, byte for byte. What is heavy is imported when
+a stage is called. `init`, `simulate`, `assess`, `report` and `batch` are the commands of those names.
 
 >>> from dzdesign import api
 >>> valve = api.identify("ramps/*.csv", meter_lag="0.1 s")         # doctest: +SKIP
@@ -19,6 +20,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
+from dzdesign.api_around import assess, batch, init, report, simulate
 from dzdesign.core.artefacts import (
     TOOL,
     check_file_may_be_written,
@@ -32,6 +34,7 @@ from dzdesign.core.artefacts import (
 from dzdesign.core.errors import DzdesignError, InputError, RequirementError
 from dzdesign.core.shown import show_by
 from dzdesign.notebook import WRITERS
+from dzdesign.summaries import SUMMARIES
 
 if TYPE_CHECKING:
     from dzdesign.codegen.project import Firmware
@@ -39,12 +42,15 @@ if TYPE_CHECKING:
     from dzdesign.identify.model import ValveModel
     from dzdesign.verify.verification import Verification
 
-__all__ = ["DzdesignError", "InputError", "RequirementError", "design", "generate", "identify", "verify"]
+__all__ = [
+    "DzdesignError", "InputError", "RequirementError",
+    "assess", "batch", "design", "generate", "identify", "init", "report", "simulate", "verify",
+]  # fmt: skip
 
 #: A file or folder as the standard library takes it.
 AnyPath = str | os.PathLike[str]
 
-show_by(WRITERS)
+show_by(WRITERS, SUMMARIES)
 
 
 def identify(
@@ -149,6 +155,7 @@ def design(
     ramp_down: str | None = None,
     dither: str | None = None,
     output_max: str | None = None,
+    accept: str | None = None,
     output: AnyPath | None = None,
 ) -> "Compensator":
     """Design the compensator of a valve, certified; the options are those of `dzdesign design`, None is its default.
@@ -183,6 +190,8 @@ def design(
         Such as "150 Hz 1 %".
     output_max : str, optional
         Largest drive.
+    accept : str, optional
+        "branch-order": design though the knees stand in the wrong order.
     output : path, optional
         Also write compensator.json here.
 

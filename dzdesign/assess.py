@@ -18,33 +18,19 @@ from dzdesign.recordings import (
 )
 
 if TYPE_CHECKING:
-    from dzdesign.verify.assessment import AssessOptions
+    from dzdesign.verify.assessment import Assessment, AssessOptions
 
 
 def run_assess(args: argparse.Namespace) -> int:
     """Compare recordings; 1 if one with the compensator misses a limit, or a limit can't be checked."""
     from dzdesign.assessment_tables import print_assessment
-    from dzdesign.verify.assessment import assess
     from dzdesign.verify.assessment_file import SCHEMA, assessment_document
 
-    options = _options(args)
+    options = assess_options(args)
     output = Path(args.output)
     check_file_may_be_written(output, SCHEMA)
     check_plots(args.plots, output)
-    sets = {
-        name: read_recordings(
-            patterns, u_max=options.of_set(name).u_max, columns=columns, dp=args.dp, skip_rows=args.skip_rows,
-            what=f"reading recordings {name}",
-        )
-        for name, patterns, columns in (
-            ("before", args.before, args.columns),
-            ("after", args.after, args.after_columns or args.columns),
-        )
-    }
-    refuse_copies([*sets["before"], *sets["after"]])
-    with stages() as stage:
-        stage(f"comparing {len(sets['before'])} recordings before with {len(sets['after'])} after")
-        found = assess(sets["before"], sets["after"], options)
+    found = compare(args, options)
     document = assessment_document(found)
     write_file(output, to_json(document), SCHEMA)
     if args.plots:
@@ -62,8 +48,40 @@ def run_assess(args: argparse.Namespace) -> int:
     return 0 if found.holds else 1
 
 
-def _options(args: argparse.Namespace) -> "AssessOptions":
-    """Return the engineer's choices."""
+def compare(args: argparse.Namespace, options: "AssessOptions") -> "Assessment":
+    """Read the recordings of both sets and compare them.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        ``before``, ``after``, ``columns``, ``after_columns``, ``dp`` and ``skip_rows`` of the command.
+    options : AssessOptions
+        Of `assess_options`.
+    """
+    from dzdesign.verify.assessment import assess
+
+    sets = {
+        name: read_recordings(
+            patterns,
+            u_max=options.of_set(name).u_max,
+            columns=columns,
+            dp=args.dp,
+            skip_rows=args.skip_rows,
+            what=f"reading recordings {name}",
+        )
+        for name, patterns, columns in (
+            ("before", args.before, args.columns),
+            ("after", args.after, args.after_columns or args.columns),
+        )
+    }
+    refuse_copies([*sets["before"], *sets["after"]])
+    with stages() as stage:
+        stage(f"comparing {len(sets['before'])} recordings before with {len(sets['after'])} after")
+        return assess(sets["before"], sets["after"], options)
+
+
+def assess_options(args: argparse.Namespace) -> "AssessOptions":
+    """Return the engineer's choices, SI; `args` has them as the command's texts."""
     from dzdesign.identify.options import IdentifyOptions
     from dzdesign.verify.assessment import AssessOptions
     from dzdesign.verify.assessment_limits import parse_limits

@@ -214,6 +214,22 @@ def _firmware_mutants(firmware: Path) -> dict[str, Any]:
 
 def run_simulate(args: argparse.Namespace) -> int:
     """Write ramp tests of a simulated valve."""
+    check_folder_may_be_written(Path(args.output))
+    files, manifest = simulate(args)
+    write_folder(Path(args.output), files, manifest)
+    said = one_line(f"Written: {len(files)} simulated ramp tests in {args.output}")
+    print(to_json(manifest) if args.json else said)
+    return 0
+
+
+def simulate(args: argparse.Namespace) -> tuple[dict[str, bytes], dict[str, Any]]:
+    """Return recordings by the names of their files, and the manifest of their folder.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        ``plant``, ``firmware``, ``dp``, ``ramp_time`` and ``seed`` of the command.
+    """
     from dzdesign.verify.plant import Plant, read_plant
     from dzdesign.verify.simulation import Bench, simulated_files
 
@@ -224,14 +240,9 @@ def run_simulate(args: argparse.Namespace) -> int:
         raise InputError(f"--dp repeats a pressure drop ({', '.join(texts)}); give each of them once")
     ramp_s = parse_quantity(args.ramp_time, "time", "--ramp-time")
     bench = Bench(seed=_seed(args.seed))
-    check_folder_may_be_written(Path(args.output))
     firmware = Path(args.firmware) if args.firmware else None
     with stages() as stage:
-        files, manifest = simulated_files(plant, pressures, ramp_s, bench, say=stage, firmware=firmware)
-    write_folder(Path(args.output), files, manifest)
-    said = one_line(f"Written: {len(files)} simulated ramp tests in {args.output}")
-    print(to_json(manifest) if args.json else said)
-    return 0
+        return simulated_files(plant, pressures, ramp_s, bench, say=stage, firmware=firmware)
 
 
 def run_derive(args: argparse.Namespace) -> int:

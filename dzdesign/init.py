@@ -62,22 +62,69 @@ class Look:
     skip_rows: int | None = None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Proposal:
+    """What a look at recordings proposes.
+
+    Attributes
+    ----------
+    text : str
+        Of the file of options.
+    seen : tuple of str
+        What was seen, for a person.
+    opens : tuple of str
+        What is open: without it `identify` can't run.
+    look : Look
+        What was seen.
+    """
+
+    text: str
+    seen: tuple[str, ...]
+    opens: tuple[str, ...]
+    look: Look
+
+
+def propose(
+    ramps: list[str],
+    *,
+    columns: str | dict[str, str] | None,
+    dp: str | dict[str, str] | None,
+    skip_rows: int | str | None,
+    output: str | None,
+) -> Proposal:
+    """Look at recordings, and write the file of options that this gives; the arguments are those of the command.
+
+    Raises
+    ------
+    InputError
+        If a recording can't be read, or the file exists.
+    """
+    if output is not None:
+        if os.path.lexists(output):
+            raise InputError(
+                f"'{output}' exists, and init never writes over a file; give another name with -o, or move it away"
+            )
+        check_file_may_be_written(Path(output))
+    paths = expand(ramps) if ramps else _found_recordings()
+    look, opens = _look(paths, columns, dp, rows_to_skip(skip_rows))
+    seen = _summary(look)
+    text = options_file(look, seen, opens)
+    if output is not None:
+        write_file(Path(output), text)
+    return Proposal(text=text, seen=tuple(seen), opens=tuple(opens), look=look)
+
+
 def run_init(args: argparse.Namespace) -> int:
     """Write the file of options; 1 if it leaves something open without which `identify` can't run."""
     output = Path(args.output)
-    if os.path.lexists(output):
-        raise InputError(
-            f"'{output}' exists, and init never writes over a file; give another name with -o, or move it away"
-        )
-    check_file_may_be_written(output)
-    paths = expand(args.ramps) if args.ramps else _found_recordings()
-    look, opens = _look(paths, args)
-    text = options_file(look, _summary(look), opens)
-    write_file(output, text)
+    proposal = propose(
+        args.ramps, columns=args.columns, dp=args.dp, skip_rows=args.skip_rows, output=args.output
+    )
+    opens = proposal.opens
     if args.json:
-        print(to_json(_document(look, opens, args.output)), end="")
+        print(to_json(_document(proposal.look, list(opens), args.output)), end="")
         return 1 if opens else 0
-    for line in _summary(look):
+    for line in proposal.seen:
         print(line)
     for line in opens:
         print(f"open: {line}")
@@ -102,30 +149,34 @@ def _found_recordings() -> list[Path]:
     raise InputError("there are no recordings in ./ramps or in this folder; name them: dzdesign init RAMP...")
 
 
-def _look(paths: list[Path], args: argparse.Namespace) -> tuple[Look, list[str]]:
+def _look(
+    paths: list[Path],
+    said_columns: str | dict[str, str] | None,
+    said_dp: str | dict[str, str] | None,
+    skip_rows: int | None,
+) -> tuple[Look, list[str]]:
     """Return what was seen, and what is open."""
     from dzdesign.identify.column_labels import PER_CENT, parse_columns
     from dzdesign.identify.first_look import guess_columns, is_per_cent, look_at_sides, pressure_in_name, proposed_u_max
 
-    given = parse_columns(args.columns) if args.columns else {}
-    skip = rows_to_skip(args.skip_rows)
-    guesses = [guess_columns(path, skip) for path in with_bar(paths, "looking at columns")]
-    columns, opens, notes = _columns(guesses, given, declared=bool(args.dp))
+    given = parse_columns(said_columns) if said_columns else {}
+    guesses = [guess_columns(path, skip_rows) for path in with_bar(paths, "looking at columns")]
+    columns, opens, notes = _columns(guesses, given, declared=bool(said_dp))
     undeclared, unused = _pressures(guesses, columns)
     opens, notes = opens + undeclared, notes + unused
     nothing = Look(paths=paths, guesses=guesses, columns=columns, dp={}, sides={}, refused={})
     if opens:
         return nothing, list(dict.fromkeys(opens))
     names = [path.as_posix() for path in paths]
-    tests = read_recordings(names, u_max=10.0, columns=columns or None, dp=args.dp, skip_rows=skip)
+    tests = read_recordings(names, u_max=10.0, columns=columns or None, dp=said_dp, skip_rows=skip_rows)
     if "dP" in columns and "dP" not in given:
         opens += _contradicted(tests, columns["dP"])
-    dp = args.dp if isinstance(args.dp, dict) else {test.source: args.dp for test in tests} if args.dp else {}
+    dp = said_dp if isinstance(said_dp, dict) else {test.source: said_dp for test in tests} if said_dp else {}
     lacking = [test.source for test in tests if test.dp is None]
     if lacking:
         dp = {source: text for source in lacking if (text := pressure_in_name(source))}
         if len(dp) == len(lacking):
-            tests = read_recordings(names, u_max=10.0, columns=columns or None, dp=dp, skip_rows=skip)
+            tests = read_recordings(names, u_max=10.0, columns=columns or None, dp=dp, skip_rows=skip_rows)
             notes.append(f"pressure drop by the files' names: {', '.join(dict.fromkeys(dp.values()))}")
         elif len(tests) > 1:
             unsaid = [source for source in lacking if source not in dp]
@@ -150,7 +201,7 @@ def _look(paths: list[Path], args: argparse.Namespace) -> tuple[Look, list[str]]
     return (
         Look(
             paths=paths, guesses=guesses, columns=columns, dp=dp, u_max=u_max, u_seen=u_seen, sides=sides,
-            refused=refused, notes=tuple(notes), skip_rows=skip,
+            refused=refused, notes=tuple(notes), skip_rows=skip_rows,
         ),
         opens,
     )  # fmt: skip

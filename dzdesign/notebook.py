@@ -55,14 +55,14 @@ def valve_html(valve: "ValveModel") -> str:
                 ]
             )
         headings = ("ramp test", "dP (MPa)", "knee opening (V)", "closing (V)", "bound (V)", "beta", "Q max (L/min)")
-        parts += [_table(f"Valve, {name} side: thresholds ± s.e.", headings, rows), _sentences(_side_lines(side))]
+        parts += [_table(f"Valve, {name} side: thresholds ± s.e.", headings, rows), _sentences(side_lines(side))]
     for each in valve.warnings:
         source = f"{each.source}: " if each.source else ""
         parts.append(_sentences([f"warning [{each.code}] {source}{each.text}"]))
     return "".join(parts)
 
 
-def _side_lines(side: "SideModel") -> list[str]:
+def side_lines(side: "SideModel") -> list[str]:
     """Say what the law takes from a side."""
     at = "" if side.reference_dp_MPa is None else f" at dP0 = {side.reference_dp_MPa:.3f} MPa"
     lines = [

@@ -16,12 +16,12 @@ def run_report(args: argparse.Namespace) -> int:
     """Make report.html; 1 if a requirement does not hold or was not checked, or the files do not belong together."""
     folder = Path(args.folder)
     output = Path(args.output) if args.output else _beside_evidence(folder)
-    report = _report_of(folder)
+    report = report_of(folder)
     for line in report.missing:
         say(f"missing: {line}")
     for line in report.faults:
         say(f"does not fit: {line}")
-    _write(output, report.html)
+    write_report(output, report.html)
     if args.json:
         print(
             to_json(
@@ -41,7 +41,7 @@ def run_report(args: argparse.Namespace) -> int:
     return 0 if report.kind == "good" else 1
 
 
-def _report_of(folder: Path) -> "Report":
+def report_of(folder: Path) -> "Report":
     """Return the report of a batch, or of one valve's artefacts."""
     from dzdesign.batch.lot_files import is_lot, refuse_uncalibrated
 
@@ -68,7 +68,7 @@ def _beside_evidence(folder: Path) -> Path:
     return folder / REPORT_NAME
 
 
-def _write(output: Path, html: str) -> None:
+def write_report(output: Path, html: str) -> None:
     """Write the report; in a folder whose manifest lists it the manifest follows, both or neither."""
     manifest_path = output.parent / MANIFEST_NAME
     if not manifest_path.is_file():

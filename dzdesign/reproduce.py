@@ -132,12 +132,13 @@ def run_chain(valve: "RecoveredValve", say: Callable[[str], None] = lambda _: No
 def _ramp_tests(valve: "RecoveredValve", bench: "Bench") -> dict[str, bytes]:
     """Record the ramp tests of the bare valve: file name to content, each marked as simulated."""
     from dzdesign.derivation.published import RAMP_S
-    from dzdesign.identify.ramp_files import ramp_file_bytes
+    from dzdesign.identify.ramp_files import SIMULATED_MARK, ramp_file_bytes
     from dzdesign.verify.closed_loop import ClosedLoop, RampSequence
     from dzdesign.verify.simulation import simulate_ramp
 
     loop, sequence = ClosedLoop(valve.plant), RampSequence(ramp=float(RAMP_S))
-    comments = (f"SIMULATED by dzdesign reproduce; the paper's {valve.published.name}, recovered. No measurement.",)
+    origin = f"the paper's {valve.published.name}, recovered"
+    comments = (f"{SIMULATED_MARK} by dzdesign reproduce; {origin}. No measurement.",)
     return {
         f"ramp_dP{dp_MPa:g}.csv": ramp_file_bytes(
             simulate_ramp(loop, valve.plant, dp_MPa, bench, sequence), comments, compress=False

@@ -17,6 +17,7 @@ SCHEMAS: Mapping[str, tuple[str, str, str]] = MappingProxyType(
         "firmware": ("dzdesign.codegen", "manifest.json of a firmware", "codegen"),
         "evidence": ("dzdesign.verify", "verification.json", "verify"),
         "assessment": ("dzdesign.verify", "assessment.json", "assess"),
+        "batch": ("dzdesign", "batch.json", "batch"),
         "reproduction": ("dzdesign", "reproduction.json", "reproduce"),
         "derivation": ("dzdesign.derivation", "derivation.json", "derive --format json"),
     }

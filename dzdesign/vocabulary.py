@@ -71,6 +71,7 @@ IDENTIFY = (
 DESIGN = (
     _given("--law", metavar="LAW", help="paper: Eq. (18); target: meets Eq. (16) (default: paper)"),
     _given("--guard", metavar="G", help="threshold to protect: closing, mean or opening (default: closing)"),
+    _given("--accept", metavar="CODE", help="design in spite of this warning: branch-order (default: refuse)"),
     _given(
         "--edge",
         metavar="C",
@@ -349,7 +350,7 @@ OPTION_GROUPS = {
     "the recordings": ("--record", "--columns", "--after-columns", "--dp", "--skip-rows", "--u-max", "--after-u-max"),
     "the flow meter": ("--meter-floor", "--meter-lag", "--meter-zero"),
     "how it is fitted": ("--knee-window", "--confidence", "--flat-below", "--linearity-window"),
-    "the law": ("--law", "--guard", "--edge", "--below-dp0", "--output-max"),
+    "the law": ("--law", "--guard", "--edge", "--below-dp0", "--output-max", "--accept"),
     "what the firmware is connected to": (
         "--command-signal", "--polarity", "--pressure-span", "--pressure-a", "--pressure-b", "--negative-dp",
     ),

@@ -4,11 +4,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from dzdesign.core.errors import InputError
+from dzdesign.identify.clipped_meter import without_clipping
 from dzdesign.identify.described_tests import L_MIN
 from dzdesign.identify.model import SIDES, ValveModel, Warning_
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.quality import about_clocks, about_thinning
 from dzdesign.identify.ramp_files import RampTest
+from dzdesign.identify.recording_quality import about_a_stuck_sensor, about_recordings
 from dzdesign.identify.side import IdentifiedSide, identify_side
 from dzdesign.identify.sides import tests_of_side
 
@@ -57,20 +58,23 @@ def identify_sides(
     if not tests:
         raise InputError("no ramp tests were given; expected at least one file")
     sides: dict[str, IdentifiedSide] = {}
-    warnings: list[Warning_] = [*about_clocks(tests), *about_thinning(tests)]
+    warnings: list[Warning_] = []
     for name, sign in SIDES.items():
         mine = tests_of_side(tests, sign, options.u_max)
         if not mine:
             continue
+        stuck = tuple(about_a_stuck_sensor(mine))
+        mine, own, clipped = without_clipping(mine, options)
         try:
-            sides[name] = identify_side(mine, options)
+            sides[name] = identify_side(mine, own)
         except InputError as error:
             if not sides:
-                raise
+                # Ramps of several pressures taken for one test may be refused for any reason: the cause is this.
+                raise InputError(f"{error}; it may be that {stuck[0].text}") if stuck else error from error
             warnings.append(Warning_(code="side-refused", text=f"the {name} side is missing: {error}", source=None))
             continue
         prefix = f"{name} side: " if len(sides) > 1 else ""
-        warnings += [replace(item, text=prefix + item.text) for item in sides[name].warnings]
+        warnings += [replace(item, text=prefix + item.text) for item in (*stuck, *clipped, *sides[name].warnings)]
     lag = next(iter(sides.values())).described.lag
     model = ValveModel(
         u_max_V=options.u_max,
@@ -80,10 +84,23 @@ def identify_sides(
         meter_zero_L_min=options.meter_zero / L_MIN,
         knee_window=options.knee_window,
         sides={name: side.model for name, side in sides.items()},
-        warnings=tuple(warnings),
+        warnings=(*about_recordings(tests), *([_about_two_sides()] if len(sides) > 1 else []), *warnings),
         made_from=tuple(
             dict.fromkeys(file for side in sides.values() for item in side.described.tests for file in item.files)
         ),
         record=record or {},
     )
     return Identified(model=model, sides=sides)
+
+
+def _about_two_sides() -> Warning_:
+    """Say that a design for commands of one sign, which is the default, leaves one side out."""
+    return Warning_(
+        code="two-sides",
+        text=(
+            "both sides are identified, but a command of one sign, which `design` assumes, drives the positive side "
+            "only: the negative one is then left out of the firmware. Give `design` a --command-signal of both signs, "
+            "such as '-10..10 V x 0.15 + 1.5 V'"
+        ),
+        source=None,
+    )

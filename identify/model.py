@@ -17,6 +17,8 @@ TRENDS = ("decreasing", "flat", "increasing")
 #: Of a branch: the thresholds with their standard errors.
 MEASURES = ("knee", "level", "onset")
 DIRECTIONS = ("rising", "falling")
+#: Standard errors by which closing must lie above opening to be no noise; and V, for a simulation has next to none.
+ORDER_SIGNIFICANCE, ORDER_LEAST_V = 5.0, 1e-3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,6 +98,13 @@ class TestResult:
     def u_knee_se_V(self) -> float:
         """The larger of the knees' standard errors, V."""
         return max(branch.knee_se_V for branch in (self.rising, self.falling) if branch)
+
+    @property
+    def closes_above_opening(self) -> bool:
+        """Whether the knees stand in an order that no valve has: then the lag or the time is wrong, and so are they."""
+        opens, closes = self.u_knee_rising_V, self.u_knee_falling_V
+        least = max(ORDER_SIGNIFICANCE * self.u_knee_se_V, ORDER_LEAST_V)
+        return opens is not None and closes is not None and closes - opens > least
 
     def to_document(self) -> dict[str, Any]:
         """Return the entry of valve.json; of the ramps, how many and which."""
@@ -263,7 +272,7 @@ class Warning_:
     source: str | None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class ValveModel(ShownInNotebooks):
     """The identified valve.
 

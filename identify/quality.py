@@ -1,14 +1,13 @@
 """The quality gate that speaks: what is weak in the data, with the numbers and what to do."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from dzdesign.identify.clock import ASSUMED_MS
 from dzdesign.identify.described_tests import L_MIN, DescribedTest, DescribedTests
+from dzdesign.identify.knee_errors import about_errors
 from dzdesign.identify.model import SideModel, TestResult, Warning_
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.ramp_files import RampTest
 from dzdesign.identify.sweep_quality import about_sweeps
 
 #: A softer edge than this share of u_max between knee and the tail's zero is said.
@@ -17,8 +16,6 @@ SOFT_EDGE = 5e-3
 LARGE_LAG = 1e-2
 #: Lag that a flow meter without a word about it may well have, s.
 LIKELY_LAG = 0.1
-#: Standard error of a knee, over u_max, above which the noise decides what the compensator gives up.
-NOISY = 2.5e-3
 #: Shares of the guarded threshold between which a leak inside the overlap is looked for, and its standard errors.
 OVERLAP, LEAK_SIGNIFICANCE = (0.6, 0.85), 5.0
 #: A leak below this share of the largest flow is not worth a word.
@@ -48,41 +45,9 @@ def find_warnings(
         *_about_pressure(side, group.tests),
         *_about_declarations(group.tests),
         *about_sweeps(side, group.tests, options.u_max),
-        *_about_noise(side, options.u_max),
+        *about_errors(side, group.tests, options.u_max),
         *_about_the_edge(side, group, options.u_max),
     )
-
-
-def about_thinning(tests: Sequence[RampTest]) -> Iterator[Warning_]:
-    """Yield a warning for each recording that was too long to be kept row by row."""
-    for test in tests:
-        if test.run > 1:
-            yield Warning_(
-                code="thinned",
-                text=(
-                    f"of {test.rows_read} rows every {test.run} in a row were averaged, without their spikes, to "
-                    f"{test.time.size} samples, to which noise and outliers refer. The next one may be recorded at a "
-                    "lower rate"
-                ),
-                source=test.source,
-            )
-
-
-def about_clocks(tests: Sequence[RampTest]) -> Iterator[Warning_]:
-    """Yield a warning for each recording whose time is plainly in milliseconds and does not say so."""
-    for test in tests:
-        if test.clock_doubt:
-            took = "was taken as" if test.clock_doubt == ASSUMED_MS else "was not taken as"
-            why = "says no unit" if test.clock_doubt == ASSUMED_MS else "says another unit"
-            yield Warning_(
-                code="time-unit",
-                text=(
-                    f"the column of time counts like milliseconds, in whole numbers by which a ramp in seconds would "
-                    f"take more than an hour, and {why}: it {took} milliseconds. Say its unit in its label, such as "
-                    'time_ms, or by --columns "time=LABEL:ms"'
-                ),
-                source=test.source,
-            )
 
 
 def _about_the_lag(group: DescribedTests, options: IdentifyOptions) -> Iterator[Warning_]:
@@ -113,20 +78,6 @@ def _about_the_lag(group: DescribedTests, options: IdentifyOptions) -> Iterator[
             ),
             source=None,
         )
-
-
-def _about_noise(side: SideModel, u_max: float) -> Iterator[Warning_]:
-    for test in side.tests:
-        if test.u_knee_se_V > NOISY * u_max:
-            yield Warning_(
-                code="noise",
-                text=(
-                    f"a knee is known to {1e3 * test.u_knee_se_V:.0f} mV only (one standard error; noise "
-                    f"{test.noise_L_min:.3g} L/min, {test.noise_colour:.0f} times as harmful as white noise): its "
-                    "bound lies several times that lower. Record slower ramps, or repeat them"
-                ),
-                source=test.source,
-            )
 
 
 def _about_the_meter(zero_L_min: Mapping[str, float]) -> Iterator[Warning_]:

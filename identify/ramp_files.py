@@ -5,6 +5,7 @@ A file is read block by block, and a long one thinned on the way: see `thinning`
 
 import gzip
 import io
+import re
 from collections.abc import Generator, Mapping
 from contextlib import closing
 from dataclasses import dataclass
@@ -25,6 +26,8 @@ from dzdesign.identify.thinning import Thinner
 
 #: Fewest complete rows in which two branches with a threshold could stand.
 MIN_ROWS = 20
+#: First word of the first comment line of a recording that is none: whoever makes one up writes it there.
+SIMULATED_MARK = "SIMULATED"
 #: SI numbers beyond these are no measurement of a valve: a wrong unit, or what a logger writes for an overflow.
 LARGEST = {"time": 1e12, "voltage": 1e4, "pressure": 1e9, "flow": 10.0}
 
@@ -47,6 +50,8 @@ class RampTest:
         Complete rows in the file, and how many of them in a row were averaged to one sample (1: none were).
     clock_doubt : str
         What is doubtful about the unit of the time, as `Clock.doubt` gives it.
+    simulated : bool
+        True if a comment line above the labels begins with `SIMULATED_MARK`.
     """
 
     source: str
@@ -59,6 +64,7 @@ class RampTest:
     rows_read: int = 0
     run: int = 1
     clock_doubt: str = ""
+    simulated: bool = False
 
     def __post_init__(self) -> None:
         for array in (self.time, self.u, self.q, self.dp):
@@ -102,12 +108,14 @@ def read_ramp_file(
     path = Path(path)
     thinner, clock = Thinner(u_max), Clock()
     found: dict[str, Column] = {}
+    simulated = False
     with open_bytes(path, "ramp file") as file:
         sha256 = sha256_of_file(file)
         with closing(read_tables(file, path, skip_rows)) as tables:
             for table in tables:
                 if not found:
                     found = find_columns(table, columns or {})
+                    simulated = _is_marked(table.comments)
                     _refuse_two_pressures(table, found, dp)
                     _refuse_unequal_lengths(table, found)
                 thinner.add(_complete_rows(table, found, clock, u_max, dp))
@@ -130,7 +138,13 @@ def read_ramp_file(
         rows_read=thinner.read,
         run=thinner.run,
         clock_doubt=doubt,
+        simulated=simulated,
     )
+
+
+def _is_marked(comments: str) -> bool:
+    """Tell whether a comment line says that this is no measurement; a spreadsheet may have put it in quotes."""
+    return re.search(rf'^[ \t,;"]*#[ \t"]*{SIMULATED_MARK}\b', comments, re.MULTILINE) is not None
 
 
 def read_tables(file: BinaryIO, path: Path, skip_rows: int | None = None) -> Generator[Table, None, None]:

@@ -10,8 +10,6 @@ from dzdesign.identify.model import SideModel, TestResult, Warning_
 
 #: A command that stays below this share of u_max is not full.
 FULL_COMMAND = 0.97
-#: Standard errors by which closing must lie above opening to be worth a word.
-ORDER_SIGNIFICANCE = 5.0
 #: Share of the largest flow by which the flow at full command may lie below it, and noises of one sample.
 FLOW_FALLS, FALL_SIGNIFICANCE = 0.05, 3.0
 #: Share of the largest flow that is missing where the straight part would reach it: above this a valve is curved.
@@ -65,13 +63,13 @@ def _about_branches(test: TestResult) -> Iterator[Warning_]:
             text="no rising branch: the residual dead zone on opening can't be said. Ramp up as well",
             source=test.source,
         )
-    if rising is not None and falling is not None and falling - rising > ORDER_SIGNIFICANCE * test.u_knee_se_V:
+    if test.closes_above_opening:
         yield Warning_(
             code="branch-order",
             text=(
                 f"the valve closes ({falling:.3f} V) above where it opens ({rising:.3f} V): is the meter's lag "
                 "over-corrected, or the time column wrong? The certificate guards the closing threshold, here the "
-                "higher one, so flow at zero command is possible"
+                "higher one, so flow at zero command is possible, and `design` refuses"
             ),
             source=test.source,
         )

@@ -39,11 +39,14 @@ class Table(ABC):
         In the order of the file; one may repeat.
     units : mapping
         Label -> unit, where the file states it beside the label and not in it.
+    comments : str
+        The lines that stand above the labels, as they are in the file.
     """
 
     path: Path
     labels: tuple[str, ...]
     units: Mapping[str, str] = field(default_factory=dict)
+    comments: str = ""
 
     @abstractmethod
     def numbers(self, label: str) -> np.ndarray:

@@ -194,8 +194,9 @@ def text_tables(file: BinaryIO, path: Path, skip_rows: int | None = None) -> Ite
     InputError
         If it is no such text, or a row has not as many cells as the header.
     """
-    header, number, foot = None, 1, _Foot(path)
+    header, number, foot, above = None, 1, _Foot(path), b""
     for block in text_blocks(file, path):
+        whole = block
         skipped = _end_of_lines(block, (skip_rows or 0) + 1 - number)
         number += _count(block[:skipped], "\n")
         block = block[skipped:]
@@ -206,13 +207,14 @@ def text_tables(file: BinaryIO, path: Path, skip_rows: int | None = None) -> Ite
                     f"'{path}' begins with {len(block)} bytes of comments and blank lines; expected a header row such "
                     "as time_s,u_V,dP_MPa,Q_Lmin near its beginning"
                 )
+            above += whole[: len(whole) - len(rows)]
             if header is not None and skip_rows is None:
                 _tell(header, block, number, path)
         else:
             rows = block
         if header is not None:
             first = number + block.count(b"\n", 0, len(block) - len(rows))
-            yield _table(rows, first, header, foot)
+            yield _table(rows, first, header, foot, above.decode())
         number += _count(block, "\n")
     if header is None:
         below = f" below its first {skip_rows} rows (--skip-rows)" if skip_rows else ""
@@ -263,8 +265,8 @@ class _Foot:
             raise self._error
 
 
-def _table(rows: bytes, number: int, header: Header, foot: _Foot) -> TextTable:
-    """Return the table of rows; `number` is that of their first line in the file."""
+def _table(rows: bytes, number: int, header: Header, foot: _Foot, above: str) -> TextTable:
+    """Return the table of rows; `number` is that of their first line in the file, `above` what stands over them all."""
     cells = None if _has_other_lines(rows, header) else _plain_cells(rows, header.separator, len(header.labels))
     if cells is not None:
         foot.refuse_what_follows()
@@ -277,6 +279,7 @@ def _table(rows: bytes, number: int, header: Header, foot: _Foot) -> TextTable:
         path=foot.path,
         labels=header.labels,
         units=header.units,
+        comments=above,
         cells=cells,
         header_line=header.line,
         lines=lines,

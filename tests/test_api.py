@@ -15,6 +15,7 @@ from nbclient import NotebookClient
 from synthetic import needs_compiler
 
 from dzdesign import api
+from dzdesign.batch.command import IDENTIFY
 from dzdesign.cli import main
 from dzdesign.design_options import DEFAULTS
 from dzdesign.identify.model import ValveModel
@@ -65,7 +66,8 @@ def test_the_options_are_those_of_the_commands():
     """An option that a command gains is missing here until the API has it."""
     import inspect
 
-    only_on_paper = {"identify": {"plots"}, "design": set()}
+    only_on_paper = {"identify": {"plots"}, "assess": {"plots"}, "design": set(), "init": set(), "report": set()}
+    only_on_paper |= {"simulate": set(), "batch": {*DEFAULTS, *IDENTIFY, "record"}}  # those are in its two mappings
     for name, left_out in only_on_paper.items():
         words = {option[0][-1] for option in COMMANDS[name][2]}
         options = {word.removeprefix("--").replace("-", "_") for word in words if word.startswith("--")}
@@ -83,12 +85,75 @@ def test_the_options_are_those_of_the_commands():
         (lambda ramps: api.design("nothing.json"), "'nothing.json' does not exist"),
         (lambda ramps: api.design("nothing.json", target="f28334"), "did you mean 'f28335'?"),
         (lambda ramps: api.verify("nothing"), "does not exist"),
+        (lambda ramps: api.init("nothing_*.csv"), "no file matches 'nothing_*.csv'"),
+        (lambda ramps: api.simulate(dp=["1 MPa", "1 MPa"]), "--dp repeats a pressure drop"),
+        (lambda ramps: api.simulate(dp="1 MPa", seed=-1), "--seed is '-1'"),
+        (lambda ramps: api.assess(ramps, ramps), "byte for byte the same recording"),
+        (lambda ramps: api.assess(ramps, ramps, limits={"linearty": "5 %"}), "did you mean 'linearity'?"),
+        (lambda ramps: api.report("nothing"), "nothing"),
+        (lambda ramps: api.batch("nothing", output="lot"), "'nothing'"),
+        (lambda ramps: api.batch(".", output="lot", identify={"meter_lagg": "0 s"}), "did you mean 'meter_lag'?"),
+        (lambda ramps: api.batch(".", output="lot", design={"meter_lag": "0 s"}), "design has no option 'meter_lag'"),
     ],
 )
 def test_bad_input_is_one_sentence(call, words, ramps):
     with pytest.raises(api.InputError) as error:
         call(ramps)
     assert words in str(error.value)
+
+
+def test_what_stands_around_the_stages_writes_the_bytes_of_the_commands(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    two = ["--dp", "1 MPa", "--dp", "2 MPa", "--ramp-time", "20 s"]
+    assert main(["simulate", *two, "-o", "lot/V1"]) == 0 and main(["simulate", *two, "--seed", "2", "-o", "after"]) == 0
+    files = api.simulate(dp=["1 MPa", "2 MPa"], ramp_time="20 s", output="again")
+    assert {path.name: path.read_bytes() for path in Path("lot/V1").glob("*.gz")} == files
+    assert Path("again/manifest.json").read_bytes() == Path("lot/V1/manifest.json").read_bytes()
+    pairs = []
+    assert main(["init", "lot/V1/*.gz", "-o", "init.toml"]) == 0
+    proposal = api.init("lot/V1/*.gz", output="api_init.toml")
+    assert not proposal.opens and "largest command: 10.00 V" in proposal.seen
+    pairs.append(("init.toml", "api_init.toml"))
+    limits = ["--limits", "dead_zone_opening = 60 %", "--meter-lag", "0.1 s"]
+    assert main(["assess", "lot/V1/*.gz", "--after", "after/*.gz", *limits]) == 0
+    compared = {"limits": {"dead_zone_opening": "60 %"}, "meter_lag": "0.1 s", "output": "api_assessment.json"}
+    assert api.assess("lot/V1/*.gz", "after/*.gz", **compared).holds
+    pairs.append(("assessment.json", "api_assessment.json"))
+    assert main(["batch", "lot", "--meter-lag", "0.1 s", "--guard", "mean", "--jobs", "1", "-o", "done"]) == 0
+    capsys.readouterr()
+    said = {"identify": {"meter_lag": "0.1 s"}, "design": {"guard": "mean"}, "jobs": 1}
+    document = api.batch(Path("lot"), output=Path("api_done"), **said)
+    assert document["calibrated"] == document["valves"] == 1
+    pairs += [(f"done/{name}", f"api_done/{name}") for name in ("batch.json", "valves.csv", "report.html")]
+    made = api.report("done", output="api_report.html")
+    assert made.holds is None and "NOT VERIFIED" in made.verdict
+    pairs.append(("done/report.html", "api_report.html"))
+    for name, other in pairs:
+        assert Path(name).read_bytes() == Path(other).read_bytes(), name
+    assert capsys.readouterr() == ("", "")  # the API prints nothing
+
+
+def test_a_valve_of_a_lot_that_fails_is_no_error_of_the_api(ramps, tmp_path):
+    for name, content in (("V1", ramps[0].read_bytes()), ("V2", b"no table")):
+        (tmp_path / "lot" / name).mkdir(parents=True)
+        (tmp_path / "lot" / name / "a.csv").write_bytes(content)
+    document = api.batch(tmp_path / "lot", output=tmp_path / "out", jobs=1)
+    assert [each["name"] for each in document["failed"]] == ["V2"] and document["calibrated"] == 1
+
+
+def test_print_sums_a_result_up(example_valve, example_compensator, example_firmware):
+    side, text = example_valve.positive, str(example_valve)
+    assert text.startswith("Valve of 10 V, positive side, from 6 recordings\n")
+    for test in side.tests:
+        assert f"{test.dp_MPa:.3f} MPa: knee opening {test.u_knee_rising_V:.3f} ± {test.rising.knee_se_V:.3f}" in text
+    assert "trend with dP: decreasing" in text and "warnings: simulated, " in text
+    assert "cost: outside 0.50 to 5.00 MPa" in str(example_compensator)
+    assert "core/dz_comp.c" in str(example_firmware)
+    for result in (example_valve, example_compensator, example_firmware):
+        assert repr([result]) == f"[<{str(result).splitlines()[0]}>]"
+        assert len(str(result)) < 4000
+    steered = replace(example_valve, warnings=(replace(example_valve.warnings[0], code="\x1b[31m\nred"),))
+    assert "\x1b" not in str(steered) and str(steered).splitlines()[-1].endswith("red; their texts are in .warnings")
 
 
 def test_a_compensator_whose_certificate_does_not_follow_is_not_generated(example_compensator):
@@ -180,6 +245,7 @@ def typed_house(tmp_path_factory):
         (house / "dzdesign" / room).mkdir(parents=True)
         for source in (ROOT / room).glob("*.py"):
             shutil.copy(source, house / "dzdesign" / room)
+    shutil.copytree(ROOT / "dzdesign" / "batch", house / "dzdesign" / "batch")
     for source in (*(ROOT / "dzdesign").glob("*.py"), ROOT / "dzdesign" / "py.typed"):
         shutil.copy(source, house / "dzdesign")
     shutil.copy(ROOT / "pyproject.toml", house)
@@ -187,6 +253,11 @@ def typed_house(tmp_path_factory):
         "from dzdesign import api\n"
         'firmware = api.generate(api.design(api.identify("ramps/*.csv", dp0="1 MPa")), target="host")\n'
         "holds: bool = api.verify(firmware).holds\n"
+        'holds = api.assess("a.csv", ["b.csv"], limits={"hysteresis": "5 %"}).holds\n'
+        'names: list[str] = list(api.simulate(dp="1 MPa"))\n'
+        "text: str = api.init().text\n"
+        'page: str = api.report("evidence").html\n'
+        'failed: object = api.batch("lot", output="out", identify={"meter_lag": "0.1 s"})["failed"]\n'
     )
     (house / "wrong.py").write_text(
         "from dzdesign import api\n"
@@ -197,7 +268,7 @@ def typed_house(tmp_path_factory):
 
 
 def test_the_api_and_its_use_are_typed_strictly(typed_house):
-    ours = ("api", "notebook", "identify_options", "core.shown")
+    ours = ("api", "api_around", "notebook", "summaries", "identify_options", "core.shown")
     modules = (*(f"dzdesign.{name}" for name in ours), "right", "wrong")
     command = [sys.executable, "-m", "mypy", *(f"-m{module}" for module in modules)]
     done = subprocess.run(command, cwd=typed_house, capture_output=True, text=True, check=False)

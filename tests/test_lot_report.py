@@ -9,6 +9,7 @@ from urllib.parse import unquote
 import pytest
 from many_valves import recordings, write_lot
 from page_reader import HOSTILE, Page
+from schema_checks import overlooked, problems
 from synthetic_lots import lot_rows, write_lot_folder
 
 from dzdesign.batch.lot_files import lot_of
@@ -64,6 +65,8 @@ def test_the_batch_writes_the_report_and_it_leads_with_the_verdict(made):
     document = json.loads((made / "batch.json").read_bytes())
     top = head(html)
     assert "4 of 6 valves calibrated, 2 NOT" in top and "2 failed: V0001, V0004" in top
+    assert "SIMULATED recordings, not of measured valves: V0000" in top
+    assert document["warnings"]["simulated"] == [f"V000{at}" for at in (0, 2, 3, 5)]
     for column in ("dead_zone_opening_percent", "dead_zone_closing_percent", "common_extra_dead_zone_percent"):
         at = document["quantiles"][column]
         assert f"{at['0.5']:.2f} %" in top and f"{at['0.05']:.2f} to {at['0.95']:.2f} %" in top
@@ -103,6 +106,57 @@ def test_a_lot_without_a_report_has_its_table(made, tmp_path, monkeypatch, capsy
     assert main(["batch", str(made.parent / "lot"), "-o", str(out), *OPTIONS, "--json"]) == 1
     said = capsys.readouterr()
     assert json.loads(said.out)["report"] is None and "no report.html: valves.csv is larger" in said.err
+
+
+def test_a_table_too_large_for_a_page_is_one_sentence_and_leaves_no_page_of_an_earlier_run(
+    made, tmp_path, monkeypatch, capsys
+):
+    out = shutil.copytree(made, tmp_path / "out")
+    size = (out / "valves.csv").stat().st_size
+    monkeypatch.setattr("dzdesign.batch.lot_files.MOST_TABLE", size - 1)
+    assert main(["batch", str(made.parent / "lot"), "-o", str(out), *OPTIONS]) == 1  # of the valves, not of the page
+    said = capsys.readouterr()
+    (line,) = [line for line in said.err.splitlines() if "no report.html" in line]
+    assert "too large for one page; read the table itself, or calibrate the lot in parts" in line
+    assert not (out / "report.html").exists() and "to be read" not in said.out
+    assert main(["report", str(out)]) == 2 and "too large for one page" in capsys.readouterr().err
+    monkeypatch.setattr("dzdesign.batch.lot_files.MOST_TABLE", size)
+    assert main(["report", str(out)]) == 1 and (out / "report.html").exists()
+
+
+def test_what_is_odd_is_in_the_verdict_and_all_of_it_below(copied, tmp_path):
+    document = json.loads((copied / "batch.json").read_bytes())
+    assert document["oddities"] == [] and "odd:" not in head(report_of_lot(copied).html)
+    document["oddities"] = [f"V{at}, <b>V{at + 1}</b> share a recording" for at in range(5)]
+    (copied / "batch.json").write_text(json.dumps(document))
+    html = report_of_lot(copied).html
+    assert head(html).count("share a recording") == 3 and "odd: 2 more" in head(html)
+    assert html.count("share a recording.") == 5 and "<b>V1</b>" not in html
+    document["oddities"] = "two"
+    (copied / "batch.json").write_text(json.dumps(document))
+    with pytest.raises(InputError, match="'oddities'"):
+        report_of_lot(copied)
+    del document["oddities"]  # of an older version
+    (copied / "batch.json").write_text(json.dumps(document))
+    assert not report_of_lot(copied).faults
+
+
+def test_batch_json_fits_its_schema_and_every_fault_in_it_is_seen(made):
+    document = json.loads((made / "batch.json").read_bytes())
+    assert problems("batch", document) == []
+    assert overlooked("batch", document) == []
+    for key in set(document) - {"schema", "tool", "complete"}:
+        assert problems("batch", {name: value for name, value in document.items() if name != key}), key
+    setting = document["common_setting"]
+    assert setting["without_binding"]["left_out"]
+    for key in setting:
+        lacking = {name: value for name, value in setting.items() if name != key}
+        assert problems("batch", {**document, "common_setting": lacking}), key
+    for other in ({"why_not": "one valve only"}, {**setting, "without_binding": None}):
+        assert problems("batch", {**document, "common_setting": other}) == []
+    assert problems("batch", {**document, "common_setting": {**setting, "why_not": "both"}})
+    stopped = {key: document[key] for key in ("schema", "tool")} | {"complete": False}
+    assert problems("batch", {**stopped, "names": ["V1"]}) == [] and problems("batch", stopped)
 
 
 def test_every_valve_not_calibrated_has_its_reason_and_what_to_do(made):

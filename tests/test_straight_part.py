@@ -90,7 +90,7 @@ class TestTables:
 
     def test_and_the_gate_says_that_it_is_known_no_better(self):
         codes = {warning.code for warning in identify([self.table()], DECLARED).warnings}
-        assert "noise" in codes
+        assert "coarse-levels" in codes
 
     def test_finer_levels_need_no_chord(self):
         (test,) = identify([self.table(step=0.05)], DECLARED).positive.tests

@@ -87,6 +87,8 @@ def test_the_headline_of_a_batch_counts_calibrated_valves(capsys):
 
     document = {"valves": 4, "calibrated": 3, "failed": [], "quantiles": {}, "common_setting": {"why_not": "none"}}
     document["oddities"] = ["two share a recording"]
+    document["warnings"] = {"onset-hidden": ["V1", "V2", "V3", "V4"], "pressure-stuck": ["V3"]}
     print_batch(document, "out")
     said = capsys.readouterr().out
     assert "3 calibrated valves of 4" in said and "odd: two share a recording" in said
+    assert "warnings: pressure-stuck 1 (V3), onset-hidden 4" in said

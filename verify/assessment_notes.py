@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING
 
 from dzdesign.identify.lag import MeterLag
 from dzdesign.identify.model import Warning_
-from dzdesign.identify.quality import LIKELY_LAG, about_thinning
+from dzdesign.identify.quality import LIKELY_LAG
 from dzdesign.identify.ramp_files import RampTest
+from dzdesign.identify.recording_quality import about_recordings
 
 if TYPE_CHECKING:
     from dzdesign.verify.assessment import AssessOptions, PressureAssessment
@@ -41,7 +42,7 @@ def find_notes(
         Of the meter.
     """
     return (
-        *(note for tests in sets.values() for note in about_thinning(tests)),
+        *about_recordings([test for tests in sets.values() for test in tests]),
         *_about_partners(pressures),
         *_about_the_lag(pressures, options, lag),
         *_about_the_floor(floor),

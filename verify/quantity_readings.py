@@ -183,7 +183,10 @@ def _linearity(curves: PressureCurves, rated: float, window: tuple[float, float]
     u = np.linspace(low, high, count)
     mean = np.mean([np.interp(u, curve.u, curve.q) for curve in curves.curves], axis=0)
     errors = np.array([np.interp(u, curve.u, curve.q_se) for curve in curves.curves])
-    departure = np.abs(mean - np.polyval(np.polyfit(u, mean, 1), u))
+    # The ends stand for half a step each: counted in full they pull the line to themselves.
+    weights = np.ones(count)
+    weights[[0, -1]] = math.sqrt(0.5)  # of the departure, not of its square
+    departure = np.abs(mean - np.polyval(np.polyfit(u, mean, 1, w=weights), u))
     widest = int(np.argmax(departure))
     error = float(np.sqrt(np.sum(errors[:, widest] ** 2))) / len(errors) / rated
     return Reading(

@@ -1,6 +1,7 @@
 """What the report leads with: the verdict, and the few numbers that matter."""
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
@@ -29,6 +30,8 @@ class Headline:
         What does not hold or was not checked.
     untried : tuple of str
         What nobody asked for, and the command that tries it: no requirement, but a reader should see it.
+    cautions : tuple of str
+        What the verdict is not about, whatever it is.
     """
 
     kind: str
@@ -36,6 +39,7 @@ class Headline:
     text: str
     reasons: tuple[str, ...] = ()
     untried: tuple[str, ...] = ()
+    cautions: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,6 +59,21 @@ def headline(chain: Chain) -> Headline:
     ----------
     chain : Chain
     """
+    return replace(_verdict(chain), cautions=tuple(_cautions(chain)))
+
+
+def _cautions(chain: Chain) -> Iterator[str]:
+    """Say what a verdict does not speak of: a machine's own valve, and a side without a law."""
+    valve, compensator = chain.document("valve"), chain.document("compensator")
+    if valve and any(warning["code"] == "simulated" for warning in valve["warnings"]):
+        yield "SIMULATED recordings: this is an example, not of a measured valve."
+    if valve and compensator:
+        for name in valve["sides"]:
+            if not compensator["sides"].get(name):
+                yield f"The {name} side was identified, and is NOT in this firmware: its command has one sign."
+
+
+def _verdict(chain: Chain) -> Headline:
     evidence = chain.document("verification")
     if chain.faults:
         return Headline(

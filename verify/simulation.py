@@ -11,7 +11,7 @@ import numpy as np
 from dzdesign.core.artefacts import TOOL, read_bytes, sha256_of
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator_file import compensator_from_document
-from dzdesign.identify.ramp_files import ramp_file_bytes
+from dzdesign.identify.ramp_files import SIMULATED_MARK, ramp_file_bytes
 from dzdesign.verify.closed_loop import RECORD_S, ClosedLoop, RampSequence
 from dzdesign.verify.firmware_folder import check_firmware_inside
 from dzdesign.verify.plant import Plant, plant_document
@@ -102,7 +102,7 @@ def simulated_files(
             raise InputError(f"a pressure drop of {dp_MPa:g} MPa can't be simulated, expected 0.01 to 18 MPa")
         say(f"simulating {dp_MPa:g} MPa")
         comments = (
-            "SIMULATED by dzdesign simulate; not a measurement.",
+            f"{SIMULATED_MARK} by dzdesign simulate; not a measurement.",
             f"pressure drop {dp_MPa:g} MPa at no flow; 0-{plant.u_max_V:g} V in {ramp_s:g} s and back",
             f"meter: floor {bench.meter_floor_L_min:g} L/min, lag {bench.meter_lag_s:g} s, "
             f"noise {bench.meter_noise_L_min:g} L/min; seed {bench.seed}",

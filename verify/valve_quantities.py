@@ -58,7 +58,8 @@ QUANTITIES: dict[str, Quantity] = {
     "linearity": Quantity(
         name="linearity",
         unit="%",
-        formula="largest |m(u) - (a + b u)| / Q_rated in the window of u; m is the mean of both branches, a + b u its "
+        formula="largest |m(u) - (a + b u)| / Q_rated in the window of u; m is the mean of both branches, each "
+        "averaged over cells of 1 % of u_max (of single readings the noise would add to the largest), a + b u its "
         "least-squares line there, Q_rated the largest flow BEFORE at this pressure drop",
         limit="ratio",
     ),

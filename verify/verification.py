@@ -45,7 +45,7 @@ Watch = Callable[[Iterable[Any], int], Iterable[Any]]
 WORKERS = 2
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Verification(ShownInNotebooks):
     """All evidence about one firmware folder.
 

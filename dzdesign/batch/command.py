@@ -6,6 +6,7 @@ import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from dzdesign.batch.calibration import Outcome, Task
 from dzdesign.batch.common import common_of, without_binding
@@ -29,6 +30,33 @@ IDENTIFY = (*IDENTIFY_NAMES, "columns", "dp", "skip_rows")
 
 def run_batch(args: argparse.Namespace) -> int:
     """Calibrate the valves of a folder or a list; raise at the end if any could not be."""
+    output = Path(args.output)
+    document, report = calibrate_lot(args)
+    if args.json:
+        print(to_json({**document, "report": report and str(report)}), end="")
+    else:
+        print_batch(document, str(output), report is not None)
+    if document["failed"]:
+        raise RequirementError(
+            f"{len(document['failed'])} of {document['valves']} valves are not calibrated; their reasons are in "
+            f"'{output / 'valves.csv'}'"
+        )
+    return 0
+
+
+def calibrate_lot(args: argparse.Namespace) -> tuple[dict[str, Any], Path | None]:
+    """Calibrate the valves of a folder or a list; return batch.json, and where the report is if there is one.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Of the command.
+
+    Raises
+    ------
+    InputError
+        If no valve could be calibrated so: a wrong option, list or folder. A valve that can't is no error.
+    """
     source, output = Path(args.source), Path(args.output)
     jobs = _jobs(args.jobs, args.dask)
     _check_options(args)
@@ -56,7 +84,7 @@ def _only_batch(output: Path) -> Iterator[None]:
 
 def _calibrate(
     args: argparse.Namespace, valves: list[Valve], plant: tuple[str, bytes] | None, results: Results, jobs: int
-) -> int:
+) -> tuple[dict[str, Any], Path | None]:
     output = results.folder
     results.begin([valve.name for valve in valves])
     waiting = [valve for valve in with_bar(valves, "reading") if not _is_done(results, _task(valve, args, plant))]
@@ -79,17 +107,7 @@ def _calibrate(
         (output / "common_compensator.json").unlink(missing_ok=True)  # of an earlier run with other valves
     write_files(output, files, "-o")
     results.write_summary(document)
-    report = _write_report(output)
-    if args.json:
-        print(to_json({**document, "report": report and str(report)}), end="")
-    else:
-        print_batch(document, str(output))
-    if document["failed"]:
-        raise RequirementError(
-            f"{len(document['failed'])} of {len(valves)} valves are not calibrated; their reasons are in "
-            f"'{output / 'valves.csv'}'"
-        )
-    return 0
+    return document, _write_report(output)
 
 
 def _write_report(output: Path) -> Path | None:
@@ -101,6 +119,7 @@ def _write_report(output: Path) -> Path | None:
     try:
         write_file(path, report_of_lot(output).html)
     except InputError as error:
+        path.unlink(missing_ok=True)  # of an earlier run: it would pass for one of this
         say(f"no {REPORT_NAME}: {error}")
         return None
     return path

@@ -17,6 +17,7 @@ from dzdesign.batch.table import HASHED, TABLE, Calibrated, read_back, rows_from
 from dzdesign.batch.valves import NAME
 from dzdesign.core.artefacts import MANIFEST_NAME, parse_document, read_bytes, sha256_of
 from dzdesign.core.errors import InputError
+from dzdesign.core.input_files import MOST_DOCUMENT
 from dzdesign.core.shape import Exactly, check_shape
 from dzdesign.progress import with_bar
 
@@ -39,6 +40,8 @@ COMMON = {
     "without_binding": (dict, NoneType),
 }
 AT = {"0.5": float, "0.95": float, "1": float}
+#: Largest table of which a report is made: beyond it, some 25 000 valves, no browser would show the page.
+MOST_TABLE = MOST_DOCUMENT
 #: Files or valves that a sentence names.
 NAMED = 10
 
@@ -76,6 +79,11 @@ class Lot:
     missing: tuple[str, ...] = ()
     compared: bool = False
     warning_texts: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def oddities(self) -> tuple[str, ...]:
+        """What is odd in the lot though each of its valves is in order; of an older batch.json none."""
+        return tuple(self.document.get("oddities", ()))
 
     @property
     def complete(self) -> bool:
@@ -162,6 +170,8 @@ def lot_of(folder: Path) -> Lot:
     if document.get("complete") is not True:
         return _stopped(folder, document, hashes)
     check_shape(document, FINISHED, str(folder / SUMMARY), AGAIN)
+    if "oddities" in document:  # they came later
+        check_shape(document, {"oddities": [str]}, str(folder / SUMMARY), AGAIN)
     if "why_not" not in document["common_setting"]:
         _check_common(document["common_setting"], f"{folder / SUMMARY}: common_setting")
     faults: list[str] = []
@@ -215,6 +225,11 @@ def _fits(path: Path, stated: str, faults: list[str], missing: list[str]) -> byt
 
 
 def _table(folder: Path, document: Mapping[str, Any], faults: list[str], missing: list[str]) -> bytes | None:
+    if (folder / TABLE).is_file() and (folder / TABLE).stat().st_size > MOST_TABLE:
+        raise InputError(
+            f"the table of {document['valves']} valves, '{folder / TABLE}', is larger than {MOST_TABLE >> 20} MiB, too "
+            "large for one page; read the table itself, or calibrate the lot in parts, each with a folder of its own"
+        )
     content = _fits(folder / TABLE, document["files"][TABLE], faults, missing)
     for name, stated in document["files"].items():
         if name != TABLE and isinstance(stated, str) and NAME.fullmatch(name):

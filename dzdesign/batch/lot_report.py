@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from dzdesign.batch.calibration import DOES_NOT_HOLD
@@ -14,8 +15,8 @@ from dzdesign.verify.report_page import render_page
 from dzdesign.verify.report_summary import Figure, Headline
 from dzdesign.verify.report_table import whole
 
-#: Valves that the verdict names.
-IN_VERDICT = 8
+#: Valves that the verdict names, and oddities.
+IN_VERDICT, ODD_IN_VERDICT = 8, 3
 
 
 def report_of_lot(folder: Path) -> Report:
@@ -73,6 +74,16 @@ def lot_headline(lot: Lot) -> Headline:
     ----------
     lot : Lot
     """
+    more = len(lot.oddities) - ODD_IN_VERDICT
+    odd = [f"odd: {text}" for text in lot.oddities[:ODD_IN_VERDICT]]
+    simulated = [row["name"] for row in lot.calibrated if "simulated" in row["warnings"].split()]
+    if simulated:
+        odd.insert(0, f"SIMULATED recordings, not of measured valves: {named(simulated, IN_VERDICT)}")
+    odd += [f"odd: {more} more, under “What the recordings leave open”"] if more > 0 else []
+    return replace(_verdict(lot), cautions=tuple(odd))
+
+
+def _verdict(lot: Lot) -> Headline:
     if lot.faults:
         return Headline(
             kind="bad", sign="✗", text="THE FILES DO NOT BELONG TOGETHER. No verdict stands.", reasons=lot.faults

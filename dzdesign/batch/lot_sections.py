@@ -208,8 +208,9 @@ def _common_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
     costs = _of(spreads, "common_extra_dead_zone_percent")
     low, high = (f"{end:.3g}" for end in (common["dp_MPa"][0], common["dp_MPa"][-1]))
     lines = [
-        f"The largest offset that over-compensates none of the valves, certified for each of them from {low} to {high} "
-        f"MPa, is in {common['file']}; its trend is that of {common['carrier']}.",
+        "The largest offset that over-compensates none of the valves, certified for each of them "
+        + (f"from {low} to {high} MPa" if low != high else f"at {low} MPa only")
+        + f", is in {common['file']}; its trend is that of {common['carrier']}.",
         *(_cost_line(spread) for spread in costs),
         f"It is held down by {named(common['binding'])}.",
         *_without_lines(common.get("without_binding")),
@@ -262,9 +263,12 @@ def _valves_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
 
 def _recordings_section(lot: Lot) -> Section:
     table = warnings_table(lot)
+    odd = tuple(f"Odd: {text}." for text in lot.oddities)
     if table is None:
-        return Section(lines=("No recording of a calibrated valve has a warning.",) if lot.calibrated else ())
+        none = ("No recording of a calibrated valve has a warning.",) if lot.calibrated else ()
+        return Section(lines=(*odd, *none))
     return Section(
+        lines=odd,
         note="None of these stops a calibration. The text of each valve, with its numbers, stands in its report and in "
         "its valve.json; what to do about a code stands in the documentation under “Warning codes”.",
         tables=(table,),

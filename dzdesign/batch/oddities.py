@@ -40,4 +40,4 @@ def _left_over(found: Mapping[str, Calibrated], folder: Path) -> list[str]:
     if not others:
         return []
     shown = ", ".join(others[:5]) + (f" and {len(others) - 5} more" if len(others) > 5 else "")
-    return [f"'{folder / 'valves'}' holds {shown}, not of this lot: left by an earlier run; take them away"]
+    return [f"the folder 'valves' holds {shown}, not of this lot: left by an earlier run; take them away"]

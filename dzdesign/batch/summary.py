@@ -7,6 +7,9 @@ from dzdesign.batch.calibration import OK
 from dzdesign.batch.spread import QUANTITIES, quantiles
 from dzdesign.core.artefacts import sha256_of, to_json
 
+#: Valves of one warning that are named.
+NAMED = 3
+
 if TYPE_CHECKING:
     from dzdesign.design.common import CommonSetting
 
@@ -46,12 +49,22 @@ def summary_of(
         "calibrated": len(rows) - len(failed),
         "failed": failed,
         "verified": verified,
+        "warnings": _warnings(rows),
         "files": {name: sha256_of(content) for name, content in files.items()},
         "quantiles": {column: quantiles([row[column] for row in rows]) for column in columns},
         "common_setting": (
             {**_common_document(common), "without_binding": without_binding} if common else {"why_not": why_not}
         ),
     }
+
+
+def _warnings(rows: Sequence[Mapping[str, Any]]) -> dict[str, list[str]]:
+    """Return the codes of warnings, each with the valves that have it."""
+    found: dict[str, list[str]] = {}
+    for row in rows:
+        for code in row["warnings"].split():
+            found.setdefault(code, []).append(row["name"])
+    return dict(sorted(found.items()))
 
 
 def _common_document(common: "CommonSetting") -> dict[str, Any]:
@@ -71,7 +84,7 @@ def _common_document(common: "CommonSetting") -> dict[str, Any]:
     }
 
 
-def print_batch(document: Mapping[str, Any], folder: str) -> None:
+def print_batch(document: Mapping[str, Any], folder: str, has_report: bool = True) -> None:
     """Print the counts, the spread, the common setting's cost and the reasons.
 
     Parameters
@@ -80,6 +93,8 @@ def print_batch(document: Mapping[str, Any], folder: str) -> None:
         From `summary_of`.
     folder : str
         Where it was written.
+    has_report : bool
+        Whether the lot's report is there too.
     """
     from dzdesign.page import new_console, new_table, put_line
 
@@ -98,6 +113,9 @@ def print_batch(document: Mapping[str, Any], folder: str) -> None:
     console.print(table)
     for line in _common_lines(document):
         put_line(console, line)
+    warned = sorted(document["warnings"].items(), key=lambda item: len(item[1]))
+    if warned:
+        put_line(console, "warnings: " + ", ".join(_warned(code, names) for code, names in warned))
     for each in document["failed"]:
         put_line(console, f"{each['status']}  {each['name']}: {each['reason']}")
     for line in document["oddities"]:
@@ -106,8 +124,13 @@ def print_batch(document: Mapping[str, Any], folder: str) -> None:
         console,
         f"{document['calibrated']} of {document['valves']} valves calibrated, {len(document['failed'])} not. "
         f"Table: {folder}/valves.csv, valves.parquet; "
-        f"to be read: {folder}/report.html",
+        + (f"to be read: {folder}/report.html" if has_report else "no report.html"),
     )
+
+
+def _warned(code: str, names: Sequence[str]) -> str:
+    """Return a code with how many valves have it; a few are named, for those are where to look."""
+    return f"{code} {len(names)}" + (f" ({', '.join(names)})" if len(names) <= NAMED else "")
 
 
 def _common_lines(document: Mapping[str, Any]) -> list[str]:
@@ -116,16 +139,18 @@ def _common_lines(document: Mapping[str, Any]) -> list[str]:
     if "why_not" in common:
         return [f"no common setting: {common['why_not']}"]
     low, high = common["dp_MPa"]
+    where = f"from {low:.4g} to {high:.4g} MPa" if high > low else f"at {low:.4g} MPa only"
     held = ", ".join(common["binding"][:5]) + (" and others" if len(common["binding"]) > 5 else "")
     costs = [(name, q) for name, q in document["quantiles"].items() if name.endswith("common_extra_dead_zone_percent")]
     lines = [
-        f"one common setting, safe for each of these valves from {low:g} to {high:g} MPa, is held down by {held}; "
+        f"one common setting, safe for each of these valves {where}, is held down by {held}; "
         f"it is in {common['file']}"
     ]
     for name, q in costs:
+        one_in_twenty = f"{q['0.95']:.2f} % at one in twenty, " if document["calibrated"] >= 20 else ""
         side = name.removesuffix("common_extra_dead_zone_percent").replace("_", " side: ")
         lines.append(
             f"{side}it leaves more dead zone than each valve's own setting: {q['0.5']:.2f} % of command at the median "
-            f"valve, {q['0.95']:.2f} % at one in twenty, {q['1']:.2f} % at most"
+            f"valve, {one_in_twenty}{q['1']:.2f} % at most"
         )
     return lines

@@ -77,6 +77,11 @@ def valves_of(source: Path, pattern: str | None, options: Collection[str]) -> li
         if pattern is not None:
             raise InputError(f"--pattern is for a folder, and '{source}' is none; write patterns in its column files")
         valves = _of_table(source, options)
+    if not valves and source.is_dir() and _recordings_in(source, pattern):
+        raise InputError(
+            f"'{source}' holds recordings itself, of one valve; give the folder that holds it, or use `dzdesign "
+            "identify`"
+        )
     if not valves:
         raise InputError(f"'{source}' names no valve; expected one subfolder of recordings, or one row, a valve")
     _check_names([valve.name for valve in valves], source)

@@ -1,0 +1,279 @@
+"""What the quality gate says of whole recordings, and what follows from it down to the C and the report."""
+
+import gzip
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from synthetic import L_MIN, MPA, Truth, synthetic_ramp
+
+from dzdesign.cli import main
+from dzdesign.codegen.project import generate
+from dzdesign.core.artefacts import to_json
+from dzdesign.core.errors import InputError
+from dzdesign.design.compensator_file import compensator_document
+from dzdesign.design.designing import design
+from dzdesign.design.options import DesignOptions
+from dzdesign.identify.identification import identify
+from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.ramp_files import ramp_file_bytes, read_ramp_file
+from dzdesign.verify.report import make_report
+from dzdesign.verify.report_artefacts import chain_of
+from dzdesign.verify.report_summary import headline
+
+PRESSURES = (1.0, 2.0, 4.0)
+MARK = "SIMULATED by somebody"
+
+
+def warned(valve, code):
+    return [warning for warning in valve.warnings if warning.code == code]
+
+
+def valve_at(dp_MPa, **changes):
+    """A ramp of a valve whose flow grows with the root of the pressure drop."""
+    root = dp_MPa**0.5
+    truth = Truth(knee_rising=5.5 - 0.05 * dp_MPa, slope=4 * root, saturation=100 * root)
+    return synthetic_ramp(dp_MPa, replace(truth, **changes), source=f"ramp_dP{dp_MPa:g}.csv")
+
+
+def written(path, test, *comments):
+    """Write a recording into a file and read it back."""
+    columns = {"time_s": test.time, "u_V": test.u, "dP_MPa": test.dp / MPA, "Q_Lmin": test.q / L_MIN}
+    path.write_bytes(ramp_file_bytes(columns, comments, compress=path.suffix == ".gz"))
+    return read_ramp_file(path)
+
+
+class TestSimulated:
+    @pytest.mark.parametrize("name", ["ramp.csv", "ramp.csv.gz"])
+    @pytest.mark.parametrize(("comments", "marked"), [((MARK, "more"), True), (("more", MARK), True), ((), False)])
+    def test_the_mark_is_seen_wherever_it_stands_above_the_labels(self, tmp_path, name, comments, marked):
+        assert written(tmp_path / name, valve_at(1.0), *comments).simulated is marked
+
+    @pytest.mark.parametrize(("line", "marked"), [('"# SIMULATED, no data",,,', True), ("# simulated leak: no", False)])
+    def test_a_spreadsheet_may_quote_it_and_a_word_in_a_sentence_is_none(self, tmp_path, line, marked):
+        path = tmp_path / "ramp.csv"
+        written(path, valve_at(1.0))
+        path.write_text(f"{line}\n{path.read_text()}")
+        assert read_ramp_file(path).simulated is marked
+
+    def test_every_bundled_recording_is_marked_and_so_is_the_valve(self, example_tests, example_valve, example_folder):
+        assert all(test.simulated for test in example_tests)
+        assert example_valve.warnings[0].code == "simulated"
+        assert f"all {len(example_tests)} recordings are simulated" in example_valve.warnings[0].text
+        first = sorted((example_folder / "ramps").glob("*.csv.gz"))[0]
+        assert gzip.decompress(first.read_bytes()).startswith(b"# SIMULATED")
+
+    def test_some_of_several_are_named(self):
+        tests = [valve_at(dp) for dp in PRESSURES]
+        tests[1] = replace(tests[1], simulated=True)
+        (warning,) = warned(identify(tests), "simulated")
+        assert "1 of 3 recordings (ramp_dP2.csv) is simulated" in warning.text
+
+    def test_the_firmware_and_the_report_say_so_and_those_of_a_measured_valve_do_not(self):
+        for simulated in (True, False):
+            valve = identify([replace(valve_at(dp), simulated=simulated) for dp in PRESSURES])
+            compensator = design(valve)
+            firmware = generate(compensator, "host")
+            for name, text in firmware.files.items():
+                assert ("SIMULATED" in text) is simulated or name == "compensator.json", name
+            shelf = {
+                "valve.json": to_json(valve.to_document()).encode(),
+                "compensator.json": to_json(compensator_document(compensator)).encode(),
+            }
+            cautions = headline(chain_of(shelf)).cautions
+            assert [text.startswith("SIMULATED") for text in cautions] == [True] * simulated
+            html = make_report(chain_of(shelf)).html
+            assert ("SIMULATED recordings" in html[: html.index('<section id="data">')]) is simulated
+
+
+@pytest.fixture(scope="module")
+def crossed():
+    """As a lag that was declared ten times too large leaves it: the knees change places."""
+    return identify([valve_at(dp, hysteresis=-0.05) for dp in PRESSURES], IdentifyOptions(meter_lag=0.0))
+
+
+class TestBranchOrder:
+    def test_design_refuses_in_one_sentence(self, crossed):
+        assert len(warned(crossed, "branch-order")) == 3
+        words = r"'ramp_dP1.csv': the valve closes .* --meter-lag .* --accept branch-order"
+        with pytest.raises(InputError, match=words):
+            design(crossed)
+
+    def test_a_simulation_without_noise_and_hysteresis_is_in_order(self):
+        side = identify([valve_at(1.0, hysteresis=-1e-4, noise=0.0)]).positive
+        assert not side.tests[0].closes_above_opening and side.tests[0].u_knee_se_V < 1e-5
+
+    def test_accepted_it_goes_on_and_the_cost_is_said(self, crossed):
+        compensator = design(crossed, DesignOptions(accept=("branch-order",)))
+        assert any(line.startswith("accepted, branch-order: at 1.00, 2.00, 4.00 MPa") for line in compensator.costs)
+
+    def test_a_valve_in_order_costs_nothing_of_it(self):
+        valve = identify([valve_at(dp) for dp in PRESSURES])
+        assert not any("accepted" in line for line in design(valve, DesignOptions(accept=("branch-order",))).costs)
+
+    def test_the_command_line_and_a_file_of_options_accept_it(self, crossed, tmp_path, monkeypatch, capsys):
+        monkeypatch.chdir(tmp_path)
+        (tmp_path / "valve.json").write_text(to_json(crossed.to_document()))
+        (tmp_path / "options.toml").write_text('accept = "branch-order"\n')
+        assert main(["design", "valve.json"]) == 2 and not (tmp_path / "compensator.json").exists()
+        assert "--accept branch-order" in capsys.readouterr().err
+        assert main(["codegen", "valve.json", "--target", "host"]) == 2 and not (tmp_path / "firmware").exists()
+        assert main(["design", "valve.json", "--accept", "branch-ordr"]) == 2
+        assert main(["design", "valve.json", "--accept", "branch-order"]) == 0
+        assert "cost: accepted, branch-order" in capsys.readouterr().out
+        assert main(["codegen", "valve.json", "--target", "host", "--config", "options.toml"]) == 0
+
+    def test_only_what_stops_a_design_can_be_accepted(self):
+        with pytest.raises(InputError, match=r"'branch-ordr' \(did you mean 'branch-order'\?\)"):
+            DesignOptions(accept=("branch-ordr",))
+
+
+def test_a_side_that_the_firmware_leaves_out_is_said_from_identify_to_the_report():
+    tests = []
+    for dp in PRESSURES:
+        up, down = valve_at(dp), valve_at(dp)
+        tests.append(
+            replace(
+                up,
+                time=np.concatenate([up.time, up.time[-1] + 0.02 + down.time]),
+                u=np.concatenate([up.u, -down.u]),
+                q=np.concatenate([up.q, -down.q]),
+                dp=np.concatenate([up.dp, down.dp]),
+            )
+        )
+    both, one = identify(tests), identify([valve_at(dp) for dp in PRESSURES])
+    (warning,) = warned(both, "two-sides")
+    assert "--command-signal" in warning.text and not warned(one, "two-sides")
+    for valve, said in ((both, True), (one, False)):
+        shelf = {
+            "valve.json": to_json(valve.to_document()).encode(),
+            "compensator.json": to_json(compensator_document(design(valve))).encode(),
+        }
+        assert any("negative side" in text for text in headline(chain_of(shelf)).cautions) is said
+
+
+class TestKneeErrors:
+    @staticmethod
+    def curved(power, *, noise=0.08, correlation=0.0, pressures=PRESSURES):
+        """Ramps whose flow is a power of the travel; the noise may be slow."""
+        from scipy.signal import lfilter
+
+        tests = []
+        for dp in pressures:
+            test = synthetic_ramp(dp, Truth(noise=0.0))
+            rising = np.arange(test.u.size) < test.u.size / 2
+            travel = np.clip(test.u - np.where(rising, 5.4, 5.3), 0, None) / 4.6
+            white = np.random.default_rng([1, int(dp)]).standard_normal(test.u.size)
+            slow = lfilter([np.sqrt(1 - correlation**2)], [1, -correlation], white)
+            tests.append(replace(test, q=(18 * dp**0.5 * travel**power + noise * slow) * L_MIN))
+        return tests
+
+    @pytest.mark.parametrize("pressures", [PRESSURES, (1.0,)])
+    @pytest.mark.parametrize("power", [0.5, 0.6, 2.0])
+    @pytest.mark.parametrize("noise", [0.005, 0.08])
+    def test_a_curve_is_not_put_down_to_the_meter(self, power, noise, pressures):
+        valve = identify(self.curved(power, noise=noise, pressures=pressures))
+        assert warned(valve, "bend") and not warned(valve, "noise")
+
+    @pytest.mark.parametrize(("noise", "correlation"), [(1.5, 0.0), (0.3, 0.99)])
+    def test_noise_fast_or_slow_is_not_put_down_to_the_valve(self, noise, correlation):
+        valve = identify(self.curved(1.0, noise=noise, correlation=correlation))
+        assert warned(valve, "noise") and not warned(valve, "bend")
+
+    def test_one_branch_alone_says_that_it_cannot_tell(self):
+        (test,) = self.curved(2.0, pressures=(1.0,))
+        half = test.u.size // 2
+        up = replace(test, **{name: getattr(test, name)[:half] for name in ("time", "u", "q", "dp")})
+        (warning,) = warned(identify([up]), "noise")
+        assert "one branch alone can't tell" in warning.text
+
+    def test_a_sharp_straight_valve_hears_nothing(self):
+        valve = identify(self.curved(1.0))
+        assert not {"noise", "bend", "coarse-levels"} & {warning.code for warning in valve.warnings}
+
+
+class TestStuckPressure:
+    @staticmethod
+    def stuck(pressures, names=("a.csv", "b.csv", "c.csv")):
+        return [
+            replace(valve_at(dp), source=name, dp=np.full(valve_at(dp).u.size, 1.0 * MPA))
+            for dp, name in zip(pressures, names, strict=True)
+        ]
+
+    def test_flows_that_differ_tell_it(self):
+        (warning,) = warned(identify(self.stuck(PRESSURES)), "pressure-stuck")
+        assert "1 MPa in every row of all 3 recordings" in warning.text and "differ by 10" in warning.text
+
+    def test_names_that_differ_tell_it(self):
+        tests = self.stuck((1.0, 1.0, 1.0), ("V7_dP1.csv", "V7_dP2.csv", "V7_4bar.csv"))
+        tests = [replace(test, q=test.q + seed * 1e-9) for seed, test in enumerate(tests)]
+        (warning,) = warned(identify(tests), "pressure-stuck")
+        assert "names say different ones" in warning.text
+
+    def test_a_repeated_test_is_welcome(self):
+        assert not warned(identify(self.stuck((1.0, 1.0, 1.0))), "pressure-stuck")
+        repeated = self.stuck((1.0, 1.0, 1.0), ("dP1.csv", "dP1_again.csv", "dP1_third.csv"))
+        assert not warned(identify(repeated), "pressure-stuck")
+
+    def test_a_sensor_that_works_is_not_blamed(self):
+        assert not warned(identify([valve_at(dp) for dp in PRESSURES]), "pressure-stuck")
+
+    def test_where_the_mixture_is_refused_the_sensor_is_named(self, monkeypatch):
+        def refuse(*_):
+            raise InputError("the flow jumps")
+
+        monkeypatch.setattr("dzdesign.identify.identification.identify_side", refuse)
+        with pytest.raises(InputError, match=r"^the flow jumps; it may be that .* the sensor is stuck"):
+            identify(self.stuck(PRESSURES))
+        with pytest.raises(InputError, match=r"^the flow jumps$"):
+            identify([valve_at(dp) for dp in PRESSURES])
+
+
+class TestClippedMeter:
+    @staticmethod
+    def recordings(tmp_path, cut, **truth):
+        tests = []
+        for dp in PRESSURES:
+            test = valve_at(dp, **truth)
+            tests.append(written(tmp_path / test.source, replace(test, q=cut(test.q / L_MIN) * L_MIN)))
+        return tests
+
+    @pytest.mark.parametrize(
+        "cut",
+        [
+            pytest.param(lambda q: np.where(q < 0, -0.0, q), id="at zero, written -0.0"),
+            pytest.param(lambda q: np.where(q < 0.6, -0.0, q), id="zero below its floor, written -0.0"),
+            pytest.param(lambda q: np.maximum(q, 0.6), id="at its floor"),
+        ],
+    )
+    def test_knees_are_true_and_bounds_below_them(self, tmp_path, cut):
+        tests = self.recordings(tmp_path, cut)
+        for test, dp in zip(identify(tests).positive.tests, PRESSURES, strict=True):
+            opens = 5.5 - 0.05 * dp
+            assert test.u_knee_rising_V == pytest.approx(opens, abs=5e-3)
+            assert test.u_knee_falling_V == pytest.approx(opens - 0.1, abs=5e-3)
+            assert opens - 0.12 < test.u_guard_lower_V < opens - 0.1
+
+    def test_a_floor_that_is_written_as_such_is_no_zero_error(self, tmp_path):
+        valve = identify(self.recordings(tmp_path, lambda q: np.maximum(q, 0.6)))
+        assert len(warned(valve, "meter-clipped")) == 3 and not warned(valve, "meter-zero")
+        assert valve.meter_floor_L_min == pytest.approx(0.6)
+
+    def test_a_zero_error_stays_one(self, tmp_path):
+        valve = identify(self.recordings(tmp_path, lambda q: q + 0.6))
+        assert warned(valve, "meter-zero") and not warned(valve, "meter-clipped")
+        quiet = identify(self.recordings(tmp_path, lambda q: q + 0.6, noise=0.0))
+        assert warned(quiet, "meter-zero") and not warned(quiet, "meter-clipped")
+
+    def test_a_declared_floor_tells_a_quiet_meter(self, tmp_path):
+        tests = self.recordings(tmp_path, lambda q: np.maximum(q, 0.6), noise=0.0)
+        declared = identify(tests, IdentifyOptions(meter_floor=0.6 * L_MIN))
+        assert warned(declared, "meter-clipped")
+        assert declared.positive.tests[0].u_guard_lower_V < 5.35
+
+
+def test_warnings_reach_the_file(tmp_path):
+    document = identify([replace(valve_at(1.0), simulated=True)]).to_document()
+    assert document["warnings"][0]["code"] == "simulated"
+    assert json.loads(to_json(document))["warnings"][0]["source"] == "ramp_dP1.csv"
