@@ -134,10 +134,7 @@ def verify(
     checks.append(compiles)
     inputs: tuple[InputCheck, ...] = ()
     maps: tuple[InputMap, ...] = ()
-    loops: tuple[LoopComparison, ...] = ()
-    plants: list[dict[str, Any]] = []
-    scenarios: tuple[ScenarioResult, ...] = ()
-    scattered: tuple[Scatter, ...] = ()
+    loop = _InTheLoop()
     signs = (1, -1) if document["sides"]["negative"] else (1,)
     if compiles.holds:
         say("comparing every input with the exact law")
@@ -151,33 +148,16 @@ def verify(
             checks += input_checks(each, len(inputs) > 1)
         maps = tuple(map_inputs(folder, document, sign) for sign in signs)
         checks += [drive_follows(folder, compensator), keeps_no_state(folder)]
-        say("running the closed loop")
-        scenes = building.result()
-        plants = [
-            {"side": scene.side, "dp_MPa": scene.dp_MPa, "parameters": plant_document(scene.plant)} for scene in scenes
-        ]
-        loops = _run_loops(scenes, sequence or RampSequence(), watch)
-        say("running the scenarios")
-        scenarios = _run_scenarios(scenes, watch)
-        shut = no_flow_at_zero(loops, document, plant)
-        valve = valve_from_document(to_json(document["valve"]).encode(), "compensator.json")
-        checks += [plant_opens(loops), plant_is_the_valve(loops, valve), shut]
-        checks.append(shut_after_scenarios(scenarios, shut, plant))
-        if tolerances and plant:
-            say(f"running {tolerances.plants} plants at {len(scenes)} pressure drops")
-            scattered = tuple(
-                scatter(scene.loop, plant, tolerances, scene.dp_MPa, scene.side)
-                for scene in watch(scenes, len(scenes))
-            )
-    checks += [certificate_follows(compensator), *law_follows(compensator, document)]
+        loop = _close_the_loop(building.result(), document, plant, sequence or RampSequence(), tolerances, say, watch)
+    checks += [*loop.checks, certificate_follows(compensator), *law_follows(compensator, document)]
     source = plant_source or "made from the identified thresholds"
     return Verification(
         checks=tuple(checks),
         inputs=inputs,
         maps=maps,
-        loops=loops,
-        scenarios=scenarios,
-        scatter=scattered,
+        loops=loop.loops,
+        scenarios=loop.scenarios,
+        scatter=loop.scattered,
         plant_source=source,
         document={
             "schema": SCHEMA,
@@ -190,12 +170,61 @@ def verify(
                 "plant": plant_document(plant) if plant else None,
                 "plant_source": source,
                 "plant_sha256": plant_sha256,
-                "plants": [] if plant else plants,
-                "pressures": [asdict(loop.result) for loop in loops],
+                "plants": [] if plant else list(loop.plants),
+                "pressures": [asdict(each.result) for each in loop.loops],
             },
-            "scenarios": [asdict(each) for each in scenarios],
-            "monte_carlo": scatter_document(tolerances, scattered) if tolerances else None,
+            "scenarios": [asdict(each) for each in loop.scenarios],
+            "monte_carlo": scatter_document(tolerances, loop.scattered) if tolerances else None,
         },
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _InTheLoop:
+    """What the closed loop showed; nothing of it where there was no core to close it with."""
+
+    checks: tuple[Check, ...] = ()
+    plants: tuple[dict[str, Any], ...] = ()
+    loops: tuple[LoopComparison, ...] = ()
+    scenarios: tuple[ScenarioResult, ...] = ()
+    scattered: tuple[Scatter, ...] = ()
+
+
+def _close_the_loop(
+    scenes: tuple[Scene, ...],
+    document: dict[str, Any],
+    plant: Plant | None,
+    sequence: RampSequence,
+    tolerances: Tolerances | None,
+    say: Callable[[str], None],
+    watch: Watch,
+) -> _InTheLoop:
+    """Run the ramps, the scenarios and, where tolerances are given, the series of plants."""
+    say("running the closed loop")
+    loops = _run_loops(scenes, sequence, watch)
+    say("running the scenarios")
+    scenarios = _run_scenarios(scenes, watch)
+    scattered: tuple[Scatter, ...] = ()
+    if tolerances and plant:
+        say(f"running {tolerances.plants} plants at {len(scenes)} pressure drops")
+        scattered = tuple(
+            scatter(scene.loop, plant, tolerances, scene.dp_MPa, scene.side) for scene in watch(scenes, len(scenes))
+        )
+    shut = no_flow_at_zero(loops, document, plant)
+    valve = valve_from_document(to_json(document["valve"]).encode(), "compensator.json")
+    return _InTheLoop(
+        checks=(
+            plant_opens(loops),
+            plant_is_the_valve(loops, valve),
+            shut,
+            shut_after_scenarios(scenarios, shut, plant),
+        ),
+        plants=tuple(
+            {"side": scene.side, "dp_MPa": scene.dp_MPa, "parameters": plant_document(scene.plant)} for scene in scenes
+        ),
+        loops=loops,
+        scenarios=scenarios,
+        scattered=scattered,
     )
 
 
