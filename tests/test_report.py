@@ -294,8 +294,16 @@ def test_the_papers_numbers_are_shown_where_they_lie(copied):
     }  # fmt: skip
     tool = {"name": "dzdesign", "version": "0"}
     document = {"schema": "dzdesign.reproduction/1", "tool": tool, "paper": "doi", "holds": False, "rows": [row]}
-    (copied / "reproduction.json").write_text(to_json({**document, "valves": []}))
+    folder = copied / "paper"
+    folder.mkdir()
+    content = to_json({**document, "valves": []})
+    (folder / "reproduction.json").write_text(content)
+    # As `reproduce -o` writes it: of the same schema, and before it in the alphabet.
+    listing = {"reproduction.json": sha256_of(content.encode())}
+    manifest = {"schema": "dzdesign.reproduction/1", "tool": tool, "files": listing}
+    (folder / MANIFEST_NAME).write_text(to_json(manifest))
     html = report_of_folder(copied).html
+    assert "lacks the key" not in html
     assert "54.10 (+0.20)" in html and "The paper&#39;s first valve" in html
     assert html.count('<td class="bad">✗ DOES NOT HOLD</td>') == 1
 

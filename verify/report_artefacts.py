@@ -263,9 +263,16 @@ class _Search:
         return next((name for name, digest in self.hashes.items() if digest == stated), None)
 
     def _first(self, schema: str) -> str | None:
-        """Return the first file of a schema."""
+        """Return the first file of a schema; the manifest of a folder has that of what it lists, and is none."""
         mark = f'"{schema}"'.encode()
-        return next((name for name, content in self.shelf.items() if mark in content[:HEAD]), None)
+        return next(
+            (
+                name
+                for name, content in self.shelf.items()
+                if mark in content[:HEAD] and name.rpartition("/")[2] != MANIFEST_NAME
+            ),
+            None,
+        )
 
     def _say_other(self, stated: str | None, schema: str, which: str) -> None:
         other = self._first(schema)
