@@ -9,20 +9,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from dzdesign.identify.described_tests import L_MIN
+from dzdesign.identify.described_tests import FEWEST_AT_REST, L_MIN, readings_at_rest
 from dzdesign.identify.model import Warning_
-from dzdesign.identify.noise import robust_sigma
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramp_files import RampTest
 
-#: Commands within this share of u_max are at rest, and the fewest readings there that tell.
-AT_REST, FEWEST = 0.01, 20
-#: A flow above this share of the largest is one in which the meter's noise shows.
-FLOWING = 0.3
-#: Steps of the last digit beyond which a scatter is the meter's noise, which then is missing at rest.
-STEPS = 2.0
-#: The declared floor names the flow at which the readings stop, within this share.
-DECLARED = 0.05
+#: Readings within this share of the largest are one reading.
+ONE_READING = 1e-6
+#: Share of the readings at rest, from below, among which drop-outs and glitches may lie.
+GLITCHES = 0.05
+#: Fewest of the readings at rest that are the lowest one, and most of all readings that lie between zero and it.
+STAYS, BELOW = 0.4, 0.005
 
 
 def without_clipping(
@@ -37,11 +34,11 @@ def without_clipping(
     options : IdentifyOptions
         Choices of the engineer; a floor that is declared stays, unless the meter was cut off above it.
     """
-    lowest = [_clipped_at(test, options) for test in tests]
+    lowest = [_clipped_at(test, options.u_max) for test in tests]
     if not any(lowest):
         return list(tests), options, ()
     seen = [
-        replace(test, q=np.where(test.q <= low, 0.0, test.q)) if low else test
+        replace(test, q=np.where(test.q <= low + _one_reading(test), 0.0, test.q)) if low else test
         for test, low in zip(tests, lowest, strict=True)
     ]
     floor = max(options.meter_floor or 0.0, *lowest, 0.0)
@@ -49,24 +46,26 @@ def without_clipping(
     return seen, replace(options, meter_floor=floor), warnings
 
 
-def _clipped_at(test: RampTest, options: IdentifyOptions) -> float:
+def _clipped_at(test: RampTest, u_max: float) -> float:
     """Return the flow below which nothing was written, m³/s; 0 if the readings show no such flow.
 
-    At rest the readings are that flow to the last digit, and none is below it. A zero error of a meter that hardly
-    scatters looks the same; it is told by the scatter of the flows, or by the engineer's word.
+    At rest many readings are that flow to the last digit, and none but glitches and drop-outs is below it anywhere. A
+    zero error of a meter that does not scatter looks the same, and is taken for this: to subtract what is a floor would
+    be the wrong way, and not to subtract what is an error only lowers the bounds.
     """
-    rest = test.q[np.abs(test.u) <= AT_REST * options.u_max]
-    low = float(test.q.min())
-    if rest.size < FEWEST or low <= 0 or rest.max() > low:
+    rest = readings_at_rest(test, u_max)
+    rest = rest[rest > 0]
+    if rest.size < FEWEST_AT_REST:
         return 0.0
-    if options.meter_floor and abs(low - options.meter_floor) <= DECLARED * options.meter_floor:
-        return low
-    flowing = test.q[test.q > FLOWING * test.q.max()]
-    steps = np.diff(np.unique(test.q))
-    if flowing.size < FEWEST or not steps.size:
-        return 0.0
-    scatter = robust_sigma(np.diff(flowing, 2)) / np.sqrt(6)  # of the second differences of white noise
-    return low if scatter > STEPS * steps.min() else 0.0
+    one = _one_reading(test)
+    low = float(np.quantile(rest, GLITCHES, method="lower"))
+    stays = np.mean(np.abs(rest - low) <= one)
+    below = np.mean((test.q > 0) & (test.q < low - one))
+    return low if stays >= STAYS and below <= BELOW else 0.0
+
+
+def _one_reading(test: RampTest) -> float:
+    return ONE_READING * float(test.q.max())
 
 
 def _warning(test: RampTest, low: float) -> Warning_:
@@ -74,8 +73,9 @@ def _warning(test: RampTest, low: float) -> Warning_:
         code="meter-clipped",
         text=(
             f"the flow never reads less than {low / L_MIN:.3g} L/min, and reads that to the last digit in "
-            f"{int(np.sum(test.q <= low))} rows: the meter or the logger cuts it off there. Those rows are taken as no "
-            "flow seen, below a floor of that much. Let the logger write what the meter reads, or zero below its floor"
+            f"{int(np.sum(test.q <= low + _one_reading(test)))} rows: the meter or the logger cuts it off there. Those "
+            "rows are taken as no flow seen, below a floor of that much. Let the logger write what the meter reads, or "
+            "zero below its floor; if it is the zero error of a meter that does not scatter, zero it and record again"
         ),
         source=test.source,
     )

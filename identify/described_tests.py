@@ -119,25 +119,36 @@ def _reading_at_zero(test: RampTest, u_max: float) -> tuple[float, float]:
     """Return what the meter reads at zero command where that is not zero, and its standard error, m³/s.
 
     It is the meter's zero error, or a leak. Thousands of readings at rest tell it far better than any declared bound;
-    zeros are returned where it does not stand out. Of the hold before the first ramp only the later half counts, and
-    none of it if it still drifts: hoses and meter may be filling. Where the command hardly rests, what the meter reads
-    far below the first flow serves as well.
+    zeros are returned where it does not stand out.
+    """
+    rest = readings_at_rest(test, u_max)
+    if rest.size < FEWEST_AT_REST:
+        return 0.0, 0.0
+    zero, error = float(np.median(rest)), _error_of_median(rest)
+    stands_out = abs(zero) > max(5 * error, ZERO_SHARE * float(np.abs(test.q).max()))
+    return (zero, float(error)) if stands_out else (0.0, 0.0)
+
+
+def readings_at_rest(test: RampTest, u_max: float) -> np.ndarray:
+    """Return the flows read where the command rests, m³/s; fewer than `FEWEST_AT_REST` if it does so nowhere.
+
+    Of the hold before the first ramp only the later half counts, and none of it if it still drifts: hoses and meter may
+    be filling. Where the command hardly rests, what the meter reads far below the first flow serves as well.
     """
     flowing = np.abs(test.q) > FIRST_FLOW * np.abs(test.q).max()
     opens = float(np.quantile(np.abs(test.u[flowing]), 0.01)) if flowing.any() else 0.0
+    rest = test.q[:0]
     for share in AT_REST:
         at_rest = np.abs(test.u) <= share * u_max
         if share > AT_REST[0] and share * u_max > FAR_BELOW * opens:
             break  # the valve may be open there
-        rest = _readings_at_rest(test, at_rest)
+        rest = _without_filling(test, at_rest)
         if rest.size >= FEWEST_AT_REST:
-            zero, error = float(np.median(rest)), _error_of_median(rest)
-            stands_out = abs(zero) > max(5 * error, ZERO_SHARE * float(np.abs(test.q).max()))
-            return (zero, float(error)) if stands_out else (0.0, 0.0)
-    return 0.0, 0.0
+            break
+    return rest
 
 
-def _readings_at_rest(test: RampTest, at_rest: np.ndarray) -> np.ndarray:
+def _without_filling(test: RampTest, at_rest: np.ndarray) -> np.ndarray:
     before = int(np.argmin(at_rest)) if not at_rest.all() else 0
     third, fourth = test.q[before // 2 : 3 * before // 4], test.q[3 * before // 4 : before]
     drifts = third.size >= 5 and abs(np.median(third) - np.median(fourth)) > 5 * _error_of_median(fourth)

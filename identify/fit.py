@@ -10,7 +10,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.characteristic import BranchShape
-from dzdesign.identify.fit_problems import branch_numbers, offset_solver, solver_with_numbers
+from dzdesign.identify.fit_problems import ONE_AT_A_TIME, branch_numbers, offset_solver, solver_with_numbers
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -83,16 +83,18 @@ def fit_knees(
     numbers = [branch_numbers(shape, scale, floor, u_max) for shape, scale in zip(mine, scales, strict=True)]
     chain = tuple(index for index, (_, column) in enumerate(where) if column == ordered and trend != "flat")
     order = _order_knees(mine, scales, chain if len(chain) > 1 else (), increasing=trend == "increasing")
-    solver, known = solver_with_numbers(numbers, order.chain, order.steps)
-    solution = solver(x0=order.start, p=known, lbg=0.0, ubg=np.inf)
-    _log("knees", solver.stats())
-    if not solver.stats()["success"]:
+    with ONE_AT_A_TIME:
+        solver, known = solver_with_numbers(numbers, order.chain, order.steps)
+        solution = solver(x0=order.start, p=known, lbg=0.0, ubg=np.inf)
+        said = solver.stats()
+        best, slack = np.asarray(solution["x"]).ravel(), np.asarray(solution["g"]).ravel() * order.unit
+        hessian = _hessian_of_cost(solver, best, known)
+    _log("knees", said)
+    if not said["success"]:
         raise InputError(
-            f"the joint fit did not converge ({solver.stats()['return_status']}); "
+            f"the joint fit did not converge ({said['return_status']}); "
             "look at the ramp tests, and leave out the one that is unlike the others"
         )
-    best, slack = np.asarray(solution["x"]).ravel(), np.asarray(solution["g"]).ravel() * order.unit
-    hessian = _hessian_of_cost(solver, best, known)
     variance = np.diag(np.linalg.inv(hessian))
     knee, knee_se, slope = (np.full((len(shapes), 2), np.nan) for _ in range(3))
     for index, ((row, column), shape, (slope_scale, knee_scale)) in enumerate(zip(where, mine, scales, strict=True)):
@@ -109,7 +111,7 @@ def fit_knees(
             for (index, following), gap in zip(pairwise(order.chain), slack, strict=True)
             if gap < ACTIVE * u_max
         ),
-        iterations=int(solver.stats()["iter_count"]),
+        iterations=int(said["iter_count"]),
     )
 
 
@@ -236,15 +238,17 @@ def fit_offset(
     weight = (largest / np.maximum(guard_se, largest / np.sqrt(LARGEST_WEIGHT))) ** 2
     known = np.concatenate([(guard - lowest) * 1e3, (ceiling - lowest) * 1e3, weight / weight.max()])
     low, high = {"decreasing": (-np.inf, 0.0), "increasing": (0.0, np.inf), "flat": (0.0, 0.0)}[trend]
-    solver = offset_solver(guard.size)
-    solution = solver(x0=0.1, p=known, lbx=0.0, lbg=low, ubg=high)
-    _log("offset", solver.stats())
-    slack = np.maximum(np.asarray(solution["x"]).ravel(), 0.0) / 1e3
+    with ONE_AT_A_TIME:
+        solver = offset_solver(guard.size)
+        solution = solver(x0=0.1, p=known, lbx=0.0, lbg=low, ubg=high)
+        said = solver.stats()
+        slack = np.maximum(np.asarray(solution["x"]).ravel(), 0.0) / 1e3
+    _log("offset", said)
     found = ceiling - slack
     wrong_way = {"decreasing": np.diff(found), "increasing": -np.diff(found), "flat": np.abs(np.diff(found))}[trend]
-    if not solver.stats()["success"] or np.any(wrong_way > 2 * ACTIVE * u_max):
+    if not said["success"] or np.any(wrong_way > 2 * ACTIVE * u_max):
         raise InputError(
-            f"beta(dP) could not be fitted under its bounds ({solver.stats()['return_status']}); "
+            f"beta(dP) could not be fitted under its bounds ({said['return_status']}); "
             "check that the ramp tests belong to one valve"
         )
     return OffsetFit(u_min0=float(found[reference]), beta=found / found[reference], active=slack < ACTIVE * u_max)

@@ -6,6 +6,7 @@ is, how many branches and which knees must run one way, the valves of a lot shar
 
 from collections.abc import Sequence
 from functools import lru_cache
+from threading import Lock
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +16,8 @@ from dzdesign.identify.characteristic import BranchShape
 if TYPE_CHECKING:
     import casadi as ca
 
+#: Held while a solver is built or used: one that is kept serves all threads, and CasADi does not expect two at once.
+ONE_AT_A_TIME = Lock()
 #: Unknowns and constraints are in standard errors, so nothing is left to scale. Bounds are not relaxed, or knees would
 #: run the wrong way. Slack times multiplier is met as tightly as the rest: IPOPT's own 1e-4 leaves knees 1e-5 V off.
 IPOPT = {

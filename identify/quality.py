@@ -18,6 +18,10 @@ LARGE_LAG = 1e-2
 LIKELY_LAG = 0.1
 #: Shares of the guarded threshold between which a leak inside the overlap is looked for, and its standard errors.
 OVERLAP, LEAK_SIGNIFICANCE = (0.6, 0.85), 5.0
+#: Half a step of the flow, as a shift of the threshold over u_max, above which it matters whether it was cut off.
+COARSE_STEP = 5e-4
+#: Readings a level, from which on a flow is one of steps.
+READINGS_A_LEVEL = 5
 #: A leak below this share of the largest flow is not worth a word.
 LEAK_SHARE = 1e-3
 
@@ -40,6 +44,7 @@ def find_warnings(
     """
     return (
         *_about_the_meter(group.zero_L_min),
+        *_about_steps(side, group.tests, options),
         *_about_the_lag(group, options),
         *_about_order(side, departure),
         *_about_pressure(side, group.tests),
@@ -48,6 +53,28 @@ def find_warnings(
         *about_errors(side, group.tests, options.u_max),
         *_about_the_edge(side, group, options.u_max),
     )
+
+
+def _about_steps(side: SideModel, tests: tuple[DescribedTest, ...], options: IdentifyOptions) -> Iterator[Warning_]:
+    """Say of a flow in coarse steps that a logger which cuts off, instead of rounding, puts all thresholds too high."""
+    levels = [np.unique(item.test.q) for item in tests]
+    steps = [
+        float(np.median(np.diff(known))) if 2 < known.size * READINGS_A_LEVEL < item.test.q.size else 0.0
+        for known, item in zip(levels, tests, strict=True)
+    ]
+    shifts = [0.5 * step / L_MIN / test.slope_L_min_V for step, test in zip(steps, side.tests, strict=True)]
+    worst = int(np.argmax(shifts))
+    if options.meter_zero < 0.49 * steps[worst] and shifts[worst] > COARSE_STEP * options.u_max:
+        half = 0.5 * steps[worst] / L_MIN
+        yield Warning_(
+            code="coarse-flow",
+            text=(
+                f"the flow is written in steps of {2 * half:.3g} L/min: if the meter or the logger cuts off what lies "
+                f"between two steps, and does not round it, every threshold here is up to {1e3 * shifts[worst]:.0f} mV "
+                f'too high. Write more digits, or, if it cuts off, allow for it by --meter-zero "{half:.3g} L/min"'
+            ),
+            source=tests[worst].test.source,
+        )
 
 
 def _about_the_lag(group: DescribedTests, options: IdentifyOptions) -> Iterator[Warning_]:

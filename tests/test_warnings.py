@@ -230,6 +230,25 @@ class TestStuckPressure:
             identify([valve_at(dp) for dp in PRESSURES])
 
 
+class TestCoarseFlow:
+    @staticmethod
+    def cut_off(step):
+        tests = [valve_at(dp) for dp in PRESSURES]
+        return [replace(test, q=np.floor(np.maximum(test.q / L_MIN, 0) / step) * step * L_MIN) for test in tests]
+
+    def test_a_flow_that_was_cut_off_to_steps_is_said_and_can_be_allowed_for(self):
+        true = [5.4 - 0.05 * dp for dp in PRESSURES]
+        coarse = identify(self.cut_off(0.5))
+        assert any(test.u_guard_lower_V > closes for test, closes in zip(coarse.positive.tests, true, strict=True))
+        assert "steps of 0.5 L/min" in warned(coarse, "coarse-flow")[0].text
+        allowed = identify(self.cut_off(0.5), IdentifyOptions(meter_zero=0.25 * L_MIN))
+        assert not warned(allowed, "coarse-flow")
+        assert all(test.u_guard_lower_V < closes for test, closes in zip(allowed.positive.tests, true, strict=True))
+
+    def test_fine_steps_are_not_worth_a_word(self):
+        assert not warned(identify(self.cut_off(0.01)), "coarse-flow")
+
+
 class TestClippedMeter:
     @staticmethod
     def recordings(tmp_path, cut, **truth):
@@ -245,6 +264,10 @@ class TestClippedMeter:
             pytest.param(lambda q: np.where(q < 0, -0.0, q), id="at zero, written -0.0"),
             pytest.param(lambda q: np.where(q < 0.6, -0.0, q), id="zero below its floor, written -0.0"),
             pytest.param(lambda q: np.maximum(q, 0.6), id="at its floor"),
+            pytest.param(lambda q: np.round(np.maximum(q, 0.6) / 0.1) * 0.1, id="in steps of its noise"),
+            pytest.param(lambda q: np.where(np.arange(q.size) % 997 == 0, 0.0, np.maximum(q, 0.6)), id="drop-outs"),
+            pytest.param(lambda q: np.where(np.arange(q.size) == 0, 5.0, np.maximum(q, 0.6)), id="a glitch first"),
+            pytest.param(lambda q: np.maximum(q, 0.6) * (1 + 1e-9 * np.sin(q)), id="not to the last digit"),
         ],
     )
     def test_knees_are_true_and_bounds_below_them(self, tmp_path, cut):
@@ -263,14 +286,12 @@ class TestClippedMeter:
     def test_a_zero_error_stays_one(self, tmp_path):
         valve = identify(self.recordings(tmp_path, lambda q: q + 0.6))
         assert warned(valve, "meter-zero") and not warned(valve, "meter-clipped")
-        quiet = identify(self.recordings(tmp_path, lambda q: q + 0.6, noise=0.0))
-        assert warned(quiet, "meter-zero") and not warned(quiet, "meter-clipped")
 
-    def test_a_declared_floor_tells_a_quiet_meter(self, tmp_path):
-        tests = self.recordings(tmp_path, lambda q: np.maximum(q, 0.6), noise=0.0)
-        declared = identify(tests, IdentifyOptions(meter_floor=0.6 * L_MIN))
-        assert warned(declared, "meter-clipped")
-        assert declared.positive.tests[0].u_guard_lower_V < 5.35
+    @pytest.mark.parametrize("cut", [lambda q: np.maximum(q, 0.6), lambda q: q + 0.6], ids=["floor", "zero error"])
+    def test_of_a_meter_that_does_not_scatter_the_safe_one_is_taken(self, tmp_path, cut):
+        quiet = identify(self.recordings(tmp_path, cut, noise=0.0))
+        assert warned(quiet, "meter-clipped") and not warned(quiet, "meter-zero")
+        assert quiet.positive.tests[0].u_guard_lower_V < 5.375  # where the first of them closes
 
 
 def test_warnings_reach_the_file(tmp_path):
