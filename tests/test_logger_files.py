@@ -155,6 +155,52 @@ def test_thousands_are_read_as_they_are_meant(here):
     assert read(excel_english()).dp[0] == pytest.approx(2e6)
 
 
+def kilopascals(separator=";", comma=True, cell="{:,.0f}", quotes=""):
+    """A recording whose pressure drops in kPa have a mark between thousands: 2.000, or 2,000 where it has points."""
+    swap = str.maketrans(",.", ".,") if comma else {}
+    pressures = [quotes + cell.format(2000 + index % 7).translate(swap) + quotes for index in range(TIME.size)]
+    labels = separator.join(["t_s", "u_V", "dP_kPa", "Q_Lmin"])
+    return text(labels, *rows(TIME, U, pressures, Q, separator=separator, comma=comma))
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (kilopascals(), "row 2, column 'dP_kPa': '2.000' may be 2000 or a decimal, as column 't_s' has decimal commas"),
+        (kilopascals("\t", comma=False), "'2,000' may be 2000 or a decimal, as column 't_s' has decimal points ('0.04"),
+        (kilopascals(",", comma=False, quotes='"'), "'2,000' may be 2000 or a decimal, as column 't_s' has decimal po"),
+    ],
+)
+def test_thousands_that_look_like_decimals_are_refused(here, content, words):
+    assert words in refusal(content)
+
+
+def test_thousands_that_look_like_decimals_in_another_block(here, monkeypatch):
+    lines = kilopascals(cell="{:,.1f}").decode().split("\n")
+    first = [line.replace(",0;", ";") if 500 < index else line for index, line in enumerate(lines)]
+    last = [line.replace(",0;", ";") if index < 500 else line for index, line in enumerate(lines)]
+    monkeypatch.setattr(text_blocks, "BLOCK_BYTES", 4096)
+    assert read(text(*first[:-1])).dp[[0, -1]] == pytest.approx([2e6, 2.005e6])
+    assert "'2.000' may be 2000 or a decimal, as column" in refusal(text(*last[:-1]))
+    whole = [f"{n};5;2.001;3" for n in range(2000)]
+    halves = [f"{n};5;2.000,5;3" for n in range(2000, 4000)]
+    labels = "t_s;u_V;dP_kPa;Q_Lmin"
+    assert "'2.001' may be 2001 or a decimal, as column 'dP_kPa' has decimal commas ('2.000,5')" in refusal(
+        text(labels, *whole, *halves)
+    )
+    later = [line.replace(";2.000,5;", ";2.001;") for line in halves[1000:]]
+    assert read(text(labels, *halves[:1000], *later)).dp[[0, -1]] == pytest.approx([2000.5e3, 2001e3])
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_three_digits_behind_a_point_stay_decimals(here, monkeypatch, separator):
+    labels = separator.join(["t_s", "u_V", "dP_MPa", "Q_Lmin"])
+    lines = rows(TIME, U, [f"{2.001:.3f}"] * TIME.size, Q, separator=separator, comma=False)
+    np.testing.assert_allclose(read(text(labels, *lines)).dp, 2.001e6)
+    monkeypatch.setattr(text_blocks, "BLOCK_BYTES", 4096)
+    np.testing.assert_allclose(read(text(labels, *lines)).dp, 2.001e6)
+
+
 # clocks
 
 
