@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import final
 
 from dzdesign.core.errors import InputError
-from dzdesign.core.units import measures, si_factor
+from dzdesign.core.units import measures, refuse_thousands, si_factor
 from dzdesign.identify.column_labels import EXAMPLE_LABELS, PER_CENT, QUANTITY_OF_COLUMN, Column
 
 _NUMBER = r"([-+]?\d{1,9}(?:[.,]\d{1,9})?)"
@@ -62,6 +62,7 @@ def _of_range(quantity: str, text: str, u_max: float) -> Scaling:
     found = RANGE.fullmatch(text.strip())
     if found is None:
         raise InputError(f"'{text[:80]}' is no range, expected one such as '4..20 mA = {_full_scale(quantity)}'")
+    refuse_thousands(text, f"'{text[:80]}'")
     low, high, bottom, top = (float(found[index].replace(",", ".")) for index in (1, 2, 4, 5))
     signal = found[3].strip()
     if not any(measures(signal, kind) for kind in SIGNALS):

@@ -276,6 +276,7 @@ def test_whole_numbers_without_a_unit_that_can_only_be_milliseconds(here, capsys
         ("4..20 mA = 0..50 bar", "'bar' is not a unit of flow"),
         ("4..20 s = 0..50 L/min", "'s' is no unit of a transmitter's signal"),
         ("4..4 mA = 0..50 L/min", "has no width"),
+        ("4..20 mA = 0..50,000 mL/min", "'50,000' may be 50000 or 50.0; write 50000 or 50.0"),
     ],
 )
 def test_a_current_is_no_flow_until_its_range_is_told(here, unit, words):
