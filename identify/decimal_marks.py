@@ -173,8 +173,8 @@ class DecimalMarks:
                     either = re.sub(r"[.,]", "", cell)
                     raise InputError(
                         f"'{self._path}' {place}, column '{label}': '{cell[:QUOTED_CHARACTERS]}' may be "
-                        f"{either[:QUOTED_CHARACTERS]} or a decimal, as column '{other[:QUOTED_CHARACTERS]}' has decimal "
-                        f"{NAMES[decimal]} ('{shown[:QUOTED_CHARACTERS]}'); {ADVICE}"
+                        f"{either[:QUOTED_CHARACTERS]} or a decimal, as column '{other[:QUOTED_CHARACTERS]}' has "
+                        f"decimal {NAMES[decimal]} ('{shown[:QUOTED_CHARACTERS]}'); {ADVICE}"
                     )
 
     def _unclear(

@@ -1,8 +1,8 @@
 """Artefact files: written whole or not at all, nothing of anybody's lost, and documents checked key by key."""
 
 import json
-import re
 import os
+import re
 import stat
 import sys
 from pathlib import Path

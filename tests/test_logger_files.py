@@ -133,8 +133,28 @@ def test_a_wrong_row_among_samples_is_found(here, where, line, words):
     assert words in refusal(text(*lines[:where], line, *lines[where:]))
 
 
-def test_a_row_of_units_gives_way_to_the_labels_and_is_no_first_sample(here):
-    assert_is_the_ramp(read(text("t_s;u;dP_MPa;Q_Lmin", "ms;V;bar;l/min", *rows(TIME, U, DP, Q))))
+def test_a_row_of_units_is_no_first_sample_and_may_say_what_labels_say(here):
+    assert_is_the_ramp(read(text("t_s;u;dP_MPa;Q_Lmin", "sec;V;MPa;l/min", *rows(TIME, U, DP, Q))))
+
+
+@pytest.mark.parametrize(
+    ("labels", "units", "words"),
+    [
+        ("t_s;u;dP_MPa;Q_Lmin", "s;V;MPa;l/h", "'Q_Lmin' says 'Lmin' in its label, and 'l/h' is stated as its unit"),
+        ("t_s;u;dP_bar;Q_Lmin", "s;V;MPa;l/min", "'dP_bar' says 'bar' in its label, and 'MPa' is stated as its unit"),
+        ("t_s;u_V;dP_MPa;Q_Lmin", "ms;%;MPa;mA", "'t_s' says 's' in its label, and 'ms' is stated as its unit"),
+        ("t_s;u_V;dP_MPa;Q_Lmin", "s;%;MPa;l/min", "'u_V' says 'V' in its label, and '%' is stated as its unit"),
+        ("t_s;u_V;dP_MPa;Q_Lmin", "s;V;MPa;mA", "'Q_Lmin' says 'Lmin' in its label, and 'mA' is stated as its unit"),
+    ],
+)
+def test_units_that_contradict_each_other(here, labels, units, words):
+    content = text(labels, units, *rows(TIME, U, DP, Q))
+    assert words in refusal(content)
+    label, own = words.split("'")[1:4:2]
+    quantity = {"t_s": "time"}.get(label, label.partition("_")[0])
+    assert words in refusal(content, columns={quantity: label})
+    if quantity in ("dP", "Q"):  # no other label is contradicted
+        assert read(content, columns={quantity: f"{label}:{own}"}).dp.max() > 0
 
 
 @pytest.mark.parametrize(
@@ -177,7 +197,7 @@ def test_thousands_that_look_like_decimals_are_refused(here, content, words):
 
 def test_thousands_that_look_like_decimals_in_another_block(here, monkeypatch):
     lines = kilopascals(cell="{:,.1f}").decode().split("\n")
-    first = [line.replace(",0;", ";") if 500 < index else line for index, line in enumerate(lines)]
+    first = [line.replace(",0;", ";") if index > 500 else line for index, line in enumerate(lines)]
     last = [line.replace(",0;", ";") if index < 500 else line for index, line in enumerate(lines)]
     monkeypatch.setattr(text_blocks, "BLOCK_BYTES", 4096)
     assert read(text(*first[:-1])).dp[[0, -1]] == pytest.approx([2e6, 2.005e6])
@@ -282,6 +302,13 @@ def test_whole_numbers_without_a_unit_that_can_only_be_milliseconds(here, capsys
 def test_a_current_is_no_flow_until_its_range_is_told(here, unit, words):
     content = text("t_s,u_V,dP_MPa,F (mA)", *rows(TIME, U, DP, 4 + 0.32 * Q, separator=",", comma=False))
     assert words in refusal(content, columns={"Q": f"F (mA):{unit}" if unit != "mA" else "F (mA)"})
+
+
+def test_a_range_in_another_unit_than_the_labels(here):
+    content = text("t_s,u_V,dP_MPa,Q_mV", *rows(TIME, U, DP, 200 * Q, separator=",", comma=False))
+    words = "the range '0..10 V = 0..50 L/min' is of a column in V, but the file says 'mV'"
+    assert words in refusal(content, columns={"Q": "Q_mV:0..10 V = 0..50 L/min"})
+    assert_is_the_ramp(read(content, columns={"Q": "Q_mV:0..10000 mV = 0..50 L/min"}))
 
 
 def test_a_range_may_fall_and_hold_other_signals(here):
