@@ -22,6 +22,7 @@ from dzdesign.identify.text_header import (
     LONGEST_HEADER,
     LONGEST_LINE,
     MOST_LINES,
+    NO_VALUE,
     TABLE_LINE,
     Header,
     find_header,
@@ -268,6 +269,8 @@ def _table(
     rows: bytes, number: int, header: Header, foot: _Foot, marks: DecimalMarks, above: str
 ) -> TextTable:
     """Return the table of rows; `number` is that of their first line in the file, `above` what stands over them all."""
+    if b"#" in rows and header.separator != BLANKS:
+        rows = NO_VALUE.sub(rb"\1", rows)
     cells = None if _has_other_lines(rows, header) else _plain_cells(rows, header.separator, len(header.labels))
     if cells is not None:
         foot.refuse_what_follows()

@@ -133,6 +133,17 @@ def test_a_wrong_row_among_samples_is_found(here, where, line, words):
     assert words in refusal(text(*lines[:where], line, *lines[where:]))
 
 
+@pytest.mark.parametrize("cell", ["#N/A", "#NV", "#DIV/0!", "#WERT!", '"#N/A"', " #NAME?"])
+@pytest.mark.parametrize("separator", [";", ","])
+def test_what_a_spreadsheet_writes_for_no_value_is_a_blank_cell_and_no_comment(here, cell, separator):
+    lines = rows(np.zeros(TIME.size), TIME, U, DP, Q, separator=separator, comma=False)
+    spoiled = [cell + line[line.index(separator) :] if index % 3 == 0 else line for index, line in enumerate(lines)]
+    labels = separator.join(["note", "t_s", "u_V", "dP_MPa", "Q_Lmin"])
+    assert_is_the_ramp(read(text(labels, *spoiled)))
+    spoiled = [line.rpartition(separator)[0] + separator + cell if n == 9 else line for n, line in enumerate(lines)]
+    assert_is_the_ramp(read(text(labels, "# a comment", *spoiled)), np.arange(TIME.size) != 9)
+
+
 def test_a_row_of_units_is_no_first_sample_and_may_say_what_labels_say(here):
     assert_is_the_ramp(read(text("t_s;u;dP_MPa;Q_Lmin", "sec;V;MPa;l/min", *rows(TIME, U, DP, Q))))
 
