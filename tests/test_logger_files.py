@@ -246,6 +246,9 @@ def test_three_digits_behind_a_point_stay_decimals(here, monkeypatch, separator)
         ("12/11/2026 23:59:59", "13/11/2026 00:00:00", 1),
         ("11:59:59.5 a.m.", "12:00:00 p.m.", 0.5),
         ("23:59:59", "00:00:01", 2),
+        ("26.11.22 23:59:59", "26.11.23 00:00:01", 2),
+        ("22.11.26 23:59:59", "23.11.26 00:00:01", 2),
+        ("30.11.26 23:59:59", "01.12.26 00:00:01", 2),
         ("99:59:59", "100:00:00", 1),
         ("03:04:05:250", "03:04:05:500", 0.25),
     ],
@@ -271,6 +274,16 @@ def test_stamps(here, first, second, seconds):
 def test_stamps_that_can_not_be_told(here, cells, words):
     clock = [cells[min(index, len(cells) - 1)] for index in range(TIME.size)]
     assert words in refusal(text("time;u [V];Q [l/min]", *rows(clock, U, Q)))
+
+
+def test_milliseconds_beside_a_time_of_day_are_not_passed_over(here):
+    clock = [stamp.partition(".")[0] for stamp in stamps("%H:%M:%S.")]
+    parts = [stamp.partition(".")[2] for stamp in stamps("%H:%M:%S.")]
+    content = text("Time;ms;u [V];dP [MPa];Q [l/min]", *rows(clock, parts, U, DP, Q))
+    assert "has milliseconds in 'ms' beside the times in 'Time', expected both in one column" in refusal(content)
+    read(content, columns={"time": "Time"})
+    whole = text("Time;ms;u [V];dP [MPa];Q [l/min]", *rows(stamps("%H:%M:%S."), parts, U, DP, Q))
+    assert_is_the_ramp(read(whole))
 
 
 def test_stamps_over_blocks_count_from_the_first_row_of_the_file(here, monkeypatch):
