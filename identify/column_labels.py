@@ -145,7 +145,7 @@ def _refuse_parted_time(table: Table, label: str) -> None:
     if beside is not None and table.is_clock(label) and not FRACTION.search(table.cell(label, 0)):
         raise InputError(
             f"'{table.path}'{table.header} has milliseconds in '{beside}' beside the times in '{label}', expected both "
-            f'in one column, such as 03:04:05.123; join them, or leave the milliseconds aside by --columns "time={label}"'
+            f"in one column, such as 03:04:05.123; join them, or leave it aside by --columns 'time={label}'"
         )
 
 

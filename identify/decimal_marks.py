@@ -77,14 +77,14 @@ class DecimalMarks:
         """
         if label in self._shown or label in self._doubtful:
             return
-        broken = np.flatnonzero(numbers != np.rint(numbers))
-        broken = broken[np.isfinite(numbers[broken])]
-        parts = np.abs(numbers[broken])
-        # In a decimal below 1, from 1000 on or with four digits behind it the point stands between no thousands.
-        told = np.flatnonzero((parts < 1) | (parts >= 1000) | (np.abs(1e3 * parts - np.rint(1e3 * parts)) > 1e-6))
-        if told.size:
-            self._show(label, ".", f"{numbers[broken[told[0]]]:g}")
-            return
+        for some in (numbers[:FEW_ROWS], numbers):
+            broken = np.flatnonzero(np.isfinite(some) & (some != np.rint(some)))
+            parts = np.abs(some[broken])
+            # In a decimal below 1, from 1000 on or with four digits behind it the point stands between no thousands.
+            told = np.flatnonzero((parts < 1) | (parts >= 1000) | (np.abs(1e3 * parts - np.rint(1e3 * parts)) > 1e-6))
+            if told.size:
+                self._show(label, ".", f"{some[broken[told[0]]]:g}")
+                return
         cells = first_cells()
         if not self._take(label, ".", cells, place) and broken.size:
             row = int(broken[0])
@@ -108,6 +108,8 @@ class DecimalMarks:
             If which mark is the decimal one can't be told.
         """
         point = texts.str.contains(".", literal=True).fill_null(False)
+        if not point.any() and self.has_commas(label):
+            return texts.str.replace(",", ".", literal=True)
         comma = texts.str.contains(",", literal=True).fill_null(False)
         if point.any() and comma.any():
             return self._of_two_marks(label, texts, point, comma, place)
