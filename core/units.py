@@ -38,7 +38,8 @@ SPELLINGS = {
     "lmin": "L/min", "l_min": "L/min", "lpm": "L/min", "l/min": "L/min", "gpm": "gallon/minute",
     "m3/s": "m**3/s", "m3s": "m**3/s", "m3/h": "m**3/hour", "cm3/s": "cm**3/s", "%": "percent",
     "pct": "percent", "kgf/cm2": "kgf/cm**2", "n/mm2": "N/mm**2", "vdc": "V", "volt": "V", "volts": "V",
-    "sek": "s", "sek.": "s", "barg": "bar", "bara": "bar",
+    "sek": "s", "sek.": "s", "bar": "bar", "barg": "bar", "bara": "bar",
+    "psi": "psi", "psig": "psi", "psia": "psi", "lph": "L/hour", "l/h": "L/hour",
 }  # fmt: skip
 #: Names with one-digit powers, times or per one another. A unit comes from a file, and pint computes what it reads:
 #: ``9**9**9**9`` would never end.
@@ -47,6 +48,8 @@ UNIT = re.compile(rf"{FACTOR}(?:\s*[*/·\s]\s*{FACTOR})*")
 LONGEST_UNIT, LONGEST_QUANTITY = 40, 200
 #: Of units in which valves are measured; a mistyped one is looked for under each.
 PREFIXES = ("", "m", "k", "M", "milli", "kilo", "mega")
+#: May be 2000 or 2.0: a comma before three digits.
+THOUSANDS = re.compile(r"(?<!\d)(?<!\d[.,])[1-9]\d{0,2},\d{3}(?!,?\d)", re.ASCII)
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", re.ASCII)
 
 
@@ -135,6 +138,27 @@ def _near_unit(unit: str, quantity: str) -> str:
     return ""
 
 
+def refuse_thousands(text: str, what: str) -> None:
+    """Refuse a number whose comma may be a decimal one or stand between thousands.
+
+    Parameters
+    ----------
+    text : str
+        In which the number stands.
+    what : str
+        Begins the message, such as ``--dp is '2,000 kPa'``.
+
+    Raises
+    ------
+    InputError
+        If a comma stands before three digits, as in ``2,000``; ``0,125`` and ``2,0`` can only be decimals.
+    """
+    found = THOUSANDS.search(text)
+    if found:
+        whole, decimal = found[0].replace(",", ""), float(found[0].replace(",", "."))
+        raise InputError(f"{what}: '{found[0]}' may be {whole} or {decimal}; write {whole} or {decimal}")
+
+
 def parse_quantity(text: str, quantity: str, option: str) -> float:
     """Read a number with its unit, such as ``"0.6 L/min"``, and return it in SI.
 
@@ -150,7 +174,7 @@ def parse_quantity(text: str, quantity: str, option: str) -> float:
     Raises
     ------
     InputError
-        If the number or the unit can't be read.
+        If the number or the unit can't be read, or the number may be 2000 or 2.0.
 
     Examples
     --------
@@ -161,6 +185,7 @@ def parse_quantity(text: str, quantity: str, option: str) -> float:
     words = text.strip().replace(",", ".")
     if len(text) > LONGEST_QUANTITY:
         raise InputError(f"{option} is {quoted(text)}, expected a number and a unit such as '1 {example}'")
+    refuse_thousands(text, f"{option} is '{text}'")
     number = NUMBER.match(words)
     unit = words[number.end() :].strip() if number else ""
     if number is None or unit[:1] == ".":

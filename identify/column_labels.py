@@ -4,9 +4,10 @@ import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
+from math import isclose
 
 from dzdesign.core.errors import InputError, nearest
-from dzdesign.core.units import measures
+from dzdesign.core.units import measures, si_factor
 from dzdesign.identify.table import Table, clean_label
 
 #: Spelling in a header (lower case, letters only) -> quantity of a ramp test.
@@ -25,6 +26,9 @@ EXAMPLE_UNITS = {"time": "s", "u": "V", "dP": "MPa", "pA": "MPa", "pB": "MPa", "
 MOST_MEANT = 200
 #: Units of a command that is a share of u_max.
 PER_CENT = ("%", "pct", "percent")
+#: A column of the milliseconds of a time of day, and a time of day that has them itself.
+MILLISECONDS = re.compile(r"[\[(]?(?:ms|msec|millis|milli-?se[ck]\w{0,6})[\])]?", re.IGNORECASE)
+FRACTION = re.compile(r":\d\d:\d\d[.,:]\d")
 TELLING = ("time", "voltage", "pressure", "flow")
 #: Characters of a label in which a quantity is looked for.
 LONGEST_NAME = 80
@@ -32,10 +36,19 @@ LONGEST_NAME = 80
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Column:
-    """A column that was found: its label in the file, and its unit ("" if none is known)."""
+    """A column that was found: its label in the file, and its unit ("" if none is known).
+
+    Attributes
+    ----------
+    label, unit : str
+        As the file or ``--columns`` says.
+    stated : str
+        The unit that the file states, where ``--columns`` says another or a range.
+    """
 
     label: str
     unit: str
+    stated: str = ""
 
 
 def parse_columns(text: str | Mapping[str, str]) -> dict[str, str]:
@@ -101,7 +114,8 @@ def find_columns(table: Table, chosen: Mapping[str, str]) -> dict[str, Column]:
         quantity, unit = split_label(label)
         if quantity is None or label in taken or quantity in chosen.keys() | pressures:
             continue
-        unit = unit if unit and (fits(unit, quantity) or label not in table.units) else table.units.get(label, "")
+        own = unit
+        unit = own if own and (fits(own, quantity) or label not in table.units) else table.units.get(label, "")
         unit = "s" if quantity == "time" and not fits(unit, "time") and table.is_clock(label) else unit
         if quantity in columns and not fits(unit, quantity):
             continue  # an oil temperature T_degC beside the time t_s, a set point Q_set beside Q_Lmin
@@ -110,16 +124,29 @@ def find_columns(table: Table, chosen: Mapping[str, str]) -> dict[str, Column]:
                 f"'{table.path}'{table.header} has two columns of {quantity}: '{columns[quantity].label}' and "
                 f"'{label}'; keep one, give the other another name, or choose by --columns"
             )
+        _refuse_two_units(table, quantity, label, own)
         columns[quantity] = Column(label=label, unit=unit)
     if ("pA" in columns) != ("pB" in columns) and "dP" not in columns:
         have, lack = ("pA", "pB") if "pA" in columns else ("pB", "pA")
         raise InputError(
             f"'{table.path}'{table.header} has a column of {have} but none of {lack}; expected both, or dP"
         )
+    if "time" in columns and "time" not in chosen:
+        _refuse_parted_time(table, columns["time"].label)
     for quantity in ("time", "u", "Q"):
         if quantity not in columns:
             raise _missing_column(quantity, table, columns)
     return columns
+
+
+def _refuse_parted_time(table: Table, label: str) -> None:
+    """Refuse times of day in whole seconds beside a column of their milliseconds."""
+    beside = next((other for other in table.labels if MILLISECONDS.fullmatch(clean_label(other))), None)
+    if beside is not None and table.is_clock(label) and not FRACTION.search(table.cell(label, 0)):
+        raise InputError(
+            f"'{table.path}'{table.header} has milliseconds in '{beside}' beside the times in '{label}', expected both "
+            f"in one column, such as 03:04:05.123; join them, or leave it aside by --columns 'time={label}'"
+        )
 
 
 def _chosen_column(table: Table, quantity: str, text: str) -> Column:
@@ -132,6 +159,9 @@ def _chosen_column(table: Table, quantity: str, text: str) -> Column:
         raise InputError(f"'{table.path}'{table.header} has {table.labels.count(label)} columns '{label}'; rename one")
     _, own = split_label(label)
     bracketed = bool(re.search(r"[\[(]", label))
+    stated = (own if bracketed or is_signal_or_telling(own) else "") or table.units.get(label, "")
+    if not unit:
+        _refuse_two_units(table, quantity, label, own)
     unit = unit or (own if bracketed or fits(own, quantity) else "") or table.units.get(label, "")
     if quantity == "time" and not fits(unit, "time") and table.is_clock(label):
         unit = "s"
@@ -140,7 +170,37 @@ def _chosen_column(table: Table, quantity: str, text: str) -> Column:
             f"'{table.path}' column '{label}' has no unit; write for example "
             f'--columns "{quantity}={label}:{EXAMPLE_UNITS[quantity]}"'
         )
-    return Column(label=label, unit=unit)
+    return Column(label=label, unit=unit, stated=stated)
+
+
+def _refuse_two_units(table: Table, quantity: str, label: str, own: str) -> None:
+    """Refuse a label whose unit is another than the one that the file states beside it."""
+    beside = table.units.get(label, "")
+    if beside and fits(own, quantity) and is_signal_or_telling(beside) and not same_unit(own, beside, quantity):
+        raise InputError(
+            f"'{table.path}' column '{label}' says '{own}' in its label, and '{beside[:LONGEST_NAME]}' is stated as "
+            f'its unit beside it; correct one, or say which it is, for example --columns "{quantity}={label}:{own}"'
+        )
+
+
+def same_unit(one: str, other: str, column: str) -> bool:
+    """Tell whether two units are the same for a column of that quantity, however they are spelled.
+
+    Examples
+    --------
+    >>> same_unit("Lmin", "l/min", "Q"), same_unit("Lmin", "l/h", "Q"), same_unit("V", "%", "u")
+    (True, False, False)
+    """
+    if one.lower() in PER_CENT or other.lower() in PER_CENT:
+        return one.lower() in PER_CENT and other.lower() in PER_CENT
+    kinds = [QUANTITY_OF_COLUMN[column], "voltage", "current"]
+    kind = next((kind for kind in kinds if measures(one, kind) and measures(other, kind)), None)
+    return kind is not None and isclose(si_factor(one, kind), si_factor(other, kind), rel_tol=1e-9)
+
+
+def is_signal_or_telling(unit: str) -> bool:
+    """Tell whether a unit is one of a ramp test's quantities or of a current."""
+    return is_telling(unit) or measures(unit, "current")
 
 
 def split_label(label: str) -> tuple[str | None, str]:

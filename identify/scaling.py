@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import final
 
 from dzdesign.core.errors import InputError
-from dzdesign.core.units import measures, si_factor
-from dzdesign.identify.column_labels import EXAMPLE_LABELS, PER_CENT, QUANTITY_OF_COLUMN, Column
+from dzdesign.core.units import measures, refuse_thousands, si_factor
+from dzdesign.identify.column_labels import EXAMPLE_LABELS, PER_CENT, QUANTITY_OF_COLUMN, Column, same_unit
 
 _NUMBER = r"([-+]?\d{1,9}(?:[.,]\d{1,9})?)"
 _ENDS = rf"{_NUMBER}\s?\.\.\s?{_NUMBER}\s?"
@@ -52,20 +52,29 @@ def scaling_of(path: Path, quantity: str, column: Column, u_max: float) -> Scali
         raise InputError(f"'{path}' column '{column.label}' has no unit; write for example {EXAMPLE_LABELS[quantity]}")
     try:
         if "=" in column.unit or ".." in column.unit:
-            return _of_range(quantity, column.unit, u_max)
+            return _of_range(quantity, column, u_max)
         return Scaling(gain=_factor(quantity, column.unit, u_max))
     except InputError as error:
         raise InputError(f"'{path}' column '{column.label}': {error}{_hint(quantity, column)}") from error
 
 
-def _of_range(quantity: str, text: str, u_max: float) -> Scaling:
+def _of_range(quantity: str, column: Column, u_max: float) -> Scaling:
+    text = column.unit
     found = RANGE.fullmatch(text.strip())
     if found is None:
         raise InputError(f"'{text[:80]}' is no range, expected one such as '4..20 mA = {_full_scale(quantity)}'")
+    refuse_thousands(text, f"'{text[:80]}'")
     low, high, bottom, top = (float(found[index].replace(",", ".")) for index in (1, 2, 4, 5))
     signal = found[3].strip()
     if not any(measures(signal, kind) for kind in SIGNALS):
         raise InputError(f"'{signal}' is no unit of a transmitter's signal, expected mA, A, V or mV")
+    if any(measures(column.stated, kind) for kind in SIGNALS) and not any(
+        same_unit(column.stated, unit, quantity) for unit in (signal, found[6].strip())
+    ):
+        raise InputError(
+            f"the range '{text[:80]}' is of a column in {signal}, but the file says '{column.stated}'; write the range "
+            f"in {column.stated}, or correct the unit in the file"
+        )
     if low == high or bottom == top:
         raise InputError(f"the range '{text[:80]}' has no width, expected one such as '4..20 mA = 0..50 L/min'")
     gain = (top - bottom) / (high - low)

@@ -32,6 +32,10 @@ SEPARATORS, BLANKS = ",;\t|", " "
 #: The same in the order in which rows of numbers are tried: a comma may be a decimal one, a blank part of a date.
 IN_DOUBT = ";\t|, "
 NUMBER = re.compile(r"[-+]?[\d.,]*\d[.,]?(?:[eE][-+]?\d+)?|nan|[-+]?inf(?:inity)?|[-+]?∞", re.IGNORECASE)
+#: What a spreadsheet writes where it has no value, in English and German: a blank cell, and no comment.
+NO_VALUE = re.compile(
+    rb'(^|[,;\t|"]) *#(?:N/A|NV|(?:DIV/0|VALUE|WERT|REF|BEZUG|NUM|ZAHL|NULL)!|NAME\?)(?= *(?:[,;\t|"]|$))', re.MULTILINE
+)
 #: The column that LabVIEW announces, and leaves out of rows that have no comment.
 COMMENT = "comment"
 #: An artefact of dzdesign begins with its schema.

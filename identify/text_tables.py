@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, BinaryIO, final
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.identify.decimal_marks import FEW_ROWS, DecimalMarks
 from dzdesign.identify.table import QUOTED_CHARACTERS, Table, clean_label
 from dzdesign.identify.text_blocks import text_blocks
 from dzdesign.identify.text_header import (
@@ -21,6 +22,7 @@ from dzdesign.identify.text_header import (
     LONGEST_HEADER,
     LONGEST_LINE,
     MOST_LINES,
+    NO_VALUE,
     TABLE_LINE,
     Header,
     find_header,
@@ -41,12 +43,8 @@ CELL_END = "\x1f"
 NUMERIC = "0123456789+-."
 #: A cell with a date.
 DATE = re.compile(r"\d[-/.:]\d+[-/.:]\d")
-#: Numbers with a mark between thousands, by their decimal mark.
-GROUPED = {
-    ",": r"^[-+]?(?:\d{1,3}(?:\.\d{3})+|\d+)(?:,\d*)?$",
-    ".": r"^[-+]?(?:\d{1,3}(?:,\d{3})+|\d+)(?:\.\d*)?$",
-}
-
+#: Characters of a row whose first cells are looked at; of longer rows fewer are.
+LONGEST_ROW = 256
 logger = logging.getLogger(__name__)
 
 
@@ -67,6 +65,8 @@ class TextTable(Table):
         The rows as they stand in the file, where they were read without a look at each.
     separator : str
         Between two cells.
+    marks : DecimalMarks
+        Of the file.
     """
 
     cells: "pl.DataFrame"
@@ -74,6 +74,7 @@ class TextTable(Table):
     lines: Sequence[int]
     plain: bytes
     separator: str
+    marks: DecimalMarks
 
     @property
     def header(self) -> str:
@@ -100,13 +101,16 @@ class TextTable(Table):
         import polars as pl
 
         numbers = self.cells.to_series(self.labels.index(label))
-        if numbers.dtype != pl.Float64:
-            texts = self._texts(label)
-            column = self._with_points(label, texts)
-            numbers = column.cast(pl.Float64, strict=False)
-            bad = (~(column.is_null() | (column == "")) & numbers.is_null()).arg_true()
-            if len(bad):
-                raise self._no_number(label, int(bad[0]), texts[int(bad[0])])
+        if numbers.dtype == pl.Float64 and not (self.marks.has_commas(label) and b"." in self.plain):
+            read = numbers.fill_null(np.nan).to_numpy().copy()
+            self.marks.see_points(label, read, lambda: self._first_cells(label), self.place)
+            return read
+        texts = self._texts(label)
+        column = self.marks.with_points(label, texts, self.place)
+        numbers = column.cast(pl.Float64, strict=False)
+        bad = (~(column.is_null() | (column == "")) & numbers.is_null()).arg_true()
+        if len(bad):
+            raise self._no_number(label, int(bad[0]), texts[int(bad[0])])
         return numbers.fill_null(np.nan).to_numpy().copy()
 
     def is_clock(self, label: str) -> bool:
@@ -144,28 +148,23 @@ class TextTable(Table):
     def _texts(self, label: str) -> "pl.Series":
         import polars as pl
 
-        return self.cells.to_series(self.labels.index(label)).cast(pl.String).str.strip_chars(' \t"')
+        index = self.labels.index(label)
+        column = self.cells.to_series(index)
+        if column.dtype == pl.Float64:  # its cells as they stand in the file
+            names = [f"c{number}" for number in range(len(self.labels))]
+            schema = dict.fromkeys(names, pl.String)
+            column = pl.read_csv(
+                self.plain, separator=self.separator, has_header=False, schema=schema, columns=[index], quote_char=None
+            ).to_series()
+        return column.str.strip_chars(' \t"')
 
-    def _with_points(self, label: str, texts: "pl.Series") -> "pl.Series":
-        """Return numbers with a decimal point, whatever their decimal mark is, and without one between thousands."""
-        point = texts.str.contains(".", literal=True).fill_null(False)
-        comma = texts.str.contains(",", literal=True).fill_null(False) if point.any() else ~point
-        # A decimal comma can only stand where the comma does not separate the cells.
-        if not point.any() or not comma.any():
-            return texts.str.replace(",", ".", literal=True)
-        both = texts.filter(comma & point)
-        shown = both[0] if len(both) else texts.filter(comma)[0]
-        decimal = max(",.", key=shown.rfind)
-        other = "." if decimal == "," else ","
-        wrong = (~texts.str.contains(GROUPED[decimal]).fill_null(True) & (texts != "")).arg_true()
-        if not len(both) or len(wrong):
-            row = int(wrong[0]) if len(wrong) else int(point.arg_true()[0])
-            raise InputError(
-                f"'{self.path}' {self.place(row)}, column '{label}': '{texts[row][:QUOTED_CHARACTERS]}' stands in one "
-                f"column with '{shown[:QUOTED_CHARACTERS]}', so which mark is the decimal one can't be told; export "
-                "numbers with one mark and no separator of thousands"
-            )
-        return texts.str.replace_all(other, "", literal=True).str.replace(decimal, ".", literal=True)
+    def _first_cells(self, label: str) -> "pl.Series":
+        import polars as pl
+
+        index = self.labels.index(label)
+        lines = self.plain[: FEW_ROWS * LONGEST_ROW].split(b"\n", FEW_ROWS)[:FEW_ROWS]
+        cells = [line.decode(errors="replace").split(self.separator) for line in lines]
+        return pl.Series([clean_label(row[index]) for row in cells if len(row) == len(self.labels)], dtype=pl.String)
 
     def _no_number(self, label: str, row: int, cell: str) -> InputError:
         date = f" (a column of the time may hold stamps such as {EXAMPLE})" if DATE.search(cell) else ""
@@ -195,6 +194,7 @@ def text_tables(file: BinaryIO, path: Path, skip_rows: int | None = None) -> Ite
         If it is no such text, or a row has not as many cells as the header.
     """
     header, number, foot, above = None, 1, _Foot(path), b""
+    marks = DecimalMarks(path)
     for block in text_blocks(file, path):
         whole = block
         skipped = _end_of_lines(block, (skip_rows or 0) + 1 - number)
@@ -214,7 +214,7 @@ def text_tables(file: BinaryIO, path: Path, skip_rows: int | None = None) -> Ite
             rows = block
         if header is not None:
             first = number + block.count(b"\n", 0, len(block) - len(rows))
-            yield _table(rows, first, header, foot, above.decode())
+            yield _table(rows, first, header, foot, marks, above.decode())
         number += _count(block, "\n")
     if header is None:
         below = f" below its first {skip_rows} rows (--skip-rows)" if skip_rows else ""
@@ -265,8 +265,12 @@ class _Foot:
             raise self._error
 
 
-def _table(rows: bytes, number: int, header: Header, foot: _Foot, above: str) -> TextTable:
+def _table(
+    rows: bytes, number: int, header: Header, foot: _Foot, marks: DecimalMarks, above: str
+) -> TextTable:
     """Return the table of rows; `number` is that of their first line in the file, `above` what stands over them all."""
+    if b"#" in rows and header.separator != BLANKS:
+        rows = NO_VALUE.sub(rb"\1", rows)
     cells = None if _has_other_lines(rows, header) else _plain_cells(rows, header.separator, len(header.labels))
     if cells is not None:
         foot.refuse_what_follows()
@@ -285,6 +289,7 @@ def _table(rows: bytes, number: int, header: Header, foot: _Foot, above: str) ->
         lines=lines,
         plain=rows,
         separator=header.separator,
+        marks=marks,
     )
 
 

@@ -27,6 +27,8 @@ LONGEST_STAMP = 48
 DAY = 86_400.0
 #: A time of day that goes back by more than this is one of the next day, s.
 MIDNIGHT = DAY / 2
+#: Days that no recording goes on for: a reading of two dates with more between them is not what was meant.
+LONGEST_RECORDING = 300
 EXAMPLE = "2026-11-22 03:04:05.123, 22.11.2026 03:04:05,123 or 03:04:05.123"
 
 
@@ -118,6 +120,7 @@ class Stamps:
             if self._dates:
                 first = next(iter(self._dates))
                 both = sorted({other - one for one, other in _alike(first, text)})
+                both = [days for days in both if abs(days) <= LONGEST_RECORDING] or both
                 if len(both) != 1:
                     count = " or ".join(map(str, both)) or "an unknown number of"
                     raise InputError(
@@ -142,7 +145,7 @@ def _days(date: str) -> dict[str, int]:
     """Return order of day, month and year -> days, for each order that a date can be read in."""
     numbers = [int(part) for part in re.split(r"[-./]", date)]
     if len(date.split(".")) == 3 and numbers[0] <= 31:
-        orders = ("dmy",)  # with points it is always this
+        orders = ("dmy",) if numbers[2] > 31 else ("dmy", "ymd")
     elif numbers[0] > 31:
         orders = ("ymd",)
     elif numbers[2] > 31:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import stat
 import sys
 from pathlib import Path
@@ -318,8 +319,15 @@ def test_a_value_that_does_not_fit_is_named(change, words):
         ("1 MPa", "pressure", 1e6),
         ("1MPa", "pressure", 1e6),
         ("1,5 bar", "pressure", 1.5e5),
+        ("2.000 bar", "pressure", 2e5),
+        ("0,125 bar", "pressure", 0.125e5),
+        ("1,2500 bar", "pressure", 1.25e5),
         ("1e-5 m3/s", "flow", 1e-5),
         ("1 m³/h", "flow", 1 / 3600),
+        ("3600 LPH", "flow", 1e-3),
+        ("2 Bar", "pressure", 2e5),
+        ("1 psig", "pressure", 6894.757293168361),
+        ("1 PSI", "pressure", 6894.757293168361),
         ("6e1 l/min", "flow", 1e-3),
         (".1 s", "time", 0.1),
         ("100 ms", "time", 0.1),
@@ -337,6 +345,18 @@ def test_quantities(text, quantity, si):
 )
 def test_quantities_that_are_none(text):
     with pytest.raises(InputError, match="--option is '"):
+        parse_quantity(text, "voltage", "--option")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("2,000 V", "--option is '2,000 V': '2,000' may be 2000 or 2.0; write 2000 or 2.0"),
+        ("-12,345V", "'12,345' may be 12345 or 12.345; write 12345 or 12.345"),
+    ],
+)
+def test_a_comma_before_three_digits_may_stand_between_thousands(text, words):
+    with pytest.raises(InputError, match=re.escape(words)):
         parse_quantity(text, "voltage", "--option")
 
 

@@ -133,8 +133,39 @@ def test_a_wrong_row_among_samples_is_found(here, where, line, words):
     assert words in refusal(text(*lines[:where], line, *lines[where:]))
 
 
-def test_a_row_of_units_gives_way_to_the_labels_and_is_no_first_sample(here):
-    assert_is_the_ramp(read(text("t_s;u;dP_MPa;Q_Lmin", "ms;V;bar;l/min", *rows(TIME, U, DP, Q))))
+@pytest.mark.parametrize("cell", ["#N/A", "#NV", "#DIV/0!", "#WERT!", '"#N/A"', " #NAME?"])
+@pytest.mark.parametrize("separator", [";", ","])
+def test_what_a_spreadsheet_writes_for_no_value_is_a_blank_cell_and_no_comment(here, cell, separator):
+    lines = rows(np.zeros(TIME.size), TIME, U, DP, Q, separator=separator, comma=False)
+    spoiled = [cell + line[line.index(separator) :] if index % 3 == 0 else line for index, line in enumerate(lines)]
+    labels = separator.join(["note", "t_s", "u_V", "dP_MPa", "Q_Lmin"])
+    assert_is_the_ramp(read(text(labels, *spoiled)))
+    spoiled = [line.rpartition(separator)[0] + separator + cell if n == 9 else line for n, line in enumerate(lines)]
+    assert_is_the_ramp(read(text(labels, "# a comment", *spoiled)), np.arange(TIME.size) != 9)
+
+
+def test_a_row_of_units_is_no_first_sample_and_may_say_what_labels_say(here):
+    assert_is_the_ramp(read(text("t_s;u;dP_MPa;Q_Lmin", "sec;V;MPa;l/min", *rows(TIME, U, DP, Q))))
+
+
+@pytest.mark.parametrize(
+    ("labels", "units", "words"),
+    [
+        ("t_s;u;dP_MPa;Q_Lmin", "s;V;MPa;l/h", "'Q_Lmin' says 'Lmin' in its label, and 'l/h' is stated as its unit"),
+        ("t_s;u;dP_bar;Q_Lmin", "s;V;MPa;l/min", "'dP_bar' says 'bar' in its label, and 'MPa' is stated as its unit"),
+        ("t_s;u_V;dP_MPa;Q_Lmin", "ms;%;MPa;mA", "'t_s' says 's' in its label, and 'ms' is stated as its unit"),
+        ("t_s;u_V;dP_MPa;Q_Lmin", "s;%;MPa;l/min", "'u_V' says 'V' in its label, and '%' is stated as its unit"),
+        ("t_s;u_V;dP_MPa;Q_Lmin", "s;V;MPa;mA", "'Q_Lmin' says 'Lmin' in its label, and 'mA' is stated as its unit"),
+    ],
+)
+def test_units_that_contradict_each_other(here, labels, units, words):
+    content = text(labels, units, *rows(TIME, U, DP, Q))
+    assert words in refusal(content)
+    label, own = words.split("'")[1:4:2]
+    quantity = {"t_s": "time"}.get(label, label.partition("_")[0])
+    assert words in refusal(content, columns={quantity: label})
+    if quantity in ("dP", "Q"):  # no other label is contradicted
+        assert read(content, columns={quantity: f"{label}:{own}"}).dp.max() > 0
 
 
 @pytest.mark.parametrize(
@@ -155,6 +186,52 @@ def test_thousands_are_read_as_they_are_meant(here):
     assert read(excel_english()).dp[0] == pytest.approx(2e6)
 
 
+def kilopascals(separator=";", comma=True, cell="{:,.0f}", quotes=""):
+    """A recording whose pressure drops in kPa have a mark between thousands: 2.000, or 2,000 where it has points."""
+    swap = str.maketrans(",.", ".,") if comma else {}
+    pressures = [quotes + cell.format(2000 + index % 7).translate(swap) + quotes for index in range(TIME.size)]
+    labels = separator.join(["t_s", "u_V", "dP_kPa", "Q_Lmin"])
+    return text(labels, *rows(TIME, U, pressures, Q, separator=separator, comma=comma))
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (kilopascals(), "row 2, column 'dP_kPa': '2.000' may be 2000 or a decimal, as column 't_s' has decimal commas"),
+        (kilopascals("\t", comma=False), "'2,000' may be 2000 or a decimal, as column 't_s' has decimal points ('0.04"),
+        (kilopascals(",", comma=False, quotes='"'), "'2,000' may be 2000 or a decimal, as column 't_s' has decimal po"),
+    ],
+)
+def test_thousands_that_look_like_decimals_are_refused(here, content, words):
+    assert words in refusal(content)
+
+
+def test_thousands_that_look_like_decimals_in_another_block(here, monkeypatch):
+    lines = kilopascals(cell="{:,.1f}").decode().split("\n")
+    first = [line.replace(",0;", ";") if index > 500 else line for index, line in enumerate(lines)]
+    last = [line.replace(",0;", ";") if index < 500 else line for index, line in enumerate(lines)]
+    monkeypatch.setattr(text_blocks, "BLOCK_BYTES", 4096)
+    assert read(text(*first[:-1])).dp[[0, -1]] == pytest.approx([2e6, 2.005e6])
+    assert "'2.000' may be 2000 or a decimal, as column" in refusal(text(*last[:-1]))
+    whole = [f"{n};5;2.001;3" for n in range(2000)]
+    halves = [f"{n};5;2.000,5;3" for n in range(2000, 4000)]
+    labels = "t_s;u_V;dP_kPa;Q_Lmin"
+    assert "'2.001' may be 2001 or a decimal, as column 'dP_kPa' has decimal commas ('2.000,5')" in refusal(
+        text(labels, *whole, *halves)
+    )
+    later = [line.replace(";2.000,5;", ";2.001;") for line in halves[1000:]]
+    assert read(text(labels, *halves[:1000], *later)).dp[[0, -1]] == pytest.approx([2000.5e3, 2001e3])
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_three_digits_behind_a_point_stay_decimals(here, monkeypatch, separator):
+    labels = separator.join(["t_s", "u_V", "dP_MPa", "Q_Lmin"])
+    lines = rows(TIME, U, [f"{2.001:.3f}"] * TIME.size, Q, separator=separator, comma=False)
+    np.testing.assert_allclose(read(text(labels, *lines)).dp, 2.001e6)
+    monkeypatch.setattr(text_blocks, "BLOCK_BYTES", 4096)
+    np.testing.assert_allclose(read(text(labels, *lines)).dp, 2.001e6)
+
+
 # clocks
 
 
@@ -169,6 +246,9 @@ def test_thousands_are_read_as_they_are_meant(here):
         ("12/11/2026 23:59:59", "13/11/2026 00:00:00", 1),
         ("11:59:59.5 a.m.", "12:00:00 p.m.", 0.5),
         ("23:59:59", "00:00:01", 2),
+        ("26.11.22 23:59:59", "26.11.23 00:00:01", 2),
+        ("22.11.26 23:59:59", "23.11.26 00:00:01", 2),
+        ("30.11.26 23:59:59", "01.12.26 00:00:01", 2),
         ("99:59:59", "100:00:00", 1),
         ("03:04:05:250", "03:04:05:500", 0.25),
     ],
@@ -194,6 +274,16 @@ def test_stamps(here, first, second, seconds):
 def test_stamps_that_can_not_be_told(here, cells, words):
     clock = [cells[min(index, len(cells) - 1)] for index in range(TIME.size)]
     assert words in refusal(text("time;u [V];Q [l/min]", *rows(clock, U, Q)))
+
+
+def test_milliseconds_beside_a_time_of_day_are_not_passed_over(here):
+    clock = [stamp.partition(".")[0] for stamp in stamps("%H:%M:%S.")]
+    parts = [stamp.partition(".")[2] for stamp in stamps("%H:%M:%S.")]
+    content = text("Time;ms;u [V];dP [MPa];Q [l/min]", *rows(clock, parts, U, DP, Q))
+    assert "has milliseconds in 'ms' beside the times in 'Time', expected both in one column" in refusal(content)
+    read(content, columns={"time": "Time"})
+    whole = text("Time;ms;u [V];dP [MPa];Q [l/min]", *rows(stamps("%H:%M:%S."), parts, U, DP, Q))
+    assert_is_the_ramp(read(whole))
 
 
 def test_stamps_over_blocks_count_from_the_first_row_of_the_file(here, monkeypatch):
@@ -230,11 +320,19 @@ def test_whole_numbers_without_a_unit_that_can_only_be_milliseconds(here, capsys
         ("4..20 mA = 0..50 bar", "'bar' is not a unit of flow"),
         ("4..20 s = 0..50 L/min", "'s' is no unit of a transmitter's signal"),
         ("4..4 mA = 0..50 L/min", "has no width"),
+        ("4..20 mA = 0..50,000 mL/min", "'50,000' may be 50000 or 50.0; write 50000 or 50.0"),
     ],
 )
 def test_a_current_is_no_flow_until_its_range_is_told(here, unit, words):
     content = text("t_s,u_V,dP_MPa,F (mA)", *rows(TIME, U, DP, 4 + 0.32 * Q, separator=",", comma=False))
     assert words in refusal(content, columns={"Q": f"F (mA):{unit}" if unit != "mA" else "F (mA)"})
+
+
+def test_a_range_in_another_unit_than_the_labels(here):
+    content = text("t_s,u_V,dP_MPa,Q_mV", *rows(TIME, U, DP, 200 * Q, separator=",", comma=False))
+    words = "the range '0..10 V = 0..50 L/min' is of a column in V, but the file says 'mV'"
+    assert words in refusal(content, columns={"Q": "Q_mV:0..10 V = 0..50 L/min"})
+    assert_is_the_ramp(read(content, columns={"Q": "Q_mV:0..10000 mV = 0..50 L/min"}))
 
 
 def test_a_range_may_fall_and_hold_other_signals(here):

@@ -249,7 +249,7 @@ def test_long_cells_and_many_columns_are_cut(refusal):
         (table("time_s,u_V,dP,Q_Lmin"), "column 'dP' has no unit; write for example dP_MPa"),
         (table("time_s,u_V,dP_MPa,Q"), "column 'Q' has no unit; write for example Q_Lmin"),
         (table("time_s,u_V,dP_MPA,Q_Lmin"), "column 'dP_MPA': 'MPA' is not a unit of pressure"),
-        (table("time_s,u_V,dP [BAR],Q_Lmin"), "(did you mean 'bar'?)"),
+        (table("time_s,u_V,dP [barr],Q_Lmin"), "(did you mean 'bar'?)"),
         (table("time_s,u_V,dP [Lmin],Q_Lmin"), "column 'dP [Lmin]': 'Lmin' is not a unit of pressure"),
         (table("time_s,u [mA],dP_MPa,Q_Lmin"), "column 'u [mA]': 'mA' is not a unit of voltage"),
         (table("time_s,u [9**9**9**9],dP_MPa,Q_Lmin"), "'9**9**9**9' is not a unit of voltage"),
