@@ -78,6 +78,13 @@ def test_a_constant_that_only_one_of_both_has_is_named(firmware_folder):
     assert "the manifest's OTHER is not in core/dz_comp.c" in manifest_follows(firmware_folder, manifest).text
 
 
+def test_a_truth_is_no_number(firmware_folder):
+    manifest = manifest_of(firmware_folder)
+    index, entry = next((at, one) for at, one in enumerate(manifest["constants"]) if one["value"] in (0, 1))
+    change(manifest, ("constants", index, "value"), bool(entry["value"]))
+    assert manifest_follows(firmware_folder, manifest).holds is False
+
+
 def test_a_manifest_without_constants_is_not_checked_and_one_without_shape_is_refused(firmware_folder):
     manifest = manifest_of(firmware_folder)
     without = manifest_follows(firmware_folder, {key: manifest[key] for key in manifest if key != "constants"})

@@ -122,7 +122,7 @@ def test_a_changed_file_fails_the_verification(firmware_folder):
 
 @pytest.mark.parametrize(
     "name",
-    ["f28335/extra.c", "more/extra.CPP", "f28335/startup.asm", "F28335.cmd", "f28335/own.projectspec", "Makefile"],
+    ["f28335/extra.c", "more/extra.CPP", "f28335/startup.asm", "F28335.cmd", "f28335/own.projectspec", "rules.mk"],
 )
 def test_source_and_project_files_that_were_added_are_refused(firmware_folder, name):
     manifest = json.loads((firmware_folder / "manifest.json").read_text())

@@ -97,7 +97,7 @@ def _faults_of_constants(folder: Path, manifest: dict[str, Any]) -> Iterator[str
     for (name, symbol), value in found.items():
         if (name, symbol) not in said:
             yield f"{symbol} of {name} is not in the manifest"
-        elif said[name, symbol] != value:
+        elif said[name, symbol] != value or isinstance(said[name, symbol], bool):
             yield f"{symbol} of {name} is {_words(value)}, the manifest says {_words(said[name, symbol])}"
     for name, symbol in said.keys() - found.keys():
         yield f"the manifest's {symbol} is not in {name}"
