@@ -85,10 +85,13 @@ def generate(
     Raises
     ------
     InputError
-        If the target is unknown, or its converter or PWM differs from those that the compensator was designed for.
+        If the target is unknown, its converter or PWM differs from those that the compensator was designed for, or the
+        compensator says of the target that it was designed for what is not so.
     """
     designed_for = compensator.request.target if compensator.request else None
     target = target_named(target_name or (designed_for.name if designed_for else DEFAULT_TARGET))
+    if designed_for:
+        target_named(designed_for.name).check_is_described(designed_for)
     target.check_signals(compensator.signals)
     note = target.check_designed_for(designed_for)
     document = compensator_bytes or to_json(compensator_document(compensator)).encode()

@@ -139,6 +139,26 @@ class Target:
                     f"design it again with `dzdesign design --target {self.name}`"
                 )
 
+    def check_is_described(self, designed_for: TargetInputs) -> None:
+        """Refuse a compensator that says of this target what is not so.
+
+        Parameters
+        ----------
+        designed_for : TargetInputs
+            As the compensator states it, under this target's name.
+
+        Raises
+        ------
+        InputError
+            With the first number that differs.
+        """
+        for what, said, has in _inputs_compared(designed_for, self.inputs()):
+            if said != has:
+                raise InputError(
+                    f"the compensator says that target {self.name} has {float(said):g} ({what}), but it has "
+                    f"{float(has):g}; design it again with `dzdesign design --target {self.name}`"
+                )
+
     def check_designed_for(self, designed_for: TargetInputs | None) -> str:
         """Refuse a compensator of another target whose codes are other voltages or times here.
 
@@ -159,25 +179,30 @@ class Target:
         """
         if designed_for is None:
             return ""
-        theirs, here = designed_for.converter, self.inputs()
+        theirs = designed_for.converter
         word = f"the compensator was designed for target {designed_for.name}; {self.name} "
         if self.takes_any_signals:
             word += f"takes its codes as they are: {theirs.levels} codes over {float(theirs.full_V):g} V, "
             word += f"{designed_for.compare_max} counts at full drive"
             return "" if designed_for.name == self.name else word
-        for what, asked, has in (
-            ("a converter's range in V", theirs.full_V, here.converter.full_V),
-            ("a converter's codes", theirs.levels, here.converter.levels),
-            ("counts at full drive", designed_for.compare_max, here.compare_max),
-            ("samples a second", designed_for.sample_Hz, here.sample_Hz),
-            ("PWM periods a second", designed_for.tick_Hz, here.tick_Hz),
-        ):
+        for what, asked, has in _inputs_compared(designed_for, self.inputs()):
             if asked != has:
                 raise InputError(
                     f"the compensator was designed for target {designed_for.name} ({what}: {float(asked):g}), but "
                     f"{self.name} has {float(has):g}; design it again with `dzdesign design --target {self.name}`"
                 )
         return "" if designed_for.name == self.name else word + "has the same converter and timer"
+
+
+def _inputs_compared(one: TargetInputs, other: TargetInputs) -> tuple[tuple[str, Fraction | int, Fraction | int], ...]:
+    """Return what each number is, and it of both."""
+    return (
+        ("a converter's range in V", one.converter.full_V, other.converter.full_V),
+        ("a converter's codes", one.converter.levels, other.converter.levels),
+        ("counts at full drive", one.compare_max, other.compare_max),
+        ("samples a second", one.sample_Hz, other.sample_Hz),
+        ("PWM periods a second", one.tick_Hz, other.tick_Hz),
+    )
 
 
 def folder_of(name: str) -> str:

@@ -182,6 +182,8 @@ def parse_quantity(text: str, quantity: str, option: str) -> float:
     1000000.0
     """
     example = EXAMPLES[quantity].split(",")[0]
+    if not isinstance(text, str):  # from a notebook
+        raise InputError(f"{option}: expected text with a unit such as '1 {example}', got {quoted(text)}")
     words = text.strip().replace(",", ".")
     if len(text) > LONGEST_QUANTITY:
         raise InputError(f"{option} is {quoted(text)}, expected a number and a unit such as '1 {example}'")

@@ -1,12 +1,13 @@
 """compensator.json: a `Compensator` written and read, every rational as [numerator, denominator]."""
 
 import json
+import re
 from fractions import Fraction
 from types import NoneType
 from typing import Any
 
 from dzdesign.core.artefacts import TOOL, parse_document, sha256_of, to_json
-from dzdesign.core.errors import InputError
+from dzdesign.core.errors import InputError, quoted
 from dzdesign.core.shape import Exactly, Number, check_shape
 from dzdesign.design.amplifier import Amplifier
 from dzdesign.design.compensator import Certificate, Compensator, SideLaw
@@ -82,31 +83,31 @@ SHAPE = {
     "costs": [str],
     "valve": dict,
 }
-#: What is checked where it is there. A file from before it was kept lacks what was asked for, and the valve's hash.
-LATER = {
-    "tool": {"name": str, "version": str},
-    "target": (
-        {
-            "name": str,
-            "converter_V": RATIONAL,
-            "converter_levels": Number(2, 65536, whole=True),
-            "compare_max": POSITIVE,
-            "sample_Hz": POSITIVE,
-            "tick_Hz": POSITIVE,
-        },
-        NoneType,
-    ),
-    "options": (dict, NoneType),
+#: What `prove_derived` rests on. A file from before it was kept has none of it; one that lacks a part was edited.
+ASKED = {
+    "target": {
+        "name": str,
+        "converter_V": RATIONAL,
+        "converter_levels": Number(2, 65536, whole=True),
+        "compare_max": POSITIVE,
+        "sample_Hz": POSITIVE,
+        "tick_Hz": POSITIVE,
+    },
+    "options": dict,
     "common_valves": CODE,
     "valve_sha256": str,
 }
+#: What is checked where it is there.
+LATER = {"tool": {"name": str, "version": str}, **ASKED}
+SHA256 = re.compile("[0-9a-f]{64}")
+TARGET_NAME = re.compile("[a-z][a-z0-9]*(-[a-z0-9]+)*")
 
 
 def compensator_document(compensator: Compensator) -> dict[str, Any]:
-    """Return the JSON document of schema dzdesign.compensator/1."""
+    """Return the JSON document of schema dzdesign.compensator/1; without a request it is as of before one was kept."""
     c, signals, amplifier = compensator, compensator.signals, compensator.amplifier
     valve = json.loads(c.valve_document)
-    return {
+    document = {
         "schema": SCHEMA,
         "tool": TOOL,
         "made_from": [{"source": "valve.json", "sha256": c.valve_sha256}],
@@ -151,6 +152,7 @@ def compensator_document(compensator: Compensator) -> dict[str, Any]:
         "valve_sha256": _hash_of(valve),
         "valve": valve,
     }
+    return {key: value for key, value in document.items() if c.request or key not in ASKED}
 
 
 def _hash_of(valve: dict[str, Any]) -> str:
@@ -208,9 +210,9 @@ def compensator_from_document(content: bytes, source: str) -> Compensator:
     """
     document = parse_document(content, source, (SCHEMA,))
     check_shape(document, SHAPE, source, REMEDY)
+    _check_asked(document, source)
     check_shape(document, {key: shape for key, shape in LATER.items() if key in document}, source, REMEDY)
-    if not document["made_from"]:
-        raise InputError(f"'{source}': 'made_from' is empty, expected the valve's hash; {REMEDY}")
+    _check_hashes(document, source)
     valve = valve_from_document(to_json(document["valve"]).encode(), f"{source}: valve")
     if _fraction(document["u_max_V"], "u_max_V") != Fraction(repr(valve.u_max_V)):
         raise InputError(f"'{source}': 'u_max_V' is not that of its valve, {valve.u_max_V:g} V; {REMEDY}")
@@ -250,11 +252,35 @@ def compensator_from_document(content: bytes, source: str) -> Compensator:
         raise InputError(f"'{source}': {error}; {REMEDY}") from error
 
 
+def _check_asked(document: dict[str, Any], source: str) -> None:
+    """Refuse half of what the law is derived again from: the other half would be believed."""
+    missing = [key for key in ASKED if document.get(key) is None]
+    if missing and any(key in document for key in ASKED):
+        raise InputError(
+            f"'{source}' does not say '{missing[0]}', expected all of {', '.join(ASKED)}, or in a file of an older "
+            f"version none of them; {REMEDY}"
+        )
+
+
+def _check_hashes(document: dict[str, Any], source: str) -> None:
+    """Refuse what can't be a hash; that of valve.json counts its spacing, which is not kept, and can't be compared."""
+    if not document["made_from"]:
+        raise InputError(f"'{source}': 'made_from' is empty, expected the valve's hash; {REMEDY}")
+    for index, entry in enumerate(document["made_from"]):
+        if not SHA256.fullmatch(entry["sha256"]):
+            raise InputError(
+                f"'{source}': 'made_from[{index}].sha256' is {quoted(entry['sha256'])}, expected a SHA-256 of 64 "
+                f"digits 0-9 and a-f; {REMEDY}"
+            )
+
+
 def _request(document: dict[str, Any]) -> DesignRequest | None:
     """Return what was asked for; None of a file that does not say, as all from before it was kept."""
     target, options = document.get("target"), document.get("options")
     if target is None or options is None:
         return None
+    if not TARGET_NAME.fullmatch(target["name"]):
+        raise InputError(f"'target.name' is {quoted(target['name'])}, expected a target such as 'f28335'")
     check_shape(options, dict.fromkeys(options, str), "options", "")
     full_V = _fraction(target["converter_V"], "target.converter_V")
     if full_V <= 0:

@@ -21,6 +21,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from dzdesign.api_around import assess, batch, init, report, simulate
+from dzdesign.arguments import takes_text
 from dzdesign.core.artefacts import (
     TOOL,
     check_file_may_be_written,
@@ -53,6 +54,7 @@ AnyPath = str | os.PathLike[str]
 show_by(WRITERS, SUMMARIES)
 
 
+@takes_text
 def identify(
     ramps: AnyPath | Iterable[AnyPath],
     *,
@@ -136,6 +138,7 @@ def identify(
     return valve
 
 
+@takes_text
 def design(
     valve: "ValveModel | AnyPath",
     *,
@@ -223,6 +226,7 @@ def design(
     return compensator
 
 
+@takes_text
 def generate(
     compensator: "Compensator | AnyPath", *, target: str | None = None, output: AnyPath | None = None
 ) -> "Firmware":
@@ -261,6 +265,7 @@ def generate(
     return firmware
 
 
+@takes_text
 def verify(
     firmware: "Firmware | AnyPath",
     *,

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from dzdesign.arguments import takes_text
 from dzdesign.core.artefacts import (
     check_file_may_be_written,
     check_folder_may_be_written,
@@ -39,6 +40,7 @@ def _said(option: str | Mapping[str, str] | None) -> str | dict[str, str] | None
     return dict(option) if isinstance(option, Mapping) else option
 
 
+@takes_text
 def init(
     ramps: AnyPath | Iterable[AnyPath] = (),
     *,
@@ -75,6 +77,7 @@ def init(
         return propose(_patterns(ramps), columns=_said(columns), dp=_said(dp), skip_rows=skip_rows, output=name)
 
 
+@takes_text
 def simulate(
     *,
     plant: AnyPath | None = None,
@@ -129,6 +132,7 @@ def simulate(
     return files
 
 
+@takes_text
 def assess(
     before: AnyPath | Iterable[AnyPath],
     after: AnyPath | Iterable[AnyPath],
@@ -191,6 +195,7 @@ def assess(
     return found
 
 
+@takes_text
 def report(folder: AnyPath, *, output: AnyPath | None = None) -> "Report":
     """Make the report of a folder of artefacts, or of a lot, as `dzdesign report` does.
 
@@ -220,6 +225,7 @@ def report(folder: AnyPath, *, output: AnyPath | None = None) -> "Report":
     return made
 
 
+@takes_text
 def batch(
     source: AnyPath,
     *,

@@ -102,6 +102,47 @@ def test_bad_input_is_one_sentence(call, words, ramps):
     assert words in str(error.value)
 
 
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: api.simulate(dp=1), "dp: expected text with a unit such as '1 MPa', got 1"),
+        (lambda: api.simulate(dp=[1]), "dp[0]: expected text with a unit such as '1 MPa', got 1"),
+        (lambda: api.simulate(ramp_time=5), "ramp_time: expected text with a unit such as '100 s', got 5"),
+        (lambda: api.simulate(plant=5), "plant: expected a path, got 5"),
+        (lambda: api.identify("x", meter_lag=0.1), "meter_lag: expected text with a unit such as '0.1 s', got 0.1"),
+        (lambda: api.identify("x", dp={"x": 5}), "dp['x']: expected text with a unit such as '1 MPa', got 5"),
+        (lambda: api.identify("x", record=5), "record: expected a mapping of names to values, got 5"),
+        (lambda: api.identify(["x", 5]), "ramps[1]: expected a path, got 5"),
+        (lambda: api.design("x", edge=1), "edge: expected text with a unit such as '1 %', got 1"),
+        (lambda: api.design("x", accept=["x"]), "accept: expected text, got ['x']"),
+        (lambda: api.design("x", target=28335), "target: expected text, got 28335"),
+        (lambda: api.design(5), "valve: expected a path, got 5"),
+        (lambda: api.generate(None), "compensator: expected a path, got None"),
+        (lambda: api.verify(5), "firmware: expected a path, got 5"),
+        (lambda: api.assess("x", "y", level=0.6), "level: expected text with a unit such as '0.6 L/min', got 0.6"),
+        (lambda: api.assess("x", "y", limits={"z": 5}), "limits['z']: expected text with a unit such as '5 %', got 5"),
+        (lambda: api.init(5), "ramps: expected a path, got 5"),
+        (lambda: api.init(b"x"), "ramps: expected a path, got b'x'"),
+        (lambda: api.report(None), "folder: expected a path, got None"),
+        (lambda: api.batch(".", output="lot", design={"edge": 1}), "design['edge']: expected text, got 1"),
+        (lambda: api.batch(".", output="lot", identify=5), "identify: expected a mapping of names to values, got 5"),
+    ],
+)
+def test_what_is_no_text_is_one_sentence(call, words):
+    with pytest.raises(api.InputError) as error:
+        call()
+    assert str(error.value) == words
+
+
+def test_a_number_for_an_option_of_a_lot_is_one_sentence(ramps, tmp_path):
+    with pytest.raises(api.InputError, match=r"--meter-lag: expected text with a unit such as '1 s', got 0\.1"):
+        api.batch(ramps[0].parent, output=tmp_path / "lot", identify={"meter_lag": 0.1})
+
+
+def test_paths_may_come_from_anything_that_gives_them(ramps):
+    assert len(api.identify((path for path in ramps), meter_lag="0.1 s").to_document()["made_from"]) == len(ramps)
+
+
 def test_what_stands_around_the_stages_writes_the_bytes_of_the_commands(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     two = ["--dp", "1 MPa", "--dp", "2 MPa", "--ramp-time", "20 s"]

@@ -8,7 +8,7 @@ from synthetic import Truth, synthetic_ramp
 
 from dzdesign.cli import main
 from dzdesign.codegen.project import generate, target_named
-from dzdesign.core.artefacts import to_json
+from dzdesign.core.artefacts import MANIFEST_NAME, to_json, write_folder
 from dzdesign.core.errors import InputError
 from dzdesign.design.common import Designed, common_setting
 from dzdesign.design.compensator_file import LATER, compensator_document, compensator_from_document
@@ -17,6 +17,8 @@ from dzdesign.design.designing import design
 from dzdesign.design.option_texts import options_of
 from dzdesign.identify.identification import identify
 from dzdesign.verify.checks import law_follows
+from dzdesign.verify.manifest_check import manifest_follows
+from dzdesign.verify.required import untried_of
 
 #: What no number of the law depends on, and the hash of a file whose spacing is not kept.
 WORDS = ("schema", "tool", "made_from", "target.name", "options")
@@ -114,6 +116,28 @@ def test_a_file_from_before_the_options_were_kept_is_taken_as_it_was(document, t
     assert "designed for" not in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("key", ["target", "options", "common_valves", "valve_sha256"])
+def test_half_of_what_was_asked_for_is_refused(document, key):
+    """Else the law would not be derived again, and any edit outside of the certificate would pass."""
+    said = f"does not say '{key}', expected all of target, options, common_valves, valve_sha256, or in a file"
+    for half in ({**document, key: None}, {each: document[each] for each in document if each != key}):
+        with pytest.raises(InputError, match=said):
+            read(half)
+
+
+def test_of_an_older_file_it_is_said_what_to_do():
+    evidence = {"checks": [], "closed_loop": {}, "monte_carlo": None}
+    (said,) = [each for each in untried_of(evidence) if each.startswith("the law follows from the valve")]
+    assert said.endswith(": `design, codegen and verify again with this version`")
+
+
+@pytest.mark.parametrize("digest", ["", "x" * 64, "F" * 64, "0" * 63, "0" * 65, "0" * 64 + "\n"])
+def test_a_hash_that_can_be_none_is_refused(document, digest):
+    faulty = edited(document, ("made_from", 0, "sha256"), lambda _: digest)
+    with pytest.raises(InputError, match=r"'made_from\[0\].sha256' is .*, expected a SHA-256 of 64 digits"):
+        read(faulty)
+
+
 def test_of_another_version_a_difference_is_no_fault(document):
     changed = edited(document, ("sides", "positive", "k_x_max_over_u_max"), lambda _: [1, 2])
     assert law_follows(read(changed), changed)[0].holds is False
@@ -148,7 +172,7 @@ def test_another_target_is_refused_where_a_code_is_another_voltage(example_valve
     """The F280049C's converter has 3.3 V, the F28335's 3 V: with equal counts nothing else would tell."""
     compensator = designed_for(example_valve, "cortex-m4", pressure_a="4..20 mA on 140 ohm")
     inputs = target_named("f280049c").inputs()
-    request = replace(compensator.request, target=replace(compensator.request.target, converter=inputs.converter))
+    request = replace(compensator.request, target=inputs)
     alike = replace(compensator, request=request)
     with pytest.raises(InputError, match=r"a converter's range in V: 3\.3\), but f28335 has 3; design it again"):
         generate(alike, "f28335")
@@ -167,6 +191,30 @@ def test_a_target_without_a_converter_is_wired_for_the_one_of_the_design(example
 def test_an_unknown_target_in_the_file_is_named(document):
     with pytest.raises(InputError, match=r"there is no target 'f28336' \(did you mean 'f28335'"):
         generate(read(edited(document, ("target", "name"), lambda _: "f28336")))
+
+
+@pytest.mark.parametrize("name", ["", "F28335", "f28335 ", "a/b"])
+def test_a_name_that_no_target_has_is_refused(document, name):
+    with pytest.raises(InputError, match=r"'target.name' is .*, expected a target such as 'f28335'"):
+        read(edited(document, ("target", "name"), lambda _: name))
+
+
+def test_the_target_is_compared_with_the_one_of_that_name(document):
+    """The design follows from target.* as it stands there: another converter under the target's name is believed."""
+    renamed = read(edited(document, ("target", "name"), lambda _: "f280049c"))
+    for asked in (None, "f28335", "cortex-m4"):
+        with pytest.raises(InputError, match=r"says that target f280049c has .*, but it has .*; design it again"):
+            generate(renamed, asked)
+
+
+def test_verify_says_that_the_design_was_for_another_target(example_valve, tmp_path):
+    for designed, said in (("cortex-m4", "was designed for cortex-m4, this is for f28335"), ("f28335", "as it says")):
+        firmware = generate(designed_for(example_valve, designed), "f28335")
+        write_folder(tmp_path / designed, firmware.files, firmware.manifest)
+        check = manifest_follows(
+            tmp_path / designed, dict(json.loads((tmp_path / designed / MANIFEST_NAME).read_text()))
+        )
+        assert check.holds and check.text.endswith(said)
 
 
 # ---- one setting for many ----

@@ -53,7 +53,9 @@ def test_every_wrong_value_is_named(firmware_folder):
     ("path", "value", "said"),
     [
         (("law",), "target", "the manifest's law is target, the compensator's paper"),
-        (("target",), "cortex-m4", "the manifest's target is cortex-m4, of which no file is there"),
+        (("target",), "cortex-m4", "the manifest's target is cortex-m4, but the files are those of f28335"),
+        (("target",), "core", "the manifest's target is core, but the files are those of f28335"),
+        (("constants",), [], "is not in the manifest, and "),
         (("origin", "compensator_json"), "0" * 64, "origin.compensator_json is not that of compensator.json"),
         (("origin", "valve_json"), "0" * 64, "origin.valve_json is not that of compensator.json"),
         (("origin", "ramp_tests"), [], "origin.ramp_tests is not that of compensator.json"),
@@ -76,9 +78,19 @@ def test_a_constant_that_only_one_of_both_has_is_named(firmware_folder):
     assert "the manifest's OTHER is not in core/dz_comp.c" in manifest_follows(firmware_folder, manifest).text
 
 
-def test_a_manifest_without_constants_is_taken_and_one_without_shape_is_not(firmware_folder):
+def test_a_truth_is_no_number(firmware_folder):
     manifest = manifest_of(firmware_folder)
-    assert manifest_follows(firmware_folder, {key: manifest[key] for key in manifest if key != "constants"}).holds
+    index, entry = next((at, one) for at, one in enumerate(manifest["constants"]) if one["value"] in (0, 1))
+    change(manifest, ("constants", index, "value"), bool(entry["value"]))
+    assert manifest_follows(firmware_folder, manifest).holds is False
+
+
+def test_a_manifest_without_constants_is_not_checked_and_one_without_shape_is_refused(firmware_folder):
+    manifest = manifest_of(firmware_folder)
+    without = manifest_follows(firmware_folder, {key: manifest[key] for key in manifest if key != "constants"})
+    assert without.holds is None and "lists no constants" in without.text
+    with pytest.raises(InputError, match="'constants' is None, expected a list"):
+        manifest_follows(firmware_folder, {**manifest, "constants": None})
     with pytest.raises(InputError, match="lacks the key"):
         manifest_follows(firmware_folder, {**manifest, "constants": [{}]})
 

@@ -120,11 +120,41 @@ def test_a_changed_file_fails_the_verification(firmware_folder):
     assert [check.name for check in result.checks if not check.holds] == ["files as generated"]
 
 
-def test_c_that_was_added_is_said_and_refused_where_it_may_be_taken_for_ours(firmware_folder):
+@pytest.mark.parametrize(
+    "name",
+    ["f28335/extra.c", "more/extra.CPP", "f28335/startup.asm", "F28335.cmd", "f28335/own.projectspec", "rules.mk"],
+)
+def test_source_and_project_files_that_were_added_are_refused(firmware_folder, name):
     manifest = json.loads((firmware_folder / "manifest.json").read_text())
-    (firmware_folder / "f28335" / "extra.c").write_text("int extra;\n")
+    for built in ("f28335/main.o", "f28335/firmware.out", "f28335/firmware.map"):
+        (firmware_folder / built).write_text("")
+    assert files_unchanged(firmware_folder, manifest).holds
+    (firmware_folder / name).parent.mkdir(exist_ok=True)
+    (firmware_folder / name).write_text("")
     added = files_unchanged(firmware_folder, manifest)
-    assert added.holds and "not checked: f28335/extra.c" in added.text
+    assert added.holds is False and f"does not name {name};" in added.text
+
+
+def test_a_file_whose_line_was_taken_from_the_manifest_is_refused(firmware_folder):
+    manifest = json.loads((firmware_folder / "manifest.json").read_text())
+    del manifest["files"]["f28335/dz_isr.c"]
+    assert "does not name f28335/dz_isr.c;" in files_unchanged(firmware_folder, manifest).text
+
+
+def test_what_cmake_built_may_stay_where_nothing_of_ours_is(firmware_folder):
+    manifest = json.loads((firmware_folder / "manifest.json").read_text())
+    for name in ("build/CMakeCache.txt", "build/Makefile", "build/CMakeFiles/3.30/CMakeCCompilerId.c"):
+        (firmware_folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (firmware_folder / name).write_text("")
+    built = files_unchanged(firmware_folder, manifest)
+    assert built.holds and "built by CMake, and not checked: build" in built.text
+    for name in ("f28335/CMakeCache.txt", "f28335/extra.c", "CMakeCache.txt"):
+        (firmware_folder / name).write_text("")
+    assert "does not name f28335/extra.c;" in files_unchanged(firmware_folder, manifest).text
+
+
+def test_a_header_that_may_be_taken_for_ours_is_said(firmware_folder):
+    manifest = json.loads((firmware_folder / "manifest.json").read_text())
     (firmware_folder / "f28335" / "dz_comp.h").write_text("#define DZ_COMPARE_MAX 1u\n")  # goes before core's
     shadowed = files_unchanged(firmware_folder, manifest)
     assert shadowed.holds is False and "f28335/dz_comp.h" in shadowed.text

@@ -19,6 +19,13 @@ from dzdesign.verify.scenarios import ScenarioResult
 
 #: Share of full command by which the opening of a plant may differ from the identified valve's: rounding, a quick ramp.
 SAME_THRESHOLD = 0.03
+#: Endings of C, C++, assembly, of what they include, of linker files and of projects.
+SOURCES = {
+    ".c", ".h", ".cc", ".cpp", ".cxx", ".hh", ".hpp", ".hxx", ".inc", ".inl", ".s", ".sx", ".asm", ".ld", ".lds",
+    ".lcf", ".cmd", ".icf", ".sct", ".def", ".mk", ".mak", ".cmake", ".projectspec", ".ccxml", ".gel", ".syscfg",
+    ".ioc", ".uvprojx", ".ewp", ".cproj", ".vcxproj",
+}  # fmt: skip
+BUILD_FILES = {"makefile", "gnumakefile", "cmakelists.txt", "meson.build", ".project", ".cproject", ".ccsproject"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,7 +47,12 @@ def files_unchanged(folder: Path, manifest: dict[str, Any]) -> Check:
     unlisted = [f"core/{path.name}" for path in sorted((folder / "core").glob("*.[ch]"))]
     unlisted = [name for name in unlisted if name not in manifest["files"] or name not in manifest["core"]]
     ours = {PurePosixPath(name).name for name in manifest["files"]}
-    others = [path.relative_to(folder).as_posix() for path in sorted(folder.rglob("*.[ch]"))]
+    built = _cmake_trees(folder, manifest)
+    others = [
+        path.relative_to(folder).as_posix()
+        for path in sorted(folder.rglob("*"))
+        if _is_source(path) and not built.intersection(path.parents)
+    ]
     others = [name for name in others if name not in manifest["files"]]
     shadows = [name for name in others if PurePosixPath(name).name in ours]
     if changed:
@@ -49,12 +61,25 @@ def files_unchanged(folder: Path, manifest: dict[str, Any]) -> Check:
         fault = f"the manifest does not name {', '.join(unlisted) or 'any file of the core'}"
     elif shadows:
         fault = f"{', '.join(shadows)}: not generated, but named as a generated file, for which it may be taken"
+    elif others:
+        fault = f"the manifest does not name {', '.join(others)}; keep source and project files of your own elsewhere"
     else:
         fault = ""
     text = fault or f"{len(manifest['files'])} files as generated"
-    if others and not fault:
-        text += f"; not generated, and not checked: {', '.join(others)}"
+    if built and not fault:
+        text += f"; built by CMake, and not checked: {', '.join(sorted(tree.name for tree in built))}"
     return Check(name="files as generated", holds=not fault, text=text)
+
+
+def _cmake_trees(folder: Path, manifest: dict[str, Any]) -> set[Path]:
+    """Return the folders in which CMake has built, with makefiles and C of its own, and in which nothing is ours."""
+    ours = {parent for name in manifest["files"] for parent in (folder / name).parents}
+    return {path.parent for path in folder.rglob("CMakeCache.txt")} - ours - {folder}
+
+
+def _is_source(path: Path) -> bool:
+    """Tell whether a compiler, a linker or a build reads a file; what they write may lie about."""
+    return path.is_file() and (path.suffix.lower() in SOURCES or path.name.lower() in BUILD_FILES)
 
 
 def certificate_follows(compensator: Compensator) -> Check:

@@ -263,13 +263,14 @@ class _Search:
         return next((name for name, digest in self.hashes.items() if digest == stated), None)
 
     def _first(self, schema: str) -> str | None:
-        """Return the first file of a schema; the manifest of a folder has that of what it lists, and is none."""
+        """Return the first file of a schema; a manifest has that of what it lists, and is one of a firmware only."""
         mark = f'"{schema}"'.encode()
         return next(
             (
                 name
                 for name, content in self.shelf.items()
-                if mark in content[:HEAD] and name.rpartition("/")[2] != MANIFEST_NAME
+                if mark in content[:HEAD]
+                and (schema == FIRMWARE_SCHEMA or name.rpartition("/")[2] != MANIFEST_NAME)
             ),
             None,
         )

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 VERIFY = "verify"
+LAW = "the law follows from the valve and the options"
+#: Of a compensator.json that does not say with what it was designed, no run of verify can tell.
+AGAIN = "design, codegen and verify again with this version"
 #: What every `verify` tries.
 ALWAYS = (
     "files as generated",
@@ -24,7 +27,7 @@ ALWAYS = (
     "no flow at zero command in the closed loop",
     "no flow at zero command after any scenario",
     "the certificate follows from the valve",
-    "the law follows from the valve and the options",
+    LAW,
 )
 #: What is tried if it is asked for: how its checks' names begin, what it is, the option.
 ASKED_FOR = (
@@ -47,7 +50,7 @@ class Required:
     holds : bool or None
         As found; None where it was not tried or could not be checked.
     how : str
-        The command and the option that try it.
+        The command and the option that try it, or what to do first.
     """
 
     name: str
@@ -67,7 +70,7 @@ def required_of(evidence: dict[str, Any], target: str | None = None) -> tuple[Re
         Of the firmware, where it is known.
     """
     checks = evidence["checks"]
-    found = [_tried(checks, name, name, VERIFY) for name in ALWAYS]
+    found = [_tried(checks, name, name, AGAIN if name == LAW else VERIFY) for name in ALWAYS]
     own = bool(evidence["closed_loop"].get("plant"))
     found.append(_part("closed loop with a plant of the machine's own", own, f"{VERIFY} --plant"))
     found.append(_part("load steps and frozen sensors in the closed loop", own, f"{VERIFY} --plant"))
