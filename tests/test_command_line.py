@@ -310,7 +310,7 @@ def test_a_near_miss_is_named(line, hint, ramp_file, tmp_path, monkeypatch, caps
 @pytest.mark.parametrize(
     ("unit", "quantity", "meant"),
     [("megapascl", "pressure", "megapascal"), ("L/mim", "flow", "L/min"), ("litre/minutte", "flow", "litre/minute"),
-     ("BAR", "pressure", "bar"), ("mVV", "voltage", "mV")],
+     ("BARR", "pressure", "bar"), ("mVV", "voltage", "mV")],
 )  # fmt: skip
 def test_a_mistyped_unit_names_one_of_its_quantity(unit, quantity, meant):
     with pytest.raises(InputError, match=re.escape(f"(did you mean '{meant}'?)")):
