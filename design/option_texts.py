@@ -7,7 +7,7 @@ from fractions import Fraction
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.units import parse_quantity
 from dzdesign.design.options import DesignOptions
-from dzdesign.design.request import CHOICES, DEFAULTS, DesignRequest, TargetInputs
+from dzdesign.design.request import CHOICES, DEFAULTS, DesignRequest, TargetInputs, option_name
 from dzdesign.design.signal_text import command_signal, parse_signal, pressure_signal
 from dzdesign.design.signals import Signals
 
@@ -71,17 +71,6 @@ def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
         accept=tuple(text["accept"].replace(",", " ").split()),
         request=DesignRequest(target=target, options=tuple(text.items())),
     )
-
-
-def option_name(name: str) -> str:
-    """Return an option as it is written on the command line.
-
-    Examples
-    --------
-    >>> option_name("below_dp0")
-    '--below-dp0'
-    """
-    return f"--{name.replace('_', '-')}"
 
 
 def _share(text: str, option: str) -> Fraction:

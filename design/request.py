@@ -31,6 +31,17 @@ DEFAULTS = {
 CHOICES = {"negative_dp": ("same", "swapped"), "polarity": ("normal", "inverted")}
 
 
+def option_name(name: str) -> str:
+    """Return an option as it is written on the command line.
+
+    Examples
+    --------
+    >>> option_name("below_dp0")
+    '--below-dp0'
+    """
+    return f"--{name.replace('_', '-')}"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TargetInputs:
     """What `design` needs to know of a target: its converter, its timer's counts, samples and PWM periods a second."""

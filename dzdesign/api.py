@@ -209,7 +209,8 @@ def design(
     from dzdesign.codegen.project import target_named
     from dzdesign.design.compensator_file import SCHEMA, compensator_document
     from dzdesign.design.designing import design as design_valve
-    from dzdesign.design_options import DEFAULTS, design_options
+    from dzdesign.design.request import DEFAULTS
+    from dzdesign.design_options import design_options
     from dzdesign.identify.model import ValveModel
     from dzdesign.identify.valve_file import valve_from_document
 

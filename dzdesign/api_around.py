@@ -274,7 +274,7 @@ def batch(
     """
     from dzdesign.batch.command import IDENTIFY, calibrate_lot
     from dzdesign.cli import parse
-    from dzdesign.design_options import DEFAULTS
+    from dzdesign.design.request import DEFAULTS
 
     said = parse(["batch", "lot"])
     for name, given, known in (

@@ -29,7 +29,7 @@ def _parser() -> argparse.ArgumentParser:
     from dzdesign.derivation.law import LAW_NAMES
     from dzdesign.derivation.report import FORMATS
     from dzdesign.design.options import GUARDS
-    from dzdesign.design_options import CHOICES
+    from dzdesign.design.request import CHOICES
     from dzdesign.parsing import build_parser
     from dzdesign.vocabulary import language
 

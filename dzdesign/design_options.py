@@ -3,14 +3,12 @@
 import argparse
 
 from dzdesign.core.errors import InputError
-from dzdesign.design.request import CHOICES, DEFAULTS
-
-__all__ = ["CHOICES", "DEFAULTS", "design_options", "given_design_options"]
+from dzdesign.design.request import DEFAULTS, option_name
 
 
 def given_design_options(args: argparse.Namespace) -> list[str]:
     """Return the design's options that were given, as they are written."""
-    return [f"--{name.replace('_', '-')}" for name in DEFAULTS if getattr(args, name) is not None]
+    return [option_name(name) for name in DEFAULTS if getattr(args, name) is not None]
 
 
 def design_options(args: argparse.Namespace, target: "TargetInputs") -> "DesignOptions":  # noqa: F821
@@ -38,11 +36,9 @@ def design_options(args: argparse.Namespace, target: "TargetInputs") -> "DesignO
 
 def _refuse_what_needs_both_signs(args: argparse.Namespace, command: str) -> None:
     """Refuse options of negative commands where the command has none, and would leave them without effect."""
-    given = [
-        f"--{name.replace('_', '-')}" for name in ("negative_dp", "zero_window") if getattr(args, name) is not None
-    ]
+    given = [option_name(name) for name in ("negative_dp", "zero_window") if getattr(args, name) is not None]
     given += [
-        f"the second time of --{name.replace('_', '-')}"
+        f"the second time of {option_name(name)}"
         for name in ("ramp_up", "ramp_down")
         if "/" in (getattr(args, name) or "")
     ]

@@ -74,8 +74,8 @@ class Table(ABC):
         return False
 
     def seconds(self, label: str, stamps: "Stamps") -> np.ndarray:
-        """Return a column of dates or times of day as seconds since the first row of the file."""
-        raise NotImplementedError
+        """Return a column of dates or times of day, as `is_clock` tells, as seconds since the first row of the file."""
+        raise TypeError(f"column '{label}' holds numbers")
 
     def found(self) -> str:
         """Return the labels for a message, the first `QUOTED_COLUMNS` of them."""

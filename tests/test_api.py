@@ -17,7 +17,7 @@ from synthetic import needs_compiler
 from dzdesign import api
 from dzdesign.batch.command import IDENTIFY
 from dzdesign.cli import main
-from dzdesign.design_options import DEFAULTS
+from dzdesign.design.request import DEFAULTS
 from dzdesign.identify.model import ValveModel
 from dzdesign.vocabulary import COMMANDS
 

@@ -19,7 +19,8 @@ from dzdesign.batch.valves import Valve, valves_of
 from dzdesign.core.artefacts import read_bytes, to_json, write_file, write_files
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.exchange import alone_in
-from dzdesign.design_options import DEFAULTS, design_options
+from dzdesign.design.request import DEFAULTS
+from dzdesign.design_options import design_options
 from dzdesign.identify_options import IDENTIFY_NAMES, identify_options, record_of
 from dzdesign.progress import say, with_bar
 from dzdesign.recordings import rows_to_skip
