@@ -78,6 +78,8 @@ class BranchShape:
         True if the flow at full command lies clearly below the straight line.
     outliers : int
         Samples gated out of the window.
+    dropped : float
+        Share of the samples that drop out: that read below the floor where no flow below it is credible.
     read, line : ReadBranch, GatedLine
         The samples that all this was read from, and which of them the line rests on.
     """
@@ -96,6 +98,7 @@ class BranchShape:
     onset_se: float
     saturates: bool
     outliers: int
+    dropped: float
     read: ReadBranch
     line: GatedLine
 
@@ -145,6 +148,7 @@ def _describe(
         onset_se=onset_se,
         saturates=read.y_max < 0.93 * line.slope * (branch.u.max() - line.knee),
         outliers=line.outliers,
+        dropped=line.dropped,
         read=read,
         line=line,
     )

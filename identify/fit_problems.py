@@ -33,10 +33,12 @@ IPOPT = {
 #: For a convex problem of a few unknowns in mV: to a millionth of a microvolt, and no bound overstepped.
 EXACT = {"ipopt.tol": 1e-12, "ipopt.bound_relax_factor": 0.0, "ipopt.mu_strategy": "adaptive"}
 #: Numbers of a branch beside its censored bins: see `branch_numbers`.
-NUMBERS = 8
+NUMBERS = 9
 #: Standard deviations from which the normal distribution's tail is a continued fraction, exact to 1e-13 with this many
 #: terms.
 TAIL_FROM, TAIL_TERMS = 3.0, 30
+#: Logarithm of the rarest reading that is told from a drop-out: a larger one would overflow.
+MOST = 500.0
 #: Layouts whose solvers are kept, some hundred kilobytes each.
 KEPT = 32
 #: Fewest bins with censored samples for which a solver has room.
@@ -66,7 +68,8 @@ def branch_numbers(
     -------
     numbers : (NUMBERS,) array
         Slope times u_max over sigma; the two units, the knee's over u_max; the sums of 1, x, x x, and of m, m x, with
-        ``x = (u - knee) / u_max`` and m a sample's distance from the line in standard deviations.
+        ``x = (u - knee) / u_max`` and m a sample's distance from the line in standard deviations; the share of samples
+        that drop out.
     censored : (3, C) array
         Per bin with samples below the floor their number, the floor's distance from the line in standard deviations,
         and x.
@@ -77,7 +80,8 @@ def branch_numbers(
     inside_xx = float(bins.c_uu.sum()) / u_max**2
     inside_mx = float(np.sum(bins.c_uy - shape.slope * bins.c_uu)) / (u_max * shape.sigma)
     n, n_x, n_xx, n_m, n_mx = (float(np.sum(bins.n * term)) for term in (np.ones_like(x), x, x * x, miss, miss * x))
-    numbers = np.array([per_sigma, scale[0], scale[1] / u_max, n, n_x, n_xx + inside_xx, n_m, n_mx + inside_mx])
+    sums = (n, n_x, n_xx + inside_xx, n_m, n_mx + inside_mx)
+    numbers = np.array([per_sigma, scale[0], scale[1] / u_max, *sums, shape.dropped])
     cut = bins.censored > 0
     above = bins.u_censored[cut] - shape.knee
     return numbers, np.array([bins.censored[cut], (floor - shape.slope * above) / shape.sigma, above / u_max])
@@ -119,14 +123,15 @@ def _knee_solver(branches: int, room: int, chain: tuple[int, ...]) -> "ca.Functi
     numbers, steps = ca.MX.sym("numbers", branches, NUMBERS), ca.MX.sym("steps", max(len(chain) - 1, 0), 3)
     count, depth, x = (ca.MX.sym(name, room, branches) for name in ("count", "depth", "x"))
     slopes, knees = unknown[:branches], unknown[branches:]
-    per_sigma, slope_unit, knee_unit, n, n_x, n_xx, n_m, n_mx = ca.horzsplit(numbers)
+    per_sigma, slope_unit, knee_unit, n, n_x, n_xx, n_m, n_mx, dropped = ca.horzsplit(numbers)
     steeper, later = slopes * slope_unit, knees * knee_unit
     # The line's change, in standard deviations, is tilt x + shift with x = (u - knee) / u_max.
     tilt, shift = per_sigma * steeper, -per_sigma * later * (1 + steeper)
     cost = ca.sum1((n_xx * tilt**2 + 2 * n_x * tilt * shift + n * shift**2) / 2 - n_mx * tilt - n_m * shift)
     if room:
         below = depth - x * ca.repmat(tilt.T, room, 1) - ca.repmat(shift.T, room, 1)
-        cost -= ca.dot(ca.vec(count), log_below().map(below.numel())(ca.vec(below).T).T)
+        lost = ca.vec(ca.repmat(dropped.T, room, 1))
+        cost -= ca.dot(ca.vec(count), log_shut().map(below.numel())(ca.vec(below).T, lost.T).T)
     following, before = list(chain[1:]), list(chain[:-1])
     problem = {
         "x": unknown,
@@ -150,6 +155,20 @@ def log_below() -> "ca.Function":
     middle = ca.log((1 + ca.erf(ca.fmax(depth, -TAIL_FROM) / np.sqrt(2))) / 2)
     away = ca.fmax(-depth, TAIL_FROM)
     return ca.Function("log_below", [depth], [middle + _log_tail(away) - _log_tail(TAIL_FROM)])
+
+
+@lru_cache(maxsize=1)
+def log_shut() -> "ca.Function":
+    """Return the logarithm of the probability to read below the floor: with little flow, or because a sample dropped out.
+
+    Of a meter that drops out for a share p of its samples, p + (1 - p) Phi. Without p a drop-out just above the knee
+    counts as a flow that was not there, and lifts the knee: the unsafe way.
+    """
+    import casadi as ca
+
+    depth, dropped = ca.SX.sym("depth"), ca.SX.sym("dropped")
+    below = log_below()(depth)
+    return ca.Function("log_shut", [depth, dropped], [below + ca.log(1 + dropped * (ca.exp(ca.fmin(-below, MOST)) - 1))])
 
 
 def _log_tail(away: "ca.SX | float") -> "ca.SX | float":

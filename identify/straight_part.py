@@ -19,6 +19,8 @@ from dzdesign.identify.profile import crossing, flow_at_top, smooth_profile
 
 #: A sample further than this many robust standard deviations from the line is an outlier.
 GATE = 6.0
+#: Most rounds in which outliers are left out and the line is laid anew: each finds those that the ones before hid.
+ROUNDS = 20
 #: Fewest samples for a line through noise; with fewer it goes from level to level.
 FEWEST = 5
 #: Noise below this share of the largest flow is not believed: no meter is that fine.
@@ -113,6 +115,8 @@ class GatedLine:
         Of the residuals.
     outliers : int
         Samples gated out.
+    dropped : float
+        Share of the samples that read below the floor where no flow below it is credible: drop-outs.
     """
 
     window: tuple[float, float]
@@ -127,6 +131,7 @@ class GatedLine:
     censored: np.ndarray
     roughness: Roughness
     outliers: int
+    dropped: float
 
     @property
     def knee_se(self) -> float:
@@ -181,7 +186,7 @@ def lay_line(read: ReadBranch, window: tuple[float, float]) -> GatedLine:
     slope, knee = fit_line(u[seen], y[seen])
     finest = FINEST_NOISE * read.y_max
     kept = np.ones(u.size, dtype=bool)
-    for _ in range(3):
+    for _ in range(ROUNDS):
         line, before = slope * (u - knee), kept
         miss = np.abs(y - line)
         sigma = max(1.4826 * median(miss[~censored]), finest)
@@ -209,7 +214,12 @@ def lay_line(read: ReadBranch, window: tuple[float, float]) -> GatedLine:
         censored=_among(inside, censored),
         roughness=measure_roughness(u_seen, residual),
         outliers=int((~kept).sum()),
+        dropped=_share_of_drop_outs(censored, slope * (u - knee) >= floor + GATE * sigma),
     )
+
+
+def _share_of_drop_outs(censored: np.ndarray, plain: np.ndarray) -> float:
+    return float(censored[plain].mean()) if plain.any() else 0.0
 
 
 def _among(inside: np.ndarray, chosen: np.ndarray) -> np.ndarray:
@@ -257,6 +267,7 @@ def _chord(read: ReadBranch, window: tuple[float, float]) -> GatedLine | None:
         censored=censored,
         roughness=Roughness(0, 0.0, 0.0),
         outliers=0,
+        dropped=0.0,
     )
 
 

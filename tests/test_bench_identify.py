@@ -101,3 +101,21 @@ def test_a_number_that_is_none_misses_and_intervals_hold_the_share():
     assert Row(what="x", value=float("nan"), limit=1.0).verdict == "MISSES"
     assert Row(what="x", value=1.0, limit=1.0).verdict == "holds"
     assert "0.00-0.12 %" in share_interval(0, 3000)
+
+
+class TestDropOuts:
+    """Readings that drop out just above the knee look like flow that was not there: they must not lift the bounds."""
+
+    bench = Bench(rate_Hz=100.0, pressures_MPa=(1.0, 2.0, 3.0), lag_s=0.0, drop_outs=0.1)
+
+    def failed(self):
+        outcome = run_replicates(self.bench, 24, 7, options_for(self.bench))
+        assert not outcome.refusals
+        return int((outcome.bound_excess > 0).sum())
+
+    def test_bounds_hold(self):
+        assert self.failed() == 0
+
+    def test_and_would_not_if_drop_outs_were_no_flow(self, monkeypatch):
+        monkeypatch.setattr("dzdesign.identify.straight_part._share_of_drop_outs", lambda *_: 0.0)
+        assert self.failed() >= 3

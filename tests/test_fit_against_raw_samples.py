@@ -180,6 +180,7 @@ class Shape:
     sigma: float
     y_max: float
     colour: float = 1.0
+    dropped: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)

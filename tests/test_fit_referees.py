@@ -6,7 +6,7 @@ import cvxpy
 import numpy as np
 import pytest
 from scipy.optimize import minimize
-from scipy.special import log_ndtr
+from scipy.special import log_ndtr, logsumexp
 
 from dzdesign.identify import fit
 from dzdesign.identify.branches import bin_branch
@@ -155,32 +155,41 @@ def test_monotone_knees_are_cvxpys(seed):
 
 
 def tobit_knee(read, line, shape, floor):
-    """Zero of one branch's line by the censored likelihood of its raw samples, no bins."""
+    """Zero of one branch's line by the censored likelihood of its raw samples, no bins.
+
+    A sample below the floor is one of little flow, or one that drops out.
+    """
     u, q, cut = read.branch.u[line.kept], read.y[line.kept], line.censored[line.kept]
 
     def cost(parameters):
         slope, knee = shape.slope * (1 + parameters[0]), shape.knee + parameters[1]
         miss = (q[~cut] - slope * (u[~cut] - knee)) / shape.sigma
         depth = (floor - slope * (u[cut] - knee)) / shape.sigma
-        return 0.5 * np.sum(miss**2) - np.sum(log_ndtr(depth))
+        shut = logsumexp([log_ndtr(depth), np.zeros_like(depth)], axis=0, b=[[1 - shape.dropped], [shape.dropped]])
+        return 0.5 * np.sum(miss**2) - np.sum(shut)
 
     found = minimize(cost, [0.0, 0.0], method="Nelder-Mead", options={"xatol": 1e-9, "fatol": 1e-9, "maxiter": 4000})
     assert found.success
     return shape.knee + found.x[1]
 
 
-def worst_tobit_error(seed, floor=0.6):
+def worst_tobit_error(seed, floor=0.6, dropping=0.0):
     # From 1 % of the largest flow up, well below the floor, so that censored samples weigh.
     window = (0.01, 0.5)
     group, _ = described(floor=floor, seed=seed)
-    worst, cut = 0.0, 0
+    worst, cut, rng = 0.0, 0, np.random.default_rng(seed)
     for item in group.tests:
         for branch in item.branches:
+            q = np.where(rng.random(branch.q.size) < dropping, 0.0, branch.q)
+            branch = replace(branch, q=q)
             read = read_branch(branch, branch.q, u_max=U_MAX, floor=group.floor, source="")
             line = lay_line(read, window)
             kept = line.kept
             bins = bin_branch(branch.u[kept], read.y[kept], line.censored[kept], U_MAX)
-            shape = replace(item.shapes[0], bins=bins, slope=line.slope, knee=line.knee, sigma=line.sigma)
+            assert (line.dropped > 0) == (dropping > 0)
+            shape = replace(
+                item.shapes[0], bins=bins, slope=line.slope, knee=line.knee, sigma=line.sigma, dropped=line.dropped
+            )
             found = fit_knees([(shape, None)], floor=group.floor, u_max=U_MAX, trend="flat")
             worst = max(worst, abs(found.knee[0, 0] - tobit_knee(read, line, shape, group.floor)))
             cut += int(bins.censored.sum())
@@ -191,6 +200,17 @@ def worst_tobit_error(seed, floor=0.6):
 def test_bins_lose_nothing_against_all_samples(seed):
     worst, cut = worst_tobit_error(seed)
     assert worst < 5e-6 and cut > 30
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_nor_with_drop_outs(seed):
+    worst, cut = worst_tobit_error(seed, dropping=0.05)
+    assert worst < 5e-6 and cut > 60
+
+
+def test_the_referee_sees_drop_outs_taken_for_no_flow(monkeypatch):
+    monkeypatch.setattr(fit, "branch_numbers", lambda shape, *others: original(replace(shape, dropped=0.0), *others))
+    assert worst_tobit_error(0, dropping=0.05)[0] > 5e-4
 
 
 def test_the_referee_sees_a_missing_term(monkeypatch):
