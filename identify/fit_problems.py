@@ -159,7 +159,7 @@ def log_below() -> "ca.Function":
 
 @lru_cache(maxsize=1)
 def log_shut() -> "ca.Function":
-    """Return the logarithm of the probability to read below the floor: with little flow, or because a sample dropped out.
+    """Return the logarithm of the probability to read below the floor: of little flow, or because a sample dropped out.
 
     Of a meter that drops out for a share p of its samples, p + (1 - p) Phi. Without p a drop-out just above the knee
     counts as a flow that was not there, and lifts the knee: the unsafe way.
@@ -168,7 +168,8 @@ def log_shut() -> "ca.Function":
 
     depth, dropped = ca.SX.sym("depth"), ca.SX.sym("dropped")
     below = log_below()(depth)
-    return ca.Function("log_shut", [depth, dropped], [below + ca.log(1 + dropped * (ca.exp(ca.fmin(-below, MOST)) - 1))])
+    more = dropped * (ca.exp(ca.fmin(-below, MOST)) - 1)
+    return ca.Function("log_shut", [depth, dropped], [below + ca.log(1 + more)])
 
 
 def _log_tail(away: "ca.SX | float") -> "ca.SX | float":

@@ -6,6 +6,8 @@ from dzdesign.identify.branches import bin_index
 
 #: Share of the command's range, from the top, over which the largest flow is read.
 TOP = 0.05
+#: Points off that line by more than so many robust standard deviations, and this share of the flow, are left out.
+TOP_GATE, SMALLEST_MISS = 6.0, 0.05
 #: A step between two points of a profile is a hole, rows that are missing, beyond so many usual steps, and this share
 #: of u_max.
 USUAL_STEPS, SMALLEST_HOLE = 4.0, 2e-3
@@ -63,10 +65,21 @@ def hole_within(u: np.ndarray, low: float, high: float, u_max: float) -> tuple[f
 
 
 def flow_at_top(u_profile: np.ndarray, y_profile: np.ndarray) -> float:
-    """Return the flow at the largest command: the line through the top `TOP` of its range, read at the end."""
+    """Return the flow at the largest command: the line through the top `TOP` of its range, read at the end.
+
+    Points that lie off the others' line are left out: a run of drop-outs is as long as a bin or two.
+    """
     top = u_profile >= u_profile[-1] - TOP * np.ptp(u_profile)
     u, y = u_profile[top], y_profile[top]
     if u.size < 5:
         return float(np.median(y))
-    slope = np.sum((u - u.mean()) * (y - y.mean())) / np.sum((u - u.mean()) ** 2)
-    return float(y.mean() + slope * (u_profile[-1] - u.mean()))
+    # First a line that a quarter of the points can't move, by the medians of the slopes over half of the range.
+    half = u.size // 2
+    rough = np.median((y[half:] - y[: u.size - half]) / (u[half:] - u[: u.size - half]))
+    miss = y - rough * u
+    miss = np.abs(miss - np.median(miss))
+    kept = miss <= max(TOP_GATE * 1.4826 * np.median(miss), SMALLEST_MISS * float(np.median(y)))
+    u, y = u[kept], y[kept]
+    u_mean, y_mean = u.mean(), y.mean()
+    slope = np.sum((u - u_mean) * (y - y_mean)) / np.sum((u - u_mean) ** 2)
+    return float(y_mean + slope * (u_profile[-1] - u_mean))

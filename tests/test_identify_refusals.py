@@ -75,7 +75,15 @@ def test_a_refused_rise_is_said_beside_what_was_expected():
 
 def test_spikes_of_the_flow_that_leave_no_rise_are_refused():
     with pytest.raises(InputError, match="does not rise with the command; look for spikes"):
-        identify([with_share(synthetic_ramp(1.0, Truth()), "q", 0.1, 999 * L_MIN)])
+        identify([with_share(synthetic_ramp(1.0, Truth()), "q", 0.15, 30 * L_MIN)])
+
+
+@pytest.mark.parametrize("share", [0.02, 0.05, 0.1])
+def test_fewer_spikes_move_neither_the_knee_nor_the_flow_at_full_command(share):
+    plain = synthetic_ramp(1.0, Truth())
+    clean, spoilt = (identify([test]).positive.tests[0] for test in (plain, with_share(plain, "q", share, 999 * L_MIN)))
+    assert spoilt.u_knee_falling_V == pytest.approx(clean.u_knee_falling_V, abs=1e-3)
+    assert spoilt.q_max_L_min == pytest.approx(clean.q_max_L_min, rel=0.01)
 
 
 def test_drop_outs_of_the_command_that_leave_no_ramp_are_refused():

@@ -9,7 +9,7 @@ from dzdesign.identify import straight_part
 from dzdesign.identify.described_tests import describe_tests
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.profile import crossing
+from dzdesign.identify.profile import crossing, flow_at_top
 from tests.synthetic import L_MIN, Truth, synthetic_ramp
 
 PRESSURES = (0.5, 1.0, 2.0, 3.0, 4.0, 5.0)
@@ -69,6 +69,17 @@ def test_drop_outs_do_not_move_a_crossing():
     spoiled[900:904] = 0.0  # four bins in a row without flow, far above
     spoiled[100] = 3.0
     assert crossing(u, spoiled, 1.0) == pytest.approx(crossing(u, y, 1.0)) == pytest.approx(6.0, abs=0.01)
+
+
+def test_drop_outs_do_not_lower_the_flow_at_full_command():
+    """Two runs of zeros, each as long as two bins, near the end; and one that the ramp's last bins are."""
+    u = np.linspace(0.0, 10.0, 1000)
+    flow = np.maximum(u - 5.0, 0.0) + 0.01 * np.random.default_rng(4).standard_normal(u.size)
+    for lost in ((970, 974, 985, 989), (996, 1000)):
+        y = flow.copy()
+        for start, stop in zip(lost[::2], lost[1::2], strict=True):
+            y[start:stop] = 0.0
+        assert flow_at_top(u, y) == pytest.approx(5.0, abs=0.02)
 
 
 class TestTables:

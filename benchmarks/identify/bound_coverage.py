@@ -7,6 +7,9 @@ from scoreboard import Row, print_rows, say, share_interval
 
 NOISES = {"white": 0.0, "AR(1) 0.9": 0.9, "AR(1) 0.99": 0.99}
 RATES_Hz = (100.0, 25.0)
+CASES = {f"{name}, {rate:g} Hz": {"ar": ar, "rate_Hz": rate} for rate in RATES_Hz for name, ar in NOISES.items()}
+#: In runs of ten readings, as a logger loses them that is busy.
+CASES["white, 100 Hz, 5 % of the readings drop out"] = {"drop_outs": 0.05}
 LIMIT, RESIDUAL_LIMIT = 1.0, 0.8
 #: The worst meter zero inside the declared budget: it hides flow, so that the threshold seems higher, L/min.
 BUDGET = 0.15
@@ -16,12 +19,10 @@ def print_coverage(*, quick: bool, seed: int) -> list[Row]:
     """Print and return the rows of part 2a; each as it comes, since all of them take an hour and a half."""
     count = 40 if quick else 3000
     rows = []
-    for rate in RATES_Hz:
-        for name, ar in NOISES.items():
-            bench = Bench(ar=ar, rate_Hz=rate)
-            say(f"coverage: {name} at {rate:g} Hz, {count} replicates")
-            rows.append(_failures(f"{name}, {rate:g} Hz: bound above the truth", bench, count, seed))
-            say(f"coverage: {rows[-1].what}: {rows[-1].value:.2g} %; {rows[-1].note}")
+    for name, changes in CASES.items():
+        say(f"coverage: {name}, {count} replicates")
+        rows.append(_failures(f"{name}: bound above the truth", Bench(**changes), count, seed))
+        say(f"coverage: {rows[-1].what}: {rows[-1].value:.2g} %; {rows[-1].note}")
     print_rows(f"2a. Simultaneous 99 % lower bound fails (seed {seed}; correlation is per sample)", rows)
     return rows
 
