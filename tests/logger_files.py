@@ -116,6 +116,13 @@ def with_a_foot():
     return text("Zeit;u;dP;Q", "[s];[V];[bar];[l/min]", *table, "", "Ende der Messung;;;", "Datei geschlossen", "\x1a")
 
 
+def with_statistics():
+    """What a measuring program sums up below the samples, in numbers and in their columns."""
+    words = ("Mittelwert", "Min.", "Maximum:", "StdAbw", "Std. Dev.", "Effektivwert [RMS]", "peak-to-peak")
+    sums = [f"{word};5,0;20,1;9,9" for word in words]
+    return text("t_s;u_V;dP_bar;Q_Lmin", *rows(TIME, U, 10 * DP, Q), "", *sums, ";;;;")
+
+
 def header_again():
     """A logger that writes its heading again whenever a page is full."""
     head, units, table = "t;u;dP;Q", "s;V;bar;l/min", rows(TIME, U, 10 * DP, Q)
@@ -199,6 +206,7 @@ FILES: dict[str, tuple[Callable[[], bytes], tuple[str, ...]]] = {
     "times of day": (stamped("%H:%M:%S."), ()),
     "over midnight": (over_midnight, ()),
     "a foot": (with_a_foot, ()),
+    "statistics": (with_statistics, ()),
     "the header again": (header_again, ()),
     "blank lines": (blank_lines, ()),
     "numpy.savetxt": (saved_by_numpy, ()),

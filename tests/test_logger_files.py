@@ -122,7 +122,9 @@ def test_told_that_nothing_stands_above_the_first_line_is_the_header(here):
     ("where", "line", "words"),
     [
         (400, "Pause;;;", "row 401, column 't_s': 'Pause' is not a number"),
-        (400, "Pause", "row 401 has 1 cells, expected 4"),
+        (400, "Pause", "row 401 has 1 cell, 'Pause', expected 4 as in the header"),
+        (1001, "40,0", "row 1002 has 1 cell, '40,0', expected 4 as in the header, row 1 ('t_s, u_V, dP_MPa, Q_Lmin'); "
+         "complete the row, or delete it"),
         (1, "0,0;1,0", "row 2 has 2 cells, expected 4"),
         (1001, "40,0;1,0", "row 1002 has 2 cells, expected 4"),
         (900, "x;1,0;2,0;3,0", "row 901, column 't_s': 'x' is not a number"),
@@ -131,6 +133,16 @@ def test_told_that_nothing_stands_above_the_first_line_is_the_header(here):
 def test_a_wrong_row_among_samples_is_found(here, where, line, words):
     lines = ["t_s;u_V;dP_MPa;Q_Lmin", *rows(TIME, U, DP, Q)]
     assert words in refusal(text(*lines[:where], line, *lines[where:]))
+
+
+def test_statistics_below_the_samples_are_said_and_those_amid_them_are_refused(here, caplog):
+    lines = ["t_s;u_V;dP_MPa;Q_Lmin", *rows(TIME, U, DP, Q)]
+    with caplog.at_level(logging.DEBUG, "dzdesign"):
+        assert_is_the_ramp(read(text(*lines, "Mittelwert;5,0;2,0;9,9", "Max;10,0;2,1;21")))
+    assert "row 1002 is passed over: Mittelwert 5,0 2,0 9,9" in caplog.text and "row 1003" in caplog.text
+    message = refusal(text(*lines, "Mittelwert;5,0;2,0;9,9", *lines[-3:], "Ende"))
+    assert "row 1002 has a statistic, 'Mittelwert', and samples below it" in message
+    assert "row 1002, column 't_s': 'Mitte' is not a number" in refusal(text(*lines, "Mitte;5,0;2,0;9,9"))
 
 
 @pytest.mark.parametrize("cell", ["#N/A", "#NV", "#DIV/0!", "#WERT!", '"#N/A"', " #NAME?"])
