@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 from dzdesign.core.artefacts import check_file_may_be_written, to_json, write_file
 from dzdesign.core.errors import InputError
-from dzdesign.core.units import parse_quantity
 from dzdesign.init_file import CHECK_DP, options_file
 from dzdesign.progress import say, stages, with_bar
 from dzdesign.recordings import expand, read_recordings, rows_to_skip
@@ -24,8 +23,8 @@ PLACES = tuple(
     for folder in ("ramps/", "")
     for ending in ("csv", "csv.gz", "txt", "tdms", "mat", "h5", "hdf5", "parquet", "feather")
 )
-#: A pressure in a file's name and one in its column that differ by no more than this factor are one.
-SAME_PRESSURE = 1.5
+#: Files that a line names.
+NAMED_FILES = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -157,7 +156,8 @@ def _look(
 ) -> tuple[Look, list[str]]:
     """Return what was seen, and what is open."""
     from dzdesign.identify.column_labels import PER_CENT, parse_columns
-    from dzdesign.identify.first_look import guess_columns, is_per_cent, look_at_sides, pressure_in_name, proposed_u_max
+    from dzdesign.identify.first_look import guess_columns, is_per_cent, look_at_sides, proposed_u_max
+    from dzdesign.identify.named_pressure import pressure_in_name
 
     given = parse_columns(said_columns) if said_columns else {}
     guesses = [guess_columns(path, skip_rows) for path in with_bar(paths, "looking at columns")]
@@ -169,8 +169,6 @@ def _look(
         return nothing, list(dict.fromkeys(opens))
     names = [path.as_posix() for path in paths]
     tests = read_recordings(names, u_max=10.0, columns=columns or None, dp=said_dp, skip_rows=skip_rows)
-    if "dP" in columns and "dP" not in given:
-        opens += _contradicted(tests, columns["dP"])
     dp = said_dp if isinstance(said_dp, dict) else {test.source: said_dp for test in tests} if said_dp else {}
     lacking = [test.source for test in tests if test.dp is None]
     if lacking:
@@ -191,6 +189,8 @@ def _look(
     chosen_in_per_cent = columns.get("u", "").rstrip(" ])").endswith(PER_CENT)
     if chosen_in_per_cent or ("u" not in columns and any(is_per_cent(guess.understood.get("u")) for guess in guesses)):
         u_max, u_seen = 10.0, None
+    contradicted, doubts = _contradicted(tests, u_max, columns["dP"] if "dP" in columns and "dP" not in given else "")
+    opens, notes = opens + contradicted, notes + doubts
     sides, refused = {}, {}
     if not opens:
         with stages() as stage:
@@ -231,21 +231,36 @@ def _columns(
     return columns, opens, list(dict.fromkeys(notes))
 
 
-def _contradicted(tests: "list[RampTest]", label: str) -> list[str]:
-    """Return what is open where a file's name says another pressure than its column."""
-    from dzdesign.identify.first_look import pressure_in_name
+def _contradicted(tests: "list[RampTest]", u_max: float, guessed: str) -> tuple[list[str], list[str]]:
+    """Return what is open, and what is only to be said, where a file's name says another pressure than its column.
 
-    opens = []
-    for test in tests:
-        stated = pressure_in_name(test.source)
-        said = parse_quantity(stated, "pressure", "a file's name") if stated else None
-        found = float(median(test.dp.tolist())) if test.dp is not None else None
-        if said and found is not None and not said / SAME_PRESSURE < found < said * SAME_PRESSURE:
-            opens.append(
-                f"column of dP: '{test.source}' says {stated} in its name, and {found / 1e6:.3g} MPa in '{label}', the "
-                "only column in a unit of pressure; declare the one that is the drop, by --columns or --dp"
-            )
-    return opens
+    `guessed` is the label of a column that was taken for the drop because of its unit alone, or empty: then the column
+    says itself that it is the drop, and the name may be of another pressure.
+    """
+    from dzdesign.identify.model import SIDES
+    from dzdesign.identify.named_pressure import contradicts
+    from dzdesign.identify.recording_quality import about_a_stuck_sensor
+    from dzdesign.identify.sides import tests_of_side
+
+    measured = [
+        (test.source, median(test.dp.tolist())) for test in tests if test.dp is not None and not test.dp_is_declared
+    ]
+    wrong = [(source, stated, dp / 1e6) for source, dp in measured if (stated := contradicts(source, dp))]
+    if guessed:
+        return [
+            f"column of dP: '{source}' says {stated} in its name, and {dp_MPa:.3g} MPa in '{guessed}', the only column "
+            "in a unit of pressure; declare the one that is the drop, by --columns or --dp"
+            for source, stated, dp_MPa in wrong
+        ], []
+    said = [f"'{source}' holds {dp_MPa:.3g} MPa" for source, _, dp_MPa in wrong[:NAMED_FILES]]
+    more = f" and {len(wrong) - NAMED_FILES} more" if len(wrong) > NAMED_FILES else ""
+    notes = [
+        f"CHECK: a name says another pressure drop than the column: {', '.join(said)}{more}; the sensor is stuck, the "
+        "unit is wrong, or the name is of another pressure"
+    ]
+    sides = [tests_of_side(tests, sign, u_max) for sign in SIDES.values()]
+    stuck = [f"CHECK: {warning.text}" for mine in sides for warning in about_a_stuck_sensor(mine)]
+    return [], stuck or (notes if wrong else [])
 
 
 def _pressures(guesses: "list[GuessedColumns]", columns: dict[str, str]) -> tuple[list[str], list[str]]:

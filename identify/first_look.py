@@ -35,14 +35,11 @@ from dzdesign.identify.table import Table
 
 #: Full commands that amplifiers have, V: the smallest that the recordings do not exceed by 5 % is proposed.
 USUAL_U_MAX = (1.0, 2.5, 3.3, 5.0, 10.0, 12.0, 15.0, 20.0, 24.0, 48.0)
-#: A pressure drop in the name of a file.
-PRESSURE_IN_NAME = re.compile(r"(?<![\d.])(\d+(?:[.,]\d+)?)[\s_]*(MPa|bar|kPa|psi)(?![A-Za-z])", re.IGNORECASE)
 #: A label that may be a pressure's, and has no unit: p1, P_in, Druck A, but neither pos nor PWM.
 PRESSURE_LIKE = re.compile(
     r"(?:[dΔδ]|delta|diff)?[\s_.-]?p[\s_.-]?(?:[abpst]|in|out|\d{1,2})?|[^\[(]{0,20}(?:press|druck)[^\[(]{0,20}",
     re.IGNORECASE,
 )
-UNITS_IN_NAMES = {"mpa": "MPa", "bar": "bar", "kpa": "kPa", "psi": "psi"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -205,19 +202,6 @@ def _fits(table: Table, label: str, quantity: str) -> bool:
 
 def _names_of(quantity: str) -> list[str]:
     return [name for name, its in COLUMN_NAMES.items() if its == quantity and len(name) > 1]
-
-
-def pressure_in_name(name: str) -> str | None:
-    """Return the one pressure that a file's name states, such as ``4 MPa``, or None.
-
-    Examples
-    --------
-    >>> pressure_in_name("ramp_4MPa_2.csv"), pressure_in_name("ramp_2.csv")
-    ('4 MPa', None)
-    """
-    stated = PRESSURE_IN_NAME.findall(name)
-    found = {(number.replace(",", "."), UNITS_IN_NAMES[unit.lower()]) for number, unit in stated}
-    return " ".join(found.pop()) if len(found) == 1 else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,7 +10,8 @@ import pytest
 from synthetic import L_MIN, MPA, Truth, synthetic_ramp
 
 from dzdesign.cli import main
-from dzdesign.identify.first_look import guess_columns, pressure_in_name
+from dzdesign.identify.first_look import guess_columns
+from dzdesign.identify.named_pressure import pressure_in_name
 
 LABELS = "Zeit (s),AO0 [V],Durchfluss [L/min],Temp [degC]"
 
@@ -220,6 +221,24 @@ def test_a_pressure_from_a_name_is_said_and_units_as_people_write_them(here, cap
     assert tomllib.loads(text)["dp"] == {"ramp_4MPa.csv": "4 MPa"}
     assert valve["sides"]["positive"]["tests"][0]["dp_MPa"] == 4.0
     assert '# Q = "Q_Lmin"  (in L/min; understood by its label)' in text
+
+
+@pytest.mark.parametrize("dither", [0.0, 0.006])
+def test_names_that_contradict_the_column_are_said(here, capsys, dither):
+    """A sensor that is stuck at 1 MPa: by one recording the name tells it, by several the flows as well."""
+    for number in (1, 2, 5):
+        time, u, _, q = columns_of(float(number))
+        stuck = 1.0 + dither * np.random.default_rng(number).integers(-1, 2, u.size)
+        write(f"ramp_{number}MPa.csv", "t_s,u_V,dP_MPa,Q_Lmin", time, u, stuck, q * number**0.5)
+    assert main(["init", "ramp_5MPa.csv", "-o", "one.toml"]) == 0
+    said = capsys.readouterr().out
+    assert "CHECK: a name says another pressure drop than the column: 'ramp_5MPa.csv' holds 1 MPa; the sensor" in said
+    assert "# CHECK: a name says another" in Path("one.toml").read_text()
+    assert main(["init", "ramp_5MPa.csv", "ramp_1MPa.csv", "ramp_2MPa.csv", "-o", "three.toml"]) == 0
+    said = capsys.readouterr().out
+    assert "and the files' names say different ones: the sensor is stuck" in said and said.count("CHECK") == 1
+    assert main(["init", "ramp_1MPa.csv", "-o", "right.toml"]) == 0
+    assert "CHECK" not in capsys.readouterr().out
 
 
 def test_several_recordings_without_a_pressure_are_open(here, capsys):
