@@ -41,6 +41,8 @@ class Look:
         Of the tables [columns] and [dp] to write.
     u_max, u_seen : float
         Full command to declare and the largest seen, V.
+    in_per_cent : bool
+        True if the command is, so that full command can't be seen.
     sides, refused : dict
         As `look_at_sides` gives them.
     notes : tuple of str
@@ -55,6 +57,7 @@ class Look:
     dp: dict[str, str]
     u_max: float = 10.0
     u_seen: float | None = None
+    in_per_cent: bool = False
     sides: "dict[str, SeenSide]"
     refused: dict[str, str]
     notes: tuple[str, ...] = ()
@@ -187,8 +190,12 @@ def _look(
     u_max, u_seen = proposed_u_max(tests)
     # A label that was chosen ends in its unit: Sollwert [%]
     chosen_in_per_cent = columns.get("u", "").rstrip(" ])").endswith(PER_CENT)
-    if chosen_in_per_cent or ("u" not in columns and any(is_per_cent(guess.understood.get("u")) for guess in guesses)):
+    in_per_cent = chosen_in_per_cent or (
+        "u" not in columns and any(is_per_cent(guess.understood.get("u")) for guess in guesses)
+    )
+    if in_per_cent:
         u_max, u_seen = 10.0, None
+        notes.append('full command: in per cent, so not recorded; u-max = "10 V" is a guess, correct it')
     contradicted, doubts = _contradicted(tests, u_max, columns["dP"] if "dP" in columns and "dP" not in given else "")
     opens, notes = opens + contradicted, notes + doubts
     sides, refused = {}, {}
@@ -200,8 +207,8 @@ def _look(
         opens = [f"identify would refuse these recordings: {next(iter(refused.values()))}"]
     return (
         Look(
-            paths=paths, guesses=guesses, columns=columns, dp=dp, u_max=u_max, u_seen=u_seen, sides=sides,
-            refused=refused, notes=tuple(notes), skip_rows=skip_rows,
+            paths=paths, guesses=guesses, columns=columns, dp=dp, u_max=u_max, u_seen=u_seen,
+            in_per_cent=in_per_cent, sides=sides, refused=refused, notes=tuple(notes), skip_rows=skip_rows,
         ),
         opens,
     )  # fmt: skip
@@ -298,7 +305,7 @@ def _said(name: str, side: "SeenSide") -> str:
     pressures = ", ".join(f"{dp:.3g}" for dp in side.dp_MPa if dp is not None)
     where = f"{pressures} MPa" if pressures else "an unknown pressure drop"
     rate = "" if side.rate_V_s is None else f", at most {side.rate_V_s:.3g} V/s"
-    floor = f"the meter starts at {side.floor_L_min:.2f} L/min" if side.floor_L_min else "the meter has no floor"
+    floor = f"meter floor {side.floor_L_min:.2f} L/min" if side.floor_L_min else "no meter floor is seen"
     return (
         f"{name} commands: {side.ramps} ramp{'s' if side.ramps > 1 else ''} at {where}{rate}, "
         f"up to {side.q_max_L_min:.3g} L/min; {floor}"

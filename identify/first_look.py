@@ -59,6 +59,8 @@ class GuessedColumns:
     bare_pressures : dict
         Label that looks like a pressure and has no unit -> the quantity that it says ("" if none), where no pressure
         drop was understood.
+    pressures : tuple of str
+        Labels in a unit of pressure that say no quantity, where no pressure drop was understood.
     """
 
     labels: tuple[str, ...]
@@ -66,6 +68,7 @@ class GuessedColumns:
     chosen: dict[str, str]
     unclear: dict[str, str]
     bare_pressures: dict[str, str]
+    pressures: tuple[str, ...] = ()
 
 
 def guess_columns(path: Path, skip_rows: int | None = None) -> GuessedColumns:
@@ -90,18 +93,33 @@ def guess_columns(path: Path, skip_rows: int | None = None) -> GuessedColumns:
         except InputError:
             return _guess(table)
     bare = {quantity: column for quantity, column in understood.items() if not column.unit}
+    foreign = {
+        quantity: column
+        for quantity, column in understood.items()
+        if column.unit and not fits(column.unit, quantity) and quantity not in bare
+    }
     chosen, unclear = _foreign_pressures(table, understood)
     return GuessedColumns(
         labels=table.labels,
-        understood={quantity: column for quantity, column in understood.items() if column.unit},
+        understood={name: column for name, column in understood.items() if name not in bare.keys() | foreign.keys()},
         chosen=chosen,
         unclear=unclear
         | {
             quantity: f"'{column.label}' has no unit; give it after a colon, such as {EXAMPLE_UNITS[quantity]}"
             for quantity, column in bare.items()
-        },
+        }
+        | {quantity: _no_unit_of_it(quantity, column) for quantity, column in foreign.items()},
         bare_pressures=_bare_pressures(table, understood.keys() - bare.keys()),
+        pressures=_foreign(table, understood),
     )
+
+
+def _no_unit_of_it(quantity: str, column: Column) -> str:
+    """Return what is unclear of a column whose label says a quantity, and a unit that is none of it."""
+    words = f"'{column.label}' is in {column.unit}, which is no unit of {QUANTITY_OF_COLUMN[quantity]}"
+    if quantity != "time" and any(measures(column.unit, kind) for kind in ("current", "voltage")):
+        return f"{words}; say what the signal means, {range_example(quantity, column.label, column.unit)}"
+    return f"{words}; choose another column, or convert it"
 
 
 def _guess(table: Table) -> GuessedColumns:
@@ -131,8 +149,14 @@ def _guess(table: Table) -> GuessedColumns:
     its_pressure, its_doubt = _foreign_pressures(table, understood)
     return GuessedColumns(
         labels=table.labels, understood=understood, chosen=chosen | its_pressure, unclear=unclear | its_doubt,
-        bare_pressures=_bare_pressures(table, understood.keys()),
+        bare_pressures=_bare_pressures(table, understood.keys()), pressures=_foreign(table, understood),
     )  # fmt: skip
+
+
+def _foreign(table: Table, understood: Mapping[str, Column]) -> tuple[str, ...]:
+    """Return the labels in a unit of pressure that were not understood."""
+    labels = [column.label for column in understood.values()]
+    return tuple(label for label in table.labels if label not in labels and _fits(table, label, "dP"))
 
 
 def _foreign_pressures(table: Table, understood: Mapping[str, Column]) -> tuple[dict[str, str], dict[str, str]]:
@@ -143,14 +167,14 @@ def _foreign_pressures(table: Table, understood: Mapping[str, Column]) -> tuple[
     if "dP" in understood or {"pA", "pB"} <= understood.keys():
         return {}, {}
     port = next((understood[name].label for name in ("pA", "pB") if name in understood), None)
-    labels = [column.label for column in understood.values()]
-    left = [label for label in table.labels if label not in labels and _fits(table, label, "dP")]
+    left = list(_foreign(table, understood))
     if port is not None:
         return {}, {"dP": f"'{port}' is the pressure of one port; which column is that of the other, or the drop?"}
     if len(left) == 1:
         return {"dP": left[0]}, {}
     if left:
-        return {}, {"dP": f"{' and '.join(map(repr, left))}: a pressure, but is it the drop, pA or pB?"}
+        ports = f' If one stands on either side: --columns "pA={left[0]}, pB={left[1]}"' if len(left) == 2 else ""
+        return {}, {"dP": f"{' and '.join(map(repr, left))}: a pressure, but is it the drop, pA or pB?{ports}"}
     signals = [label for label in _signals(table) if PRESSURE_LIKE.fullmatch(re.split(r"[\[(/]", label)[0].strip())]
     if signals:
         example = range_example("dP", signals[0], _unit_of(table, signals[0]))
