@@ -48,8 +48,10 @@ UNIT = re.compile(rf"{FACTOR}(?:\s*[*/·\s]\s*{FACTOR})*")
 LONGEST_UNIT, LONGEST_QUANTITY = 40, 200
 #: Of units in which valves are measured; a mistyped one is looked for under each.
 PREFIXES = ("", "m", "k", "M", "milli", "kilo", "mega")
-#: May be 2000 or 2.0: a comma before three digits.
-THOUSANDS = re.compile(r"(?<!\d)(?<!\d[.,])[1-9]\d{0,2},\d{3}(?!,?\d)", re.ASCII)
+#: May be 2000 or 2.0: a comma, or a point, before three digits.
+THOUSANDS = {
+    mark: re.compile(rf"(?<!\d)(?<!\d[.,])[1-9]\d{{0,2}}[{mark}]\d{{3}}(?!,?\d)", re.ASCII) for mark in (",", ".")
+}
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", re.ASCII)
 
 
@@ -138,7 +140,7 @@ def _near_unit(unit: str, quantity: str) -> str:
     return ""
 
 
-def refuse_thousands(text: str, what: str) -> None:
+def refuse_thousands(text: str, what: str, *, points: bool = False) -> None:
     """Refuse a number whose comma may be a decimal one or stand between thousands.
 
     Parameters
@@ -147,15 +149,17 @@ def refuse_thousands(text: str, what: str) -> None:
         In which the number stands.
     what : str
         Begins the message, such as ``--dp is '2,000 kPa'``.
+    points : bool
+        Whether a point is in doubt too, as in a range that is copied from a data sheet: ``0..25.000 kPa``.
 
     Raises
     ------
     InputError
         If a comma stands before three digits, as in ``2,000``; ``0,125`` and ``2,0`` can only be decimals.
     """
-    found = THOUSANDS.search(text)
+    found = THOUSANDS[","].search(text) or (THOUSANDS["."].search(text) if points else None)
     if found:
-        whole, decimal = found[0].replace(",", ""), float(found[0].replace(",", "."))
+        whole, decimal = re.sub("[.,]", "", found[0]), float(found[0].replace(",", "."))
         raise InputError(f"{what}: '{found[0]}' may be {whole} or {decimal}; write {whole} or {decimal}")
 
 

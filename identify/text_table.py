@@ -3,6 +3,7 @@
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, final
 
 import numpy as np
@@ -76,7 +77,8 @@ class TextTable(Table):
         numbers = self.cells.to_series(self.labels.index(label))
         if numbers.dtype == pl.Float64 and not (self.marks.has_commas(label) and b"." in self.plain):
             read = numbers.fill_null(np.nan).to_numpy().copy()
-            self.marks.see_points(label, read, lambda: self._first_cells(label), self.place)
+            first, one = partial(self._first_cells, label), partial(self.cell, label)
+            self.marks.see_points(label, read, first, one, self.place)
             return read
         texts = self._texts(label)
         column = self.marks.with_points(label, texts, self.place)

@@ -235,6 +235,21 @@ def test_thousands_that_look_like_decimals_in_another_block(here, monkeypatch):
     assert read(text(labels, *halves[:1000], *later)).dp[[0, -1]] == pytest.approx([2000.5e3, 2001e3])
 
 
+def test_thousands_beside_whole_numbers_below_them_are_refused(here):
+    """998 and 1.001 kPa: no column shows a comma, and read as decimals the pressure would fall to a thousandth."""
+    pressures = [f"{996 + index % 9:,}".replace(",", ".") for index in range(TIME.size)]
+    lines = rows(TIME, U, pressures, Q, comma=False)
+    message = refusal(text("t_s;u_V;dP_kPa;Q_Lmin", *lines))
+    assert "row 7, column 'dP_kPa': '1.001' stands in one column with '999', so it may be 1001 or a decimal" in message
+
+
+@pytest.mark.parametrize("cells", [("1.999", "2", "2.001"), ("150", "150.125", "149.875"), ("2.001", "2.000", "2.002")])
+def test_whole_numbers_beside_decimals_of_their_size_stay(here, cells):
+    pressures = [cells[index % 3] for index in range(TIME.size)]
+    test = read(text("t_s;u_V;dP_bar;Q_Lmin", *rows(TIME, U, pressures, Q, comma=False)))
+    np.testing.assert_allclose(test.dp[:3], [1e5 * float(cell) for cell in cells])
+
+
 @pytest.mark.parametrize("separator", [",", ";", "\t"])
 def test_three_digits_behind_a_point_stay_decimals(here, monkeypatch, separator):
     labels = separator.join(["t_s", "u_V", "dP_MPa", "Q_Lmin"])
@@ -332,6 +347,8 @@ def test_whole_numbers_without_a_unit_that_can_only_be_milliseconds(here, capsys
         ("4..20 mA = 0..50 bar", "'bar' is not a unit of flow"),
         ("4..20 s = 0..50 L/min", "'s' is no unit of a transmitter's signal"),
         ("4..4 mA = 0..50 L/min", "has no width"),
+        ("4..20 mA = 0..25.000 mL/min", "'25.000' may be 25000 or 25.0; write 25000 or 25.0"),
+        ("4..20 mA = 0..25,000 mL/min", "'25,000' may be 25000 or 25.0; write 25000 or 25.0"),
         ("4..20 mA = 0..50,000 mL/min", "'50,000' may be 50000 or 50.0; write 50000 or 50.0"),
     ],
 )
