@@ -27,6 +27,8 @@ GROUPED = {
 #: Numbers with one mark, and those of them whose mark may be one between thousands; 0.123 can't.
 WITH_MARK = {".": r"^[-+]?\d*\.\d*(?:[eE][-+]?\d+)?$", ",": r"^[-+]?\d*,\d*(?:[eE][-+]?\d+)?$"}
 DOUBTFUL = {".": r"^[-+]?[1-9]\d{0,2}(?:\.\d{3})+$", ",": r"^[-+]?[1-9]\d{0,2}(?:,\d{3})+$"}
+#: What stands between thousands and is no decimal mark anywhere: a blank, a narrow or hard one, an apostrophe.
+BETWEEN_THOUSANDS = " \u00a0\u202f'\u2019"
 OTHER = {".": ",", ",": "."}
 NAMES = {".": "points", ",": "commas"}
 #: Rows at the beginning of a block that mostly tell.

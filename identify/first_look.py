@@ -14,6 +14,7 @@ import numpy as np
 from dzdesign.core.artefacts import open_bytes
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.units import measures
+from dzdesign.identify.clock import is_milliseconds
 from dzdesign.identify.column_labels import (
     COLUMN_NAMES,
     EXAMPLE_UNITS,
@@ -136,8 +137,10 @@ def _guess(table: Table) -> GuessedColumns:
         if quantity in understood:
             continue
         left = [label for label in table.labels if label not in taken and _fits(table, label, quantity)]
-        if quantity == "time" and not left:
-            left = [label for label in table.labels if label not in taken and _is_clock(table, label)]
+        if quantity == "time":
+            clocks = [label for label in table.labels if label not in taken and _is_clock(table, label)]
+            # Milliseconds beside a clock are its fractions.
+            left = [label for label in left if not (clocks and is_milliseconds(label))] or clocks
         named = [label for label in left if nearest(re.split(r"[_\[( ]", label)[0], _names_of(quantity))]
         if len(left) == 1 or len(named) == 1:
             chosen[quantity] = (left if len(left) == 1 else named)[0]
@@ -145,7 +148,10 @@ def _guess(table: Table) -> GuessedColumns:
         elif left:
             unclear[quantity] = f"{' and '.join(map(repr, left))} could each be it, by their units"
         else:
-            unclear[quantity] = f"no column has a unit of {QUANTITY_OF_COLUMN[quantity]}{_or_a_signal(table, quantity)}"
+            kind = QUANTITY_OF_COLUMN[quantity]
+            unclear[quantity] = f"no column has a unit of {kind}{_or_a_signal(table, quantity)}{_or_one_a_row(table)}"
+            if quantity == "time":
+                unclear[quantity] += _or_without_a_unit(table)
     its_pressure, its_doubt = _foreign_pressures(table, understood)
     return GuessedColumns(
         labels=table.labels, understood=understood, chosen=chosen | its_pressure, unclear=unclear | its_doubt,
@@ -194,6 +200,21 @@ def _or_a_signal(table: Table, quantity: str) -> str:
         return ""
     example = range_example(quantity, signals[0], _unit_of(table, signals[0]))
     return f"; if {' or '.join(map(repr, signals))} is it, say what the current means, {example}"
+
+
+def _or_without_a_unit(table: Table) -> str:
+    """Return how the first column is declared as time, where it has no unit, as LabVIEW's X_Value."""
+    first = table.labels[0]
+    bare = first and not table.units.get(first) and split_label(first)[1] in ("", first, first.rpartition("_")[2])
+    return f'; if \'{first}\' is it, say its unit, for example --columns "time={first}:s"' if bare else ""
+
+
+def _or_one_a_row(table: Table) -> str:
+    """Return what to do about a table with a row a variable, as an archive of WinCC is."""
+    words = " ".join(table.labels).lower()
+    if not ("varname" in words and "varvalue" in words):
+        return ""
+    return "; the table has a row for each variable (VarName, VarValue): export a column for each"
 
 
 def _is_clock(table: Table, label: str) -> bool:

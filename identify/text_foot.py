@@ -18,8 +18,6 @@ STATISTIC = re.compile(
     r"|rms|eff(?:ektiv)?wert|sum|summe|count|anzahl",
     re.IGNORECASE,
 )
-#: Rows below a header in which a wrong number of cells may mean that it is none.
-NEAR_THE_HEADER = 5
 logger = logging.getLogger(__name__)
 
 
@@ -54,44 +52,50 @@ class Foot:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self._begun = False  # whether there was a sample
         self._error: InputError | None = None
         self._count = 0
 
     def add(self, number: int, cells: Sequence[str], header: Header) -> None:
         """Take a line that is no sample; refuse one that begins as a sample does."""
-        error = _wrong_row(cells, number, header, self.path)
+        error = _wrong_row(cells, number, header, self.path, first=not self._begun)
         if is_number(clean_label(cells[0])):
             raise error
         logger.debug("'%s' row %d is passed over: %s", self.path, number, " ".join(cells)[:QUOTED_CHARACTERS])
         self._error = self._error or error
         self._count += 1
         if self._count > MOST_LINES:
-            self.refuse_what_follows()
+            raise self._error
 
     def refuse_what_follows(self) -> None:
-        """Refuse samples below such lines."""
+        """Refuse samples below such lines, unless they are the first: between header and samples some stand as well."""
+        if not self._begun:
+            self._begun, self._error, self._count = True, None, 0
         if self._error is not None:
             raise self._error
 
 
-def _wrong_row(cells: Sequence[str], number: int, header: Header, path: Path) -> InputError:
-    """Return the error for a row that has too many or too few cells, or is a word of the logger amid samples."""
-    width, first = len(header.labels), clean_label(cells[0])[:QUOTED_CHARACTERS]
-    labels = f"in the header, row {header.line} ('{', '.join(header.labels)[:QUOTED_CHARACTERS]}')"
+def _wrong_row(cells: Sequence[str], number: int, header: Header, path: Path, *, first: bool) -> InputError:
+    """Return the error for a row that has too many or too few cells, or is a word of the logger amid samples.
+
+    `first`: no sample stands above it, so the header may be none.
+    """
+    width, word = len(header.labels), clean_label(cells[0])[:QUOTED_CHARACTERS]
+    the_header = f"the header, row {header.line} ('{', '.join(header.labels)[:QUOTED_CHARACTERS]}')"
     begin = f"'{path}' row {number} has"
     if len(cells) != width:
         comma = header.separator == "," and len(cells) == 2 * width
         told = [
             "decimal commas need ';' or a tab between the cells" if comma else "",
             "complete the row, or delete it, as a logger that was stopped may have left half of one"
-            if len(cells) < width and is_number(first)
+            if len(cells) < width and is_number(word) and not first
             else "correct the row, or begin it with # if it is no sample",
-            "--skip-rows says how many rows stand above the header" if number - header.line <= NEAR_THE_HEADER else "",
+            "--skip-rows says how many rows stand above the header" if first else "",
         ]
-        found = f"{len(cells)} cell{'s' if len(cells) > 1 else f', {first!r}'}"
-        return InputError(f"{begin} {found}, expected {width} as {labels}; {'; '.join(filter(None, told))}")
-    kind = "a statistic" if _is_statistic(first) else "a word and no number"
+        found = f"{len(cells)} cell{'s' if len(cells) > 1 else f', {word!r}'}"
+        return InputError(f"{begin} {found}, expected {width} as in {the_header}; {'; '.join(filter(None, told))}")
+    kind = "a statistic" if _is_statistic(word) else "a word and no number"
     return InputError(
-        f"{begin} {kind}, '{first}', and samples below it, expected samples only from {labels}, to the last; begin the "
+        f"{begin} {kind}, '{word}', and samples below it, expected nothing but samples below {the_header}; begin the "
         "row with # if it is no sample, or delete it; --skip-rows says how many rows stand above the header"
     )

@@ -14,6 +14,7 @@ from typing import final
 from dzdesign.core.errors import InputError
 from dzdesign.core.units import measures
 from dzdesign.identify.column_labels import TELLING, is_telling, split_label
+from dzdesign.identify.decimal_marks import BETWEEN_THOUSANDS
 from dzdesign.identify.table import QUOTED_CHARACTERS, clean_label
 from dzdesign.identify.time_stamps import is_stamp, is_unclear
 
@@ -25,13 +26,18 @@ MOST_LINES, LONGEST_LINE = 1000, 1 << 16
 FEWEST_ROWS, SHARE_OF_NUMBERS = 5, 0.6
 #: Lines among which a cell in quotes is looked for that goes on in the next one, and of how many it may be.
 MOST_BROKEN = 40
+#: Rows below the header, without any number, that say the columns' types and units.
+MOST_BELOW = 4
 #: A line that is neither a comment nor blank; what a spreadsheet makes of either has quotes or separators.
 TABLE_LINE = re.compile(rb'^(?![ \t,;"]*$)(?![ \t"]*#).+', re.MULTILINE)
 #: What may stand between cells; where none of them is in the header, blanks do.
 SEPARATORS, BLANKS = ",;\t|", " "
 #: The same in the order in which rows of numbers are tried: a comma may be a decimal one, a blank part of a date.
 IN_DOUBT = ";\t|, "
-NUMBER = re.compile(r"[-+]?[\d.,]*\d[.,]?(?:[eE][-+]?\d+)?|nan|[-+]?inf(?:inity)?|[-+]?∞", re.IGNORECASE)
+NUMBER = re.compile(
+    rf"[-+\u2212]?\s?(?:\d{{1,3}}(?:[{BETWEEN_THOUSANDS}]\d{{3}})+(?:[.,]\d*)?|[\d.,]*\d[.,]?(?:[eE][-+]?\d+)?)|nan|[-+]?inf(?:inity)?|[-+]?∞",
+    re.IGNORECASE,
+)
 #: What a spreadsheet writes where it has no value, in English and German: a blank cell, and no comment.
 NO_VALUE = re.compile(
     rb'(^|[,;\t|"]) *#(?:N/A|NV|(?:DIV/0|VALUE|WERT|REF|BEZUG|NUM|ZAHL|NULL)!|NAME\?)(?= *(?:[,;\t|"]|$))', re.MULTILINE
@@ -115,12 +121,27 @@ def find_header(block: bytes, number: int, path: Path, *, told: bool) -> tuple[H
     header = _header(line.number, line.text, separator, path)
     end, rows = line.end, lines[at + 1 :]
     above = lines[at - 1] if at else None
-    if rows and is_row_of_units(_cells(rows[0].text, separator)):
-        header = _with_units(header, rows[0].text)
-        end, rows = rows[0].end, rows[1:]
+    below = _rows_of_words(rows, separator)
+    units = next((row for row in below if is_row_of_units(_cells(row.text, separator))), None)
+    if below:
+        header = replace(header, repeats=header.repeats | {row.text for row in below})
+        end, rows = below[-1].end, rows[len(below) :]
+    if units:
+        header = _with_units(header, units.text)
     elif above and is_row_of_units(_cells(above.text, separator)):
         header = _with_units(header, above.text)
     return _fitted(header, rows), block[end + 1 :]
+
+
+def _rows_of_words(rows: list[_Line], separator: str) -> list[_Line]:
+    """Return the rows directly below a header that hold no number, if numbers follow: units, types of the columns."""
+    below: list[_Line] = []
+    for row in rows[: MOST_BELOW + 1]:
+        cells = _cells(row.text, separator)
+        if any(map(is_number, cells)):
+            return below
+        below.append(row)
+    return below[:1] if below and is_row_of_units(_cells(below[0].text, separator)) else []
 
 
 def _with_units(header: Header, line: str) -> Header:
@@ -247,7 +268,7 @@ def _is_row(cells: list[str]) -> bool:
 
 def _could_be_labels(cells: list[str]) -> bool:
     texts = sum(bool(cell) and not is_number(cell) for cell in cells)
-    return texts >= 2 and 2 * texts >= len(cells)
+    return texts >= 2 and 2 * texts >= len(cells) and len(set(filter(None, cells))) > 1
 
 
 def _fits(cells: list[str], width: int) -> bool:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.decimal_marks import FEW_ROWS, DecimalMarks
+from dzdesign.identify.decimal_marks import BETWEEN_THOUSANDS, FEW_ROWS, DecimalMarks
 from dzdesign.identify.table import QUOTED_CHARACTERS, Table, clean_label
 from dzdesign.identify.time_stamps import EXAMPLE, Stamps, is_stamp, is_unclear
 
@@ -83,7 +83,10 @@ class TextTable(Table):
         texts = self._texts(label)
         column = self.marks.with_points(label, texts, self.place)
         numbers = column.cast(pl.Float64, strict=False)
-        bad = (~(column.is_null() | (column == "")) & numbers.is_null()).arg_true()
+        filled = ~(column.is_null() | (column == ""))
+        if (filled & numbers.is_null()).any():
+            numbers = numbers.fill_null(_plainly_written(column).cast(pl.Float64, strict=False))
+        bad = (filled & numbers.is_null()).arg_true()
         if len(bad):
             raise self._no_number(label, int(bad[0]), texts[int(bad[0])])
         return numbers.fill_null(np.nan).to_numpy().copy()
@@ -147,3 +150,10 @@ class TextTable(Table):
             f"'{self.path}' {self.place(row)}, column '{label}': '{cell[:QUOTED_CHARACTERS]}' is not a "
             f"number{date}; correct it, or leave the cell blank if the sample is missing"
         )
+
+
+def _plainly_written(numbers: "pl.Series") -> "pl.Series":
+    """Return numbers with a decimal point without blanks behind a sign or between thousands, and with a plain minus."""
+    signed = numbers.str.replace("^\u2212", "-").str.replace(r"^([-+])\s", "${1}")
+    grouped = signed.str.contains(rf"^[-+]?\d{{1,3}}(?:[{BETWEEN_THOUSANDS}]\d{{3}})+(?:\.\d*)?$").fill_null(False)
+    return signed.str.replace_all(f"[{BETWEEN_THOUSANDS}]", "").zip_with(grouped, signed)

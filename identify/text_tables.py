@@ -138,9 +138,11 @@ def _table(
 
 
 def _has_other_lines(rows: bytes, header: Header) -> bool:
-    """Tell whether the header stands among rows once more, or a line of text at their end."""
+    """Tell whether the header stands among rows once more, or a line of text at their beginning or end."""
+    first = rows[:LONGEST_LINE].lstrip(b"\n").partition(b"\n")[0].decode(errors="replace")
     last = rows[-LONGEST_LINE:].rstrip(b"\n\t ,;|").rpartition(b"\n")[2].decode(errors="replace")
-    return is_no_sample(last.split(header.separator)) or any(line.encode() in rows for line in header.repeats)
+    ends = (line.split(header.separator) for line in (first, last))
+    return any(map(is_no_sample, ends)) or any(line.encode() in rows for line in header.repeats)
 
 
 def _plain_cells(rows: bytes, separator: str, width: int) -> "pl.DataFrame | None":

@@ -125,7 +125,7 @@ def test_told_that_nothing_stands_above_the_first_line_is_the_header(here):
         (400, "Pause", "row 401 has 1 cell, 'Pause', expected 4 as in the header"),
         (1001, "40,0", "row 1002 has 1 cell, '40,0', expected 4 as in the header, row 1 ('t_s, u_V, dP_MPa, Q_Lmin'); "
          "complete the row, or delete it"),
-        (1, "0,0;1,0", "row 2 has 2 cells, expected 4"),
+        (1, "0,0;1,0", "row 2 has 2 cells, expected 4 as in the header, row 1 ('t_s, u_V, dP_MPa, Q_Lmin'); corr"),
         (1001, "40,0;1,0", "row 1002 has 2 cells, expected 4"),
         (900, "x;1,0;2,0;3,0", "row 901, column 't_s': 'x' is not a number"),
     ],
@@ -133,6 +133,19 @@ def test_told_that_nothing_stands_above_the_first_line_is_the_header(here):
 def test_a_wrong_row_among_samples_is_found(here, where, line, words):
     lines = ["t_s;u_V;dP_MPa;Q_Lmin", *rows(TIME, U, DP, Q)]
     assert words in refusal(text(*lines[:where], line, *lines[where:]))
+
+
+@pytest.mark.parametrize(
+    ("labels", "words"),
+    [
+        ("X_Value;u (V);dP (bar);Q (l/min)", 'is it, say its unit, for example --columns "time=X_Value:s"'),
+        ("VarName;TimeString;VarValue;Time_ms", "row for each variable (VarName, VarValue): export a column for each"),
+    ],
+)
+def test_init_says_how_to_go_on_with_a_bare_time_or_a_row_a_variable(here, capsys, labels, words):
+    Path("ramp.csv").write_bytes(text(labels, *rows(TIME, U, 10 * DP, Q)))
+    assert main(["-q", "init", "ramp.csv"]) == 1
+    assert words in capsys.readouterr().out
 
 
 def test_statistics_below_the_samples_are_said_and_those_amid_them_are_refused(here, caplog):
@@ -307,8 +320,10 @@ def test_milliseconds_beside_a_time_of_day_are_not_passed_over(here):
     clock = [stamp.partition(".")[0] for stamp in stamps("%H:%M:%S.")]
     parts = [stamp.partition(".")[2] for stamp in stamps("%H:%M:%S.")]
     content = text("Time;ms;u [V];dP [MPa];Q [l/min]", *rows(clock, parts, U, DP, Q))
-    assert "has milliseconds in 'ms' beside the times in 'Time', expected both in one column" in refusal(content)
-    read(content, columns={"time": "Time"})
+    assert_is_the_ramp(read(content))
+    assert_is_the_ramp(read(content, columns={"time": "Time"}))
+    wrong = text("Time;ms;u [V];dP [MPa];Q [l/min]", *rows(clock, [*parts[:-1], "1000"], U, DP, Q))
+    assert "row 1001, column 'ms': 1000 is no part of a second, expected 0 to 999" in refusal(wrong)
     whole = text("Time;ms;u [V];dP [MPa];Q [l/min]", *rows(stamps("%H:%M:%S."), parts, U, DP, Q))
     assert_is_the_ramp(read(whole))
 
