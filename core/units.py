@@ -39,7 +39,8 @@ SPELLINGS = {
     "m3/s": "m**3/s", "m3s": "m**3/s", "m3/h": "m**3/hour", "cm3/s": "cm**3/s", "%": "percent",
     "pct": "percent", "kgf/cm2": "kgf/cm**2", "n/mm2": "N/mm**2", "vdc": "V", "volt": "V", "volts": "V",
     "sek": "s", "sek.": "s", "bar": "bar", "barg": "bar", "bara": "bar",
-    "psi": "psi", "psig": "psi", "psia": "psi", "lph": "L/hour", "l/h": "L/hour",
+    "bard": "bar", "bar(g)": "bar", "bar(a)": "bar", "bar(d)": "bar", "ltr/min": "L/min",
+    "psi": "psi", "psig": "psi", "psia": "psi", "psid": "psi", "lph": "L/hour", "l/h": "L/hour",
 }  # fmt: skip
 #: Names with one-digit powers, times or per one another. A unit comes from a file, and pint computes what it reads:
 #: ``9**9**9**9`` would never end.

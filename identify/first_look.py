@@ -13,7 +13,7 @@ import numpy as np
 
 from dzdesign.core.artefacts import open_bytes
 from dzdesign.core.errors import InputError, nearest
-from dzdesign.core.units import measures
+from dzdesign.core.units import measures, si_factor
 from dzdesign.identify.clock import is_milliseconds
 from dzdesign.identify.column_labels import (
     COLUMN_NAMES,
@@ -23,6 +23,7 @@ from dzdesign.identify.column_labels import (
     Column,
     find_columns,
     fits,
+    is_telling,
     split_label,
 )
 from dzdesign.identify.described_tests import L_MIN, MPA, DescribedTests, describe_tests
@@ -117,10 +118,15 @@ def guess_columns(path: Path, skip_rows: int | None = None) -> GuessedColumns:
 
 def _no_unit_of_it(quantity: str, column: Column) -> str:
     """Return what is unclear of a column whose label says a quantity, and a unit that is none of it."""
-    words = f"'{column.label}' is in {column.unit}, which is no unit of {QUANTITY_OF_COLUMN[quantity]}"
     if quantity != "time" and any(measures(column.unit, kind) for kind in ("current", "voltage")):
-        return f"{words}; say what the signal means, {range_example(quantity, column.label, column.unit)}"
-    return f"{words}; choose another column, or convert it"
+        kind = QUANTITY_OF_COLUMN[quantity]
+        example = range_example(quantity, column.label, column.unit)
+        return f"'{column.label}' is in {column.unit}, which is no unit of {kind}; say what the signal means, {example}"
+    try:
+        si_factor(column.unit, QUANTITY_OF_COLUMN[quantity])
+    except InputError as error:
+        return f"'{column.label}': {error}"
+    return f"'{column.label}' is in {column.unit}"
 
 
 def _guess(table: Table) -> GuessedColumns:
@@ -203,10 +209,21 @@ def _or_a_signal(table: Table, quantity: str) -> str:
 
 
 def _or_without_a_unit(table: Table) -> str:
-    """Return how the first column is declared as time, where it has no unit, as LabVIEW's X_Value."""
+    """Return how the first column is declared as time, where it rises and has no unit, as LabVIEW's X_Value.
+
+    One that counts the rows is no time: a unit would make a wrong one of it.
+    """
     first = table.labels[0]
-    bare = first and not table.units.get(first) and split_label(first)[1] in ("", first, first.rpartition("_")[2])
-    return f'; if \'{first}\' is it, say its unit, for example --columns "time={first}:s"' if bare else ""
+    if not first or table.units.get(first) or is_telling(split_label(first)[1]):
+        return ""
+    try:
+        steps = np.diff(table.numbers(first))
+    except InputError:
+        return ""
+    rises = steps.size > 0 and bool(np.all(steps >= 0)) and float(steps.max()) > 0
+    if rises and bool(np.all(steps == 1)):
+        return f"; '{first}' counts the rows: export the time beside it"
+    return f'; if \'{first}\' is it, say its unit, for example --columns "time={first}:s"' if rises else ""
 
 
 def _or_one_a_row(table: Table) -> str:

@@ -250,7 +250,8 @@ def test_sensors_on_both_sides_have_their_lines_in_the_template(here, capsys, la
 @pytest.mark.parametrize(
     ("labels", "reason"),
     [
-        ("t_s,u_V,dP_bar,Q [Hz]", "Q: 'Q [Hz]' is in Hz, which is no unit of flow; choose another column"),
+        ("t_s,u_V,dP_bar,Q [Hz]", "Q: 'Q [Hz]': 'Hz' is not a unit of flow that dzdesign knows; expected for ex"),
+        ("t_s,u [v],dP_bar,Q_Lmin", "u: 'u [v]': 'v' is not a unit of voltage that dzdesign knows (did you mean 'V'?)"),
         ("t_s,u_V,dP_bar,Q_mA", "Q: 'Q_mA' is in mA, which is no unit of flow; say what the signal means, for example"),
     ],
 )

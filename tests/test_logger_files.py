@@ -139,11 +139,13 @@ def test_a_wrong_row_among_samples_is_found(here, where, line, words):
     ("labels", "words"),
     [
         ("X_Value;u (V);dP (bar);Q (l/min)", 'is it, say its unit, for example --columns "time=X_Value:s"'),
+        ("Sample;u (V);dP (bar);Q (l/min)", "'Sample' counts the rows: export the time beside it"),
         ("VarName;TimeString;VarValue;Time_ms", "row for each variable (VarName, VarValue): export a column for each"),
     ],
 )
 def test_init_says_how_to_go_on_with_a_bare_time_or_a_row_a_variable(here, capsys, labels, words):
-    Path("ramp.csv").write_bytes(text(labels, *rows(TIME, U, 10 * DP, Q)))
+    first = np.arange(TIME.size) if labels.startswith("Sample") else TIME
+    Path("ramp.csv").write_bytes(text(labels, *rows(first, U, 10 * DP, Q)))
     assert main(["-q", "init", "ramp.csv"]) == 1
     assert words in capsys.readouterr().out
 
