@@ -1,8 +1,7 @@
 """What the functions of `dzdesign.api` are handed: what is no text, path or mapping is refused before all else.
 
-By hand, and not by pydantic or typeguard: neither reads the annotations of classes that are imported only when they are
-needed ("ValveModel | AnyPath"), both make of a number an error that lacks the example with a unit, and pydantic's has
-several lines and costs the start more than all else that it does.
+By hand, and not by pydantic or typeguard: both end in a NameError at the annotations of classes that are imported only
+when they are needed ("ValveModel | AnyPath"), and what they say of a wrong kind has several lines and no example.
 """
 
 import inspect

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dzdesign.core.units import parse_quantity
 
 #: A pressure in the name of a file, and a bare number after dP.
-WITH_UNIT = re.compile(r"(?<![\d.])(\d+(?:[.,]\d+)?)[\s_]*(MPa|bar|kPa|psi)(?![A-Za-z])", re.IGNORECASE)
-BARE = re.compile(r"dp[ _=-]?(\d+(?:[.,]\d+)?)", re.IGNORECASE)
+WITH_UNIT = re.compile(r"(?<![\d.])(\d{1,9}(?:[.,]\d{1,9})?)[\s_]*(MPa|bar|kPa|psi)(?![A-Za-z])", re.IGNORECASE)
+BARE = re.compile(r"dp[ _=-]?(\d{1,9}(?:[.,]\d{1,9})?)", re.IGNORECASE)
 UNITS = {"mpa": "MPa", "bar": "bar", "kpa": "kPa", "psi": "psi"}
 #: Pressures that differ by no more than this factor are one: nominal here, measured there.
 SAME = 1.5

@@ -33,16 +33,10 @@ class NoValues:
         rises : bool
             True for the time, which may well go on after a pause at 999 s.
         """
-        for number in {float(np.fmin.reduce(numbers, initial=np.inf)), float(np.fmax.reduce(numbers, initial=-np.inf))}:
-            if number not in NO_VALUES or (rises and number > 0):
-                continue
+        while (number := _outermost(numbers, rises=rises)) is not None:
             here = numbers == number
-            others = numbers[~here & np.isfinite(numbers)]
-            # What lies on the other side of zero counts for nothing.
-            beyond = float((others / number).max()) if others.size else float(number > 0)
-            if beyond < FAR:
-                numbers = np.where(here, np.nan, numbers)
-                self._found[number, label] += int(np.count_nonzero(here))
+            numbers = np.where(here, np.nan, numbers)
+            self._found[number, label] += int(np.count_nonzero(here))
         return numbers
 
     def said(self) -> str:
@@ -51,3 +45,17 @@ class NoValues:
             f"{number:g} in {count} row{'s' if count > 1 else ''} of '{label}'"
             for (number, label), count in self._found.items()
         )
+
+
+def _outermost(numbers: np.ndarray, *, rises: bool) -> float | None:
+    """Return the least or the largest number, if it is one that means no value."""
+    for end in (np.fmin.reduce(numbers, initial=np.inf), np.fmax.reduce(numbers, initial=-np.inf)):
+        number = float(end)
+        if number not in NO_VALUES or (rises and number > 0):
+            continue
+        others = numbers[(numbers != number) & np.isfinite(numbers)]
+        # What lies on the other side of zero counts for nothing.
+        beyond = float((others / number).max()) if others.size else float(number > 0)
+        if beyond < FAR:
+            return number
+    return None

@@ -146,8 +146,9 @@ def about_a_stuck_sensor(tests: Sequence[RampTest]) -> Iterator[Warning_]:
             text=(
                 f"the pressure drop is {about} all {len(tests)} recordings, but "
                 f"{' and '.join(signs)}: the sensor is stuck, or the column is another's, and ramps of different "
-                "pressure drops are taken for one test, whose knees are known badly for that reason. Leave that column "
-                "out and declare the pressure drops by [dp], or record again"
+                "pressure drops are taken for one test, whose knees are known badly for that reason (or it is one "
+                "pressure drop, and the valve, its supply or oil was not the same). Leave that column out and declare "
+                "the pressure drops by [dp], or record again"
             ),
             source=None,
         )

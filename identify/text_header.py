@@ -5,6 +5,7 @@ begins, and the header is the line above them that has as many cells and reads b
 """
 
 import csv
+import logging
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -35,7 +36,8 @@ SEPARATORS, BLANKS = ",;\t|", " "
 #: The same in the order in which rows of numbers are tried: a comma may be a decimal one, a blank part of a date.
 IN_DOUBT = ";\t|, "
 NUMBER = re.compile(
-    rf"[-+\u2212]?\s?(?:\d{{1,3}}(?:[{BETWEEN_THOUSANDS}]\d{{3}})+(?:[.,]\d*)?|[\d.,]*\d[.,]?(?:[eE][-+]?\d+)?)|nan|[-+]?inf(?:inity)?|[-+]?∞",
+    rf"[-+\u2212]?\s?(?:\d{{1,3}}(?:[{BETWEEN_THOUSANDS}]\d{{3}})+(?:[.,]\d*)?|[\d.,]*\d[.,]?(?:[eE][-+]?\d+)?)"
+    r"|nan|[-+]?inf(?:inity)?|[-+]?∞",
     re.IGNORECASE,
 )
 #: What a spreadsheet writes where it has no value, in English and German: a blank cell, and no comment.
@@ -48,6 +50,7 @@ COMMENT = "comment"
 ARTEFACT = re.compile(rb'\s*\{\s*"(?:[^"{}]*"\s*:\s*"[^"]*",?\s*")*?schema"\s*:\s*"(dzdesign\.[\w.-]+/\d+)"')
 #: First characters of text that is no table.
 DOCUMENTS = {b"{": "JSON", b"<": "HTML or XML"}
+logger = logging.getLogger(__name__)
 
 
 @final
@@ -124,7 +127,10 @@ def find_header(block: bytes, number: int, path: Path, *, told: bool) -> tuple[H
     below = _rows_of_words(rows, separator)
     units = next((row for row in below if is_row_of_units(_cells(row.text, separator))), None)
     if below:
-        header = replace(header, repeats=header.repeats | {row.text for row in below})
+        for row in below:
+            if row is not units:
+                words = row.text[:QUOTED_CHARACTERS]
+                logger.debug("'%s' row %d, below the header, is passed over: %s", path, row.number, words)
         end, rows = below[-1].end, rows[len(below) :]
     if units:
         header = _with_units(header, units.text)

@@ -77,3 +77,10 @@ def test_every_one_is_found_among_small_numbers(number):
     assert np.isnan(seen.without(np.array([1.0, number, 2.0]), "x", rises=False)).tolist() == [False, True, False]
     assert seen.said() == f"{number:g} in 1 row of 'x'"
     assert np.isnan(seen.without(np.array([1.0, number, 2.0]), "t", rises=True)).any() == (number < 0)
+
+
+def test_two_kinds_in_one_column():
+    seen = NoValues()
+    numbers = np.array([1.0, -999, 9999, -9999, 2.0, -9999])
+    assert np.isnan(seen.without(numbers, "x", rises=False)).tolist() == [False, True, True, True, False, True]
+    assert seen.said() == "-9999 in 2 rows of 'x', -999 in 1 row of 'x', 9999 in 1 row of 'x'"
