@@ -158,8 +158,8 @@ def _look(
     skip_rows: int | None,
 ) -> tuple[Look, list[str]]:
     """Return what was seen, and what is open."""
-    from dzdesign.identify.column_labels import PER_CENT, parse_columns
-    from dzdesign.identify.first_look import guess_columns, is_per_cent, look_at_sides, proposed_u_max
+    from dzdesign.identify.column_labels import parse_columns
+    from dzdesign.identify.first_look import guess_columns, look_at_sides, proposed_u_max
     from dzdesign.identify.named_pressure import pressure_in_name
 
     given = parse_columns(said_columns) if said_columns else {}
@@ -188,11 +188,7 @@ def _look(
         else:
             notes.append('no pressure drop, by a column or a file\'s name; declare it, if you know it, by --dp "1 MPa"')
     u_max, u_seen = proposed_u_max(tests)
-    # A label that was chosen ends in its unit: Sollwert [%]
-    chosen_in_per_cent = columns.get("u", "").rstrip(" ])").endswith(PER_CENT)
-    in_per_cent = chosen_in_per_cent or (
-        "u" not in columns and any(is_per_cent(guess.understood.get("u")) for guess in guesses)
-    )
+    in_per_cent = _is_in_per_cent(guesses, columns)
     if in_per_cent:
         u_max, u_seen = 10.0, None
         notes.append('full command: in per cent, so not recorded; u-max = "10 V" is a guess, correct it')
@@ -212,6 +208,15 @@ def _look(
         ),
         opens,
     )  # fmt: skip
+
+
+def _is_in_per_cent(guesses: "list[GuessedColumns]", columns: dict[str, str]) -> bool:
+    from dzdesign.identify.column_labels import PER_CENT
+    from dzdesign.identify.first_look import is_per_cent
+
+    if "u" in columns:  # a label that was chosen ends in its unit: Sollwert [%]
+        return columns["u"].rstrip(" ])").endswith(PER_CENT)
+    return any(is_per_cent(guess.understood.get("u")) for guess in guesses)
 
 
 def _columns(

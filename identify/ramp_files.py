@@ -123,11 +123,7 @@ def read_ramp_file(
                     _refuse_two_pressures(table, found, dp)
                     _refuse_unequal_lengths(table, found)
                 thinner.add(_complete_rows(table, found, clock, no_values, u_max, dp))
-    if thinner.read < MIN_ROWS:
-        missing = f"; {no_values.said()} are missing samples" if no_values.said() else ""
-        raise InputError(
-            f"'{path}' has {thinner.read} complete rows, expected at least {MIN_ROWS} of a ramp test{missing}"
-        )
+    _refuse_too_few_rows(path, thinner.read, no_values)
     time, u, q, *measured = (column.copy() for column in thinner.rows())
     doubt = clock.doubt(time, u)
     if doubt == ASSUMED_MS:
@@ -148,6 +144,12 @@ def read_ramp_file(
         simulated=simulated,
         no_values=no_values.said(),
     )
+
+
+def _refuse_too_few_rows(path: Path, rows: int, no_values: NoValues) -> None:
+    if rows < MIN_ROWS:
+        missing = f"; {no_values.said()} are missing samples" if no_values.said() else ""
+        raise InputError(f"'{path}' has {rows} complete rows, expected at least {MIN_ROWS} of a ramp test{missing}")
 
 
 def _is_marked(comments: str) -> bool:

@@ -8,7 +8,8 @@ from typing import final
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.table import QUOTED_CHARACTERS, clean_label
-from dzdesign.identify.text_header import MOST_LINES, Header, is_number
+from dzdesign.identify.text_cells import is_number
+from dzdesign.identify.text_header import MOST_LINES, Header
 
 #: What the first cell of a row of statistics says, in English and German, without what stands in brackets behind it.
 STATISTIC = re.compile(

@@ -15,16 +15,15 @@ import numpy as np
 from dzdesign.core.errors import InputError
 from dzdesign.identify.decimal_marks import DecimalMarks
 from dzdesign.identify.text_blocks import text_blocks
+from dzdesign.identify.text_cells import BLANKS, split_line
 from dzdesign.identify.text_foot import Foot, is_no_sample
 from dzdesign.identify.text_header import (
-    BLANKS,
     LONGEST_HEADER,
     LONGEST_LINE,
     NO_VALUE,
     TABLE_LINE,
     Header,
     find_header,
-    split_line,
 )
 from dzdesign.identify.text_table import TextTable
 
