@@ -39,7 +39,8 @@ SPELLINGS = {
     "m3/s": "m**3/s", "m3s": "m**3/s", "m3/h": "m**3/hour", "cm3/s": "cm**3/s", "%": "percent",
     "pct": "percent", "kgf/cm2": "kgf/cm**2", "n/mm2": "N/mm**2", "vdc": "V", "volt": "V", "volts": "V",
     "sek": "s", "sek.": "s", "bar": "bar", "barg": "bar", "bara": "bar",
-    "psi": "psi", "psig": "psi", "psia": "psi", "lph": "L/hour", "l/h": "L/hour",
+    "bard": "bar", "bar(g)": "bar", "bar(a)": "bar", "bar(d)": "bar", "ltr/min": "L/min",
+    "psi": "psi", "psig": "psi", "psia": "psi", "psid": "psi", "lph": "L/hour", "l/h": "L/hour",
 }  # fmt: skip
 #: Names with one-digit powers, times or per one another. A unit comes from a file, and pint computes what it reads:
 #: ``9**9**9**9`` would never end.
@@ -48,8 +49,10 @@ UNIT = re.compile(rf"{FACTOR}(?:\s*[*/·\s]\s*{FACTOR})*")
 LONGEST_UNIT, LONGEST_QUANTITY = 40, 200
 #: Of units in which valves are measured; a mistyped one is looked for under each.
 PREFIXES = ("", "m", "k", "M", "milli", "kilo", "mega")
-#: May be 2000 or 2.0: a comma before three digits.
-THOUSANDS = re.compile(r"(?<!\d)(?<!\d[.,])[1-9]\d{0,2},\d{3}(?!,?\d)", re.ASCII)
+#: May be 2000 or 2.0: a comma, or a point, before three digits.
+THOUSANDS = {
+    mark: re.compile(rf"(?<!\d)(?<!\d[.,])[1-9]\d{{0,2}}[{mark}]\d{{3}}(?!,?\d)", re.ASCII) for mark in (",", ".")
+}
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", re.ASCII)
 
 
@@ -138,7 +141,7 @@ def _near_unit(unit: str, quantity: str) -> str:
     return ""
 
 
-def refuse_thousands(text: str, what: str) -> None:
+def refuse_thousands(text: str, what: str, *, points: bool = False) -> None:
     """Refuse a number whose comma may be a decimal one or stand between thousands.
 
     Parameters
@@ -147,15 +150,17 @@ def refuse_thousands(text: str, what: str) -> None:
         In which the number stands.
     what : str
         Begins the message, such as ``--dp is '2,000 kPa'``.
+    points : bool
+        Whether a point is in doubt too, as in a range that is copied from a data sheet: ``0..25.000 kPa``.
 
     Raises
     ------
     InputError
         If a comma stands before three digits, as in ``2,000``; ``0,125`` and ``2,0`` can only be decimals.
     """
-    found = THOUSANDS.search(text)
+    found = THOUSANDS[","].search(text) or (THOUSANDS["."].search(text) if points else None)
     if found:
-        whole, decimal = found[0].replace(",", ""), float(found[0].replace(",", "."))
+        whole, decimal = re.sub("[.,]", "", found[0]), float(found[0].replace(",", "."))
         raise InputError(f"{what}: '{found[0]}' may be {whole} or {decimal}; write {whole} or {decimal}")
 
 

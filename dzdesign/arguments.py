@@ -1,4 +1,8 @@
-"""What the functions of `dzdesign.api` are handed: what is no text, path or mapping is refused before all else."""
+"""What the functions of `dzdesign.api` are handed: what is no text, path or mapping is refused before all else.
+
+By hand, and not by pydantic or typeguard: both end in a NameError at the annotations of classes that are imported only
+when they are needed ("ValveModel | AnyPath"), and what they say of a wrong kind has several lines and no example.
+"""
 
 import inspect
 import os
@@ -6,7 +10,7 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
 from typing import Any, ParamSpec, TypeVar, get_args, get_origin
 
-from dzdesign.core.errors import InputError, quoted
+from dzdesign.core.errors import InputError, nearest, quoted
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -24,7 +28,7 @@ ELSEWHERE = (int, float, bool)
 
 
 def takes_text(function: Callable[P, R]) -> Callable[P, R]:
-    """Let a function refuse, in a sentence, an argument that is not of the kind that its annotation says.
+    """Let a function refuse, in a sentence, an option that it lacks, or one of another kind than its annotation says.
 
     Parameters
     ----------
@@ -44,6 +48,10 @@ def takes_text(function: Callable[P, R]) -> Callable[P, R]:
 
     @wraps(function)
     def checked(*args: P.args, **kwargs: P.kwargs) -> R:
+        for name in kwargs:
+            if name not in signature.parameters:
+                mine, hint = function.__name__, nearest(name, signature.parameters)
+                raise InputError(f"{mine} has no option {quoted(name)}{hint}; see help({mine})")
         bound = signature.bind(*args, **kwargs)
         for name, value in bound.arguments.items():
             bound.arguments[name] = _checked(name, value, signature.parameters[name].annotation)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from dzdesign.core.artefacts import check_file_may_be_written, to_json, write_file, write_files
 from dzdesign.core.errors import InputError, one_line
 from dzdesign.core.units import parse_quantity
-from dzdesign.progress import stages
+from dzdesign.progress import say, stages
 from dzdesign.recordings import (
     check_plots,
     knee_window,
@@ -18,6 +18,7 @@ from dzdesign.recordings import (
 )
 
 if TYPE_CHECKING:
+    from dzdesign.identify.ramp_files import RampTest
     from dzdesign.verify.assessment import Assessment, AssessOptions
 
 
@@ -61,14 +62,7 @@ def compare(args: argparse.Namespace, options: "AssessOptions") -> "Assessment":
     from dzdesign.verify.assessment import assess
 
     sets = {
-        name: read_recordings(
-            patterns,
-            u_max=options.of_set(name).u_max,
-            columns=columns,
-            dp=args.dp,
-            skip_rows=args.skip_rows,
-            what=f"reading recordings {name}",
-        )
+        name: _read_set(name, patterns, columns, args, options.of_set(name).u_max)
         for name, patterns, columns in (
             ("before", args.before, args.columns),
             ("after", args.after, args.after_columns or args.columns),
@@ -78,6 +72,29 @@ def compare(args: argparse.Namespace, options: "AssessOptions") -> "Assessment":
     with stages() as stage:
         stage(f"comparing {len(sets['before'])} recordings before with {len(sets['after'])} after")
         return assess(sets["before"], sets["after"], options)
+
+
+def _read_set(
+    name: str, patterns: list[str], columns: str | dict[str, str] | None, args: argparse.Namespace, u_max: float
+) -> "list[RampTest]":
+    """Read the recordings before or after; what is wrong with the columns of those after is said of --after-columns."""
+    inherited = name == "after" and columns and not args.after_columns
+    if inherited:
+        say("recordings after: columns as those before, by --columns or [columns]; --after-columns says others")
+    try:
+        return read_recordings(
+            patterns, u_max=u_max, columns=columns, dp=args.dp, skip_rows=args.skip_rows,
+            what=f"reading recordings {name}",
+        )  # fmt: skip
+    except InputError as error:
+        if name == "before" or "--columns" not in str(error):
+            raise
+        if inherited:
+            raise InputError(
+                f"{error}; the recordings after are read by the same --columns, or [columns], as those before: say "
+                "theirs by --after-columns"
+            ) from error
+        raise InputError(str(error).replace("--columns", "--after-columns")) from error
 
 
 def assess_options(args: argparse.Namespace) -> "AssessOptions":

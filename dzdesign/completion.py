@@ -28,17 +28,21 @@ def _parser() -> argparse.ArgumentParser:
     from dzdesign.codegen.project import TARGET_NAMES
     from dzdesign.derivation.law import LAW_NAMES
     from dzdesign.derivation.report import FORMATS
-    from dzdesign.design.options import GUARDS
+    from dzdesign.design.options import ACCEPTABLE, GUARDS
     from dzdesign.design.request import CHOICES
     from dzdesign.parsing import build_parser
+    from dzdesign.schema_files import SCHEMAS
     from dzdesign.vocabulary import language
 
     words = {
         "--target": TARGET_NAMES,
         "--law": LAW_NAMES,
         "--guard": GUARDS,
+        "--accept": ACCEPTABLE,
         "--format": FORMATS,
         "--below-dp0": ("hold", "extend"),
+        "shell": shtab.SUPPORTED_SHELLS,
+        "name": SCHEMAS,
         **{f"--{name.replace('_', '-')}": known for name, known in CHOICES.items()},
     }
     parser, commands = build_parser(language())
@@ -47,8 +51,8 @@ def _parser() -> argparse.ArgumentParser:
             name = action.option_strings[-1] if action.option_strings else action.dest
             if action.nargs == 0:
                 continue
-            if name in words or name == "shell":
-                action.choices = tuple(words.get(name, shtab.SUPPORTED_SHELLS))
+            if name in words:
+                action.choices = tuple(words[name])
             elif action.metavar == "DIR":
                 action.complete = shtab.DIRECTORY
             elif not action.option_strings or action.metavar in FILES:

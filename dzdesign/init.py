@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 from dzdesign.core.artefacts import check_file_may_be_written, to_json, write_file
 from dzdesign.core.errors import InputError
-from dzdesign.core.units import parse_quantity
 from dzdesign.init_file import CHECK_DP, options_file
 from dzdesign.progress import say, stages, with_bar
 from dzdesign.recordings import expand, read_recordings, rows_to_skip
@@ -24,8 +23,8 @@ PLACES = tuple(
     for folder in ("ramps/", "")
     for ending in ("csv", "csv.gz", "txt", "tdms", "mat", "h5", "hdf5", "parquet", "feather")
 )
-#: A pressure in a file's name and one in its column that differ by no more than this factor are one.
-SAME_PRESSURE = 1.5
+#: Files that a line names.
+NAMED_FILES = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,6 +41,8 @@ class Look:
         Of the tables [columns] and [dp] to write.
     u_max, u_seen : float
         Full command to declare and the largest seen, V.
+    in_per_cent : bool
+        True if the command is, so that full command can't be seen.
     sides, refused : dict
         As `look_at_sides` gives them.
     notes : tuple of str
@@ -56,6 +57,7 @@ class Look:
     dp: dict[str, str]
     u_max: float = 10.0
     u_seen: float | None = None
+    in_per_cent: bool = False
     sides: "dict[str, SeenSide]"
     refused: dict[str, str]
     notes: tuple[str, ...] = ()
@@ -156,8 +158,9 @@ def _look(
     skip_rows: int | None,
 ) -> tuple[Look, list[str]]:
     """Return what was seen, and what is open."""
-    from dzdesign.identify.column_labels import PER_CENT, parse_columns
-    from dzdesign.identify.first_look import guess_columns, is_per_cent, look_at_sides, pressure_in_name, proposed_u_max
+    from dzdesign.identify.column_labels import parse_columns
+    from dzdesign.identify.first_look import guess_columns, look_at_sides, proposed_u_max
+    from dzdesign.identify.named_pressure import pressure_in_name
 
     given = parse_columns(said_columns) if said_columns else {}
     guesses = [guess_columns(path, skip_rows) for path in with_bar(paths, "looking at columns")]
@@ -169,8 +172,6 @@ def _look(
         return nothing, list(dict.fromkeys(opens))
     names = [path.as_posix() for path in paths]
     tests = read_recordings(names, u_max=10.0, columns=columns or None, dp=said_dp, skip_rows=skip_rows)
-    if "dP" in columns and "dP" not in given:
-        opens += _contradicted(tests, columns["dP"])
     dp = said_dp if isinstance(said_dp, dict) else {test.source: said_dp for test in tests} if said_dp else {}
     lacking = [test.source for test in tests if test.dp is None]
     if lacking:
@@ -187,10 +188,12 @@ def _look(
         else:
             notes.append('no pressure drop, by a column or a file\'s name; declare it, if you know it, by --dp "1 MPa"')
     u_max, u_seen = proposed_u_max(tests)
-    # A label that was chosen ends in its unit: Sollwert [%]
-    chosen_in_per_cent = columns.get("u", "").rstrip(" ])").endswith(PER_CENT)
-    if chosen_in_per_cent or ("u" not in columns and any(is_per_cent(guess.understood.get("u")) for guess in guesses)):
+    in_per_cent = _is_in_per_cent(guesses, columns)
+    if in_per_cent:
         u_max, u_seen = 10.0, None
+        notes.append('full command: in per cent, so not recorded; u-max = "10 V" is a guess, correct it')
+    contradicted, doubts = _contradicted(tests, u_max, columns["dP"] if "dP" in columns and "dP" not in given else "")
+    opens, notes = opens + contradicted, notes + doubts
     sides, refused = {}, {}
     if not opens:
         with stages() as stage:
@@ -200,11 +203,20 @@ def _look(
         opens = [f"identify would refuse these recordings: {next(iter(refused.values()))}"]
     return (
         Look(
-            paths=paths, guesses=guesses, columns=columns, dp=dp, u_max=u_max, u_seen=u_seen, sides=sides,
-            refused=refused, notes=tuple(notes), skip_rows=skip_rows,
+            paths=paths, guesses=guesses, columns=columns, dp=dp, u_max=u_max, u_seen=u_seen,
+            in_per_cent=in_per_cent, sides=sides, refused=refused, notes=tuple(notes), skip_rows=skip_rows,
         ),
         opens,
     )  # fmt: skip
+
+
+def _is_in_per_cent(guesses: "list[GuessedColumns]", columns: dict[str, str]) -> bool:
+    from dzdesign.identify.column_labels import PER_CENT
+    from dzdesign.identify.first_look import is_per_cent
+
+    if "u" in columns:  # a label that was chosen ends in its unit: Sollwert [%]
+        return columns["u"].rstrip(" ])").endswith(PER_CENT)
+    return any(is_per_cent(guess.understood.get("u")) for guess in guesses)
 
 
 def _columns(
@@ -231,21 +243,36 @@ def _columns(
     return columns, opens, list(dict.fromkeys(notes))
 
 
-def _contradicted(tests: "list[RampTest]", label: str) -> list[str]:
-    """Return what is open where a file's name says another pressure than its column."""
-    from dzdesign.identify.first_look import pressure_in_name
+def _contradicted(tests: "list[RampTest]", u_max: float, guessed: str) -> tuple[list[str], list[str]]:
+    """Return what is open, and what is only to be said, where a file's name says another pressure than its column.
 
-    opens = []
-    for test in tests:
-        stated = pressure_in_name(test.source)
-        said = parse_quantity(stated, "pressure", "a file's name") if stated else None
-        found = float(median(test.dp.tolist())) if test.dp is not None else None
-        if said and found is not None and not said / SAME_PRESSURE < found < said * SAME_PRESSURE:
-            opens.append(
-                f"column of dP: '{test.source}' says {stated} in its name, and {found / 1e6:.3g} MPa in '{label}', the "
-                "only column in a unit of pressure; declare the one that is the drop, by --columns or --dp"
-            )
-    return opens
+    `guessed` is the label of a column that was taken for the drop because of its unit alone, or empty: then the column
+    says itself that it is the drop, and the name may be of another pressure.
+    """
+    from dzdesign.identify.model import SIDES
+    from dzdesign.identify.named_pressure import contradicts
+    from dzdesign.identify.recording_quality import about_a_stuck_sensor
+    from dzdesign.identify.sides import tests_of_side
+
+    measured = [
+        (test.source, median(test.dp.tolist())) for test in tests if test.dp is not None and not test.dp_is_declared
+    ]
+    wrong = [(source, stated, dp / 1e6) for source, dp in measured if (stated := contradicts(source, dp))]
+    if guessed:
+        return [
+            f"column of dP: '{source}' says {stated} in its name, and {dp_MPa:.3g} MPa in '{guessed}', the only column "
+            "in a unit of pressure; declare the one that is the drop, by --columns or --dp"
+            for source, stated, dp_MPa in wrong
+        ], []
+    said = [f"'{source}' holds {dp_MPa:.3g} MPa" for source, _, dp_MPa in wrong[:NAMED_FILES]]
+    more = f" and {len(wrong) - NAMED_FILES} more" if len(wrong) > NAMED_FILES else ""
+    notes = [
+        f"CHECK: a name says another pressure drop than the column: {', '.join(said)}{more}; the sensor is stuck, the "
+        "unit is wrong, or the name is of another pressure"
+    ]
+    sides = [tests_of_side(tests, sign, u_max) for sign in SIDES.values()]
+    stuck = [f"CHECK: {warning.text}" for mine in sides for warning in about_a_stuck_sensor(mine)]
+    return [], stuck or (notes if wrong else [])
 
 
 def _pressures(guesses: "list[GuessedColumns]", columns: dict[str, str]) -> tuple[list[str], list[str]]:
@@ -283,7 +310,7 @@ def _said(name: str, side: "SeenSide") -> str:
     pressures = ", ".join(f"{dp:.3g}" for dp in side.dp_MPa if dp is not None)
     where = f"{pressures} MPa" if pressures else "an unknown pressure drop"
     rate = "" if side.rate_V_s is None else f", at most {side.rate_V_s:.3g} V/s"
-    floor = f"the meter starts at {side.floor_L_min:.2f} L/min" if side.floor_L_min else "the meter has no floor"
+    floor = f"meter floor {side.floor_L_min:.2f} L/min" if side.floor_L_min else "no meter floor is seen"
     return (
         f"{name} commands: {side.ramps} ramp{'s' if side.ramps > 1 else ''} at {where}{rate}, "
         f"up to {side.q_max_L_min:.3g} L/min; {floor}"

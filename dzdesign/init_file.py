@@ -7,6 +7,7 @@ from dzdesign.core.errors import one_line
 from dzdesign.core.units import SPELLINGS
 
 if TYPE_CHECKING:
+    from dzdesign.identify.first_look import GuessedColumns
     from dzdesign.init import Look
 
 #: Who and what; last in the file, for in TOML a table ends where the next one begins.
@@ -67,8 +68,10 @@ def options_file(look: "Look", summary: list[str], opens: list[str]) -> str:
 
 def _command_lines(look: "Look") -> list[str]:
     value = f'u-max = "{look.u_max:g} V"'
+    if look.in_per_cent:
+        return ["# Full command, what 100 % means: recordings in per cent don't say it. A guess: correct it.", value]
     if look.u_seen is None:
-        return ["# Full command; not seen (the command is in per cent, or was not read), so correct it.", value]
+        return ["# Full command: not looked at, as something is open. A guess: correct it.", value]
     if look.u_seen < 0.97 * look.u_max:
         return [f"# Full command: a guess, for the ramps end at {look.u_seen:.2f} V. Correct it if it is wrong.", value]
     return [f"# Full command: the ramps end at {look.u_seen:.2f} V.", value]
@@ -84,9 +87,9 @@ def _skip_lines(look: "Look") -> list[str]:
 def _meter_lines(look: "Look") -> list[str]:
     sides = list(look.sides.values())
     floor = max((side.floor_L_min for side in sides), default=None)
-    found = "" if not floor else f"; identify finds {floor:.2f} L/min in the recordings"
+    found = f"identify finds {floor:.2f} L/min" if floor else "none is seen, 0.60 L/min is an example"
     lines = [
-        f"# Flow below which the meter reads zero{found}.",
+        f"# The meter's floor, the flow below which it reads zero: {found if sides else 'not looked at'}.",
         "# Declare the data sheet's, where that is larger.",
         f'# meter-floor = "{floor or 0.6:.2f} L/min"',
     ]
@@ -126,9 +129,23 @@ def _column_lines(look: "Look", opens: list[str]) -> list[str]:
         if "dP" in look.columns and any("dP" in guess.chosen for guess in look.guesses):
             lines += [f"# dP: {CHECK_DP}."]
         lines += ["[columns]", *body]
-    if opens and open_ones:
-        lines += [*(() if body else ("# [columns]",)), *(f'# {name} = "LABEL:UNIT"' for name in open_ones)]
+    templates = [f'# {name} = "LABEL:UNIT"' for name in open_ones] if opens else []
+    known = look.columns.keys() | first.understood.keys()
+    if not look.dp and "dP" not in known and not {"pA", "pB"} <= known:
+        templates += [*(() if "dP" in open_ones else ('# dP = "LABEL:UNIT"',)), *_port_lines(first)]
+    if templates:
+        lines += [*(() if body else ("# [columns]",)), *templates]
     return [*lines, ""]
+
+
+def _port_lines(guess: "GuessedColumns") -> list[str]:
+    """Return how sensors on both sides of the valve's edge are declared, with their labels where two can be they."""
+    known = [f"{label}:bar" for label in guess.bare_pressures] or list(guess.pressures)
+    labels = [_quoted(label) for label in known] if len(known) == 2 else ['"LABEL:UNIT"'] * 2
+    return [
+        "# or, of a sensor on either side, pA of the higher pressure, in place of dP:",
+        *(f"# {port} = {label}" for port, label in zip(("pA", "pB"), labels, strict=True)),
+    ]
 
 
 def _shown(unit: str) -> str:

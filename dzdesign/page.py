@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from rich.console import Console, ConsoleOptions, RenderableType
+    from rich.segment import Segment
 
 #: Columns of a page when stdout is a file or a pipe, and COLUMNS does not say.
 FILE_WIDTH = 140
@@ -91,15 +92,17 @@ class Grid:
         """Add a row."""
         self.rows.append(tuple(one_line(cell) for cell in cells))  # a name from a file steers no terminal
 
-    def __rich_console__(self, console: "Console", options: "ConsoleOptions") -> "Iterator[RenderableType]":
-        """Yield one table of rich, or several."""
+    def __rich_console__(self, console: "Console", options: "ConsoleOptions") -> "Iterator[RenderableType | Segment]":
+        """Yield the lines of one table of rich, or of several."""
         from rich.text import Text
 
         blocks = self._blocks(options.max_width)
         for number, (columns, gap, widths) in enumerate(blocks, 1):
             if number > 1:
                 yield Text("  (the same rows, further columns)")
-            yield self._rendered(columns, gap, widths, self.title if number == 1 else None)
+            yield from _without_trailing_blanks(
+                console, options, self._rendered(columns, gap, widths, self.title if number == 1 else None)
+            )
 
     def _blocks(self, room: int) -> list[tuple[list[int], int, list[int]]]:
         """Return the columns of each table, the gap between them and their widths."""
@@ -178,3 +181,18 @@ class Grid:
         for row in self.rows:
             table.add_row(*(Text(row[column]) for column in columns))
         return table
+
+
+def _without_trailing_blanks(
+    console: "Console", options: "ConsoleOptions", table: "RenderableType"
+) -> "Iterator[Segment]":
+    """Yield the lines of a table as they are to stand in a file: rich fills each up with blanks."""
+    from rich.segment import Segment
+
+    for line in console.render_lines(table, options, pad=False):
+        while line and not line[-1].text.strip():
+            line.pop()
+        if line:
+            line[-1] = Segment(line[-1].text.rstrip(), line[-1].style)
+        yield from line
+        yield Segment.line()

@@ -270,7 +270,12 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
             ),
             _given("--linearity-window", default="10-90", metavar="A-B", help="per cent of full command"),
             COLUMNS,
-            _given("--after-columns", metavar="MAP", help="columns of the recordings after (default: as --columns)"),
+            _given(
+                "--after-columns",
+                metavar="MAP",
+                help="columns of the recordings after; the u there is the compensator's input (default: as --columns, "
+                "also where that is the table [columns] of the TOML file)",
+            ),
             DP,
             SKIP_ROWS,
             U_MAX,

@@ -73,9 +73,11 @@ def _warning(test: RampTest, low: float) -> Warning_:
         code="meter-clipped",
         text=(
             f"the flow never reads less than {low / L_MIN:.3g} L/min, and reads that to the last digit in "
-            f"{int(np.sum(test.q <= low + _one_reading(test)))} rows: the meter or the logger cuts it off there. Those "
-            "rows are taken as no flow seen, below a floor of that much. Let the logger write what the meter reads, or "
-            "zero below its floor; if it is the zero error of a meter that does not scatter, zero it and record again"
+            f"{int(np.sum(test.q <= low + _one_reading(test)))} rows. Either the meter or the logger cuts it off, "
+            "or the meter has a zero error of that much and does not scatter: the recordings can't tell which. It is "
+            "taken as cut off, which is safe: those rows are no flow seen, below a floor of that much; if it is a zero "
+            "error, the thresholds come out too low by it over the flow gain. Let the logger write what the meter "
+            "reads, or zero below its floor; a zero error is best set to zero, and the ramps recorded again"
         ),
         source=test.source,
     )

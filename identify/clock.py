@@ -1,12 +1,13 @@
 """The clock of a recording, from block to block: numbers or stamps, never going back; and whether its unit is plain."""
 
+import re
 from typing import final
 
 import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.column_labels import Column
-from dzdesign.identify.table import Table
+from dzdesign.identify.table import Table, clean_label
 from dzdesign.identify.time_stamps import Stamps
 
 #: No ramp takes longer than this, s: a clock of whole numbers by which one does counts milliseconds,
@@ -15,6 +16,9 @@ LONGEST_RAMP = 3600.0
 STEPS_MS, SHORTEST_RAMP = (1.0, 1000.0), 0.5
 #: Shares of the largest command between which it goes in a ramp.
 LOW, HIGH = 0.25, 0.75
+#: A column of the milliseconds of a time of day, and a time of day that has them itself.
+MILLISECONDS = re.compile(r"[\[(]?(?:ms|msec|millis|milli-?se[ck]\w{0,6})[\])]?", re.IGNORECASE)
+FRACTION = re.compile(r":\d\d:\d\d[.,:]\d")
 ASSUMED_MS, LIKE_MS = "taken as ms", "like ms"
 
 
@@ -26,6 +30,7 @@ class Clock:
         self._latest = np.empty(0)  # the last time of the block before, if there was one
         self._usual = 0.0
         self._stamps: Stamps | None = None
+        self._beside: str | None = None  # label of the milliseconds, where the stamps have whole seconds
         self._is_begun = False
         self._whole = True
         self._stated = True
@@ -43,7 +48,23 @@ class Clock:
         if not self._is_begun:
             self._is_begun, self._stated = True, bool(column.unit)
             self._stamps = Stamps() if table.is_clock(column.label) else None
-        return None if self._stamps is None else table.seconds(column.label, self._stamps)
+            self._beside = _milliseconds_beside(table, column.label) if self._stamps else None
+        if self._stamps is None:
+            return None
+        seconds = table.seconds(column.label, self._stamps)
+        return seconds if self._beside is None else seconds + self._fractions(table, self._beside)
+
+    def _fractions(self, table: Table, label: str) -> np.ndarray:
+        """Return the fractions of seconds that stand in a column of their own."""
+        thousandths = table.numbers(label)
+        wrong = np.flatnonzero((thousandths < 0) | (thousandths >= 1000))
+        if wrong.size:
+            row = int(wrong[0])
+            raise InputError(
+                f"'{table.path}' {table.place(row)}, column '{label}': {thousandths[row]:g} is no part of a second, "
+                "expected 0 to 999 beside times in whole seconds; give that column another name if it is something else"
+            )
+        return thousandths / 1000
 
     def may_be_ms(self, numbers: np.ndarray) -> bool:
         """Tell whether the numbers of a column without a unit may be milliseconds, as far as their steps tell."""
@@ -94,6 +115,23 @@ class Clock:
         if not plain:
             return ""
         return LIKE_MS if self._stated else ASSUMED_MS
+
+
+def _milliseconds_beside(table: Table, label: str) -> str | None:
+    """Return the column of milliseconds beside times of day in whole seconds, as some loggers part them."""
+    beside = next((other for other in table.labels if is_milliseconds(other)), None)
+    return None if beside is None or FRACTION.search(table.cell(label, 0)) else beside
+
+
+def is_milliseconds(label: str) -> bool:
+    """Tell whether a label is nothing but the unit: of a clock, or of the rest of one in whole seconds.
+
+    Examples
+    --------
+    >>> is_milliseconds("[ms]"), is_milliseconds("time_ms")
+    (True, False)
+    """
+    return MILLISECONDS.fullmatch(clean_label(label)) is not None
 
 
 def _is_plainly_ms(time: np.ndarray, u: np.ndarray) -> bool:

@@ -26,9 +26,6 @@ EXAMPLE_UNITS = {"time": "s", "u": "V", "dP": "MPa", "pA": "MPa", "pB": "MPa", "
 MOST_MEANT = 200
 #: Units of a command that is a share of u_max.
 PER_CENT = ("%", "pct", "percent")
-#: A column of the milliseconds of a time of day, and a time of day that has them itself.
-MILLISECONDS = re.compile(r"[\[(]?(?:ms|msec|millis|milli-?se[ck]\w{0,6})[\])]?", re.IGNORECASE)
-FRACTION = re.compile(r":\d\d:\d\d[.,:]\d")
 TELLING = ("time", "voltage", "pressure", "flow")
 #: Characters of a label in which a quantity is looked for.
 LONGEST_NAME = 80
@@ -131,22 +128,10 @@ def find_columns(table: Table, chosen: Mapping[str, str]) -> dict[str, Column]:
         raise InputError(
             f"'{table.path}'{table.header} has a column of {have} but none of {lack}; expected both, or dP"
         )
-    if "time" in columns and "time" not in chosen:
-        _refuse_parted_time(table, columns["time"].label)
     for quantity in ("time", "u", "Q"):
         if quantity not in columns:
             raise _missing_column(quantity, table, columns)
     return columns
-
-
-def _refuse_parted_time(table: Table, label: str) -> None:
-    """Refuse times of day in whole seconds beside a column of their milliseconds."""
-    beside = next((other for other in table.labels if MILLISECONDS.fullmatch(clean_label(other))), None)
-    if beside is not None and table.is_clock(label) and not FRACTION.search(table.cell(label, 0)):
-        raise InputError(
-            f"'{table.path}'{table.header} has milliseconds in '{beside}' beside the times in '{label}', expected both "
-            f"in one column, such as 03:04:05.123; join them, or leave it aside by --columns 'time={label}'"
-        )
 
 
 def _chosen_column(table: Table, quantity: str, text: str) -> Column:

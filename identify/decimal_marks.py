@@ -27,10 +27,14 @@ GROUPED = {
 #: Numbers with one mark, and those of them whose mark may be one between thousands; 0.123 can't.
 WITH_MARK = {".": r"^[-+]?\d*\.\d*(?:[eE][-+]?\d+)?$", ",": r"^[-+]?\d*,\d*(?:[eE][-+]?\d+)?$"}
 DOUBTFUL = {".": r"^[-+]?[1-9]\d{0,2}(?:\.\d{3})+$", ",": r"^[-+]?[1-9]\d{0,2}(?:,\d{3})+$"}
+#: What stands between thousands and is no decimal mark anywhere: a blank, a narrow or hard one, an apostrophe.
+BETWEEN_THOUSANDS = " \u00a0\u202f'\u2019"
 OTHER = {".": ",", ",": "."}
 NAMES = {".": "points", ",": "commas"}
 #: Rows at the beginning of a block that mostly tell.
 FEW_ROWS = 200
+#: A whole number without a mark that is at least so large, and by so much larger than one with it, tells thousands.
+LEAST_WHOLE, FAR_LARGER = 100.0, 20.0
 ADVICE = "export numbers with one mark and no separator of thousands"
 
 
@@ -55,7 +59,12 @@ class DecimalMarks:
         return self._shown.get(label, ("", ""))[0] == ","
 
     def see_points(
-        self, label: str, numbers: np.ndarray, first_cells: "Callable[[], pl.Series]", place: "Callable[[int], str]"
+        self,
+        label: str,
+        numbers: np.ndarray,
+        first_cells: "Callable[[], pl.Series]",
+        cell: "Callable[[int], str]",
+        place: "Callable[[int], str]",
     ) -> None:
         """Take a column that was read with decimal points.
 
@@ -67,13 +76,16 @@ class DecimalMarks:
             As read.
         first_cells : callable
             Gives its first cells as they stand in the file.
+        cell : callable
+            Row -> its cell as it stands in the file.
         place : callable
             Row -> where it stands, for messages.
 
         Raises
         ------
         InputError
-            If other columns have decimal commas, and this one's points may stand between thousands.
+            If this column's points may stand between thousands, and other columns have decimal commas, or other cells
+            of its own are whole numbers that are far larger without a point.
         """
         if label in self._shown or label in self._doubtful:
             return
@@ -89,6 +101,31 @@ class DecimalMarks:
         if not self._take(label, ".", cells, place) and broken.size:
             row = int(broken[0])
             self._doubt(label, ".", cells[row] if row < len(cells) else f"{numbers[row]:.3f}", place(row))
+        if broken.size:
+            self._refuse_whole_ones_beside(label, numbers, broken, cell, place)
+
+    def _refuse_whole_ones_beside(
+        self,
+        label: str,
+        numbers: np.ndarray,
+        broken: np.ndarray,
+        cell: "Callable[[int], str]",
+        place: "Callable[[int], str]",
+    ) -> None:
+        """Refuse a column in which 998 and 1.001 stand: nothing measured goes from one to the other."""
+        if label not in self._doubtful:
+            return
+        whole = np.where(np.isfinite(numbers) & (numbers == np.rint(numbers)), np.abs(numbers), 0.0)
+        largest, marked = int(np.argmax(whole)), int(broken[np.argmin(np.abs(numbers[broken]))])
+        if whole[largest] < LEAST_WHOLE or abs(numbers[marked]) > whole[largest] / FAR_LARGER:
+            return
+        one, other = cell(largest), cell(marked)
+        if "." not in one:
+            raise InputError(
+                f"'{self._path}' {place(marked)}, column '{label}': '{other[:QUOTED_CHARACTERS]}' stands in one column "
+                f"with '{one[:QUOTED_CHARACTERS]}', so it may be {re.sub('[.]', '', other)[:QUOTED_CHARACTERS]} or a "
+                f"decimal; {ADVICE}"
+            )
 
     def with_points(self, label: str, texts: "pl.Series", place: "Callable[[int], str]") -> "pl.Series":
         """Return numbers with a decimal point, whatever their decimal mark is, and without one between thousands.

@@ -13,7 +13,8 @@ import numpy as np
 
 from dzdesign.core.artefacts import open_bytes
 from dzdesign.core.errors import InputError, nearest
-from dzdesign.core.units import measures
+from dzdesign.core.units import measures, si_factor
+from dzdesign.identify.clock import is_milliseconds
 from dzdesign.identify.column_labels import (
     COLUMN_NAMES,
     EXAMPLE_UNITS,
@@ -22,6 +23,7 @@ from dzdesign.identify.column_labels import (
     Column,
     find_columns,
     fits,
+    is_telling,
     split_label,
 )
 from dzdesign.identify.described_tests import L_MIN, MPA, DescribedTests, describe_tests
@@ -35,14 +37,11 @@ from dzdesign.identify.table import Table
 
 #: Full commands that amplifiers have, V: the smallest that the recordings do not exceed by 5 % is proposed.
 USUAL_U_MAX = (1.0, 2.5, 3.3, 5.0, 10.0, 12.0, 15.0, 20.0, 24.0, 48.0)
-#: A pressure drop in the name of a file.
-PRESSURE_IN_NAME = re.compile(r"(?<![\d.])(\d+(?:[.,]\d+)?)[\s_]*(MPa|bar|kPa|psi)(?![A-Za-z])", re.IGNORECASE)
 #: A label that may be a pressure's, and has no unit: p1, P_in, Druck A, but neither pos nor PWM.
 PRESSURE_LIKE = re.compile(
     r"(?:[dΔδ]|delta|diff)?[\s_.-]?p[\s_.-]?(?:[abpst]|in|out|\d{1,2})?|[^\[(]{0,20}(?:press|druck)[^\[(]{0,20}",
     re.IGNORECASE,
 )
-UNITS_IN_NAMES = {"mpa": "MPa", "bar": "bar", "kpa": "kPa", "psi": "psi"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,6 +61,8 @@ class GuessedColumns:
     bare_pressures : dict
         Label that looks like a pressure and has no unit -> the quantity that it says ("" if none), where no pressure
         drop was understood.
+    pressures : tuple of str
+        Labels in a unit of pressure that say no quantity, where no pressure drop was understood.
     """
 
     labels: tuple[str, ...]
@@ -69,6 +70,7 @@ class GuessedColumns:
     chosen: dict[str, str]
     unclear: dict[str, str]
     bare_pressures: dict[str, str]
+    pressures: tuple[str, ...] = ()
 
 
 def guess_columns(path: Path, skip_rows: int | None = None) -> GuessedColumns:
@@ -93,18 +95,38 @@ def guess_columns(path: Path, skip_rows: int | None = None) -> GuessedColumns:
         except InputError:
             return _guess(table)
     bare = {quantity: column for quantity, column in understood.items() if not column.unit}
+    foreign = {
+        quantity: column
+        for quantity, column in understood.items()
+        if column.unit and not fits(column.unit, quantity) and quantity not in bare
+    }
     chosen, unclear = _foreign_pressures(table, understood)
     return GuessedColumns(
         labels=table.labels,
-        understood={quantity: column for quantity, column in understood.items() if column.unit},
+        understood={name: column for name, column in understood.items() if name not in bare.keys() | foreign.keys()},
         chosen=chosen,
         unclear=unclear
         | {
             quantity: f"'{column.label}' has no unit; give it after a colon, such as {EXAMPLE_UNITS[quantity]}"
             for quantity, column in bare.items()
-        },
+        }
+        | {quantity: _no_unit_of_it(quantity, column) for quantity, column in foreign.items()},
         bare_pressures=_bare_pressures(table, understood.keys() - bare.keys()),
+        pressures=_foreign(table, understood),
     )
+
+
+def _no_unit_of_it(quantity: str, column: Column) -> str:
+    """Return what is unclear of a column whose label says a quantity, and a unit that is none of it."""
+    if quantity != "time" and any(measures(column.unit, kind) for kind in ("current", "voltage")):
+        kind = QUANTITY_OF_COLUMN[quantity]
+        example = range_example(quantity, column.label, column.unit)
+        return f"'{column.label}' is in {column.unit}, which is no unit of {kind}; say what the signal means, {example}"
+    try:
+        si_factor(column.unit, QUANTITY_OF_COLUMN[quantity])
+    except InputError as error:
+        return f"'{column.label}': {error}"
+    return f"'{column.label}' is in {column.unit}"
 
 
 def _guess(table: Table) -> GuessedColumns:
@@ -121,8 +143,10 @@ def _guess(table: Table) -> GuessedColumns:
         if quantity in understood:
             continue
         left = [label for label in table.labels if label not in taken and _fits(table, label, quantity)]
-        if quantity == "time" and not left:
-            left = [label for label in table.labels if label not in taken and _is_clock(table, label)]
+        if quantity == "time":
+            clocks = [label for label in table.labels if label not in taken and _is_clock(table, label)]
+            # Milliseconds beside a clock are its fractions.
+            left = [label for label in left if not (clocks and is_milliseconds(label))] or clocks
         named = [label for label in left if nearest(re.split(r"[_\[( ]", label)[0], _names_of(quantity))]
         if len(left) == 1 or len(named) == 1:
             chosen[quantity] = (left if len(left) == 1 else named)[0]
@@ -130,12 +154,21 @@ def _guess(table: Table) -> GuessedColumns:
         elif left:
             unclear[quantity] = f"{' and '.join(map(repr, left))} could each be it, by their units"
         else:
-            unclear[quantity] = f"no column has a unit of {QUANTITY_OF_COLUMN[quantity]}{_or_a_signal(table, quantity)}"
+            kind = QUANTITY_OF_COLUMN[quantity]
+            unclear[quantity] = f"no column has a unit of {kind}{_or_a_signal(table, quantity)}{_or_one_a_row(table)}"
+            if quantity == "time":
+                unclear[quantity] += _or_without_a_unit(table)
     its_pressure, its_doubt = _foreign_pressures(table, understood)
     return GuessedColumns(
         labels=table.labels, understood=understood, chosen=chosen | its_pressure, unclear=unclear | its_doubt,
-        bare_pressures=_bare_pressures(table, understood.keys()),
+        bare_pressures=_bare_pressures(table, understood.keys()), pressures=_foreign(table, understood),
     )  # fmt: skip
+
+
+def _foreign(table: Table, understood: Mapping[str, Column]) -> tuple[str, ...]:
+    """Return the labels in a unit of pressure that were not understood."""
+    labels = [column.label for column in understood.values()]
+    return tuple(label for label in table.labels if label not in labels and _fits(table, label, "dP"))
 
 
 def _foreign_pressures(table: Table, understood: Mapping[str, Column]) -> tuple[dict[str, str], dict[str, str]]:
@@ -146,14 +179,14 @@ def _foreign_pressures(table: Table, understood: Mapping[str, Column]) -> tuple[
     if "dP" in understood or {"pA", "pB"} <= understood.keys():
         return {}, {}
     port = next((understood[name].label for name in ("pA", "pB") if name in understood), None)
-    labels = [column.label for column in understood.values()]
-    left = [label for label in table.labels if label not in labels and _fits(table, label, "dP")]
+    left = list(_foreign(table, understood))
     if port is not None:
         return {}, {"dP": f"'{port}' is the pressure of one port; which column is that of the other, or the drop?"}
     if len(left) == 1:
         return {"dP": left[0]}, {}
     if left:
-        return {}, {"dP": f"{' and '.join(map(repr, left))}: a pressure, but is it the drop, pA or pB?"}
+        ports = f' If one stands on either side: --columns "pA={left[0]}, pB={left[1]}"' if len(left) == 2 else ""
+        return {}, {"dP": f"{' and '.join(map(repr, left))}: a pressure, but is it the drop, pA or pB?{ports}"}
     signals = [label for label in _signals(table) if PRESSURE_LIKE.fullmatch(re.split(r"[\[(/]", label)[0].strip())]
     if signals:
         example = range_example("dP", signals[0], _unit_of(table, signals[0]))
@@ -173,6 +206,32 @@ def _or_a_signal(table: Table, quantity: str) -> str:
         return ""
     example = range_example(quantity, signals[0], _unit_of(table, signals[0]))
     return f"; if {' or '.join(map(repr, signals))} is it, say what the current means, {example}"
+
+
+def _or_without_a_unit(table: Table) -> str:
+    """Return how the first column is declared as time, where it rises and has no unit, as LabVIEW's X_Value.
+
+    One that counts the rows is no time: a unit would make a wrong one of it.
+    """
+    first = table.labels[0]
+    if not first or table.units.get(first) or is_telling(split_label(first)[1]):
+        return ""
+    try:
+        steps = np.diff(table.numbers(first))
+    except InputError:
+        return ""
+    rises = steps.size > 0 and bool(np.all(steps >= 0)) and float(steps.max()) > 0
+    if rises and bool(np.all(steps == 1)):
+        return f"; '{first}' counts the rows: export the time beside it"
+    return f'; if \'{first}\' is it, say its unit, for example --columns "time={first}:s"' if rises else ""
+
+
+def _or_one_a_row(table: Table) -> str:
+    """Return what to do about a table with a row a variable, as an archive of WinCC is."""
+    words = " ".join(table.labels).lower()
+    if not ("varname" in words and "varvalue" in words):
+        return ""
+    return "; the table has a row for each variable (VarName, VarValue): export a column for each"
 
 
 def _is_clock(table: Table, label: str) -> bool:
@@ -205,19 +264,6 @@ def _fits(table: Table, label: str, quantity: str) -> bool:
 
 def _names_of(quantity: str) -> list[str]:
     return [name for name, its in COLUMN_NAMES.items() if its == quantity and len(name) > 1]
-
-
-def pressure_in_name(name: str) -> str | None:
-    """Return the one pressure that a file's name states, such as ``4 MPa``, or None.
-
-    Examples
-    --------
-    >>> pressure_in_name("ramp_4MPa_2.csv"), pressure_in_name("ramp_2.csv")
-    ('4 MPa', None)
-    """
-    stated = PRESSURE_IN_NAME.findall(name)
-    found = {(number.replace(",", "."), UNITS_IN_NAMES[unit.lower()]) for number, unit in stated}
-    return " ".join(found.pop()) if len(found) == 1 else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,10 +8,14 @@ from dzdesign.identify.clipped_meter import without_clipping
 from dzdesign.identify.described_tests import L_MIN
 from dzdesign.identify.model import SIDES, ValveModel, Warning_
 from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.quality import most_serious_first
 from dzdesign.identify.ramp_files import RampTest
 from dzdesign.identify.recording_quality import about_a_stuck_sensor, about_recordings
 from dzdesign.identify.side import IdentifiedSide, identify_side
 from dzdesign.identify.sides import tests_of_side
+
+#: What ramps of several pressure drops show where a stuck sensor has made one test of them: no word on meter or valve.
+ALSO_OF_A_MIXTURE = ("noise", "bend")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,7 +78,8 @@ def identify_sides(
             warnings.append(Warning_(code="side-refused", text=f"the {name} side is missing: {error}", source=None))
             continue
         prefix = f"{name} side: " if len(sides) > 1 else ""
-        warnings += [replace(item, text=prefix + item.text) for item in (*stuck, *clipped, *sides[name].warnings)]
+        own_words = [item for item in sides[name].warnings if not stuck or item.code not in ALSO_OF_A_MIXTURE]
+        warnings += [replace(item, text=prefix + item.text) for item in (*stuck, *clipped, *own_words)]
     lag = next(iter(sides.values())).described.lag
     model = ValveModel(
         u_max_V=options.u_max,
@@ -84,7 +89,9 @@ def identify_sides(
         meter_zero_L_min=options.meter_zero / L_MIN,
         knee_window=options.knee_window,
         sides={name: side.model for name, side in sides.items()},
-        warnings=(*about_recordings(tests), *([_about_two_sides()] if len(sides) > 1 else []), *warnings),
+        warnings=most_serious_first(
+            (*about_recordings(tests), *([_about_two_sides()] if len(sides) > 1 else []), *warnings)
+        ),
         made_from=tuple(
             dict.fromkeys(file for side in sides.values() for item in side.described.tests for file in item.files)
         ),

@@ -21,7 +21,9 @@ BLAME = 0.5
 PARTS, FEWEST_PARTS = 8, 4
 
 
-def about_errors(side: SideModel, tests: tuple[DescribedTest, ...], u_max: float) -> Iterator[Warning_]:
+def about_errors(
+    side: SideModel, tests: tuple[DescribedTest, ...], u_max: float, window: tuple[float, float]
+) -> Iterator[Warning_]:
     """Yield a warning for each test whose knees are known badly, with the reason.
 
     Parameters
@@ -32,6 +34,8 @@ def about_errors(side: SideModel, tests: tuple[DescribedTest, ...], u_max: float
         What it was identified from.
     u_max : float
         Full command, V.
+    window : tuple of float
+        Of --knee-window, as shares.
     """
     if all(test.u_knee_se_V <= NOISY * u_max for test in side.tests):
         return
@@ -43,7 +47,7 @@ def about_errors(side: SideModel, tests: tuple[DescribedTest, ...], u_max: float
         if not any(map(_has_noise, group)):
             yield _coarse(test)
         elif left < BLAME:
-            yield _bent(test, group, left)
+            yield _bent(test, left, window)
         else:
             yield _noisy(test, alone=len(tests) == len(group) == 1)
 
@@ -86,15 +90,20 @@ def _noisy(test: TestResult, alone: bool) -> Warning_:
     )
 
 
-def _bent(test: TestResult, shapes: list[BranchShape], left: float) -> Warning_:
-    low, high = min(shape.window[0] for shape in shapes), max(shape.window[1] for shape in shapes)
+def _bent(test: TestResult, left: float, said: tuple[float, float]) -> Warning_:
+    branches = [branch for branch in (test.rising, test.falling) if branch]
+    worst = max(branches, key=lambda branch: branch.knee_se_V)
+    (low, high), asked = ([100 * share for share in shares] for shares in (worst.straight, said))
+    widened = f" (--knee-window {asked[0]:.3g}-{asked[1]:.3g}, widened as far as a line goes)"
+    widened = widened if worst.straight != said else ""
     return Warning_(
         code="bend",
         text=(
             f"a knee is known to {1e3 * test.u_knee_se_V:.0f} mV only (one standard error), because the flow bends "
-            f"between {low:.0%} and {high:.0%} of its largest, where a straight line is laid; the meter's noise would "
-            f"leave {1e3 * left * test.u_knee_se_V:.0f} mV at most, so slower ramps help little. The knee's bound lies "
-            "several times the error lower. See --plots, and give the --knee-window in which the flow is straight"
+            f"between {low:.3g} and {high:.3g} % of its largest{widened}, where a straight line is laid; the meter's "
+            f"noise would leave {1e3 * left * test.u_knee_se_V:.0f} mV at most, so slower ramps help little. The "
+            "knee's bound lies several times the error lower. See --plots, and give the --knee-window in which the "
+            "flow is straight"
         ),
         source=test.source,
     )

@@ -19,6 +19,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.identify.binary_tables import binary_reader
 from dzdesign.identify.clock import ASSUMED_MS, Clock
 from dzdesign.identify.column_labels import QUANTITY_OF_COLUMN, Column, find_columns
+from dzdesign.identify.no_values import NoValues
 from dzdesign.identify.scaling import scaling_of
 from dzdesign.identify.table import QUOTED_CHARACTERS, Table
 from dzdesign.identify.text_tables import text_tables
@@ -52,6 +53,8 @@ class RampTest:
         What is doubtful about the unit of the time, as `Clock.doubt` gives it.
     simulated : bool
         True if a comment line above the labels begins with `SIMULATED_MARK`.
+    no_values : str
+        Numbers that were taken for missing samples, as `NoValues.said` gives them.
     """
 
     source: str
@@ -65,6 +68,7 @@ class RampTest:
     run: int = 1
     clock_doubt: str = ""
     simulated: bool = False
+    no_values: str = ""
 
     def __post_init__(self) -> None:
         for array in (self.time, self.u, self.q, self.dp):
@@ -106,7 +110,7 @@ def read_ramp_file(
         Naming file, and row and column where there is one.
     """
     path = Path(path)
-    thinner, clock = Thinner(u_max), Clock()
+    thinner, clock, no_values = Thinner(u_max), Clock(), NoValues()
     found: dict[str, Column] = {}
     simulated = False
     with open_bytes(path, "ramp file") as file:
@@ -118,9 +122,8 @@ def read_ramp_file(
                     simulated = _is_marked(table.comments)
                     _refuse_two_pressures(table, found, dp)
                     _refuse_unequal_lengths(table, found)
-                thinner.add(_complete_rows(table, found, clock, u_max, dp))
-    if thinner.read < MIN_ROWS:
-        raise InputError(f"'{path}' has {thinner.read} complete rows, expected at least {MIN_ROWS} of a ramp test")
+                thinner.add(_complete_rows(table, found, clock, no_values, u_max, dp))
+    _refuse_too_few_rows(path, thinner.read, no_values)
     time, u, q, *measured = (column.copy() for column in thinner.rows())
     doubt = clock.doubt(time, u)
     if doubt == ASSUMED_MS:
@@ -139,7 +142,14 @@ def read_ramp_file(
         run=thinner.run,
         clock_doubt=doubt,
         simulated=simulated,
+        no_values=no_values.said(),
     )
+
+
+def _refuse_too_few_rows(path: Path, rows: int, no_values: NoValues) -> None:
+    if rows < MIN_ROWS:
+        missing = f"; {no_values.said()} are missing samples" if no_values.said() else ""
+        raise InputError(f"'{path}' has {rows} complete rows, expected at least {MIN_ROWS} of a ramp test{missing}")
 
 
 def _is_marked(comments: str) -> bool:
@@ -171,10 +181,12 @@ def read_tables(file: BinaryIO, path: Path, skip_rows: int | None = None) -> Gen
 
 
 def _complete_rows(
-    table: Table, found: Mapping[str, Column], clock: Clock, u_max: float, dp: float | None
+    table: Table, found: Mapping[str, Column], clock: Clock, no_values: NoValues, u_max: float, dp: float | None
 ) -> np.ndarray:
     """Return time, command, flow and, if it is known, pressure drop of the rows of a block that lack none of them."""
-    data = {quantity: _si_numbers(table, quantity, column, clock, u_max) for quantity, column in found.items()}
+    data = {
+        quantity: _si_numbers(table, quantity, column, clock, no_values, u_max) for quantity, column in found.items()
+    }
     measured = data["dP"] if "dP" in data else data["pA"] - data["pB"] if "pA" in data else None
     if measured is None and dp is not None:
         measured = np.full(data["time"].size, dp)
@@ -208,17 +220,20 @@ def _refuse_unequal_lengths(table: Table, found: Mapping[str, Column]) -> None:
             )
 
 
-def _si_numbers(table: Table, quantity: str, column: Column, clock: Clock, u_max: float) -> np.ndarray:
+def _si_numbers(
+    table: Table, quantity: str, column: Column, clock: Clock, no_values: NoValues, u_max: float
+) -> np.ndarray:
     """Return one column in SI, NaN where a sample is missing; refuse what no valve gives."""
     if quantity == "time":
         seconds = clock.stamps(table, column)
         if seconds is not None:
             return seconds
-        if not column.unit and clock.may_be_ms(numbers := table.numbers(column.label)):
-            return numbers  # until the whole of it tells
+    numbers = no_values.without(table.numbers(column.label), column.label, rises=quantity == "time")
+    if quantity == "time" and not column.unit and clock.may_be_ms(numbers):
+        return numbers  # until the whole of it tells
     scaling = scaling_of(table.path, quantity, column, u_max)
     with np.errstate(over="ignore", invalid="ignore"):  # an infinity is refused below
-        numbers = table.numbers(column.label) * scaling.gain + scaling.offset
+        numbers = numbers * scaling.gain + scaling.offset
     far = np.flatnonzero(np.abs(numbers) > LARGEST[QUANTITY_OF_COLUMN[quantity]])
     if far.size:
         row = int(far[0])

@@ -1,12 +1,12 @@
 """What is weak in the recordings themselves, before anything is found in them: made up, averaged, a stuck sensor."""
 
-import re
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from dzdesign.identify.clock import ASSUMED_MS
 from dzdesign.identify.model import Warning_
+from dzdesign.identify.named_pressure import claimed_pressures
 from dzdesign.identify.ramp_files import RampTest
 from dzdesign.identify.ramp_splitting import despiked
 
@@ -15,14 +15,18 @@ MPA = 1e6
 NAMED_FILES = 3
 #: Pressure drops that differ by less than this share are one number: averaging may round the last digit.
 ONE_NUMBER = 1e-12
-#: Share by which flows at one command may differ where the pressure drop is the same: a repeated ramp, warmer oil.
+#: A pressure drop stands still if all but the outermost readings lie within this share of it, or on so few levels of
+#: the converter: two a port to either side.
+STANDS_STILL, LEVELS, OUTERMOST = 0.05, 9, 0.005
+#: Means that differ by more than this factor are of several pressure drops, or of none that stands still.
+APART = 1.2
+#: Share by which flows at one command may differ where the pressure drop is the same, beyond what the means of the
+#: pressure drop say, for flow grows as its root: a repeated ramp, warmer oil. So may those that files' names state.
 SAME_FLOW = 0.1
 #: Flows are compared within this share of the largest command that all recordings reach.
 NEAR_TOP = 0.02
 #: A flow below this share of the largest one is none to compare: the command does not open the valve.
 SMALL_FLOW = 0.05
-#: A pressure drop in a file's name: after dP, or before a unit.
-CLAIMS = re.compile(r"dp[ _=-]?(\d+(?:\.\d+)?)|(\d+(?:\.\d+)?)[ _]?(?:mpa|bar|psi|kpa)", re.IGNORECASE)
 
 
 def about_recordings(tests: Sequence[RampTest]) -> Iterator[Warning_]:
@@ -35,6 +39,7 @@ def about_recordings(tests: Sequence[RampTest]) -> Iterator[Warning_]:
     """
     yield from _about_simulation(tests)
     yield from _about_clocks(tests)
+    yield from _about_missing_samples(tests)
     yield from _about_thinning(tests)
 
 
@@ -79,6 +84,20 @@ def _about_clocks(tests: Sequence[RampTest]) -> Iterator[Warning_]:
             )
 
 
+def _about_missing_samples(tests: Sequence[RampTest]) -> Iterator[Warning_]:
+    for test in tests:
+        if test.no_values:
+            yield Warning_(
+                code="missing-samples",
+                text=(
+                    f"{test.no_values}: far beyond all other values there, and what loggers write where they have "
+                    "none, so these rows were left out as missing samples. Look at the cable and the range of that "
+                    "channel, and let the logger leave such cells blank"
+                ),
+                source=test.source,
+            )
+
+
 def _about_thinning(tests: Sequence[RampTest]) -> Iterator[Warning_]:
     for test in tests:
         if test.run > 1:
@@ -94,7 +113,7 @@ def _about_thinning(tests: Sequence[RampTest]) -> Iterator[Warning_]:
 
 
 def about_a_stuck_sensor(tests: Sequence[RampTest]) -> Iterator[Warning_]:
-    """Yield a warning if the recordings of one side show one pressure drop to the last digit, and must have several.
+    """Yield a warning if the recordings of one side show one pressure drop, noise aside, and must have several.
 
     Parameters
     ----------
@@ -104,27 +123,44 @@ def about_a_stuck_sensor(tests: Sequence[RampTest]) -> Iterator[Warning_]:
     recorded = [test.dp for test in tests if test.dp is not None and not test.dp_is_declared]
     if len(tests) < 2 or len(recorded) < len(tests):
         return
-    low, high = min(float(dp.min()) for dp in recorded), max(float(dp.max()) for dp in recorded)
-    if high - low > ONE_NUMBER * abs(high):
+    means = [float(dp.mean()) for dp in recorded]
+    if min(means) <= 0 or max(means) > APART * min(means):
         return
+    every = np.concatenate(recorded)
+    low, middle, high = (float(value) for value in np.quantile(every, [OUTERMOST, 0.5, 1 - OUTERMOST]))
+    if not _stands_still(every, low, middle, high):
+        return
+    explained = max(means) / min(means)
     top, flows = _flows_at_one_command(tests)
-    claims = [_claim(test.source) for test in tests]
+    claims = claimed_pressures([test.source for test in tests])
     signs = []
-    if min(flows) > 0 and max(flows) > (1 + SAME_FLOW) * min(flows):
+    if min(flows) > 0 and max(flows) > (1 + SAME_FLOW) * explained**0.5 * min(flows):
         signs.append(f"the flows at {top:.3g} V differ by {max(flows) / min(flows) - 1:.0%}")
-    if None not in claims and len(set(claims)) > 1:
+    if claims and max(claims) > (1 + SAME_FLOW) * explained * min(claims):
         signs.append("the files' names say different ones")
     if signs:
+        one = high - low <= ONE_NUMBER * high
+        about = f"{high / MPA:.6g} MPa in every row of" if one else f"{low / MPA:.4g} to {high / MPA:.4g} MPa in"
         yield Warning_(
             code="pressure-stuck",
             text=(
-                f"the pressure drop is {high / MPA:.6g} MPa in every row of all {len(tests)} recordings, but "
+                f"the pressure drop is {about} all {len(tests)} recordings, but "
                 f"{' and '.join(signs)}: the sensor is stuck, or the column is another's, and ramps of different "
-                "pressure drops are taken for one test. Leave that column out and declare the pressure drops by [dp], "
-                "or record again"
+                "pressure drops are taken for one test, whose knees are known badly for that reason (or it is one "
+                "pressure drop, and the valve, its supply or oil was not the same). Leave that column out and declare "
+                "the pressure drops by [dp], or record again"
             ),
             source=None,
         )
+
+
+def _stands_still(every: np.ndarray, low: float, middle: float, high: float) -> bool:
+    """Tell whether readings are one number and the noise of a converter."""
+    if high - low <= STANDS_STILL * middle:
+        return True
+    inner = every[(every >= low) & (every <= high)]
+    # One level computed from two ports, or averaged, differs in its last digits.
+    return middle > 0 and np.unique(np.round(inner / middle, 6)).size <= LEVELS
 
 
 def _flows_at_one_command(tests: Sequence[RampTest]) -> tuple[float, list[float]]:
@@ -135,9 +171,3 @@ def _flows_at_one_command(tests: Sequence[RampTest]) -> tuple[float, list[float]
         away = np.abs(test.u - top)
         flows.append(float(np.median(test.q[away <= max(NEAR_TOP * top, away.min())])))
     return top, [flow if flow > SMALL_FLOW * max(flows) else 0.0 for flow in flows]
-
-
-def _claim(name: str) -> str | None:
-    """Return the number that a file's name gives as its pressure drop, or None."""
-    found = CLAIMS.search(name.rpartition("/")[2])
-    return next(filter(None, found.groups())) if found else None

@@ -63,7 +63,7 @@ def _of_range(quantity: str, column: Column, u_max: float) -> Scaling:
     found = RANGE.fullmatch(text.strip())
     if found is None:
         raise InputError(f"'{text[:80]}' is no range, expected one such as '4..20 mA = {_full_scale(quantity)}'")
-    refuse_thousands(text, f"'{text[:80]}'")
+    refuse_thousands(text, f"'{text[:80]}'", points=True)
     low, high, bottom, top = (float(found[index].replace(",", ".")) for index in (1, 2, 4, 5))
     signal = found[3].strip()
     if not any(measures(signal, kind) for kind in SIGNALS):

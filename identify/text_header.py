@@ -4,7 +4,7 @@ A logger writes about itself above the table: operator, date, a line a channel. 
 begins, and the header is the line above them that has as many cells and reads best as labels of a ramp test.
 """
 
-import csv
+import logging
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -15,7 +15,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.core.units import measures
 from dzdesign.identify.column_labels import TELLING, is_telling, split_label
 from dzdesign.identify.table import QUOTED_CHARACTERS, clean_label
-from dzdesign.identify.time_stamps import is_stamp, is_unclear
+from dzdesign.identify.text_cells import BLANKS, cells_of, is_number, labels_of
 
 #: A recording has some ten columns; a header beyond this is no table, and would take minutes to be searched.
 MOST_COLUMNS, LONGEST_HEADER = 4096, 1 << 20
@@ -25,13 +25,14 @@ MOST_LINES, LONGEST_LINE = 1000, 1 << 16
 FEWEST_ROWS, SHARE_OF_NUMBERS = 5, 0.6
 #: Lines among which a cell in quotes is looked for that goes on in the next one, and of how many it may be.
 MOST_BROKEN = 40
+#: Rows below the header, without any number, that say the columns' types and units.
+MOST_BELOW = 4
 #: A line that is neither a comment nor blank; what a spreadsheet makes of either has quotes or separators.
 TABLE_LINE = re.compile(rb'^(?![ \t,;"]*$)(?![ \t"]*#).+', re.MULTILINE)
 #: What may stand between cells; where none of them is in the header, blanks do.
-SEPARATORS, BLANKS = ",;\t|", " "
+SEPARATORS = ",;\t|"
 #: The same in the order in which rows of numbers are tried: a comma may be a decimal one, a blank part of a date.
 IN_DOUBT = ";\t|, "
-NUMBER = re.compile(r"[-+]?[\d.,]*\d[.,]?(?:[eE][-+]?\d+)?|nan|[-+]?inf(?:inity)?|[-+]?∞", re.IGNORECASE)
 #: What a spreadsheet writes where it has no value, in English and German: a blank cell, and no comment.
 NO_VALUE = re.compile(
     rb'(^|[,;\t|"]) *#(?:N/A|NV|(?:DIV/0|VALUE|WERT|REF|BEZUG|NUM|ZAHL|NULL)!|NAME\?)(?= *(?:[,;\t|"]|$))', re.MULTILINE
@@ -42,6 +43,7 @@ COMMENT = "comment"
 ARTEFACT = re.compile(rb'\s*\{\s*"(?:[^"{}]*"\s*:\s*"[^"]*",?\s*")*?schema"\s*:\s*"(dzdesign\.[\w.-]+/\d+)"')
 #: First characters of text that is no table.
 DOCUMENTS = {b"{": "JSON", b"<": "HTML or XML"}
+logger = logging.getLogger(__name__)
 
 
 @final
@@ -115,18 +117,36 @@ def find_header(block: bytes, number: int, path: Path, *, told: bool) -> tuple[H
     header = _header(line.number, line.text, separator, path)
     end, rows = line.end, lines[at + 1 :]
     above = lines[at - 1] if at else None
-    if rows and is_row_of_units(_cells(rows[0].text, separator)):
-        header = _with_units(header, rows[0].text)
-        end, rows = rows[0].end, rows[1:]
-    elif above and is_row_of_units(_cells(above.text, separator)):
+    below = _rows_of_words(rows, separator)
+    units = next((row for row in below if is_row_of_units(cells_of(row.text, separator))), None)
+    if below:
+        for row in below:
+            if row is not units:
+                words = row.text[:QUOTED_CHARACTERS]
+                logger.debug("'%s' row %d, below the header, is passed over: %s", path, row.number, words)
+        end, rows = below[-1].end, rows[len(below) :]
+    if units:
+        header = _with_units(header, units.text)
+    elif above and is_row_of_units(cells_of(above.text, separator)):
         header = _with_units(header, above.text)
     return _fitted(header, rows), block[end + 1 :]
+
+
+def _rows_of_words(rows: list[_Line], separator: str) -> list[_Line]:
+    """Return the rows directly below a header that hold no number, if numbers follow: units, types of the columns."""
+    below: list[_Line] = []
+    for row in rows[: MOST_BELOW + 1]:
+        cells = cells_of(row.text, separator)
+        if any(map(is_number, cells)):
+            return below
+        below.append(row)
+    return below[:1] if below and is_row_of_units(cells_of(below[0].text, separator)) else []
 
 
 def _with_units(header: Header, line: str) -> Header:
     """Return a header with what a row of units says."""
     units: dict[str, str] = {}
-    for label, cell in zip(header.labels, _cells(line, header.separator), strict=False):
+    for label, cell in zip(header.labels, cells_of(line, header.separator), strict=False):
         if _bare(cell):
             units.setdefault(label, _bare(cell))
     return replace(header, units=units, repeats=header.repeats | {line})
@@ -174,19 +194,19 @@ def _refuse_a_document(block: bytes, path: Path) -> None:
 def _best(lines: list[_Line], path: Path) -> tuple[int, str] | None:
     """Return which line is the header, and what parts its cells; None if no rows of numbers tell."""
     first = _usual_separator(lines[0].text)
-    if len(lines) > 1 and _could_be_labels(cells := _cells(lines[0].text, first)):
-        second = _cells(lines[1].text, first)
+    if len(lines) > 1 and _could_be_labels(cells := cells_of(lines[0].text, first)):
+        second = cells_of(lines[1].text, first)
         if len(cells) == len(second) and _is_row(second):
             return 0, first
     for separator in IN_DOUBT:
         rows = _first_row(lines, separator)
         if rows is None:
             continue
-        width = len(_cells(lines[rows].text, separator))
+        width = len(cells_of(lines[rows].text, separator))
         fitting = [
             (_score(cells, lines, index, separator), index)
             for index in range(rows)
-            if _fits(cells := _cells(lines[index].text, separator), width)
+            if _fits(cells := cells_of(lines[index].text, separator), width)
             and _could_be_labels(cells)
             and not (index and is_row_of_units(cells))
         ]
@@ -206,7 +226,7 @@ def _first_row(lines: list[_Line], separator: str) -> int | None:
     """Return the first of `FEWEST_ROWS` rows of numbers that have the same number of cells."""
     run, width = 0, 0
     for index, line in enumerate(lines):
-        cells = _cells(line.text, separator)
+        cells = cells_of(line.text, separator)
         if not _is_row(cells):
             run = 0
             continue
@@ -214,29 +234,6 @@ def _first_row(lines: list[_Line], separator: str) -> int | None:
         if run == FEWEST_ROWS:
             return index - run + 1
     return None
-
-
-def _cells(line: str, separator: str) -> list[str]:
-    """Return the cells of a line without blanks and quotes around them; never an error."""
-    if separator == BLANKS:
-        return _words(line)
-    if '"' in line:
-        try:
-            return [clean_label(cell) for cell in next(csv.reader([line], delimiter=separator, skipinitialspace=True))]
-        except csv.Error:
-            return []
-    return [clean_label(cell) for cell in line.split(separator)]
-
-
-def _words(line: str) -> list[str]:
-    """Return the words of a line; a unit in brackets belongs to the word before it."""
-    # Of a bracket that is never closed only so much is looked at: a long header of them would take hours.
-    return re.findall(r"[^\s\[(]+(?:\s{0,40}[\[(][^\])]{0,80}[\])])?", line)
-
-
-def is_number(cell: str) -> bool:
-    """Tell whether a cell is a number, with any decimal mark, a date or a time of day."""
-    return NUMBER.fullmatch(cell) is not None or is_stamp(cell) or is_unclear(cell)
 
 
 def _is_row(cells: list[str]) -> bool:
@@ -247,7 +244,7 @@ def _is_row(cells: list[str]) -> bool:
 
 def _could_be_labels(cells: list[str]) -> bool:
     texts = sum(bool(cell) and not is_number(cell) for cell in cells)
-    return texts >= 2 and 2 * texts >= len(cells)
+    return texts >= 2 and 2 * texts >= len(cells) and len(set(filter(None, cells))) > 1
 
 
 def _fits(cells: list[str], width: int) -> bool:
@@ -274,13 +271,13 @@ def _score(cells: list[str], lines: list[_Line], index: int, separator: str) -> 
     for label in cells[:MOST_COLUMNS]:
         quantity, unit = split_label(label)
         said |= {quantity} if quantity else {unit} if unit != label and is_telling(unit) else set()
-    return len(said) + (len(TELLING) if is_row_of_units(_cells(lines[index + 1].text, separator)) else 0)
+    return len(said) + (len(TELLING) if is_row_of_units(cells_of(lines[index + 1].text, separator)) else 0)
 
 
 def _usual_separator(line: str) -> str:
     """Return what is most often in a line; in a row of numbers with decimal commas that is not what parts its cells."""
     for separator in IN_DOUBT[:3]:
-        if len(line) <= LONGEST_LINE and separator in line and _is_row(_cells(line, separator)):
+        if len(line) <= LONGEST_LINE and separator in line and _is_row(cells_of(line, separator)):
             return separator
     separator = max(SEPARATORS, key=line.count)
     return separator if separator in line else BLANKS
@@ -299,8 +296,8 @@ def _commented_header(block: bytes, number: int, row: _Line) -> _Line | None:
             continue
         bare = text.lstrip('" \t#')
         separator = _usual_separator(row.text)
-        names = _cells(bare, separator)
-        if not text.startswith("#") or len(names) != len(_cells(row.text, separator)) or not _could_be_labels(names):
+        names = cells_of(bare, separator)
+        if not text.startswith("#") or len(names) != len(cells_of(row.text, separator)) or not _could_be_labels(names):
             return None
         end = sum(len(each) + 1 for each in above[: len(above) - back + 1]) - 1
         return _Line(number=row.number - back, text=bare, end=end)
@@ -326,52 +323,10 @@ def _header(number: int, line: str, separator: str, path: Path) -> Header:
 
 def _fitted(header: Header, rows: list[_Line]) -> Header:
     """Return the header with a label more or less where its rows end in a separator and it does not, or the reverse."""
-    cells = _cells(rows[0].text, header.separator) if rows else []
+    cells = cells_of(rows[0].text, header.separator) if rows else []
     labels, few = header.labels, len(cells) == len(header.labels) - 1
     if few and labels[-1].lower() in ("", COMMENT) and _is_row(cells):
         labels = labels[:-1]
     elif len(cells) == len(labels) + 1 and not cells[-1] and _is_row(cells):
         labels = (*labels, "")
     return replace(header, labels=labels)
-
-
-def labels_of(header: str, separator: str, number: int, path: Path) -> list[str]:
-    """Return the labels of a header.
-
-    Parameters
-    ----------
-    header, separator : str
-        The line, and what parts its cells.
-    number : int
-        Of the line, for messages.
-    path : Path
-        For messages.
-    """
-    return _words(header) if separator == BLANKS else split_line(header, separator, number, path)
-
-
-def split_line(line: str, separator: str, number: int, path: Path) -> list[str]:
-    """Return the cells of a line; inside quotes the separator is a character as any other.
-
-    Parameters
-    ----------
-    line, separator : str
-        A row, and what parts its cells.
-    number : int
-        Of the line, for messages.
-    path : Path
-        For messages.
-
-    Raises
-    ------
-    InputError
-        If a quote is never closed.
-    """
-    if separator == BLANKS:
-        return line.split()
-    if '"' not in line:
-        return line.split(separator)
-    try:
-        return next(csv.reader([line], delimiter=separator, skipinitialspace=True))
-    except csv.Error as error:  # a cell longer than 128 KiB, as after a quote that is never closed
-        raise InputError(f"'{path}' row {number} has a cell that can't be read ({error}); mind its quotes") from error

@@ -7,29 +7,25 @@ alike are read at once; where one does not, each line of its block is looked at.
 import logging
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, final
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.decimal_marks import FEW_ROWS, DecimalMarks
-from dzdesign.identify.table import QUOTED_CHARACTERS, Table, clean_label
+from dzdesign.identify.decimal_marks import DecimalMarks
 from dzdesign.identify.text_blocks import text_blocks
+from dzdesign.identify.text_cells import BLANKS, split_line
+from dzdesign.identify.text_foot import Foot, is_no_sample
 from dzdesign.identify.text_header import (
-    BLANKS,
     LONGEST_HEADER,
     LONGEST_LINE,
-    MOST_LINES,
     NO_VALUE,
     TABLE_LINE,
     Header,
     find_header,
-    is_number,
-    split_line,
 )
-from dzdesign.identify.time_stamps import EXAMPLE, Stamps, is_stamp, is_unclear
+from dzdesign.identify.text_table import TextTable
 
 if TYPE_CHECKING:
     import polars as pl
@@ -41,137 +37,7 @@ Lines = list[tuple[int, str]]
 CELL_END = "\x1f"
 #: What a row of numbers may begin with.
 NUMERIC = "0123456789+-."
-#: A cell with a date.
-DATE = re.compile(r"\d[-/.:]\d+[-/.:]\d")
-#: Characters of a row whose first cells are looked at; of longer rows fewer are.
-LONGEST_ROW = 256
 logger = logging.getLogger(__name__)
-
-
-@final
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TextTable(Table):
-    """A table of text: every column as strings or as numbers, and where it stands in the file.
-
-    Attributes
-    ----------
-    cells : DataFrame
-        A column is of numbers only where each of its cells is one, or blank.
-    header_line : int
-        Number of the header's line.
-    lines : sequence of int
-        Numbers of the rows' lines.
-    plain : bytes
-        The rows as they stand in the file, where they were read without a look at each.
-    separator : str
-        Between two cells.
-    marks : DecimalMarks
-        Of the file.
-    """
-
-    cells: "pl.DataFrame"
-    header_line: int
-    lines: Sequence[int]
-    plain: bytes
-    separator: str
-    marks: DecimalMarks
-
-    @property
-    def header(self) -> str:
-        """Where the labels stand."""
-        return f" row {self.header_line}"
-
-    def length(self, label: str) -> int:
-        """Return how many rows this table has, whatever the column."""
-        return self.cells.height
-
-    def place(self, row: int) -> str:
-        """Return ``row 8``, as an editor counts."""
-        return f"row {self.lines[row]}"
-
-    def cell(self, label: str, row: int) -> str:
-        """Return a cell as it stands in the file."""
-        if self.plain:
-            line = self.plain.split(b"\n")[row].decode()
-            return clean_label(line.split(self.separator)[self.labels.index(label)])
-        return self._texts(label)[row]
-
-    def numbers(self, label: str) -> np.ndarray:
-        """Return a column as float64, NaN where the cell is blank."""
-        import polars as pl
-
-        numbers = self.cells.to_series(self.labels.index(label))
-        if numbers.dtype == pl.Float64 and not (self.marks.has_commas(label) and b"." in self.plain):
-            read = numbers.fill_null(np.nan).to_numpy().copy()
-            self.marks.see_points(label, read, lambda: self._first_cells(label), self.place)
-            return read
-        texts = self._texts(label)
-        column = self.marks.with_points(label, texts, self.place)
-        numbers = column.cast(pl.Float64, strict=False)
-        bad = (~(column.is_null() | (column == "")) & numbers.is_null()).arg_true()
-        if len(bad):
-            raise self._no_number(label, int(bad[0]), texts[int(bad[0])])
-        return numbers.fill_null(np.nan).to_numpy().copy()
-
-    def is_clock(self, label: str) -> bool:
-        """Tell whether the first cell of a column that is not blank holds a time of day."""
-        import polars as pl
-
-        if self.cells.to_series(self.labels.index(label)).dtype == pl.Float64:
-            return False
-        cell = self._first(label)
-        if is_unclear(cell):
-            raise InputError(
-                f"'{self.path}' column '{label}': '{cell}' may be hours and minutes, minutes and seconds or a date, "
-                f"expected seconds as a number, or a time such as {EXAMPLE}"
-            )
-        return is_stamp(cell)
-
-    def seconds(self, label: str, stamps: Stamps) -> np.ndarray:
-        """Return a column of dates or times of day as seconds since the first row of the file."""
-        texts = self._texts(label)
-        seconds = stamps.seconds(texts, f"'{self.path}' column '{label}'")
-        bad = np.flatnonzero((~(texts.is_null() | (texts == ""))).to_numpy() & np.isnan(seconds))
-        if bad.size:
-            row = int(bad[0])
-            raise InputError(
-                f"'{self.path}' {self.place(row)}, column '{label}': '{texts[row][:QUOTED_CHARACTERS]}' is no time, "
-                f"expected one such as {EXAMPLE}, as above; correct it, or leave the cell blank if it is missing"
-            )
-        return seconds
-
-    def _first(self, label: str) -> str:
-        texts = self._texts(label)
-        filled = texts.filter(texts.is_not_null() & (texts != ""))
-        return filled[0] if len(filled) else ""
-
-    def _texts(self, label: str) -> "pl.Series":
-        import polars as pl
-
-        index = self.labels.index(label)
-        column = self.cells.to_series(index)
-        if column.dtype == pl.Float64:  # its cells as they stand in the file
-            names = [f"c{number}" for number in range(len(self.labels))]
-            schema = dict.fromkeys(names, pl.String)
-            column = pl.read_csv(
-                self.plain, separator=self.separator, has_header=False, schema=schema, columns=[index], quote_char=None
-            ).to_series()
-        return column.str.strip_chars(' \t"')
-
-    def _first_cells(self, label: str) -> "pl.Series":
-        import polars as pl
-
-        index = self.labels.index(label)
-        lines = self.plain[: FEW_ROWS * LONGEST_ROW].split(b"\n", FEW_ROWS)[:FEW_ROWS]
-        cells = [line.decode(errors="replace").split(self.separator) for line in lines]
-        return pl.Series([clean_label(row[index]) for row in cells if len(row) == len(self.labels)], dtype=pl.String)
-
-    def _no_number(self, label: str, row: int, cell: str) -> InputError:
-        date = f" (a column of the time may hold stamps such as {EXAMPLE})" if DATE.search(cell) else ""
-        return InputError(
-            f"'{self.path}' {self.place(row)}, column '{label}': '{cell[:QUOTED_CHARACTERS]}' is not a "
-            f"number{date}; correct it, or leave the cell blank if the sample is missing"
-        )
 
 
 def text_tables(file: BinaryIO, path: Path, skip_rows: int | None = None) -> Iterator[TextTable]:
@@ -193,7 +59,7 @@ def text_tables(file: BinaryIO, path: Path, skip_rows: int | None = None) -> Ite
     InputError
         If it is no such text, or a row has not as many cells as the header.
     """
-    header, number, foot, above = None, 1, _Foot(path), b""
+    header, number, foot, above = None, 1, Foot(path), b""
     marks = DecimalMarks(path)
     for block in text_blocks(file, path):
         whole = block
@@ -242,31 +108,8 @@ def _tell(header: Header, block: bytes, number: int, path: Path) -> None:
         logger.debug("'%s': the row below the header says units: %s", path, ", ".join(header.units.values()))
 
 
-@final
-class _Foot:
-    """What a logger writes below the samples: lines of text, after which no sample may follow."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self._error: InputError | None = None
-        self._count = 0
-
-    def add(self, number: int, cells: Sequence[str], header: Header) -> None:
-        """Take a line of text."""
-        logger.debug("'%s' row %d is passed over: %s", self.path, number, " ".join(cells)[:QUOTED_CHARACTERS])
-        self._error = self._error or _wrong_row(cells, number, header, self.path)
-        self._count += 1
-        if self._count > MOST_LINES:
-            self.refuse_what_follows()
-
-    def refuse_what_follows(self) -> None:
-        """Refuse samples below lines of text."""
-        if self._error is not None:
-            raise self._error
-
-
 def _table(
-    rows: bytes, number: int, header: Header, foot: _Foot, marks: DecimalMarks, above: str
+    rows: bytes, number: int, header: Header, foot: Foot, marks: DecimalMarks, above: str
 ) -> TextTable:
     """Return the table of rows; `number` is that of their first line in the file, `above` what stands over them all."""
     if b"#" in rows and header.separator != BLANKS:
@@ -294,15 +137,11 @@ def _table(
 
 
 def _has_other_lines(rows: bytes, header: Header) -> bool:
-    """Tell whether the header stands among rows once more, or a line of text at their end."""
-    last = rows[-LONGEST_LINE:].rstrip(b"\n").rpartition(b"\n")[2].decode(errors="replace")
-    return _is_text(last.split(header.separator)) or any(line.encode() in rows for line in header.repeats)
-
-
-def _is_text(cells: list[str]) -> bool:
-    """Tell whether a row is a word of the logger: nothing but text in its first cell."""
-    filled = [bare for cell in cells if (bare := clean_label(cell))]
-    return len(filled) == 1 and bool(clean_label(cells[0])) and not is_number(filled[0])
+    """Tell whether the header stands among rows once more, or a line of text at their beginning or end."""
+    first = rows[:LONGEST_LINE].lstrip(b"\n").partition(b"\n")[0].decode(errors="replace")
+    last = rows[-LONGEST_LINE:].rstrip(b"\n\t ,;|").rpartition(b"\n")[2].decode(errors="replace")
+    ends = (line.split(header.separator) for line in (first, last))
+    return any(map(is_no_sample, ends)) or any(line.encode() in rows for line in header.repeats)
 
 
 def _plain_cells(rows: bytes, separator: str, width: int) -> "pl.DataFrame | None":
@@ -356,7 +195,7 @@ def _table_lines(text: str, first: int, header: Header) -> Lines:
     ]
 
 
-def _read_cells(lines: Lines, header: Header, foot: _Foot) -> tuple["pl.DataFrame", list[int]]:
+def _read_cells(lines: Lines, header: Header, foot: Foot) -> tuple["pl.DataFrame", list[int]]:
     """Return all cells as strings, and their rows' numbers: numbers are read column by column, to name a wrong row."""
     import polars as pl
 
@@ -367,9 +206,7 @@ def _read_cells(lines: Lines, header: Header, foot: _Foot) -> tuple["pl.DataFram
             text = line.replace(separator, CELL_END)
         else:
             cells = split_line(line, separator, number, foot.path)
-            if len(cells) != width or _is_text(cells):
-                if is_number(clean_label(cells[0])):
-                    raise _wrong_row(cells, number, header, foot.path)
+            if len(cells) != width or is_no_sample(cells):
                 foot.add(number, cells, header)
                 continue
             text = CELL_END.join(cells)
@@ -383,17 +220,3 @@ def _read_cells(lines: Lines, header: Header, foot: _Foot) -> tuple["pl.DataFram
         )
     except pl.exceptions.PolarsError as error:
         raise InputError(f"'{foot.path}' can't be read as a table: {str(error).splitlines()[0]}") from error
-
-
-def _wrong_row(cells: Sequence[str], number: int, header: Header, path: Path) -> InputError:
-    """Return the error for a row that has too many or too few cells, or is a word of the logger."""
-    width = len(header.labels)
-    comma = header.separator == "," and len(cells) == 2 * width
-    hint = "; decimal commas need ';' or a tab between the cells" if comma else ""
-    one = f"one cell that is filled, '{cells[0][:QUOTED_CHARACTERS]}'"
-    found = f"{len(cells)} cells" if len(cells) != width else one
-    return InputError(
-        f"'{path}' row {number} has {found}, expected {width} as in the header, row {header.line} "
-        f"('{', '.join(header.labels)[:QUOTED_CHARACTERS]}'){hint}; correct the row, or begin it with # if it is no "
-        "sample; --skip-rows says how many rows stand above the header"
-    )

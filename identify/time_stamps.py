@@ -1,7 +1,8 @@
 """Dates and times of day in a column of text, as seconds since the first row.
 
 ``2026-11-22T03:04:05.123+01:00``, ``22.11.2026 03:04:05,123``, ``11/22/2026 03:04:05:123``, ``3:04:05.1 PM``,
-``03:04:05``. Which part of a date is the day and which the month matters only where a recording goes over midnight.
+``03:04:05``; an apostrophe before it, by which loggers keep a spreadsheet from reading it, counts for nothing. Which
+part of a date is the day and which the month matters only where a recording goes over midnight.
 """
 
 import datetime
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 #: A stamp: date (may lack), hours, minutes, seconds with their fraction, half of the day, zone.
 STAMP = (
-    r"^(?:(\d{1,4}[-./]\d{1,2}[-./]\d{1,4})[T ,]\s?)?(\d{1,3}):([0-5]?\d):([0-6]?\d(?:[.,:]\d{1,9})?)"
+    r"^'?(?:(\d{1,4}[-./]\d{1,2}[-./]\d{1,4})[T ,]\s?)?(\d{1,3}):([0-5]?\d):([0-6]?\d(?:[.,:]\d{1,9})?)"
     r"(?:\s?([AaPp])\.?[Mm]\.?)?\s?(Z|UTC|[-+]\d\d:?\d\d)?$"
 )
 #: What looks like one and lacks seconds or the time: which of the two numbers are minutes can't be told.

@@ -156,7 +156,7 @@ TEXTS: dict[str, tuple[Callable[[], bytes], str | None]] = {
     "half a character": (lambda: CSV.replace(b"time", b"\xed\xa0\x80"), "no column of time"),
     "overlong": (lambda: CSV.replace(b"time", b"\xc0\x80"), "no column of time"),
     "a preamble of a million lines": (lambda: b"Channel;1\n" * MIB + CSV, None),
-    "a foot of a million lines": (lambda: CSV + b"the end\n" * MIB, "has 1 cells, expected 4"),
+    "a foot of a million lines": (lambda: CSV + b"the end\n" * MIB, "has 1 cell, "),
     "stamps of a million days": (lambda: b"time,u_V,dP_MPa,Q_Lmin\n" + b"".join(
         b"%d-01-%02d 00:00:00,1,1,1\n" % (year, day) for year in range(1, 9999) for day in range(1, 9)), None),
     "mixed line ends": (lambda: CSV.replace(b"\n", b"\r\n", 9).replace(b"\r\n", b"\r", 3), None),

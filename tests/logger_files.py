@@ -116,6 +116,13 @@ def with_a_foot():
     return text("Zeit;u;dP;Q", "[s];[V];[bar];[l/min]", *table, "", "Ende der Messung;;;", "Datei geschlossen", "\x1a")
 
 
+def with_statistics():
+    """What a measuring program sums up below the samples, in numbers and in their columns."""
+    words = ("Mittelwert", "Min.", "Maximum:", "StdAbw", "Std. Dev.", "Effektivwert [RMS]", "peak-to-peak")
+    sums = [f"{word};5,0;20,1;9,9" for word in words]
+    return text("t_s;u_V;dP_bar;Q_Lmin", *rows(TIME, U, 10 * DP, Q), "", *sums, ";;;;")
+
+
 def header_again():
     """A logger that writes its heading again whenever a page is full."""
     head, units, table = "t;u;dP;Q", "s;V;bar;l/min", rows(TIME, U, 10 * DP, Q)
@@ -183,6 +190,47 @@ def many_words():
     return text(*head, "Zeit [s];u [V];dP [bar];Q [l/min]", *rows(TIME, U, 10 * DP, Q), encoding="cp1252")
 
 
+def graphtec():
+    """Whole seconds and their milliseconds in two columns, a blank behind each sign."""
+    times = [START + datetime.timedelta(seconds=float(time)) for time in TIME]
+    cells = [[f"{time:%Y/%m/%d %H:%M:%S}" for time in times], [f"{time.microsecond // 1000}" for time in times],
+             *([f"{value:+.4f}".replace("+", "+ ").replace("-", "- ") for value in each] for each in (U, 10 * DP, Q))]
+    head = ['"Vendor","GRAPHTEC Corporation"', "NO.,Date&Time,ms,CH1,CH2,CH3", "NO.,Time,ms,V,bar,L/min"]
+    return text(*head, *rows([str(index) for index in range(TIME.size)], *cells, separator=","), end="\r\n")
+
+
+def hioki():
+    """An apostrophe before the stamp, so that a spreadsheet leaves it alone."""
+    clock = [f"'{stamp}" for stamp in stamps("%y-%m-%d %H:%M:%S.")]
+    return text('"HIOKI 8431","Ver 1.0"', '"Date Time","CH1-1[V]","CH1-2[bar]","CH1-3[L/min]"',
+                *rows(clock, U, 10 * DP, Q, separator=",", comma=False))  # fmt: skip
+
+
+def inca():
+    """Three rows of words above the samples: names, types, units."""
+    return text("timestamps\tu\tdP\tQ", "f8\tf8\tf8\tf8", "s\tV\tbar\tl/min",
+                *rows(TIME, U, 10 * DP, Q, separator="\t", comma=False))  # fmt: skip
+
+
+def dspace():
+    """Rows that begin with what they say, as samples do not."""
+    table = rows(TIME, U, 10 * DP, Q, separator=",", comma=False)
+    head = ["version,1.0", "path,Model/time,Model/u,Model/dP,Model/Q", "name,time,u,dP,Q", "unit,s,V,bar,L/min"]
+    return text(*head, "trace_values", *(f",{row}" for row in table))
+
+
+def extremes_above():
+    """The least and the largest value of each column between header and samples."""
+    return text("t;u;dP;Q", "s;V;bar;l/min", "Min;0,0;20,0;-0,1", "Max;10,0;20,0;28,3", *rows(TIME, U, 10 * DP, Q))
+
+
+def grouped(mark):
+    """Thousands parted by what is no decimal mark, and a minus as typesetters write it."""
+    pressures = [f"{1000 * value:,.2f}".replace(",", mark) for value in DP]
+    flows = [f"{value:.4f}".replace("-", "\N{MINUS SIGN}") for value in Q]
+    return lambda: text("t [s];u [V];dP [kPa];Q [l/min]", *rows(TIME, U, pressures, flows, comma=False))
+
+
 #: Name -> what makes it, and options of `init` and `identify` that it takes beside.
 FILES: dict[str, tuple[Callable[[], bytes], tuple[str, ...]]] = {
     "catman": (catman, ()),
@@ -199,6 +247,7 @@ FILES: dict[str, tuple[Callable[[], bytes], tuple[str, ...]]] = {
     "times of day": (stamped("%H:%M:%S."), ()),
     "over midnight": (over_midnight, ()),
     "a foot": (with_a_foot, ()),
+    "statistics": (with_statistics, ()),
     "the header again": (header_again, ()),
     "blank lines": (blank_lines, ()),
     "numpy.savetxt": (saved_by_numpy, ()),
@@ -211,4 +260,12 @@ FILES: dict[str, tuple[Callable[[], bytes], tuple[str, ...]]] = {
     "units above": (units_above, ()),
     "rows that end in a separator": (rows_that_end_in_a_separator, ()),
     "many words": (many_words, ()),
+    "Graphtec": (graphtec, ()),
+    "Hioki": (hioki, ()),
+    "INCA": (inca, ()),
+    "dSPACE": (dspace, ()),
+    "extremes above": (extremes_above, ()),
+    "Swiss": (grouped("'"), ()),
+    "blanks between thousands": (grouped(" "), ()),
+    "narrow blanks between thousands": (grouped("\N{NARROW NO-BREAK SPACE}"), ()),
 }  # fmt: skip

@@ -125,6 +125,12 @@ def test_bad_input_is_one_sentence(call, words, ramps):
         (lambda: api.init(b"x"), "ramps: expected a path, got b'x'"),
         (lambda: api.report(None), "folder: expected a path, got None"),
         (lambda: api.batch(".", output="lot", design={"edge": 1}), "design['edge']: expected text, got 1"),
+        (
+            lambda: api.identify("x", kneewindow="20-60"),
+            "identify has no option 'kneewindow' (did you mean 'knee_window'?); see help(identify)",
+        ),
+        (lambda: api.verify("x", Plant="p"), "verify has no option 'Plant' (did you mean 'plant'?); see help(verify)"),
+        (lambda: api.report("x", zzz=1), "report has no option 'zzz'; see help(report)"),
         (lambda: api.batch(".", output="lot", identify=5), "identify: expected a mapping of names to values, got 5"),
     ],
 )

@@ -514,6 +514,20 @@ def test_a_command_in_per_cent_and_columns_of_their_own(bench, capsys):
     assert status == 2 and "the command runs from 5.20 to 10.00 V" in err
 
 
+def test_columns_that_are_taken_from_those_before_are_said_and_their_own_named(bench, capsys):
+    """Of the recordings before the file of options says the columns; those after have others."""
+    for dp in (1, 4):
+        write(bench / f"before_{dp}.csv", record(BEFORE, dp), header="Zeit_s,AO0_V,dP_MPa,Q_Lmin")
+    (bench / "dz.toml").write_text('[columns]\ntime = "Zeit_s:s"\nu = "AO0_V"\n')
+    status, _, err = run(capsys, *SETS, "--config", "dz.toml")
+    assert status == 2 and "recordings after: columns as those before, by --columns or [columns]" in err
+    assert "which --columns names for time" in err
+    assert "read by the same --columns, or [columns], as those before: say theirs by --after-columns" in err
+    status, _, err = run(capsys, *SETS, "--config", "dz.toml", "--after-columns", "u=AO0_V")
+    assert status == 2 and "which --after-columns names for u" in err and "as those before" not in err
+    assert run(capsys, *SETS, "--config", "dz.toml", "--after-columns", "u=u_V")[0] == 0
+
+
 def test_a_dead_zone_that_stays_is_asked_about(bench, capsys):
     """The compensator was switched off, or a column holds the valve's drive in place of the command."""
     write(bench / "after_4.csv", record(BEFORE, 4, seed=9))

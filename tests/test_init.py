@@ -10,7 +10,8 @@ import pytest
 from synthetic import L_MIN, MPA, Truth, synthetic_ramp
 
 from dzdesign.cli import main
-from dzdesign.identify.first_look import guess_columns, pressure_in_name
+from dzdesign.identify.first_look import guess_columns
+from dzdesign.identify.named_pressure import pressure_in_name
 
 LABELS = "Zeit (s),AO0 [V],Durchfluss [L/min],Temp [degC]"
 
@@ -78,11 +79,12 @@ def test_both_signs_and_a_smaller_command(here):
     assert set(valve["sides"]) == {"positive", "negative"}
 
 
-def test_a_command_in_per_cent_says_that_full_command_was_not_seen(here):
+def test_a_command_in_per_cent_says_that_full_command_was_not_seen(here, capsys):
     time, u, dp, q = columns_of(1.0)
     write("ramp.csv", "t_s,u_%,dP_MPa,Q_Lmin", time, 10 * u, dp, q)
     text, _ = init_then_identify("ramp.csv")
-    assert "# Full command; not seen (the command is in per cent" in text
+    assert "# Full command, what 100 % means: recordings in per cent don't say it. A guess: correct it." in text
+    assert 'full command: in per cent, so not recorded; u-max = "10 V" is a guess' in capsys.readouterr().out
 
 
 def test_ramps_that_stop_short_make_full_command_a_guess(here):
@@ -199,7 +201,7 @@ def test_a_command_in_per_cent_under_another_name(here):
     time, u, dp, q = columns_of(1.0)
     write("ramp.csv", "t_s,Sollwert [%],dP_MPa,Q_Lmin", time, 10 * u, dp, q)
     text, _ = init_then_identify("ramp.csv")
-    assert tomllib.loads(text)["columns"] == {"u": "Sollwert [%]"} and "(the command is in per cent" in text
+    assert tomllib.loads(text)["columns"] == {"u": "Sollwert [%]"} and "recordings in per cent don't say it" in text
 
 
 def test_a_pressure_drop_without_a_unit_is_open(here, capsys):
@@ -220,6 +222,62 @@ def test_a_pressure_from_a_name_is_said_and_units_as_people_write_them(here, cap
     assert tomllib.loads(text)["dp"] == {"ramp_4MPa.csv": "4 MPa"}
     assert valve["sides"]["positive"]["tests"][0]["dp_MPa"] == 4.0
     assert '# Q = "Q_Lmin"  (in L/min; understood by its label)' in text
+
+
+@pytest.mark.parametrize(
+    ("labels", "ports"),
+    [
+        ("t_s,u_V,p1 [bar],p2 [bar],Q_Lmin", ["p1 [bar]", "p2 [bar]"]),
+        ("t_s,u_V,p1,p2,Q_Lmin", ["p1:bar", "p2:bar"]),
+        ("t_s,u_V,x,y,Q_Lmin", ["LABEL:UNIT", "LABEL:UNIT"]),
+    ],
+)
+def test_sensors_on_both_sides_have_their_lines_in_the_template(here, capsys, labels, ports):
+    time, u, dp, q = columns_of(1.0)
+    write("ramp.csv", labels, time, u, 10 * dp + 20, 0 * dp + 20, q)
+    assert main(["init", "ramp.csv"]) == (1 if "[bar]" in labels else 0)
+    lines = Path("dzdesign.toml").read_text("utf-8").splitlines()
+    at = lines.index("# or, of a sensor on either side, pA of the higher pressure, in place of dP:")
+    assert lines[at - 2 : at] == ["# [columns]", '# dP = "LABEL:UNIT"']
+    assert lines[at + 1 : at + 3] == [f'# pA = "{ports[0]}"', f'# pB = "{ports[1]}"']
+    told = [line.removeprefix("# ") for line in (lines[at - 2], *lines[at + 1 : at + 3])]
+    if "LABEL" not in ports[0]:
+        Path("told.toml").write_text("\n".join(told))
+        assert main(["-q", "identify", "ramp.csv", "--config", "told.toml"]) == 0
+        assert json.loads(Path("valve.json").read_text())["sides"]["positive"]["tests"][0]["dp_MPa"] == pytest.approx(1)
+
+
+@pytest.mark.parametrize(
+    ("labels", "reason"),
+    [
+        ("t_s,u_V,dP_bar,Q [Hz]", "Q: 'Q [Hz]': 'Hz' is not a unit of flow that dzdesign knows; expected for ex"),
+        ("t_s,u [v],dP_bar,Q_Lmin", "u: 'u [v]': 'v' is not a unit of voltage that dzdesign knows (did you mean 'V'?)"),
+        ("t_s,u_V,dP_bar,Q_mA", "Q: 'Q_mA' is in mA, which is no unit of flow; say what the signal means, for example"),
+    ],
+)
+def test_a_unit_that_is_none_of_its_quantity_is_open(here, capsys, labels, reason):
+    time, u, dp, q = columns_of(1.0)
+    write("ramp.csv", labels, time, u, 10 * dp, q)
+    assert main(["init", "ramp.csv"]) == 1
+    assert f"open: column of {reason}" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("dither", [0.0, 0.006])
+def test_names_that_contradict_the_column_are_said(here, capsys, dither):
+    """A sensor that is stuck at 1 MPa: by one recording the name tells it, by several the flows as well."""
+    for number in (1, 2, 5):
+        time, u, _, q = columns_of(float(number))
+        stuck = 1.0 + dither * np.random.default_rng(number).integers(-1, 2, u.size)
+        write(f"ramp_{number}MPa.csv", "t_s,u_V,dP_MPa,Q_Lmin", time, u, stuck, q * number**0.5)
+    assert main(["init", "ramp_5MPa.csv", "-o", "one.toml"]) == 0
+    said = capsys.readouterr().out
+    assert "CHECK: a name says another pressure drop than the column: 'ramp_5MPa.csv' holds 1 MPa; the sensor" in said
+    assert "# CHECK: a name says another" in Path("one.toml").read_text()
+    assert main(["init", "ramp_5MPa.csv", "ramp_1MPa.csv", "ramp_2MPa.csv", "-o", "three.toml"]) == 0
+    said = capsys.readouterr().out
+    assert "and the files' names say different ones: the sensor is stuck" in said and said.count("CHECK") == 1
+    assert main(["init", "ramp_1MPa.csv", "-o", "right.toml"]) == 0
+    assert "CHECK" not in capsys.readouterr().out
 
 
 def test_several_recordings_without_a_pressure_are_open(here, capsys):

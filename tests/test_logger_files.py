@@ -122,8 +122,10 @@ def test_told_that_nothing_stands_above_the_first_line_is_the_header(here):
     ("where", "line", "words"),
     [
         (400, "Pause;;;", "row 401, column 't_s': 'Pause' is not a number"),
-        (400, "Pause", "row 401 has 1 cells, expected 4"),
-        (1, "0,0;1,0", "row 2 has 2 cells, expected 4"),
+        (400, "Pause", "row 401 has 1 cell, 'Pause', expected 4 as in the header"),
+        (1001, "40,0", "row 1002 has 1 cell, '40,0', expected 4 as in the header, row 1 ('t_s, u_V, dP_MPa, Q_Lmin'); "
+         "complete the row, or delete it"),
+        (1, "0,0;1,0", "row 2 has 2 cells, expected 4 as in the header, row 1 ('t_s, u_V, dP_MPa, Q_Lmin'); corr"),
         (1001, "40,0;1,0", "row 1002 has 2 cells, expected 4"),
         (900, "x;1,0;2,0;3,0", "row 901, column 't_s': 'x' is not a number"),
     ],
@@ -131,6 +133,31 @@ def test_told_that_nothing_stands_above_the_first_line_is_the_header(here):
 def test_a_wrong_row_among_samples_is_found(here, where, line, words):
     lines = ["t_s;u_V;dP_MPa;Q_Lmin", *rows(TIME, U, DP, Q)]
     assert words in refusal(text(*lines[:where], line, *lines[where:]))
+
+
+@pytest.mark.parametrize(
+    ("labels", "words"),
+    [
+        ("X_Value;u (V);dP (bar);Q (l/min)", 'is it, say its unit, for example --columns "time=X_Value:s"'),
+        ("Sample;u (V);dP (bar);Q (l/min)", "'Sample' counts the rows: export the time beside it"),
+        ("VarName;TimeString;VarValue;Time_ms", "row for each variable (VarName, VarValue): export a column for each"),
+    ],
+)
+def test_init_says_how_to_go_on_with_a_bare_time_or_a_row_a_variable(here, capsys, labels, words):
+    first = np.arange(TIME.size) if labels.startswith("Sample") else TIME
+    Path("ramp.csv").write_bytes(text(labels, *rows(first, U, 10 * DP, Q)))
+    assert main(["-q", "init", "ramp.csv"]) == 1
+    assert words in capsys.readouterr().out
+
+
+def test_statistics_below_the_samples_are_said_and_those_amid_them_are_refused(here, caplog):
+    lines = ["t_s;u_V;dP_MPa;Q_Lmin", *rows(TIME, U, DP, Q)]
+    with caplog.at_level(logging.DEBUG, "dzdesign"):
+        assert_is_the_ramp(read(text(*lines, "Mittelwert;5,0;2,0;9,9", "Max;10,0;2,1;21")))
+    assert "row 1002 is passed over: Mittelwert 5,0 2,0 9,9" in caplog.text and "row 1003" in caplog.text
+    message = refusal(text(*lines, "Mittelwert;5,0;2,0;9,9", *lines[-3:], "Ende"))
+    assert "row 1002 has a statistic, 'Mittelwert', and samples below it" in message
+    assert "row 1002, column 't_s': 'Mitte' is not a number" in refusal(text(*lines, "Mitte;5,0;2,0;9,9"))
 
 
 @pytest.mark.parametrize("cell", ["#N/A", "#NV", "#DIV/0!", "#WERT!", '"#N/A"', " #NAME?"])
@@ -223,6 +250,21 @@ def test_thousands_that_look_like_decimals_in_another_block(here, monkeypatch):
     assert read(text(labels, *halves[:1000], *later)).dp[[0, -1]] == pytest.approx([2000.5e3, 2001e3])
 
 
+def test_thousands_beside_whole_numbers_below_them_are_refused(here):
+    """998 and 1.001 kPa: no column shows a comma, and read as decimals the pressure would fall to a thousandth."""
+    pressures = [f"{996 + index % 9:,}".replace(",", ".") for index in range(TIME.size)]
+    lines = rows(TIME, U, pressures, Q, comma=False)
+    message = refusal(text("t_s;u_V;dP_kPa;Q_Lmin", *lines))
+    assert "row 7, column 'dP_kPa': '1.001' stands in one column with '999', so it may be 1001 or a decimal" in message
+
+
+@pytest.mark.parametrize("cells", [("1.999", "2", "2.001"), ("150", "150.125", "149.875"), ("2.001", "2.000", "2.002")])
+def test_whole_numbers_beside_decimals_of_their_size_stay(here, cells):
+    pressures = [cells[index % 3] for index in range(TIME.size)]
+    test = read(text("t_s;u_V;dP_bar;Q_Lmin", *rows(TIME, U, pressures, Q, comma=False)))
+    np.testing.assert_allclose(test.dp[:3], [1e5 * float(cell) for cell in cells])
+
+
 @pytest.mark.parametrize("separator", [",", ";", "\t"])
 def test_three_digits_behind_a_point_stay_decimals(here, monkeypatch, separator):
     labels = separator.join(["t_s", "u_V", "dP_MPa", "Q_Lmin"])
@@ -280,8 +322,10 @@ def test_milliseconds_beside_a_time_of_day_are_not_passed_over(here):
     clock = [stamp.partition(".")[0] for stamp in stamps("%H:%M:%S.")]
     parts = [stamp.partition(".")[2] for stamp in stamps("%H:%M:%S.")]
     content = text("Time;ms;u [V];dP [MPa];Q [l/min]", *rows(clock, parts, U, DP, Q))
-    assert "has milliseconds in 'ms' beside the times in 'Time', expected both in one column" in refusal(content)
-    read(content, columns={"time": "Time"})
+    assert_is_the_ramp(read(content))
+    assert_is_the_ramp(read(content, columns={"time": "Time"}))
+    wrong = text("Time;ms;u [V];dP [MPa];Q [l/min]", *rows(clock, [*parts[:-1], "1000"], U, DP, Q))
+    assert "row 1001, column 'ms': 1000 is no part of a second, expected 0 to 999" in refusal(wrong)
     whole = text("Time;ms;u [V];dP [MPa];Q [l/min]", *rows(stamps("%H:%M:%S."), parts, U, DP, Q))
     assert_is_the_ramp(read(whole))
 
@@ -320,6 +364,8 @@ def test_whole_numbers_without_a_unit_that_can_only_be_milliseconds(here, capsys
         ("4..20 mA = 0..50 bar", "'bar' is not a unit of flow"),
         ("4..20 s = 0..50 L/min", "'s' is no unit of a transmitter's signal"),
         ("4..4 mA = 0..50 L/min", "has no width"),
+        ("4..20 mA = 0..25.000 mL/min", "'25.000' may be 25000 or 25.0; write 25000 or 25.0"),
+        ("4..20 mA = 0..25,000 mL/min", "'25,000' may be 25000 or 25.0; write 25000 or 25.0"),
         ("4..20 mA = 0..50,000 mL/min", "'50,000' may be 50000 or 50.0; write 50000 or 50.0"),
     ],
 )

@@ -2,7 +2,9 @@
 
 import gzip
 import json
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,8 +17,11 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.compensator_file import compensator_document
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
+from dzdesign.identify import knee_errors, quality
 from dzdesign.identify.identification import identify
+from dzdesign.identify.model import Warning_
 from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.quality import MOST_SERIOUS_FIRST, most_serious_first
 from dzdesign.identify.ramp_files import ramp_file_bytes, read_ramp_file
 from dzdesign.verify.report import make_report
 from dzdesign.verify.report_artefacts import chain_of
@@ -193,6 +198,20 @@ class TestKneeErrors:
         assert not {"noise", "bend", "coarse-levels"} & {warning.code for warning in valve.warnings}
 
 
+    @pytest.mark.parametrize("window", [(0.12, 0.5), (0.6, 0.8)])
+    def test_the_window_of_the_line_is_named(self, window):
+        (warning, *_) = warned(identify(self.curved(0.5), IdentifyOptions(knee_window=window)), "bend")
+        low, high = (round(100 * share) for share in window)
+        assert f"the flow bends between {low} and {high} % of its largest, where" in warning.text
+
+    def test_a_window_that_was_widened_is_named_beside_the_one_that_was_asked_for(self):
+        valve = identify(self.curved(0.5))
+        row = valve.positive.tests[0]
+        row = replace(row, rising=replace(row.rising, straight=(0.12, 0.9), knee_se_V=1.0))
+        warning = knee_errors._bent(row, 0.1, (0.12, 0.5))
+        assert "between 12 and 90 % of its largest (--knee-window 12-50, widened as far" in warning.text
+
+
 class TestStuckPressure:
     @staticmethod
     def stuck(pressures, names=("a.csv", "b.csv", "c.csv")):
@@ -204,6 +223,41 @@ class TestStuckPressure:
     def test_flows_that_differ_tell_it(self):
         (warning,) = warned(identify(self.stuck(PRESSURES)), "pressure-stuck")
         assert "1 MPa in every row of all 3 recordings" in warning.text and "differ by 10" in warning.text
+
+    @pytest.mark.parametrize("step", [0.0061, 0.0244])
+    @pytest.mark.parametrize("ports", [1, 2])
+    def test_the_noise_of_a_converter_hides_nothing(self, step, ports):
+        tests = self.stuck((1.0, 1.4, 2.0))
+        for index, test in enumerate(tests):
+            rng = np.random.default_rng(index)
+            noise = sum(rng.integers(-2, 3, test.u.size) for _ in range(ports))
+            tests[index] = replace(test, dp=(1.0 + step * noise) * MPA)
+        valve = identify(tests)
+        (warning,) = warned(valve, "pressure-stuck")
+        assert "MPa in all 3 recordings, but the flows at 10 V differ by 4" in warning.text
+        assert not warned(valve, "noise") and not warned(valve, "bend")
+
+    def test_an_analog_sensor_that_is_stuck_has_no_steps(self):
+        tests = self.stuck(PRESSURES)
+        for index, test in enumerate(tests):
+            noise = np.random.default_rng(index).standard_normal(test.u.size)
+            tests[index] = replace(test, dp=(1.0 + 0.008 * noise) * MPA)
+        assert warned(identify(tests), "pressure-stuck")
+
+    def test_a_coarse_sensor_that_follows_is_not_blamed(self):
+        """Steps of 0.5 MPa: 1.0 and 1.5 MPa are neighbours, and the flows differ by what that means."""
+        tests = [replace(valve_at(dp), source=f"{dp}.csv") for dp in (1.0, 1.5)]
+        for index, test in enumerate(tests):
+            noise = 0.5 * (np.random.default_rng(index).random(test.u.size) < 0.02)
+            tests[index] = replace(test, dp=test.dp + noise * MPA)
+        assert not warned(identify(tests), "pressure-stuck")
+        close = [valve_at(dp) for dp in (1.0, 1.15)]
+        assert not warned(identify(close), "pressure-stuck")
+
+    def test_names_in_other_units_say_the_same(self):
+        tests = self.stuck((1.0, 1.0, 1.0), ("1MPa.csv", "10bar.csv", "1000 kPa.csv"))
+        tests = [replace(test, q=test.q + seed * 1e-9) for seed, test in enumerate(tests)]
+        assert not warned(identify(tests), "pressure-stuck")
 
     def test_names_that_differ_tell_it(self):
         tests = self.stuck((1.0, 1.0, 1.0), ("V7_dP1.csv", "V7_dP2.csv", "V7_4bar.csv"))
@@ -291,7 +345,30 @@ class TestClippedMeter:
     def test_of_a_meter_that_does_not_scatter_the_safe_one_is_taken(self, tmp_path, cut):
         quiet = identify(self.recordings(tmp_path, cut, noise=0.0))
         assert warned(quiet, "meter-clipped") and not warned(quiet, "meter-zero")
+        assert "the recordings can't tell which. It is taken as cut off, which is safe" in quiet.warnings[0].text
         assert quiet.positive.tests[0].u_guard_lower_V < 5.375  # where the first of them closes
+
+
+class TestOrder:
+    def test_what_stops_a_design_comes_first(self, crossed):
+        marked = [replace(valve_at(dp, hysteresis=-0.05), simulated=True) for dp in PRESSURES]
+        for valve in (crossed, identify(marked, IdentifyOptions(meter_lag=0.0))):
+            assert [warning.code for warning in valve.warnings[:3]] == ["branch-order"] * 3
+        codes = [warning.code for warning in valve.warnings]
+        assert codes[3] == "simulated"
+        assert [MOST_SERIOUS_FIRST.index(code) for code in codes] == sorted(map(MOST_SERIOUS_FIRST.index, codes))
+
+    def test_every_code_has_its_place(self):
+        written = {
+            code
+            for path in Path(quality.__file__).parent.glob("*.py")
+            for code in re.findall(r'code="([a-z-]+)"', path.read_text("utf-8"))
+        }
+        assert written == set(MOST_SERIOUS_FIRST) and len(MOST_SERIOUS_FIRST) == len(written)
+
+    def test_an_unknown_one_comes_last(self):
+        two = [Warning_(code=code, text="", source=None) for code in ("unheard-of", "thinned")]
+        assert most_serious_first(two) == tuple(reversed(two))
 
 
 def test_warnings_reach_the_file(tmp_path):
