@@ -169,7 +169,7 @@ def checks_table(evidence: dict[str, Any], required: tuple[Required, ...]) -> Ta
     ]
     untried = [each for each in required if not each.done]
     rows += [
-        (Cell(text="– not tried", kind="open"), Cell(text=each.name), Cell(text=f"tried by dzdesign {each.how}"))
+        (Cell(text="– not tried", kind="open"), Cell(text=each.name), Cell(text=f"to try it: {each.how}"))
         for each in untried
     ]
     return Table(

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 VERIFY = "verify"
-LAW = "the law follows from the valve and the options"
-#: Of a compensator.json that does not say with what it was designed, no run of verify can tell.
-AGAIN = "design, codegen and verify again with this version"
+VALVE = "the valve is that of valve.json"
+#: Of a valve.json that is not written as `identify` writes it, the hash is known from the file alone.
+BESIDE = f"{VERIFY} with the valve.json that compensator.json names beside the firmware"
+#: Of a board file that its user filled in: nothing that was generated is there to compare it with.
+REVIEW = "review it, and try it on the machine"
 #: What every `verify` tries.
 ALWAYS = (
     "files as generated",
@@ -27,7 +29,8 @@ ALWAYS = (
     "no flow at zero command in the closed loop",
     "no flow at zero command after any scenario",
     "the certificate follows from the valve",
-    LAW,
+    "the law follows from the valve and the options",
+    VALVE,
 )
 #: What is tried if it is asked for: how its checks' names begin, what it is, the option.
 ASKED_FOR = (
@@ -59,41 +62,38 @@ class Required:
     how: str
 
 
-def required_of(evidence: dict[str, Any], target: str | None = None) -> tuple[Required, ...]:
+def required_of(evidence: dict[str, Any]) -> tuple[Required, ...]:
     """Return everything that can be tried, with what the evidence says of it.
 
     Parameters
     ----------
     evidence : dict
         verification.json.
-    target : str, optional
-        Of the firmware, where it is known.
     """
     checks = evidence["checks"]
-    found = [_tried(checks, name, name, AGAIN if name == LAW else VERIFY) for name in ALWAYS]
+    found = [_tried(checks, name, name, BESIDE if name == VALVE else VERIFY) for name in ALWAYS]
     own = bool(evidence["closed_loop"].get("plant"))
     found.append(_part("closed loop with a plant of the machine's own", own, f"{VERIFY} --plant"))
     found.append(_part("load steps and frozen sensors in the closed loop", own, f"{VERIFY} --plant"))
     series = bool(evidence["monte_carlo"])
     found.append(_part("a series of plants, with tolerances", series, f"{VERIFY} --tolerances"))
     found += [_tried(checks, begins, name, f"{VERIFY} {option}") for begins, name, option in ASKED_FOR]
-    if target in (None, "f28335"):
+    if evidence.get("target") in (None, "f28335"):
         name = "compiles against C2000Ware"
         found.append(_tried(checks, name, f"{name}, TI's headers", f"{VERIFY} --c2000ware"))
+    found += [_part(f"{name}, which is yours and was changed", False, REVIEW) for name in evidence.get("yours", ())]
     return tuple(found)
 
 
-def untried_of(evidence: dict[str, Any], target: str | None = None) -> tuple[str, ...]:
+def untried_of(evidence: dict[str, Any]) -> tuple[str, ...]:
     """Return what was not tried, each with the command that would.
 
     Parameters
     ----------
     evidence : dict
         verification.json.
-    target : str, optional
-        Of the firmware, where it is known.
     """
-    return tuple(f"{each.name}: `{each.how}`" for each in required_of(evidence, target) if not each.done)
+    return tuple(f"{each.name}: `{each.how}`" for each in required_of(evidence) if not each.done)
 
 
 def _tried(checks: list[dict[str, Any]], begins: str, name: str, how: str) -> Required:
