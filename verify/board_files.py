@@ -41,7 +41,7 @@ def board_files(folder: Path, manifest: dict[str, Any]) -> tuple[BoardFile, ...]
             name=name,
             changed=not (folder / name).is_file() or sha256_of((folder / name).read_bytes()) != manifest["files"][name],
         )
-        for name in sorted(set(manifest.get("board", ())))
+        for name in sorted(set(manifest.get("board", ())) & manifest["files"].keys())
     )
 
 

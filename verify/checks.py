@@ -58,7 +58,10 @@ def files_unchanged(folder: Path, manifest: dict[str, Any]) -> Check:
     ]
     others = [name for name in others if name not in manifest["files"]]
     shadows = [name for name in others if PurePosixPath(name).name in ours]
-    if changed:
+    claimed = [name for name in sorted(board) if not _may_be_filled_in(name, manifest)]
+    if claimed:
+        fault = f"the manifest calls {', '.join(claimed)} the user's to fill in, which is none of a target's files"
+    elif changed:
         fault = f"changed or missing: {', '.join(changed)}"
     elif foreign:
         fault = f"{', '.join(foreign)}: not generated; core/ is the compensator alone, keep files of your own elsewhere"
@@ -76,6 +79,12 @@ def files_unchanged(folder: Path, manifest: dict[str, Any]) -> Check:
     if built and not fault:
         text += f"; built by CMake, and not checked: {', '.join(sorted(tree.name for tree in built))}"
     return Check(name="files as generated", holds=not fault, text=text)
+
+
+def _may_be_filled_in(name: str, manifest: dict[str, Any]) -> bool:
+    """Tell whether a file can be its user's: listed, and in a target's folder, not of the core."""
+    folder, slash, _ = name.partition("/")
+    return bool(slash) and folder != "core" and name in manifest["files"] and name not in manifest["core"]
 
 
 def _cmake_trees(folder: Path, manifest: dict[str, Any]) -> set[Path]:

@@ -31,19 +31,7 @@ def read_firmware_manifest(folder: Path) -> tuple[bytes, dict[str, Any]]:
     check_shape(manifest, shape, str(path), "make it again with `dzdesign codegen`")
     check_inside(folder, [*manifest["files"], *manifest["core"]], f"'{path}'")
     check_firmware_inside(folder)
-    _check_board(manifest, path)
     return content, manifest
-
-
-def _check_board(manifest: dict[str, Any], path: Path) -> None:
-    """Refuse to take for a user's what is the compensator, or what the manifest does not list."""
-    for name in manifest.get("board", ()):
-        ours = not name.startswith(f"{manifest['target'].replace('-', '_')}/")
-        if ours or name in manifest["core"] or name not in manifest["files"]:
-            raise InputError(
-                f"'{path}' calls '{name[:80]}' a board file, which its user fills in, but it is "
-                f"{'none of the target' if ours else 'not one of its files'}; make it again with `dzdesign codegen`"
-            )
 
 
 def check_firmware_inside(folder: Path) -> None:

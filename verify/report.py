@@ -80,10 +80,12 @@ def with_report(files: Mapping[str, str | bytes], firmware: Path, output: Path) 
         f"{name}/{file}": content.encode() if isinstance(content, str) else content
         for file, content in files.items()
     }
+    around = shelf_of(firmware)
+    compensator = around.get(f"{place}/compensator.json")
     used = {
         file: content
-        for file, content in shelf_of(firmware).items()
-        if file.startswith(f"{place}/") or is_of(content, VALVE_SCHEMA)
+        for file, content in around.items()
+        if file.startswith(f"{place}/") or content == compensator or is_of(content, VALVE_SCHEMA)
     }
     kept = {file: content for file, content in used.items() if not file.startswith(f"{name}/")}
     chain = chain_of(new | kept, own=(f"{name}/", f"{place}/"), sealed=False)

@@ -17,7 +17,7 @@ from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.design.derived import prove_derived
 from dzdesign.identify.model import SCHEMA as VALVE_SCHEMA
 from dzdesign.identify.valve_file import valve_from_document
-from dzdesign.verify.report_shapes import ASSESSMENT, CONSTANTS, FIRMWARE, REPRODUCTION, VERIFICATION
+from dzdesign.verify.report_shapes import ASSESSMENT, BOARD, CONSTANTS, FIRMWARE, REPRODUCTION, VERIFICATION
 from dzdesign.verify.report_shelf import (
     EVIDENCE_SCHEMA,
     FIRMWARE_SCHEMA,
@@ -184,7 +184,7 @@ class _Search:
     def _firmware(self) -> None:
         evidence = self.found.get("verification")
         stated = _origin(evidence) if evidence else None
-        name = self._by_hash(stated) if stated else self._first(FIRMWARE_SCHEMA)
+        name = self._by_hash(stated, self.own) if stated else self._first(FIRMWARE_SCHEMA)
         if name:
             self._take("firmware", name)
             if "firmware" in self.found:
@@ -270,10 +270,10 @@ class _Search:
         place, slash, leaf = name.rpartition("/")
         return listing(self.shelf.get(place + slash + MANIFEST_NAME)).get(leaf)
 
-    def _by_hash(self, stated: str | None) -> str | None:
-        """Return the file of a hash; of copies the one in the folder that the report is asked for."""
+    def _by_hash(self, stated: str | None, rather: tuple[str, ...] = ("",)) -> str | None:
+        """Return the file of a hash; of copies, beside which other files may differ, rather that of some place."""
         found = [name for name, digest in self.hashes.items() if digest == stated]
-        return next((name for name in found if name.startswith(self.own)), found[0] if found else None)
+        return next((name for name in found if name.startswith(rather)), found[0] if found else None)
 
     def _first(self, schema: str) -> str | None:
         """Return the first file of a schema; a manifest has that of what it lists, and is one of a firmware only."""
@@ -336,8 +336,9 @@ def _checked(role: str, content: bytes, name: str) -> dict[str, Any]:
     schema, shape = SCHEMAS[role]
     document = parse_document(content, name, (schema,))
     check_shape(document, shape, name, "make it again")
-    if role == "firmware" and "constants" in document:
-        check_shape(document, CONSTANTS, name, "make it again with `dzdesign codegen`")
+    for key, later in (("constants", CONSTANTS), ("board", BOARD)):
+        if role == "firmware" and key in document:
+            check_shape(document, later, name, "make it again with `dzdesign codegen`")
     if role == "compensator":
         compensator = compensator_from_document(content, name)
         if document.get("tool") == TOOL:  # another version may have chosen other tables

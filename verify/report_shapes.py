@@ -78,6 +78,8 @@ FIRMWARE = {
     "origin": {"compensator_json": str, "valve_json": str, "ramp_tests": MADE_FROM},
     "files": dict,
 }
+#: The files that are its user's to fill in.
+BOARD = {"board": [str]}
 #: Of a constant also `value`: a whole number, or the rows of a table.
 CONSTANTS = {
     "constants": [
