@@ -135,6 +135,14 @@ def test_source_and_project_files_that_were_added_are_refused(firmware_folder, n
     assert added.holds is False and f"does not name {name};" in added.text
 
 
+def test_a_file_of_ones_own_in_the_core_is_told_where_it_belongs(firmware_folder):
+    manifest = json.loads((firmware_folder / "manifest.json").read_text())
+    (firmware_folder / "core" / "my.c").write_text("")
+    added = files_unchanged(firmware_folder, manifest)
+    assert added.holds is False
+    assert added.text == "core/my.c: not generated; core/ is the compensator alone, keep files of your own elsewhere"
+
+
 def test_a_file_whose_line_was_taken_from_the_manifest_is_refused(firmware_folder):
     manifest = json.loads((firmware_folder / "manifest.json").read_text())
     del manifest["files"]["f28335/dz_isr.c"]
