@@ -35,6 +35,7 @@ from dzdesign.core.artefacts import (
 from dzdesign.core.errors import DzdesignError, InputError, RequirementError
 from dzdesign.core.shown import show_by
 from dzdesign.notebook import WRITERS
+from dzdesign.regenerated import with_regenerated
 from dzdesign.summaries import SUMMARIES
 
 if TYPE_CHECKING:
@@ -311,6 +312,7 @@ def verify(
             sha256_of(read_bytes(Path(plant), "plant file")) if plant is not None else None,
             tolerances=read_tolerances(Path(tolerances)) if tolerances is not None else None,
         )
+        verification = with_regenerated(verification, folder)
         if output is not None:
             manifest = {"schema": SCHEMA, "tool": TOOL, "made_from": verification.document["made_from"]}
             files = with_report(evidence_files(verification), folder, Path(output))

@@ -22,6 +22,7 @@ from dzdesign.core.units import parse_quantity
 from dzdesign.identify_options import identify_options, record_of
 from dzdesign.progress import say, stages, with_bar
 from dzdesign.recordings import check_plots, read_recordings, refuse_copies
+from dzdesign.regenerated import with_regenerated
 
 
 def _seed(text: str) -> int:
@@ -168,6 +169,7 @@ def run_verify(args: argparse.Namespace) -> int:
     ware = check_against_c2000ware(firmware, Path(args.c2000ware), say) if args.c2000ware else None
     with stages() as stage:
         verification = verify(firmware, plant, source, digest, tolerances=tolerances, say=stage, watch=stage.each)
+    verification = with_regenerated(verification, firmware)
     added = [ware] if ware else []
     if args.machine_code:
         from dzdesign.verify.machine_code import machine_code_checks

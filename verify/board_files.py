@@ -77,6 +77,6 @@ def board_compiles(folder: Path, manifest: dict[str, Any]) -> list[Check]:
             return []
         if done.returncode:
             first = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr.strip()[:300])
-            return [Check(name=COMPILES, holds=False, text=f"{source}: {first} ({Path(compiler).name})")]
+            return [Check(name=COMPILES, holds=False, text=f"{first} ({Path(compiler).name})")]
     text = f"with {', '.join(changed)} as you changed them ({Path(compiler).name}); what they do is not checked"
     return [Check(name=COMPILES, holds=True, text=text)]

@@ -17,7 +17,7 @@ from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.design.derived import prove_derived
 from dzdesign.identify.model import SCHEMA as VALVE_SCHEMA
 from dzdesign.identify.valve_file import valve_from_document
-from dzdesign.verify.report_shapes import ASSESSMENT, BOARD, CONSTANTS, FIRMWARE, REPRODUCTION, VERIFICATION
+from dzdesign.verify.report_shapes import ASSESSMENT, FIRMWARE, LATER, REPRODUCTION, VERIFICATION
 from dzdesign.verify.report_shelf import (
     EVIDENCE_SCHEMA,
     FIRMWARE_SCHEMA,
@@ -336,9 +336,9 @@ def _checked(role: str, content: bytes, name: str) -> dict[str, Any]:
     schema, shape = SCHEMAS[role]
     document = parse_document(content, name, (schema,))
     check_shape(document, shape, name, "make it again")
-    for key, later in (("constants", CONSTANTS), ("board", BOARD)):
-        if role == "firmware" and key in document:
-            check_shape(document, later, name, "make it again with `dzdesign codegen`")
+    for key, later in LATER.get(role, {}).items():
+        if key in document:
+            check_shape(document, later, name, "make it again")
     if role == "compensator":
         compensator = compensator_from_document(content, name)
         if document.get("tool") == TOOL:  # another version may have chosen other tables

@@ -10,8 +10,12 @@ VERIFY = "verify"
 VALVE = "the valve is that of valve.json"
 #: Of a valve.json that is not written as `identify` writes it, the hash is known from the file alone.
 BESIDE = f"{VERIFY} with the valve.json that compensator.json names beside the firmware"
+#: The generator itself is asked by the command, not by this room.
+REGENERATED = "the files are those that codegen makes of compensator.json"
 #: Of a board file that its user filled in: nothing that was generated is there to compare it with.
 REVIEW = "review it, and try it on the machine"
+#: How to have tried what `verify` could not try.
+HOW = {VALVE: BESIDE, REGENERATED: f"{VERIFY} with the version of dzdesign that generated it, or codegen with this one"}
 #: What every `verify` tries.
 ALWAYS = (
     "files as generated",
@@ -31,6 +35,7 @@ ALWAYS = (
     "the certificate follows from the valve",
     "the law follows from the valve and the options",
     VALVE,
+    REGENERATED,
 )
 #: What is tried if it is asked for: how its checks' names begin, what it is, the option.
 ASKED_FOR = (
@@ -71,7 +76,8 @@ def required_of(evidence: dict[str, Any]) -> tuple[Required, ...]:
         verification.json.
     """
     checks = evidence["checks"]
-    found = [_tried(checks, name, name, BESIDE if name == VALVE else VERIFY) for name in ALWAYS]
+    found = [_part(f"{name}, which is yours and was changed", False, REVIEW) for name in evidence.get("yours", ())]
+    found += [_tried(checks, name, name, HOW.get(name, VERIFY)) for name in ALWAYS]
     own = bool(evidence["closed_loop"].get("plant"))
     found.append(_part("closed loop with a plant of the machine's own", own, f"{VERIFY} --plant"))
     found.append(_part("load steps and frozen sensors in the closed loop", own, f"{VERIFY} --plant"))
@@ -81,7 +87,6 @@ def required_of(evidence: dict[str, Any]) -> tuple[Required, ...]:
     if evidence.get("target") in (None, "f28335"):
         name = "compiles against C2000Ware"
         found.append(_tried(checks, name, f"{name}, TI's headers", f"{VERIFY} --c2000ware"))
-    found += [_part(f"{name}, which is yours and was changed", False, REVIEW) for name in evidence.get("yours", ())]
     return tuple(found)
 
 

@@ -27,7 +27,7 @@ def valve_follows(folder: Path, document: dict[str, Any]) -> list[Check]:
     """
     stated, valve = document["made_from"][0]["sha256"], document["valve"]
     if stated == sha256_of(to_json(valve).encode()):  # as `identify` writes it: no file is needed
-        text = f"written as `identify` writes it, it has the SHA-256 that compensator.json names, {stated}"
+        text = "its SHA-256, as `identify` writes it, is the one that compensator.json names"
         return [Check(name=VALVE, holds=True, text=text)]
     for name, content, found in _valves_around(folder):
         digest = sha256_of(content)
