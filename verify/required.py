@@ -21,6 +21,7 @@ ALWAYS = (
     "files as generated",
     "the manifest says what is in the firmware",
     "compiles without a warning",
+    "every compiler sees the same core",
     "equals the exactly rounded law",
     "within range, monotone",
     "no over-compensation on the tested interval",

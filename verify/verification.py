@@ -35,6 +35,7 @@ from dzdesign.verify.host_compiler import host_compiler
 from dzdesign.verify.input_map import InputMap, map_inputs
 from dzdesign.verify.loop_plot import plot_loops
 from dzdesign.verify.manifest_check import manifest_follows
+from dzdesign.verify.one_core import seen_by_all
 from dzdesign.verify.plant import Plant, plant_document, plants_from_tests
 from dzdesign.verify.scenarios import ScenarioResult, Scene, run_scenarios
 from dzdesign.verify.tolerances import Scatter, Tolerances, scatter, scatter_document
@@ -142,7 +143,7 @@ def verify(
     say("compiling the core with every warning an error")
     checks = [files_unchanged(folder, manifest), manifest_follows(folder, manifest)]
     compiles = compiles_strictly(folder, manifest)
-    checks.append(compiles)
+    checks += [compiles, seen_by_all(folder, manifest)]
     inputs: tuple[InputCheck, ...] = ()
     maps: tuple[InputMap, ...] = ()
     loop = _InTheLoop()
