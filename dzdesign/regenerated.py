@@ -50,7 +50,7 @@ def regenerated(folder: Path) -> "Check | None":
     from dzdesign.verify.required import REGENERATED
 
     _, manifest = read_firmware_manifest(folder)
-    if manifest.get("tool") != TOOL or manifest["target"] not in TARGET_NAMES:
+    if manifest.get("tool") != TOOL or manifest.get("target") not in TARGET_NAMES:
         return None
     source = folder / "compensator.json"
     content = read_bytes(source, "compensator")

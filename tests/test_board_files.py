@@ -190,7 +190,7 @@ def test_verify_holds_and_says_that_it_was_not_checked(cortex, tmp_path):
     fill_in(cortex)
     result = verify(cortex, sequence=RampSequence(rest=0.5, ramp=4.0, top=0.5))
     assert result.holds and result.document["yours"] == ["cortex_m4/dz_board.c"]
-    said = "cortex_m4/dz_board.c, which is yours and was changed: `review it, and try it on the machine`"
+    said = "cortex_m4/dz_board.c, which is yours and was changed: review it, and try it on the machine"
     assert said in untried_of(result.document)
     assert "NOT TRIED: cortex_m4/dz_board.c, which is yours" in str(result)
     manifest = {"schema": SCHEMA, "made_from": result.document["made_from"]}

@@ -60,7 +60,7 @@ def board_compiles(folder: Path, manifest: dict[str, Any]) -> list[Check]:
     list of Check
         None where nothing was changed, the compiler is not there, or a header lies elsewhere, so that nobody can tell.
     """
-    compiler, *options = COMPILERS.get(manifest["target"], ("",))
+    compiler, *options = COMPILERS.get(manifest.get("target", ""), ("",))
     changed = [each.name for each in board_files(folder, manifest) if each.changed]
     if not changed or not compiler or not shutil.which(compiler):
         return []

@@ -27,7 +27,8 @@ def read_firmware_manifest(folder: Path) -> tuple[bytes, dict[str, Any]]:
         raise InputError(f"'{folder}' {found}, expected the firmware folder that `dzdesign codegen` writes; name that")
     content = read_bytes(path, "firmware manifest")
     manifest = parse_document(content, str(path), (FIRMWARE_SCHEMA,))
-    shape = {"files": dict, "core": [str], "target": str} | ({"board": [str]} if "board" in manifest else {})
+    later = {key: kind for key, kind in {"target": str, "board": [str]}.items() if key in manifest}
+    shape = {"files": dict, "core": [str], **later}
     check_shape(manifest, shape, str(path), "make it again with `dzdesign codegen`")
     check_inside(folder, [*manifest["files"], *manifest["core"]], f"'{path}'")
     check_firmware_inside(folder)

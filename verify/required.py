@@ -6,16 +6,17 @@ The names are those of the checks; a check of a name that is not here stands in 
 from dataclasses import dataclass
 from typing import Any
 
-VERIFY = "verify"
 VALVE = "the valve is that of valve.json"
-#: Of a valve.json that is not written as `identify` writes it, the hash is known from the file alone.
-BESIDE = f"{VERIFY} with the valve.json that compensator.json names beside the firmware"
 #: The generator itself is asked by the command, not by this room.
 REGENERATED = "the files are those that codegen makes of compensator.json"
 #: Of a board file that its user filled in: nothing that was generated is there to compare it with.
 REVIEW = "review it, and try it on the machine"
-#: How to have tried what `verify` could not try.
-HOW = {VALVE: BESIDE, REGENERATED: f"{VERIFY} with the version of dzdesign that generated it, or codegen with this one"}
+#: How to have tried what `verify` could not try. Of a valve.json that is not written as `identify` writes it, the hash
+#: is known from the file alone.
+HOW = {
+    VALVE: "`verify` with the valve.json that compensator.json names beside the firmware",
+    REGENERATED: "`verify` with the version of dzdesign that generated it, or `codegen` with this one",
+}
 #: What every `verify` tries.
 ALWAYS = (
     "files as generated",
@@ -59,7 +60,7 @@ class Required:
     holds : bool or None
         As found; None where it was not tried or could not be checked.
     how : str
-        The command and the option that try it, or what to do first.
+        What to do to have it tried; a command stands in backticks.
     """
 
     name: str
@@ -78,16 +79,16 @@ def required_of(evidence: dict[str, Any]) -> tuple[Required, ...]:
     """
     checks = evidence["checks"]
     found = [_part(f"{name}, which is yours and was changed", False, REVIEW) for name in evidence.get("yours", ())]
-    found += [_tried(checks, name, name, HOW.get(name, VERIFY)) for name in ALWAYS]
+    found += [_tried(checks, name, name, HOW.get(name, "`verify`")) for name in ALWAYS]
     own = bool(evidence["closed_loop"].get("plant"))
-    found.append(_part("closed loop with a plant of the machine's own", own, f"{VERIFY} --plant"))
-    found.append(_part("load steps and frozen sensors in the closed loop", own, f"{VERIFY} --plant"))
+    found.append(_part("closed loop with a plant of the machine's own", own, "`verify --plant`"))
+    found.append(_part("load steps and frozen sensors in the closed loop", own, "`verify --plant`"))
     series = bool(evidence["monte_carlo"])
-    found.append(_part("a series of plants, with tolerances", series, f"{VERIFY} --tolerances"))
-    found += [_tried(checks, begins, name, f"{VERIFY} {option}") for begins, name, option in ASKED_FOR]
+    found.append(_part("a series of plants, with tolerances", series, "`verify --tolerances`"))
+    found += [_tried(checks, begins, name, f"`verify {option}`") for begins, name, option in ASKED_FOR]
     if evidence.get("target") in (None, "f28335"):
         name = "compiles against C2000Ware"
-        found.append(_tried(checks, name, f"{name}, TI's headers", f"{VERIFY} --c2000ware"))
+        found.append(_tried(checks, name, f"{name}, TI's headers", "`verify --c2000ware`"))
     return tuple(found)
 
 
@@ -99,7 +100,7 @@ def untried_of(evidence: dict[str, Any]) -> tuple[str, ...]:
     evidence : dict
         verification.json.
     """
-    return tuple(f"{each.name}: `{each.how}`" for each in required_of(evidence) if not each.done)
+    return tuple(f"{each.name}: {each.how}" for each in required_of(evidence) if not each.done)
 
 
 def _tried(checks: list[dict[str, Any]], begins: str, name: str, how: str) -> Required:

@@ -176,7 +176,7 @@ def verify(
             "schema": SCHEMA,
             "tool": TOOL,
             "made_from": [{"source": f"{folder.name}/{MANIFEST_NAME}", "sha256": sha256_of(manifest_bytes)}],
-            "target": manifest["target"],
+            "target": manifest.get("target", ""),
             "yours": [each.name for each in board_files(folder, manifest) if each.changed],
             "holds": all(check.holds for check in checks),
             "checks": [asdict(check) for check in checks],
