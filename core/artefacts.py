@@ -316,9 +316,7 @@ def _keep(
     return {name: old["files"][name] != listing[name] for name in sorted(changed)}
 
 
-def write_folder(
-    folder: Path, files: Mapping[str, str | bytes], manifest: Mapping[str, Any]
-) -> Mapping[str, bool]:
+def write_folder(folder: Path, files: Mapping[str, str | bytes], manifest: Mapping[str, Any]) -> Mapping[str, bool]:
     """Write a folder whole or not at all; one that dzdesign made before is replaced, any other is left alone.
 
     Parameters

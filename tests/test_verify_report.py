@@ -80,6 +80,15 @@ def test_a_strangers_valve_beside_is_a_remark_and_inside_a_fault(copied):
     assert "DO NOT BELONG TOGETHER" in report_of_folder(copied).verdict
 
 
+def test_of_two_copies_of_a_firmware_the_one_that_fits_is_taken_or_the_one_that_is_named(copied):
+    shutil.copytree(copied / "firmware", copied / "a copy")
+    (copied / "a copy/core/dz_comp.c").write_text("int edited;\n")
+    for named in (copied, copied / "evidence", copied / "firmware"):
+        assert report_of_folder(named).kind == "good"
+    report = report_of_folder(copied / "a copy")
+    assert report.kind == "bad" and any("a copy/core/dz_comp.c was changed" in fault for fault in report.faults)
+
+
 def test_files_that_verify_calls_changed_have_its_verdict_and_no_other(copied):
     (copied / "firmware/f28335/main.c").write_text("int main;\n")
 

@@ -184,7 +184,7 @@ class _Search:
     def _firmware(self) -> None:
         evidence = self.found.get("verification")
         stated = _origin(evidence) if evidence else None
-        name = self._by_hash(stated, self.own) if stated else self._first(FIRMWARE_SCHEMA)
+        name = self._firmware_by_hash(stated) if stated else self._first(FIRMWARE_SCHEMA)
         if name:
             self._take("firmware", name)
             if "firmware" in self.found:
@@ -270,10 +270,19 @@ class _Search:
         place, slash, leaf = name.rpartition("/")
         return listing(self.shelf.get(place + slash + MANIFEST_NAME)).get(leaf)
 
-    def _by_hash(self, stated: str | None, rather: tuple[str, ...] = ("",)) -> str | None:
-        """Return the file of a hash; of copies, beside which other files may differ, rather that of some place."""
+    def _by_hash(self, stated: str | None) -> str | None:
+        return next((name for name, digest in self.hashes.items() if digest == stated), None)
+
+    def _firmware_by_hash(self, stated: str) -> str | None:
+        """Return the manifest of a hash: of copies that in the folder asked for, then that beside which all fits."""
+
+        def preferred(name: str) -> tuple[bool, int]:
+            place = name.removesuffix(MANIFEST_NAME)
+            files = listing(self.shelf[name])
+            return not name.startswith(self.own), sum(self.hashes.get(place + leaf) != files[leaf] for leaf in files)
+
         found = [name for name, digest in self.hashes.items() if digest == stated]
-        return next((name for name in found if name.startswith(rather)), found[0] if found else None)
+        return min(found, key=preferred, default=None)
 
     def _first(self, schema: str) -> str | None:
         """Return the first file of a schema; a manifest has that of what it lists, and is one of a firmware only."""
