@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
 from math import ceil, lcm
+from typing import NamedTuple
 
 from dzdesign.core.errors import InputError
 from dzdesign.derivation.edge import evaluate_edge
@@ -108,63 +109,24 @@ def integer_form(compensator: Compensator, sign: int = 1) -> IntegerForm:
         If the coefficients need more than 64-bit arithmetic.
     """
     c, side = compensator, compensator.side(sign)
-    compare_max = c.signals.compare_max
-    chosen = law(c.law_name)
+    terms = _terms(compensator, sign)
+    divisor, shift, common = _denominator(terms)
+    slope, offset, linear, edge = (int(value * common) for value in terms)
     span = c.signals.command.span(sign)
-
-    def line(beta: int) -> Line:
-        return evaluate_line(
-            chosen,
-            beta=beta,
-            kappa=side.k_x_max_over_u_max,
-            u_min0_over_u_max=side.u_min0_over_u_max,
-            n_adc=span,
-            n_full=compare_max,
-        )
-
-    # Eq. (18) is affine in beta: in counts it is beta (per_command c + constant) + plain c.
-    without, whole = line(beta=0), line(beta=1)
-    beta_unit = c.beta_denominator * c.beta_step_codes
-    per_command = (whole.slope - without.slope) / beta_unit
-    constant = (whole.start - without.start) / beta_unit
-    plain = without.slope
-    per_edge_code = 0 * constant
-    if c.edge_codes:  # what one unit of the gap lowers at zero command, over the edge's codes
-        lowered = evaluate_edge(
-            beta_opening=1,
-            beta_closing=0,
-            u_min0_over_u_max=side.u_min0_over_u_max,
-            share_of_edge=0,
-            n_full=compare_max,
-        )
-        per_edge_code = lowered / beta_unit / c.edge_codes
-    common = lcm(*(value.denominator for value in (per_command, constant, plain, per_edge_code)))
-    divisor, shift = common, 0
-    while divisor % 2 == 0:
-        divisor, shift = divisor // 2, shift + 1
-    # Rounding to nearest needs half a unit, and a shift by a whole word of 32 bits costs nothing.
-    shift, common = max(shift, WORD_BITS), common << max(WORD_BITS - shift, 0)
-    slope, offset, linear, edge = (int(value * common) for value in (per_command, constant, plain, per_edge_code))
     scale_beta = _share((slope, offset, edge), (abs(slope) * span, abs(offset), edge * c.edge_codes))
-    slope, offset, edge = slope // scale_beta, offset // scale_beta, edge // scale_beta
-    linear_shift = 0
-    while linear and linear % 2 == 0:
-        linear, linear_shift = linear // 2, linear_shift + 1
+    linear, linear_shift = _odd_part(linear)
     asked = _largest_quotient(compensator, sign, divisor)
     if asked > INT32_MAX:
         raise InputError(f"the law's quotient by {divisor} needs more than 31 bits; choose other scalings")
     largest = (c.amplifier.compare_limit + 1) * divisor - 1
     reciprocal, reciprocal_shift = _exact_reciprocal(divisor, largest)
-    fallback = (min(side.law_numerators),) * 2
-    nodes = side.law_numerators + fallback
-    lower = side.beta_numerators + (min(side.beta_numerators),) * 2
     form = IntegerForm(
-        table=tuple(scale_beta * numerator for numerator in nodes),
-        zero_table=tuple(scale_beta * numerator for numerator in lower) if c.edge_codes else (),
+        table=_table(side.law_numerators, scale_beta),
+        zero_table=_table(side.beta_numerators, scale_beta) if c.edge_codes else (),
         scale_beta=scale_beta,
-        slope=slope,
-        offset=offset,
-        edge=edge,
+        slope=slope // scale_beta,
+        offset=offset // scale_beta,
+        edge=edge // scale_beta,
         linear=linear,
         linear_shift=linear_shift,
         half=common // 2,
@@ -178,6 +140,68 @@ def integer_form(compensator: Compensator, sign: int = 1) -> IntegerForm:
     )
     _prove_widths(form, compensator, sign)
     return form
+
+
+class _Terms(NamedTuple):
+    """Rational factors of the law in counts, in the units of the table: p, o, l and e of the module's text."""
+
+    per_command: Fraction
+    constant: Fraction
+    plain: Fraction
+    per_edge_code: Fraction
+
+
+def _terms(compensator: Compensator, sign: int) -> _Terms:
+    """Return the law's terms: Eq. (18) is affine in beta, in counts beta (per_command c + constant) + plain c."""
+    c, side = compensator, compensator.side(sign)
+
+    def line(beta: int) -> Line:
+        return evaluate_line(
+            law(c.law_name),
+            beta=beta,
+            kappa=side.k_x_max_over_u_max,
+            u_min0_over_u_max=side.u_min0_over_u_max,
+            n_adc=c.signals.command.span(sign),
+            n_full=c.signals.compare_max,
+        )
+
+    without, whole = line(beta=0), line(beta=1)
+    beta_unit = c.beta_denominator * c.beta_step_codes
+    per_edge_code = Fraction(0)
+    if c.edge_codes:  # what one unit of the gap lowers at zero command, over the edge's codes
+        lowered = evaluate_edge(
+            beta_opening=1,
+            beta_closing=0,
+            u_min0_over_u_max=side.u_min0_over_u_max,
+            share_of_edge=0,
+            n_full=c.signals.compare_max,
+        )
+        per_edge_code = lowered / beta_unit / c.edge_codes
+    return _Terms(
+        per_command=(whole.slope - without.slope) / beta_unit,
+        constant=(whole.start - without.start) / beta_unit,
+        plain=without.slope,
+        per_edge_code=per_edge_code,
+    )
+
+
+def _denominator(terms: _Terms) -> tuple[int, int, int]:
+    """Return (divisor, shift, divisor 2^shift): what all terms times it are integers, the divisor odd."""
+    divisor, shift = _odd_part(lcm(*(value.denominator for value in terms)))
+    # Rounding to nearest needs half a unit, and a shift by a whole word of 32 bits costs nothing.
+    shift = max(shift, WORD_BITS)
+    return divisor, shift, divisor << shift
+
+
+def _odd_part(value: int) -> tuple[int, int]:
+    """Return (odd, shift) with ``odd << shift == value``; of zero (0, 0)."""
+    shift = (value & -value).bit_length() - 1 if value else 0
+    return value >> shift, shift
+
+
+def _table(numerators: tuple[int, ...], scale: int) -> tuple[int, ...]:
+    """Return the scaled nodes, then twice the smallest of them: the fallback's segment."""
+    return tuple(scale * numerator for numerator in (*numerators, *(min(numerators),) * 2))
 
 
 def _share(coefficients: tuple[int, ...], sizes: tuple[int, ...]) -> int:

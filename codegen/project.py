@@ -2,10 +2,11 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import import_module
 from importlib.resources import files as files_of
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dzdesign.codegen.core_plan import FilePlan, core_plan, drive_header_plan, drive_plan, header_plan
@@ -13,7 +14,7 @@ from dzdesign.codegen.origin import origin_of_constants
 from dzdesign.codegen.target import Target, folder_of
 from dzdesign.codegen.user_names import printable_list
 from dzdesign.codegen.wiring import wiring_of
-from dzdesign.core.artefacts import TOOL, sha256_of, to_json
+from dzdesign.core.artefacts import TOOL, sha256_of, to_json, write_folder
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.shown import ShownInNotebooks
 from dzdesign.design.compensator import Compensator
@@ -48,6 +49,36 @@ class Firmware(ShownInNotebooks):
     files: Mapping[str, str]
     manifest: Mapping[str, Any]
     note: str = ""
+
+
+def write_firmware(firmware: Firmware, folder: Path) -> Firmware:
+    """Write a firmware folder; board files that their user changed in an earlier one stay as they are.
+
+    Parameters
+    ----------
+    firmware : Firmware
+        From `generate`.
+    folder : Path
+        Where it goes.
+
+    Returns
+    -------
+    Firmware
+        The same, with a note on what was kept.
+
+    Raises
+    ------
+    InputError
+        If the place can't be written, or holds files that would be lost.
+    """
+    kept = write_folder(folder, firmware.files, firmware.manifest)
+    if not kept:
+        return firmware
+    note = f"kept as you changed it: {', '.join(kept)}"
+    if newer := [name for name, other in kept.items() if other]:
+        note += f"; would be generated otherwise now: {', '.join(newer)}"
+    note += "; for what is generated now, move yours away or choose a new folder with -o"
+    return replace(firmware, note="; ".join(filter(None, (firmware.note, note))))
 
 
 def target_named(name: str) -> Target:
@@ -105,7 +136,12 @@ def generate(
     own = environment(f"{PACKAGE}.{target.folder}")
     plans += [(path, own, template, hardware) for path, template in target.templates.items()]
     files = {
-        path: _render(renderer, template, banner(template, digest, recordings, simulated), plan)
+        path: _render(
+            renderer,
+            template,
+            board_banner(template) if path in target.board else banner(template, digest, recordings, simulated),
+            plan,
+        )
         for path, renderer, template, plan in plans
     }
     files["compensator.json"] = document.decode()
@@ -116,6 +152,7 @@ def generate(
         "target": target.name,
         "law": compensator.law_name,
         "core": sorted(path for path in files if path.startswith("core/")),
+        "board": sorted(target.board),
         **origin_of_constants(compensator, digest, {path: plan.constants for path, _, plan in core}),
     }
     return Firmware(files=files, manifest=manifest, note=note)
@@ -233,6 +270,22 @@ def banner(template: str, digest: str, recordings: Sequence[str] = (), simulated
     if simulated:
         lines.append("SIMULATED recordings: an example, not of a measured valve. Not for a machine.")
     return tuple(lines)
+
+
+def board_banner(template: str) -> tuple[str, ...]:
+    """Return the lines that open a file which its user fills in.
+
+    Nothing in them, such as a hash, grows old where the file is kept through the next generation.
+
+    Parameters
+    ----------
+    template : str
+        File name of the template.
+    """
+    return (
+        f"Written by dzdesign {TOOL['version']} from template {template}. Yours to edit: `dzdesign codegen` keeps what",
+        "you change here, and `dzdesign verify` names this file as yours and does not check it.",
+    )
 
 
 def _render(

@@ -45,6 +45,8 @@ class Target:
         those that the targets share.
     context
         Every value that a template prints, already a string.
+    board
+        Output paths of the files that are the user's to fill in; the rest is generated again as it is.
     link
         The serial line of its telemetry, or None if it sends none.
     arithmetic
@@ -73,6 +75,7 @@ class Target:
     arithmetic: str = "wide"
     takes_any_signals: bool = False
     has_timer: bool = True
+    board: frozenset[str] = frozenset()
     link: Link | None = None
 
     def __post_init__(self) -> None:
@@ -89,6 +92,8 @@ class Target:
                 raise DzdesignError(
                     f"target {self.name}: output path must stay below the firmware folder, got {path!r}"
                 )
+        if strangers := sorted(self.board - self.templates.keys()):
+            raise DzdesignError(f"target {self.name}: board files {strangers} have no template")
         for key, value in self.context.items():
             if not isinstance(value, str):
                 raise DzdesignError(

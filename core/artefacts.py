@@ -5,7 +5,7 @@ import json
 import logging
 import os
 import shutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
@@ -258,13 +258,28 @@ def _check_folder_is_ours(folder: Path, schema: str | None) -> None:
         raise InputError(
             f"'{folder}' holds {manifest['schema']}, which {schema} would replace; choose a new folder with -o"
         )
+    _refuse_to_lose(folder, set(_changed_in(folder, manifest)) - _board_of(manifest))
+
+
+def _refuse_to_lose(folder: Path, changed: set[str]) -> None:
+    for name in sorted(changed):
+        raise InputError(
+            f"'{folder / name}' was changed since dzdesign wrote it and would be lost; "
+            "move it away or choose a new folder with -o"
+        )
+
+
+def _changed_in(folder: Path, manifest: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the files of a folder that are there and not as dzdesign wrote them."""
     for name, digest in manifest["files"].items():
-        path = folder / name
-        if path.is_file() and _digest(path) != digest:
-            raise InputError(
-                f"'{path}' was changed since dzdesign wrote it and would be lost; "
-                "move it away or choose a new folder with -o"
-            )
+        if (folder / name).is_file() and _digest(folder / name) != digest:
+            yield name
+
+
+def _board_of(manifest: Mapping[str, Any]) -> set[str]:
+    """Return the files that are their user's to fill in."""
+    board = manifest.get("board")
+    return {name for name in board if isinstance(name, str)} if isinstance(board, list) else set()
 
 
 def _digest(path: Path) -> str:
@@ -289,7 +304,19 @@ def _carry_over(folder: Path, staging: Path, generated: set[str]) -> None:
         shutil.copy2(path, target, follow_symlinks=False)
 
 
-def write_folder(folder: Path, files: Mapping[str, str | bytes], manifest: Mapping[str, Any]) -> None:
+def _keep(
+    folder: Path, staging: Path, old: Mapping[str, Any], listing: Mapping[str, str], board: set[str]
+) -> dict[str, bool]:
+    """Copy what a person filled in into the new output; return its names, and whether the generated text is another."""
+    changed = set(_changed_in(folder, old))
+    _refuse_to_lose(folder, changed - board)
+    for name in changed:
+        (staging / name).unlink()
+        shutil.copy2(folder / name, staging / name, follow_symlinks=False)
+    return {name: old["files"][name] != listing[name] for name in sorted(changed)}
+
+
+def write_folder(folder: Path, files: Mapping[str, str | bytes], manifest: Mapping[str, Any]) -> Mapping[str, bool]:
     """Write a folder whole or not at all; one that dzdesign made before is replaced, any other is left alone.
 
     Parameters
@@ -300,7 +327,13 @@ def write_folder(folder: Path, files: Mapping[str, str | bytes], manifest: Mappi
         Relative POSIX path to content.
     manifest : mapping
         Written as `MANIFEST_NAME`, with the SHA-256 of every file added under ``files``: by it the folder is known
-        again, and a file that somebody changed is not overwritten.
+        again, and a file that somebody changed is not overwritten. Those under ``board`` are their user's to fill in:
+        where one was changed in the earlier folder, it stays as it is there.
+
+    Returns
+    -------
+    mapping of str to bool
+        The files that were kept, and whether dzdesign would write another text now than it did then.
 
     Raises
     ------
@@ -311,7 +344,8 @@ def write_folder(folder: Path, files: Mapping[str, str | bytes], manifest: Mappi
     listing = {name: sha256_of(data) for name, data in contents.items()}
     contents[MANIFEST_NAME] = to_json({**manifest, "files": listing}).encode()
     folder = Path(folder)
-    staging = None
+    staging: Path | None = None
+    kept: dict[str, bool] = {}
     try:
         folder = Path(os.path.realpath(folder))  # a link stays, its target is replaced
         if not folder.parent.is_dir():
@@ -324,6 +358,7 @@ def write_folder(folder: Path, files: Mapping[str, str | bytes], manifest: Mappi
             _write_staging(staging, contents)
             if folder.is_dir():
                 old = _manifest_of(folder)
+                kept = _keep(folder, staging, old, listing, _board_of(manifest)) if old else {}
                 _carry_over(folder, staging, set(old["files"]) if old else set())
                 put_in_place(staging, folder)
             else:
@@ -336,6 +371,7 @@ def write_folder(folder: Path, files: Mapping[str, str | bytes], manifest: Mappi
     finally:
         if staging:
             shutil.rmtree(staging, ignore_errors=True)
+    return kept
 
 
 def _write_staging(staging: Path, contents: Mapping[str, bytes]) -> None:

@@ -83,7 +83,8 @@ SHAPE = {
     "costs": [str],
     "valve": dict,
 }
-#: What `prove_derived` rests on. A file from before it was kept has none of it; one that lacks a part was edited.
+#: What `prove_derived` rests on. From a file without any of it nothing is generated, and `verify` calls it not checked;
+#: one that lacks a part was edited.
 ASKED = {
     "target": {
         "name": str,
@@ -257,8 +258,7 @@ def _check_asked(document: dict[str, Any], source: str) -> None:
     missing = [key for key in ASKED if document.get(key) is None]
     if missing and any(key in document for key in ASKED):
         raise InputError(
-            f"'{source}' does not say '{missing[0]}', expected all of {', '.join(ASKED)}, or in a file of an older "
-            f"version none of them; {REMEDY}"
+            f"'{source}' does not say '{missing[0]}', expected all of {', '.join(ASKED)}; {REMEDY}"
         )
 
 

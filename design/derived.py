@@ -21,6 +21,28 @@ COARSEST = Fraction(1, 2**12)
 RATIONAL = re.compile(r"(_over_u_max|u_max_V|margin_V|converter_V|span_MPa|(error|dp)_MPa\[\d\])$")
 
 
+def refuse_unsaid(compensator: Compensator, source: str) -> None:
+    """Refuse a file that does not say what it was designed with: nothing in it could be derived again.
+
+    Parameters
+    ----------
+    compensator : Compensator
+        As it was read.
+    source : str
+        The file, for the message.
+
+    Raises
+    ------
+    InputError
+        If it does not.
+    """
+    if compensator.request is None:
+        raise InputError(
+            f"'{source}' does not say for which target and with which options it was designed ('target', 'options', "
+            f"'common_valves', 'valve_sha256'), so no number in it can be derived again; {REMEDY}"
+        )
+
+
 def prove_derived(compensator: Compensator) -> None:
     """Design the compensator again from the valve and the options in it, and compare every number.
 

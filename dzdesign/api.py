@@ -35,6 +35,7 @@ from dzdesign.core.artefacts import (
 from dzdesign.core.errors import DzdesignError, InputError, RequirementError
 from dzdesign.core.shown import show_by
 from dzdesign.notebook import WRITERS
+from dzdesign.regenerated import with_regenerated
 from dzdesign.summaries import SUMMARIES
 
 if TYPE_CHECKING:
@@ -247,23 +248,22 @@ def generate(
     InputError
         If the file can't be read, a number in it does not follow, or the target counts otherwise.
     """
-    from dzdesign.codegen.project import SCHEMA
+    from dzdesign.codegen.project import SCHEMA, write_firmware
     from dzdesign.codegen.project import generate as generate_project
     from dzdesign.design.compensator import Compensator
     from dzdesign.design.compensator_file import compensator_from_document
-    from dzdesign.design.derived import prove_derived
+    from dzdesign.design.derived import prove_derived, refuse_unsaid
 
     if output is not None:
         check_folder_may_be_written(Path(output), SCHEMA)
     content = None
     if not isinstance(compensator, Compensator):
         content = read_bytes(Path(compensator), "compensator file")
-        compensator = compensator_from_document(content, os.fspath(compensator))
+        source, compensator = os.fspath(compensator), compensator_from_document(content, os.fspath(compensator))
+        refuse_unsaid(compensator, source)
     prove_derived(compensator)
     firmware = generate_project(compensator, target, content)
-    if output is not None:
-        write_folder(Path(output), firmware.files, firmware.manifest)
-    return firmware
+    return firmware if output is None else write_firmware(firmware, Path(output))
 
 
 @takes_text
@@ -312,6 +312,7 @@ def verify(
             sha256_of(read_bytes(Path(plant), "plant file")) if plant is not None else None,
             tolerances=read_tolerances(Path(tolerances)) if tolerances is not None else None,
         )
+        verification = with_regenerated(verification, folder)
         if output is not None:
             manifest = {"schema": SCHEMA, "tool": TOOL, "made_from": verification.document["made_from"]}
             files = with_report(evidence_files(verification), folder, Path(output))

@@ -22,6 +22,7 @@ from dzdesign.core.units import parse_quantity
 from dzdesign.identify_options import identify_options, record_of
 from dzdesign.progress import say, stages, with_bar
 from dzdesign.recordings import check_plots, read_recordings, refuse_copies
+from dzdesign.regenerated import with_regenerated
 
 
 def _seed(text: str) -> int:
@@ -95,10 +96,10 @@ def run_design(args: argparse.Namespace) -> int:
 
 def run_codegen(args: argparse.Namespace) -> int:
     """Generate the firmware of a compensator."""
-    from dzdesign.codegen.project import DEFAULT_TARGET, SCHEMA, generate, target_named
+    from dzdesign.codegen.project import DEFAULT_TARGET, SCHEMA, generate, target_named, write_firmware
     from dzdesign.design.compensator_file import SCHEMA as COMPENSATOR_SCHEMA
     from dzdesign.design.compensator_file import compensator_from_document
-    from dzdesign.design.derived import prove_derived
+    from dzdesign.design.derived import prove_derived, refuse_unsaid
     from dzdesign.design_options import given_design_options
     from dzdesign.identify.model import SCHEMA as VALVE_SCHEMA
     from dzdesign.tables import print_firmware
@@ -119,14 +120,15 @@ def run_codegen(args: argparse.Namespace) -> int:
         for option in given_design_options(args):
             raise InputError(f"{option} is an option of the design, and '{path}' is designed; use `dzdesign design`")
         compensator = compensator_from_document(content, str(path))
+        refuse_unsaid(compensator, str(path))
         try:
             prove_derived(compensator)
         except InputError as error:
             raise InputError(f"'{path}': {error}") from error
         firmware = generate(compensator, args.target, content)
+    firmware = write_firmware(firmware, Path(args.output))
     if firmware.note:
         say(firmware.note)
-    write_folder(Path(args.output), firmware.files, firmware.manifest)
     if args.json:
         print(to_json(firmware.manifest), end="")
     else:
@@ -167,6 +169,7 @@ def run_verify(args: argparse.Namespace) -> int:
     ware = check_against_c2000ware(firmware, Path(args.c2000ware), say) if args.c2000ware else None
     with stages() as stage:
         verification = verify(firmware, plant, source, digest, tolerances=tolerances, say=stage, watch=stage.each)
+    verification = with_regenerated(verification, firmware)
     added = [ware] if ware else []
     if args.machine_code:
         from dzdesign.verify.machine_code import machine_code_checks

@@ -8,6 +8,7 @@ from dzdesign.core.artefacts import TOOL, check_folder_may_be_written, sha256_of
 from dzdesign.core.errors import InputError
 from dzdesign.core.units import parse_quantity
 from dzdesign.progress import say, stages
+from dzdesign.regenerated import with_regenerated
 
 #: The flow meter of the bundled recordings, as their first lines tell it.
 METER_LAG, METER_FLOOR = "0.1 s", "0.6 L/min"
@@ -62,6 +63,7 @@ def run_demo(args: argparse.Namespace) -> int:
         write_folder(folder / "firmware", firmware.files, firmware.manifest)
         source = "plant.toml of the example"
         verification = verify(folder / "firmware", plant, source, digest, say=stage, watch=stage.each)
+    verification = with_regenerated(verification, folder / "firmware")
     manifest = {"schema": SCHEMA, "tool": TOOL, "made_from": verification.document["made_from"]}
     evidence = with_report(evidence_files(verification), folder / "firmware", folder / "evidence")
     write_folder(folder / "evidence", evidence, manifest)

@@ -111,9 +111,8 @@ def firmware_html(firmware: "Firmware") -> str:
 
 def verification_html(verification: "Verification") -> str:
     """Return the verdict, every check and the closed loop of a verification."""
-    verdict = "Every requirement holds." if verification.holds else "DOES NOT HOLD"
     checks = _table(
-        verdict,
+        verification.verdict,
         ("requirement", "verdict", "figures"),
         ((check.name, VERDICTS[check.holds], check.text) for check in verification.checks),
         words=(0, 1, 2),

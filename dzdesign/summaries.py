@@ -39,8 +39,9 @@ def valve_summary(valve: "ValveModel") -> str:
 
 
 def compensator_summary(compensator: "Compensator") -> str:
-    """Return the law, the offset and certificate of each side, and the costs."""
-    lines = [f"Compensator, law {compensator.law_name}, of a valve of {float(compensator.u_max_V):g} V"]
+    """Return target and law, the offset and certificate of each side, and the costs."""
+    target = f" for {compensator.request.target.name}" if compensator.request else ""
+    lines = [f"Compensator{target}, law {compensator.law_name}, of a valve of {float(compensator.u_max_V):g} V"]
     for sign in compensator.signals.signs:
         side = compensator.side(sign)
         low, high = (float(end) for end in side.certificate.dp_MPa)
@@ -55,14 +56,17 @@ def compensator_summary(compensator: "Compensator") -> str:
 def firmware_summary(firmware: "Firmware") -> str:
     """Return target and law, and the files."""
     head = f"Firmware for {firmware.manifest['target']}, law {firmware.manifest['law']}, {len(firmware.files)} files"
-    return "\n".join(map(one_line, [head, *(f"  {name}" for name in firmware.files)]))
+    note = [f"  {firmware.note}"] if firmware.note else []
+    return "\n".join(map(one_line, [head, *(f"  {name}" for name in firmware.files), *note]))
 
 
 def verification_summary(verification: "Verification") -> str:
-    """Return the verdict and every requirement with its figures."""
-    verdict = "every requirement holds" if verification.holds else "DOES NOT HOLD"
+    """Return the verdict, every requirement with its figures, and what was not tried."""
+    from dzdesign.verify.required import untried_of
+
     checks = [f"  {VERDICTS[check.holds]}: {check.name}: {check.text}" for check in verification.checks]
-    return "\n".join(map(one_line, [f"Verification: {verdict}", *checks]))
+    untried = [f"  NOT TRIED: {name}".replace("`", "") for name in untried_of(verification.document)]
+    return "\n".join(map(one_line, [f"Verification: {verification.verdict}", *checks, *untried]))
 
 
 #: Class of a result -> its summary, for `dzdesign.core.shown`.

@@ -152,7 +152,7 @@ def print_verification(verification: "Verification") -> None:
         console.print(_closed_loop(verification))
     print_scenarios(verification.scenarios)
     print_scatter(verification.scatter)
-    put_line(console, _verdict(verification))
+    put_line(console, verification.verdict)
 
 
 def _closed_loop(verification: "Verification") -> "Grid":
@@ -176,13 +176,6 @@ def _closed_loop(verification: "Verification") -> "Grid":
             f"{result.q_max_L_min:.1f}",
         )
     return table
-
-
-def _verdict(verification: "Verification") -> str:
-    failed = [check.name for check in verification.checks if not check.holds]
-    if not failed:
-        return "Every requirement holds."
-    return f"DOES NOT HOLD: {', '.join(failed)}"
 
 
 def print_scenarios(scenarios: "Sequence[ScenarioResult]") -> None:
@@ -293,7 +286,7 @@ def print_demo(valve: "ValveModel", verification: "Verification", folder: str) -
     console.print(table)
     checked, wrong = (sum(getattr(each, name) for each in verification.inputs) for name in ("inputs", "wrong"))
     put_line(console, f"Inputs checked: {checked}, wrong: {wrong}")
-    put_line(console, _verdict(verification))
+    put_line(console, verification.verdict)
     put_line(console, f"Artefacts: {folder}")
 
 

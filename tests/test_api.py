@@ -195,6 +195,7 @@ def test_print_sums_a_result_up(example_valve, example_compensator, example_firm
         assert f"{test.dp_MPa:.3f} MPa: knee opening {test.u_knee_rising_V:.3f} ± {test.rising.knee_se_V:.3f}" in text
     assert "trend with dP: decreasing" in text and "warnings: simulated, " in text
     assert "cost: outside 0.50 to 5.00 MPa" in str(example_compensator)
+    assert str(example_compensator).startswith("Compensator for f28335, law paper, of a valve of 10 V\n")
     assert "core/dz_comp.c" in str(example_firmware)
     for result in (example_valve, example_compensator, example_firmware):
         assert repr([result]) == f"[<{str(result).splitlines()[0]}>]"

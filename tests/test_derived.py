@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 from synthetic import Truth, synthetic_ramp
 
+from dzdesign import api
 from dzdesign.cli import main
 from dzdesign.codegen.project import generate, target_named
 from dzdesign.core.artefacts import MANIFEST_NAME, to_json, write_folder
@@ -18,7 +19,6 @@ from dzdesign.design.option_texts import options_of
 from dzdesign.identify.identification import identify
 from dzdesign.verify.checks import law_follows
 from dzdesign.verify.manifest_check import manifest_follows
-from dzdesign.verify.required import untried_of
 
 #: What no number of the law depends on, and the hash of a file whose spacing is not kept.
 WORDS = ("schema", "tool", "made_from", "target.name", "options")
@@ -102,33 +102,28 @@ def test_costs_are_compared(document):
     assert f"'costs[{place}]' is" in refusal(edited(document, ("costs", place), lambda _: text.replace("5.", "4.")))
 
 
-def test_a_file_from_before_the_options_were_kept_is_taken_as_it_was(document, tmp_path, capsys):
-    old = {key: value for key, value in document.items() if key not in LATER or key == "tool"}
-    compensator = read(old)
-    prove_derived(compensator)
-    assert compensator.request is None and law_follows(compensator, old) == []
+def test_a_file_without_its_options_is_generated_by_nobody_and_checked_by_nobody(document, tmp_path, capsys):
+    """All of them deleted, any number outside of the certificate could be another."""
+    bare = {key: value for key, value in document.items() if key not in LATER or key == "tool"}
+    compensator = read(bare)
+    check = law_follows(compensator, bare)
+    assert compensator.request is None and check.holds is None and "does not say for which target" in check.text
     path = tmp_path / "compensator.json"
-    path.write_text(to_json(old), encoding="utf-8", newline="")
-    for asked, made in (((), "f28335"), (("--target", "cortex-m4"), "cortex-m4")):
-        folder = tmp_path / made
-        assert main(["codegen", str(path), "-o", str(folder), *asked]) == 0
-        assert json.loads((folder / "manifest.json").read_text())["target"] == made
-    assert "designed for" not in capsys.readouterr().err
+    path.write_text(to_json(bare), encoding="utf-8", newline="")
+    assert main(["codegen", str(path), "-o", str(tmp_path / "firmware")]) == 2
+    assert "does not say for which target and with which options" in capsys.readouterr().err
+    assert not (tmp_path / "firmware").exists()
+    with pytest.raises(InputError, match="does not say for which target"):
+        api.generate(path)
 
 
 @pytest.mark.parametrize("key", ["target", "options", "common_valves", "valve_sha256"])
 def test_half_of_what_was_asked_for_is_refused(document, key):
     """Else the law would not be derived again, and any edit outside of the certificate would pass."""
-    said = f"does not say '{key}', expected all of target, options, common_valves, valve_sha256, or in a file"
+    said = f"does not say '{key}', expected all of target, options, common_valves, valve_sha256; make"
     for half in ({**document, key: None}, {each: document[each] for each in document if each != key}):
         with pytest.raises(InputError, match=said):
             read(half)
-
-
-def test_of_an_older_file_it_is_said_what_to_do():
-    evidence = {"checks": [], "closed_loop": {}, "monte_carlo": None}
-    (said,) = [each for each in untried_of(evidence) if each.startswith("the law follows from the valve")]
-    assert said.endswith(": `design, codegen and verify again with this version`")
 
 
 @pytest.mark.parametrize("digest", ["", "x" * 64, "F" * 64, "0" * 63, "0" * 65, "0" * 64 + "\n"])
@@ -140,9 +135,9 @@ def test_a_hash_that_can_be_none_is_refused(document, digest):
 
 def test_of_another_version_a_difference_is_no_fault(document):
     changed = edited(document, ("sides", "positive", "k_x_max_over_u_max"), lambda _: [1, 2])
-    assert law_follows(read(changed), changed)[0].holds is False
+    assert law_follows(read(changed), changed).holds is False
     changed["tool"]["version"] = "0.0.9"
-    (check,) = law_follows(read(changed), changed)
+    check = law_follows(read(changed), changed)
     assert check.holds is None and "designed by dzdesign 0.0.9" in check.text
 
 

@@ -9,13 +9,15 @@ import pytest
 from synthetic import SHARED, needs_compiler
 
 from dzdesign.cli import main
+from dzdesign.codegen.project import target_named
 from dzdesign.core.artefacts import write_folder
 from dzdesign.core.errors import InputError
 from dzdesign.design.designing import design
+from dzdesign.design.option_texts import options_of
 from dzdesign.design.options import DesignOptions
 from dzdesign.verify.closed_loop import RampSequence
 
-EDGE = DesignOptions(edge=Fraction(1, 100))
+EDGE = options_of({"edge": "1 %"}, target_named("f28335").inputs())
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ import numpy as np
 import plant_oracle
 import pytest
 from plant_oracle import Oracle
-from synthetic import needs_compiler, signals_with_span, with_side
+from synthetic import needs_compiler, with_side
 
 from dzdesign.core.artefacts import to_json, write_folder
 from dzdesign.core.errors import InputError
@@ -133,6 +133,14 @@ def test_source_and_project_files_that_were_added_are_refused(firmware_folder, n
     (firmware_folder / name).write_text("")
     added = files_unchanged(firmware_folder, manifest)
     assert added.holds is False and f"does not name {name};" in added.text
+
+
+def test_a_file_of_ones_own_in_the_core_is_told_where_it_belongs(firmware_folder):
+    manifest = json.loads((firmware_folder / "manifest.json").read_text())
+    (firmware_folder / "core" / "my.c").write_text("")
+    added = files_unchanged(firmware_folder, manifest)
+    assert added.holds is False
+    assert added.text == "core/my.c: not generated; core/ is the compensator alone, keep files of your own elsewhere"
 
 
 def test_a_file_whose_line_was_taken_from_the_manifest_is_refused(firmware_folder):
@@ -343,11 +351,11 @@ def test_what_could_not_be_checked_is_not_passed(tmp_path):
 
 
 def test_a_span_that_ends_at_the_tested_pressure_can_be_verified(example_valve, tmp_path):
-    from dzdesign.codegen.project import generate
+    from dzdesign.codegen.project import generate, target_named
     from dzdesign.design.designing import design
-    from dzdesign.design.options import DesignOptions
+    from dzdesign.design.option_texts import options_of
 
-    options = DesignOptions(signals=signals_with_span(Fraction(51, 10)))
+    options = options_of({"pressure_span": "5.1 MPa"}, target_named("f28335").inputs())
     firmware = generate(design(example_valve, options), "f28335")
     write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
     assert verify(tmp_path / "fw", sequence=QUICK).holds

@@ -11,11 +11,12 @@ import pytest
 from synthetic import L_MIN, MPA, Truth, synthetic_ramp
 
 from dzdesign.cli import main
-from dzdesign.codegen.project import generate
+from dzdesign.codegen.project import generate, target_named
 from dzdesign.core.artefacts import to_json
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator_file import compensator_document
 from dzdesign.design.designing import design
+from dzdesign.design.option_texts import options_of
 from dzdesign.design.options import DesignOptions
 from dzdesign.identify import knee_errors, quality
 from dzdesign.identify.identification import identify
@@ -112,6 +113,21 @@ class TestBranchOrder:
     def test_accepted_it_goes_on_and_the_cost_is_said(self, crossed):
         compensator = design(crossed, DesignOptions(accept=("branch-order",)))
         assert any(line.startswith("accepted, branch-order: at 1.00, 2.00, 4.00 MPa") for line in compensator.costs)
+
+    def test_the_report_says_so_beside_the_verdict_and_beside_the_warning(self, crossed):
+        """The warning was written before anybody accepted it, and says that `design` refuses."""
+        options = options_of({"accept": "branch-order"}, target_named("f28335").inputs())
+        for valve, accepted in ((crossed, True), (identify([valve_at(dp) for dp in PRESSURES]), False)):
+            shelf = {
+                "valve.json": to_json(valve.to_document()).encode(),
+                "compensator.json": to_json(compensator_document(design(valve, options))).encode(),
+            }
+            said = [line for line in headline(chain_of(shelf)).cautions if line.startswith("ACCEPTED warning, branch-")]
+            html = make_report(chain_of(shelf)).html
+            words = re.sub("<[^>]*>|`", "", html)
+            assert bool(said) is accepted
+            assert ("ACCEPTED warning, branch-order" in html[: html.index('<section id="data">')]) is accepted
+            assert ("refuses; ACCEPTED: the design was made in spite of it" in words) is accepted
 
     def test_a_valve_in_order_costs_nothing_of_it(self):
         valve = identify([valve_at(dp) for dp in PRESSURES])

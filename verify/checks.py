@@ -44,8 +44,11 @@ def files_unchanged(folder: Path, manifest: dict[str, Any]) -> Check:
         for name, digest in manifest["files"].items()
         if not (folder / name).is_file() or sha256_of((folder / name).read_bytes()) != digest
     ]
-    unlisted = [f"core/{path.name}" for path in sorted((folder / "core").glob("*.[ch]"))]
-    unlisted = [name for name in unlisted if name not in manifest["files"] or name not in manifest["core"]]
+    board = set(manifest.get("board", ()))
+    filled_in, changed = ([name for name in changed if (name in board) is yours] for yours in (True, False))
+    present = [f"core/{path.name}" for path in sorted((folder / "core").glob("*.[ch]"))]
+    foreign = [name for name in present if name not in manifest["files"]]
+    unlisted = [name for name in present if name in manifest["files"] and name not in manifest["core"]]
     ours = {PurePosixPath(name).name for name in manifest["files"]}
     built = _cmake_trees(folder, manifest)
     others = [
@@ -55,8 +58,13 @@ def files_unchanged(folder: Path, manifest: dict[str, Any]) -> Check:
     ]
     others = [name for name in others if name not in manifest["files"]]
     shadows = [name for name in others if PurePosixPath(name).name in ours]
-    if changed:
+    claimed = [name for name in sorted(board) if not _may_be_filled_in(name, manifest)]
+    if claimed:
+        fault = f"the manifest calls {', '.join(claimed)} the user's to fill in, which is none of a target's files"
+    elif changed:
         fault = f"changed or missing: {', '.join(changed)}"
+    elif foreign:
+        fault = f"{', '.join(foreign)}: not generated; core/ is the compensator alone, keep files of your own elsewhere"
     elif unlisted or not manifest["core"]:
         fault = f"the manifest does not name {', '.join(unlisted) or 'any file of the core'}"
     elif shadows:
@@ -65,10 +73,18 @@ def files_unchanged(folder: Path, manifest: dict[str, Any]) -> Check:
         fault = f"the manifest does not name {', '.join(others)}; keep source and project files of your own elsewhere"
     else:
         fault = ""
-    text = fault or f"{len(manifest['files'])} files as generated"
+    text = fault or f"{len(manifest['files']) - len(filled_in)} files as generated"
+    if filled_in and not fault:
+        text += f"; yours, changed, and not checked: {', '.join(filled_in)}"
     if built and not fault:
         text += f"; built by CMake, and not checked: {', '.join(sorted(tree.name for tree in built))}"
     return Check(name="files as generated", holds=not fault, text=text)
+
+
+def _may_be_filled_in(name: str, manifest: dict[str, Any]) -> bool:
+    """Tell whether a file can be its user's: listed, and in a target's folder, not of the core."""
+    folder, slash, _ = name.partition("/")
+    return bool(slash) and folder != "core" and name in manifest["files"] and name not in manifest["core"]
 
 
 def _cmake_trees(folder: Path, manifest: dict[str, Any]) -> set[Path]:
@@ -99,8 +115,8 @@ def certificate_follows(compensator: Compensator) -> Check:
     )
 
 
-def law_follows(compensator: Compensator, document: dict[str, Any]) -> list[Check]:
-    """Tell whether designing again gives the same numbers; nothing of a file from before options were kept in it.
+def law_follows(compensator: Compensator, document: dict[str, Any]) -> Check:
+    """Tell whether designing again gives the same numbers, which a file without its options does not let anyone do.
 
     Parameters
     ----------
@@ -110,17 +126,18 @@ def law_follows(compensator: Compensator, document: dict[str, Any]) -> list[Chec
     """
     name = "the law follows from the valve and the options"
     if compensator.request is None:
-        return []
+        text = "compensator.json does not say for which target and with which options it was designed, so no number of "
+        return Check(name=name, holds=None, text=f"{text}it can be derived again; make it again with `dzdesign design`")
     try:
         prove_derived(compensator)
     except InputError as error:
         version = document.get("tool", {}).get("version")
         known = version == TOOL["version"]
         text = str(error) if known else f"designed by dzdesign {version}, and this is {TOOL['version']}: {error}"
-        return [Check(name=name, holds=False if known else None, text=text)]
+        return Check(name=name, holds=False if known else None, text=text)
     target = compensator.request.target.name
     text = f"designed again from the valve and the options in compensator.json, for {target}: every number the same"
-    return [Check(name=name, holds=True, text=text)]
+    return Check(name=name, holds=True, text=text)
 
 
 def drive_follows(folder: Path, compensator: Compensator) -> Check:

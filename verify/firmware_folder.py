@@ -27,7 +27,9 @@ def read_firmware_manifest(folder: Path) -> tuple[bytes, dict[str, Any]]:
         raise InputError(f"'{folder}' {found}, expected the firmware folder that `dzdesign codegen` writes; name that")
     content = read_bytes(path, "firmware manifest")
     manifest = parse_document(content, str(path), (FIRMWARE_SCHEMA,))
-    check_shape(manifest, {"files": dict, "core": [str]}, str(path), "make it again with `dzdesign codegen`")
+    later = {key: kind for key, kind in {"target": str, "board": [str]}.items() if key in manifest}
+    shape = {"files": dict, "core": [str], **later}
+    check_shape(manifest, shape, str(path), "make it again with `dzdesign codegen`")
     check_inside(folder, [*manifest["files"], *manifest["core"]], f"'{path}'")
     check_firmware_inside(folder)
     return content, manifest

@@ -4,12 +4,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from dzdesign.identify.model import SCHEMA as VALVE_SCHEMA
 from dzdesign.verify.report_artefacts import Chain, chain_of
 from dzdesign.verify.report_body import SECTIONS, sections_of
 from dzdesign.verify.report_figure import figure_style
 from dzdesign.verify.report_law import account_of
 from dzdesign.verify.report_page import render_page
-from dzdesign.verify.report_shelf import VERIFICATION_NAME, shelf_of
+from dzdesign.verify.report_shelf import is_of, places_of, shelf_of
 from dzdesign.verify.report_summary import headline, key_figures
 
 REPORT_NAME = "report.html"
@@ -54,31 +55,41 @@ def report_of_folder(folder: Path) -> Report:
     InputError
         If there is nothing to report, or an artefact is none.
     """
-    return make_report(chain_of(shelf_of(folder)))
+    return make_report(chain_of(shelf_of(folder), own=places_of(folder)))
 
 
 def with_report(files: Mapping[str, str | bytes], firmware: Path, output: Path) -> dict[str, str | bytes]:
-    """Return the files of an evidence folder with the report of them.
+    """Return the files of an evidence folder with the report of them: of what `verify` used, and of nothing else.
+
+    Its verdict is the evidence's own. Files that lie about, an assessment or a stranger's valve.json, have no part in
+    it; `dzdesign report` looks at them.
 
     Parameters
     ----------
     files : mapping
         Of the evidence folder, not written yet: name to content.
     firmware : Path
-        The firmware folder that it is of; what that was made from is looked for beside it.
+        The firmware folder that it is of; the valve.json that it was made from is looked for around it.
     output : Path
         The evidence folder.
     """
-    name = Path(output).resolve().name
+    name, place = Path(output).resolve().name, Path(firmware).resolve().name
+    if name == place:  # in two folders of one name
+        name = f"{name} (evidence)"
     new = {
         f"{name}/{file}": content.encode() if isinstance(content, str) else content
         for file, content in files.items()
     }
     around = shelf_of(firmware)
-    # Evidence that is older is another firmware's, or about to be replaced.
-    older = {place for place, _, leaf in (file.rpartition("/") for file in around) if leaf == VERIFICATION_NAME}
-    kept = {file: content for file, content in around.items() if file.rpartition("/")[0] not in older | {name}}
-    return {**files, REPORT_NAME: make_report(chain_of(new | kept, sealed=False)).html}
+    compensator = around.get(f"{place}/compensator.json")
+    used = {
+        file: content
+        for file, content in around.items()
+        if file.startswith(f"{place}/") or content == compensator or is_of(content, VALVE_SCHEMA)
+    }
+    kept = {file: content for file, content in used.items() if not file.startswith(f"{name}/")}
+    chain = chain_of(new | kept, own=(f"{name}/", f"{place}/"), sealed=False)
+    return {**files, REPORT_NAME: make_report(chain).html}
 
 
 def make_report(chain: Chain) -> Report:

@@ -17,12 +17,12 @@ from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.design.derived import prove_derived
 from dzdesign.identify.model import SCHEMA as VALVE_SCHEMA
 from dzdesign.identify.valve_file import valve_from_document
-from dzdesign.verify.report_shapes import ASSESSMENT, CONSTANTS, FIRMWARE, REPRODUCTION, VERIFICATION
+from dzdesign.verify.report_shapes import ASSESSMENT, FIRMWARE, LATER, REPRODUCTION, VERIFICATION
 from dzdesign.verify.report_shelf import (
     EVIDENCE_SCHEMA,
     FIRMWARE_SCHEMA,
-    HEAD,
     VERIFICATION_NAME,
+    is_of,
     listing,
 )
 
@@ -86,29 +86,33 @@ class Chain:
         return None if found is None else found.document
 
 
-def chain_of(shelf: Mapping[str, bytes], *, sealed: bool = True) -> Chain:
+def chain_of(shelf: Mapping[str, bytes], *, own: tuple[str, ...] = ("",), sealed: bool = True) -> Chain:
     """Follow the chain from the evidence back to the valve, as far as the files go.
 
     Parameters
     ----------
     shelf : mapping of str to bytes
         Files by name, such as `report_shelf.shelf_of` returns; of two of a kind the first one counts.
+    own : tuple of str
+        How the names of the files begin that the report is asked for. What else lies there and belongs to another chain
+        is a stranger's: said, and no fault.
     sealed : bool
-        False of evidence that is not written yet, so that no manifest states its hash.
+        False of evidence that `verify` has made this moment: no manifest states its hash yet, and what is wrong with
+        the files it has found itself, so that its own verdict stands.
 
     Raises
     ------
     InputError
         If there are two pieces of evidence, or an artefact that fits is none: a key is missing.
     """
-    return _Search(shelf, sealed).chain()
+    return _Search(shelf, own, sealed).chain()
 
 
 class _Search:
     """Follows hashes over a shelf."""
 
-    def __init__(self, shelf: Mapping[str, bytes], sealed: bool) -> None:
-        self.shelf, self.sealed = shelf, sealed
+    def __init__(self, shelf: Mapping[str, bytes], own: tuple[str, ...], sealed: bool) -> None:
+        self.shelf, self.own, self.sealed = shelf, own, sealed
         self.hashes = {name: sha256_of(content) for name, content in shelf.items()}
         self.faults: list[str] = []
         self.missing: list[str] = []
@@ -133,6 +137,9 @@ class _Search:
         if self.unreadable and not self.found:
             raise InputError("; ".join(self.unreadable))
         self.missing += self.unreadable
+        if not self.sealed:
+            self.missing += self.faults
+            self.faults = []
         return Chain(
             artefacts=self.found, curves=curves, faults=tuple(self.faults), missing=tuple(self.missing)
         )
@@ -177,7 +184,7 @@ class _Search:
     def _firmware(self) -> None:
         evidence = self.found.get("verification")
         stated = _origin(evidence) if evidence else None
-        name = self._by_hash(stated) if stated else self._first(FIRMWARE_SCHEMA)
+        name = self._firmware_by_hash(stated) if stated else self._first(FIRMWARE_SCHEMA)
         if name:
             self._take("firmware", name)
             if "firmware" in self.found:
@@ -187,10 +194,14 @@ class _Search:
         self._say_other(stated, FIRMWARE_SCHEMA, "the evidence is of")
 
     def _firmware_files(self, place: str) -> None:
-        """Say which files of the firmware are not those that were generated."""
-        for leaf, stated in self.found["firmware"].document["files"].items():
+        """Say which files of the firmware are not those that were generated; a board file is its user's to change."""
+        firmware = self.found["firmware"].document
+        for leaf, stated in firmware["files"].items():
             digest = self.hashes.get(place + leaf)
-            if digest is None:
+            if leaf in firmware.get("board", ()):
+                if digest != stated:
+                    self.missing.append(f"{place}{leaf}: yours, and no longer as generated: nothing here is about it")
+            elif digest is None:
                 self.faults.append(f"{place}{leaf} is gone; the firmware's manifest lists it")
             elif digest != stated:
                 self.faults.append(
@@ -262,14 +273,24 @@ class _Search:
     def _by_hash(self, stated: str | None) -> str | None:
         return next((name for name, digest in self.hashes.items() if digest == stated), None)
 
+    def _firmware_by_hash(self, stated: str) -> str | None:
+        """Return the manifest of a hash: of copies that in the folder asked for, then that beside which all fits."""
+
+        def preferred(name: str) -> tuple[bool, int]:
+            place = name.removesuffix(MANIFEST_NAME)
+            files = listing(self.shelf[name])
+            return not name.startswith(self.own), sum(self.hashes.get(place + leaf) != files[leaf] for leaf in files)
+
+        found = [name for name, digest in self.hashes.items() if digest == stated]
+        return min(found, key=preferred, default=None)
+
     def _first(self, schema: str) -> str | None:
         """Return the first file of a schema; a manifest has that of what it lists, and is one of a firmware only."""
-        mark = f'"{schema}"'.encode()
         return next(
             (
                 name
                 for name, content in self.shelf.items()
-                if mark in content[:HEAD]
+                if is_of(content, schema)
                 and (schema == FIRMWARE_SCHEMA or name.rpartition("/")[2] != MANIFEST_NAME)
             ),
             None,
@@ -277,10 +298,13 @@ class _Search:
 
     def _say_other(self, stated: str | None, schema: str, which: str) -> None:
         other = self._first(schema)
-        if stated and other:
-            self.faults.append(
-                f"{other} has the SHA-256 {self.hashes[other]}, but {which} one of {stated}: not used"
-            )
+        if not stated or not other:
+            return
+        said = f"{other} has the SHA-256 {self.hashes[other]}, but {which} one of {stated}: not used"
+        if other.startswith(self.own):
+            self.faults.append(said)
+        else:
+            self.missing.append(f"{said}, as it lies beside these files and is not one of them")
 
     def _miss(self, role: str, stated: str | None = None, hint: str = "") -> None:
         by = f" of SHA-256 {stated}" if stated else f" ({hint})" if hint else ""
@@ -321,8 +345,9 @@ def _checked(role: str, content: bytes, name: str) -> dict[str, Any]:
     schema, shape = SCHEMAS[role]
     document = parse_document(content, name, (schema,))
     check_shape(document, shape, name, "make it again")
-    if role == "firmware" and "constants" in document:
-        check_shape(document, CONSTANTS, name, "make it again with `dzdesign codegen`")
+    for key, later in LATER.get(role, {}).items():
+        if key in document:
+            check_shape(document, later, name, "make it again")
     if role == "compensator":
         compensator = compensator_from_document(content, name)
         if document.get("tool") == TOOL:  # another version may have chosen other tables

@@ -265,9 +265,7 @@ def _checks_section(chain: Chain) -> Section:
     evidence = chain.document("verification")
     if evidence is None:
         return Section(missing="NOT CHECKED: no evidence is here; `dzdesign verify` makes it.")
-    firmware = chain.document("firmware")
-    required = required_of(evidence, firmware["target"] if firmware else None)
-    return Section(tables=(checks_table(evidence, required),))
+    return Section(tables=(checks_table(evidence, required_of(evidence)),))
 
 
 def _warnings_section(chain: Chain) -> Section:
@@ -275,7 +273,9 @@ def _warnings_section(chain: Chain) -> Section:
     warnings = []
     for warning in valve.get("warnings", []) if valve else []:
         source = f"{warning['source']}: " if warning["source"] else ""
-        warnings.append(f"[{warning['code']}] {source}{warning['text']}")
+        accepted = warning["code"] in _accepted(compensator)
+        end = "; ACCEPTED: the design was made in spite of it (--accept)" if accepted else ""
+        warnings.append(f"[{warning['code']}] {source}{warning['text']}{end}")
     signals = []
     if compensator:
         one = compensator_from_document(to_json(compensator).encode(), "compensator.json")
@@ -288,6 +288,12 @@ def _warnings_section(chain: Chain) -> Section:
             ("What this report does not prove", NOT_PROVED),
         )
     )
+
+
+def _accepted(compensator: dict[str, Any] | None) -> list[str]:
+    """Return the codes of the warnings in spite of which the compensator was designed."""
+    options = (compensator or {}).get("options") or {}
+    return options.get("accept", "").replace(",", " ").split()
 
 
 def _provenance_section(chain: Chain) -> Section:

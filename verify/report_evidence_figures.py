@@ -1,6 +1,7 @@
 """Figures of the evidence: inputs, zero command, closed loop, dead zone before and after."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,7 @@ from dzdesign.verify.report_table import whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.collections import QuadMesh
 
 #: Where the enlarged panel of the closed loop ends, per cent of full command.
 NEAR_ZERO = 15.0
@@ -53,66 +55,95 @@ def map_figure(
     zero : mapping of str to array, or None
         Of zero_command_<side>.csv: where the valve is over-compensated.
     """
-    from matplotlib.colors import ListedColormap
-
-    signals = compensator["signals"]
-    command, sensor = signals["command"], signals["pressure_a"]
-    full = command["full_code" if side == "positive" else "negative_full_code"]
-    code_MPa = float(Fraction(*sensor["span_MPa"])) / (sensor["full_code"] - sensor["zero_code"])
-    codes, dp_codes = np.unique(curves["command_code"]), np.unique(curves["dp_code"])
-    shape = (dp_codes.size, codes.size)
-    order = np.lexsort((curves["command_code"], curves["dp_code"]))
-    volt = float(Fraction(*compensator["u_max_V"])) / signals["compare_max"]
-    output, error, status = (
-        curves[name][order].reshape(shape) for name in ("compare", "error", "status")
-    )
-    u, dp = 100 * (codes - command["zero_code"]) / (full - command["zero_code"]), dp_codes * code_MPa
+    grid = _grid_of(curves, compensator, side)
     low, high = (float(Fraction(*end)) for end in compensator["sides"][side]["certificate"]["dp_MPa"])
-    room = max(0.14 * (high - low), 0.01 * float(np.ptp(dp)))  # of one tested pressure drop, too, a strip is shown
+    room = max(0.14 * (high - low), 0.01 * float(np.ptp(grid.dp)))  # of one tested pressure drop, too, a strip is shown
     figure = new_figure(4.3, right=0.1, top=0.3)
     left, tested = figure.subplots(1, 2, width_ratios=(1, 2.7), gridspec_kw={"wspace": 0.16})
-    volts = volt * output
-    for axes, limits in ((left, (dp.min(), dp.max())), (tested, (low - room, high + room))):
-        mesh = axes.pcolormesh(u, dp, volts, cmap="cividis", shading="nearest", rasterized=True)
-        fallen = np.ma.masked_equal(np.asarray(status != 0, dtype=float), 0)
-        if fallen.count():
-            axes.pcolormesh(u, dp, fallen, cmap=ListedColormap(["#ffffff"]), alpha=0.35, shading="nearest",
-                            rasterized=True)  # fmt: skip
-            axes.contourf(u, dp, (status != 0).astype(float), levels=[0.5, 1.5], colors="none", hatches=["///"])
-        for end in (low, high):
-            axes.axhline(end, color="#ffffff", lw=1.6, ls="--")
-        wrong = np.argwhere(error != 0)
-        axes.plot(u[wrong[:, 1]], dp[wrong[:, 0]], "x", color="#ff2d2d", ms=4.5, mew=1.6, zorder=5)
-        axes.set(ylim=limits, xlabel="command u_i (% of full)")
-        axes.grid(False)
-    levels = _levels(volts)
-    lines = tested.contour(u, dp, volts, levels=levels, linewidths=0.8,
-                           colors=["#f2f2f2" if level < volts.mean() else "#101418" for level in levels])  # fmt: skip
+    _draw_map(left, grid, (low, high), (grid.dp.min(), grid.dp.max()))
+    mesh = _draw_map(tested, grid, (low, high), (low - room, high + room))
+    levels, mean = _levels(grid.volts), grid.volts.mean()
+    lines = tested.contour(grid.u, grid.dp, grid.volts, levels=levels, linewidths=0.8,
+                           colors=["#f2f2f2" if level < mean else "#101418" for level in levels])  # fmt: skip
     over = _draw_zero_strip(tested, zero)
-    left.set_xlim(u.min(), u.max())
-    tested.set_xlim(max(u.min(), -OTHER_SIGN), u.max())
-    left.set(ylabel="pressure drop dP (MPa)", title="every difference of codes")
-    tested.set_title("the tested interval, dashed, and around it")
+    first, last = grid.u.min(), grid.u.max()
+    left.set(xlim=(first, last), ylabel="pressure drop dP (MPa)", title="every difference of codes")
+    tested.set(xlim=(max(first, -OTHER_SIGN), last), title="the tested interval, dashed, and around it")
     bar = figure.colorbar(mesh, ax=tested, pad=0.02)
     bar.set_label("output u_O of the C (V)")
     bar.outline.set_visible(False)
     bar.add_lines(lines)
+    wrong, fallen = int(grid.wrong.sum()), int(grid.fallen.sum())
     description = (
         f"Map of the output over command and pressure drop. {whole(inputs['inputs'])} pairs checked, "
-        f"{whole(inputs['wrong'])} wrong. On the drawn grid {len(wrong)} of {output.size} points are wrong, "
-        f"{int((status != 0).sum())} fall back to the safe value; {over} codes are over-compensated at zero command."
+        f"{whole(inputs['wrong'])} wrong. On the drawn grid {wrong} of {grid.volts.size} points are wrong, "
+        f"{fallen} fall back to the safe value; {over} codes are over-compensated at zero command."
     )
     return ReportFigure(
         name=f"map-{side}",
         caption=f"What the compiled C puts out for {side} commands, on a coarse grid of the pairs that were checked. "
         "Hatched: a command or a pressure drop that can't be, where the C falls back to the safe value. "
         "Red crosses: points where it is not "
-        f"the exactly rounded law; on this grid {len(wrong)}, of all pairs {whole(inputs['wrong'])}. Strip at zero "
+        f"the exactly rounded law; on this grid {wrong}, of all pairs {whole(inputs['wrong'])}. Strip at zero "
         f"command: green where the drive is below the threshold's bound, red and hatched where not ({over} codes).",
         description=description,
         svg=svg_of(figure, f"map-{side}", description),
         csv=text,
     )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Grid:
+    """What the core gives on a grid: command in per cent, pressure drop in MPa, output in V, and where it is wrong or
+    falls back, each (pressures, commands)."""
+
+    u: np.ndarray
+    dp: np.ndarray
+    volts: np.ndarray
+    wrong: np.ndarray
+    fallen: np.ndarray
+
+
+def _grid_of(curves: Curves, compensator: dict[str, Any], side: str) -> _Grid:
+    """Return the rows of input_map_<side>.csv as a grid, codes as what they stand for."""
+    signals = compensator["signals"]
+    command, sensor = signals["command"], signals["pressure_a"]
+    full = command["full_code" if side == "positive" else "negative_full_code"]
+    code_MPa = float(Fraction(*sensor["span_MPa"])) / (sensor["full_code"] - sensor["zero_code"])
+    volt = float(Fraction(*compensator["u_max_V"])) / signals["compare_max"]
+    codes, dp_codes = np.unique(curves["command_code"]), np.unique(curves["dp_code"])
+    order = np.lexsort((curves["command_code"], curves["dp_code"]))
+    output, error, status = (
+        curves[name][order].reshape(dp_codes.size, codes.size) for name in ("compare", "error", "status")
+    )
+    return _Grid(
+        u=100 * (codes - command["zero_code"]) / (full - command["zero_code"]),
+        dp=dp_codes * code_MPa,
+        volts=volt * output,
+        wrong=error != 0,
+        fallen=status != 0,
+    )
+
+
+def _draw_map(
+    axes: "Axes", grid: _Grid, certified_MPa: tuple[float, float], limits_MPa: tuple[float, float]
+) -> "QuadMesh":
+    """Draw the output as colours, the fallback hatched, what is wrong as crosses, the certified interval dashed."""
+    from matplotlib.colors import ListedColormap
+
+    mesh = axes.pcolormesh(grid.u, grid.dp, grid.volts, cmap="cividis", shading="nearest", rasterized=True)
+    fallen = np.ma.masked_equal(grid.fallen.astype(float), 0)
+    if fallen.count():
+        axes.pcolormesh(grid.u, grid.dp, fallen, cmap=ListedColormap(["#ffffff"]), alpha=0.35, shading="nearest",
+                        rasterized=True)  # fmt: skip
+        axes.contourf(grid.u, grid.dp, grid.fallen.astype(float), levels=[0.5, 1.5], colors="none", hatches=["///"])
+    for end in certified_MPa:
+        axes.axhline(end, color="#ffffff", lw=1.6, ls="--")
+    rows, columns = np.nonzero(grid.wrong)
+    axes.plot(grid.u[columns], grid.dp[rows], "x", color="#ff2d2d", ms=4.5, mew=1.6, zorder=5)
+    axes.set(ylim=limits_MPa, xlabel="command u_i (% of full)")
+    axes.grid(False)
+    return mesh
 
 
 def _levels(volts: np.ndarray) -> np.ndarray:

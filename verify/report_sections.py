@@ -168,10 +168,9 @@ def checks_table(evidence: dict[str, Any], required: tuple[Required, ...]) -> Ta
         (verdict(check["holds"]), Cell(text=check["name"]), Cell(text=check["text"])) for check in evidence["checks"]
     ]
     untried = [each for each in required if not each.done]
-    rows += [
-        (Cell(text="– not tried", kind="open"), Cell(text=each.name), Cell(text=f"tried by dzdesign {each.how}"))
-        for each in untried
-    ]
+    for each in untried:
+        how = f"to try it: {each.how}".replace("`", "")
+        rows.append((Cell(text="– not tried", kind="open"), Cell(text=each.name), Cell(text=how)))
     return Table(
         caption=f"{len(evidence['checks'])} requirements tried, {len(untried)} not",
         columns=("verdict", "requirement", "figures"),

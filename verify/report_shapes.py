@@ -69,7 +69,7 @@ VERIFICATION = {
         NoneType,
     ),
 }
-#: manifest.json of a firmware folder; `constants` came later.
+#: manifest.json of a firmware folder.
 FIRMWARE = {
     "tool": {"name": str, "version": str},
     "made_from": MADE_FROM,
@@ -92,6 +92,11 @@ CONSTANTS = {
             "generator": str,
         }
     ]
+}
+#: Keys that came later, by the kind of artefact.
+LATER = {
+    "firmware": {"constants": CONSTANTS, "board": {"board": [str]}},
+    "verification": {"target": {"target": str}, "yours": {"yours": [str]}},
 }
 NUMBER_OR_NONE = (float, NoneType)
 #: assessment.json.

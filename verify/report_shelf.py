@@ -44,7 +44,7 @@ def shelf_of(folder: Path) -> dict[str, bytes]:
     evidence = (folder / VERIFICATION_NAME).is_file()
     others = _evidence_of_others(folder, within)
     shelf: dict[str, bytes] = {}
-    for place in (root, *within[:MOST]):  # in one order whichever of them was named: same bytes
+    for place in dict.fromkeys((root, *within[:MOST], folder)):  # in one order whichever was named: same bytes
         if place == folder:
             shelf |= named
         elif place not in others and not (evidence and (place / VERIFICATION_NAME).is_file()):  # only the one named
@@ -56,6 +56,17 @@ def shelf_of(folder: Path) -> dict[str, bytes]:
             "valve.json; give the folder that `dzdesign demo`, `verify` or `codegen` wrote"
         )
     return shelf
+
+
+def places_of(folder: Path) -> tuple[str, ...]:
+    """Return how the names of a folder's own files begin on its shelf; what else lies there was only looked around for.
+
+    Parameters
+    ----------
+    folder : Path
+        As `shelf_of` takes it.
+    """
+    return (f"{folder.resolve().name}/",) if _is_one_stage(folder) else ("",)
 
 
 def _evidence_of_others(folder: Path, within: list[Path]) -> set[Path]:
@@ -107,6 +118,19 @@ def _files_in(place: Path, root: Path) -> dict[str, bytes]:
         if inside and path.is_file() and path.stat().st_size <= LARGEST:
             files[path.relative_to(root).as_posix()] = path.read_bytes()
     return files
+
+
+def is_of(content: bytes, schema: str) -> bool:
+    """Tell whether a file's first bytes name a schema.
+
+    Parameters
+    ----------
+    content : bytes
+        Of the file.
+    schema : str
+        Such as ``dzdesign.valve/1``.
+    """
+    return f'"{schema}"'.encode() in content[:HEAD]
 
 
 def listing(manifest: bytes | None) -> dict[str, str]:

@@ -31,7 +31,7 @@ class Headline:
     untried : tuple of str
         What nobody asked for, and the command that tries it: no requirement, but a reader should see it.
     cautions : tuple of str
-        What the verdict is not about, whatever it is.
+        What the verdict is not about, whatever it is, and what somebody accepted.
     """
 
     kind: str
@@ -59,12 +59,17 @@ def headline(chain: Chain) -> Headline:
     ----------
     chain : Chain
     """
-    return replace(_verdict(chain), cautions=tuple(_cautions(chain)))
+    evidence = chain.document("verification")
+    untried = untried_of(evidence) if evidence and not chain.faults else ()
+    return replace(_verdict(chain), cautions=tuple(_cautions(chain)), untried=untried)
 
 
 def _cautions(chain: Chain) -> Iterator[str]:
     """Say what a verdict does not speak of: a machine's own valve, and a side without a law."""
     valve, compensator = chain.document("valve"), chain.document("compensator")
+    for cost in dict.fromkeys(compensator["costs"] if compensator else ()):
+        if cost.startswith("accepted, "):
+            yield f"ACCEPTED warning, {cost.removeprefix('accepted, ')}."
     if valve and any(warning["code"] == "simulated" for warning in valve["warnings"]):
         yield "SIMULATED recordings: this is an example, not of a measured valve."
     if valve and compensator:
@@ -108,10 +113,8 @@ def _verdict(chain: Chain) -> Headline:
     if unknown or not checks or not evidence["holds"]:
         text = f"NOT CHECKED in full: {len(unknown)} of {len(checks)} requirements are open"
         return Headline(kind="open", sign="?", text=text, reasons=reasons)
-    firmware = chain.document("firmware")
-    untried = untried_of(evidence, firmware["target"] if firmware else None)
     text = f"Every requirement holds, all {len(checks)} that were tried"
-    return Headline(kind="good", sign="✓", text=text, untried=untried)
+    return Headline(kind="good", sign="✓", text=text)
 
 
 def _limits(chain: Chain) -> list[dict[str, Any]]:

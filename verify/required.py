@@ -6,15 +6,23 @@ The names are those of the checks; a check of a name that is not here stands in 
 from dataclasses import dataclass
 from typing import Any
 
-VERIFY = "verify"
-LAW = "the law follows from the valve and the options"
-#: Of a compensator.json that does not say with what it was designed, no run of verify can tell.
-AGAIN = "design, codegen and verify again with this version"
+VALVE = "the valve is that of valve.json"
+#: The generator itself is asked by the command, not by this room.
+REGENERATED = "the files are those that codegen makes of compensator.json"
+#: Of a board file that its user filled in: nothing that was generated is there to compare it with.
+REVIEW = "review it, and try it on the machine"
+#: How to have tried what `verify` could not try. Of a valve.json that is not written as `identify` writes it, the hash
+#: is known from the file alone.
+HOW = {
+    VALVE: "`verify` with the valve.json that compensator.json names beside the firmware",
+    REGENERATED: "`verify` with the version of dzdesign that generated it, or `codegen` with this one",
+}
 #: What every `verify` tries.
 ALWAYS = (
     "files as generated",
     "the manifest says what is in the firmware",
     "compiles without a warning",
+    "every compiler sees the same core",
     "equals the exactly rounded law",
     "within range, monotone",
     "no over-compensation on the tested interval",
@@ -27,7 +35,9 @@ ALWAYS = (
     "no flow at zero command in the closed loop",
     "no flow at zero command after any scenario",
     "the certificate follows from the valve",
-    LAW,
+    "the law follows from the valve and the options",
+    VALVE,
+    REGENERATED,
 )
 #: What is tried if it is asked for: how its checks' names begin, what it is, the option.
 ASKED_FOR = (
@@ -50,7 +60,7 @@ class Required:
     holds : bool or None
         As found; None where it was not tried or could not be checked.
     how : str
-        The command and the option that try it, or what to do first.
+        What to do to have it tried; a command stands in backticks.
     """
 
     name: str
@@ -59,41 +69,38 @@ class Required:
     how: str
 
 
-def required_of(evidence: dict[str, Any], target: str | None = None) -> tuple[Required, ...]:
+def required_of(evidence: dict[str, Any]) -> tuple[Required, ...]:
     """Return everything that can be tried, with what the evidence says of it.
 
     Parameters
     ----------
     evidence : dict
         verification.json.
-    target : str, optional
-        Of the firmware, where it is known.
     """
     checks = evidence["checks"]
-    found = [_tried(checks, name, name, AGAIN if name == LAW else VERIFY) for name in ALWAYS]
+    found = [_part(f"{name}, which is yours and was changed", False, REVIEW) for name in evidence.get("yours", ())]
+    found += [_tried(checks, name, name, HOW.get(name, "`verify`")) for name in ALWAYS]
     own = bool(evidence["closed_loop"].get("plant"))
-    found.append(_part("closed loop with a plant of the machine's own", own, f"{VERIFY} --plant"))
-    found.append(_part("load steps and frozen sensors in the closed loop", own, f"{VERIFY} --plant"))
+    found.append(_part("closed loop with a plant of the machine's own", own, "`verify --plant`"))
+    found.append(_part("load steps and frozen sensors in the closed loop", own, "`verify --plant`"))
     series = bool(evidence["monte_carlo"])
-    found.append(_part("a series of plants, with tolerances", series, f"{VERIFY} --tolerances"))
-    found += [_tried(checks, begins, name, f"{VERIFY} {option}") for begins, name, option in ASKED_FOR]
-    if target in (None, "f28335"):
+    found.append(_part("a series of plants, with tolerances", series, "`verify --tolerances`"))
+    found += [_tried(checks, begins, name, f"`verify {option}`") for begins, name, option in ASKED_FOR]
+    if evidence.get("target") in (None, "f28335"):
         name = "compiles against C2000Ware"
-        found.append(_tried(checks, name, f"{name}, TI's headers", f"{VERIFY} --c2000ware"))
+        found.append(_tried(checks, name, f"{name}, TI's headers", "`verify --c2000ware`"))
     return tuple(found)
 
 
-def untried_of(evidence: dict[str, Any], target: str | None = None) -> tuple[str, ...]:
+def untried_of(evidence: dict[str, Any]) -> tuple[str, ...]:
     """Return what was not tried, each with the command that would.
 
     Parameters
     ----------
     evidence : dict
         verification.json.
-    target : str, optional
-        Of the firmware, where it is known.
     """
-    return tuple(f"{each.name}: `{each.how}`" for each in required_of(evidence, target) if not each.done)
+    return tuple(f"{each.name}: {each.how}" for each in required_of(evidence) if not each.done)
 
 
 def _tried(checks: list[dict[str, Any]], begins: str, name: str, how: str) -> Required:

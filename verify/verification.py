@@ -13,6 +13,7 @@ from dzdesign.core.shown import ShownInNotebooks
 from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.identify.valve_file import valve_from_document
 from dzdesign.verify.all_inputs import InputCheck, check_all_inputs
+from dzdesign.verify.board_files import board_compiles, board_files
 from dzdesign.verify.checks import (
     Check,
     certificate_follows,
@@ -34,9 +35,11 @@ from dzdesign.verify.host_compiler import host_compiler
 from dzdesign.verify.input_map import InputMap, map_inputs
 from dzdesign.verify.loop_plot import plot_loops
 from dzdesign.verify.manifest_check import manifest_follows
+from dzdesign.verify.one_core import seen_by_all
 from dzdesign.verify.plant import Plant, plant_document, plants_from_tests
 from dzdesign.verify.scenarios import ScenarioResult, Scene, run_scenarios
 from dzdesign.verify.tolerances import Scatter, Tolerances, scatter, scatter_document
+from dzdesign.verify.valve_check import valve_follows
 
 SCHEMA = "dzdesign.evidence/1"
 #: Shows how far a stage is: pieces and their number in, the pieces out.
@@ -82,6 +85,15 @@ class Verification(ShownInNotebooks):
     def holds(self) -> bool:
         """True if every requirement holds."""
         return all(check.holds for check in self.checks)
+
+    @property
+    def verdict(self) -> str:
+        """In words, as the report's: what does not hold goes before what could not be checked."""
+        missed = [check.name for check in self.checks if check.holds is False]
+        unknown = [check.name for check in self.checks if check.holds is None]
+        if missed:
+            return f"DOES NOT HOLD: {', '.join(missed)}" + (f"; NOT CHECKED: {', '.join(unknown)}" if unknown else "")
+        return f"NOT CHECKED: {', '.join(unknown)}" if unknown else "Every requirement holds."
 
 
 def verify(
@@ -131,7 +143,7 @@ def verify(
     say("compiling the core with every warning an error")
     checks = [files_unchanged(folder, manifest), manifest_follows(folder, manifest)]
     compiles = compiles_strictly(folder, manifest)
-    checks.append(compiles)
+    checks += [compiles, seen_by_all(folder, manifest)]
     inputs: tuple[InputCheck, ...] = ()
     maps: tuple[InputMap, ...] = ()
     loop = _InTheLoop()
@@ -149,7 +161,8 @@ def verify(
         maps = tuple(map_inputs(folder, document, sign) for sign in signs)
         checks += [drive_follows(folder, compensator), keeps_no_state(folder)]
         loop = _close_the_loop(building.result(), document, plant, sequence or RampSequence(), tolerances, say, watch)
-    checks += [*loop.checks, certificate_follows(compensator), *law_follows(compensator, document)]
+    checks += [*loop.checks, certificate_follows(compensator), law_follows(compensator, document)]
+    checks += [*valve_follows(folder, document), *board_compiles(folder, manifest)]
     source = plant_source or "made from the identified thresholds"
     return Verification(
         checks=tuple(checks),
@@ -163,6 +176,8 @@ def verify(
             "schema": SCHEMA,
             "tool": TOOL,
             "made_from": [{"source": f"{folder.name}/{MANIFEST_NAME}", "sha256": sha256_of(manifest_bytes)}],
+            "target": manifest.get("target", ""),
+            "yours": [each.name for each in board_files(folder, manifest) if each.changed],
             "holds": all(check.holds for check in checks),
             "checks": [asdict(check) for check in checks],
             "inputs": [asdict(each) for each in inputs],

@@ -38,6 +38,7 @@ def rescaled_gain(gain: Fraction) -> str:
     return f"{int(gain * ADC_SPAN_V / OTHER_SPAN_V * 10**5) / 10**5:.5f}"
 
 
+BOARD_FILES = ("main.c", "dz_board.c", "dz_tick.h", "startup.c", "mps2_an386.ld")  # the user's to fill in
 OWN_FILES = ("main.c", "dz_tick.c", "dz_tick.h", "dz_board.c", "dz_board.h", "startup.c", "selftest.c")
 OTHER_FILES = ("dz_selftest.c", "dz_selftest.h", "mps2_an386.ld", "Makefile", "README.md")
 
@@ -49,6 +50,7 @@ TARGET = Target(
     adc_full_V=ADC_SPAN_V,
     takes_any_signals=True,
     templates={f"{FOLDER}/{file}": f"{file}.jinja" for file in OWN_FILES + OTHER_FILES},
+    board=frozenset(f"{FOLDER}/{file}" for file in BOARD_FILES),
     context={
         "clock_hz": str(CLOCK_HZ),
         "clock_mhz": str(CLOCK_HZ // 10**6),

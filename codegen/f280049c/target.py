@@ -154,5 +154,6 @@ TARGET = Target(
     sample_Hz=SAMPLE_HZ,
     tick_Hz=PWM_HZ,
     templates={f"{FOLDER}/{file}": f"{file}.jinja" for file in FILES},
+    board=frozenset({f"{FOLDER}/dzdesign.projectspec"}),  # where the user's C2000Ware lies
     context=CONTEXT,
 )
