@@ -10,6 +10,7 @@ from dzdesign.batch.lot_files import Lot, lot_of
 from dzdesign.batch.lot_sections import HEADINGS, sections_of, spreads_of
 from dzdesign.batch.lot_tables import named
 from dzdesign.batch.spread import FAR, Spread
+from dzdesign.batch.summary import lacking_lines
 from dzdesign.verify.report import Report
 from dzdesign.verify.report_page import render_page
 from dzdesign.verify.report_summary import Figure, Headline
@@ -79,6 +80,7 @@ def lot_headline(lot: Lot) -> Headline:
     simulated = [row["name"] for row in lot.calibrated if "simulated" in row["warnings"].split()]
     if simulated:
         odd.insert(0, f"SIMULATED recordings, not of measured valves: {named(simulated, IN_VERDICT)}")
+    odd += lacking_lines(lot.common() or {})
     odd += [f"odd: {more} more, under “What the recordings leave open”"] if more > 0 else []
     return replace(_verdict(lot), cautions=tuple(odd))
 

@@ -17,6 +17,7 @@ from dzdesign.batch.lot_tables import (
 )
 from dzdesign.batch.reasons import reason_groups
 from dzdesign.batch.spread import FAR, FEWEST, QUANTITIES, Spread, spread_of
+from dzdesign.batch.summary import checked_lines, lacking_lines, span
 from dzdesign.verify.report_page import Section
 from dzdesign.verify.report_table import whole
 
@@ -37,7 +38,7 @@ NOT_PROVED = (
     "A valve counts as calibrated if it was identified, its compensator designed and its C made. That the C does what "
     "the law says is known of those that were verified.",
     "The common setting is certified for each valve of this batch with the confidence of that valve's own bounds, not "
-    "for all of them at once. Of a valve that is not in the batch it says nothing.",
+    "for all of them at once. Of a valve that is not in the batch it says nothing; `dzdesign verify` checks its C.",
     "Spread is of the valves and of the bench: a meter or an oil temperature that drifts while a lot is measured looks "
     "like valves that differ. Measure one valve again at the end of the lot to tell.",
     "Far from the rest is a place to look, no verdict: such a valve is calibrated as certainly as any other.",
@@ -206,11 +207,12 @@ def _common_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
         why = lot.document["common_setting"].get("why_not", "not known")
         return Section(missing=f"There is no common setting: {why}.", optional=True)
     costs = _of(spreads, "common_extra_dead_zone_percent")
-    low, high = (f"{end:.3g}" for end in (common["dp_MPa"][0], common["dp_MPa"][-1]))
     lines = [
         "The largest offset that over-compensates none of the valves, certified for each of them "
-        + (f"from {low} to {high} MPa" if low != high else f"at {low} MPa only")
-        + f", is in {common['file']}; its trend is that of {common['carrier']}.",
+        f"{span(*common['dp_MPa'])}, is in {common['file']}; its trend is that of {common['carrier']}.",
+        *(f"{line[0].upper()}{line[1:]}. `dzdesign verify`, of the firmware that `dzdesign codegen` makes of the file, "
+          "compares the C itself with the bounds of each." for line in checked_lines(common)),
+        *(f"{line}." for line in lacking_lines(common)),
         *(_cost_line(spread) for spread in costs),
         f"It is held down by {named(common['binding'])}.",
         *_without_lines(common.get("without_binding")),

@@ -4,6 +4,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from dzdesign.batch.table import Calibrated
+from dzdesign.core.errors import and_more
+
+#: Names in a sentence.
+NAMED = 5
 
 
 def oddities_of(found: Mapping[str, Calibrated], folder: Path) -> list[str]:
@@ -39,5 +43,5 @@ def _left_over(found: Mapping[str, Calibrated], folder: Path) -> list[str]:
     others = [name for name in others if not name.startswith(".")]
     if not others:
         return []
-    shown = ", ".join(others[:5]) + (f" and {len(others) - 5} more" if len(others) > 5 else "")
+    shown = and_more(others, NAMED)
     return [f"the folder 'valves' holds {shown}, not of this lot: left by an earlier run; take them away"]
