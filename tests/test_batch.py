@@ -357,3 +357,47 @@ def test_a_firmware_that_does_not_hold_is_no_calibrated_valve(lot, tmp_path, cap
     assert row["status"] == "does not hold" and row["reason"]
     evidence = json.loads((tmp_path / "out/valves/V0000/evidence/verification.json").read_text())
     assert evidence["holds"] is False
+
+
+def test_patterns_that_overlap_are_named_with_what_to_do(lot, tmp_path, capsys):
+    listing = tmp_path / "list.csv"
+    ramps = Path(os.path.relpath(lot[0], tmp_path))
+    listing.write_text(
+        "name,files\n"
+        f"one,{ramps}/V000[13]/*.csv\n"
+        f"other,{ramps}/V0003/*.csv\n"
+        f"twice,{ramps}/V0001/*.csv;{ramps}/V0001/ramp*1.csv\n"
+    )
+    assert main(["batch", str(listing), "-o", str(tmp_path / "out"), "--jobs", "1", *OPTIONS]) == 1
+    said = " ".join(capsys.readouterr().out.split())
+    assert "failed twice: valve 'twice' takes the file 'ramp_dP1.csv' twice, by '*.csv' and by 'ramp*1.csv'" in said
+    assert "odd: one, other take the same file, 'ramp_dP1.csv' and 2 more: in the column files" in said
+    assert "byte for byte" not in said
+
+
+def test_a_valve_that_lacks_a_pressure_is_named_with_the_range_without_it(lot, tmp_path, capsys):
+    listing = tmp_path / "list.csv"
+    ramps = Path(os.path.relpath(lot[0], tmp_path))
+    low, middle, high = (f"ramp_dP{dp:g}.csv" for dp in PRESSURES_MPa)
+    listing.write_text(
+        f"name,files\na,{ramps}/V0001/*.csv\nb,{ramps}/V0003/*.csv\nc,{ramps}/V0004/*.csv\n"
+        f"short,{ramps}/V0005/{low};{ramps}/V0005/{middle}\n"
+        f"coarse,{ramps}/V0007/{low};{ramps}/V0007/{high}\n"
+    )
+    out = tmp_path / "out"
+    assert main(["batch", str(listing), "-o", str(out), "--jobs", "1", *OPTIONS]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    words = (
+        "short was not tested at 5 MPa, as the lot was: so the common setting holds for all from 1 to 2.5 MPa, and "
+        "without it from 1 to 5 MPa; record what is missing, or calibrate it apart",
+        "coarse was not tested at 2.5 MPa, as the lot was: between two tests only the lower",
+        "it lies under the bounds of each of the 5 valves, at every pressure code of its tests; nearest is ",
+    )
+    report = " ".join((out / "report.html").read_text(encoding="utf-8").split())
+    assert all(each in said for each in words) and all(each in report for each in words[:2])
+    common = json.loads((out / "batch.json").read_text(encoding="utf-8"))["common_setting"]
+    assert [(each["name"], each["dp_MPa"], each["narrows"]) for each in common["lacking"]] == [
+        ("coarse", [2.5], False), ("short", [5.0], True),
+    ]  # fmt: skip
+    assert (common["dp_MPa"], common["dp_without_MPa"]) == ([1.0, 2.5], [1.0, 5.0])
+    assert common["checked"]["valves"] == 5 and common["checked"]["smallest_margin_V"] >= 0

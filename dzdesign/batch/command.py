@@ -99,7 +99,7 @@ def _calibrate(
     files = table_files(rows)
     without = without_binding(found, common)
     document = summary_of(rows, common, why_not, files=files, verified=args.verify, without_binding=without)
-    document["oddities"] = oddities_of(found, output)
+    document["oddities"] = oddities_of(found, output, valves)
     if common is not None:
         from dzdesign.design.compensator_file import compensator_document
 

@@ -1,6 +1,7 @@
 """Which valves a batch has: one subfolder of recordings a valve, or a CSV file with one row a valve."""
 
 import csv
+import os
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -47,11 +48,26 @@ class Valve:
         Raises
         ------
         InputError
-            If there are none.
+            If there are none, or one is named twice.
         """
+        return list(self.matched())
+
+    def matched(self) -> dict[Path, str]:
+        """Return its recordings, each with the pattern that names it; see `recordings`."""
         if not self.patterns:
             raise InputError(f"valve '{self.name}' has no recording; expected files such as ramp_1MPa.csv")
-        return expand(list(self.patterns))
+        found: dict[Path, str] = {}
+        places: dict[str, str] = {}
+        for pattern in self.patterns:
+            for path in expand([pattern]):
+                place = os.path.abspath(path)
+                if place in places:
+                    raise InputError(
+                        f"valve '{self.name}' takes the file '{path.name}' twice, by '{Path(places[place]).name}' and "
+                        f"by '{Path(pattern).name}' of its column files; make each of them match other files"
+                    )
+                found[path] = places[place] = pattern
+        return found
 
 
 def valves_of(source: Path, pattern: str | None, options: Collection[str]) -> list[Valve]:
