@@ -13,6 +13,8 @@ FAR = 3.5
 PER_MAD = 1.4826
 #: In a smaller lot the deviation itself is not known well enough to call a valve far.
 FEWEST = 8
+#: In a smaller lot a twentieth is less than a valve: 5 and 95 % say no more than the ends.
+TWENTY = 20
 #: Characters of a valve's name in a figure or a narrow cell; names may have a hundred.
 SHOWN_NAME = 18
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from dzdesign.batch.calibration import OK
-from dzdesign.batch.spread import QUANTITIES, quantiles
+from dzdesign.batch.spread import QUANTITIES, TWENTY, quantiles
 from dzdesign.core.artefacts import sha256_of, to_json
 from dzdesign.core.errors import and_more
 
@@ -183,7 +183,8 @@ def span(low: float, high: float) -> str:
     >>> span(1.0, 5.0), span(2.5, 2.5)
     ('from 1 to 5 MPa', 'at 2.5 MPa only')
     """
-    return f"from {low:.4g} to {high:.4g} MPa" if high > low else f"at {low:.4g} MPa only"
+    ends = f"{low:.3g}", f"{high:.3g}"
+    return f"from {ends[0]} to {ends[1]} MPa" if high > low else f"at {ends[0]} MPa only"
 
 
 def print_batch(document: Mapping[str, Any], folder: str, has_report: bool = True) -> None:
@@ -250,7 +251,7 @@ def _common_lines(document: Mapping[str, Any]) -> list[str]:
         *lacking_lines(common),
     ]
     for name, q in costs:
-        one_in_twenty = f"{q['0.95']:.2f} % at one in twenty, " if document["calibrated"] >= 20 else ""
+        one_in_twenty = f"{q['0.95']:.2f} % at one in twenty, " if document["calibrated"] >= TWENTY else ""
         side = name.removesuffix("common_extra_dead_zone_percent").replace("_", " side: ")
         lines.append(
             f"{side}it leaves more dead zone than each valve's own setting: {q['0.5']:.2f} % of command at the median "
