@@ -19,6 +19,7 @@ from many_valves import PRESSURES_MPa, lot_bench, write_lot
 from synthetic import needs_compiler
 
 from dzdesign.batch.calibration import Outcome, Task
+from dzdesign.batch.command import useful_jobs
 from dzdesign.batch.results import Results
 from dzdesign.batch.runners import run_local
 from dzdesign.batch.table import read_back
@@ -288,6 +289,11 @@ def test_a_list_names_valves_with_options_of_their_own(lot, tmp_path, capsys):
         ("name,files\nCON,a\n", "a valve named 'CON'"),
         ("name,files\nv,a\nV,b\n", "has the valves 'v' and 'V'"),
         ("name,files\n", "names no valve"),
+        ("", "is empty, expected a list of valves"),
+        ("name;files\nv;a\n", "parts its columns by ';', expected a comma"),
+        ("name\tfiles\nv\ta\n", "parts its columns by a tab, expected a comma"),
+        ("name,files\nv,a\nv,b\n", "has two valves named 'v'"),
+        ('name,files\n"v\nw",a\n', "a valve named 'v w'"),
         ("\udcff", "is no CSV in UTF-8"),
     ],
 )
@@ -401,3 +407,26 @@ def test_a_valve_that_lacks_a_pressure_is_named_with_the_range_without_it(lot, t
     ]  # fmt: skip
     assert (common["dp_MPa"], common["dp_without_MPa"]) == ([1.0, 2.5], [1.0, 5.0])
     assert common["checked"]["valves"] == 5 and common["checked"]["smallest_margin_V"] >= 0
+
+
+def test_a_link_to_nothing_is_a_valve_with_a_reason_and_no_place_to_write(lot, tmp_path, capsys):
+    folder = tmp_path / "lot"
+    folder.mkdir()
+    try:
+        (folder / "gone").symlink_to(tmp_path / "nowhere")
+    except OSError:
+        pytest.skip("this system makes no links")
+    (folder / "V0001").symlink_to(lot[0] / "V0001")
+    out = tmp_path / "out"
+    assert main(["batch", str(folder), "-o", str(out), "--jobs", "1", *OPTIONS]) == 1
+    assert {row["name"]: row["status"] for row in rows(out)} == {"V0001": "ok", "gone": "failed"}
+    assert main(["batch", str(folder), "-o", str(folder / "gone"), *OPTIONS]) == 2
+    (tmp_path / "link").symlink_to(tmp_path / "nowhere")
+    assert main(["batch", str(folder), "-o", str(tmp_path / "link"), *OPTIONS]) == 2
+    assert "which is gone; choose another with -o" in capsys.readouterr().err
+
+
+def test_no_more_processes_than_have_something_to_do(monkeypatch):
+    monkeypatch.setattr("os.cpu_count", lambda: 2)
+    assert [useful_jobs(jobs, 60) for jobs in (1, 2, 8, 1000)] == [1, 2, 8, 8]
+    assert [useful_jobs(1000, waiting) for waiting in (0, 1, 3)] == [2, 2, 3]  # one alone would be this very process

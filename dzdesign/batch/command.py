@@ -25,6 +25,8 @@ from dzdesign.identify_options import IDENTIFY_NAMES, identify_options, record_o
 from dzdesign.progress import say, with_bar
 from dzdesign.recordings import rows_to_skip
 
+#: Processes for each processor: more only take memory.
+MOST_A_PROCESSOR = 4
 #: Options of `identify` that a valve may have of its own, beside those of `design` and the target.
 IDENTIFY = (*IDENTIFY_NAMES, "columns", "dp", "skip_rows")
 
@@ -91,7 +93,7 @@ def _calibrate(
     waiting = [valve for valve in with_bar(valves, "reading") if not _is_done(results, _task(valve, args, plant))]
     say(f"{len(valves)} valves, {len(valves) - len(waiting)} of them done before")
     tasks = (_task(valve, args, plant) for valve in waiting)
-    outcomes = run_on_cluster(tasks, args.dask) if args.dask else run_local(tasks, jobs)
+    outcomes = run_on_cluster(tasks, args.dask) if args.dask else run_local(tasks, useful_jobs(jobs, len(waiting)))
     unwritten = _write_all(results, outcomes, len(waiting))
     found = {valve.name: read_back(results, valve.name, unwritten) for valve in with_bar(valves, "making the table")}
     common, why_not = common_of(found)
@@ -135,6 +137,22 @@ def _jobs(text: str | None, dask: str | None) -> int:
     if not re.fullmatch(r"[1-9]\d{0,3}", text, re.ASCII):
         raise InputError(f"--jobs is '{text}', expected a number of processes such as 4")
     return int(text)
+
+
+def useful_jobs(jobs: int, waiting: int) -> int:
+    """Return so many processes as have something to do: a thousand of them would fill a machine and never begin.
+
+    Parameters
+    ----------
+    jobs : int
+        That are asked for.
+    waiting : int
+        Valves to calibrate.
+    """
+    most = MOST_A_PROCESSOR * (os.cpu_count() or 1)
+    if jobs > most and waiting > most:
+        say(f"--jobs {jobs}: {most} processes, as this machine has {os.cpu_count() or 1} processors")
+    return min(jobs, max(min(most, waiting), 2))  # two, so that a valve that kills its process does not end this one
 
 
 def _check_options(args: argparse.Namespace) -> None:
