@@ -1,6 +1,7 @@
 """Many valves: what can be calibrated is, the rest has its reason; taken up where it was killed; one safe setting."""
 
 import csv
+import errno
 import io
 import json
 import os
@@ -25,6 +26,7 @@ from dzdesign.batch.runners import run_local
 from dzdesign.batch.table import read_back
 from dzdesign.cli import main
 from dzdesign.core.artefacts import sha256_of
+from dzdesign.core.errors import InputError
 from dzdesign.design.beta_table import DECIMALS
 from dzdesign.design.common import common_setting
 from dzdesign.design.compensator_file import compensator_from_document
@@ -424,6 +426,27 @@ def test_a_link_to_nothing_is_a_valve_with_a_reason_and_no_place_to_write(lot, t
     (tmp_path / "link").symlink_to(tmp_path / "nowhere")
     assert main(["batch", str(folder), "-o", str(tmp_path / "link"), *OPTIONS]) == 2
     assert "which is gone; choose another with -o" in capsys.readouterr().err
+
+
+def test_a_full_disk_stops_the_batch_with_what_to_do_and_keeps_what_is_done(lot, tmp_path, monkeypatch, capsys):
+    out, written = tmp_path / "out", []
+
+    def full(self, outcome):
+        if len(written) == 2:
+            raise InputError("can't be written") from OSError(errno.ENOSPC, "No space left on device")
+        written.append(outcome.name)
+        whole(self, outcome)
+
+    whole = Results.write
+    monkeypatch.setattr(Results, "write", full)
+    command = ["batch", str(lot[0]), "-o", str(out), "--jobs", "1", *OPTIONS]
+    assert main(command) == 2
+    said = capsys.readouterr().err
+    assert f"no space is left to write into '{out}'; make room and give the same command again" in said
+    assert not (out / "valves.csv").exists() and sorted(each.name for each in (out / "valves").iterdir()) == written
+    monkeypatch.setattr(Results, "write", whole)
+    assert main(command) == 1
+    assert f"{COUNT} valves, 2 of them done before" in capsys.readouterr().err
 
 
 def test_no_more_processes_than_have_something_to_do(monkeypatch):

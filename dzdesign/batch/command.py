@@ -2,6 +2,7 @@
 
 import argparse
 import contextlib
+import errno
 import os
 import re
 from collections.abc import Iterator
@@ -25,6 +26,8 @@ from dzdesign.identify_options import IDENTIFY_NAMES, identify_options, record_o
 from dzdesign.progress import say, with_bar
 from dzdesign.recordings import rows_to_skip
 
+#: Of a disk, and of what a user may take of it; Windows knows no such limit.
+FULL = (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC))
 #: Processes for each processor: more only take memory.
 MOST_A_PROCESSOR = 4
 #: Options of `identify` that a valve may have of its own, beside those of `design` and the target.
@@ -68,7 +71,7 @@ def calibrate_lot(args: argparse.Namespace) -> tuple[dict[str, Any], Path | None
     valves = valves_of(source, args.pattern, (*IDENTIFY, *DEFAULTS, "target"))
     plant = _plant(args)
     results = Results(output)
-    with _only_batch(output):
+    with _only_batch(output), _room_in(output):
         return _calibrate(args, valves, plant, results, jobs)
 
 
@@ -83,6 +86,24 @@ def _only_batch(output: Path) -> Iterator[None]:
                 f"another batch is writing into '{output}'; wait until it has ended, or choose another folder with -o"
             ) from error
         yield
+
+
+@contextlib.contextmanager
+def _room_in(output: Path) -> Iterator[None]:
+    """Say of a full disk what to do: another place, as every command says, would leave behind what is done."""
+    try:
+        yield
+    except InputError as error:
+        if not _is_full(error):
+            raise
+        raise InputError(
+            f"no space is left to write into '{output}'; make room and give the same command again: it takes up the "
+            "valves that are done"
+        ) from error
+
+
+def _is_full(error: InputError) -> bool:
+    return isinstance(error.__cause__, OSError) and error.__cause__.errno in FULL
 
 
 def _calibrate(
@@ -214,5 +235,7 @@ def _write_all(results: Results, outcomes: Iterator[Outcome], count: int) -> dic
         try:
             results.write(outcome)
         except InputError as error:
+            if _is_full(error):  # no other would find room either, and each would count as failed
+                raise
             unwritten[outcome.name] = str(error)
     return unwritten
