@@ -2,7 +2,7 @@
 
 import os
 import reprlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 #: Names in a folder among which a mistyped one is looked for.
 MOST_NEIGHBOURS = 10_000
@@ -95,6 +95,18 @@ def neighbour(path: str | os.PathLike[str]) -> str:
             return hint.replace("mean '", f"mean '{before}").replace("'?)", f"{below}'?)")
         place, below = folder, os.path.join(os.sep, name) + below
     return ""
+
+
+def and_more(names: Sequence[str], most: int) -> str:
+    """Return names for a sentence, and how many more there are.
+
+    Examples
+    --------
+    >>> and_more(["a", "b", "c"], 2)
+    'a, b and 1 more'
+    """
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
 
 
 def one_line(text: str) -> str:

@@ -2,7 +2,8 @@
 
 Its offset lies, at every pressure code, under the least of the valves' certified ceilings. That is proved as for one
 valve, by `certify`, for every valve that comes within `CLEAR` of the least ceiling anywhere; the others lie above it by
-more than a million times the error of the double precision in which that was found.
+more than a million times the error of the double precision in which that was found. That it lies under the bounds of
+every valve is proved of each of them, by `prove_lot`, here and wherever the file is read.
 
 A compensator's file holds the valve that its certificate follows from. The common one holds a real valve of the batch,
 its *carrier*, and never an invented one with the least thresholds of all: no ramp test ever showed that.
@@ -21,6 +22,7 @@ from dzdesign.design.certifying import certify, guarded_curve, prove_certificate
 from dzdesign.design.compensator import Certificate, Compensator, SideLaw
 from dzdesign.design.costs import costs_of
 from dzdesign.design.designing import over, prove_monotone, travel
+from dzdesign.design.lot import LotMargin, LotValve, prove_lot
 from dzdesign.design.signals import Signals
 from dzdesign.design.units import finest_units
 from dzdesign.identify.model import SideModel, ValveModel
@@ -63,6 +65,8 @@ class CommonSetting:
         Valves that hold the offset down somewhere; for these `proved` has an exact certificate.
     proved : mapping of str to tuple of Certificate
         Name to a certificate per sign of command.
+    margins : tuple of LotMargin
+        Of every valve of the batch: how far the offset stays under its bound.
     """
 
     compensator: Compensator
@@ -70,6 +74,12 @@ class CommonSetting:
     dp_MPa: tuple[float, float]
     binding: tuple[str, ...]
     proved: Mapping[str, tuple[Certificate, ...]]
+    margins: tuple[LotMargin, ...]
+
+    @property
+    def worst(self) -> LotMargin:
+        """The margin of the valve that has the least."""
+        return min(self.margins, key=lambda each: each.margin_V)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,27 +125,43 @@ def common_setting(batch: Mapping[str, Designed]) -> CommonSetting:
         raise InputError("no law of one direction lies under the least guarded offset of all valves")
     _, carrier, laws = best
     compensator = replace(
-        batch[carrier].own, positive=laws[1], negative=laws.get(-1), costs=(), common_valves=len(batch)
+        batch[carrier].own,
+        positive=laws[1],
+        negative=laws.get(-1),
+        costs=(),
+        common_valves=len(batch),
+        lot=_lot(batch, first, sides),
     )
     for side in sides:
         prove_monotone(compensator, side.sign)
     prove_certificates(compensator)
+    margins = prove_lot(compensator)
     proved = {
         name: tuple(_certified(side, name, laws[side.sign], first) for side in sides if name in side.exact)
         for name in batch
         if any(name in side.exact for side in sides)
     }
     line = (
-        f"common setting of {len(batch)} valves: certified for each of them with its own confidence; this file holds "
-        f"the valve {carrier}, for which the lines above are"
+        f"common setting of {len(batch)} valves: under the bounds of each, with that valve's own confidence; this file "
+        f"holds the valve {carrier}, for which the lines above are"
     )
     compensator = replace(compensator, costs=(*costs_of(compensator, batch[carrier].valve), line))
     return CommonSetting(
         compensator=compensator,
         carrier=carrier,
-        dp_MPa=_common_interval(curve for side in sides for curve in side.curves.values()),
+        dp_MPa=_common_interval(side.curves for side in sides),
         binding=tuple(proved),
         proved=proved,
+        margins=margins,
+    )
+
+
+def _lot(batch: Mapping[str, Designed], first: Compensator, sides: Sequence[_Side]) -> tuple[LotValve, ...]:
+    """Return the valves with the bounds of the threshold that their compensators guard."""
+    guards = {side.sign: first.side(side.sign).certificate.guard for side in sides}
+    return tuple(
+        LotValve.of(name, each.own.valve_sha256, {side.sign: side.models[name] for side in sides}, guards)
+        for name, each in batch.items()
     )
 
 
@@ -155,14 +181,15 @@ def _shared_design(batch: Mapping[str, Designed]) -> Compensator:
     return first
 
 
-def _common_interval(curves: Iterable[OffsetCurve]) -> tuple[float, float]:
+def _common_interval(sides: Iterable[Mapping[str, OffsetCurve]]) -> tuple[float, float]:
     """Return the pressure drops that all curves cover, MPa."""
-    ends = [(curve.dp_MPa[0], curve.dp_MPa[-1]) for curve in curves]
-    low, high = max(low for low, _ in ends), min(high for _, high in ends)
+    ends = [(curve.dp_MPa[0], curve.dp_MPa[-1], name) for curves in sides for name, curve in curves.items()]
+    low, _, highest = max(ends, key=lambda one: one[0])
+    _, high, lowest = min(ends, key=lambda one: one[1])
     if low > high:
         raise InputError(
-            f"the valves have no tested pressure drop in common (one begins at {float(low):g} MPa, another ends at "
-            f"{float(high):g} MPa), so no setting is certified for all"
+            f"the valves have no tested pressure drop in common ({highest} begins at {float(low):g} MPa, {lowest} ends "
+            f"at {float(high):g} MPa), so no setting is certified for all"
         )
     return float(low), float(high)
 
@@ -175,7 +202,7 @@ def _side(batch: Mapping[str, Designed], first: Compensator, sign: int) -> _Side
     models = {name: each.valve.sides[label] for name, each in batch.items()}
     guard = first.side(sign).certificate.guard
     curves = {name: guarded_curve(model, guard, first.below_reference) for name, model in models.items()}
-    low, high = _common_interval(curves.values())
+    low, high = _common_interval([curves])
     least, near = _near_the_least(curves, signals, float(u_max), sign)
     exact = {
         name: offset_ceiling(curves[name], signals, u_max, sign=sign, reserve=reserve)

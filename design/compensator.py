@@ -9,6 +9,7 @@ from dzdesign.derivation.edge import evaluate_edge
 from dzdesign.derivation.law import law
 from dzdesign.derivation.scaling import drive, evaluate_line
 from dzdesign.design.amplifier import RAMPED_CODES, Amplifier
+from dzdesign.design.lot import LotValve
 from dzdesign.design.request import DesignRequest
 from dzdesign.design.signals import Signals
 from dzdesign.identify.guard_curve import GUARDS
@@ -124,6 +125,8 @@ class Compensator(ShownInNotebooks):
         Target and options that it was designed with; None where nobody wrote them down.
     common_valves : int
         Of one setting for many valves: how many; 0 of a valve's own.
+    lot : tuple of LotValve
+        These valves and their bounds; empty of a valve's own setting, and in a file from before they were kept.
     """
 
     law_name: str
@@ -142,6 +145,7 @@ class Compensator(ShownInNotebooks):
     valve_sha256: str
     request: DesignRequest | None = None
     common_valves: int = 0
+    lot: tuple[LotValve, ...] = ()
 
     def __post_init__(self) -> None:
         law(self.law_name)
@@ -170,6 +174,10 @@ class Compensator(ShownInNotebooks):
             raise InputError(f"a ramp counts up to {RAMPED_CODES} codes of command from zero on; use a shorter signal")
         if self.common_valves == 1:
             raise InputError("common_valves is 1, expected 0 of a valve's own setting, and two or more of a common one")
+        if self.lot and len(self.lot) != self.common_valves:
+            raise InputError(f"the lot has {len(self.lot)} valves, expected {self.common_valves} as common_valves says")
+        if len({valve.name for valve in self.lot}) < len(self.lot):
+            raise InputError("the lot names a valve twice, expected each valve once")
         for sign in self.signals.signs:
             self._check_side(sign)
 

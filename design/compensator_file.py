@@ -11,6 +11,7 @@ from dzdesign.core.errors import InputError, quoted
 from dzdesign.core.shape import Exactly, Number, check_shape
 from dzdesign.design.amplifier import Amplifier
 from dzdesign.design.compensator import Certificate, Compensator, SideLaw
+from dzdesign.design.lot_file import LOT, check_lot_hash, lot_document, lot_from_document
 from dzdesign.design.request import DesignRequest, TargetInputs
 from dzdesign.design.signal_text import Converter
 from dzdesign.design.signals import CommandSignal, PressureSignal, Signals
@@ -99,7 +100,7 @@ ASKED = {
     "valve_sha256": str,
 }
 #: What is checked where it is there.
-LATER = {"tool": {"name": str, "version": str}, **ASKED}
+LATER = {"tool": {"name": str, "version": str}, **ASKED, **LOT}
 SHA256 = re.compile("[0-9a-f]{64}")
 TARGET_NAME = re.compile("[a-z][a-z0-9]*(-[a-z0-9]+)*")
 
@@ -153,6 +154,7 @@ def compensator_document(compensator: Compensator) -> dict[str, Any]:
         "valve_sha256": _hash_of(valve),
         "valve": valve,
     }
+    document |= lot_document(c.lot)
     return {key: value for key, value in document.items() if c.request or key not in ASKED}
 
 
@@ -248,6 +250,7 @@ def compensator_from_document(content: bytes, source: str) -> Compensator:
             valve_sha256=document["made_from"][0]["sha256"],
             request=_request(document),
             common_valves=document.get("common_valves", 0),
+            lot=lot_from_document(document),
         )
     except InputError as error:
         raise InputError(f"'{source}': {error}; {REMEDY}") from error
@@ -264,6 +267,7 @@ def _check_asked(document: dict[str, Any], source: str) -> None:
 
 def _check_hashes(document: dict[str, Any], source: str) -> None:
     """Refuse what can't be a hash; that of valve.json counts its spacing, which is not kept, and can't be compared."""
+    check_lot_hash(document, source)
     if not document["made_from"]:
         raise InputError(f"'{source}': 'made_from' is empty, expected the valve's hash; {REMEDY}")
     for index, entry in enumerate(document["made_from"]):

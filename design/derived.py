@@ -5,16 +5,19 @@ from collections.abc import Iterator
 from fractions import Fraction
 from typing import Any
 
-from dzdesign.core.errors import InputError, quoted
+from dzdesign.core.errors import InputError, RequirementError, quoted
 from dzdesign.design.certifying import prove_certificates
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.compensator_file import REMEDY, compensator_document
 from dzdesign.design.designing import design
+from dzdesign.design.lot import LotSide, prove_lot
 from dzdesign.design.option_texts import options_of
 from dzdesign.identify.valve_file import valve_from_document
 
 #: What of a common setting no single valve gives.
 OF_ALL_VALVES = ("k_x_max_over_u_max", "u_min0_over_u_max", "beta", "certificate")
+#: Keys of a common setting that no design of one valve has, or has otherwise.
+OF_THE_LOT = ("costs", "common_valves", "lot", "lot_sha256")
 #: Coarsest unit of the law's coefficients, see `dzdesign.design.units`.
 COARSEST = Fraction(1, 2**12)
 #: Keys whose pair is one rational number.
@@ -54,6 +57,10 @@ def prove_derived(compensator: Compensator) -> None:
         For the first key that does not follow.
     """
     prove_certificates(compensator)
+    try:
+        prove_lot(compensator)
+    except RequirementError as error:
+        raise InputError(f"{error}; make it again with `dzdesign batch`") from error
     if compensator.request is None:
         return
     try:
@@ -66,7 +73,8 @@ def prove_derived(compensator: Compensator) -> None:
     if compensator.common_valves:
         _prove_common(compensator, own)
         for document in (said, follows):
-            del document["costs"], document["common_valves"]
+            for key in OF_THE_LOT:
+                document.pop(key, None)
             for side in filter(None, document["sides"].values()):
                 for key in OF_ALL_VALVES:
                     del side[key]
@@ -81,8 +89,10 @@ def prove_derived(compensator: Compensator) -> None:
 def _prove_common(compensator: Compensator, own: Compensator) -> None:
     """Bound what follows from all valves by what follows from the one in the file: no larger offset, all of its travel.
 
-    Full command must not ask for more than full drive either.
+    Full command must not ask for more than full drive either. That valve is one of the lot, with the bounds it has.
     """
+    valve = valve_from_document(compensator.valve_document.encode(), "compensator.json: valve")
+    of_carrier = [each for each in compensator.lot if each.valve_sha256 == compensator.valve_sha256]
     for sign in compensator.signals.signs:
         common, single = compensator.side(sign), own.side(sign)
         name = "positive" if sign > 0 else "negative"
@@ -96,6 +106,12 @@ def _prove_common(compensator: Compensator, own: Compensator) -> None:
                     f"'sides.{name}.{place}' is {float(value):.6f}, expected {float(low):.6f} to {float(high):.6f} of "
                     f"a setting for this valve among others; {REMEDY}"
                 )
+        bounds = LotSide.of(valve.sides[name], common.certificate.guard)
+        if compensator.lot and bounds not in [each.positive if sign > 0 else each.negative for each in of_carrier]:
+            raise InputError(
+                f"the lot has no valve with the hash and the {name} bounds of the valve in the file; make it again "
+                "with `dzdesign batch`"
+            )
 
 
 def _differences(said: Any, follows: Any, place: str = "") -> Iterator[tuple[str, Any, Any]]:

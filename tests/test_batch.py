@@ -1,6 +1,7 @@
 """Many valves: what can be calibrated is, the rest has its reason; taken up where it was killed; one safe setting."""
 
 import csv
+import errno
 import io
 import json
 import os
@@ -19,11 +20,13 @@ from many_valves import PRESSURES_MPa, lot_bench, write_lot
 from synthetic import needs_compiler
 
 from dzdesign.batch.calibration import Outcome, Task
+from dzdesign.batch.command import useful_jobs
 from dzdesign.batch.results import Results
 from dzdesign.batch.runners import run_local
 from dzdesign.batch.table import read_back
 from dzdesign.cli import main
 from dzdesign.core.artefacts import sha256_of
+from dzdesign.core.errors import InputError
 from dzdesign.design.beta_table import DECIMALS
 from dzdesign.design.common import common_setting
 from dzdesign.design.compensator_file import compensator_from_document
@@ -288,6 +291,11 @@ def test_a_list_names_valves_with_options_of_their_own(lot, tmp_path, capsys):
         ("name,files\nCON,a\n", "a valve named 'CON'"),
         ("name,files\nv,a\nV,b\n", "has the valves 'v' and 'V'"),
         ("name,files\n", "names no valve"),
+        ("", "is empty, expected a list of valves"),
+        ("name;files\nv;a\n", "parts its columns by ';', expected a comma"),
+        ("name\tfiles\nv\ta\n", "parts its columns by a tab, expected a comma"),
+        ("name,files\nv,a\nv,b\n", "has two valves named 'v'"),
+        ('name,files\n"v\nw",a\n', "a valve named 'v w'"),
         ("\udcff", "is no CSV in UTF-8"),
     ],
 )
@@ -357,3 +365,91 @@ def test_a_firmware_that_does_not_hold_is_no_calibrated_valve(lot, tmp_path, cap
     assert row["status"] == "does not hold" and row["reason"]
     evidence = json.loads((tmp_path / "out/valves/V0000/evidence/verification.json").read_text())
     assert evidence["holds"] is False
+
+
+def test_patterns_that_overlap_are_named_with_what_to_do(lot, tmp_path, capsys):
+    listing = tmp_path / "list.csv"
+    ramps = Path(os.path.relpath(lot[0], tmp_path))
+    listing.write_text(
+        "name,files\n"
+        f"one,{ramps}/V000[13]/*.csv\n"
+        f"other,{ramps}/V0003/*.csv\n"
+        f"twice,{ramps}/V0001/*.csv;{ramps}/V0001/ramp*1.csv\n"
+    )
+    assert main(["batch", str(listing), "-o", str(tmp_path / "out"), "--jobs", "1", *OPTIONS]) == 1
+    said = " ".join(capsys.readouterr().out.split())
+    assert "failed twice: valve 'twice' takes the file 'ramp_dP1.csv' twice, by '*.csv' and by 'ramp*1.csv'" in said
+    assert "odd: one, other take the same file, 'ramp_dP1.csv' and 2 more: in the column files" in said
+    assert "byte for byte" not in said
+
+
+def test_a_valve_that_lacks_a_pressure_is_named_with_the_range_without_it(lot, tmp_path, capsys):
+    listing = tmp_path / "list.csv"
+    ramps = Path(os.path.relpath(lot[0], tmp_path))
+    low, middle, high = (f"ramp_dP{dp:g}.csv" for dp in PRESSURES_MPa)
+    listing.write_text(
+        f"name,files\na,{ramps}/V0001/*.csv\nb,{ramps}/V0003/*.csv\nc,{ramps}/V0004/*.csv\n"
+        f"short,{ramps}/V0005/{low};{ramps}/V0005/{middle}\n"
+        f"coarse,{ramps}/V0007/{low};{ramps}/V0007/{high}\n"
+    )
+    out = tmp_path / "out"
+    assert main(["batch", str(listing), "-o", str(out), "--jobs", "1", *OPTIONS]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    words = (
+        "short was not tested at 5 MPa, as the lot was: so the common setting holds for all from 1 to 2.5 MPa, and "
+        "without it from 1 to 5 MPa; record what is missing, or calibrate it apart",
+        "coarse was not tested at 2.5 MPa, as the lot was: between two tests only the lower",
+        "it lies under the bounds of each of the 5 valves, at every pressure code of its tests; nearest is ",
+    )
+    report = " ".join((out / "report.html").read_text(encoding="utf-8").split())
+    assert all(each in said for each in words) and all(each in report for each in words[:2])
+    common = json.loads((out / "batch.json").read_text(encoding="utf-8"))["common_setting"]
+    assert [(each["name"], each["dp_MPa"], each["narrows"]) for each in common["lacking"]] == [
+        ("coarse", [2.5], False), ("short", [5.0], True),
+    ]  # fmt: skip
+    assert (common["dp_MPa"], common["dp_without_MPa"]) == ([1.0, 2.5], [1.0, 5.0])
+    assert common["checked"]["valves"] == 5 and common["checked"]["smallest_margin_V"] >= 0
+
+
+def test_a_link_to_nothing_is_a_valve_with_a_reason_and_no_place_to_write(lot, tmp_path, capsys):
+    folder = tmp_path / "lot"
+    folder.mkdir()
+    try:
+        (folder / "gone").symlink_to(tmp_path / "nowhere")
+    except OSError:
+        pytest.skip("this system makes no links")
+    (folder / "V0001").symlink_to(lot[0] / "V0001")
+    out = tmp_path / "out"
+    assert main(["batch", str(folder), "-o", str(out), "--jobs", "1", *OPTIONS]) == 1
+    assert {row["name"]: row["status"] for row in rows(out)} == {"V0001": "ok", "gone": "failed"}
+    assert main(["batch", str(folder), "-o", str(folder / "gone"), *OPTIONS]) == 2
+    (tmp_path / "link").symlink_to(tmp_path / "nowhere")
+    assert main(["batch", str(folder), "-o", str(tmp_path / "link"), *OPTIONS]) == 2
+    assert "which is gone; choose another with -o" in capsys.readouterr().err
+
+
+def test_a_full_disk_stops_the_batch_with_what_to_do_and_keeps_what_is_done(lot, tmp_path, monkeypatch, capsys):
+    out, written = tmp_path / "out", []
+
+    def full(self, outcome):
+        if len(written) == 2:
+            raise InputError("can't be written") from OSError(errno.ENOSPC, "No space left on device")
+        written.append(outcome.name)
+        whole(self, outcome)
+
+    whole = Results.write
+    monkeypatch.setattr(Results, "write", full)
+    command = ["batch", str(lot[0]), "-o", str(out), "--jobs", "1", *OPTIONS]
+    assert main(command) == 2
+    said = capsys.readouterr().err
+    assert f"no space is left to write into '{out}'; make room and give the same command again" in said
+    assert not (out / "valves.csv").exists() and sorted(each.name for each in (out / "valves").iterdir()) == written
+    monkeypatch.setattr(Results, "write", whole)
+    assert main(command) == 1
+    assert f"{COUNT} valves, 2 of them done before" in capsys.readouterr().err
+
+
+def test_no_more_processes_than_have_something_to_do(monkeypatch):
+    monkeypatch.setattr("os.cpu_count", lambda: 2)
+    assert [useful_jobs(jobs, 60) for jobs in (1, 2, 8, 1000)] == [1, 2, 8, 8]
+    assert [useful_jobs(1000, waiting) for waiting in (0, 1, 3)] == [2, 2, 3]  # one alone would be this very process

@@ -234,4 +234,4 @@ def test_a_common_setting_is_bounded_by_its_valve(common):
     other = edited(document, ("signals", "command", "full_code"), lambda _: 3000)
     assert "'signals.command.full_code' is" in refusal(other)
     own = edited(document, ("common_valves",), lambda _: 0)
-    assert "follows from its valve" in refusal(own)
+    assert "the lot has 2 valves, expected 0" in refusal(own)

@@ -3,9 +3,11 @@
 import csv
 import io
 import json
+import re
 import shutil
 from urllib.parse import unquote
 
+import numpy as np
 import pytest
 from many_valves import recordings, write_lot
 from page_reader import HOSTILE, Page
@@ -17,7 +19,7 @@ from dzdesign.batch.lot_report import report_of_lot
 from dzdesign.batch.lot_sections import HEADINGS
 from dzdesign.batch.reasons import reason_groups
 from dzdesign.batch.results import Results
-from dzdesign.batch.spread import FAR, spread_of
+from dzdesign.batch.spread import FAR, quantiles, spread_of
 from dzdesign.batch.table import SIDE_COLUMNS
 from dzdesign.cli import main
 from dzdesign.core.artefacts import sha256_of, to_json
@@ -69,7 +71,7 @@ def test_the_batch_writes_the_report_and_it_leads_with_the_verdict(made):
     assert document["warnings"]["simulated"] == [f"V000{at}" for at in (0, 2, 3, 5)]
     for column in ("dead_zone_opening_percent", "dead_zone_closing_percent", "common_extra_dead_zone_percent"):
         at = document["quantiles"][column]
-        assert f"{at['0.5']:.2f} %" in top and f"{at['0.05']:.2f} to {at['0.95']:.2f} %" in top
+        assert f"{at['0.5']:.2f} %" in top and f"all from {at['0']:.2f} to {at['1']:.2f} %" in top
     ids = [attributes["id"] for _, attributes in Page(html).tags if "id" in attributes]
     assert [name for name, _ in HEADINGS] == [name for name in ids if name in dict(HEADINGS)]
     assert len(ids) == len(set(ids))
@@ -173,7 +175,7 @@ def test_what_the_setting_would_cost_without_those_that_hold_it_down(made):
     (at,) = without["quantiles"].values()
     assert at["1"] < with_all["1"] and at["0.5"] < with_all["0.5"]
     html = (made / "report.html").read_text(encoding="utf-8")
-    assert f"would cost {at['0.5']:.2f} % at the median valve" in html
+    assert f"would cost {at['0.5']:.2f} % of command at the median valve" in html
 
 
 def test_one_valve_of_the_lot_has_its_own_report_and_one_without_calibration_its_reason(made, tmp_path, capsys):
@@ -350,7 +352,7 @@ def test_bipolar_valves_through_the_command(tmp_path, capsys):
     html = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "2 of 2 valves calibrated" in head(html) and "Negative side: it leaves" in html
     assert 'id="figure-common"' in html and 'id="figure-left-negative"' in html
-    assert "positive: 5 to 95 %" in head(html) and "negative: 5 to 95 %" in head(html)
+    assert "positive: all from " in head(html) and "negative: all from " in head(html)
 
 
 def test_a_thousand_valves_fit_a_page(on_paper):
@@ -445,3 +447,30 @@ def test_names_reach_no_file_outside_of_the_valves(on_paper, tmp_path):
     folder = on_paper(rows)
     (folder / "valves").mkdir()
     assert any("../../secret" in fault for fault in lot_of(folder).faults)
+
+
+@pytest.mark.parametrize(("count", "strip"), [(2, True), (10, True), (11, False), (60, False)])
+def test_of_few_valves_each_is_a_dot_with_its_name_and_of_many_there_are_bars(count, strip, tmp_path):
+    html = report_of_lot(write_lot_folder(tmp_path / "lot", lot_rows(count))).html
+    figure = re.search('id="figure-thresholds".*?</figure>', html, re.DOTALL)[0]
+    assert (">valves</text>" not in figure) is strip  # the axis that counts them
+    assert (">V0001</text>" in figure) is strip
+    assert ("5 and 95 %" in figure) is (count >= 20)
+    assert ("at one in twenty" in html or "5 to 95 % of the valves" in html) is (count >= 20)
+
+
+def test_valves_without_spread_have_a_figure(tmp_path):
+    row, *_ = lot_rows(1)
+    html = report_of_lot(write_lot_folder(tmp_path / "lot", [{**row, "name": name} for name in ("a", "b", "c")])).html
+    figure = re.search('id="figure-law".*?</figure>', html, re.DOTALL)[0]
+    assert ">all 3</text>" in figure and ">valves</text>" not in figure
+
+
+def test_the_median_of_an_even_lot_is_the_mean_of_the_two_middle_ones():
+    assert quantiles([4.0, 1.0, 2.0, 9.0])["0.5"] == 3.0 and quantiles([4.0, 1.0, 2.0])["0.5"] == 2.0
+    values = list(np.random.default_rng(5).normal(5, 1, 61).round(7))
+    for count in range(1, len(values)):
+        at = quantiles(values[:count])
+        assert (at["0"], at["1"]) == (min(values[:count]), max(values[:count]))  # of valves, that can be named
+        wanted = np.quantile(values[:count], [float(q) for q in at])
+        np.testing.assert_allclose(list(at.values()), wanted, atol=1e-7)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from dzdesign.verify.compiled_core import CompiledCore, Findings
+from dzdesign.verify.lot_check import LotCheck, check_lot
 from dzdesign.verify.prepared_inputs import PreparedInputs
 from dzdesign.verify.reference import ExactLaw
 from dzdesign.verify.zero_command import zero_command_margins
@@ -47,6 +48,8 @@ class InputCheck:
         Pairs of sound pressure codes; each is tried, see `check_all_inputs`.
     first_wrong : str or None
         The first failure, in words.
+    lot : LotCheck or None
+        Of a common setting: every valve of its lot; None of a valve's own.
     """
 
     sign: int
@@ -68,6 +71,7 @@ class InputCheck:
     calls: int
     pressure_pairs: int
     first_wrong: str | None
+    lot: LotCheck | None = None
 
     @property
     def holds(self) -> bool:
@@ -83,6 +87,7 @@ class InputCheck:
                 self.bad_fallbacks,
                 self.bad_status,
                 self.bad_betas,
+                self.lot and self.lot.over_compensated,
             )
         )
 
@@ -149,6 +154,7 @@ def input_check(document: dict[str, Any], prepared: PreparedInputs, core: Compil
         calls=found.calls,
         pressure_pairs=prepared.differences.pairs,
         first_wrong=first_wrong(prepared, found),
+        lot=check_lot(document, exact, prepared.differences, found.at_zero),
     )
 
 

@@ -5,7 +5,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from dzdesign.core.artefacts import TOOL, sha256_of
-from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.errors import InputError, RequirementError, and_more
 from dzdesign.design.certifying import prove_certificates
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.derived import prove_derived
@@ -14,6 +14,7 @@ from dzdesign.verify.all_inputs import InputCheck
 from dzdesign.verify.closed_loop import NO_FLOW_L_MIN, LoopComparison
 from dzdesign.verify.drive_check import SEED, CompiledDrive, PreparedDrive
 from dzdesign.verify.host_compiler import check_strictly, find_compilers
+from dzdesign.verify.lot_check import NAMED
 from dzdesign.verify.plant import Plant
 from dzdesign.verify.scenarios import ScenarioResult
 
@@ -106,10 +107,11 @@ def certificate_follows(compensator: Compensator) -> Check:
     except InputError as error:
         return Check(name=name, holds=False, text=str(error))
     certificate = compensator.positive.certificate
+    common = f"of {compensator.common_valves} valves the one in compensator.json: " if compensator.common_valves else ""
     return Check(
         name=name,
         holds=True,
-        text=f"the {certificate.guard} threshold's {100 * certificate.confidence:.6g}% lower bound, from "
+        text=f"{common}the {certificate.guard} threshold's {100 * certificate.confidence:.6g}% lower bound, from "
         f"{float(certificate.dp_MPa[0]):.2f} to {float(certificate.dp_MPa[1]):.2f} MPa, proved again at every "
         "difference of pressure codes",
     )
@@ -169,6 +171,36 @@ def compiles_strictly(folder: Path, manifest: dict[str, Any]) -> Check:
         holds=True,
         text=f"-std=c99 -Wall -Wextra -Wconversion -Wpedantic -Werror: {names}",
     )
+
+
+def lot_checked(inputs: tuple[InputCheck, ...], document: dict[str, Any]) -> list[Check]:
+    """Tell whether the core of a common setting over-compensates any valve of its lot; nothing of a valve's own.
+
+    Parameters
+    ----------
+    inputs : tuple of InputCheck
+        One a sign of command.
+    document : dict
+        compensator.json.
+    """
+    name, count = "no over-compensation of any valve of the lot", document.get("common_valves", 0)
+    if not count:
+        return []
+    found = [each.lot for each in inputs if each.lot is not None]
+    if not found:
+        text = f"compensator.json is of {count} valves and holds the bounds of one; run `dzdesign batch` again, and "
+        return [Check(name=name, holds=None, text=f"{text}make the firmware from its common_compensator.json")]
+    worst = min(found, key=lambda each: each.smallest_margin_V)
+    least, most = (f"{100 * ends:.6g}" for ends in worst.confidence)
+    text = (
+        f"{min(each.valves for each in found)} of {count} valves, each at every difference of pressure codes that it "
+        f"was tested over, against its own bounds ({least if least == most else f'{least} to {most}'} % for each): "
+    )
+    over = list(dict.fromkeys(name for each in found for name in each.over_compensated))
+    text += f"{len(over)} over-compensated" + (f": {and_more(over, NAMED)}" if over else "")
+    text += f"; smallest margin {1e3 * worst.smallest_margin_V:.3f} mV: {worst.worst}, {worst.worst_dp_MPa:.2f} MPa"
+    all_there = all(each.valves == count for each in found)
+    return [Check(name=name, holds=not over and all_there, text=text)]
 
 
 def input_checks(inputs: InputCheck, both: bool) -> list[Check]:

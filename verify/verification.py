@@ -22,6 +22,7 @@ from dzdesign.verify.checks import (
     files_unchanged,
     input_checks,
     law_follows,
+    lot_checked,
     no_flow_at_zero,
     plant_is_the_valve,
     plant_opens,
@@ -158,6 +159,7 @@ def verify(
     if inputs:
         for each in inputs:
             checks += input_checks(each, len(inputs) > 1)
+        checks += lot_checked(inputs, document)
         maps = tuple(map_inputs(folder, document, sign) for sign in signs)
         checks += [drive_follows(folder, compensator), keeps_no_state(folder)]
         loop = _close_the_loop(building.result(), document, plant, sequence or RampSequence(), tolerances, say, watch)

@@ -68,12 +68,7 @@ def bounds_at(document: dict[str, Any], exact: ExactLaw, found: Differences) -> 
         for test, bound in zip(side["tests"], bounds, strict=True)
     )
     pressures, values = [dp for dp, _ in tests], [bound for _, bound in tests]
-    if side["trend"] == "decreasing":
-        best = list(accumulate(values[::-1], max))[::-1]  # of a test and all above it
-    elif side["trend"] == "increasing":
-        best = list(accumulate(values, max))  # of a test and all below it
-    else:
-        best = [min(values)] * len(values)
+    best = best_bounds(side["trend"], values)
     scale, lowest, highest = pressure_drops(exact, found, [dp.denominator for dp in pressures])
     ends = [int(dp * scale) for dp in pressures]
     known: list[Fraction | None] = []
@@ -85,6 +80,23 @@ def bounds_at(document: dict[str, Any], exact: ExactLaw, found: Differences) -> 
         else:
             known.append(best[bisect_right(ends, max(low, ends[0])) - 1])
     return known
+
+
+def best_bounds(trend: str | None, values: list[Fraction]) -> list[Fraction]:
+    """Return what is known at each test of the threshold's lower bound, by its monotony.
+
+    Parameters
+    ----------
+    trend : str or None
+        Of the threshold over the pressure drop.
+    values : list of Fraction
+        Bounds of the tests, in the order of rising pressure drop.
+    """
+    if trend == "decreasing":
+        return list(accumulate(values[::-1], max))[::-1]  # of a test and all above it
+    if trend == "increasing":
+        return list(accumulate(values, max))  # of a test and all below it
+    return [min(values)] * len(values)
 
 
 def bounds_of(side: dict[str, Any], guard: str) -> list[float]:

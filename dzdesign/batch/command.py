@@ -2,6 +2,7 @@
 
 import argparse
 import contextlib
+import errno
 import os
 import re
 from collections.abc import Iterator
@@ -25,6 +26,10 @@ from dzdesign.identify_options import IDENTIFY_NAMES, identify_options, record_o
 from dzdesign.progress import say, with_bar
 from dzdesign.recordings import rows_to_skip
 
+#: Of a disk, and of what a user may take of it; Windows knows no such limit.
+FULL = (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC))
+#: Processes for each processor: more only take memory.
+MOST_A_PROCESSOR = 4
 #: Options of `identify` that a valve may have of its own, beside those of `design` and the target.
 IDENTIFY = (*IDENTIFY_NAMES, "columns", "dp", "skip_rows")
 
@@ -66,7 +71,7 @@ def calibrate_lot(args: argparse.Namespace) -> tuple[dict[str, Any], Path | None
     valves = valves_of(source, args.pattern, (*IDENTIFY, *DEFAULTS, "target"))
     plant = _plant(args)
     results = Results(output)
-    with _only_batch(output):
+    with _only_batch(output), _room_in(output):
         return _calibrate(args, valves, plant, results, jobs)
 
 
@@ -83,6 +88,24 @@ def _only_batch(output: Path) -> Iterator[None]:
         yield
 
 
+@contextlib.contextmanager
+def _room_in(output: Path) -> Iterator[None]:
+    """Say of a full disk what to do: another place, as every command says, would leave behind what is done."""
+    try:
+        yield
+    except InputError as error:
+        if not _is_full(error):
+            raise
+        raise InputError(
+            f"no space is left to write into '{output}'; make room and give the same command again: it takes up the "
+            "valves that are done"
+        ) from error
+
+
+def _is_full(error: InputError) -> bool:
+    return isinstance(error.__cause__, OSError) and error.__cause__.errno in FULL
+
+
 def _calibrate(
     args: argparse.Namespace, valves: list[Valve], plant: tuple[str, bytes] | None, results: Results, jobs: int
 ) -> tuple[dict[str, Any], Path | None]:
@@ -91,7 +114,7 @@ def _calibrate(
     waiting = [valve for valve in with_bar(valves, "reading") if not _is_done(results, _task(valve, args, plant))]
     say(f"{len(valves)} valves, {len(valves) - len(waiting)} of them done before")
     tasks = (_task(valve, args, plant) for valve in waiting)
-    outcomes = run_on_cluster(tasks, args.dask) if args.dask else run_local(tasks, jobs)
+    outcomes = run_on_cluster(tasks, args.dask) if args.dask else run_local(tasks, useful_jobs(jobs, len(waiting)))
     unwritten = _write_all(results, outcomes, len(waiting))
     found = {valve.name: read_back(results, valve.name, unwritten) for valve in with_bar(valves, "making the table")}
     common, why_not = common_of(found)
@@ -99,7 +122,7 @@ def _calibrate(
     files = table_files(rows)
     without = without_binding(found, common)
     document = summary_of(rows, common, why_not, files=files, verified=args.verify, without_binding=without)
-    document["oddities"] = oddities_of(found, output)
+    document["oddities"] = oddities_of(found, output, valves)
     if common is not None:
         from dzdesign.design.compensator_file import compensator_document
 
@@ -135,6 +158,22 @@ def _jobs(text: str | None, dask: str | None) -> int:
     if not re.fullmatch(r"[1-9]\d{0,3}", text, re.ASCII):
         raise InputError(f"--jobs is '{text}', expected a number of processes such as 4")
     return int(text)
+
+
+def useful_jobs(jobs: int, waiting: int) -> int:
+    """Return so many processes as have something to do: a thousand of them would fill a machine and never begin.
+
+    Parameters
+    ----------
+    jobs : int
+        That are asked for.
+    waiting : int
+        Valves to calibrate.
+    """
+    most = MOST_A_PROCESSOR * (os.cpu_count() or 1)
+    if jobs > most and waiting > most:
+        say(f"--jobs {jobs}: {most} processes, as this machine has {os.cpu_count() or 1} processors")
+    return min(jobs, max(min(most, waiting), 2))  # two, so that a valve that kills its process does not end this one
 
 
 def _check_options(args: argparse.Namespace) -> None:
@@ -196,5 +235,7 @@ def _write_all(results: Results, outcomes: Iterator[Outcome], count: int) -> dic
         try:
             results.write(outcome)
         except InputError as error:
+            if _is_full(error):  # no other would find room either, and each would count as failed
+                raise
             unwritten[outcome.name] = str(error)
     return unwritten

@@ -16,7 +16,7 @@ from dzdesign.batch.results import AGAIN, SCHEMA, SUMMARY, VALVE_SCHEMA, Results
 from dzdesign.batch.table import HASHED, TABLE, Calibrated, read_back, rows_from, rows_of
 from dzdesign.batch.valves import NAME
 from dzdesign.core.artefacts import MANIFEST_NAME, parse_document, read_bytes, sha256_of
-from dzdesign.core.errors import InputError
+from dzdesign.core.errors import InputError, and_more
 from dzdesign.core.input_files import MOST_DOCUMENT
 from dzdesign.core.shape import Exactly, check_shape
 from dzdesign.progress import with_bar
@@ -38,6 +38,12 @@ COMMON = {
     "binding": [str],
     "smallest_margin_V": dict,
     "without_binding": (dict, NoneType),
+}
+#: Of the common setting, as later versions write it.
+COMMON_LATER = {
+    "lacking": [{"name": str, "side": str, "dp_MPa": [float], "narrows": bool}],
+    "dp_without_MPa": (Exactly(2, float), NoneType),
+    "checked": {"valves": int, "worst": str, "dp_MPa": float, "smallest_margin_V": float},
 }
 AT = {"0.5": float, "0.95": float, "1": float}
 #: Largest table of which a report is made: beyond it, some 25 000 valves, no browser would show the page.
@@ -201,6 +207,7 @@ def lot_of(folder: Path) -> Lot:
 
 def _check_common(setting: Mapping[str, Any], source: str) -> None:
     check_shape(setting, COMMON, source, AGAIN)
+    check_shape(setting, {key: shape for key, shape in COMMON_LATER.items() if key in setting}, source, AGAIN)
     without = setting["without_binding"]
     if without is not None:
         shape = {"why_not": str} if "why_not" in without else {"left_out": [str], "quantiles": dict}
@@ -270,9 +277,9 @@ def _look_at_valves(
             elif file == "valve.json" and set(row["warnings"].split()) - set(texts):
                 texts = {**_texts(content, str(path)), **texts}
     if other:
-        more = f" and {len(other) - NAMED} more" if len(other) > NAMED else ""
-        names = ", ".join(other[:NAMED]) + more
-        faults.append(f"files of valves are not those that the table was made from ({len(other)}): {names}")
+        faults.append(
+            f"files of valves are not those that the table was made from ({len(other)}): {and_more(other, NAMED)}"
+        )
     return texts
 
 

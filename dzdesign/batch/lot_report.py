@@ -9,7 +9,8 @@ from dzdesign.batch.calibration import DOES_NOT_HOLD
 from dzdesign.batch.lot_files import Lot, lot_of
 from dzdesign.batch.lot_sections import HEADINGS, sections_of, spreads_of
 from dzdesign.batch.lot_tables import named
-from dzdesign.batch.spread import FAR, Spread
+from dzdesign.batch.spread import FAR, TWENTY, Spread
+from dzdesign.batch.summary import lacking_lines
 from dzdesign.verify.report import Report
 from dzdesign.verify.report_page import render_page
 from dzdesign.verify.report_summary import Figure, Headline
@@ -79,6 +80,7 @@ def lot_headline(lot: Lot) -> Headline:
     simulated = [row["name"] for row in lot.calibrated if "simulated" in row["warnings"].split()]
     if simulated:
         odd.insert(0, f"SIMULATED recordings, not of measured valves: {named(simulated, IN_VERDICT)}")
+    odd += lacking_lines(lot.common() or {})
     odd += [f"odd: {more} more, under “What the recordings leave open”"] if more > 0 else []
     return replace(_verdict(lot), cautions=tuple(odd))
 
@@ -175,7 +177,10 @@ def _spread_figure(label: str, note: str, spreads: Sequence[Spread]) -> Figure:
     medians = " and ".join(f"{spread.at['0.5']:.{digits}f}" for spread in spreads)
     parts = []
     for spread in spreads:
-        low, high, most = (f"{spread.at[q]:.{digits}f}" for q in ("0.05", "0.95", "1"))
+        least, low, high, most = (f"{spread.at[q]:.{digits}f}" for q in ("0", "0.05", "0.95", "1"))
         side = f"{spread.side.rstrip('_')}: " if spread.side else ""
-        parts.append(f"{side}5 to 95 % of the valves {low} to {high} {unit}, at most {most} {unit}")
+        if len(spread.values) < TWENTY:
+            parts.append(f"{side}all from {least} to {most} {unit}")
+        else:
+            parts.append(f"{side}5 to 95 % of the valves {low} to {high} {unit}, at most {most} {unit}")
     return Figure(label=label, value=f"{medians} {unit}", note=f"median, {note}; {'; '.join(parts)}")

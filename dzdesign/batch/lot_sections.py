@@ -16,7 +16,8 @@ from dzdesign.batch.lot_tables import (
     warnings_table,
 )
 from dzdesign.batch.reasons import reason_groups
-from dzdesign.batch.spread import FAR, FEWEST, QUANTITIES, Spread, spread_of
+from dzdesign.batch.spread import FAR, FEWEST, QUANTITIES, TWENTY, Spread, spread_of
+from dzdesign.batch.summary import checked_lines, lacking_lines, span
 from dzdesign.verify.report_page import Section
 from dzdesign.verify.report_table import whole
 
@@ -206,14 +207,17 @@ def _common_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
         why = lot.document["common_setting"].get("why_not", "not known")
         return Section(missing=f"There is no common setting: {why}.", optional=True)
     costs = _of(spreads, "common_extra_dead_zone_percent")
-    low, high = (f"{end:.3g}" for end in (common["dp_MPa"][0], common["dp_MPa"][-1]))
     lines = [
         "The largest offset that over-compensates none of the valves, certified for each of them "
-        + (f"from {low} to {high} MPa" if low != high else f"at {low} MPa only")
-        + f", is in {common['file']}; its trend is that of {common['carrier']}.",
+        f"{span(*common['dp_MPa'])}, is in {common['file']}; its trend is that of {common['carrier']}.",
+        *(
+            f"{line[0].upper()}{line[1:]}. The C made of the file is compared with all bounds by dzdesign verify."
+            for line in checked_lines(common)
+        ),
+        *(f"{line}." for line in lacking_lines(common)),
         *(_cost_line(spread) for spread in costs),
         f"It is held down by {named(common['binding'])}.",
-        *_without_lines(common.get("without_binding")),
+        *_without_lines(common.get("without_binding"), len(lot.calibrated)),
     ]
     figure = spread_figure(
         "common", costs,
@@ -227,14 +231,19 @@ def _common_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
 
 def _cost_line(spread: Spread) -> str:
     side = f"{spread.side.rstrip('_').capitalize()} side: it" if spread.side else "It"
-    middle, high, most = (f"{spread.at[q]:.2f}" for q in ("0.5", "0.95", "1"))
     return (
-        f"{side} leaves more dead zone than each valve's own setting: {middle} % of command at the median valve, "
-        f"{high} % at one in twenty, {most} % at worst ({spread.name_at('1')})."
+        f"{side} leaves more dead zone than each valve's own setting: {_three(spread.at, len(spread.values))} "
+        f"({spread.name_at('1')})."
     )
 
 
-def _without_lines(without: Mapping[str, Any] | None) -> list[str]:
+def _three(at: Mapping[str, float], count: int) -> str:
+    """Say a cost at the median valve, at one in twenty if there are so many, and at worst."""
+    twentieth = f"{at['0.95']:.2f} % at one in twenty, " if count >= TWENTY else ""
+    return f"{at['0.5']:.2f} % of command at the median valve, {twentieth}{at['1']:.2f} % at worst"
+
+
+def _without_lines(without: Mapping[str, Any] | None, count: int) -> list[str]:
     """Say what the setting would cost without the valves that hold it down."""
     if without is None:
         return []
@@ -245,8 +254,7 @@ def _without_lines(without: Mapping[str, Any] | None) -> list[str]:
         side = f" on the {column.partition('_')[0]} side" if column.startswith(("positive", "negative")) else ""
         lines.append(
             f"With settings of their own for {named(without['left_out'], 5)}, the common setting of the others would "
-            f"cost{side} {at['0.5']:.2f} % at the median valve, {at['0.95']:.2f} % at one in twenty and "
-            f"{at['1']:.2f} % at worst."
+            f"cost{side} {_three(at, count - len(without['left_out']))}."
         )
     return lines
 

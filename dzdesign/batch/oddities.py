@@ -1,12 +1,18 @@
 """What is odd in a lot though each of its valves is in order: a recording that two share, valves of another lot."""
 
-from collections.abc import Mapping
+import os
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 from dzdesign.batch.table import Calibrated
+from dzdesign.batch.valves import Valve
+from dzdesign.core.errors import InputError, and_more
+
+#: Names in a sentence.
+NAMED = 5
 
 
-def oddities_of(found: Mapping[str, Calibrated], folder: Path) -> list[str]:
+def oddities_of(found: Mapping[str, Calibrated], folder: Path, valves: Sequence[Valve] = ()) -> list[str]:
     """Return sentences.
 
     Parameters
@@ -15,11 +21,39 @@ def oddities_of(found: Mapping[str, Calibrated], folder: Path) -> list[str]:
         Name of each valve of the lot to what was read back of it.
     folder : Path
         Of the batch.
+    valves : sequence of Valve
+        The lot as it was given, with the patterns of the recordings.
     """
-    return [*_shared_recordings(found), *_left_over(found, folder)]
+    overlapping = _overlapping(valves)
+    return [*overlapping.values(), *_shared_recordings(found, overlapping), *_left_over(found, folder)]
 
 
-def _shared_recordings(found: Mapping[str, Calibrated]) -> list[str]:
+def _overlapping(valves: Sequence[Valve]) -> dict[tuple[str, ...], str]:
+    """Return what to say of valves whose patterns match one file, by their names."""
+    owners: dict[str, dict[str, str]] = {}
+    for valve in valves:
+        try:
+            for path, pattern in valve.matched().items():
+                owners.setdefault(os.path.abspath(path), {})[valve.name] = pattern
+        except InputError:  # such a valve has failed, and says so itself
+            continue
+    shared: dict[tuple[str, ...], list[str]] = {}
+    for place, by in owners.items():
+        if len(by) > 1:
+            shared.setdefault(tuple(by), []).append(place)
+    said = {}
+    for names, places in shared.items():
+        by = owners[places[0]]
+        more = f" and {len(places) - 1} more" if len(places) > 1 else ""
+        what = " and ".join(f"'{by[name]}' of {name}" for name in names[:2])
+        said[names] = (
+            f"{and_more(names, NAMED)} take the same file, '{Path(places[0]).name}'{more}: in the column files {what} "
+            "overlap; let each valve's match its own files alone, unless one valve is meant twice, with other options"
+        )
+    return said
+
+
+def _shared_recordings(found: Mapping[str, Calibrated], known: Collection[tuple[str, ...]]) -> list[str]:
     """A bench that saves a recording under the wrong name gives a valve the firmware of another."""
     owners: dict[str, list[str]] = {}
     for name, each in found.items():
@@ -27,10 +61,10 @@ def _shared_recordings(found: Mapping[str, Calibrated]) -> list[str]:
             owners.setdefault(digest, []).append(name)
     groups = dict.fromkeys(tuple(dict.fromkeys(names)) for names in owners.values())
     return [
-        f"{', '.join(names)} share a recording, byte for byte: was one saved under the name of another valve? Their "
-        "firmware is that valve's"
+        f"{and_more(names, NAMED)} share a recording, byte for byte, in files of their own: was one saved under the "
+        "name of another valve? Their firmware is that valve's; record the ramp test again"
         for names in groups
-        if len(names) > 1
+        if len(names) > 1 and names not in known
     ]
 
 
@@ -39,5 +73,5 @@ def _left_over(found: Mapping[str, Calibrated], folder: Path) -> list[str]:
     others = [name for name in others if not name.startswith(".")]
     if not others:
         return []
-    shown = ", ".join(others[:5]) + (f" and {len(others) - 5} more" if len(others) > 5 else "")
+    shown = and_more(others, NAMED)
     return [f"the folder 'valves' holds {shown}, not of this lot: left by an earlier run; take them away"]

@@ -33,6 +33,8 @@ class Results:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
+        if folder.is_symlink() and not folder.exists():
+            raise InputError(f"'{folder}' is a link to '{folder.readlink()}', which is gone; choose another with -o")
         try:
             if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
                 self._check_is_ours()

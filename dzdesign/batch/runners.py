@@ -60,6 +60,8 @@ def run_local(tasks: Iterable[Task], jobs: int, work: Work = calibrate) -> Itera
 def _in_processes(tasks: Iterable[Task], jobs: int, work: Work) -> Iterator[Outcome]:
     from joblib import Parallel, delayed, parallel_config
 
+    # Of a run that is stopped, by a full disk for one: what to do is said by whoever stops it.
+    warnings.filterwarnings("ignore", r"\d+ tasks (which were still|have been)", UserWarning)
     threads = {} if jobs == 1 else {"backend": "loky", "inner_max_num_threads": 1}
     with parallel_config(n_jobs=jobs, **threads):
         pool = Parallel(return_as="generator_unordered", pre_dispatch=AHEAD * jobs, batch_size=1)

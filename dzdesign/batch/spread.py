@@ -13,6 +13,8 @@ FAR = 3.5
 PER_MAD = 1.4826
 #: In a smaller lot the deviation itself is not known well enough to call a valve far.
 FEWEST = 8
+#: In a smaller lot a twentieth is less than a valve: 5 and 95 % say no more than the ends.
+TWENTY = 20
 #: Characters of a valve's name in a figure or a narrow cell; names may have a hundred.
 SHOWN_NAME = 18
 
@@ -122,15 +124,30 @@ class Spread:
 
 
 def quantiles(values: Sequence[float | None]) -> dict[str, float]:
-    """Return quantiles by the nearest rank: each is the value of a valve that is there.
+    """Return quantiles, straight between the two nearest valves (the seventh method of Hyndman and Fan, 1996).
+
+    The median of an even number is then the mean of the two middle ones, the ends are values of valves.
 
     Parameters
     ----------
     values : sequence of float or None
         None of a valve that has none.
+
+    Examples
+    --------
+    >>> quantiles([1.0, None, 2.0, 5.0, 4.0])["0.5"]
+    3.0
     """
     known = sorted(value for value in values if value is not None)
-    return {f"{q:g}": known[round(q * (len(known) - 1))] for q in QUANTILES} if known else {}
+    return {f"{q:g}": _between(known, q * (len(known) - 1)) for q in QUANTILES} if known else {}
+
+
+def _between(known: Sequence[float], place: float) -> float:
+    """Return the value at a place of a rising sequence, which may lie between two."""
+    index, share = int(place), place - int(place)
+    if share < 1e-9:  # 0.05 times 100 is not 5
+        return known[index]
+    return round(known[index] + share * (known[index + 1] - known[index]), 7)
 
 
 def short(name: str) -> str:

@@ -4,8 +4,9 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from dzdesign.batch.calibration import OK
-from dzdesign.batch.spread import QUANTITIES, quantiles
+from dzdesign.batch.spread import QUANTITIES, TWENTY, quantiles
 from dzdesign.core.artefacts import sha256_of, to_json
+from dzdesign.core.errors import and_more
 
 #: Valves of one warning that are named.
 NAMED = 3
@@ -75,13 +76,115 @@ def _common_document(common: "CommonSetting") -> dict[str, Any]:
         "file": "common_compensator.json",
         "sha256": sha256_of(content),
         "dp_MPa": list(common.dp_MPa),
+        **_lacking_document(common),
         "carrier": common.carrier,
         "binding": list(common.binding),
         "smallest_margin_V": {
             name: [round(float(each.smallest_margin_V), 7) for each in certificates]
             for name, certificates in common.proved.items()
         },
+        "checked": {
+            "valves": len(common.margins),
+            "worst": common.worst.name,
+            "dp_MPa": round(float(common.worst.dp_MPa), 4),
+            "smallest_margin_V": round(float(common.worst.margin_V), 7),
+        },
     }
+
+
+def checked_lines(common: Mapping[str, Any]) -> list[str]:
+    """Say for how many valves it is proved that the common setting lies under their bounds, and which is nearest.
+
+    Parameters
+    ----------
+    common : mapping
+        Of batch.json; of an older version it says nothing of this.
+    """
+    checked = common.get("checked")
+    if not checked:
+        return []
+    margin_mV = 1e3 * checked["smallest_margin_V"]
+    return [
+        f"it lies under the bounds of each of the {checked['valves']} valves, at every pressure code of its tests; "
+        f"nearest is {checked['worst']}, {margin_mV:.3f} mV under at {checked['dp_MPa']:.2f} MPa"
+    ]
+
+
+def _lacking_document(common: "CommonSetting") -> dict[str, Any]:
+    """Return which valves were not tested where the lot was, and what the interval would be without those it hurts."""
+    from dzdesign.design.lot_pressures import common_interval, lacking_in
+
+    lot = common.compensator.lot
+    lacking = lacking_in(lot)
+    names = {each.name for each in lacking}
+    wider = common_interval([valve for valve in lot if valve.name not in names]) or common.dp_MPa
+    narrow = {valve.name for valve in lot if valve.name in names and not _covers(common_interval([valve]), wider)}
+    return {
+        "lacking": [
+            {
+                "name": each.name,
+                "side": "positive" if each.sign > 0 else "negative",
+                "dp_MPa": list(each.dp_MPa),
+                "narrows": each.name in narrow,
+            }
+            for each in lacking
+        ],
+        "dp_without_MPa": list(wider) if narrow else None,
+    }
+
+
+def _covers(own: tuple[float, float] | None, other: tuple[float, float]) -> bool:
+    return own is not None and own[0] <= other[0] and own[1] >= other[1]
+
+
+def lacking_lines(common: Mapping[str, Any]) -> list[str]:
+    """Say which valves were not tested where the lot was, and what that costs the common setting.
+
+    Parameters
+    ----------
+    common : mapping
+        Of batch.json; of an older version it says nothing of this.
+    """
+    lacking = common.get("lacking") or ()
+    narrow, inside = ([each for each in lacking if each["narrows"] is narrows] for narrows in (True, False))
+    lines = []
+    if narrow:
+        them = "it" if len({each["name"] for each in narrow}) == 1 else "them"
+        lines.append(
+            f"{_untested(narrow)}: so the common setting holds for all {span(*common['dp_MPa'])}, and without {them} "
+            f"{span(*(common['dp_without_MPa'] or common['dp_MPa']))}; record what is missing, or calibrate {them} "
+            "apart"
+        )
+    if inside:
+        lines.append(
+            f"{_untested(inside)}: between two tests only the lower of their bounds is known, which may hold the "
+            "common setting down"
+        )
+    return lines
+
+
+def _untested(lacking: Sequence[Mapping[str, Any]]) -> str:
+    """Say which valves lack which pressure drops, those that lack the same together."""
+    at: dict[tuple[float, ...], dict[str, None]] = {}
+    for each in lacking:
+        at.setdefault(tuple(each["dp_MPa"]), {})[each["name"]] = None
+    return "; ".join(
+        f"{and_more(list(names), NAMED)} {'was' if len(names) == 1 else 'were'} not tested at "
+        f"{' and '.join(f'{dp:.4g}' for dp in pressures)} MPa, as the lot was"
+        for pressures, names in at.items()
+    )
+
+
+def span(low: float, high: float) -> str:
+    """Return a range of pressure drops in words.
+
+    Examples
+    --------
+    >>> span(1.0, 5.0), span(2.5, 2.5)
+    ('from 1 to 5 MPa', 'at 2.5 MPa only')
+    """
+    ends = f"{low:.3g}", f"{high:.3g}"
+    return f"from {ends[0]} to {ends[1]} MPa" if high > low else f"at {ends[0]} MPa only"
 
 
 def print_batch(document: Mapping[str, Any], folder: str, has_report: bool = True) -> None:
@@ -138,16 +241,17 @@ def _common_lines(document: Mapping[str, Any]) -> list[str]:
     common = document["common_setting"]
     if "why_not" in common:
         return [f"no common setting: {common['why_not']}"]
-    low, high = common["dp_MPa"]
-    where = f"from {low:.4g} to {high:.4g} MPa" if high > low else f"at {low:.4g} MPa only"
+    where = span(*common["dp_MPa"])
     held = ", ".join(common["binding"][:5]) + (" and others" if len(common["binding"]) > 5 else "")
     costs = [(name, q) for name, q in document["quantiles"].items() if name.endswith("common_extra_dead_zone_percent")]
     lines = [
         f"one common setting, safe for each of these valves {where}, is held down by {held}; "
-        f"it is in {common['file']}"
+        f"it is in {common['file']}",
+        *checked_lines(common),
+        *lacking_lines(common),
     ]
     for name, q in costs:
-        one_in_twenty = f"{q['0.95']:.2f} % at one in twenty, " if document["calibrated"] >= 20 else ""
+        one_in_twenty = f"{q['0.95']:.2f} % at one in twenty, " if document["calibrated"] >= TWENTY else ""
         side = name.removesuffix("common_extra_dead_zone_percent").replace("_", " side: ")
         lines.append(
             f"{side}it leaves more dead zone than each valve's own setting: {q['0.5']:.2f} % of command at the median "

@@ -1,6 +1,8 @@
 """Which valves a batch has: one subfolder of recordings a valve, or a CSV file with one row a valve."""
 
 import csv
+import io
+import os
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -47,11 +49,26 @@ class Valve:
         Raises
         ------
         InputError
-            If there are none.
+            If there are none, or one is named twice.
         """
+        return list(self.matched())
+
+    def matched(self) -> dict[Path, str]:
+        """Return its recordings, each with the pattern that names it; see `recordings`."""
         if not self.patterns:
             raise InputError(f"valve '{self.name}' has no recording; expected files such as ramp_1MPa.csv")
-        return expand(list(self.patterns))
+        found: dict[Path, str] = {}
+        places: dict[str, str] = {}
+        for pattern in self.patterns:
+            for path in expand([pattern]):
+                place = os.path.abspath(path)
+                if place in places:
+                    raise InputError(
+                        f"valve '{self.name}' takes the file '{path.name}' twice, by '{Path(places[place]).name}' and "
+                        f"by '{Path(pattern).name}' of its column files; make each of them match other files"
+                    )
+                found[path] = places[place] = pattern
+        return found
 
 
 def valves_of(source: Path, pattern: str | None, options: Collection[str]) -> list[Valve]:
@@ -89,8 +106,16 @@ def valves_of(source: Path, pattern: str | None, options: Collection[str]) -> li
 
 
 def _of_folder(folder: Path, pattern: str | None) -> list[Valve]:
-    subfolders = [path for path in sorted(folder.iterdir()) if path.is_dir() and not path.name.startswith(".")]
-    return [Valve(name=path.name, patterns=tuple(_recordings_in(path, pattern))) for path in subfolders]
+    try:
+        visible = [path for path in sorted(folder.iterdir()) if not path.name.startswith(".")]
+    except OSError as error:
+        raise InputError(f"'{folder}' can't be read: {error.strerror}; check who may read it") from error
+    # A link to a folder that is gone was a valve: its reason is that the file can't be read.
+    gone = {path: (str(path),) for path in visible if path.is_symlink() and not path.exists()}
+    folders = [path for path in visible if path in gone or path.is_dir()]
+    return [
+        Valve(name=path.name, patterns=gone.get(path) or tuple(_recordings_in(path, pattern))) for path in folders
+    ]
 
 
 def _recordings_in(folder: Path, pattern: str | None) -> list[str]:
@@ -101,11 +126,18 @@ def _recordings_in(folder: Path, pattern: str | None) -> list[str]:
 def _of_table(path: Path, options: Collection[str]) -> list[Valve]:
     """Read the CSV file; a pattern of its column `files` is relative to its folder."""
     try:
-        lines = read_bytes(path, "list of valves").decode("utf-8-sig").splitlines()
-        rows = list(csv.reader(lines, strict=True))
+        text = read_bytes(path, "list of valves").decode("utf-8-sig")
+        rows = list(csv.reader(io.StringIO(text, newline=""), strict=True))
     except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"'{path}' is no CSV in UTF-8: {error}; first row name,files") from error
-    heading = [_heading(label.strip()) for label in rows[0]] if rows else []
+    if not any(cell.strip() for row in rows for cell in row):
+        raise InputError(f"'{path}' is empty, expected a list of valves with a first row name,files")
+    if len(rows[0]) == 1 and (other := next((mark for mark in ";\t" if mark in rows[0][0]), None)):
+        raise InputError(
+            f"'{path}' parts its columns by {'a tab' if other == chr(9) else repr(other)}, expected a comma; save it "
+            "as CSV with commas (a ';' parts the patterns in the column files)"
+        )
+    heading = [_heading(label.strip()) for label in rows[0]]
     known = ("name", "files", *options)
     for label in heading:
         if label not in known and not label.startswith(RECORD):
@@ -147,6 +179,8 @@ def _check_names(names: Sequence[str], source: Path) -> None:
                 f"'{source}' has a valve named '{name[:100]}', expected up to 100 letters, digits, blanks and . _ + -, "
                 "a letter or digit first; rename it"
             )
+        if seen.get(name.casefold()) == name:
+            raise InputError(f"'{source}' has two valves named '{name}'; rename one, or put all files of it in one row")
         if name.casefold() in seen:
             raise InputError(f"'{source}' has the valves '{seen[name.casefold()]}' and '{name}'; rename one")
         seen[name.casefold()] = name
