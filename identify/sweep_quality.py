@@ -69,7 +69,7 @@ def _about_branches(test: TestResult) -> Iterator[Warning_]:
             text=(
                 f"the valve closes ({falling:.3f} V) above where it opens ({rising:.3f} V): is the meter's lag "
                 "over-corrected, or the time column wrong? The certificate guards the closing threshold, here the "
-                "higher one, so flow at zero command is possible, and `design` refuses"
+                "higher one, so flow at zero command is possible, and `design` refuses it unless it is accepted"
             ),
             source=test.source,
         )

@@ -115,7 +115,7 @@ class TestBranchOrder:
         assert any(line.startswith("accepted, branch-order: at 1.00, 2.00, 4.00 MPa") for line in compensator.costs)
 
     def test_the_report_says_so_beside_the_verdict_and_beside_the_warning(self, crossed):
-        """The warning was written before anybody accepted it, and says that `design` refuses."""
+        """The warning was written before anybody accepted it."""
         options = options_of({"accept": "branch-order"}, target_named("f28335").inputs())
         for valve, accepted in ((crossed, True), (identify([valve_at(dp) for dp in PRESSURES]), False)):
             shelf = {
@@ -127,7 +127,7 @@ class TestBranchOrder:
             words = re.sub("<[^>]*>|`", "", html)
             assert bool(said) is accepted
             assert ("ACCEPTED warning, branch-order" in html[: html.index('<section id="data">')]) is accepted
-            assert ("refuses; ACCEPTED: the design was made in spite of it" in words) is accepted
+            assert ("refuses it unless it is accepted, which it was (--accept)" in words) is accepted
 
     def test_a_valve_in_order_costs_nothing_of_it(self):
         valve = identify([valve_at(dp) for dp in PRESSURES])

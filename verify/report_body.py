@@ -274,7 +274,7 @@ def _warnings_section(chain: Chain) -> Section:
     for warning in valve.get("warnings", []) if valve else []:
         source = f"{warning['source']}: " if warning["source"] else ""
         accepted = warning["code"] in _accepted(compensator)
-        end = "; ACCEPTED: the design was made in spite of it (--accept)" if accepted else ""
+        end = ", which it was (--accept)" if accepted else ""
         warnings.append(f"[{warning['code']}] {source}{warning['text']}{end}")
     signals = []
     if compensator:
