@@ -15,7 +15,10 @@ ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 TUTORIAL = DOCS / "tutorial.md"
 #: Pages that go on where the tutorial ended, each with a copy of its folder.
-HOW_TO = sorted(page for page in (DOCS / "howto").glob("*.md") if commands_of(page.read_text(encoding="utf-8")))
+HOW_TO = [
+    DOCS / "before-after.md",
+    *sorted(page for page in (DOCS / "howto").glob("*.md") if commands_of(page.read_text(encoding="utf-8"))),
+]
 
 pytestmark = [needs_compiler, pytest.mark.skipif(shutil.which("bash") is None, reason="the pages' commands need bash")]
 
