@@ -21,6 +21,9 @@ from dzdesign.identify.profile import crossing, flow_at_top, smooth_profile
 GATE = 6.0
 #: Most rounds in which outliers are left out and the line is laid anew: each finds those that the ones before hid.
 ROUNDS = 20
+#: Logarithm of the probability below which a run of readings below the floor is not the noise's: about one run in ten
+#: million, and a branch has a hundred.
+UNLIKELY = -16.0
 #: Fewest samples for a line through noise; with fewer it goes from level to level.
 FEWEST = 5
 #: Noise below this share of the largest flow is not believed: no meter is that fine.
@@ -200,6 +203,7 @@ def lay_line(read: ReadBranch, window: tuple[float, float]) -> GatedLine:
     u_seen = u[seen]
     residual = y[seen] - slope * (u_seen - knee)
     sigma = max(float(np.sqrt(np.sum(residual**2) / max(u_seen.size - 2, 1))), finest)
+    kept &= ~_runs_of_drop_outs(censored, (slope * (u - knee) - floor) / sigma, residual)
     block_colour = colour_of_blocks(residual, sigma)
     return GatedLine(
         window=window,
@@ -216,6 +220,37 @@ def lay_line(read: ReadBranch, window: tuple[float, float]) -> GatedLine:
         outliers=int((~kept).sum()),
         dropped=_share_of_drop_outs(censored, slope * (u - knee) >= floor + GATE * sigma),
     )
+
+
+def _runs_of_drop_outs(censored: np.ndarray, above: np.ndarray, residual: np.ndarray) -> np.ndarray:
+    """Return which censored samples belong to a run that noise does not explain: a logger that was busy, a wire.
+
+    A meter with a floor reads nothing where the flow is a little above it, now and then, but not for long. Taken for
+    little flow, half a second of lost readings just above the knee lifts it, and the bounds with it.
+
+    Parameters
+    ----------
+    censored : (N,) bool array
+        Samples in the order of time that read below the floor.
+    above : (N,) array
+        How far the line is above the floor at each, in standard deviations.
+    residual : (M,) array
+        Of the other samples, which tell how slow the noise is: slow noise explains longer runs.
+    """
+    edges = np.flatnonzero(np.diff(censored.astype(np.int8), prepend=0, append=0))
+    starts, ends = edges[::2], edges[1::2]
+    lost = np.zeros(censored.size, dtype=bool)
+    if not starts.size or not np.any(above[censored] > 0):
+        return lost
+    from scipy.special import log_ndtr
+
+    slow = float(np.clip(residual[1:] @ residual[:-1] / max(residual @ residual, 1e-300), 0.0, 1.0))
+    own = (1 - slow) / (1 + slow)  # share of a sample in what is news, of noise that forgets exponentially
+    length = ends - starts
+    last = np.cumsum(log_ndtr(-above[censored]))[np.cumsum(length) - 1]
+    chance = np.diff(last, prepend=0.0) * (own + (1 - own) / length)
+    lost[censored] = np.repeat(chance < UNLIKELY, length)
+    return lost
 
 
 def _share_of_drop_outs(censored: np.ndarray, plain: np.ndarray) -> float:

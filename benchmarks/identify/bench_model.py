@@ -54,7 +54,9 @@ class Bench:
     rate_Hz, ramp_s : float
         Sampling rate, and duration of each branch.
     outliers, drop_outs, lost : float
-        Shares of readings that are anything, that are zero (in runs of ten), and that are missing.
+        Shares of readings that are anything, that are zero (in runs), and that are missing.
+    run : int
+        How many readings drop out in a row.
     pressures_MPa : tuple of float
         One ramp test each.
     top_first : bool
@@ -75,6 +77,7 @@ class Bench:
     outliers: float = 0.0
     drop_outs: float = 0.0
     lost: float = 0.0
+    run: int = 10
     pressures_MPa: tuple[float, ...] = PRESSURES_MPa
     top_first: bool = False
 
@@ -159,9 +162,9 @@ def _spoil(q: np.ndarray, bench: Bench, rng: np.random.Generator) -> None:
         hit = rng.random(q.shape) < bench.outliers
         q[hit] = rng.uniform(0.0, 1.5 * q.max(), hit.sum())
     if bench.drop_outs:
-        starts = np.argwhere(rng.random(q.shape) < bench.drop_outs / 10)
+        starts = np.argwhere(rng.random(q.shape) < bench.drop_outs / bench.run)
         for row, start in starts:
-            q[row, start : start + 10] = 0.0
+            q[row, start : start + bench.run] = 0.0
 
 
 def _ramp_test(dp_MPa: float, q: np.ndarray, time: np.ndarray, u: np.ndarray, keep: np.ndarray | None) -> RampTest:

@@ -8,8 +8,9 @@ from scoreboard import Row, print_rows, say, share_interval
 NOISES = {"white": 0.0, "AR(1) 0.9": 0.9, "AR(1) 0.99": 0.99}
 RATES_Hz = (100.0, 25.0)
 CASES = {f"{name}, {rate:g} Hz": {"ar": ar, "rate_Hz": rate} for rate in RATES_Hz for name, ar in NOISES.items()}
-#: In runs of ten readings, as a logger loses them that is busy.
-CASES["white, 100 Hz, 5 % of the readings drop out"] = {"drop_outs": 0.05}
+#: Readings drop out in runs, of a logger that is busy or a wire that is loose.
+CASES["white, 100 Hz, 5 % drop out, ten in a row"] = {"drop_outs": 0.05}
+CASES["white, 100 Hz, 1 % drop out, 50 in a row, twice the noise"] = {"drop_outs": 0.01, "run": 50, "noise_L_min": 0.3}
 LIMIT, RESIDUAL_LIMIT = 1.0, 0.8
 #: The worst meter zero inside the declared budget: it hides flow, so that the threshold seems higher, L/min.
 BUDGET = 0.15
