@@ -20,6 +20,8 @@ LIKELY_LAG = 0.1
 OVERLAP, LEAK_SIGNIFICANCE = (0.6, 0.85), 5.0
 #: Half a step of the flow, as a shift of the threshold over u_max, above which it matters whether it was cut off.
 COARSE_STEP = 5e-4
+#: The same where it is more than the bounds' distance from the threshold: a certificate that counts on less is none.
+SMALL_SHIFT = 5e-5
 #: Readings a level, from which on a flow is one of steps.
 READINGS_A_LEVEL = 5
 #: A leak below this share of the largest flow is not worth a word.
@@ -89,13 +91,18 @@ def _about_steps(side: SideModel, tests: tuple[DescribedTest, ...], options: Ide
     ]
     shifts = [0.5 * step / L_MIN / test.slope_L_min_V for step, test in zip(steps, side.tests, strict=True)]
     worst = int(np.argmax(shifts))
-    if options.meter_zero < 0.49 * steps[worst] and shifts[worst] > COARSE_STEP * options.u_max:
+    # Half a step matters as well where it is more than what the bounds leave to the noise.
+    beyond = any(
+        shift > max(test.u_guard_V - test.u_guard_lower_V, SMALL_SHIFT * options.u_max)
+        for shift, test in zip(shifts, side.tests, strict=True)
+    )
+    if options.meter_zero < 0.49 * steps[worst] and (beyond or shifts[worst] > COARSE_STEP * options.u_max):
         half = 0.5 * steps[worst] / L_MIN
         yield Warning_(
             code="coarse-flow",
             text=(
                 f"the flow is written in steps of {2 * half:.3g} L/min: if the meter or the logger cuts off what lies "
-                f"between two steps, and does not round it, every threshold here is up to {1e3 * shifts[worst]:.0f} mV "
+                f"between two steps, and does not round it, every threshold here is up to {1e3 * shifts[worst]:.2g} mV "
                 f'too high. Write more digits, or, if it cuts off, allow for it by --meter-zero "{half:.3g} L/min"'
             ),
             source=tests[worst].test.source,

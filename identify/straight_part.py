@@ -45,11 +45,11 @@ SHUT, JUMPED, JUMP = 0.05, 0.15, 3.0
 
 
 def fit_line(u: np.ndarray, y: np.ndarray) -> tuple[float, float]:
-    """Return slope and zero of the least-squares line."""
-    centre, height = u.mean(), y.mean()
+    """Return slope and zero of the least-squares line; a level one has no zero: the middle of its samples."""
+    centre, height = float(u.mean()), float(y.mean())
     du = u - centre
     slope = float(du @ (y - height) / (du @ du))
-    return slope, float(centre - height / slope)
+    return slope, centre - height / slope if slope else centre
 
 
 def colour_of_blocks(residual: np.ndarray, sigma: float) -> float:

@@ -315,6 +315,13 @@ class TestCoarseFlow:
         assert not warned(allowed, "coarse-flow")
         assert all(test.u_guard_lower_V < closes for test, closes in zip(allowed.positive.tests, true, strict=True))
 
+    def test_steps_that_move_a_threshold_past_its_bound_are_said_however_fine(self):
+        quiet = [valve_at(dp, noise=0.01) for dp in PRESSURES]
+        cut = [replace(test, q=np.floor(test.q / L_MIN / 0.02) * 0.02 * L_MIN) for test in quiet]
+        found = identify(cut)
+        assert "steps of 0.02 L/min" in warned(found, "coarse-flow")[0].text
+        assert any(test.u_guard_lower_V > 5.4 - 0.05 * test.dp_MPa for test in found.positive.tests)
+
     def test_fine_steps_are_not_worth_a_word(self):
         assert not warned(identify(self.cut_off(0.01)), "coarse-flow")
 
