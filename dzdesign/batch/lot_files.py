@@ -14,7 +14,7 @@ from typing import Any
 from dzdesign.batch.calibration import OK
 from dzdesign.batch.results import AGAIN, SCHEMA, SUMMARY, VALVE_SCHEMA, Results
 from dzdesign.batch.table import HASHED, TABLE, Calibrated, read_back, rows_from, rows_of
-from dzdesign.batch.valves import NAME
+from dzdesign.batch.valves import NAME, by_name
 from dzdesign.core.artefacts import MANIFEST_NAME, parse_document, read_bytes, sha256_of
 from dzdesign.core.errors import InputError, and_more
 from dzdesign.core.input_files import MOST_DOCUMENT
@@ -184,6 +184,7 @@ def lot_of(folder: Path) -> Lot:
     missing: list[str] = []
     found = _table(folder, document, faults, missing)
     rows = [] if found is None else rows_from(found, str(folder / TABLE))
+    rows.sort(key=lambda row: by_name(row["name"]))  # an older version had V10 before V2
     hashes += [] if found is None else [(TABLE, sha256_of(found))]
     counted = {"valves": len(rows), "calibrated": sum(row["status"] == OK for row in rows)}
     faults += [
@@ -294,7 +295,7 @@ def _stopped(folder: Path, document: dict[str, Any], hashes: list[tuple[str, str
     """Read what a batch that was stopped, or still runs, has come to."""
     names = document.get("names")
     if not isinstance(names, list) or not all(isinstance(name, str) and NAME.fullmatch(name) for name in names):
-        names = sorted(path.name for path in _folders(folder))
+        names = sorted((path.name for path in _folders(folder)), key=by_name)
     there = [name for name in names if (folder / "valves" / name / MANIFEST_NAME).is_file()]
     found: dict[str, Calibrated] = {}
     faults: list[str] = []

@@ -7,7 +7,8 @@ from dzdesign.batch.calibration import OK
 from dzdesign.batch.lot_files import Lot
 from dzdesign.batch.reasons import ReasonGroup
 from dzdesign.batch.spread import Spread, short
-from dzdesign.batch.table import TABLE
+from dzdesign.batch.table import TABLE, safe_cell
+from dzdesign.batch.valves import RECORD
 from dzdesign.verify.report_figure import csv_text
 from dzdesign.verify.report_table import Cell, Table, number, whole
 
@@ -74,7 +75,8 @@ def failed_table(groups: Sequence[ReasonGroup], failed: Sequence[Mapping[str, An
         columns=("status", "valves", "what is wrong", "what is expected, or to be done", "names"),
         rows=tuple(rows),
         csv=csv_text(
-            ("name", "status", "reason"), ([row[key] for key in ("name", "status", "reason")] for row in failed)
+            ("name", "status", "reason"),
+            ([safe_cell(row[key]) for key in ("name", "status", "reason")] for row in failed),
         ),
         name="not-calibrated",
     )
@@ -252,13 +254,16 @@ def valves_table(lot: Lot, far: Collection[str]) -> Table | None:
         for side in lot.sides
         for column, heading, digits in SHOWN
     ]
+    serials = [column for column in lot.rows[0] if column.casefold() == f"{RECORD}serial"]
+    serial = ("serial",) if serials else ()
     good, embedded = Cell(text="✓ ok", kind="good"), len(lot.table) <= EMBEDDED
     return Table(
         caption=caption,
-        columns=("valve", "status", *(heading for _, heading, _ in columns), "warnings"),
+        columns=("valve", *serial, "status", *(heading for _, heading, _ in columns), "warnings"),
         rows=tuple(
             (
                 Cell(text=row["name"]),
+                *(Cell(text=next((row[key] for key in serials if row[key]), "–")) for _ in serial),
                 good if row["status"] == OK else Cell(text=f"✗ {row['status']}", kind="bad"),
                 *(number(row[column], digits) for column, _, digits in columns),
                 Cell(text=row["warnings"] or "–"),
