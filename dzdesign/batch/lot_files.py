@@ -45,6 +45,8 @@ COMMON_LATER = {
     "dp_without_MPa": (Exactly(2, float), NoneType),
     "checked": {"valves": int, "worst": str, "dp_MPa": float, "smallest_margin_V": float},
 }
+#: Of a valve that lacks a pressure drop, as still later ones do.
+LACKING_LATER = {"coarser_V": float, "cost_percent": float}
 AT = {"0.5": float, "0.95": float, "1": float}
 #: Largest table of which a report is made: beyond it, some 25 000 valves, no browser would show the page.
 MOST_TABLE = MOST_DOCUMENT
@@ -209,6 +211,9 @@ def lot_of(folder: Path) -> Lot:
 def _check_common(setting: Mapping[str, Any], source: str) -> None:
     check_shape(setting, COMMON, source, AGAIN)
     check_shape(setting, {key: shape for key, shape in COMMON_LATER.items() if key in setting}, source, AGAIN)
+    for each in setting.get("lacking", ()):
+        if LACKING_LATER.keys() & each.keys():
+            check_shape(each, LACKING_LATER, f"{source}.lacking", AGAIN)
     without = setting["without_binding"]
     if without is not None:
         shape = {"why_not": str} if "why_not" in without else {"left_out": [str], "quantiles": dict}

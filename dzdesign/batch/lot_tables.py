@@ -224,10 +224,16 @@ def holding_table(lot: Lot) -> Table | None:
     return Table(
         caption=f"{caption}, the first {ROWS} of {len(cells)}" if len(cells) > ROWS else caption,
         columns=(
-            "valve", "smallest margin (mV)", *(f"own offset at dP0{each} (V)" for each in of),
+            "valve", "margin under its own ceiling (mV)", *(f"own offset at dP0{each} (V)" for each in of),
             *(f"extra dead zone{each} (%)" for each in of),
         ),
         rows=tuple(cells[:ROWS]),
+        notes=(
+            "A valve's own ceiling, which its own offset may not exceed, runs straight between its tests, at its "
+            "bounds or under them: this margin is no larger than that valve's margin under its bounds, which is said "
+            "above of the nearest valve. Both are of the exact law, with half a count of rounding added; what dzdesign "
+            "verify states is of the whole numbers that the C gives.",
+        ),
     )  # fmt: skip
 
 

@@ -106,7 +106,8 @@ def checked_lines(common: Mapping[str, Any]) -> list[str]:
     margin_mV = 1e3 * checked["smallest_margin_V"]
     return [
         f"it lies under the bounds of each of the {checked['valves']} valves, at every pressure code of its tests; "
-        f"nearest is {checked['worst']}, {margin_mV:.3f} mV under at {checked['dp_MPa']:.2f} MPa"
+        f"nearest is {checked['worst']}: the exact law with half a count of rounding stays {margin_mV:.3f} mV "
+        f"under its bound at {checked['dp_MPa']:.2f} MPa"
     ]
 
 
