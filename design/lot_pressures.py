@@ -3,10 +3,14 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from dzdesign.design.lot import LotValve
+import numpy as np
+
+from dzdesign.design.lot import LotSide, LotValve
 
 #: Tests nearer than this share are at one pressure drop of the lot: no bench sets it to a per cent.
 SAME = 0.05
+#: Trends of which a test between two others raises the bound: of another, the lowest of all holds everywhere.
+SLOPING = ("decreasing", "increasing")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,11 +25,15 @@ class Lacking:
         Of the command.
     dp_MPa : tuple of float
         Which, as the others' tests have it in the middle.
+    coarser_V : float
+        By how much its bound there lies under the straight line between its bounds at the tests beside, at most: what
+        a test there would gain, about. 0 where its threshold has no trend, or lies outside its tests.
     """
 
     name: str
     sign: int
     dp_MPa: tuple[float, ...]
+    coarser_V: float = 0.0
 
 
 def common_interval(lot: Sequence[LotValve]) -> tuple[float, float] | None:
@@ -41,14 +49,53 @@ def lacking_in(lot: Sequence[LotValve]) -> tuple[Lacking, ...]:
     """Return the valves that lack one of the lot's pressure drops, in the order of the lot."""
     found = []
     for sign in (1, -1):
-        tested = {valve.name: side.dp_MPa for valve in lot if (side := valve.positive if sign > 0 else valve.negative)}
-        wanted = _pressures_of_lot(list(tested.values()))
+        tested = {valve.name: side for valve in lot if (side := valve.positive if sign > 0 else valve.negative)}
+        wanted = _pressures_of_lot([side.dp_MPa for side in tested.values()])
         for name, own in tested.items():
-            missing = [(low, high) for low, high in wanted if not any(low <= dp <= high for dp in own)]
+            missing = [(low, high) for low, high in wanted if not any(low <= dp <= high for dp in own.dp_MPa)]
             if missing:
                 middles = tuple(round((low + high) / 2, 6) for low, high in missing)
-                found.append(Lacking(name=name, sign=sign, dp_MPa=middles))
+                coarser = max(_coarser_V(own, dp) for dp in middles)
+                found.append(Lacking(name=name, sign=sign, dp_MPa=middles, coarser_V=coarser))
     return tuple(found)
+
+
+def without_narrow(
+    lot: Sequence[LotValve], lacking: Sequence[Lacking]
+) -> tuple[frozenset[str], tuple[float, float] | None]:
+    """Return which valves make the interval of the lot narrower by what they lack, and what it is without them.
+
+    Parameters
+    ----------
+    lot : sequence of LotValve
+    lacking : sequence of Lacking
+        Of `lacking_in`.
+
+    Returns
+    -------
+    frozenset of str, (float, float) or None
+        Names; None without any, or where no interval is left.
+    """
+    sides = {(valve.name, sign): side for valve in lot for sign, side in ((1, valve.positive), (-1, valve.negative))}
+    names = set()
+    for each in lacking:
+        side = sides[each.name, each.sign]
+        if side and not all(side.dp_MPa[0] < dp < side.dp_MPa[-1] for dp in each.dp_MPa):
+            names.add(each.name)
+    before = common_interval(lot)
+    after = common_interval([valve for valve in lot if valve.name not in names])
+    if before and after and before[0] <= after[0] * (1 + SAME) and after[1] <= before[1] * (1 + SAME):
+        return frozenset(), None  # the other side of command, or another valve, ends there too
+    return frozenset(names), after if names else None
+
+
+def _coarser_V(side: LotSide, dp_MPa: float) -> float:
+    """Return how far a bound between two tests lies under the straight line through theirs, V."""
+    for low, high, bound in side.steps():
+        if low < dp_MPa < high:
+            straight = np.interp(dp_MPa, side.dp_MPa, side.lower_V)
+            return max(float(straight) - float(bound), 0.0) if side.trend in SLOPING else 0.0
+    return 0.0
 
 
 def _pressures_of_lot(tested: Sequence[Sequence[float]]) -> list[tuple[float, float]]:

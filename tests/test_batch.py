@@ -398,7 +398,7 @@ def test_a_valve_that_lacks_a_pressure_is_named_with_the_range_without_it(lot, t
     words = (
         "short was not tested at 5 MPa, as the lot was: so the common setting holds for all from 1 to 2.5 MPa, and "
         "without it from 1 to 5 MPa; record what is missing, or calibrate it apart",
-        "coarse was not tested at 2.5 MPa, as the lot was: between two tests only the lower",
+        "coarse was not tested at 2.5 MPa, as the lot was: between the tests beside it only the lower",
         "it lies under the bounds of each of the 5 valves, at every pressure code of its tests; nearest is ",
     )
     report = " ".join((out / "report.html").read_text(encoding="utf-8").split())

@@ -1,23 +1,27 @@
-"""`batch --dask`: a real scheduler and real workers as processes on 127.0.0.1, one of them killed in mid-run."""
+"""`batch --dask`: a real scheduler and real workers as processes on 127.0.0.1, any of them killed in mid-run."""
 
 import csv
 import json
+import logging
 import os
 import signal
 import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import CancelledError
 from pathlib import Path
 
 import pytest
+from distributed.client import ClosedClientError
 from dying_work import die_over_bad
 from many_valves import write_lot
 
 from dzdesign.batch.calibration import Task
-from dzdesign.batch.runners import run_on_cluster
+from dzdesign.batch.runners import _scheduler_lost, run_on_cluster
 from dzdesign.cli import main
 from dzdesign.core.artefacts import sha256_of
+from dzdesign.core.errors import InputError
 
 COUNT, SEED = 7, 7
 OPTIONS = ["--meter-lag", "0.1 s", "--target", "host"]
@@ -40,7 +44,10 @@ def start(*arguments: str, folder: Path, deaths: int = 3) -> subprocess.Popen:
 
 @pytest.fixture
 def cluster(tmp_path, request):
-    """A scheduler, and a way to start workers; all end with the test. Its parameter: deaths that a task may survive."""
+    """Address of a scheduler, a way to start workers, and its process; all end with the test.
+
+    Its parameter: deaths that a task may survive.
+    """
     contact = tmp_path / "scheduler.json"
     processes = [
         start(
@@ -59,7 +66,7 @@ def cluster(tmp_path, request):
         processes.append(start("worker", address, *options, folder=tmp_path / name))
         return processes[-1]
 
-    yield address, worker
+    yield address, worker, processes[0]
     for process in reversed(processes):
         process.kill()
         process.wait(20)
@@ -71,7 +78,7 @@ def whole_folders(output: Path) -> list[str]:
 
 @pytest.mark.skipif(os.name == "nt", reason="SIGKILL is of POSIX")
 def test_a_worker_is_killed_in_mid_run_and_nothing_is_lost(cluster, tmp_path, monkeypatch):
-    address, worker = cluster
+    address, worker, _ = cluster
     monkeypatch.chdir(tmp_path)
     broken = write_lot(Path("lot"), COUNT, 2, SEED)
     victim, _ = worker("victim"), worker("survivor")
@@ -100,9 +107,63 @@ def test_a_worker_is_killed_in_mid_run_and_nothing_is_lost(cluster, tmp_path, mo
 
 
 @pytest.mark.skipif(os.name == "nt", reason="SIGKILL is of POSIX")
+@pytest.mark.parametrize("kind", [signal.SIGTERM, getattr(signal, "SIGKILL", None)])
+def test_a_scheduler_that_dies_in_mid_run_is_one_sentence_and_what_is_done_is_kept(
+    cluster, kind, tmp_path, monkeypatch, capsys
+):
+    address, worker, scheduler = cluster
+    monkeypatch.chdir(tmp_path)
+    write_lot(Path("lot"), COUNT, 2, SEED)
+    worker("one")
+
+    def kill() -> None:
+        while len(whole_folders(tmp_path / "out")) < 2:
+            time.sleep(0.01)
+        scheduler.send_signal(kind)
+
+    killer = threading.Thread(target=kill, daemon=True)
+    killer.start()
+    # In a process of its own: what Dask logs goes where stderr was when it was imported.
+    code = "import sys; from dzdesign.cli import main; sys.exit(main(sys.argv[1:]))"
+    command = [sys.executable, "-c", code, "batch", "lot", "-o", "out", "--dask", address, *OPTIONS]
+    said = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+    killer.join(30)
+    done = whole_folders(tmp_path / "out")
+    assert 2 <= len(done) < COUNT, "the scheduler was not killed in mid-run"
+    assert (said.returncode, said.stdout) == (2, "") and said.stderr.splitlines() == [
+        f"dzdesign: {COUNT} valves, 0 of them done before",
+        f"dzdesign: the Dask scheduler at '{address}' is gone; what is done is kept: start one, and give the same "
+        "command again with its address",
+    ]
+    assert main(["batch", "lot", "-o", "out", "--jobs", "1", *OPTIONS]) == 1
+    assert f"{COUNT} valves, {len(done)} of them done before" in capsys.readouterr().err
+
+
+def test_a_lot_that_waits_for_a_worker_says_so_once_and_goes_on(cluster, monkeypatch, capsys):
+    monkeypatch.setattr("dzdesign.batch.runners.LOOK_S", 0.1)
+    address, worker, _ = cluster
+    starter = threading.Timer(2, worker, ["late"])
+    starter.start()
+    (outcome,) = run_on_cluster(iter([Task(name="a", **NOTHING)]), address, die_over_bad)
+    assert outcome.status == "ok"
+    said = capsys.readouterr().err
+    assert said.count("no worker is connected") == 1 and f"such as `dask worker {address} --nthreads 1`" in said
+
+
+@pytest.mark.parametrize("fault", [CancelledError(), OSError("a comm is closed"), ClosedClientError("closed")])
+def test_whatever_dask_says_of_a_lost_scheduler_is_that_sentence(fault):
+    level = logging.getLogger("distributed.client").level
+    with pytest.raises(InputError, match="the Dask scheduler at 'tcp://x' is gone"), _scheduler_lost("tcp://x"):
+        raise fault
+    with pytest.raises(ZeroDivisionError), _scheduler_lost("tcp://x"):
+        raise ZeroDivisionError
+    assert logging.getLogger("distributed.client").level == level
+
+
+@pytest.mark.skipif(os.name == "nt", reason="SIGKILL is of POSIX")
 @pytest.mark.parametrize("cluster", [0], indirect=True)
 def test_a_valve_that_kills_every_worker_is_named(cluster):
-    address, worker = cluster
+    address, worker, _ = cluster
     for number in range(3):
         worker(f"w{number}")
     names = ["a", "bad", "b", "c"]

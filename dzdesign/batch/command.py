@@ -118,7 +118,7 @@ def _calibrate(
     unwritten = _write_all(results, outcomes, len(waiting))
     found = {valve.name: read_back(results, valve.name, unwritten) for valve in with_bar(valves, "making the table")}
     common, why_not = common_of(found)
-    rows = rows_of(found, common)
+    rows = rows_of(found, common, {valve.name: _record(valve, args) for valve in valves})
     files = table_files(rows)
     without = without_binding(found, common)
     document = summary_of(rows, common, why_not, files=files, verified=args.verify, without_binding=without)
@@ -204,7 +204,7 @@ def _plant(args: argparse.Namespace) -> tuple[str, bytes] | None:
 def _task(valve: Valve, args: argparse.Namespace, plant: tuple[str, bytes] | None) -> Task:
     """Read a valve's recordings; where they can't be read the task says why."""
     options = {**vars(args), **valve.overrides}
-    record = {**record_of(args.record), **valve.record}
+    record = _record(valve, args)
     recordings, refused = [], ""
     try:
         recordings = [(path.name, read_bytes(path, "ramp file")) for path in valve.recordings()]
@@ -222,6 +222,10 @@ def _task(valve: Valve, args: argparse.Namespace, plant: tuple[str, bytes] | Non
         plant=plant,
         refused=refused,
     )
+
+
+def _record(valve: Valve, args: argparse.Namespace) -> dict[str, str]:
+    return {**record_of(args.record), **valve.record}
 
 
 def _is_done(results: Results, task: Task) -> bool:

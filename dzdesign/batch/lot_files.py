@@ -14,7 +14,7 @@ from typing import Any
 from dzdesign.batch.calibration import OK
 from dzdesign.batch.results import AGAIN, SCHEMA, SUMMARY, VALVE_SCHEMA, Results
 from dzdesign.batch.table import HASHED, TABLE, Calibrated, read_back, rows_from, rows_of
-from dzdesign.batch.valves import NAME
+from dzdesign.batch.valves import NAME, by_name
 from dzdesign.core.artefacts import MANIFEST_NAME, parse_document, read_bytes, sha256_of
 from dzdesign.core.errors import InputError, and_more
 from dzdesign.core.input_files import MOST_DOCUMENT
@@ -45,6 +45,8 @@ COMMON_LATER = {
     "dp_without_MPa": (Exactly(2, float), NoneType),
     "checked": {"valves": int, "worst": str, "dp_MPa": float, "smallest_margin_V": float},
 }
+#: Of a valve that lacks a pressure drop, as still later ones do.
+LACKING_LATER = {"coarser_V": float, "cost_percent": float}
 AT = {"0.5": float, "0.95": float, "1": float}
 #: Largest table of which a report is made: beyond it, some 25 000 valves, no browser would show the page.
 MOST_TABLE = MOST_DOCUMENT
@@ -184,6 +186,7 @@ def lot_of(folder: Path) -> Lot:
     missing: list[str] = []
     found = _table(folder, document, faults, missing)
     rows = [] if found is None else rows_from(found, str(folder / TABLE))
+    rows.sort(key=lambda row: by_name(row["name"]))  # an older version had V10 before V2
     hashes += [] if found is None else [(TABLE, sha256_of(found))]
     counted = {"valves": len(rows), "calibrated": sum(row["status"] == OK for row in rows)}
     faults += [
@@ -208,6 +211,9 @@ def lot_of(folder: Path) -> Lot:
 def _check_common(setting: Mapping[str, Any], source: str) -> None:
     check_shape(setting, COMMON, source, AGAIN)
     check_shape(setting, {key: shape for key, shape in COMMON_LATER.items() if key in setting}, source, AGAIN)
+    for each in setting.get("lacking", ()):
+        if LACKING_LATER.keys() & each.keys():
+            check_shape(each, LACKING_LATER, f"{source}.lacking", AGAIN)
     without = setting["without_binding"]
     if without is not None:
         shape = {"why_not": str} if "why_not" in without else {"left_out": [str], "quantiles": dict}
@@ -294,7 +300,7 @@ def _stopped(folder: Path, document: dict[str, Any], hashes: list[tuple[str, str
     """Read what a batch that was stopped, or still runs, has come to."""
     names = document.get("names")
     if not isinstance(names, list) or not all(isinstance(name, str) and NAME.fullmatch(name) for name in names):
-        names = sorted(path.name for path in _folders(folder))
+        names = sorted((path.name for path in _folders(folder)), key=by_name)
     there = [name for name in names if (folder / "valves" / name / MANIFEST_NAME).is_file()]
     found: dict[str, Calibrated] = {}
     faults: list[str] = []

@@ -7,7 +7,8 @@ from dzdesign.batch.calibration import OK
 from dzdesign.batch.lot_files import Lot
 from dzdesign.batch.reasons import ReasonGroup
 from dzdesign.batch.spread import Spread, short
-from dzdesign.batch.table import TABLE
+from dzdesign.batch.table import TABLE, safe_cell
+from dzdesign.batch.valves import RECORD
 from dzdesign.verify.report_figure import csv_text
 from dzdesign.verify.report_table import Cell, Table, number, whole
 
@@ -74,7 +75,8 @@ def failed_table(groups: Sequence[ReasonGroup], failed: Sequence[Mapping[str, An
         columns=("status", "valves", "what is wrong", "what is expected, or to be done", "names"),
         rows=tuple(rows),
         csv=csv_text(
-            ("name", "status", "reason"), ([row[key] for key in ("name", "status", "reason")] for row in failed)
+            ("name", "status", "reason"),
+            ([safe_cell(row[key]) for key in ("name", "status", "reason")] for row in failed),
         ),
         name="not-calibrated",
     )
@@ -222,10 +224,16 @@ def holding_table(lot: Lot) -> Table | None:
     return Table(
         caption=f"{caption}, the first {ROWS} of {len(cells)}" if len(cells) > ROWS else caption,
         columns=(
-            "valve", "smallest margin (mV)", *(f"own offset at dP0{each} (V)" for each in of),
+            "valve", "margin under its own ceiling (mV)", *(f"own offset at dP0{each} (V)" for each in of),
             *(f"extra dead zone{each} (%)" for each in of),
         ),
         rows=tuple(cells[:ROWS]),
+        notes=(
+            "A valve's own ceiling, which its own offset may not exceed, runs straight between its tests, at its "
+            "bounds or under them: this margin is no larger than that valve's margin under its bounds, which is said "
+            "above of the nearest valve. Both are of the exact law, with half a count of rounding added; what dzdesign "
+            "verify states is of the whole numbers that the C gives.",
+        ),
     )  # fmt: skip
 
 
@@ -252,13 +260,16 @@ def valves_table(lot: Lot, far: Collection[str]) -> Table | None:
         for side in lot.sides
         for column, heading, digits in SHOWN
     ]
+    serials = [column for column in lot.rows[0] if column.casefold() == f"{RECORD}serial"]
+    serial = ("serial",) if serials else ()
     good, embedded = Cell(text="✓ ok", kind="good"), len(lot.table) <= EMBEDDED
     return Table(
         caption=caption,
-        columns=("valve", "status", *(heading for _, heading, _ in columns), "warnings"),
+        columns=("valve", *serial, "status", *(heading for _, heading, _ in columns), "warnings"),
         rows=tuple(
             (
                 Cell(text=row["name"]),
+                *(Cell(text=next((row[key] for key in serials if row[key]), "–")) for _ in serial),
                 good if row["status"] == OK else Cell(text=f"✗ {row['status']}", kind="bad"),
                 *(number(row[column], digits) for column, _, digits in columns),
                 Cell(text=row["warnings"] or "–"),

@@ -5,7 +5,7 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 from dzdesign.batch.table import Calibrated
-from dzdesign.batch.valves import Valve
+from dzdesign.batch.valves import Valve, by_name
 from dzdesign.core.errors import InputError, and_more
 
 #: Names in a sentence.
@@ -69,8 +69,8 @@ def _shared_recordings(found: Mapping[str, Calibrated], known: Collection[tuple[
 
 
 def _left_over(found: Mapping[str, Calibrated], folder: Path) -> list[str]:
-    others = sorted(path.name for path in (folder / "valves").iterdir() if path.is_dir() and path.name not in found)
-    others = [name for name in others if not name.startswith(".")]
+    there = (path.name for path in (folder / "valves").iterdir() if path.is_dir() and path.name not in found)
+    others = sorted((name for name in there if not name.startswith(".")), key=by_name)
     if not others:
         return []
     shown = and_more(others, NAMED)

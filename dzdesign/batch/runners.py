@@ -1,14 +1,19 @@
 """Where valves are calibrated: in processes of this machine by joblib, or on a cluster by Dask's scheduler."""
 
+import logging
 import warnings
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import CancelledError
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager, suppress
 from itertools import count, islice
+from threading import Event, Thread
 from typing import TYPE_CHECKING
 
 from dzdesign.batch.calibration import FAILED, Outcome, Task, calibrate
 from dzdesign.core.artefacts import TOOL
 from dzdesign.core.errors import InputError, one_line
+from dzdesign.progress import say
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -18,6 +23,10 @@ Work = Callable[[Task], Outcome]
 #: Tasks on their way for each that runs: a batch of any length takes no more memory than these.
 AHEAD = 2
 CONNECT_S = 10
+#: How often it is looked whether any worker is there: waiting for one looks like work.
+LOOK_S = 5.0
+#: Loggers of Dask that tell of a lost scheduler in pages of their own.
+TALKATIVE = ("distributed", "distributed.client")
 ENDED = "the process that calibrated it ended without a word (out of memory, or killed)"
 
 
@@ -101,19 +110,67 @@ def run_on_cluster(tasks: Iterable[Task], address: str, work: Work = calibrate) 
     InputError
         If the scheduler can't be reached or goes away, or a worker runs another version of dzdesign.
     """
-    with _client(address) as client:
+    with _scheduler_lost(address), _client(address) as client, _workers_missed(client, address):
         suspects = []
-        for task, future in _ended(client, iter(tasks), work, address):
+        for task, future in _ended(client, iter(tasks), work):
             if _killed(future):
                 suspects.append(task)
             else:
                 yield _outcome(future, task)
         for suspect in suspects:
-            for task, future in _ended(client, iter([suspect]), work, address):
+            for task, future in _ended(client, iter([suspect]), work):
                 yield _dead(task) if _killed(future) else _outcome(future, task)
 
 
-def _ended(client: "Client", source: Iterator[Task], work: Work, address: str) -> "Iterator[tuple[Task, Future]]":
+@contextmanager
+def _scheduler_lost(address: str) -> Iterator[None]:
+    """Say of a scheduler that goes away, whatever was under way with it, one sentence instead of Dask's own pages."""
+    with suppress(ImportError):  # which is said elsewhere
+        import distributed  # noqa: F401  (when first imported it sets the levels of its loggers)
+    levels = {name: logging.getLogger(name).level for name in TALKATIVE}
+    for name in TALKATIVE:
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+    try:
+        yield
+    except Exception as error:
+        if not isinstance(error, OSError | CancelledError) and not type(error).__module__.startswith("distributed."):
+            raise
+        raise InputError(
+            f"the Dask scheduler at '{address}' is gone; what is done is kept: start one, and give the same command "
+            "again with its address"
+        ) from error
+    finally:
+        for name, level in levels.items():
+            logging.getLogger(name).setLevel(level)
+
+
+@contextmanager
+def _workers_missed(client: "Client", address: str) -> Iterator[None]:
+    """Say, once each time, that no worker is there: the batch waits for one, be it for ever."""
+    over = Event()
+
+    def look() -> None:
+        alone = False
+        while not over.wait(LOOK_S):
+            try:
+                before, alone = alone, not client.nthreads()
+            except (OSError, RuntimeError, CancelledError, ValueError):
+                return  # the scheduler is gone, which is said elsewhere
+            if alone and not before:
+                say(
+                    f"no worker is connected to the Dask scheduler at '{address}': waiting for one, such as `dask "
+                    f"worker {address} --nthreads 1`; if you stop this, what is done is kept"
+                )
+
+    looking = Thread(target=look, daemon=True)
+    looking.start()
+    try:
+        yield
+    finally:
+        over.set()
+
+
+def _ended(client: "Client", source: Iterator[Task], work: Work) -> "Iterator[tuple[Task, Future]]":
     """Hand tasks over, a few ahead of the workers, and return each with its future once that has ended."""
     from distributed import as_completed
 
@@ -133,7 +190,7 @@ def _ended(client: "Client", source: Iterator[Task], work: Work, address: str) -
         task = tasks.pop(future)
         if future.status in ("cancelled", "lost"):
             if client.status != "running":
-                raise InputError(f"the Dask scheduler at '{address}' is gone; what is done is kept, run it again")
+                raise ConnectionError("the scheduler took its tasks along")
             completed.add(submit(task))  # it forgot a task whose workers died one after the other
             continue
         for following in islice(source, 1):

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from statistics import median
 from typing import Any
 
+from dzdesign.batch.valves import by_name
+
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 #: Beyond so many robust standard deviations a valve is far from the rest: the limit that Iglewicz and Hoaglin (1993)
 #: recommend. Of a normal lot one valve in 2000 lies there, which keeps a list of a thousand valves short.
@@ -116,7 +118,7 @@ class Spread:
         if self.limits is None:
             return ()
         found = [one for one in zip(self.names, self.values, strict=True) if abs(self.distance(one[1])) > FAR]
-        return tuple(sorted(found, key=lambda one: (-abs(self.distance(one[1])), one[0])))
+        return tuple(sorted(found, key=lambda one: (-abs(self.distance(one[1])), by_name(one[0]))))
 
     def name_at(self, quantile: str) -> str:
         """Return a valve that has the least (``0``) or the largest (``1``) value."""

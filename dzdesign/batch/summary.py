@@ -106,35 +106,33 @@ def checked_lines(common: Mapping[str, Any]) -> list[str]:
     margin_mV = 1e3 * checked["smallest_margin_V"]
     return [
         f"it lies under the bounds of each of the {checked['valves']} valves, at every pressure code of its tests; "
-        f"nearest is {checked['worst']}, {margin_mV:.3f} mV under at {checked['dp_MPa']:.2f} MPa"
+        f"nearest is {checked['worst']}: the exact law with half a count of rounding stays {margin_mV:.3f} mV "
+        f"under its bound at {checked['dp_MPa']:.2f} MPa"
     ]
 
 
 def _lacking_document(common: "CommonSetting") -> dict[str, Any]:
     """Return which valves were not tested where the lot was, and what the interval would be without those it hurts."""
-    from dzdesign.design.lot_pressures import common_interval, lacking_in
+    from dzdesign.design.lot_pressures import lacking_in, without_narrow
 
     lot = common.compensator.lot
     lacking = lacking_in(lot)
-    names = {each.name for each in lacking}
-    wider = common_interval([valve for valve in lot if valve.name not in names]) or common.dp_MPa
-    narrow = {valve.name for valve in lot if valve.name in names and not _covers(common_interval([valve]), wider)}
-    return {
-        "lacking": [
+    narrow, wider = without_narrow(lot, lacking)
+    documents = []
+    for each in lacking:
+        coarser = each.coarser_V if each.name in common.binding else 0.0
+        full = float(common.compensator.side(each.sign).k_x_max_over_u_max * common.compensator.u_max_V)
+        documents.append(
             {
                 "name": each.name,
                 "side": "positive" if each.sign > 0 else "negative",
                 "dp_MPa": list(each.dp_MPa),
                 "narrows": each.name in narrow,
+                "coarser_V": round(each.coarser_V, 7),
+                "cost_percent": round(100 * coarser / full, 5),
             }
-            for each in lacking
-        ],
-        "dp_without_MPa": list(wider) if narrow else None,
-    }
-
-
-def _covers(own: tuple[float, float] | None, other: tuple[float, float]) -> bool:
-    return own is not None and own[0] <= other[0] and own[1] >= other[1]
+        )
+    return {"lacking": documents, "dp_without_MPa": list(wider) if wider else None}
 
 
 def lacking_lines(common: Mapping[str, Any]) -> list[str]:
@@ -143,21 +141,46 @@ def lacking_lines(common: Mapping[str, Any]) -> list[str]:
     Parameters
     ----------
     common : mapping
-        Of batch.json; of an older version it says nothing of this.
+        Of batch.json; of an older version it says nothing of this, or only which range there would be.
     """
     lacking = common.get("lacking") or ()
-    narrow, inside = ([each for each in lacking if each["narrows"] is narrows] for narrows in (True, False))
+    here, wider = span(*common["dp_MPa"]) if lacking else "", common.get("dp_without_MPa")
+    # An older version called ranges wider that differ by what no bench sets.
+    without = f", and without %s {span(*wider)}" if wider and span(*wider) != here else ""
+    narrow = [each for each in lacking if each["narrows"] and (without or not wider)]
     lines = []
     if narrow:
         them = "it" if len({each["name"] for each in narrow}) == 1 else "them"
         lines.append(
-            f"{_untested(narrow)}: so the common setting holds for all {span(*common['dp_MPa'])}, and without {them} "
-            f"{span(*(common['dp_without_MPa'] or common['dp_MPa']))}; record what is missing, or calibrate {them} "
-            "apart"
+            f"{_untested(narrow)}: so the common setting holds for all {here}{without and without % them}; record what "
+            f"is missing, or calibrate {them} apart"
         )
-    if inside:
+    return lines + _coarse_lines([each for each in lacking if each not in narrow])
+
+
+def _coarse_lines(inside: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Say of valves whose bounds are coarser between two tests by how much, and what that costs."""
+    costly = [each for each in inside if each.get("cost_percent", 0) > 0]
+    free = [each for each in inside if each not in costly and "cost_percent" in each]
+    unknown = [each for each in inside if "cost_percent" not in each]
+    lines = []
+    for each in costly:
         lines.append(
-            f"{_untested(inside)}: between two tests only the lower of their bounds is known, which may hold the "
+            f"{_untested([each])}: between the tests beside it only the lower of their two bounds is known, there "
+            f"about {1e3 * each['coarser_V']:.3g} mV under what a test would show, and {each['name']} holds the common "
+            f"setting down: that may cost each valve up to {each['cost_percent']:.2g} % of command; record what is "
+            "missing"
+        )
+    if coarse := [each for each in free if each["coarser_V"] > 0]:
+        lines.append(
+            f"{_untested(coarse)}: between the tests beside it only the lower of their two bounds is known, which "
+            "costs nothing, as other valves hold the common setting down"
+        )
+    if same := [each for each in free if each not in coarse]:
+        lines.append(f"{_untested(same)}: that costs the common setting nothing")
+    if unknown:
+        lines.append(
+            f"{_untested(unknown)}: between two tests only the lower of their bounds is known, which may hold the "
             "common setting down"
         )
     return lines

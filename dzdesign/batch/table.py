@@ -3,6 +3,7 @@
 import csv
 import io
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -10,8 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 from dzdesign.batch.calibration import FAILED, OK
 from dzdesign.batch.results import AGAIN, Results
+from dzdesign.batch.valves import RECORD, by_name
 from dzdesign.core.artefacts import read_bytes, sha256_of
 from dzdesign.core.errors import InputError, quoted
+from dzdesign.identify.record import checked_record
 
 if TYPE_CHECKING:
     from dzdesign.design.common import CommonSetting, Designed
@@ -31,6 +34,9 @@ HASHED = {
 TABLE = "valves.csv"
 #: No number of the table is larger: volts, MPa, per cent, shares.
 LARGEST = 1e6
+#: A spreadsheet takes a cell that begins so for a formula, but for the '; one more ' before it makes it text.
+FORMULA = re.compile(r"'*[=+\-@]")
+SAFE = re.compile(f"'{FORMULA.pattern}")
 TEXTS = ("name", "status", "reason", "warnings", "inputs_sha256", *HASHED)
 
 
@@ -72,8 +78,12 @@ def read_back(results: Results, name: str, unwritten: Mapping[str, str]) -> Cali
     return Calibrated(manifest=manifest, designed=designed, hashes=hashes)
 
 
-def rows_of(found: Mapping[str, Calibrated], common: "CommonSetting | None") -> list[dict[str, Any]]:
-    """Return the rows, by name; see `SIDE_COLUMNS`.
+def rows_of(
+    found: Mapping[str, Calibrated],
+    common: "CommonSetting | None",
+    records: Mapping[str, Mapping[str, str]] | None = None,
+) -> list[dict[str, Any]]:
+    """Return the rows, in the order of the names; see `SIDE_COLUMNS`.
 
     Parameters
     ----------
@@ -81,11 +91,13 @@ def rows_of(found: Mapping[str, Calibrated], common: "CommonSetting | None") -> 
         Name to what was read back.
     common : CommonSetting or None
         For the cost of it at each valve.
+    records : mapping, optional
+        Name to the record that the valve was given, for those without a valve.json that has it.
     """
     both = any(each.designed and each.designed.own.negative for each in found.values())
     signs = {"": 1} if not both else {"positive_": 1, "negative_": -1}
     rows = []
-    for name in sorted(found):
+    for name in sorted(found, key=by_name):
         each = found[name]
         row: dict[str, Any] = {"name": name, "status": each.manifest["status"], "reason": each.manifest["reason"]}
         for prefix, sign in signs.items():
@@ -98,7 +110,25 @@ def rows_of(found: Mapping[str, Calibrated], common: "CommonSetting | None") -> 
         row["inputs_sha256"] = each.manifest.get("inputs_sha256") or None
         row.update({column: each.hashes.get(column) for column in HASHED})
         rows.append(row)
+    _add_records(rows, [_record(found[row["name"]], (records or {}).get(row["name"], {})) for row in rows])
     return rows
+
+
+def _record(valve: Calibrated, given: Mapping[str, str]) -> Mapping[str, str]:
+    """Return a valve's record: of its valve.json, or as it was given if that can be a record."""
+    if valve.designed:
+        return valve.designed.valve.record
+    try:
+        return checked_record(given.items(), "the record")
+    except InputError:  # such a valve has failed, and says why itself
+        return {}
+
+
+def _add_records(rows: Sequence[dict[str, Any]], records: Sequence[Mapping[str, str]]) -> None:
+    """Add a column for each entry that some valve's record has, in the order in which they come."""
+    names = dict.fromkeys(name for record in records for name in record)
+    for row, record in zip(rows, records, strict=True):
+        row.update({RECORD + name: record.get(name) for name in names})
 
 
 def _side_values(designed: "Designed", sign: int, common: "CommonSetting | None") -> dict[str, Any]:
@@ -169,11 +199,27 @@ def is_text(column: str) -> bool:
     column : str
         Its name.
     """
-    return column in TEXTS or column.endswith("trend")
+    return column in TEXTS or column.endswith("trend") or column.startswith(RECORD)
+
+
+def safe_cell(text: str) -> str:
+    """Return a text as a cell of a CSV file that no spreadsheet takes for a formula; `rows_from` takes it back.
+
+    Parameters
+    ----------
+    text : str
+        Somebody's.
+
+    Examples
+    --------
+    >>> safe_cell("=1+1"), safe_cell("'=1"), safe_cell("4711")
+    ("'=1+1", "''=1", '4711')
+    """
+    return f"'{text}" if FORMULA.match(text) else text
 
 
 def table_files(rows: Sequence[Mapping[str, Any]]) -> dict[str, bytes]:
-    """Return valves.csv and valves.parquet, the same rows in both.
+    """Return valves.csv and valves.parquet, the same rows in both, but for `safe_cell` in the former.
 
     Parameters
     ----------
@@ -186,7 +232,8 @@ def table_files(rows: Sequence[Mapping[str, Any]]) -> dict[str, bytes]:
     frame = polars.DataFrame([dict(row) for row in rows], schema=schema)
     parquet = io.BytesIO()
     frame.write_parquet(parquet)
-    return {TABLE: frame.write_csv().encode(), "valves.parquet": parquet.getvalue()}
+    safe = frame.with_columns(polars.col(polars.String).str.replace(f"^({FORMULA.pattern})", "'${1}"))
+    return {TABLE: safe.write_csv().encode(), "valves.parquet": parquet.getvalue()}
 
 
 def rows_from(content: bytes, source: str) -> list[dict[str, Any]]:
@@ -224,7 +271,7 @@ def _row(heading: Sequence[str], line: Sequence[str], where: str) -> dict[str, A
     row: dict[str, Any] = {}
     for column, cell in zip(heading, line, strict=True):
         if is_text(column):
-            row[column] = cell
+            row[column] = cell[1:] if SAFE.match(cell) else cell
             continue
         try:
             row[column] = float(cell) if cell else None

@@ -20,6 +20,7 @@ RECORD = "record."
 #: A name is a folder's on every system and a cell's in every spreadsheet.
 NAME = re.compile(r"[^\W_][\w .+-]{0,99}(?<![. ])")
 RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
+DIGITS = re.compile(r"([0-9]+)")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,8 +72,27 @@ class Valve:
         return found
 
 
+def by_name(name: str) -> tuple[tuple[tuple[str, int, str], ...], str]:
+    """Return what to sort a valve by: its name, the numbers in it as numbers.
+
+    Parameters
+    ----------
+    name : str
+        Of a valve.
+
+    Examples
+    --------
+    >>> sorted(["V10", "V2", "V1b", "V1"], key=by_name)
+    ['V1', 'V1b', 'V2', 'V10']
+    """
+    words, numbers = DIGITS.split(name)[::2], [digits.lstrip("0") for digits in DIGITS.findall(name)]
+    # By length first: a number may have more digits than Python makes an int of.
+    parts = ((word, len(digits), digits) for word, digits in zip(words, [*numbers, ""], strict=True))
+    return tuple(parts), name
+
+
 def valves_of(source: Path, pattern: str | None, options: Collection[str]) -> list[Valve]:
-    """Return the valves that a folder or a CSV file names, in the order of their names.
+    """Return the valves that a folder or a CSV file names, in the order of their names; see `by_name`.
 
     Parameters
     ----------
@@ -102,7 +122,7 @@ def valves_of(source: Path, pattern: str | None, options: Collection[str]) -> li
     if not valves:
         raise InputError(f"'{source}' names no valve; expected one subfolder of recordings, or one row, a valve")
     _check_names([valve.name for valve in valves], source)
-    return sorted(valves, key=lambda valve: valve.name)
+    return sorted(valves, key=lambda valve: by_name(valve.name))
 
 
 def _of_folder(folder: Path, pattern: str | None) -> list[Valve]:
