@@ -270,9 +270,10 @@ def _refuse_to_lose(folder: Path, changed: set[str]) -> None:
 
 
 def _changed_in(folder: Path, manifest: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the files of a folder that are there and not as dzdesign wrote them."""
+    """Yield the files of a folder that are there and not as dzdesign wrote them; a link is a person's, wherever to."""
     for name, digest in manifest["files"].items():
-        if (folder / name).is_file() and _digest(folder / name) != digest:
+        path = folder / name
+        if path.is_symlink() or (path.is_file() and _digest(path) != digest):
             yield name
 
 

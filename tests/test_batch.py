@@ -453,3 +453,20 @@ def test_no_more_processes_than_have_something_to_do(monkeypatch):
     monkeypatch.setattr("os.cpu_count", lambda: 2)
     assert [useful_jobs(jobs, 60) for jobs in (1, 2, 8, 1000)] == [1, 2, 8, 8]
     assert [useful_jobs(1000, waiting) for waiting in (0, 1, 3)] == [2, 2, 3]  # one alone would be this very process
+
+
+def test_a_board_file_that_was_filled_in_stays_and_its_valve_with_it(tmp_path, capsys):
+    lot = tmp_path / "lot"
+    write_lot(lot, 2, 0, SEED)
+    out = tmp_path / "out"
+    command = ["batch", str(lot), "-o", str(out), "--jobs", "1", *OPTIONS[:-1], "cortex-m4"]
+    assert main(command) == 0
+    board = out / "valves" / "V0001" / "firmware" / "cortex_m4" / "dz_board.c"
+    board.write_text(filled := board.read_text() + "/* mine */\n")
+    common = (out / "common_compensator.json").read_bytes()
+    assert main(command) == 0
+    assert "2 of them done before" in capsys.readouterr().err
+    assert main([*command, "--guard", "mean"]) == 0  # designed anew
+    assert board.read_text() == filled
+    assert main(command) == 0
+    assert board.read_text() == filled and (out / "common_compensator.json").read_bytes() == common

@@ -130,6 +130,27 @@ def test_what_was_filled_in_is_not_lost_to_another_target(compensator, cortex):
     assert "return 7u;" in (cortex / "cortex_m4/dz_board.c").read_text()
 
 
+def test_so_does_one_whose_drive_is_not_mounted_and_one_that_nobody_edited_yet(compensator, cortex, tmp_path):
+    """A stub in its place would compile, and read no converter."""
+    board, mine = cortex / "cortex_m4/dz_board.c", tmp_path / "my_board.c"
+    board.rename(mine)
+    board.symlink_to(mine)
+    kept = write_folder(cortex, *_parts(generate(compensator, "cortex-m4")))
+    assert kept == {"cortex_m4/dz_board.c": False} and board.is_symlink()
+    mine.rename(tmp_path / "elsewhere.c")
+    kept = write_folder(cortex, *_parts(generate(compensator, "cortex-m4")))
+    assert kept == {"cortex_m4/dz_board.c": False} and board.is_symlink() and not board.exists()
+    core = cortex / "core/dz_comp.c"
+    core.rename(tmp_path / "dz_comp.c")
+    core.symlink_to(tmp_path / "gone.c")
+    with pytest.raises(InputError, match=r"dz_comp\.c' was changed since dzdesign wrote it and would be lost"):
+        write_folder(cortex, *_parts(generate(compensator, "cortex-m4")))
+
+
+def _parts(firmware):
+    return firmware.files, firmware.manifest
+
+
 def test_a_link_in_its_place_stays_a_link(compensator, cortex, tmp_path):
     mine = tmp_path / "my_board.c"
     mine.write_text("/* mine */\n")

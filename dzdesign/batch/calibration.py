@@ -13,6 +13,8 @@ from dzdesign.core.artefacts import TOOL, sha256_of, write_folder
 from dzdesign.core.errors import DzdesignError, one_line
 
 OK, FAILED, DOES_NOT_HOLD = "ok", "failed", "does not hold"
+#: Folder of a valve's firmware, in the folder of its results.
+FIRMWARE = "firmware"
 #: A worker may run several threads; NumPy and the solvers of one process would only get in each other's way.
 ONE_AT_A_TIME = Lock()
 
@@ -129,14 +131,14 @@ def _run(task: Task, folder: Path) -> tuple[str, str]:
     valve = api.identify(paths, **task.identify, output=out / "valve.json")
     compensator = api.design(valve, target=task.target, **task.design, output=out / "compensator.json")
     firmware = generate(compensator, task.target)  # proved by the design, a line above
-    write_folder(out / "firmware", firmware.files, firmware.manifest)
+    write_folder(out / FIRMWARE, firmware.files, firmware.manifest)
     if not task.verify:
         return OK, ""
     plant = None
     if task.plant:
         plant = folder / task.plant[0]
         plant.write_bytes(task.plant[1])
-    verification = api.verify(out / "firmware", plant=plant, output=out / "evidence")
+    verification = api.verify(out / FIRMWARE, plant=plant, output=out / "evidence")
     if verification.holds:
         return OK, ""
     check = next(check for check in verification.checks if not check.holds)

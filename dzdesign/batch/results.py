@@ -1,12 +1,13 @@
 """The folder of a batch: one folder a valve, written whole; what is there and still valid is not made again."""
 
+import json
 import re
 import shutil
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
-from dzdesign.batch.calibration import DOES_NOT_HOLD, FAILED, OK, Outcome
+from dzdesign.batch.calibration import DOES_NOT_HOLD, FAILED, FIRMWARE, OK, Outcome
 from dzdesign.core.artefacts import MANIFEST_NAME, TOOL, parse_document, sha256_of, to_json, write_file, write_folder
 from dzdesign.core.errors import InputError
 
@@ -80,6 +81,7 @@ class Results:
             "status": outcome.status,
             "reason": outcome.reason,
             "inputs_sha256": outcome.digest,
+            "board": _board_of(files),
         }
         write_folder(self.of(outcome.name), files, manifest)
 
@@ -106,8 +108,16 @@ class Results:
             manifest = self.manifest(name)
             if manifest.get("inputs_sha256") != digest:
                 return False
+            board = manifest.get("board") or ()  # of which a person's version is as good
             return all(
-                sha256_of((self.of(name) / file).read_bytes()) == sha256 for file, sha256 in manifest["files"].items()
+                sha256_of((self.of(name) / file).read_bytes()) == sha256 or file in board
+                for file, sha256 in manifest["files"].items()
             )
         except (InputError, OSError):
             return False
+
+
+def _board_of(files: Mapping[str, bytes]) -> list[str]:
+    """Return which files of a valve's folder are its user's to fill in: those of its firmware."""
+    manifest = files.get(f"{FIRMWARE}/{MANIFEST_NAME}")
+    return [f"{FIRMWARE}/{name}" for name in json.loads(manifest)["board"]] if manifest else []
