@@ -115,7 +115,7 @@ def about_stuck_recordings(tests: Sequence[RampTest]) -> Iterator[Warning_]:
         Of one side, its commands and flows positive.
     """
     scatters = any(_scatters(test) for test in tests)
-    for test in tests:
+    for test in sorted(tests, key=lambda test: test.source):
         if not is_one_number(test):
             continue
         dp = float(test.dp[0])
@@ -143,7 +143,9 @@ def about_typed_pressures(tests: Sequence[RampTest]) -> Iterator[Warning_]:
         Of one side, its commands and flows positive.
     """
     recorded = [test for test in tests if test.dp is not None and not test.dp_is_declared]
-    for test in recorded if all(is_one_number(test) for test in recorded) else ():
+    if not all(is_one_number(test) for test in recorded):
+        return
+    for test in sorted(recorded, key=lambda test: (float(test.dp[0]), test.source)):
         yield Warning_(
             code="declared-pressure",
             text=(
@@ -216,7 +218,7 @@ def _at_one_pressure(tests: Sequence[RampTest]) -> Iterator[tuple[float, list[Ra
         if 0 < high < APART * low:
             at_nominal = np.sqrt(dp / np.maximum(test.dp, SMALL_FLOW * dp))
             steady.append((float(dp), replace(test, q=test.q * at_nominal)))
-    steady.sort(key=lambda pair: pair[0])
+    steady.sort(key=lambda pair: (pair[0], pair[1].source))
     while steady:
         lowest = steady[0][0]
         group = [test for dp, test in steady if dp <= (1 + SAME_PRESSURE) * lowest]
