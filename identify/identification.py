@@ -74,21 +74,21 @@ def identify_sides(
         if not mine:
             continue
         stuck = tuple(about_a_stuck_sensor(mine))
-        doubts = stuck or (*about_stuck_recordings(mine), *about_mixtures(mine))
-        doubtful = {item.source for item in doubts}
-        typed = () if stuck else [item for item in about_typed_pressures(mine) if item.source not in doubtful]
+        mixed = stuck or tuple(about_mixtures(mine))
+        pressures = stuck or (*mixed, *_about_single_pressures(mine))
         mine, own, clipped = without_clipping(mine, options)
         try:
             sides[name] = identify_side(mine, own)
         except InputError as error:
+            # Ramps of several pressures taken for one test may be refused for any reason: the cause is this.
+            reason = f"{error}; it may be that {mixed[0].text}" if mixed else str(error)
             if not sides:
-                # Ramps of several pressures taken for one test may be refused for any reason: the cause is this.
-                raise InputError(f"{error}; it may be that {doubts[0].text}") if doubts else error from error
-            warnings.append(Warning_(code="side-refused", text=f"the {name} side is missing: {error}", source=None))
+                raise InputError(reason) from error
+            warnings.append(Warning_(code="side-refused", text=f"the {name} side is missing: {reason}", source=None))
             continue
         prefix = f"{name} side: " if len(sides) > 1 else ""
         own_words = [item for item in sides[name].warnings if not stuck or item.code not in ALSO_OF_A_MIXTURE]
-        warnings += [replace(item, text=prefix + item.text) for item in (*doubts, *typed, *clipped, *own_words)]
+        warnings += [replace(item, text=prefix + item.text) for item in (*pressures, *clipped, *own_words)]
     lag = next(iter(sides.values())).described.lag
     model = ValveModel(
         u_max_V=options.u_max,
@@ -107,6 +107,13 @@ def identify_sides(
         record=record or {},
     )
     return Identified(model=model, sides=sides)
+
+
+def _about_single_pressures(mine: Sequence[RampTest]) -> list[Warning_]:
+    """Return what is weak in the pressure drop of single recordings; of a stuck one not that it was typed in."""
+    stuck = list(about_stuck_recordings(mine))
+    known = {item.source for item in stuck}
+    return stuck + [item for item in about_typed_pressures(mine) if item.source not in known]
 
 
 def _about_two_sides() -> Warning_:

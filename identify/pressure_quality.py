@@ -238,7 +238,7 @@ def about_flow_gains(tests: Sequence[TestResult]) -> Iterator[Warning_]:
     tests : sequence of TestResult
         Of one side, in the order of rising pressure drop.
     """
-    left = [test for test in tests if test.dp_MPa is not None]
+    left = [test for test in tests if test.dp_MPa is not None and test.slope_L_min_V > 0]
     # Without the worst one the others may agree; of two, either may be wrong, and both are named.
     while len(left) > 1:
         against = [[other for other in left if _contradict(test, other)] for test in left]

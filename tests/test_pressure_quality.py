@@ -77,6 +77,12 @@ class TestFlowAgainstPressure:
         with pytest.raises(InputError, match="not above zero.*it may be that recordings that are " + words):
             identify(tests)
 
+    def test_a_side_that_is_missing_for_that_reason_says_it(self):
+        mixed = [ramp(0.5, said=5.0, source="a.csv"), ramp(1, source="b.csv"), ramp(5, source="c.csv")]
+        tests = [ramp(1), *(replace(test, u=-test.u, q=-test.q) for test in mixed)]
+        (warning,) = warned(tests, "side-refused")
+        assert "it may be that recordings that are taken as one test, at 5 MPa" in warning.text
+
     def test_recordings_of_one_test_that_differ_are_said_where_nothing_is_refused(self):
         mixed = [ramp(1), ramp(4, source="a.csv"), ramp(2.2, said=4.0, source="b.csv"), ramp(4, source="c.csv")]
         (warning, *_) = warned(mixed, "flow-contradicts-dp")
