@@ -15,6 +15,7 @@ from dzdesign.recordings import expand, read_recordings, rows_to_skip
 
 if TYPE_CHECKING:
     from dzdesign.identify.first_look import GuessedColumns, SeenSide
+    from dzdesign.identify.model import Warning_
     from dzdesign.identify.ramp_files import RampTest
 
 #: Where recordings are looked for if none are named.
@@ -160,7 +161,6 @@ def _look(
     """Return what was seen, and what is open."""
     from dzdesign.identify.column_labels import parse_columns
     from dzdesign.identify.first_look import guess_columns, look_at_sides, proposed_u_max
-    from dzdesign.identify.named_pressure import pressure_in_name
 
     given = parse_columns(said_columns) if said_columns else {}
     guesses = [guess_columns(path, skip_rows) for path in with_bar(paths, "looking at columns")]
@@ -175,18 +175,10 @@ def _look(
     dp = said_dp if isinstance(said_dp, dict) else {test.source: said_dp for test in tests} if said_dp else {}
     lacking = [test.source for test in tests if test.dp is None]
     if lacking:
-        dp = {source: text for source in lacking if (text := pressure_in_name(source))}
+        dp, unsaid, by_names = _pressures_by_names(lacking, alone=len(tests) == 1)
+        opens, notes = opens + unsaid, notes + by_names
         if len(dp) == len(lacking):
             tests = read_recordings(names, u_max=10.0, columns=columns or None, dp=dp, skip_rows=skip_rows)
-            notes.append(f"pressure drop by the files' names: {', '.join(dict.fromkeys(dp.values()))}")
-        elif len(tests) > 1:
-            unsaid = [source for source in lacking if source not in dp]
-            opens += [
-                f"pressure drop of '{source}': no column, and none in its name; declare it by --dp or [dp]"
-                for source in unsaid
-            ]
-        else:
-            notes.append('no pressure drop, by a column or a file\'s name; declare it, if you know it, by --dp "1 MPa"')
     u_max, u_seen = proposed_u_max(tests)
     in_per_cent = _is_in_per_cent(guesses, columns)
     if in_per_cent:
@@ -208,6 +200,25 @@ def _look(
         ),
         opens,
     )  # fmt: skip
+
+
+def _pressures_by_names(lacking: list[str], *, alone: bool) -> tuple[dict[str, str], list[str], list[str]]:
+    """Return the pressures that files' names state, what is open, and what is to be said; a single file may lack it."""
+    from dzdesign.identify.named_pressure import pressures_in_name
+
+    readings = {source: pressures_in_name(source) for source in lacking}
+    dp = {source: texts[0] for source, texts in readings.items() if len(texts) == 1}
+    opens = [
+        f"pressure drop of '{source}': its name may say {' or '.join(texts)}; declare the right one by --dp or [dp]"
+        if texts
+        else f"pressure drop of '{source}': no column, and none in its name; declare it by --dp or [dp]"
+        for source, texts in readings.items()
+        if len(texts) > 1 or (not texts and not alone)
+    ]
+    if len(dp) == len(lacking):
+        return dp, [], [f"pressure drop by the files' names: {', '.join(dict.fromkeys(dp.values()))}"]
+    nothing = 'no pressure drop, by a column or a file\'s name; declare it, if you know it, by --dp "1 MPa"'
+    return dp, opens, [] if opens else [nothing]
 
 
 def _is_in_per_cent(guesses: "list[GuessedColumns]", columns: dict[str, str]) -> bool:
@@ -251,7 +262,7 @@ def _contradicted(tests: "list[RampTest]", u_max: float, guessed: str) -> tuple[
     """
     from dzdesign.identify.model import SIDES
     from dzdesign.identify.named_pressure import contradicts
-    from dzdesign.identify.recording_quality import about_a_stuck_sensor
+    from dzdesign.identify.pressure_quality import about_a_stuck_sensor, about_mixtures, about_stuck_recordings
     from dzdesign.identify.sides import tests_of_side
 
     measured = [
@@ -272,7 +283,16 @@ def _contradicted(tests: "list[RampTest]", u_max: float, guessed: str) -> tuple[
     ]
     sides = [tests_of_side(tests, sign, u_max) for sign in SIDES.values()]
     stuck = [f"CHECK: {warning.text}" for mine in sides for warning in about_a_stuck_sensor(mine)]
-    return [], stuck or (notes if wrong else [])
+    if stuck:
+        return [], stuck
+    named = {source for source, _, _ in wrong}
+    doubts = [item for mine in sides if mine for item in (*about_stuck_recordings(mine), *about_mixtures(mine))]
+    said = [f"CHECK: {_told(item)}" for item in doubts if item.source not in named]
+    return [], (notes if wrong else []) + list(dict.fromkeys(said))
+
+
+def _told(warning: "Warning_") -> str:
+    return f"'{warning.source}': {warning.text}" if warning.source else warning.text
 
 
 def _pressures(guesses: "list[GuessedColumns]", columns: dict[str, str]) -> tuple[list[str], list[str]]:

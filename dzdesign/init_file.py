@@ -154,6 +154,9 @@ def _shown(unit: str) -> str:
 
 
 def _dp_lines(look: "Look", opens: list[str]) -> list[str]:
+    """Return the pressures of files' names, and of those that are open a line to fill in, or one for each reading."""
+    from dzdesign.identify.named_pressure import pressures_in_name
+
     lines = []
     if look.dp:
         lines = ["# Pressure drop of recordings without a column of it, as their names (or you) say.", "[dp]"]
@@ -161,7 +164,9 @@ def _dp_lines(look: "Look", opens: list[str]) -> list[str]:
     missing = [line.split("'")[1] for line in opens if line.startswith("pressure drop of")]
     if missing and not look.dp:
         lines = ["# Pressure drop of recordings without a column of it.", "# [dp]"]
-    lines += [f'# {_quoted(name)} = "1 MPa"' for name in missing]
+    # Of a name with two readings a line for each, the right one to be kept.
+    readings = [(name, text) for name in missing for text in pressures_in_name(name) or ("1 MPa",)]
+    lines += [f"# {_quoted(name)} = {_quoted(text)}" for name, text in readings]
     return [*lines, ""] if lines else []
 
 

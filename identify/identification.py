@@ -8,9 +8,15 @@ from dzdesign.identify.clipped_meter import without_clipping
 from dzdesign.identify.described_tests import L_MIN
 from dzdesign.identify.model import SIDES, ValveModel, Warning_
 from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.pressure_quality import (
+    about_a_stuck_sensor,
+    about_mixtures,
+    about_stuck_recordings,
+    about_typed_pressures,
+)
 from dzdesign.identify.quality import most_serious_first
 from dzdesign.identify.ramp_files import RampTest
-from dzdesign.identify.recording_quality import about_a_stuck_sensor, about_recordings
+from dzdesign.identify.recording_quality import about_recordings
 from dzdesign.identify.side import IdentifiedSide, identify_side
 from dzdesign.identify.sides import tests_of_side
 
@@ -68,18 +74,21 @@ def identify_sides(
         if not mine:
             continue
         stuck = tuple(about_a_stuck_sensor(mine))
+        mixed = stuck or tuple(about_mixtures(mine))
+        pressures = stuck or (*mixed, *_about_single_pressures(mine))
         mine, own, clipped = without_clipping(mine, options)
         try:
             sides[name] = identify_side(mine, own)
         except InputError as error:
+            # Ramps of several pressures taken for one test may be refused for any reason: the cause is this.
+            reason = f"{error}; it may be that {mixed[0].text}" if mixed else str(error)
             if not sides:
-                # Ramps of several pressures taken for one test may be refused for any reason: the cause is this.
-                raise InputError(f"{error}; it may be that {stuck[0].text}") if stuck else error from error
-            warnings.append(Warning_(code="side-refused", text=f"the {name} side is missing: {error}", source=None))
+                raise InputError(reason) from error
+            warnings.append(Warning_(code="side-refused", text=f"the {name} side is missing: {reason}", source=None))
             continue
         prefix = f"{name} side: " if len(sides) > 1 else ""
         own_words = [item for item in sides[name].warnings if not stuck or item.code not in ALSO_OF_A_MIXTURE]
-        warnings += [replace(item, text=prefix + item.text) for item in (*stuck, *clipped, *own_words)]
+        warnings += [replace(item, text=prefix + item.text) for item in (*pressures, *clipped, *own_words)]
     lag = next(iter(sides.values())).described.lag
     model = ValveModel(
         u_max_V=options.u_max,
@@ -98,6 +107,13 @@ def identify_sides(
         record=record or {},
     )
     return Identified(model=model, sides=sides)
+
+
+def _about_single_pressures(mine: Sequence[RampTest]) -> list[Warning_]:
+    """Return what is weak in the pressure drop of single recordings; of a stuck one not that it was typed in."""
+    stuck = list(about_stuck_recordings(mine))
+    known = {item.source for item in stuck}
+    return stuck + [item for item in about_typed_pressures(mine) if item.source not in known]
 
 
 def _about_two_sides() -> Warning_:

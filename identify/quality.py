@@ -8,6 +8,7 @@ from dzdesign.identify.described_tests import L_MIN, DescribedTest, DescribedTes
 from dzdesign.identify.knee_errors import about_errors
 from dzdesign.identify.model import SideModel, TestResult, Warning_
 from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.pressure_quality import about_flow_gains
 from dzdesign.identify.sweep_quality import about_sweeps
 
 #: A softer edge than this share of u_max between knee and the tail's zero is said.
@@ -32,7 +33,7 @@ LEAK_SHARE = 1e-3
 #: pass at zero command, what can't be said, what costs performance, and what is only to be known.
 MOST_SERIOUS_FIRST = (
     "branch-order", "one-branch",
-    "simulated", "pressure-stuck", "time-unit", "missing-samples", "side-refused", "two-sides",
+    "simulated", "flow-contradicts-dp", "pressure-stuck", "time-unit", "missing-samples", "side-refused", "two-sides",
     "coarse-flow", "meter-clipped", "edge-not-swept", "gap", "not-monotone", "leak", "meter-zero", "onset-hidden",
     "lag-large", "lag-unknown", "clock",
     "no-pressure", "one-pressure", "declared-pressure",
@@ -74,6 +75,7 @@ def find_warnings(
         *_about_steps(side, group.tests, options),
         *_about_the_lag(group, options),
         *_about_order(side, departure),
+        *about_flow_gains(side.tests),
         *_about_pressure(side, group.tests),
         *_about_declarations(group.tests),
         *about_sweeps(side, group.tests, options.u_max),

@@ -280,6 +280,42 @@ def test_names_that_contradict_the_column_are_said(here, capsys, dither):
     assert "CHECK" not in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("name", ["Rampe_0_5MPa.txt", "Rampe_0-5MPa.txt", "Rampe_0p5MPa.txt"])
+def test_names_without_a_point_say_decimal_numbers(here, name):
+    for dp_MPa, path in ((0.5, name), (1.0, "Rampe_1MPa.txt")):
+        time, u, dp, q = columns_of(dp_MPa)
+        write(path, "t_s,u_V,Q_Lmin", time, u, q * dp_MPa**0.5)
+        write(f"with_{path}", "t_s,u_V,dP_MPa,Q_Lmin", time, u, 0.99 * dp, q * dp_MPa**0.5)
+    text, valve = init_then_identify("Rampe_*.txt")
+    assert tomllib.loads(text)["dp"] == {name: "0.5 MPa", "Rampe_1MPa.txt": "1 MPa"}
+    assert [test["dp_MPa"] for test in valve["sides"]["positive"]["tests"]] == [0.5, 1.0]
+    assert main(["init", "with_*", "-o", "with.toml"]) == 0 and "CHECK" not in Path("with.toml").read_text()
+
+
+@pytest.mark.parametrize("others", [(), ("Rampe_1MPa.txt",)])
+def test_a_name_that_can_be_read_in_two_ways_is_asked(here, capsys, others):
+    time, u, _, q = columns_of(1.0)
+    for path in ("Rampe_2_5MPa.txt", *others):
+        write(path, "t_s,u_V,Q_Lmin", time, u, q)
+    assert main(["init", "Rampe_2_5MPa.txt", *others]) == 1
+    said = capsys.readouterr().out
+    assert "open: pressure drop of 'Rampe_2_5MPa.txt': its name may say 2.5 MPa or 5 MPa; declare the right one" in said
+    text = Path("dzdesign.toml").read_text()
+    assert '# "Rampe_2_5MPa.txt" = "2.5 MPa"\n# "Rampe_2_5MPa.txt" = "5 MPa"\n' in text
+    assert tomllib.loads(text).get("dp", {}) == {path: "1 MPa" for path in others}
+
+
+def test_one_stuck_sensor_and_flows_that_differ_are_said(here, capsys):
+    for name, dp_MPa in (("a.csv", 1.0), ("b.csv", 2.0), ("c.csv", 2.0)):
+        time, u, dp, q = columns_of(dp_MPa)
+        noise = 0 if name == "a.csv" else np.random.default_rng(1).integers(-9, 9, u.size)
+        write(name, "t_s,u_V,dP_MPa,Q_Lmin", time, u, dp + 0.001 * noise, q * (2 if name == "b.csv" else 1))
+    assert main(["init", "a.csv", "b.csv", "c.csv"]) == 0
+    said = capsys.readouterr().out
+    assert "CHECK: 'a.csv': the pressure drop is 1 MPa to the last digit" in said
+    assert "CHECK: recordings that are taken as one test, at" in said and said.count("CHECK") == 2
+
+
 def test_several_recordings_without_a_pressure_are_open(here, capsys):
     for number in (1, 2):
         time, u, _, q = columns_of(float(number))
