@@ -5,6 +5,7 @@ from fractions import Fraction
 from textwrap import wrap
 from typing import Any
 
+from dzdesign.codegen.common_lot import lot_in_words
 from dzdesign.codegen.constants import COLUMNS, Constant, defines
 from dzdesign.codegen.drive_constants import (
     drive_constants,
@@ -178,7 +179,8 @@ def certificate_lines(compensator: Compensator, sign: int = 1) -> list[str]:
         text += f", so that nothing flows; flow below {certificate.level_L_min:.2f} L/min counts as none."
     else:
         text += ". After closing, flow may remain: the closing threshold lies lower, and is not the one guarded."
-    return wrap(text, COLUMNS - 3)
+    lot = lot_in_words(compensator)
+    return wrap(f"{text} {lot.certificate}" if lot else text, COLUMNS - 3)
 
 
 def _counted(compensator: Compensator) -> str:

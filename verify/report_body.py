@@ -1,6 +1,7 @@
 """What stands in each section of the report: sentences, figures and tables, and what is missing for them."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from dzdesign.core.artefacts import to_json
@@ -11,6 +12,8 @@ from dzdesign.verify.evidence_curves import closed_loop_name, input_map_name, re
 from dzdesign.verify.report_acceptance import assessed_table, limits_table, paper_tables
 from dzdesign.verify.report_artefacts import Chain
 from dzdesign.verify.report_evidence_figures import dead_zone_figure, loop_figure, map_figure, zero_figure
+from dzdesign.verify.report_lot import SECTION as LOT_SECTION
+from dzdesign.verify.report_lot import common_count, lot_section
 from dzdesign.verify.report_page import Section
 from dzdesign.verify.report_sections import (
     checks_table,
@@ -32,6 +35,7 @@ from dzdesign.verify.required import required_of
 SMALLEST_P = 1e-9
 #: Anchor and heading of every section, in their order.
 SECTIONS = (
+    LOT_SECTION,
     ("data", "Data and fit"),
     ("thresholds", "Thresholds"),
     ("beta", "β over the pressure drop"),
@@ -44,6 +48,8 @@ SECTIONS = (
     ("warnings", "Warnings, and what is not covered"),
     ("provenance", "Provenance"),
 )
+#: Of a common setting, these are of the one valve that its file holds.
+OF_A_VALVE = ("data", "thresholds", "beta", "loop")
 #: Of every report, whatever it finds.
 NOT_PROVED = (
     "Pressure drops beyond the tested interval: the nearest tested β is held there, and nothing is certified.",
@@ -78,7 +84,10 @@ def sections_of(chain: Chain) -> dict[str, Section]:
         "warnings": _warnings_section(chain),
         "provenance": _provenance_section(chain),
     }
-    return {name: made[name] for name, _ in SECTIONS}
+    if compensator and common_count(compensator):
+        made |= {name: replace(made[name], of_valve=True) for name in OF_A_VALVE}
+        made["lot"] = lot_section(compensator)
+    return {name: made[name] for name, _ in SECTIONS if name in made}
 
 
 def _valve_sections(valve: dict[str, Any] | None, compensator: dict[str, Any] | None) -> dict[str, Section]:
@@ -186,7 +195,7 @@ def _inputs_section(chain: Chain) -> Section:
             f"{side.capitalize()} commands: {whole(each['inputs'])} pairs of command and pressure-difference code "
             f"compared with the exactly rounded law, {whole(each['wrong'])} wrong, largest error "
             f"{each['largest_error']} counts; {each['over_compensated']} pressure codes over-compensated, smallest "
-            f"margin {1e3 * each['smallest_margin_V']:.3f} mV."
+            f"margin of the C's compare values {1e3 * each['smallest_margin_V']:.3f} mV."
         )
         if each["first_wrong"]:
             lines.append(f"First wrong: {each['first_wrong']}.")

@@ -207,8 +207,9 @@ def _certificate(compensator: dict[str, Any], inputs: list[dict[str, Any]]) -> F
         label="Certificate",
         value=f"{100 * worst['confidence']:g} %",
         note=f"confidence that the drive at zero command stays below the {worst['guard']} threshold from {low:.2f} to "
-        f"{high:.2f} MPa; smallest margin to its bound {margin:.2f} mV at any pressure"
-        + (f", {least:.2f} mV at those that the converter can tell apart" if inputs else "")
+        f"{high:.2f} MPa; smallest margin {margin:.3f} mV of the exact law under the certified offset, half a count kept "
+        "for the rounding"
+        + (f"; {least:.3f} mV of the C's compare values under the threshold's bound" if inputs else "")
         + f". Flow below {worst['level_L_min']:.2f} L/min counts as none",
     )
 
