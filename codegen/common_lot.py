@@ -47,9 +47,9 @@ def lot_in_words(compensator: Compensator) -> LotInWords | None:
     return LotInWords(
         carrier=carrier,
         banner=f"COMMON SETTING of {count} valves, {known}.",
-        readme=f"**This is a common setting of {count} valves** ({known}), not one valve's own. Recordings and certificate "
-        f"named in these files are those of one of them, the carrier: {carrier[0].lower()}{carrier[1:]}. "
-        "`../compensator.json` lists all under `lot`.",
+        readme=f"**This is a common setting of {count} valves**, not one valve's own.\n"
+        f"Lot SHA-256: {digest or 'not known'}. Recordings and certificate that these files name are those of one\n"
+        f"of them, the carrier: {carrier[0].lower()}{carrier[1:]}. `../compensator.json` lists all under `lot`.",
         certificate=f"The certificate is that of one of the {count} valves of this common setting, "
         f"{carrier[0].lower()}{carrier[1:]}; of the others codegen proved the same under their own bounds."
         if digest

@@ -6,6 +6,7 @@ from typing import Any
 
 from dzdesign.core.artefacts import TOOL, sha256_of
 from dzdesign.core.errors import InputError, RequirementError, and_more
+from dzdesign.core.units import span_MPa
 from dzdesign.design.certifying import prove_certificates
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.derived import prove_derived
@@ -132,9 +133,8 @@ def certificate_follows(compensator: Compensator) -> Check:
     return Check(
         name=name,
         holds=True,
-        text=f"{common}the {certificate.guard} threshold's {100 * certificate.confidence:.6g}% lower bound, from "
-        f"{float(certificate.dp_MPa[0]):.2f} to {float(certificate.dp_MPa[1]):.2f} MPa, proved again at every "
-        "difference of pressure codes",
+        text=f"{common}the {certificate.guard} threshold's {100 * certificate.confidence:.6g}% lower bound, "
+        f"{span_MPa(*map(float, certificate.dp_MPa))}, proved again at every difference of pressure codes",
     )
 
 

@@ -103,14 +103,17 @@ def make_report(chain: Chain) -> Report:
     """
     verdict = headline(chain)
     compensator = chain.document("compensator")
+    lot, figures = lot_figures(chain), key_figures(chain)
+    if lot and chain.document("verification"):  # the last of them, the inputs, is of the C and not of a valve
+        lot, figures = (*lot, figures[-1]), figures[:-1]
     with figure_style():
         sections = sections_of(chain)
     html = render_page(
         title=_title(chain),
         verdict=verdict,
         record=_record(chain),
-        figures=key_figures(chain),
-        lot=lot_figures(chain),
+        figures=figures,
+        lot=lot,
         carrier=carrier_of(compensator) if common_count(compensator) and compensator else "",
         headings=[(name, heading) for name, heading in SECTIONS if name in sections],
         sections=sections,

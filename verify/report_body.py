@@ -6,6 +6,7 @@ from typing import Any
 
 from dzdesign.core.artefacts import to_json
 from dzdesign.core.errors import InputError
+from dzdesign.core.units import chance
 from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.design.signals_in_words import signals_in_words
 from dzdesign.verify.evidence_curves import closed_loop_name, input_map_name, read_curves, zero_command_name
@@ -27,12 +28,10 @@ from dzdesign.verify.report_sections import (
     series_table,
     thresholds_table,
 )
-from dzdesign.verify.report_table import Table, whole
+from dzdesign.verify.report_table import Table, counted, whole
 from dzdesign.verify.report_valve_figures import beta_figure, law_figure, lines_figure, thresholds_figure
 from dzdesign.verify.required import required_of
 
-#: A probability below this is said to be below it.
-SMALLEST_P = 1e-9
 #: Anchor and heading of every section, in their order.
 SECTIONS = (
     LOT_SECTION,
@@ -110,7 +109,7 @@ def _valve_sections(valve: dict[str, Any] | None, compensator: dict[str, Any] | 
         "data": Section(
             figures=tuple(fits),
             lines=(
-                f"{sum(len(side['tests']) for side in valve['sides'].values())} ramp tests; full command "
+                f"{counted(sum(len(side['tests']) for side in valve['sides'].values()), 'ramp test')}; full command "
                 f"{valve['u_max_V']:g} V.",
                 f"Flow meter: floor {meter['floor_L_min']:.2f} L/min; lag taken as {meter['lag_s']:.3g} s "
                 f"({lag.get(meter['lag_is'], meter['lag_is'])}).",
@@ -134,10 +133,9 @@ def _trend(name: str, side: dict[str, Any]) -> str:
     if side["trend"] is None:
         return f"{stroke}; how the threshold moves with the pressure drop can't be said from one ramp test."
     change, error = 1e3 * side["trend_change_V"], 1e3 * side["trend_change_se_V"]
-    chance = f"= {side['trend_p']:.2g}" if side["trend_p"] > SMALLEST_P else f"below {SMALLEST_P:g}"
     return (
         f"{stroke}; trend of the threshold with the pressure drop: {side['trend']}, {change:+.1f} ± {error:.1f} mV "
-        f"over the tested range (p {chance})."
+        f"over the tested range ({chance(side['trend_p'])})."
     )
 
 

@@ -67,9 +67,7 @@ def lot_costs(compensator: dict[str, Any]) -> tuple[LotCost, ...]:
     """
     signs = {name: sign for name, sign in (("positive", 1), ("negative", -1)) if compensator["sides"][name]}
     found = [
-        cost
-        for name, sign in signs.items()
-        for cost in _costs_of_side(compensator, ExactLaw(compensator, sign), name)
+        cost for name, sign in signs.items() for cost in _costs_of_side(compensator, ExactLaw(compensator, sign), name)
     ]
     return tuple(sorted(found, key=lambda each: -each.most_percent))
 
@@ -118,7 +116,7 @@ def lot_figures(chain: Chain) -> tuple[Figure, ...]:
     first = Figure(
         label="Common setting",
         value=f"of {count} valves",
-        note=f"one law for all; the file holds one of them, {carrier}, its carrier, of which the trend is",
+        note=f"one law for all; the file holds one of them, {carrier}, its carrier",
     )
     return (first, _worst(evidence), _cost(lot_costs(compensator)))
 
@@ -133,10 +131,10 @@ def _worst(evidence: dict[str, Any] | None) -> Figure:
     worst = min(found, key=lambda each: each["smallest_margin_V"])
     over = list(dict.fromkeys(name for each in found for name in each["over_compensated"]))
     return Figure(
-        label="Worst valve of the lot",
-        value=worst["worst"],
-        note=f"{1e3 * worst['smallest_margin_V']:.3f} mV from the C's compare values at zero command to its own lower "
-        f"bound, at {worst['worst_dp_MPa']:.2f} MPa; {len(over)} of {min(each['valves'] for each in found)} valves "
+        label=f"Worst valve of the lot: {worst['worst']}",
+        value=f"{1e3 * worst['smallest_margin_V']:.3f} mV",
+        note="margin of the C's compare values at zero command under its own lower bound, at "
+        f"{worst['worst_dp_MPa']:.2f} MPa; {len(over)} of {min(each['valves'] for each in found)} valves "
         "over-compensated",
         kind="bad" if over else "text",
     )
