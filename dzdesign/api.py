@@ -15,7 +15,7 @@ True
 
 import os
 from argparse import Namespace
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -272,7 +272,7 @@ def verify(
     *,
     plant: AnyPath | None = None,
     tolerances: AnyPath | None = None,
-    include: Sequence[AnyPath] = (),
+    include: AnyPath | Iterable[AnyPath] = (),
     output: AnyPath | None = None,
 ) -> "Verification":
     """Verify a firmware: every input against the exact law, then the closed loop; needs a C compiler.
@@ -285,7 +285,7 @@ def verify(
         TOML file of the plant; without it one is made from the identified thresholds.
     tolerances : path, optional
         TOML file of a series of plants about `plant`.
-    include : sequence of path
+    include : path or iterable of paths, optional
         Folders of headers that board files of yours include.
     output : path, optional
         Also write the evidence folder here.
@@ -314,7 +314,7 @@ def verify(
             Path(plant).name if plant is not None else "",
             sha256_of(read_bytes(Path(plant), "plant file")) if plant is not None else None,
             tolerances=read_tolerances(Path(tolerances)) if tolerances is not None else None,
-            include=[Path(place) for place in include],
+            include=[Path(place) for place in ([include] if isinstance(include, str | os.PathLike) else include)],
         )
         verification = with_regenerated(verification, folder)
         if output is not None:

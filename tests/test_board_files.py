@@ -227,7 +227,7 @@ def test_files_in_the_folder_for_them_are_named_kept_and_not_checked(compensator
     (cortex / "board/adc.c").write_text("this is no C")
     (cortex / "board/my_chip.ld").write_text("/* mine */")
     check = unchanged(cortex)
-    assert check.holds and check.text.endswith("yours, in board/, and not checked: board/adc.c and board/my_chip.ld")
+    assert check.holds and check.text.endswith("yours, in board/, and not checked: board/adc.c, board/my_chip.ld")
     write_firmware(generate(compensator, "cortex-m4"), cortex)
     assert (cortex / "board/adc.c").read_text() == "this is no C"
     evidence = {"checks": [], "closed_loop": {}, "monte_carlo": None, "own": ["board/adc.c"]}

@@ -102,7 +102,7 @@ def board_compiles(folder: Path, manifest: dict[str, Any], include: Sequence[Pat
     place = (folder / changed[0]).parent
     sources = sorted(name for name in manifest["files"] if (folder / name).parent == place and name.endswith(".c"))
     # Warnings in headers of a vendor are no concern here: -isystem.
-    folders = [f"-I{folder / 'core'}", f"-I{place}", f"-I{folder / OWN}"]
+    folders = [f"-I{folder / 'core'}", f"-I{place}", "-iquote", str(folder / OWN)]
     folders += [word for path in include for word in ("-isystem", str(path))]
     for source in (name for name in sources if (folder / name).is_file()):
         command = [compiler, *options, *folders, "-c", str(folder / source), "-o", str(build_folder() / "board.o")]

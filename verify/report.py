@@ -9,6 +9,7 @@ from dzdesign.verify.report_artefacts import Chain, chain_of
 from dzdesign.verify.report_body import SECTIONS, sections_of
 from dzdesign.verify.report_figure import figure_style
 from dzdesign.verify.report_law import account_of
+from dzdesign.verify.report_lot import SECTION as LOT_SECTION
 from dzdesign.verify.report_lot import carrier_of, common_count, lot_figures
 from dzdesign.verify.report_page import render_page
 from dzdesign.verify.report_shelf import is_of, places_of, shelf_of
@@ -115,7 +116,7 @@ def make_report(chain: Chain) -> Report:
         figures=figures,
         lot=lot,
         carrier=carrier_of(compensator) if common_count(compensator) and compensator else "",
-        headings=[(name, heading) for name, heading in SECTIONS if name in sections],
+        headings=[(name, heading) for name, heading in (LOT_SECTION, *SECTIONS) if name in sections],
         sections=sections,
         missing=chain.missing,
         law=account_of(compensator["law"]) if compensator else None,

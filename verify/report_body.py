@@ -13,7 +13,6 @@ from dzdesign.verify.evidence_curves import closed_loop_name, input_map_name, re
 from dzdesign.verify.report_acceptance import assessed_table, limits_table, paper_tables
 from dzdesign.verify.report_artefacts import Chain
 from dzdesign.verify.report_evidence_figures import dead_zone_figure, loop_figure, map_figure, zero_figure
-from dzdesign.verify.report_lot import SECTION as LOT_SECTION
 from dzdesign.verify.report_lot import common_count, lot_section
 from dzdesign.verify.report_page import Section
 from dzdesign.verify.report_sections import (
@@ -34,7 +33,6 @@ from dzdesign.verify.required import required_of
 
 #: Anchor and heading of every section, in their order.
 SECTIONS = (
-    LOT_SECTION,
     ("data", "Data and fit"),
     ("thresholds", "Thresholds"),
     ("beta", "β over the pressure drop"),
@@ -86,7 +84,7 @@ def sections_of(chain: Chain) -> dict[str, Section]:
     if compensator and common_count(compensator):
         made |= {name: replace(made[name], of_valve=True) for name in OF_A_VALVE}
         made["lot"] = lot_section(compensator)
-    return {name: made[name] for name, _ in SECTIONS if name in made}
+    return made
 
 
 def _valve_sections(valve: dict[str, Any] | None, compensator: dict[str, Any] | None) -> dict[str, Section]:

@@ -159,13 +159,19 @@ def _dead_zone(loops: list[dict[str, Any]], word: str) -> Figure:
     return Figure(
         label=f"Dead zone on {word}",
         value=f"{max(before):.1f} % → {max(after):.1f} %",
-        note=f"of command, without → with; {_worst_of(loops)}"
+        note=f"of command, without → with; {worst_of(loops)}"
         + (f". With: {min(after):.1f} to {max(after):.1f} %" if len(loops) > 1 else ""),
     )
 
 
-def _worst_of(loops: list[dict[str, Any]]) -> str:
-    """Say of how many runs a figure is the worst: of two sides the pressure drops of each."""
+def worst_of(loops: list[dict[str, Any]]) -> str:
+    """Say of how many runs a figure is the worst: of two sides the pressure drops of each.
+
+    Parameters
+    ----------
+    loops : list of dict
+        Of verification.json.
+    """
     sides = dict.fromkeys(each["side"] for each in loops)
     counts = {name: sum(each["side"] == name for each in loops) for name in sides}
     if len(set(counts.values())) > 1:
@@ -184,7 +190,7 @@ def _at_zero(loops: list[dict[str, Any]]) -> Figure:
     return Figure(
         label="Flow at zero command",
         value="none" if flow <= 1e-9 else f"{flow:.3g} L/min",
-        note=f"in the simulated loop, after closing, {_worst_of(loops)}; without β it would be {bare:.2f} L/min",
+        note=f"in the simulated loop, after closing, {worst_of(loops)}; without β it would be {bare:.2f} L/min",
         kind="text" if flow <= 1e-9 else "bad",
     )
 
