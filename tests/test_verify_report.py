@@ -149,7 +149,7 @@ def test_of_another_spacing_it_is_compared_with_the_file_and_not_tried_without(c
     assert valve_follows(copied / "firmware", document) == []
     evidence = {"checks": [], "closed_loop": {}, "monte_carlo": None}
     (said,) = [line for line in untried_of(evidence) if line.startswith(VALVE)]
-    assert "with the valve.json that compensator.json names beside the firmware" in said
+    assert "with the valve.json that compensator.json names by its SHA-256 beside the firmware" in said
 
 
 def test_a_valve_file_that_was_replaced_is_said_first(copied):

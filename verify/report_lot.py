@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cache
 from itertools import pairwise
 from typing import Any
 
@@ -75,12 +76,17 @@ def lot_costs(compensator: dict[str, Any]) -> tuple[LotCost, ...]:
 def _costs_of_side(compensator: dict[str, Any], exact: ExactLaw, name: str) -> Iterator[LotCost]:
     u_max = float(Fraction(*compensator["u_max_V"]))
     code_MPa = float(Fraction(*exact.a["span_MPa"])) / (exact.a["full_code"] - exact.a["zero_code"])
+
+    @cache  # the valves of a lot are tested at the same few pressure drops
+    def corners_at(dp_code: int) -> list[tuple[float, float]]:
+        return [(away / exact.span, float(counts)) for away, counts in exact.corners(exact.betas(dp_code))]
+
     for valve in compensator.get("lot", ()):
         side = valve["sides"][name]
         if side is None:
             continue
         shares = [
-            (_share(exact, round(dp / code_MPa), bound * exact.compare_max / u_max), dp)
+            (_share(corners_at(round(dp / code_MPa)), bound * exact.compare_max / u_max), dp)
             for dp, bound in zip(side["dp_MPa"], side["u_lower_V"], strict=True)
         ]
         (least, least_at), (most, most_at) = min(shares), max(shares)
@@ -90,14 +96,13 @@ def _costs_of_side(compensator: dict[str, Any], exact: ExactLaw, name: str) -> I
         )  # fmt: skip
 
 
-def _share(exact: ExactLaw, dp_code: int, counts: float) -> float:
+def _share(corners: list[tuple[float, float]], counts: float) -> float:
     """Return the share of full command at which the drive reaches so many counts: 0 if at zero command, 1 if never."""
-    corners = exact.corners(exact.betas(dp_code))
     if corners[0][1] >= counts:
         return 0.0
     for (left, low), (right, high) in pairwise(corners):
         if high >= counts:
-            return (left + (right - left) * (counts - float(low)) / float(high - low)) / exact.span
+            return left + (right - left) * (counts - low) / (high - low)
     return 1.0
 
 
@@ -177,7 +182,7 @@ def lot_section(compensator: dict[str, Any]) -> Section:
             f"{carrier}, the carrier.",
             "Cost: the share of the command that passes before the drive reaches the valve's own lower bound, at its "
             "tested pressure drops, in the exact law. How much more that is than with a setting of its own stands in "
-            "the report of `dzdesign batch`.".replace("`", ""),
+            "the report of dzdesign batch.",
         ),
         tables=(
             Table(
