@@ -5,6 +5,7 @@ from fractions import Fraction
 from textwrap import wrap
 from typing import Any
 
+from dzdesign.codegen.common_lot import lot_in_words
 from dzdesign.codegen.constants import COLUMNS, Constant, defines
 from dzdesign.codegen.drive_constants import (
     drive_constants,
@@ -23,6 +24,7 @@ from dzdesign.codegen.law_constants import (
 )
 from dzdesign.codegen.misra import misra_lines
 from dzdesign.codegen.signal_constants import SignalConstants
+from dzdesign.core.units import span_MPa
 from dzdesign.derivation.law import Law, law
 from dzdesign.design.amplifier import RAMP_UNIT
 from dzdesign.design.compensator import Compensator
@@ -168,9 +170,10 @@ def certificate_lines(compensator: Compensator, sign: int = 1) -> list[str]:
     """Say in comment lines what the offset is certified for."""
     side = compensator.side(sign)
     certificate = side.certificate
-    low, high = (float(end) for end in certificate.dp_MPa)
+    low, high = certificate.dp_MPa
+    where = span_MPa(float(low), float(high)) + (", between the tests too" if low < high else "")
     text = (
-        f"Certificate: from {low:.2f} to {high:.2f} MPa, between the tests too, that lies below the "
+        f"Certificate: {where}, that lies below the "
         f"{100 * certificate.confidence:.6g}% lower bound of the {certificate.guard} threshold, by "
         f"{1e3 * float(certificate.smallest_margin_V):.3g} mV at the least beyond {_counted(compensator)}"
     )
@@ -178,7 +181,8 @@ def certificate_lines(compensator: Compensator, sign: int = 1) -> list[str]:
         text += f", so that nothing flows; flow below {certificate.level_L_min:.2f} L/min counts as none."
     else:
         text += ". After closing, flow may remain: the closing threshold lies lower, and is not the one guarded."
-    return wrap(text, COLUMNS - 3)
+    lot = lot_in_words(compensator)
+    return wrap(f"{text} {lot.certificate}" if lot else text, COLUMNS - 3)
 
 
 def _counted(compensator: Compensator) -> str:

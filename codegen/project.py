@@ -1,7 +1,8 @@
 """`generate`: a `Compensator` and a target in, the files of a C project out."""
 
+import contextlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib import import_module
@@ -9,12 +10,21 @@ from importlib.resources import files as files_of
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from dzdesign.codegen.common_lot import LotInWords, lot_in_words
 from dzdesign.codegen.core_plan import FilePlan, core_plan, drive_header_plan, drive_plan, header_plan
 from dzdesign.codegen.origin import origin_of_constants
 from dzdesign.codegen.target import Target, folder_of
 from dzdesign.codegen.user_names import printable_list
 from dzdesign.codegen.wiring import wiring_of
-from dzdesign.core.artefacts import TOOL, sha256_of, to_json, write_folder
+from dzdesign.core.artefacts import (
+    MANIFEST_NAME,
+    TOOL,
+    parse_document,
+    read_bytes,
+    sha256_of,
+    to_json,
+    write_folder,
+)
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.shown import ShownInNotebooks
 from dzdesign.design.compensator import Compensator
@@ -64,21 +74,33 @@ def write_firmware(firmware: Firmware, folder: Path) -> Firmware:
     Returns
     -------
     Firmware
-        The same, with a note on what was kept.
+        The same, with a note on what was kept, and on a target that was replaced.
 
     Raises
     ------
     InputError
         If the place can't be written, or holds files that would be lost.
     """
+    earlier = _target_in(Path(folder))
     kept = write_folder(folder, firmware.files, firmware.manifest)
-    if not kept:
-        return firmware
-    note = f"kept as you changed it: {', '.join(kept)}"
-    if newer := [name for name, other in kept.items() if other]:
-        note += f"; would be generated otherwise now: {', '.join(newer)}"
-    note += "; for what is generated now, move yours away or choose a new folder with -o"
-    return replace(firmware, note="; ".join(filter(None, (firmware.note, note))))
+    notes = [firmware.note] if firmware.note else []
+    if earlier not in ("", firmware.manifest["target"]):
+        gone = f"the firmware for {earlier} in '{folder}' was replaced by this one for {firmware.manifest['target']}"
+        notes.append(f"{gone}; to have both, give each its own folder with -o")
+    if kept:
+        note = f"kept as you changed it: {', '.join(kept)}"
+        if newer := [name for name, other in kept.items() if other]:
+            note += f"; would be generated otherwise now: {', '.join(newer)}"
+        notes.append(f"{note}; for what is generated now, move yours away or choose a new folder with -o")
+    return replace(firmware, note="; ".join(notes))
+
+
+def _target_in(folder: Path) -> str:
+    """Return the target of the firmware that lies in a folder; nothing where there is none."""
+    with contextlib.suppress(InputError):
+        manifest = read_bytes(folder / MANIFEST_NAME, "firmware manifest")
+        return str(parse_document(manifest, MANIFEST_NAME, (SCHEMA,)).get("target", ""))
+    return ""
 
 
 def target_named(name: str) -> Target:
@@ -127,7 +149,7 @@ def generate(
     note = target.check_designed_for(designed_for)
     document = compensator_bytes or to_json(compensator_document(compensator)).encode()
     digest = sha256_of(document)
-    recordings, simulated = ramp_tests_of(compensator), is_simulated(compensator)
+    opening = banner_of(compensator, digest)
     header = header_plan(compensator)
     hardware = hardware_context(compensator, target, digest)
     shared = environment(PACKAGE)
@@ -139,7 +161,7 @@ def generate(
         path: _render(
             renderer,
             template,
-            board_banner(template) if path in target.board else banner(template, digest, recordings, simulated),
+            board_banner(template) if path in target.board else opening(template),
             plan,
         )
         for path, renderer, template, plan in plans
@@ -194,6 +216,7 @@ def hardware_context(compensator: Compensator, target: Target, digest: str) -> d
         **core_context(compensator.signals.signs),
         "wiring": wiring_of(compensator, Converter(full_V=full_V, levels=levels)),
         "firmware_origin": f"0x{digest[:4].upper()}",
+        "common_setting": lot_in_words(compensator),
     }
 
 
@@ -247,7 +270,23 @@ def environment(package: str) -> "jinja2.Environment":
     )
 
 
-def banner(template: str, digest: str, recordings: Sequence[str] = (), simulated: bool = False) -> tuple[str, ...]:
+def banner_of(compensator: Compensator, digest: str) -> Callable[[str], tuple[str, ...]]:
+    """Return what gives each template's file its first lines.
+
+    Parameters
+    ----------
+    compensator : Compensator
+        What the firmware is of.
+    digest : str
+        SHA-256 of compensator.json.
+    """
+    recordings, simulated, lot = ramp_tests_of(compensator), is_simulated(compensator), lot_in_words(compensator)
+    return lambda template: banner(template, digest, recordings, simulated, lot)
+
+
+def banner(
+    template: str, digest: str, recordings: Sequence[str] = (), simulated: bool = False, lot: LotInWords | None = None
+) -> tuple[str, ...]:
     """Return the lines that open every generated file: tool, template, hash and recordings; no date.
 
     Parameters
@@ -260,13 +299,17 @@ def banner(template: str, digest: str, recordings: Sequence[str] = (), simulated
         Names from users; whatever could act in a comment is replaced.
     simulated : bool
         Whether they are marked as simulated.
+    lot : LotInWords, optional
+        Of a common setting: its valves, of which the recordings are those of one.
     """
     lines = [
         f"Generated by dzdesign {TOOL['version']} from template {template}. Do not edit: generate it again.",
         f"Compensator SHA-256: {digest}",
     ]
+    lines += [lot.banner] if lot else []
     if recordings:
-        lines.append(f"Valve identified from: {printable_list(recordings)}")
+        of = f"{lot.carrier} identified from" if lot else "Valve identified from"
+        lines.append(f"{of}: {printable_list(recordings)}")
     if simulated:
         lines.append("SIMULATED recordings: an example, not of a measured valve. Not for a machine.")
     return tuple(lines)

@@ -17,7 +17,7 @@ from dzdesign.design.signals import Signals
 ARITHMETICS = ("wide", "narrow")
 
 RENDERER_NAMES = frozenset(
-    {"banner", "project", "wiring", "firmware_origin", "bipolar", "core_sources", "core_headers"}
+    {"banner", "project", "wiring", "firmware_origin", "bipolar", "core_sources", "core_headers", "common_setting"}
 )
 """Names that the renderer itself passes to every template; a target's context may not use them."""
 

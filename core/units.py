@@ -207,3 +207,37 @@ def parse_quantity(text: str, quantity: str, option: str) -> float:
     if not math.isfinite(value):
         raise InputError(f"{option} is '{text}', more than a number can hold; expected for example '1 {example}'")
     return value
+
+
+def span_MPa(low: float, high: float, digits: int = 2) -> str:
+    """Say between which pressure drops something holds, or at which one.
+
+    Parameters
+    ----------
+    low, high : float
+        Ends, MPa.
+    digits : int
+        Decimals.
+
+    Examples
+    --------
+    >>> span_MPa(1.0, 4.0), span_MPa(0.9993, 0.9993)
+    ('from 1.00 to 4.00 MPa', 'at 1.00 MPa')
+    """
+    first, last = f"{low:.{digits}f}", f"{high:.{digits}f}"
+    return f"at {first} MPa" if first == last else f"from {first} to {last} MPa"
+
+
+def chance(p: float) -> str:
+    """Say a p-value; one so small that only rounding is in its digits is said to be below.
+
+    Parameters
+    ----------
+    p : float
+
+    Examples
+    --------
+    >>> chance(0.0312), chance(3.6e-21)
+    ('p = 0.031', 'p < 1e-9')
+    """
+    return f"p = {p:.2g}" if p >= 1e-9 else "p < 1e-9"

@@ -272,6 +272,7 @@ def verify(
     *,
     plant: AnyPath | None = None,
     tolerances: AnyPath | None = None,
+    include: AnyPath | Iterable[AnyPath] = (),
     output: AnyPath | None = None,
 ) -> "Verification":
     """Verify a firmware: every input against the exact law, then the closed loop; needs a C compiler.
@@ -284,6 +285,8 @@ def verify(
         TOML file of the plant; without it one is made from the identified thresholds.
     tolerances : path, optional
         TOML file of a series of plants about `plant`.
+    include : path or iterable of paths, optional
+        Folders of headers that board files of yours include.
     output : path, optional
         Also write the evidence folder here.
 
@@ -311,6 +314,7 @@ def verify(
             Path(plant).name if plant is not None else "",
             sha256_of(read_bytes(Path(plant), "plant file")) if plant is not None else None,
             tolerances=read_tolerances(Path(tolerances)) if tolerances is not None else None,
+            include=[Path(place) for place in ([include] if isinstance(include, str | os.PathLike) else include)],
         )
         verification = with_regenerated(verification, folder)
         if output is not None:

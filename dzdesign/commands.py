@@ -165,10 +165,13 @@ def run_verify(args: argparse.Namespace) -> int:
     source = Path(args.plant).name if args.plant else ""
     digest = sha256_of(read_bytes(Path(args.plant), "plant file")) if args.plant else None
     tolerances = read_tolerances(Path(args.tolerances)) if args.tolerances else None
+    include = [Path(place) for place in args.include or ()]
     firmware = Path(args.firmware)
     ware = check_against_c2000ware(firmware, Path(args.c2000ware), say) if args.c2000ware else None
     with stages() as stage:
-        verification = verify(firmware, plant, source, digest, tolerances=tolerances, say=stage, watch=stage.each)
+        verification = verify(
+            firmware, plant, source, digest, tolerances=tolerances, include=include, say=stage, watch=stage.each
+        )
     verification = with_regenerated(verification, firmware)
     added = [ware] if ware else []
     if args.machine_code:

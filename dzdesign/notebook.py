@@ -4,6 +4,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
 
+from dzdesign.core.units import chance
+
 if TYPE_CHECKING:
     from dzdesign.codegen.project import Firmware
     from dzdesign.design.compensator import Compensator
@@ -74,7 +76,7 @@ def side_lines(side: "SideModel") -> list[str]:
     if side.trend_change_V is None or side.trend_change_se_V is None:
         return [*lines, "trend with dP: can't be said from one ramp test"]
     change, error = 1e3 * side.trend_change_V, 1e3 * side.trend_change_se_V
-    return [*lines, f"trend with dP: {side.trend} ({change:+.1f} ± {error:.1f} mV, p = {side.trend_p:.2g})"]
+    return [*lines, f"trend with dP: {side.trend} ({change:+.1f} ± {error:.1f} mV, {chance(side.trend_p or 0.0)})"]
 
 
 def compensator_html(compensator: "Compensator") -> str:

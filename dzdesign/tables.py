@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING
 
 from dzdesign.core.errors import one_line
+from dzdesign.core.units import chance, span_MPa
 from dzdesign.page import new_console, new_table, put_line
 
 if TYPE_CHECKING:
@@ -88,7 +89,7 @@ def _side_lines(side: "SideModel") -> tuple[str, ...]:
         "trend with dP: can't be said from one ramp test"
         if side.trend is None
         else f"trend with dP: {side.trend} ({1e3 * side.trend_change_V:+.1f} ± {1e3 * side.trend_change_se_V:.1f} mV "
-        f"over the tested range, p = {side.trend_p:.2g})",
+        f"over the tested range, {chance(side.trend_p or 0.0)})",
     )
 
 
@@ -115,7 +116,7 @@ def print_compensator(compensator: "Compensator") -> None:
             f"both as shares of full command; beta(dP): straight between {len(side.beta_numerators)} nodes, each a "
             f"whole number of 1/{compensator.beta_denominator}",
             f"{label}certificate: the offset stays below the {100 * certificate.confidence:.6g}% lower bound of the "
-            f"{certificate.guard} threshold from {low:.3f} to {high:.3f} MPa, at every pressure code; flow below "
+            f"{certificate.guard} threshold {span_MPa(low, high, 3)}, at every pressure code; flow below "
             f"{certificate.level_L_min:.2f} L/min (meter's floor, its noise, or 0.5 % of the largest flow) counts as "
             "none",
         ]

@@ -201,6 +201,12 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
                 metavar="TOL.toml",
                 help="also run a series of plants, like examples/paper_valve/tolerances.toml; needs --plant",
             ),
+            _given(
+                "--include",
+                action="append",
+                metavar="DIR",
+                help="where headers lie that your board files include, such as your chip's; may be repeated",
+            ),
             _given("--c2000ware", metavar="DIR", help="also compile f28335 firmware against your C2000Ware's headers"),
             _given("--mutate", action="store_true", help="also make the C wrong in every place; count what is caught"),
             _given("--proof", action="store_true", help="also show by Frama-C that nothing overflows a 16-bit int"),
@@ -360,7 +366,7 @@ OPTION_GROUPS = {
         "--command-signal", "--polarity", "--pressure-span", "--pressure-a", "--pressure-b", "--negative-dp",
     ),
     "beside the law": ("--zero-window", "--ramp-up", "--ramp-down", "--dither"),
-    "further checks": ("--tolerances", "--c2000ware", "--mutate", "--machine-code", "--proof"),
+    "further checks": ("--tolerances", "--include", "--c2000ware", "--mutate", "--machine-code", "--proof"),
     "of every command": ("--config", "--json", "--quiet", "--verbose", "--help"),
 }  # fmt: skip
 #: Printed at the end of the help; "" is that of dzdesign itself.

@@ -3,6 +3,7 @@
 import json
 import re
 import shutil
+import subprocess
 
 import pytest
 from conftest import default_options
@@ -16,7 +17,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.compensator_file import compensator_document
 from dzdesign.design.designing import design
 from dzdesign.verify import board_files
-from dzdesign.verify.board_files import board_compiles
+from dzdesign.verify.board_files import BoardCompiled, board_compiles
 from dzdesign.verify.checks import files_unchanged
 from dzdesign.verify.closed_loop import RampSequence
 from dzdesign.verify.firmware_folder import read_firmware_manifest
@@ -194,17 +195,121 @@ def test_a_manifest_whose_board_is_no_list_is_bad_input(cortex):
 )
 def test_it_is_compiled_if_that_can_be_done(cortex, new, holds):
     _, manifest = read_firmware_manifest(cortex)
-    assert board_compiles(cortex, manifest) == []
+    assert board_compiles(cortex, manifest) == BoardCompiled()
     fill_in(cortex, new=new)
-    checks = board_compiles(cortex, manifest)
+    found = board_compiles(cortex, manifest)
+    checks = found.checks
+    assert bool(found.untried) is (holds is None)
     assert [check.holds for check in checks] == ([] if holds is None else [holds])
     assert holds is not False or ("cortex_m4/dz_board.c" in checks[0].text and "seven" in checks[0].text)
 
 
-def test_without_the_compiler_nothing_is_said_of_it(cortex, monkeypatch):
+def test_without_the_compiler_it_is_said_why(cortex, monkeypatch):
     monkeypatch.setitem(board_files.COMPILERS, "cortex-m4", ("no-such-gcc",))
     fill_in(cortex, new="return seven;")
-    assert board_compiles(cortex, read_firmware_manifest(cortex)[1]) == []
+    found = board_compiles(cortex, read_firmware_manifest(cortex)[1])
+    assert found == BoardCompiled(untried="no-such-gcc is not on the path; install it, then `verify`")
+
+
+@needs_arm
+def test_a_vendors_header_is_named_and_found_by_an_option(cortex, tmp_path, capsys):
+    fill_in(cortex, old="#include", new='#include "stm32_chip.h"\n#include')
+    evidence = tmp_path / "evidence"
+    assert main(["verify", str(cortex), "-o", str(evidence)]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    why = "stm32_chip.h, which cortex_m4/dz_board.c includes, was not found in the firmware; verify --include DIR"
+    assert f"NOT TRIED your board files compile: {why}" in said
+    assert "stm32_chip.h, which" in (evidence / REPORT_NAME).read_text(encoding="utf-8")
+    headers = [tmp_path / "device", tmp_path / "cmsis"]
+    for folder, text in zip(headers, ['#include "core_cm4.h"\n', "int narrow(long x);\n"], strict=True):
+        folder.mkdir()
+        (folder / ("stm32_chip.h" if "core" in text else "core_cm4.h")).write_text(text)
+    one = ["--include", str(headers[0])]
+    assert main(["verify", str(cortex), "-o", str(evidence), *one]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert f"core_cm4.h, which cortex_m4/dz_board.c includes, was not found in the firmware nor in {headers[0]}" in said
+    assert main(["verify", str(cortex), "-o", str(evidence), *one, "--include", str(headers[1])]) == 0
+    assert "holds your board files compile: with cortex_m4/dz_board.c" in " ".join(capsys.readouterr().out.split())
+
+
+def test_include_of_what_is_no_folder_or_not_compiled_here_is_refused(compensator, cortex, tmp_path):
+    with pytest.raises(InputError, match=r"nowhere' is no folder, expected one with headers after --include"):
+        api.verify(cortex, include=[tmp_path / "nowhere"])
+    write_firmware(generate(compensator, "f28335"), tmp_path / "other")
+    with pytest.raises(InputError, match="is for the board files of cortex-m4, and this firmware is for f28335"):
+        api.verify(tmp_path / "other", include=[tmp_path])
+
+
+# ---- files of the user's own beside them ----
+
+
+def test_files_in_the_folder_for_them_are_named_kept_and_not_checked(compensator, cortex):
+    (cortex / "board").mkdir()
+    (cortex / "board/adc.c").write_text("this is no C")
+    (cortex / "board/my_chip.ld").write_text("/* mine */")
+    check = unchanged(cortex)
+    assert check.holds and check.text.endswith("yours, in board/, and not checked: board/adc.c, board/my_chip.ld")
+    write_firmware(generate(compensator, "cortex-m4"), cortex)
+    assert (cortex / "board/adc.c").read_text() == "this is no C"
+    evidence = {"checks": [], "closed_loop": {}, "monte_carlo": None, "own": ["board/adc.c"]}
+    assert "board/adc.c, which is yours: review it, and try it on the machine" in untried_of(evidence)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("board/dz_comp.h", "board/dz_comp.h: not generated, but named as a generated file"),
+        ("cortex_m4/my.ld", "does not name cortex_m4/my.ld; keep source and project files of your own in board/"),
+        ("core/board/adc.c", "does not name core/board/adc.c"),
+        ("core/adc.c", "core/ is the compensator alone, keep files of your own in board/"),
+    ],
+)
+def test_elsewhere_or_by_a_name_of_ours_they_fail(cortex, name, said):
+    (cortex / name).parent.mkdir(exist_ok=True)
+    (cortex / name).write_text("int x;\n")
+    assert unchanged(cortex).holds is False and said in unchanged(cortex).text
+
+
+def test_a_manifest_can_not_hide_a_core_file_in_that_folder(cortex):
+    """What it lists is compared with its hash, wherever it lies."""
+    manifest = json.loads((cortex / MANIFEST_NAME).read_text())
+    manifest["files"]["board/adc.c"] = "0" * 64
+    (cortex / MANIFEST_NAME).write_text(to_json(manifest))
+    (cortex / "board").mkdir()
+    (cortex / "board/adc.c").write_text("int x;\n")
+    assert unchanged(cortex).holds is False and "changed or missing: board/adc.c" in unchanged(cortex).text
+
+
+@needs_arm
+def test_make_takes_renamed_copies_of_board_files_and_finds_what_lies_in_board(cortex):
+    place, own = cortex / "cortex_m4", cortex / "board"
+    own.mkdir()
+    script, board = (place / "mps2_an386.ld").read_text(), (place / "dz_board.c").read_text()
+    (own / "my_chip.ld").write_text(script.replace("LENGTH = 4M", "LENGTH = 2M"))
+    (own / "my_board.c").write_text('#include "my_adc.h"\n' + board)
+    (own / "my_adc.h").write_text("uint16_t my_adc(void);\n".replace("uint16_t", "unsigned short"))
+    (own / "my_adc.c").write_text('#include "my_adc.h"\nunsigned short my_adc(void)\n{\n    return 7u;\n}\n')
+    own_files = ["LDSCRIPT=../board/my_chip.ld", "DZ_BOARD=../board/my_board.c"]
+    done = subprocess.run(["make", "-C", place, *own_files], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "-T ../board/my_chip.ld" in done.stdout and done.stdout.count("my_board.c") == 1
+    assert "../board/my_adc.c" in done.stdout and " dz_board.c" not in done.stdout
+    named = subprocess.run(
+        ["make", "-B", "-C", place, *own_files, "BOARD=../board/my_adc.c"], capture_output=True, text=True, check=False
+    )
+    assert named.returncode == 0, named.stderr
+    assert unchanged(cortex).holds
+
+
+def test_an_earlier_target_that_is_replaced_is_said_so(compensator, cortex, tmp_path, capsys):
+    path = tmp_path / "compensator.json"
+    path.write_text(to_json(compensator_document(compensator)))
+    assert main(["codegen", str(path), "--target", "cortex-m4", "-o", str(cortex)]) == 0
+    assert "replaced" not in capsys.readouterr().err
+    assert main(["codegen", str(path), "--target", "host", "-o", str(cortex)]) == 0
+    said = capsys.readouterr().err
+    assert "the firmware for cortex-m4 in '" in said and "was replaced by this one for host" in said
+    assert not (cortex / "cortex_m4").exists()
 
 
 def test_verify_holds_and_says_that_it_was_not_checked(cortex, tmp_path):

@@ -10,7 +10,7 @@ from synthetic import Truth, needs_compiler, synthetic_ramp
 
 from dzdesign.batch.summary import lacking_lines
 from dzdesign.cli import main
-from dzdesign.codegen.project import generate, target_named
+from dzdesign.codegen.project import generate, target_named, write_firmware
 from dzdesign.core.artefacts import to_json, write_folder
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.certifying import guarded_curve
@@ -27,6 +27,8 @@ from dzdesign.verify.checks import lot_checked
 from dzdesign.verify.lot_check import check_lot
 from dzdesign.verify.prepared_inputs import differences
 from dzdesign.verify.reference import ExactLaw
+from dzdesign.verify.report_artefacts import Artefact, Chain
+from dzdesign.verify.report_lot import lot_costs, lot_figures, lot_section
 from dzdesign.verify.zero_command import zero_command_margins
 
 KNEES = {"a": lambda dp: 5.6 - 0.05 * dp, "b": lambda dp: 5.2 + 0.03 * dp, "c": lambda dp: 5.4, "d": lambda dp: 5.5}
@@ -193,7 +195,8 @@ def test_verify_compares_the_core_with_every_valve(common, tmp_path):
     found = check_all_inputs(lower)
     (check,) = lot_checked((found,), document)
     assert check.holds is False and not found.holds and found.lot.over_compensated == ("d",)
-    assert "1 over-compensated: d; smallest margin -" in check.text and "d, 1.99 MPa" in check.text
+    assert "1 over-compensated: d; smallest margin of the C's compare values -" in check.text
+    assert "d, 1.99 MPa" in check.text
 
 
 @needs_compiler
@@ -304,3 +307,68 @@ def test_a_range_that_no_valve_would_widen_is_said_alone():
     each = {"name": "a", "side": "positive", "dp_MPa": [4.0], "narrows": True, "coarser_V": 0.0, "cost_percent": 0.0}
     (line,) = lacking_lines({"lacking": [each], "dp_MPa": [2.0, 2.0], "dp_without_MPa": None})
     assert "so the common setting holds for all at 2 MPa only; record what is missing" in line
+
+
+# ---- what a reader is told ----
+
+
+@needs_compiler
+def test_firmware_and_report_say_first_that_they_are_of_a_lot(common, batch, tmp_path):
+    folder = tmp_path / "firmware"
+    made = generate(common.compensator, "f28335")
+    write_firmware(made, folder)
+    document = json.loads((folder / "compensator.json").read_bytes())
+    said = f"COMMON SETTING of 4 valves, lot SHA-256 {document['lot_sha256']}."
+    for name, text in made.files.items():
+        assert name in (*made.manifest["board"], "compensator.json") or said in "\n".join(text.splitlines()[:4]), name
+    header, readme = made.files["core/dz_comp.h"], made.files["f28335/README.md"]
+    assert f"/* Valve {common.carrier} identified from: " in header
+    words = " ".join(header.replace(" * ", " ").split())
+    assert f"of one of the 4 valves of this common setting, valve {common.carrier}; of the others" in words
+    assert "**This is a common setting of 4 valves**" in readme and document["lot_sha256"] in readme
+    own = generate(batch["a"].own, "host")
+    assert not any("common setting" in text.lower() for text in own.files.values())
+    evidence = tmp_path / "evidence"
+    main(["verify", str(folder), "-o", str(evidence), "--quiet"])  # its verdict is no matter here
+    report = (evidence / "report.html").read_text(encoding="utf-8")
+    lot = json.loads((evidence / "verification.json").read_bytes())["inputs"][0]["lot"]
+    head = report[: report.index('<section id="lot">')]
+    assert "<h1>Common setting of 4 valves: dead-zone compensator for f28335" in head
+    assert f"Worst valve of the lot: {lot['worst']}" in head and f"{1e3 * lot['smallest_margin_V']:.3f} mV" in head
+    costs = lot_costs(document)
+    least = min(each.least_percent for each in costs)
+    assert f"{least:.1f} to {costs[0].most_percent:.1f} %" in head
+    carrier = head.index(f"Of one of these valves, {common.carrier}, the carrier")
+    assert head.index("What it costs over the lot") < carrier < head.index("Dead zone on opening")
+    for heading in ("Data and fit", "Thresholds", "Closed loop"):
+        assert f"<h2>{heading} <small>of {common.carrier}, the carrier</small></h2>" in report
+    assert document["lot_sha256"] in report[report.index('<section id="lot">') :]
+
+
+def test_what_it_costs_a_valve_is_the_command_before_its_own_bound(document, common):
+    """Counted anew, code by code, by the compensator's own rounding: the least command at which the drive is there."""
+    compensator, signals = common.compensator, common.compensator.signals
+    costs = {each.valve: each for each in lot_costs(document)}
+    assert set(costs) == set(KNEES)
+    for valve in common.compensator.lot:
+        shares = []
+        for dp, bound in zip(valve.positive.dp_MPa, valve.positive.lower_V, strict=True):
+            code, counts = round(signals.dp_code(Fraction(repr(dp)))), bound / compensator.u_max_V * signals.compare_max
+            full = signals.command.full_code
+            first = next(u for u in range(full + 1) if compensator.compare(u, code, 1) >= counts - Fraction(1, 2))
+            shares.append(100 * first / full)
+        found = costs[valve.name]
+        assert [found.least_percent, found.most_percent] == pytest.approx([min(shares), max(shares)], abs=0.05)
+
+
+def test_an_old_common_file_without_its_lot_says_that_it_is_not_known(document):
+    old = {name: value for name, value in document.items() if name not in ("lot", "lot_sha256")}
+    compensator = read(old)
+    said = generate(compensator, "host").files["core/dz_comp.h"]
+    assert "COMMON SETTING of 4 valves, the file does not say which." in said
+    artefacts = {
+        "compensator": Artefact(role="compensator", name="compensator.json", sha256="0" * 64, document=old),
+    }
+    first, worst, cost = lot_figures(Chain(artefacts=artefacts))
+    assert first.value == "of 4 valves" and worst.value == "NOT CHECKED" and cost.value == "not known"
+    assert "run `dzdesign batch` again" in lot_section(old).missing

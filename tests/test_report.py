@@ -3,22 +3,24 @@
 import json
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from urllib.parse import unquote
 
 import pytest
 from page_reader import HOSTILE, Page
-from synthetic import needs_compiler
+from synthetic import Truth, needs_compiler, synthetic_ramp
 
 from dzdesign.cli import main
 from dzdesign.core.artefacts import MANIFEST_NAME, sha256_of, to_json
 from dzdesign.core.errors import InputError
+from dzdesign.identify.identification import identify
 from dzdesign.verify.report import REPORT_NAME, report_of_folder
 from dzdesign.verify.report_artefacts import chain_of
 from dzdesign.verify.report_body import SECTIONS
 from dzdesign.verify.report_figure import PALETTE, csv_text
 from dzdesign.verify.report_shelf import shelf_of
-from dzdesign.verify.report_summary import headline
+from dzdesign.verify.report_summary import headline, worst_of
 
 pytestmark = needs_compiler
 
@@ -481,3 +483,47 @@ def test_a_series_of_plants_is_shown(copied):
     change_evidence(copied, lambda evidence: evidence.update(monte_carlo={"pressures": [one]}))
     html = report_of_folder(copied).html
     assert "2.10 (1.00 to 3.45)" in html and "3 of 200" in html
+
+
+# ---- few tests, and two sides ----
+
+
+@pytest.fixture(scope="module")
+def reports(tmp_path_factory):
+    """Reports of a valve of one ramp test, and of one with two sides of two tests each, without firmware."""
+
+    one, other = (synthetic_ramp(dp, Truth(), seed=7, rate_Hz=10.0) for dp in (1.0, 4.0))
+    mirrored = [replace(test, source=f"minus_{test.source}", u=-test.u, q=-test.q) for test in (one, other)]
+    found = {}
+    for name, ramps in (("one", [one]), ("both", [one, other, *mirrored])):
+        folder = tmp_path_factory.mktemp(name)
+        (folder / "valve.json").write_text(to_json(identify(ramps).to_document()), encoding="utf-8")
+        found[name] = report_of_folder(folder).html
+    return found
+
+
+def test_one_ramp_test_is_one(reports):
+    text = Page(reports["one"]).text
+    assert "1 ramp test; full command" in text and "1 ramp tests" not in text and "1 pressure drops" not in text
+    assert "staircase" not in text and "One pressure drop was tested, and nothing is certified at another." in text
+
+
+def test_figures_of_two_sides_say_which_they_are_of(reports):
+    for side in ("positive", "negative"):
+        start = reports["both"].index(f'id="figure-fit-{side}"')
+        assert f"{side} commands</text>" in reports["both"][start : reports["both"].index("</svg>", start)]
+    assert "commands</text>" not in reports["one"]
+
+
+@pytest.mark.parametrize(
+    ("sides", "said"),
+    [
+        ({"positive": 1}, "at 1.00 MPa, the one pressure drop tested"),
+        ({"positive": 6}, "the worst of 6 pressure drops"),
+        ({"positive": 2, "negative": 2}, "the worst of 2 pressure drops on each of 2 sides"),
+        ({"positive": 1, "negative": 1}, "the worse of both sides, each at one pressure drop"),
+        ({"positive": 3, "negative": 1}, "the worst of 3 pressure drops positive and 1 pressure drop negative"),
+    ],
+)
+def test_of_how_many_runs_a_figure_is_the_worst(sides, said):
+    assert worst_of([{"side": name, "dp_MPa": 1.0 + n} for name, count in sides.items() for n in range(count)]) == said

@@ -157,6 +157,22 @@ def test_a_page_is_quiet_whole_and_readable(browser, pages, name, width, scheme)
         assert heard == []
 
 
+#: By how much each box's content is wider than the box.
+SCROLLS = """selector => [...document.querySelectorAll(selector)].map(e => e.scrollWidth - e.clientWidth)"""
+
+
+@pytest.mark.parametrize("name", ["demo", "valve alone"])
+def test_nothing_scrolls_sideways_on_a_wide_page_and_no_figure_on_a_narrow_one(browser, pages, name):
+    with opened(browser, pages[name]) as (page, _):
+        assert max(page.evaluate(SCROLLS, ".scroll")) == 0
+        assert not page.locator(".large").first.is_visible()
+    with opened(browser, pages[name], width=400) as (page, _):
+        assert max(page.evaluate(SCROLLS, "figure .scroll")) == 0
+        page.locator(".large input").first.check()
+        wider = page.evaluate(SCROLLS, "figure .scroll")
+        assert wider[0] > 250 and max(wider[1:]) == 0
+
+
 def test_the_raster_decodes_and_the_numbers_can_be_fetched(browser, pages):
     with opened(browser, pages["demo"]) as (page, heard):
         widths = page.evaluate(IMAGES)

@@ -149,7 +149,31 @@ def test_of_another_spacing_it_is_compared_with_the_file_and_not_tried_without(c
     assert valve_follows(copied / "firmware", document) == []
     evidence = {"checks": [], "closed_loop": {}, "monte_carlo": None}
     (said,) = [line for line in untried_of(evidence) if line.startswith(VALVE)]
-    assert "with the valve.json that compensator.json names beside the firmware" in said
+    assert "with the valve.json that compensator.json names by its SHA-256 beside the firmware" in said
+
+
+def test_a_valve_file_that_was_replaced_is_said_first(copied):
+    """What was compared is told by its hash, and the file of the name comes before others."""
+    document = json.loads((copied / "compensator.json").read_bytes())
+    stated = document["made_from"][0]["sha256"]
+    other = json.loads((copied / "valve.json").read_bytes())
+    other["record"] = {"serial": "another"}
+    for name in ("again.json", "valve.json"):
+        (copied / name).write_text(to_json(other))
+    digest = sha256_of((copied / "valve.json").read_bytes())
+    (check,) = valve_follows(copied / "firmware", document)
+    assert check.holds and "valve.json" not in check.name
+    assert check.text.startswith(f"valve.json beside the firmware is ANOTHER valve, SHA-256 {digest}, and not used; ")
+    assert check.text.endswith(f"the SHA-256 {stated} in made_from")
+    shutil.rmtree(copied / "evidence")
+    report = report_of_folder(copied / "firmware")
+    assert any(line.startswith(f"valve.json has the SHA-256 {digest}, but the compen") for line in report.missing)
+    (copied / "a.json").write_text(to_json(document["valve"]))  # the one that it was made from, by another name
+    report = report_of_folder(copied / "firmware")
+    said = "valve.json is another valve by now; the compensator was made from a.json: used"
+    assert said in report.missing and not report.faults
+    (check,) = valve_follows(copied / "firmware", document)
+    assert check.holds and check.text.startswith("valve.json beside the firmware is ANOTHER valve")
 
 
 def test_a_strangers_valve_is_not_compared(copied):

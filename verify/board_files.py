@@ -1,21 +1,24 @@
 """The files of a firmware that its user fills in: which of them were changed, and whether they compile."""
 
+import re
 import shutil
 import subprocess
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from dzdesign.core.artefacts import sha256_of
-from dzdesign.verify.checks import Check
+from dzdesign.core.errors import InputError
+from dzdesign.verify.checks import OWN, Check
 from dzdesign.verify.host_compiler import build_folder, run_compiler
 from dzdesign.verify.machines import CORTEX_M4
+from dzdesign.verify.required import COMPILES
 
-COMPILES = "your board files compile"
 #: Compiler and options of a target whose board files can be compiled without a vendor's library.
 COMPILERS = {"cortex-m4": (CORTEX_M4.compiler, *CORTEX_M4.core_flags)}
-#: How a compiler says that a header lies elsewhere: with which options it is found only its user knows.
-ELSEWHERE = "No such file or directory"
+#: How a compiler says that a header lies elsewhere: where, only its user knows.
+ELSEWHERE = re.compile(r"error: (\S+): No such file or directory")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +48,40 @@ def board_files(folder: Path, manifest: dict[str, Any]) -> tuple[BoardFile, ...]
     )
 
 
-def board_compiles(folder: Path, manifest: dict[str, Any]) -> list[Check]:
+def check_include(include: Sequence[Path], manifest: dict[str, Any]) -> None:
+    """Refuse folders of headers that are none, or of a target whose board files are not compiled here.
+
+    Parameters
+    ----------
+    include : sequence of Path
+        As given.
+    manifest : dict
+        Of `read_firmware_manifest`.
+
+    Raises
+    ------
+    InputError
+        Naming the first that is none.
+    """
+    for place in include:
+        if not place.is_dir():
+            raise InputError(f"'{place}' is no folder, expected one with headers after --include; check the name")
+    if include and manifest.get("target") not in COMPILERS:
+        raise InputError(
+            f"--include is for the board files of {', '.join(COMPILERS)}, and this firmware is for "
+            f"{manifest.get('target')}, whose board files are not compiled here; leave it out"
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoardCompiled:
+    """Whether the user's board files compile: a check, or why it was not tried; neither where nothing was changed."""
+
+    checks: tuple[Check, ...] = ()
+    untried: str = ""
+
+
+def board_compiles(folder: Path, manifest: dict[str, Any], include: Sequence[Path] = ()) -> BoardCompiled:
     """Compile the target's C together with the board files that were changed.
 
     Parameters
@@ -54,29 +90,34 @@ def board_compiles(folder: Path, manifest: dict[str, Any]) -> list[Check]:
         Of the firmware.
     manifest : dict
         Of `read_firmware_manifest`.
-
-    Returns
-    -------
-    list of Check
-        None where nothing was changed, the compiler is not there, or a header lies elsewhere, so that nobody can tell.
+    include : sequence of Path
+        Where headers of the user's chip lie.
     """
     compiler, *options = COMPILERS.get(manifest.get("target", ""), ("",))
     changed = [each.name for each in board_files(folder, manifest) if each.changed]
-    if not changed or not compiler or not shutil.which(compiler):
-        return []
+    if not changed or not compiler:
+        return BoardCompiled()
+    if not shutil.which(compiler):
+        return BoardCompiled(untried=f"{compiler} is not on the path; install it, then `verify`")
     place = (folder / changed[0]).parent
     sources = sorted(name for name in manifest["files"] if (folder / name).parent == place and name.endswith(".c"))
-    folders = [f"-I{folder / 'core'}", f"-I{place}"]
+    # Warnings in headers of a vendor are no concern here: -isystem.
+    folders = [f"-I{folder / 'core'}", f"-I{place}", "-iquote", str(folder / OWN)]
+    folders += [word for path in include for word in ("-isystem", str(path))]
     for source in (name for name in sources if (folder / name).is_file()):
         command = [compiler, *options, *folders, "-c", str(folder / source), "-o", str(build_folder() / "board.o")]
         try:
             done = run_compiler(command)
-        except (OSError, subprocess.TimeoutExpired):
-            return []
-        if done.returncode and ELSEWHERE in done.stderr:
-            return []
+        except (OSError, subprocess.TimeoutExpired) as error:
+            return BoardCompiled(untried=f"{compiler} did not run on {source} ({type(error).__name__}); then `verify`")
+        if done.returncode and (lost := ELSEWHERE.search(done.stderr)):
+            given = f" nor in {', '.join(map(str, include))}" if include else ""
+            return BoardCompiled(
+                untried=f"{lost[1]}, which {source} includes, was not found in the firmware{given}; `verify --include "
+                "DIR` with the folder in which it lies"
+            )
         if done.returncode:
             first = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr.strip()[:300])
-            return [Check(name=COMPILES, holds=False, text=f"{first} ({Path(compiler).name})")]
+            return BoardCompiled(checks=(Check(name=COMPILES, holds=False, text=f"{first} ({Path(compiler).name})"),))
     text = f"with {', '.join(changed)} as you changed them ({Path(compiler).name}); what they do is not checked"
-    return [Check(name=COMPILES, holds=True, text=text)]
+    return BoardCompiled(checks=(Check(name=COMPILES, holds=True, text=text),))

@@ -6,6 +6,7 @@ from typing import Any
 
 from dzdesign.core.artefacts import TOOL, sha256_of
 from dzdesign.core.errors import InputError, RequirementError, and_more
+from dzdesign.core.units import span_MPa
 from dzdesign.design.certifying import prove_certificates
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.derived import prove_derived
@@ -26,6 +27,8 @@ SOURCES = {
     ".lcf", ".cmd", ".icf", ".sct", ".def", ".mk", ".mak", ".cmake", ".projectspec", ".ccxml", ".gel", ".syscfg",
     ".ioc", ".uvprojx", ".ewp", ".cproj", ".vcxproj",
 }  # fmt: skip
+#: Folder of a firmware for files of the user's own, beside those that were generated.
+OWN = "board"
 BUILD_FILES = {"makefile", "gnumakefile", "cmakelists.txt", "meson.build", ".project", ".cproject", ".ccsproject"}
 
 
@@ -59,27 +62,46 @@ def files_unchanged(folder: Path, manifest: dict[str, Any]) -> Check:
     ]
     others = [name for name in others if name not in manifest["files"]]
     shadows = [name for name in others if PurePosixPath(name).name in ours]
+    own = own_files(folder, manifest)
+    others = [name for name in others if name not in own]
     claimed = [name for name in sorted(board) if not _may_be_filled_in(name, manifest)]
     if claimed:
         fault = f"the manifest calls {', '.join(claimed)} the user's to fill in, which is none of a target's files"
     elif changed:
         fault = f"changed or missing: {', '.join(changed)}"
     elif foreign:
-        fault = f"{', '.join(foreign)}: not generated; core/ is the compensator alone, keep files of your own elsewhere"
+        fault = f"{', '.join(foreign)}: not generated; core/ is the compensator alone, keep files of your own in {OWN}/"
     elif unlisted or not manifest["core"]:
         fault = f"the manifest does not name {', '.join(unlisted) or 'any file of the core'}"
     elif shadows:
         fault = f"{', '.join(shadows)}: not generated, but named as a generated file, for which it may be taken"
     elif others:
-        fault = f"the manifest does not name {', '.join(others)}; keep source and project files of your own elsewhere"
+        fault = f"the manifest does not name {', '.join(others)}; keep source and project files of your own in {OWN}/, "
+        fault += "beside core/, or outside"
     else:
         fault = ""
     text = fault or f"{len(manifest['files']) - len(filled_in)} files as generated"
     if filled_in and not fault:
         text += f"; yours, changed, and not checked: {', '.join(filled_in)}"
+    if own and not fault:
+        text += f"; yours, in {OWN}/, and not checked: {and_more(own, NAMED)}"
     if built and not fault:
         text += f"; built by CMake, and not checked: {', '.join(sorted(tree.name for tree in built))}"
     return Check(name="files as generated", holds=not fault, text=text)
+
+
+def own_files(folder: Path, manifest: dict[str, Any]) -> list[str]:
+    """Return the files of the user's own: those in the folder kept for them, in which nothing is generated.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the firmware.
+    manifest : dict
+        Of `read_firmware_manifest`.
+    """
+    found = [path.relative_to(folder).as_posix() for path in sorted((folder / OWN).rglob("*")) if _is_source(path)]
+    return [name for name in found if name not in manifest["files"]]
 
 
 def _may_be_filled_in(name: str, manifest: dict[str, Any]) -> bool:
@@ -111,9 +133,8 @@ def certificate_follows(compensator: Compensator) -> Check:
     return Check(
         name=name,
         holds=True,
-        text=f"{common}the {certificate.guard} threshold's {100 * certificate.confidence:.6g}% lower bound, from "
-        f"{float(certificate.dp_MPa[0]):.2f} to {float(certificate.dp_MPa[1]):.2f} MPa, proved again at every "
-        "difference of pressure codes",
+        text=f"{common}the {certificate.guard} threshold's {100 * certificate.confidence:.6g}% lower bound, "
+        f"{span_MPa(*map(float, certificate.dp_MPa))}, proved again at every difference of pressure codes",
     )
 
 
@@ -198,7 +219,8 @@ def lot_checked(inputs: tuple[InputCheck, ...], document: dict[str, Any]) -> lis
     )
     over = list(dict.fromkeys(name for each in found for name in each.over_compensated))
     text += f"{len(over)} over-compensated" + (f": {and_more(over, NAMED)}" if over else "")
-    text += f"; smallest margin {1e3 * worst.smallest_margin_V:.3f} mV: {worst.worst}, {worst.worst_dp_MPa:.2f} MPa"
+    text += f"; smallest margin of the C's compare values {1e3 * worst.smallest_margin_V:.3f} mV: {worst.worst}, "
+    text += f"{worst.worst_dp_MPa:.2f} MPa"
     all_there = all(each.valves == count for each in found)
     return [Check(name=name, holds=not over and all_there, text=text)]
 
@@ -223,7 +245,7 @@ def input_checks(inputs: InputCheck, both: bool) -> list[Check]:
             name="no over-compensation on the tested interval",
             holds=inputs.over_compensated == 0,
             text=f"{inputs.over_compensated} pressure codes above the threshold's lower bound, "
-            f"smallest margin {1e3 * inputs.smallest_margin_V:.3f} mV",
+            f"smallest margin of the C's compare values {1e3 * inputs.smallest_margin_V:.3f} mV",
         ),
         Check(
             name="depends on the pressures by their difference only",

@@ -9,6 +9,8 @@ from dzdesign.verify.report_artefacts import Chain, chain_of
 from dzdesign.verify.report_body import SECTIONS, sections_of
 from dzdesign.verify.report_figure import figure_style
 from dzdesign.verify.report_law import account_of
+from dzdesign.verify.report_lot import SECTION as LOT_SECTION
+from dzdesign.verify.report_lot import carrier_of, common_count, lot_figures
 from dzdesign.verify.report_page import render_page
 from dzdesign.verify.report_shelf import is_of, places_of, shelf_of
 from dzdesign.verify.report_summary import headline, key_figures
@@ -102,14 +104,19 @@ def make_report(chain: Chain) -> Report:
     """
     verdict = headline(chain)
     compensator = chain.document("compensator")
+    lot, figures = lot_figures(chain), key_figures(chain)
+    if lot and chain.document("verification"):  # the last of them, the inputs, is of the C and not of a valve
+        lot, figures = (*lot, figures[-1]), figures[:-1]
     with figure_style():
         sections = sections_of(chain)
     html = render_page(
         title=_title(chain),
         verdict=verdict,
         record=_record(chain),
-        figures=key_figures(chain),
-        headings=SECTIONS,
+        figures=figures,
+        lot=lot,
+        carrier=carrier_of(compensator) if common_count(compensator) and compensator else "",
+        headings=[(name, heading) for name, heading in (LOT_SECTION, *SECTIONS) if name in sections],
         sections=sections,
         missing=chain.missing,
         law=account_of(compensator["law"]) if compensator else None,
@@ -128,8 +135,10 @@ def _record(chain: Chain) -> tuple[tuple[str, str], ...]:
 
 def _title(chain: Chain) -> str:
     firmware, valve = chain.document("firmware"), chain.document("valve")
+    count = common_count(chain.document("compensator"))
+    what = f"Common setting of {count} valves: dead-zone compensator" if count else "Dead-zone compensator"
     if firmware:
-        return f"Dead-zone compensator for {firmware['target']}, law “{firmware['law']}”"
+        return f"{what} for {firmware['target']}, law “{firmware['law']}”"
     if "compensator" in chain.artefacts:
-        return "Dead-zone compensator"
+        return what
     return "Valve, identified from ramp tests" if valve else "Evidence of a dead-zone compensator"

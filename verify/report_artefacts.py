@@ -236,15 +236,18 @@ class _Search:
             return
         stated = _origin(compensator)
         name = self._by_hash(stated)
+        named = compensator.document["made_from"][0]["source"]
         if name:
             self._take("valve", name)
+            if named != name and self._other(VALVE_SCHEMA, named) == named:
+                self.missing.append(f"{named} is another valve by now; the compensator was made from {name}: used")
             if "valve" in self.found and self.found["valve"].document != compensator.document["valve"]:
                 self.faults.append(
                     f"{compensator.name} holds another valve than {name}, whose SHA-256 it states: it was edited"
                 )
             return
         content = to_json(compensator.document["valve"]).encode()
-        self._say_other(stated, VALVE_SCHEMA, "the compensator was made from")
+        self._say_other(stated, VALVE_SCHEMA, "the compensator was made from", named)
         self.found["valve"] = Artefact(
             role="valve",
             name=f"{compensator.name}, its key “valve”",
@@ -296,8 +299,14 @@ class _Search:
             None,
         )
 
-    def _say_other(self, stated: str | None, schema: str, which: str) -> None:
-        other = self._first(schema)
+    def _other(self, schema: str, named: str) -> str | None:
+        """Return a file of a schema that is not the one: that of its name, which was replaced, before a stranger."""
+        if is_of(self.shelf.get(named, b""), schema):
+            return named
+        return self._first(schema)
+
+    def _say_other(self, stated: str | None, schema: str, which: str, named: str = "") -> None:
+        other = self._other(schema, named)
         if not stated or not other:
             return
         said = f"{other} has the SHA-256 {self.hashes[other]}, but {which} one of {stated}: not used"

@@ -1,16 +1,19 @@
 """What stands in each section of the report: sentences, figures and tables, and what is missing for them."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from dzdesign.core.artefacts import to_json
 from dzdesign.core.errors import InputError
+from dzdesign.core.units import chance
 from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.design.signals_in_words import signals_in_words
 from dzdesign.verify.evidence_curves import closed_loop_name, input_map_name, read_curves, zero_command_name
 from dzdesign.verify.report_acceptance import assessed_table, limits_table, paper_tables
 from dzdesign.verify.report_artefacts import Chain
 from dzdesign.verify.report_evidence_figures import dead_zone_figure, loop_figure, map_figure, zero_figure
+from dzdesign.verify.report_lot import common_count, lot_section
 from dzdesign.verify.report_page import Section
 from dzdesign.verify.report_sections import (
     checks_table,
@@ -24,12 +27,10 @@ from dzdesign.verify.report_sections import (
     series_table,
     thresholds_table,
 )
-from dzdesign.verify.report_table import Table, whole
+from dzdesign.verify.report_table import Table, counted, whole
 from dzdesign.verify.report_valve_figures import beta_figure, law_figure, lines_figure, thresholds_figure
 from dzdesign.verify.required import required_of
 
-#: A probability below this is said to be below it.
-SMALLEST_P = 1e-9
 #: Anchor and heading of every section, in their order.
 SECTIONS = (
     ("data", "Data and fit"),
@@ -44,6 +45,8 @@ SECTIONS = (
     ("warnings", "Warnings, and what is not covered"),
     ("provenance", "Provenance"),
 )
+#: Of a common setting, these are of the one valve that its file holds.
+OF_A_VALVE = ("data", "thresholds", "beta", "loop")
 #: Of every report, whatever it finds.
 NOT_PROVED = (
     "Pressure drops beyond the tested interval: the nearest tested β is held there, and nothing is certified.",
@@ -78,7 +81,10 @@ def sections_of(chain: Chain) -> dict[str, Section]:
         "warnings": _warnings_section(chain),
         "provenance": _provenance_section(chain),
     }
-    return {name: made[name] for name, _ in SECTIONS}
+    if compensator and common_count(compensator):
+        made |= {name: replace(made[name], of_valve=True) for name in OF_A_VALVE}
+        made["lot"] = lot_section(compensator)
+    return made
 
 
 def _valve_sections(valve: dict[str, Any] | None, compensator: dict[str, Any] | None) -> dict[str, Section]:
@@ -101,7 +107,7 @@ def _valve_sections(valve: dict[str, Any] | None, compensator: dict[str, Any] | 
         "data": Section(
             figures=tuple(fits),
             lines=(
-                f"{sum(len(side['tests']) for side in valve['sides'].values())} ramp tests; full command "
+                f"{counted(sum(len(side['tests']) for side in valve['sides'].values()), 'ramp test')}; full command "
                 f"{valve['u_max_V']:g} V.",
                 f"Flow meter: floor {meter['floor_L_min']:.2f} L/min; lag taken as {meter['lag_s']:.3g} s "
                 f"({lag.get(meter['lag_is'], meter['lag_is'])}).",
@@ -125,10 +131,9 @@ def _trend(name: str, side: dict[str, Any]) -> str:
     if side["trend"] is None:
         return f"{stroke}; how the threshold moves with the pressure drop can't be said from one ramp test."
     change, error = 1e3 * side["trend_change_V"], 1e3 * side["trend_change_se_V"]
-    chance = f"= {side['trend_p']:.2g}" if side["trend_p"] > SMALLEST_P else f"below {SMALLEST_P:g}"
     return (
         f"{stroke}; trend of the threshold with the pressure drop: {side['trend']}, {change:+.1f} ± {error:.1f} mV "
-        f"over the tested range (p {chance})."
+        f"over the tested range ({chance(side['trend_p'])})."
     )
 
 
@@ -186,7 +191,7 @@ def _inputs_section(chain: Chain) -> Section:
             f"{side.capitalize()} commands: {whole(each['inputs'])} pairs of command and pressure-difference code "
             f"compared with the exactly rounded law, {whole(each['wrong'])} wrong, largest error "
             f"{each['largest_error']} counts; {each['over_compensated']} pressure codes over-compensated, smallest "
-            f"margin {1e3 * each['smallest_margin_V']:.3f} mV."
+            f"margin of the C's compare values {1e3 * each['smallest_margin_V']:.3f} mV."
         )
         if each["first_wrong"]:
             lines.append(f"First wrong: {each['first_wrong']}.")

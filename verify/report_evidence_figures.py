@@ -288,8 +288,10 @@ def dead_zone_figure(pressures: Sequence[dict[str, Any]], side: str, both: bool)
     both : bool
         Whether the valve has two sides.
     """
-    figure = new_figure(3.0, legend_rows=1)
+    figure = new_figure(3.0, legend_rows=1, top=0.3 if both else 0.12)
     axes = figure.subplots()
+    if both:
+        axes.set_title(f"{side} commands")
     dp = [each["dp_MPa"] for each in pressures]
     lines = (
         ("dead_zone_opening", "without, opening", "^", "-", "vermilion"),

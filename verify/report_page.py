@@ -42,6 +42,8 @@ class Section:
         Whether the page is whole without it.
     note : str
         What to do with it; what stands between backticks is a command.
+    of_valve : bool
+        Whether it is of one valve: of a common setting, of its carrier.
     """
 
     figures: tuple[ReportFigure, ...] = ()
@@ -51,6 +53,7 @@ class Section:
     missing: str = ""
     optional: bool = False
     note: str = ""
+    of_valve: bool = False
 
 
 def render_page(
@@ -63,6 +66,8 @@ def render_page(
     missing: Sequence[str] = (),
     law: "LawAccount | None" = None,
     record: Sequence[tuple[str, str]] = (),
+    lot: "Sequence[Figure]" = (),
+    carrier: str = "",
 ) -> str:
     """Return the page.
 
@@ -84,6 +89,10 @@ def render_page(
         The derivation, for the section ``law``.
     record : sequence of (str, str)
         Who and what, in the engineer's words.
+    lot : sequence of Figure
+        Of a common setting, before all others.
+    carrier : str
+        Of a common setting: the one valve that `record` and `figures` are of.
     """
     import jinja2
 
@@ -107,6 +116,8 @@ def render_page(
         palette=PALETTE,
         missing=missing,
         record=record,
+        lot=lot,
+        carrier=carrier,
     )
 
 

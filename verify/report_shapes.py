@@ -96,7 +96,8 @@ CONSTANTS = {
 #: Keys that came later, by the kind of artefact.
 LATER = {
     "firmware": {"constants": CONSTANTS, "board": {"board": [str]}},
-    "verification": {"target": {"target": str}, "yours": {"yours": [str]}},
+    "verification": {"target": {"target": str}, "yours": {"yours": [str]}, "own": {"own": [str]},
+                     "board_untried": {"board_untried": str}},
 }
 NUMBER_OR_NONE = (float, NoneType)
 #: assessment.json.

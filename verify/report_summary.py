@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
+from dzdesign.core.units import span_MPa
 from dzdesign.verify.report_artefacts import Chain
-from dzdesign.verify.report_table import whole
+from dzdesign.verify.report_table import counted, whole
 from dzdesign.verify.required import untried_of
 
 #: What the check of the inputs counts, each of which a requirement has to say.
@@ -158,9 +159,28 @@ def _dead_zone(loops: list[dict[str, Any]], word: str) -> Figure:
     return Figure(
         label=f"Dead zone on {word}",
         value=f"{max(before):.1f} % → {max(after):.1f} %",
-        note=f"of command, without → with; the worst of {len(loops)} pressure drops. "
-        f"With: {min(after):.1f} to {max(after):.1f} %",
+        note=f"of command, without → with; {worst_of(loops)}"
+        + (f". With: {min(after):.1f} to {max(after):.1f} %" if len(loops) > 1 else ""),
     )
+
+
+def worst_of(loops: list[dict[str, Any]]) -> str:
+    """Say of how many runs a figure is the worst: of two sides the pressure drops of each.
+
+    Parameters
+    ----------
+    loops : list of dict
+        Of verification.json.
+    """
+    sides = dict.fromkeys(each["side"] for each in loops)
+    counts = {name: sum(each["side"] == name for each in loops) for name in sides}
+    if len(set(counts.values())) > 1:
+        return "the worst of " + " and ".join(f"{counted(n, 'pressure drop')} {name}" for name, n in counts.items())
+    count = next(iter(counts.values()))
+    if count == 1:
+        where = f"at {loops[0]['dp_MPa']:.2f} MPa, the one pressure drop tested" if len(sides) == 1 else ""
+        return where or "the worse of both sides, each at one pressure drop"
+    return f"the worst of {count} pressure drops" + (f" on each of {len(sides)} sides" if len(sides) > 1 else "")
 
 
 def _at_zero(loops: list[dict[str, Any]]) -> Figure:
@@ -170,8 +190,7 @@ def _at_zero(loops: list[dict[str, Any]]) -> Figure:
     return Figure(
         label="Flow at zero command",
         value="none" if flow <= 1e-9 else f"{flow:.3g} L/min",
-        note=f"in the simulated loop, after closing, the worst of {len(loops)} pressure drops; without β it would be "
-        f"{bare:.2f} L/min",
+        note=f"in the simulated loop, after closing, {worst_of(loops)}; without β it would be {bare:.2f} L/min",
         kind="text" if flow <= 1e-9 else "bad",
     )
 
@@ -183,8 +202,12 @@ def _threshold(valve: dict[str, Any]) -> Figure:
     return Figure(
         label="Dead zone of the valve",
         value=f"{share * max(opens):.1f} %",
-        note=f"of {valve['u_max_V']:g} V, on opening, {name} commands; {share * min(opens):.1f} to "
-        f"{share * max(opens):.1f} % over {len(opens)} pressure drops",
+        note=f"of {valve['u_max_V']:g} V, on opening, {name} commands"
+        + (
+            f"; {share * min(opens):.1f} to {share * max(opens):.1f} % over {len(opens)} pressure drops"
+            if len(opens) > 1
+            else ", at one pressure drop"
+        ),
     )
 
 
@@ -206,9 +229,10 @@ def _certificate(compensator: dict[str, Any], inputs: list[dict[str, Any]]) -> F
     return Figure(
         label="Certificate",
         value=f"{100 * worst['confidence']:g} %",
-        note=f"confidence that the drive at zero command stays below the {worst['guard']} threshold from {low:.2f} to "
-        f"{high:.2f} MPa; smallest margin to its bound {margin:.2f} mV at any pressure"
-        + (f", {least:.2f} mV at those that the converter can tell apart" if inputs else "")
+        note=f"confidence that the drive at zero command stays below the {worst['guard']} threshold "
+        f"{span_MPa(low, high)}; smallest margin {margin:.3f} mV of the exact law under the certified offset, half a "
+        "count kept for the rounding"
+        + (f"; {least:.3f} mV of the C's compare values under the threshold's bound" if inputs else "")
         + f". Flow below {worst['level_L_min']:.2f} L/min counts as none",
     )
 

@@ -91,6 +91,22 @@ def whole(value: int) -> str:
     return f"{value:,}".replace(",", "\u202f")
 
 
+def counted(count: int, noun: str) -> str:
+    """Return a count with its noun, in the plural where it is not one.
+
+    Parameters
+    ----------
+    count : int
+    noun : str
+
+    Examples
+    --------
+    >>> counted(1, "ramp test"), counted(6, "ramp test")
+    ('1 ramp test', '6 ramp tests')
+    """
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
 def verdict(holds: bool | None) -> Cell:
     """Return a verdict with its sign.
 

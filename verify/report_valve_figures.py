@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,13 +17,27 @@ from dzdesign.verify.report_figure import (
     new_figure,
     svg_of,
 )
+from dzdesign.verify.report_table import counted
 from dzdesign.verify.zero_command import bounds_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 BRANCHES = (("rising", "opening", "^", "-", "blue"), ("falling", "closing", "v", "--", "vermilion"))
 
 
 def _side_words(name: str, both: bool) -> str:
     return f", {name} commands" if both else ""
+
+
+def _titled(height: float, name: str, both: bool, **margins: Any) -> tuple["Figure", "Axes"]:
+    """Return an empty figure; of a valve with two sides its title says which it is of."""
+    figure = new_figure(height, **margins, **({"top": 0.3} if both else {}))
+    axes = figure.subplots()
+    if both:
+        axes.set_title(f"{name} commands")
+    return figure, axes
 
 
 def lines_figure(side: dict[str, Any], name: str, both: bool) -> ReportFigure:
@@ -38,8 +52,7 @@ def lines_figure(side: dict[str, Any], name: str, both: bool) -> ReportFigure:
     both : bool
         Whether the valve has two sides.
     """
-    figure = new_figure(3.5, right=0.65)
-    axes = figure.subplots()
+    figure, axes = _titled(3.5, name, both, right=0.65)
     rows, labels = [], []
     for index, test in enumerate(side["tests"]):
         colour = LIGHT[CYCLE[index % len(CYCLE)]]
@@ -63,8 +76,8 @@ def lines_figure(side: dict[str, Any], name: str, both: bool) -> ReportFigure:
     axes.legend(loc="upper left")
     axes.set(xlabel="valve command u (V)", ylabel="flow Q (L/min)", ylim=(0, None))
     description = (
-        f"Straight lines of flow over command of {len(side['tests'])} pressure drops; they meet zero flow at the "
-        f"knees, {_span([row[2] for row in rows], 'V', 3)}."
+        f"Straight lines of flow over command of {counted(len(side['tests']), 'pressure drop')}; they meet zero "
+        f"flow at the knees, {_span([row[2] for row in rows], 'V', 3)}."
     )
     return ReportFigure(
         name=f"fit-{name}",
@@ -102,8 +115,7 @@ def thresholds_figure(side: dict[str, Any], guard: str, name: str, both: bool) -
     """
     curve = _guard_curve(side, guard)
     dp = np.array([test["dp_MPa"] or 0.0 for test in side["tests"]])
-    figure = new_figure(3.8, legend_rows=2)
-    axes = figure.subplots()
+    figure, axes = _titled(3.8, name, both, legend_rows=2)
     for branch, word, marker, _, colour in BRANCHES:
         for what, face, size in (("knee", LIGHT[colour], 5.5), ("onset", "none", 8.5)):
             at = [test[f"u_{what}_{branch}_V"] for test in side["tests"]]
@@ -129,8 +141,12 @@ def thresholds_figure(side: dict[str, Any], guard: str, name: str, both: bool) -
     return ReportFigure(
         name=f"thresholds-{name}",
         caption=f"Thresholds over the pressure drop{_side_words(name, both)}. The {guard} threshold is guarded: the "
-        "drive at zero command stays below the staircase, which is what the bounds of all tests together certify "
-        "between the tests too.",
+        "drive at zero command stays below "
+        + (
+            "the staircase, which is what the bounds of all tests together certify between the tests too."
+            if len(dp) > 1
+            else "its lower bound. One pressure drop was tested, and nothing is certified at another."
+        ),
         description=description,
         svg=svg_of(figure, f"thresholds-{name}", description),
         csv=csv_text(
@@ -193,8 +209,7 @@ def beta_figure(
     steps, lower, threshold = (
         np.array(curve[key]) / u_min0 for key in ("certified_steps_V", "u_lower_V", "u_threshold_V")
     )
-    figure = new_figure(3.6, legend_rows=2)
-    axes = figure.subplots()
+    figure, axes = _titled(3.6, name, both, legend_rows=2)
     axes.fill_between(dp, lower, threshold, color=LIGHT["sky"], alpha=0.25, lw=0,
                       label="from bound to threshold, over u_min0")  # fmt: skip
     axes.plot(dp, threshold, ":", color=LIGHT["blue"], lw=1.4, label="threshold / u_min0")
@@ -264,8 +279,7 @@ def law_figure(compensator: dict[str, Any], name: str, both: bool) -> ReportFigu
     sensor = compensator["signals"]["pressure_a"]
     code_MPa = float(Fraction(*sensor["span_MPa"])) / (sensor["full_code"] - sensor["zero_code"])
     low, high = (float(Fraction(*end)) for end in compensator["sides"][name]["certificate"]["dp_MPa"])
-    figure = new_figure(3.2)
-    axes = figure.subplots()
+    figure, axes = _titled(3.2, name, both)
     axes.plot([0, 100], [0, u_max], ":", color=LIGHT["soft"], lw=1.3, label="without compensator")
     rows = []
     for dp_MPa, dash, colour in ((low, "-", "blue"), (high, "--", "vermilion")):

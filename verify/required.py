@@ -6,7 +6,8 @@ The names are those of the checks; a check of a name that is not here stands in 
 from dataclasses import dataclass
 from typing import Any
 
-VALVE = "the valve is that of valve.json"
+VALVE = "the valve is the one that compensator.json was made from"
+COMPILES = "your board files compile"
 #: The generator itself is asked by the command, not by this room.
 REGENERATED = "the files are those that codegen makes of compensator.json"
 #: Of a board file that its user filled in: nothing that was generated is there to compare it with.
@@ -14,7 +15,7 @@ REVIEW = "review it, and try it on the machine"
 #: How to have tried what `verify` could not try. Of a valve.json that is not written as `identify` writes it, the hash
 #: is known from the file alone.
 HOW = {
-    VALVE: "`verify` with the valve.json that compensator.json names beside the firmware",
+    VALVE: "`verify` with the valve.json that compensator.json names by its SHA-256 beside the firmware",
     REGENERATED: "`verify` with the version of dzdesign that generated it, or `codegen` with this one",
 }
 #: What every `verify` tries.
@@ -79,6 +80,9 @@ def required_of(evidence: dict[str, Any]) -> tuple[Required, ...]:
     """
     checks = evidence["checks"]
     found = [_part(f"{name}, which is yours and was changed", False, REVIEW) for name in evidence.get("yours", ())]
+    found += [_part(f"{name}, which is yours", False, REVIEW) for name in evidence.get("own", ())]
+    if evidence.get("board_untried"):
+        found.append(_part(COMPILES, False, evidence["board_untried"]))
     found += [_tried(checks, name, name, HOW.get(name, "`verify`")) for name in ALWAYS]
     own = bool(evidence["closed_loop"].get("plant"))
     found.append(_part("closed loop with a plant of the machine's own", own, "`verify --plant`"))

@@ -25,21 +25,32 @@ def valve_follows(folder: Path, document: dict[str, Any]) -> list[Check]:
     document : dict
         compensator.json.
     """
-    stated, valve = document["made_from"][0]["sha256"], document["valve"]
+    source, valve = document["made_from"][0], document["valve"]
+    stated = source["sha256"]
+    around = list(_valves_around(folder))
+    other = _replaced(source, valve, around)
     if stated == sha256_of(to_json(valve).encode()):  # as `identify` writes it: no file is needed
-        text = "its SHA-256, as `identify` writes it, is the one that compensator.json names"
-        return [Check(name=VALVE, holds=True, text=text)]
-    for name, content, found in _valves_around(folder):
+        text = f"the valve that compensator.json holds has, as `identify` writes it, the SHA-256 {stated} in made_from"
+        return [Check(name=VALVE, holds=True, text=other + text)]
+    for name, content, found in around:
         digest = sha256_of(content)
         if digest == stated:
             holds = found == valve
-            text = f"compared with {name}, which has the SHA-256 that compensator.json names"
+            text = f"compared with {name}, which has the SHA-256 {stated} in made_from"
             text += "" if holds else ", but is another valve; make the compensator again with `dzdesign design`"
-            return [Check(name=VALVE, holds=holds, text=text)]
+            return [Check(name=VALVE, holds=holds, text=other + text)]
         if found == valve:
             text = f"{name} is that valve, but its SHA-256 is {digest} and compensator.json names {stated}; make the "
             return [Check(name=VALVE, holds=False, text=f"{text}compensator again with `dzdesign design`")]
     return []
+
+
+def _replaced(source: dict[str, Any], valve: dict[str, Any], around: list[tuple[str, bytes, dict[str, Any]]]) -> str:
+    """Say that the file of the name in made_from is another by now, if it is."""
+    for name, content, found in around:
+        if name == source["source"] and found != valve:
+            return f"{name} beside the firmware is ANOTHER valve, SHA-256 {sha256_of(content)}, and not used; "
+    return ""
 
 
 def _valves_around(folder: Path) -> Iterator[tuple[str, bytes, dict[str, Any]]]:

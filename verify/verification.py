@@ -1,7 +1,7 @@
 """`verify`: a firmware folder in, evidence out: strict compilation, every input, closed loop."""
 
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -13,7 +13,7 @@ from dzdesign.core.shown import ShownInNotebooks
 from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.identify.valve_file import valve_from_document
 from dzdesign.verify.all_inputs import InputCheck, check_all_inputs
-from dzdesign.verify.board_files import board_compiles, board_files
+from dzdesign.verify.board_files import board_compiles, board_files, check_include
 from dzdesign.verify.checks import (
     Check,
     certificate_follows,
@@ -24,6 +24,7 @@ from dzdesign.verify.checks import (
     law_follows,
     lot_checked,
     no_flow_at_zero,
+    own_files,
     plant_is_the_valve,
     plant_opens,
     shut_after_scenarios,
@@ -104,6 +105,7 @@ def verify(
     plant_sha256: str | None = None,
     sequence: RampSequence | None = None,
     tolerances: Tolerances | None = None,
+    include: Sequence[Path] = (),
     say: Callable[[str], None] = lambda _: None,
     watch: Watch = lambda items, _: items,
 ) -> Verification:
@@ -123,6 +125,8 @@ def verify(
         The command over time; 0-10 V in 100 s and back by default.
     tolerances : Tolerances, optional
         Of a series of plants about `plant`, which is then needed.
+    include : sequence of Path
+        Where headers lie that the user's board files include.
     say : callable
         Told each stage before it begins.
     watch : callable
@@ -137,6 +141,7 @@ def verify(
         raise InputError("tolerances are about a plant; give it with --plant PLANT.toml")
     folder = Path(folder)
     manifest_bytes, manifest = read_firmware_manifest(folder)
+    check_include(include, manifest)
     content = read_bytes(folder / "compensator.json", "compensator")
     compensator = compensator_from_document(content, str(folder / "compensator.json"))  # every key that is read below
     document = json.loads(content)
@@ -164,7 +169,8 @@ def verify(
         checks += [drive_follows(folder, compensator), keeps_no_state(folder)]
         loop = _close_the_loop(building.result(), document, plant, sequence or RampSequence(), tolerances, say, watch)
     checks += [*loop.checks, certificate_follows(compensator), law_follows(compensator, document)]
-    checks += [*valve_follows(folder, document), *board_compiles(folder, manifest)]
+    board = board_compiles(folder, manifest, include)
+    checks += [*valve_follows(folder, document), *board.checks]
     source = plant_source or "made from the identified thresholds"
     return Verification(
         checks=tuple(checks),
@@ -180,6 +186,8 @@ def verify(
             "made_from": [{"source": f"{folder.name}/{MANIFEST_NAME}", "sha256": sha256_of(manifest_bytes)}],
             "target": manifest.get("target", ""),
             "yours": [each.name for each in board_files(folder, manifest) if each.changed],
+            "own": own_files(folder, manifest),
+            "board_untried": board.untried,
             "holds": all(check.holds for check in checks),
             "checks": [asdict(check) for check in checks],
             "inputs": [asdict(each) for each in inputs],
