@@ -261,6 +261,8 @@ def test_files_in_the_folder_for_them_are_named_kept_and_not_checked(compensator
         ("board/dz_comp.h", "board/dz_comp.h: not generated, but named as a generated file"),
         ("cortex_m4/my.ld", "does not name cortex_m4/my.ld; keep source and project files of your own in board/"),
         ("core/board/adc.c", "does not name core/board/adc.c"),
+        ("core/dz_comp.h.gch", "core/dz_comp.h.gch: not generated, but named as a generated file"),
+        ("core/dz_comp.h.gch/any", "core/dz_comp.h.gch: not generated, but named as a generated file"),
         ("core/adc.c", "core/ is the compensator alone, keep files of your own in board/"),
     ],
 )

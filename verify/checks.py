@@ -29,6 +29,8 @@ SOURCES = {
 }  # fmt: skip
 #: Folder of a firmware for files of the user's own, beside those that were generated.
 OWN = "board"
+#: Endings of precompiled headers, files or folders: a compiler takes one in place of the header beside it.
+PRECOMPILED = (".gch", ".pch", ".pcm")
 BUILD_FILES = {"makefile", "gnumakefile", "cmakelists.txt", "meson.build", ".project", ".cproject", ".ccsproject"}
 
 
@@ -61,7 +63,7 @@ def files_unchanged(folder: Path, manifest: dict[str, Any]) -> Check:
         if _is_source(path) and not built.intersection(path.parents)
     ]
     others = [name for name in others if name not in manifest["files"]]
-    shadows = [name for name in others if PurePosixPath(name).name in ours]
+    shadows = [name for name in others if _header_of(PurePosixPath(name).name) in ours]
     own = own_files(folder, manifest)
     others = [name for name in others if name not in own]
     claimed = [name for name in sorted(board) if not _may_be_filled_in(name, manifest)]
@@ -88,6 +90,13 @@ def files_unchanged(folder: Path, manifest: dict[str, Any]) -> Check:
     if built and not fault:
         text += f"; built by CMake, and not checked: {', '.join(sorted(tree.name for tree in built))}"
     return Check(name="files as generated", holds=not fault, text=text)
+
+
+def _header_of(name: str) -> str:
+    """Return the name under which a compiler looks for a file: a precompiled header's is the header's."""
+    for ending in PRECOMPILED:
+        name = name.removesuffix(ending)
+    return name
 
 
 def own_files(folder: Path, manifest: dict[str, Any]) -> list[str]:
@@ -118,6 +127,8 @@ def _cmake_trees(folder: Path, manifest: dict[str, Any]) -> set[Path]:
 
 def _is_source(path: Path) -> bool:
     """Tell whether a compiler, a linker or a build reads a file; what they write may lie about."""
+    if path.name.lower().endswith(PRECOMPILED):
+        return True
     return path.is_file() and (path.suffix.lower() in SOURCES or path.name.lower() in BUILD_FILES)
 
 
