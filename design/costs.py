@@ -25,8 +25,9 @@ def costs_of(compensator: Compensator, valve: ValveModel) -> tuple[str, ...]:
         lines += [label + _cost_of_test(compensator, test, sign) for test in side.tests]
         lines += [label + line for line in _cost_of_side(compensator, side, sign)]
     low, high = (float(end) for end in compensator.positive.certificate.dp_MPa)
+    beyond = f"outside {low:.2f} to {high:.2f} MPa" if high > low else f"at any pressure drop but {low:.2f} MPa"
     lines.append(
-        f"outside {low:.2f} to {high:.2f} MPa the nearest tested beta is held and nothing is certified; "
+        f"{beyond} the nearest tested beta is held and nothing is certified; "
         f"a pressure difference below -{compensator.reverse_codes} codes is taken as a failed sensor: smallest beta"
     )
     if compensator.negative is None and valve.sides.get("negative") is not None:
