@@ -1,5 +1,6 @@
 """Results as tables on stdout, by rich; plain where stdout is no terminal."""
 
+import json
 from typing import TYPE_CHECKING
 
 from dzdesign.core.errors import one_line
@@ -134,7 +135,9 @@ def print_compensator(compensator: "Compensator") -> None:
 
 def print_firmware(firmware: "Firmware", folder: str) -> None:
     """Print the files of a firmware folder."""
-    print(one_line(f"Firmware for {firmware.manifest['target']}, law {firmware.manifest['law']}, in {folder}:"))
+    valves = json.loads(firmware.files["compensator.json"]).get("common_valves")
+    common = f", common setting of {valves} valves" if valves else ""
+    print(one_line(f"Firmware for {firmware.manifest['target']}, law {firmware.manifest['law']}{common}, in {folder}:"))
     for name in firmware.files:
         print(f"  {name}")
 

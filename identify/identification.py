@@ -87,7 +87,7 @@ def identify_sides(
             warnings.append(Warning_(code="side-refused", text=f"the {name} side is missing: {reason}", source=None))
             continue
         prefix = f"{name} side: " if len(sides) > 1 else ""
-        own_words = [item for item in sides[name].warnings if not stuck or item.code not in ALSO_OF_A_MIXTURE]
+        own_words = [item for item in sides[name].warnings if not mixed or item.code not in ALSO_OF_A_MIXTURE]
         warnings += [replace(item, text=prefix + item.text) for item in (*pressures, *clipped, *own_words)]
     lag = next(iter(sides.values())).described.lag
     model = ValveModel(

@@ -19,12 +19,12 @@ SAME = 1.5
 def pressures_in_name(name: str) -> tuple[str, ...]:
     """Return the pressures as which a file's name can be read: none, one, or the decimal one and the other.
 
-    ``0_5``, ``0-5`` and ``2p5`` are decimal numbers; ``2_5MPa`` may be 2.5 MPa, or 5 MPa after a number of its own, and
-    ``2.000 bar`` may be two thousand. What is no valve's pressure drop is none of the readings.
+    ``2p5`` is a decimal number; ``2_5MPa`` may be 2.5 MPa, or 5 MPa after a number of its own, so may ``0_5MPa`` (valve
+    0, run 0), and ``2.000 bar`` may be two thousand. What is no valve's pressure drop is none of the readings.
 
     Examples
     --------
-    >>> pressures_in_name("ramp_4MPa_2.csv"), pressures_in_name("ramp_0_5MPa.csv"), pressures_in_name("ramp_2_5MPa.csv")
+    >>> pressures_in_name("ramp_4MPa_2.csv"), pressures_in_name("ramp_0p5MPa.csv"), pressures_in_name("ramp_2_5MPa.csv")
     (('4 MPa',), ('0.5 MPa',), ('2.5 MPa', '5 MPa'))
     """
     found = {
@@ -62,12 +62,7 @@ def _with_unit(readings: tuple[str, ...], unit: str) -> tuple[str, ...]:
     """Return readings with their unit, without those that no valve's pressure drop can be."""
     texts = [f"{reading} {unit}" for reading in readings]
     possible = [text for text in texts if SMALLEST_DP <= _in_Pa(text) <= LARGEST_DP] or texts
-    return _decimal_of_zero(tuple(possible))
-
-
-def _decimal_of_zero(readings: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the decimal number alone where its whole part is nought: 0_5."""
-    return readings[:1] if readings[0].startswith("0.") else readings
+    return tuple(possible)
 
 
 def _in_Pa(text: str) -> float:
@@ -105,7 +100,7 @@ def _bare(name: str) -> list[float]:
     if not found:
         return []
     before, mark, number = (part or "" for part in found.groups())
-    return [float(text) for text in _decimal_of_zero(_readings(before, mark, number, after=before))]
+    return [float(text) for text in _readings(before, mark, number, after=before)]
 
 
 def _closest(readings: Sequence[Sequence[float]]) -> list[float]:

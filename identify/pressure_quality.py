@@ -127,8 +127,9 @@ def about_stuck_recordings(tests: Sequence[RampTest]) -> Iterator[Warning_]:
                 code="pressure-stuck",
                 text=(
                     f"the pressure drop is {dp / MPA:.6g} MPa to the last digit in every row, but "
-                    f"{' and '.join(signs)}: the sensor is stuck, or the number was typed in. {WHAT_FOLLOWS}. "
-                    "Leave that column out and declare the pressure drop by [dp], or record again"
+                    f"{' and '.join(signs)}: the sensor is stuck or too coarse to show anything, or the number "
+                    f"was typed in. {WHAT_FOLLOWS}. Leave that column out and declare the pressure drop by [dp], or "
+                    "record again"
                 ),
                 source=test.source,
             )

@@ -229,7 +229,16 @@ def test_a_vendors_header_is_named_and_found_by_an_option(cortex, tmp_path, caps
     said = " ".join(capsys.readouterr().out.split())
     assert f"core_cm4.h, which cortex_m4/dz_board.c includes, was not found in the firmware nor in {headers[0]}" in said
     assert main(["verify", str(cortex), "-o", str(evidence), *one, "--include", str(headers[1])]) == 0
-    assert "holds your board files compile: with cortex_m4/dz_board.c" in " ".join(capsys.readouterr().out.split())
+    said = " ".join(capsys.readouterr().out.split())
+    assert "holds your board files compile: one by one, with cortex_m4/dz_board.c" in said
+    (cortex / "board").mkdir()
+    (cortex / "board/adc.c").write_text("int adc(void);\nint adc(void) { return 1; }\n")
+    manifest = json.loads((cortex / MANIFEST_NAME).read_text())
+    (check,) = board_compiles(cortex, manifest, headers).checks
+    assert check.holds and "as you changed them and board/adc.c" in check.text
+    (cortex / "board/adc.c").write_text("#error broken\n")
+    (check,) = board_compiles(cortex, manifest, headers).checks
+    assert check.holds is False and "broken" in check.text
 
 
 def test_include_of_what_is_no_folder_or_not_compiled_here_is_refused(compensator, cortex, tmp_path):

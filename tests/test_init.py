@@ -280,8 +280,8 @@ def test_names_that_contradict_the_column_are_said(here, capsys, dither):
     assert "CHECK" not in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("name", ["Rampe_0_5MPa.txt", "Rampe_0-5MPa.txt", "Rampe_0p5MPa.txt"])
-def test_names_without_a_point_say_decimal_numbers(here, name):
+def test_a_p_stands_for_a_point(here):
+    name = "Rampe_0p5MPa.txt"
     for dp_MPa, path in ((0.5, name), (1.0, "Rampe_1MPa.txt")):
         time, u, dp, q = columns_of(dp_MPa)
         write(path, "t_s,u_V,Q_Lmin", time, u, q * dp_MPa**0.5)
@@ -290,6 +290,16 @@ def test_names_without_a_point_say_decimal_numbers(here, name):
     assert tomllib.loads(text)["dp"] == {name: "0.5 MPa", "Rampe_1MPa.txt": "1 MPa"}
     assert [test["dp_MPa"] for test in valve["sides"]["positive"]["tests"]] == [0.5, 1.0]
     assert main(["init", "with_*", "-o", "with.toml"]) == 0 and "CHECK" not in Path("with.toml").read_text()
+
+
+def test_a_valve_nought_is_no_decimal_number(here, capsys):
+    """V0_1MPa: a tenth of the pressure would go into the certificate."""
+    for number in (1, 3, 5):
+        time, u, _, q = columns_of(float(number))
+        write(f"V0_{number}MPa.csv", "t_s,u_V,Q_Lmin", time, u, q * number**0.5)
+    assert main(["init", *(f"V0_{number}MPa.csv" for number in (1, 3, 5))]) == 1
+    assert "its name may say 0.1 MPa or 1 MPa" in capsys.readouterr().out
+    assert "dp" not in tomllib.loads(Path("dzdesign.toml").read_text())
 
 
 @pytest.mark.parametrize("others", [(), ("Rampe_1MPa.txt",)])

@@ -8,11 +8,12 @@ from dzdesign.identify.named_pressure import claimed_pressures, contradicts, pre
 @pytest.mark.parametrize(
     ("name", "readings"),
     [
-        ("Rampe_0_5MPa.txt", ["0.5 MPa"]),
+        ("Rampe_0_5MPa.txt", ["0.5 MPa", "5 MPa"]),
+        ("V0_1MPa.csv", ["0.1 MPa", "1 MPa"]),
         ("ramp_0p5MPa.txt", ["0.5 MPa"]),
-        ("ramp_0-5MPa.txt", ["0.5 MPa"]),
+        ("ramp_0-5MPa.txt", ["0.5 MPa", "5 MPa"]),
         ("ramp_0,5 MPa.txt", ["0.5 MPa"]),
-        ("run_10_0_5_MPa.txt", ["0.5 MPa"]),
+        ("run_10_0_5_MPa.txt", ["0.5 MPa", "5 MPa"]),
         ("ramp2P5MPa.txt", ["2.5 MPa"]),
         ("ramp 12,5 Bar up.csv", ["12.5 bar"]),
         ("ramp_2_1.5MPa.csv", ["1.5 MPa"]),
@@ -39,11 +40,12 @@ def test_what_can_be_read_in_two_ways_is_not_guessed(name, readings):
 def test_a_column_that_agrees_with_either_reading_is_no_contradiction():
     assert not contradicts("ramp_2_5MPa.csv", 2.4e6) and not contradicts("ramp_2_5MPa.csv", 4.9e6)
     assert contradicts("ramp_2_5MPa.csv", 1e6) == "2.5 MPa or 5 MPa"
-    assert contradicts("ramp_0_5MPa.csv", 5e6) == "0.5 MPa" and not contradicts("ramp_0_5MPa.csv", 0.495e6)
+    assert contradicts("ramp_0p5MPa.csv", 5e6) == "0.5 MPa" and not contradicts("ramp_0p5MPa.csv", 0.495e6)
+    assert not contradicts("V0_5MPa.csv", 5e6) and not contradicts("ramp_0_5MPa.csv", 0.495e6)
 
 
 def test_names_that_may_say_the_same_tell_nothing_apart():
     assert claimed_pressures(["dP2_1.csv", "dP2_2.csv"]) == [2.0, 2.0]  # or 2.1 and 2.2: less alike
     assert claimed_pressures(["V1_2MPa.csv", "V2_2MPa.csv"]) == [2e6, 2e6]
-    assert claimed_pressures(["dP0_5.csv", "dP5.csv"]) == [0.5, 5.0]
+    assert claimed_pressures(["dP0p5.csv", "dP5.csv"]) == [0.5, 5.0]
     assert claimed_pressures(["a.csv", "dP5.csv"]) == []

@@ -10,7 +10,7 @@ from typing import Any
 
 from dzdesign.core.artefacts import sha256_of
 from dzdesign.core.errors import InputError
-from dzdesign.verify.checks import OWN, Check
+from dzdesign.verify.checks import OWN, Check, own_files
 from dzdesign.verify.host_compiler import build_folder, run_compiler
 from dzdesign.verify.machines import CORTEX_M4
 from dzdesign.verify.required import COMPILES
@@ -82,7 +82,7 @@ class BoardCompiled:
 
 
 def board_compiles(folder: Path, manifest: dict[str, Any], include: Sequence[Path] = ()) -> BoardCompiled:
-    """Compile the target's C together with the board files that were changed.
+    """Compile the target's C together with the board files that were changed, and the user's own; nothing is linked.
 
     Parameters
     ----------
@@ -101,6 +101,8 @@ def board_compiles(folder: Path, manifest: dict[str, Any], include: Sequence[Pat
         return BoardCompiled(untried=f"{compiler} is not on the path; install it, then `verify`")
     place = (folder / changed[0]).parent
     sources = sorted(name for name in manifest["files"] if (folder / name).parent == place and name.endswith(".c"))
+    own = [name for name in own_files(folder, manifest) if name.endswith(".c")]
+    sources += own
     # Warnings in headers of a vendor are no concern here: -isystem.
     folders = [f"-I{folder / 'core'}", f"-I{place}", "-iquote", str(folder / OWN)]
     folders += [word for path in include for word in ("-isystem", str(path))]
@@ -119,5 +121,7 @@ def board_compiles(folder: Path, manifest: dict[str, Any], include: Sequence[Pat
         if done.returncode:
             first = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr.strip()[:300])
             return BoardCompiled(checks=(Check(name=COMPILES, holds=False, text=f"{first} ({Path(compiler).name})"),))
-    text = f"with {', '.join(changed)} as you changed them ({Path(compiler).name}); what they do is not checked"
+    added = f" and {', '.join(own)}" if own else ""
+    text = f"one by one, with {', '.join(changed)} as you changed them{added} ({Path(compiler).name}); not linked, and "
+    text += "what they do is not checked"
     return BoardCompiled(checks=(Check(name=COMPILES, holds=True, text=text),))
