@@ -17,6 +17,7 @@ from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler
 PROJECT = "f28335/dzdesign.projectspec"
+QUICK = RampSequence(rest=0.5, ramp=4.0, top=0.5)
 
 
 def seal(folder, change=lambda manifest: None):
@@ -82,18 +83,74 @@ def test_what_is_the_users_to_fill_in_may_be_anything(firmware_folder):
     assert regenerated(firmware_folder).holds
 
 
-@pytest.mark.parametrize("change", [{"tool": {"name": "dzdesign", "version": "0.0.9"}}, {"target": "mychip"}])
-def test_of_another_version_or_target_nobody_can_tell(firmware_folder, change):
-    seal(firmware_folder, lambda manifest: manifest.update(change))
-    assert regenerated(firmware_folder) is None
-    evidence = {"checks": [], "closed_loop": {}, "monte_carlo": None}
-    (said,) = [line for line in untried_of(evidence) if line.startswith(REGENERATED)]
-    assert "with the version of dzdesign that generated it" in said
+def always_60000(folder):
+    """Let the interrupt write another compare value than the law's, as nothing on the host sees."""
+    edit(folder, "f28335/dz_isr.c", "CMPA.half.CMPA = compare;", "CMPA.half.CMPA = 60000u;")
+
+
+def rename_target(manifest, folder):
+    """Call the target something unknown, folder and all."""
+    (folder / "f28335").rename(folder / "mychip")
+    for key in ("files", "board"):
+        renamed = [name.replace("f28335/", "mychip/") for name in manifest[key]]
+        manifest[key] = dict(zip(renamed, manifest[key].values(), strict=True)) if key == "files" else renamed
+    manifest["target"] = "mychip"
+
+
+#: What takes a firmware out of reach of this version's generator, and what the message names.
+UNKNOWN_ORIGINS = {
+    "another version": (lambda manifest, _: manifest["tool"].update(version="0.0.9"), "dzdesign 0.0.9"),
+    "another name": (lambda manifest, _: manifest["tool"].update(name="mydesign"), "mydesign"),
+    "no tool": (lambda manifest, _: manifest.pop("tool"), "does not name"),
+    "a tool of no version": (lambda manifest, _: manifest["tool"].pop("version"), "does not name"),
+    "a tool that is no object": (lambda manifest, _: manifest.update(tool=["dzdesign", 1]), "does not name"),
+    "another target": (rename_target, "mychip"),
+    "no target": (lambda manifest, _: manifest.pop("target"), "target"),
+}
+
+
+@pytest.mark.parametrize("origin", UNKNOWN_ORIGINS)
+def test_what_this_version_can_not_generate_again_is_not_checked(firmware_folder, origin):
+    change, named = UNKNOWN_ORIGINS[origin]
+    seal(firmware_folder, lambda manifest: change(manifest, firmware_folder))
+    check = regenerated(firmware_folder)
+    assert check.name == REGENERATED and check.holds is None
+    assert named in check.text and "`dzdesign codegen`" in check.text and len(check.text) < 300
+
+
+def test_a_version_of_any_length_and_any_characters_fits_a_message(firmware_folder):
+    seal(firmware_folder, lambda manifest: manifest["tool"].update(version="9" * 10_000 + "\x1b[2J\n"))
+    text = regenerated(firmware_folder).text
+    assert len(text) < 300 and text.isprintable()
+
+
+@pytest.mark.parametrize("origin", UNKNOWN_ORIGINS)
+def test_an_edit_does_not_hide_behind_an_unknown_origin(firmware_folder, tmp_path, monkeypatch, capsys, origin):
+    monkeypatch.setattr(verification, "verify", partial(verification.verify, sequence=QUICK))
+    always_60000(firmware_folder)
+    seal(firmware_folder, lambda manifest: UNKNOWN_ORIGINS[origin][0](manifest, firmware_folder))
+    assert main(["verify", str(firmware_folder), "-o", str(tmp_path / "evidence")]) == 1
+    out = capsys.readouterr().out
+    (line,) = [line for line in out.splitlines() if REGENERATED in line and line.startswith("NOT CHECKED  ")]
+    assert UNKNOWN_ORIGINS[origin][1] in line
+    evidence = json.loads((tmp_path / "evidence/verification.json").read_text())
+    assert evidence["holds"] is False and not any(line.startswith(REGENERATED) for line in untried_of(evidence))
+    html = (tmp_path / "evidence/report.html").read_text(encoding="utf-8")
+    assert 'class="verdict good"' not in html
+
+
+def test_of_another_version_all_else_holds_and_the_function_says_so(firmware_folder, tmp_path, monkeypatch):
+    monkeypatch.setattr(verification, "verify", partial(verification.verify, sequence=QUICK))
+    always_60000(firmware_folder)
+    seal(firmware_folder, lambda manifest: manifest["tool"].update(version="0.0.9"))
+    result = api.verify(firmware_folder, output=tmp_path / "evidence")
+    assert result.holds is False and result.verdict == f"NOT CHECKED: {REGENERATED}"
+    html = (tmp_path / "evidence/report.html").read_text(encoding="utf-8")
+    assert 'class="verdict open"' in html and "dzdesign 0.0.9" in html
 
 
 def test_the_command_and_the_function_say_so(firmware_folder, tmp_path, monkeypatch, capsys):
-    quick = partial(verification.verify, sequence=RampSequence(rest=0.5, ramp=4.0, top=0.5))
-    monkeypatch.setattr(verification, "verify", quick)
+    monkeypatch.setattr(verification, "verify", partial(verification.verify, sequence=QUICK))
     edit(firmware_folder, "f28335/dz_isr.c", "{", "{ /* another */")
     seal(firmware_folder)
     assert main(["verify", str(firmware_folder), "-o", str(tmp_path / "evidence")]) == 1

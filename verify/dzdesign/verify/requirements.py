@@ -16,7 +16,6 @@ REVIEW = "review it, and try it on the machine"
 #: is known from the file alone.
 HOW = {
     VALVE: "`verify` with the valve.json that compensator.json names by its SHA-256 beside the firmware",
-    REGENERATED: "`verify` with the version of dzdesign that generated it, or `codegen` with this one",
 }
 #: What every `verify` tries.
 ALWAYS = (
