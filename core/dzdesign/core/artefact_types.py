@@ -14,7 +14,7 @@ Examples
 ...     FILE_NAME: ClassVar[str] = "supply.json"
 ...     schema: Literal["dzdesign.supply/1"] = "dzdesign.supply/1"
 ...     p_MPa: Annotated[float, quantity("MPa", "Set pressure.", ge=0, le=50)]
->>> to_json_bytes(Supply(tool=THIS_TOOL, made_from=(), p_MPa=21.0))[:33]
+>>> to_json_bytes(Supply(tool=THIS_TOOL, made_from=(), p_MPa=21.0))[:32]
 b'{\\n "schema": "dzdesign.supply/1"'
 """
 
