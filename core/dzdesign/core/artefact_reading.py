@@ -72,6 +72,19 @@ def read_artefact(
     return artefact
 
 
+def rounded(artefact: AnArtefact, decimals: int) -> AnArtefact:
+    """Return an artefact with every float in it rounded, as its file is to have them."""
+    return convert(_rounded(as_document(artefact), decimals), type(artefact), dec_hook=_decoded)
+
+
+def _rounded(value: Any, decimals: int) -> Any:
+    if isinstance(value, float):
+        return round(value, decimals)
+    if isinstance(value, dict):
+        return {key: _rounded(item, decimals) for key, item in value.items()}
+    return [_rounded(item, decimals) for item in value] if isinstance(value, list | tuple) else value
+
+
 def _decoded(kind: type, value: object) -> object:
     """Read what JSON has no type for."""
     if kind is not Fraction:

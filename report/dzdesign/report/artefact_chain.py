@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, TOOL, parse_document, sha256_of, to_json
+from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.documents import written_by
 from dzdesign.core.errors import InputError
 from dzdesign.core.shape import check_shape
@@ -16,7 +17,7 @@ from dzdesign.design.compensator_file import SCHEMA as COMPENSATOR_SCHEMA
 from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.design.redesign_check import prove_derived
 from dzdesign.identify.valve.model import SCHEMA as VALVE_SCHEMA
-from dzdesign.identify.valve.valve_file import valve_from_document
+from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.artefact_folder import (
     EVIDENCE_SCHEMA,
     FIRMWARE_SCHEMA,
@@ -36,6 +37,7 @@ ROLES = {
     "assessment": "assessment of recordings",
     "reproduction": "the paper's numbers",
 }
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Artefact:
@@ -140,9 +142,7 @@ class _Search:
         if not self.sealed:
             self.missing += self.faults
             self.faults = []
-        return Chain(
-            artefacts=self.found, curves=curves, faults=tuple(self.faults), missing=tuple(self.missing)
-        )
+        return Chain(artefacts=self.found, curves=curves, faults=tuple(self.faults), missing=tuple(self.missing))
 
     # one artefact after the other -------------------------------------------------------------------------------
 
@@ -293,8 +293,7 @@ class _Search:
             (
                 name
                 for name, content in self.shelf.items()
-                if is_of(content, schema)
-                and (schema == FIRMWARE_SCHEMA or name.rpartition("/")[2] != MANIFEST_NAME)
+                if is_of(content, schema) and (schema == FIRMWARE_SCHEMA or name.rpartition("/")[2] != MANIFEST_NAME)
             ),
             None,
         )
@@ -362,7 +361,5 @@ def _checked(role: str, content: bytes, name: str) -> dict[str, Any]:
         if document.get("tool") == TOOL:  # another version may have chosen other tables
             prove_derived(compensator)
     if role == "valve":
-        valve_from_document(content, name)
+        read_artefact(content, ValveModel, name)
     return document
-
-

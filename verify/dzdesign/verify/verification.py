@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, TOOL, read_bytes, sha256_of, to_json
+from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.design.compensator_file import compensator_from_document
-from dzdesign.identify.valve.valve_file import valve_from_document
+from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.analysis.core_state import keeps_no_state
 from dzdesign.verify.checks import (
     Check,
@@ -236,7 +237,7 @@ def _close_the_loop(
             scatter(scene.loop, plant, tolerances, scene.dp_MPa, scene.side) for scene in watch(scenes, len(scenes))
         )
     shut = no_flow_at_zero(loops, document, plant)
-    valve = valve_from_document(to_json(document["valve"]).encode(), "compensator.json")
+    valve = read_artefact(to_json(document["valve"]).encode(), ValveModel, "compensator.json")
     return _InTheLoop(
         checks=(
             plant_opens(loops),
@@ -255,20 +256,20 @@ def _close_the_loop(
 
 def _scenes(folder: Path, document: dict[str, Any], plant: Plant | None) -> tuple[Scene, ...]:
     """Return the compensated loop of each side at every tested pressure drop."""
-    valve = valve_from_document(to_json(document["valve"]).encode(), "compensator.json")
+    valve = read_artefact(to_json(document["valve"]).encode(), ValveModel, "compensator.json")
     scenes: list[Scene] = []
     for name, sign in (("positive", 1), ("negative", -1)):
         if not document["sides"][name]:
             continue
         side = valve.sides[name]
         # One that stands in for the valve at one pressure drop says nothing of another.
-        plants = dict.fromkeys(side.beta_dp_MPa, plant) if plant else plants_from_tests(side, valve.u_max_V)
+        plants = dict.fromkeys(side.beta.dp_MPa, plant) if plant else plants_from_tests(side, valve.u_max_V)
         tested = (min(plants), max(plants)) if plant else None
         first = ClosedLoop(next(iter(plants.values())), folder, document, sign)
         scenes += [
             Scene(
                 loop=first.with_plant(one), plant=one, side=name, dp_MPa=dp_MPa,
-                reference_MPa=side.reference_dp_MPa, tested_MPa=tested,
+                reference_MPa=side.reference.dp_MPa, tested_MPa=tested,
             )
             for dp_MPa, one in plants.items()
         ]  # fmt: skip
