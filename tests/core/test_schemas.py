@@ -8,7 +8,7 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from dzdesign.command_line.cli import main
-from dzdesign.commands.schema import SCHEMAS, schema_document
+from dzdesign.commands.schema import SCHEMAS, schema_document, schema_text
 from dzdesign.core.artefact_files import to_json, write_folder
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.identify.options import IdentifyOptions
@@ -116,6 +116,16 @@ def test_a_schema_is_of_the_draft_and_describes_every_key_with_its_unit(name):
     for part, item in {"": schema, **schema.get("$defs", {})}.items():
         look(item, part)
     assert lacking == []
+
+
+@pytest.mark.parametrize("name", [name for name in SCHEMAS if ":" in SCHEMAS[name][0]])
+def test_a_schema_is_its_golden(name, request):
+    """What the types say; after a change that is meant: `make goldens`, and read the diff before you commit it."""
+    golden = GOLDENS.parent / "goldens" / "schemas" / f"{name}.schema.json"
+    if request.config.getoption("--update-goldens"):
+        golden.parent.mkdir(exist_ok=True)
+        golden.write_text(schema_text(name), encoding="utf-8", newline="\n")
+    assert schema_text(name) == golden.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("name", ["valve", "compensator", "firmware"])

@@ -101,10 +101,8 @@ def update() -> None:
         content = (root / "valve.json").read_bytes()
         document = compensator_document(design(read_artefact(content, ValveModel, "valve.json"), options, content))
         (root / INPUT).write_text(to_json(document), encoding="utf-8", newline="\n")
-        for folder in root.iterdir():
-            if folder.is_dir():
-                shutil.rmtree(folder)
         for target in names:
+            shutil.rmtree(root / target, ignore_errors=True)
             for name, text in golden_files(target, root).items():
                 path = root / target / name
                 path.parent.mkdir(parents=True, exist_ok=True)

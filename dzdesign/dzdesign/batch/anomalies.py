@@ -57,8 +57,8 @@ def _shared_recordings(found: Mapping[str, Calibrated], known: Collection[tuple[
     """A bench that saves a recording under the wrong name gives a valve the firmware of another."""
     owners: dict[str, list[str]] = {}
     for name, each in found.items():
-        for _, digest in each.designed.valve.made_from if each.designed else ():
-            owners.setdefault(digest, []).append(name)
+        for file in each.designed.valve.made_from if each.designed else ():
+            owners.setdefault(file.sha256, []).append(name)
     groups = dict.fromkeys(tuple(dict.fromkeys(names)) for names in owners.values())
     return [
         f"{and_more(names, NAMED)} share a recording, byte for byte, in files of their own: was one saved under the "

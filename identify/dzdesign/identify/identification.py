@@ -108,9 +108,12 @@ def identify_sides(
         warnings=most_serious_first(
             (*about_recordings(tests), *([_about_two_sides()] if len(sides) > 1 else []), *warnings)
         ),
-        record=record or {},
+        record=dict(record or {}),
     )
-    return Identified(model=rounded(model, DECIMALS), sides=sides)
+    model = rounded(model, DECIMALS)
+    return Identified(
+        model=model, sides={name: replace(side, model=model.sides[name]) for name, side in sides.items()}
+    )
 
 
 def _about_single_pressures(mine: Sequence[RampTest]) -> list[Warning_]:

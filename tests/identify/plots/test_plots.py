@@ -97,7 +97,7 @@ class TestFlow:
             assert labelled(axes, label).get_xydata().tolist() == [[u, 0]]
             assert axes.get_xlim()[0] < u < axes.get_xlim()[1]
         assert set(labelled(axes, "certified bound").get_xdata()) == {test.u_guard_lower_V}
-        assert set(labelled(axes, "meter's floor").get_ydata()) == {found.model.meter_floor_L_min}
+        assert set(labelled(axes, "meter's floor").get_ydata()) == {found.model.meter.floor_L_min}
 
     def test_the_solid_line_spans_the_window_and_the_dashed_one_goes_on_to_the_knee(self, found, figures):
         test, item = found.model.positive.tests[0], found.sides["positive"].described.tests[0]

@@ -80,14 +80,14 @@ class TestSides:
         mirrored = [replace(test, source=f"minus_{test.source}", u=-test.u, q=-test.q) for test in tests]
         both = identify([*mirrored, *tests])
         assert [test.source for test in both.sides["negative"].tests] == [test.source for test in mirrored]
-        assert both.sides["negative"].u_min0_V == pytest.approx(both.positive.u_min0_V, abs=1e-6)
+        assert both.sides["negative"].reference.u_min_V == pytest.approx(both.positive.reference.u_min_V, abs=1e-6)
 
     def test_a_side_without_data_is_said_to_be_missing(self, valve):
-        assert as_document(valve)["untested_sides"] == []
+        assert valve.untested_sides == ()
         test = synthetic_ramp(1.0, Truth())
-        assert as_document(identify([test]))["untested_sides"] == ["negative"]
+        assert identify([test]).untested_sides == ("negative",)
         only_negative = identify([replace(test, u=-test.u, q=-test.q)])
-        assert as_document(only_negative)["untested_sides"] == ["positive"]
+        assert only_negative.untested_sides == ("positive",)
         with pytest.raises(InputError, match="negative commands only; record ramp tests with positive ones"):
             design(only_negative)
 
@@ -200,8 +200,8 @@ class TestQualityGate:
         tests = [synthetic_ramp(dp, Truth(knee_rising=5.4 - 0.01 * dp, noise=0.02)) for dp in PRESSURES]
         assert identify(tests).positive.trend == "decreasing"
         flat = identify(tests, IdentifyOptions(flat_change=5e-3)).positive
-        assert flat.trend == "flat" and set(flat.beta) == {1.0} and flat.trend_p < 0.01
-        assert max(flat.certified_steps_V) <= min(test.u_guard_lower_V for test in flat.tests)
+        assert flat.trend == "flat" and set(flat.beta.beta) == {1.0} and flat.trend_p < 0.01
+        assert max(flat.curve.certified_steps_V) <= min(test.u_guard_lower_V for test in flat.tests)
 
 
 def test_the_pressure_of_a_side_is_read_where_it_is_shut(recordings):

@@ -133,10 +133,10 @@ class TestSplitting:
         valve = identify([recording, other])
         low, high = as_document(valve)["sides"]["positive"]["tests"]
         assert low["source"] == "all.csv (ramps 1, 3)"
-        assert low["ramps"] == {"count": 2, "sources": ["all.csv (ramp 1)", "all.csv (ramp 3)"]}
+        assert low["ramps"] == ("all.csv (ramp 1)", "all.csv (ramp 3)")
         assert high["source"] == "all.csv (ramp 2), b.csv"
-        assert high["ramps"] == {"count": 2, "sources": ["all.csv (ramp 2)", "b.csv"]}
-        assert [source for source, _ in valve.made_from] == ["all.csv", "b.csv"]
+        assert high["ramps"] == ("all.csv (ramp 2)", "b.csv")
+        assert [file.source for file in valve.made_from] == ["all.csv", "b.csv"]
         text = to_json_bytes(valve).decode()
         assert to_json_bytes(read_artefact(text.encode(), ValveModel, "valve.json")).decode() == text
 

@@ -59,7 +59,7 @@ class ValveModel(Artefact, ShownInNotebooks):
             "computed from it.",
             max_length=MOST_ENTRIES,
         ),
-    ] = field(default_factory=dict)
+    ]
     u_max_V: Annotated[float, quantity("V", "Full command.", ge=1e-3, le=1e4)]
     meter: Annotated[Meter, Meta(description="What was taken of the flow meter.")]
     knee_window: Annotated[
