@@ -1,16 +1,19 @@
-"""`dzdesign schema`: the JSON Schemas of the artefacts, each kept in the room that writes the artefact."""
+"""`dzdesign schema`: the JSON Schemas of the artefacts, as their types say them."""
 
 import argparse
 import json
 from collections.abc import Mapping
+from importlib import import_module
 from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from dzdesign.core.artefact_schema import json_schema
 from dzdesign.core.errors import InputError, nearest
 
-#: Name -> (package that keeps it, the artefact, the command that writes it), in the order of the pipeline.
+#: Name -> (module and class of the artefact, or the package that keeps its schema as a file; the artefact; the command
+#: that writes it), in the order of the pipeline.
 SCHEMAS: Mapping[str, tuple[str, str, str]] = MappingProxyType(
     {
         "valve": ("dzdesign.identify", "valve.json", "identify"),
@@ -47,7 +50,10 @@ def schema_text(name: str) -> str:
         raise InputError(
             f"there is no schema '{name[:40]}'{nearest(name, SCHEMAS)}; expected one of {', '.join(SCHEMAS)}"
         )
-    return (Path(str(files(SCHEMAS[name][0]))) / "schemas" / f"{name}.schema.json").read_text(encoding="utf-8")
+    place, _, kind = SCHEMAS[name][0].partition(":")
+    if kind:
+        return json.dumps(json_schema(getattr(import_module(place), kind)), indent=2, ensure_ascii=False) + "\n"
+    return (Path(str(files(place))) / "schemas" / f"{name}.schema.json").read_text(encoding="utf-8")
 
 
 def schema_document(name: str) -> dict[str, Any]:
@@ -58,7 +64,8 @@ def schema_document(name: str) -> dict[str, Any]:
     name : str
         One of `SCHEMAS`.
     """
-    return json.loads(schema_text(name))
+    document: dict[str, Any] = json.loads(schema_text(name))
+    return document
 
 
 def run_schema(args: argparse.Namespace) -> int:
