@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dzdesign.core.artefact_files import TOOL, read_bytes, sha256_of
+from dzdesign.core.artefact_types import as_document
 from dzdesign.core.errors import InputError, quoted
 
 if TYPE_CHECKING:
@@ -58,8 +59,8 @@ def regenerated(folder: Path) -> "Check":
         firmware = generate(compensator_from_document(content, str(source)), manifest["target"], content)
     except InputError as error:
         return Check(name=REGENERATED, holds=False, text=str(error))
-    made = {name: sha256_of(text.encode()) for name, text in firmware.files.items()}
-    expected: dict[str, Any] = {**firmware.manifest, "files": made}
+    expected = as_document(firmware.manifest)
+    made = expected["files"]
     others = [name for name in sorted(made) if name not in expected["board"] and _digest(folder / name) != made[name]]
     others += [f"{key} of manifest.json" for key in sorted(expected) if manifest.get(key) != expected[key]]
     if others:
