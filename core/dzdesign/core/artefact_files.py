@@ -281,7 +281,7 @@ def _changed_in(folder: Path, manifest: Mapping[str, Any]) -> Iterator[str]:
 def _board_of(manifest: Mapping[str, Any]) -> set[str]:
     """Return the files that are their user's to fill in."""
     board = manifest.get("board")
-    return {name for name in board if isinstance(name, str)} if isinstance(board, list) else set()
+    return {name for name in board if isinstance(name, str)} if isinstance(board, list | tuple) else set()
 
 
 def _digest(path: Path) -> str:
@@ -363,7 +363,7 @@ def write_folder(
             _write_staging(staging, contents)
             if folder.is_dir():
                 old = _manifest_of(folder)
-                kept = _keep(folder, staging, old, listing, _board_of(manifest)) if old else {}
+                kept = _keep(folder, staging, old, listing, _board_of(document)) if old else {}
                 _carry_over(folder, staging, set(old["files"]) if old else set())
                 put_in_place(staging, folder)
             else:

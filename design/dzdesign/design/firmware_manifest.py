@@ -1,6 +1,6 @@
 """manifest.json of a firmware as a type: which files it has, and where every number in its core came from.
 
-`codegen` writes it and `verify` compares it with the folder. They share no code, so their common type stands before both.
+`codegen` writes it and `verify` compares it with the folder. These share no code, so what both read stands before them.
 """
 
 from collections.abc import Mapping
@@ -24,7 +24,7 @@ class FirmwareOrigin:
 
     compensator_json: Annotated[Sha256, Meta(description="SHA-256 of compensator.json.")]
     valve_json: Annotated[Sha256, Meta(description="SHA-256 of valve.json.")]
-    ramp_tests: Annotated[tuple[SourceFile, ...], Meta(description="The recordings that the valve was identified from.")]
+    ramp_tests: Annotated[tuple[SourceFile, ...], Meta(description="Recordings that the valve was identified from.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
