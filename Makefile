@@ -6,7 +6,7 @@ STAMP  := $(VENV)/.installed
 DOCS   := docs/derivation
 SITE   := docs/_build/html
 
-.PHONY: demo test coverage lint docs goldens lock clean fuzz bench bench-batch bench-identify bench-isr bench-verify
+.PHONY: demo test quick coverage lint docs goldens lock clean fuzz bench bench-batch bench-identify bench-isr bench-verify
 
 demo: $(STAMP)
 	$(BIN)/dzdesign demo demo
@@ -23,7 +23,7 @@ lint: $(STAMP)
 
 # After a change of what codegen writes: tests/goldens anew, then the tests that compile and run them. Read the diff.
 goldens: $(STAMP)
-	$(BIN)/pytest tests/test_goldens.py --update-goldens
+	$(BIN)/pytest tests/codegen/test_goldens.py --update-goldens
 
 # All benchmarks and one Markdown table of every limit: hours; `make bench BENCH=--quick` takes a quarter of one.
 bench: $(VENV)/.bench
@@ -54,7 +54,7 @@ SECONDS ?= 180
 SEED ?= 1
 fuzz: $(VENV)/.fuzz
 	$(BIN)/python benchmarks/fuzz/run_fuzz.py --seconds $(SECONDS) --seed $(SEED)
-	DZDESIGN_FUZZ=5 DZDESIGN_SEED=$(SEED) $(BIN)/pytest -q tests/test_hostile_files.py
+	DZDESIGN_FUZZ=5 DZDESIGN_SEED=$(SEED) $(BIN)/pytest -q tests/identify/reading/test_hostile_files.py
 
 $(VENV)/.fuzz: $(STAMP)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation -e '.[fuzz]'

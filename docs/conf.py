@@ -16,8 +16,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 from figures.draw import draw_all
 from generated import MADE
 
-from dzdesign import __version__
-from dzdesign.schema_files import SCHEMAS, schema_text
+from dzdesign.commands.schema import SCHEMAS, schema_text
+from dzdesign.core.version import __version__
 
 HERE = Path(__file__).parent
 

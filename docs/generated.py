@@ -6,25 +6,25 @@ from argparse import ArgumentParser
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from dzdesign.parsing import COMMON, build_parser
-from dzdesign.schema_files import SCHEMAS, schema_document
-from dzdesign.vocabulary import COMMANDS, EXAMPLES, language
+from dzdesign.command_line.command_spec import COMMANDS, EXAMPLES, language
+from dzdesign.command_line.parsing import COMMON, build_parser
+from dzdesign.commands.schema import SCHEMAS, schema_document
 
 #: What a caller of the rooms needs; of a module without names all that is its own.
 API = (
     ("dzdesign.api", ("identify", "design", "generate", "verify", "init", "simulate", "assess", "report", "batch")),
-    ("dzdesign.init", ("Proposal",)),
-    ("dzdesign.verify.assessment", ("Assessment",)),
-    ("dzdesign.verify.report", ("Report",)),
-    ("dzdesign.identify.ramp_files", ("RampTest", "read_ramp_file")),
+    ("dzdesign.commands.init", ("Proposal",)),
+    ("dzdesign.assess.assessment", ("Assessment",)),
+    ("dzdesign.report.valve_report", ("Report",)),
+    ("dzdesign.identify.reading.ramp_files", ("RampTest", "read_ramp_file")),
     ("dzdesign.identify.options", ("IdentifyOptions",)),
     ("dzdesign.identify.identification", ("identify",)),
-    ("dzdesign.identify.model", ("ValveModel", "SideModel", "TestResult")),
+    ("dzdesign.identify.valve.model", ("ValveModel", "SideModel", "TestResult")),
     ("dzdesign.design.options", ("DesignOptions",)),
     ("dzdesign.design.designing", ("design",)),
     ("dzdesign.design.compensator", ("Compensator",)),
     ("dzdesign.codegen.project", ("generate",)),
-    ("dzdesign.verify.plant", ("Plant", "read_plant")),
+    ("dzdesign.verify.closed_loop.plant", ("Plant", "read_plant")),
     ("dzdesign.verify.verification", ("verify", "Verification")),
     ("dzdesign.core.errors", ("DzdesignError", "InputError", "RequirementError")),
 )

@@ -5,13 +5,13 @@ import os
 # As the command line does: the matrices are small. Read when NumPy is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from importlib.resources import files
 from pathlib import Path
 
 import pytest
 
-from dzdesign.core.artefacts import to_json, write_folder
-from dzdesign.identify.ramp_files import read_ramp_file
+from dzdesign.core.artefact_files import to_json, write_folder
+from dzdesign.example import example_folder as bundled_folder
+from dzdesign.identify.reading.ramp_files import read_ramp_file
 
 
 def pytest_addoption(parser):
@@ -27,7 +27,7 @@ def page_of_a_file(monkeypatch):
 
 @pytest.fixture(scope="session")
 def example_folder() -> Path:
-    return Path(str(files("dzdesign.example")))
+    return bundled_folder()
 
 
 @pytest.fixture(scope="session")
@@ -76,11 +76,11 @@ def firmware_folder(example_firmware, tmp_path):
 def reported_demo(example_valve, tmp_path_factory):
     """A folder as `dzdesign demo` leaves it, with quicker ramps: valve.json, compensator.json, firmware, evidence."""
     from dzdesign.codegen.project import generate
-    from dzdesign.core.artefacts import TOOL
+    from dzdesign.core.artefact_files import TOOL
     from dzdesign.design.compensator_file import compensator_document
     from dzdesign.design.designing import design
-    from dzdesign.verify.closed_loop import RampSequence
-    from dzdesign.verify.report import with_report
+    from dzdesign.report.valve_report import with_report
+    from dzdesign.verify.closed_loop.loop import RampSequence
     from dzdesign.verify.verification import SCHEMA, evidence_files, verify
 
     folder = tmp_path_factory.mktemp("reported")

@@ -22,7 +22,7 @@ from scoreboard import Row, print_rows, run_parts, say  # noqa: E402
 BROKEN = 10
 #: Valves of which the jobs are compared.
 COMPARED = 100
-COMMAND = "import sys; from dzdesign.cli import main; sys.exit(main(sys.argv[1:]))"
+COMMAND = "import sys; from dzdesign.command_line.cli import main; sys.exit(main(sys.argv[1:]))"
 
 
 def timed_batch(lot: Path, output: Path, jobs: int) -> tuple[float, list[dict[str, str]]]:

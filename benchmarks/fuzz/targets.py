@@ -7,19 +7,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from dzdesign.codegen.telemetry import FRAME_OCTETS, FrameReader
-from dzdesign.config import options_from_file
+from dzdesign.assess.limits import parse_limits
+from dzdesign.codegen.telemetry.frame import FRAME_OCTETS, FrameReader
+from dzdesign.command_line.toml_options import options_from_file
 from dzdesign.core.errors import InputError
 from dzdesign.core.units import SI_UNIT, parse_quantity
 from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.design.signal_text import parse_signal
-from dzdesign.identify.column_labels import find_columns, parse_columns
-from dzdesign.identify.ramp_files import read_ramp_file
-from dzdesign.identify.text_tables import text_tables
-from dzdesign.identify.valve_file import valve_from_document
-from dzdesign.verify.assessment_limits import parse_limits
-from dzdesign.verify.plant import read_plant
-from dzdesign.verify.tolerances import read_tolerances
+from dzdesign.identify.reading.column_labels import find_columns, parse_columns
+from dzdesign.identify.reading.ramp_files import read_ramp_file
+from dzdesign.identify.reading.text.tables import text_tables
+from dzdesign.identify.valve.valve_file import valve_from_document
+from dzdesign.verify.closed_loop.plant import read_plant
+from dzdesign.verify.closed_loop.tolerances import read_tolerances
 
 GOLDENS = Path(__file__).parents[2] / "tests" / "goldens"
 CSV = b"# bench 3\ntime_s;u [V];dP (bar);Q_Lmin\n" + b"".join(

@@ -12,7 +12,7 @@ from scoreboard import Row, print_rows
 from dzdesign.core.errors import InputError
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.ramp_files import RampTest, read_ramp_file
+from dzdesign.identify.reading.ramp_files import RampTest, read_ramp_file
 
 SHARED = Path(os.environ.get("DZDESIGN_SHARED_DATA", Path(__file__).parents[3] / "shared" / "data"))
 LIMIT_mV = 15.0

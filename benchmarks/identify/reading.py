@@ -84,7 +84,7 @@ def make(kind: str, rows: int, path: str, seed: int) -> None:
 def run_identify(path: str) -> None:
     """Identify one recording, and print its knees and their error."""
     from dzdesign.identify.identification import identify
-    from dzdesign.identify.ramp_files import read_ramp_file
+    from dzdesign.identify.reading.ramp_files import read_ramp_file
 
     (test,) = identify([read_ramp_file(Path(path))]).positive.tests
     print(test.u_knee_rising_V, test.u_knee_falling_V, test.u_knee_se_V)

@@ -11,8 +11,8 @@ from scoreboard import say
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.identification import identify
-from dzdesign.identify.model import ValveModel
 from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.valve.model import ValveModel
 
 #: Points of the pressure drop at which the offset is held against the truth.
 GRID = 451

@@ -71,13 +71,12 @@ def main(arguments: list[str] | None = None) -> int:
 def _compensator(path: Path | None) -> Compensator:
     if path:
         return compensator_from_document(path.read_bytes(), str(path))
-    from importlib.resources import files
-
     from dzdesign.design.designing import design
+    from dzdesign.example import example_folder
     from dzdesign.identify.identification import identify
-    from dzdesign.identify.ramp_files import read_ramp_file
+    from dzdesign.identify.reading.ramp_files import read_ramp_file
 
-    ramps = Path(str(files("dzdesign.example"))) / "ramps"
+    ramps = example_folder() / "ramps"
     return design(identify([read_ramp_file(ramp) for ramp in sorted(ramps.glob("*.csv.gz"))]))
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.compensator_file import compensator_document
-from dzdesign.verify.reference import ExactLaw
+from dzdesign.verify.exhaustive.exact_law import ExactLaw
 
 SEED = 7
 RANDOM_INPUTS = 64

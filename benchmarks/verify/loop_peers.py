@@ -14,8 +14,8 @@ import casadi as ca
 import numpy as np
 
 from dzdesign.design.compensator_file import compensator_from_document
-from dzdesign.verify.host_compiler import load_library
-from dzdesign.verify.plant import PWM_PERIOD_S, Plant, derivatives, orifice
+from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant, derivatives, orifice
+from dzdesign.verify.toolchain.host_compiler import load_library
 
 #: PWM periods between two samples of the core.
 TICKS = 2

@@ -22,8 +22,8 @@ from loop_peers import (
 from scoreboard import Row, print_rows, say
 
 from dzdesign.design.compensator_file import compensator_document
-from dzdesign.verify.closed_loop import PERIODS_PER_RECORD, RECORD_S, ClosedLoop
-from dzdesign.verify.plant import PWM_PERIOD_S, Plant
+from dzdesign.verify.closed_loop.loop import PERIODS_PER_RECORD, RECORD_S, ClosedLoop
+from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
 
 NONLINEAR = Plant()
 #: Without flow force and droop nothing but the stops is nonlinear.

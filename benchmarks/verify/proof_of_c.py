@@ -7,7 +7,7 @@ from time import perf_counter
 from firmware import example_firmware
 from scoreboard import Row, print_rows, say
 
-from dzdesign.verify.proof import prove
+from dzdesign.verify.analysis.frama_c import prove
 
 QUICK_ROWS = 20
 

@@ -5,22 +5,22 @@ import tempfile
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from importlib.resources import as_file, files
 from pathlib import Path
 
 import numpy as np
 
 from dzdesign.codegen.project import generate
-from dzdesign.core.artefacts import to_json, write_folder
+from dzdesign.core.artefact_files import to_json, write_folder
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.compensator_file import compensator_document
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
+from dzdesign.example import example_folder
 from dzdesign.identify.identification import Identified, identify_sides
-from dzdesign.identify.model import SideModel
-from dzdesign.identify.ramp_files import read_ramp_file
-from dzdesign.verify.closed_loop import ClosedLoop, LoopRun, RampSequence
-from dzdesign.verify.plant import Plant, read_plant
+from dzdesign.identify.reading.ramp_files import read_ramp_file
+from dzdesign.identify.valve.model import SideModel
+from dzdesign.verify.closed_loop.loop import ClosedLoop, LoopRun, RampSequence
+from dzdesign.verify.closed_loop.plant import Plant, read_plant
 
 #: Shorter than a bench's, so that all figures are drawn in seconds; the simulated meter has no lag.
 RAMP = RampSequence(rest=1.0, ramp=20.0, top=1.0)
@@ -70,6 +70,6 @@ class Example:
 
 def read_example() -> Example:
     """Identify the bundled example."""
-    with as_file(files("dzdesign.example")) as folder:
-        tests = [read_ramp_file(path) for path in sorted((folder / "ramps").glob("*.csv.gz"))]
-        return Example(found=identify_sides(tests), plant=read_plant(folder / "plant.toml"))
+    folder = example_folder()
+    tests = [read_ramp_file(path) for path in sorted((folder / "ramps").glob("*.csv.gz"))]
+    return Example(found=identify_sides(tests), plant=read_plant(folder / "plant.toml"))

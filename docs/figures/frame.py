@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dzdesign.identify.plot_frame import METADATA, STYLE
+from dzdesign.identify.plots.frame import METADATA, STYLE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,0 +1,280 @@
+"""Flow over command of recorded ramps, one curve a branch, for the quantities of a valve test.
+
+Reading, parting, pooling and the straight part are `identify`'s. One thing is not: a reading at zero command is left as
+it is. `identify` takes it for the meter's zero error, and here it may be what the compensator lets through.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dzdesign.core.errors import InputError
+from dzdesign.identify.knees.linear_fits import USEFUL_FLOW, find_straight_parts
+from dzdesign.identify.knees.linear_region import GATE, GatedLine, ReadBranch, read_branch
+from dzdesign.identify.knees.noise import robust_sigma
+from dzdesign.identify.knees.prepared_tests import split_recordings
+from dzdesign.identify.knees.profile import flow_at_top, smooth_profile
+from dzdesign.identify.knees.refusals import refuse_a_jump
+from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.ramps.branches import Branch, at_nominal_pressure
+from dzdesign.identify.ramps.pooling import PooledTest, group_by_pressure, pool_ramps
+from dzdesign.identify.ramps.splitting import Ramp, nominal_dp
+from dzdesign.identify.reading.ramp_files import RampTest
+
+#: Width over u_max of the cells in which a curve is averaged: a mean over some tens of samples.
+CELL = 0.01
+#: Fewest samples of a cell that tell how they scatter.
+FEWEST_IN_CELL = 3
+#: A sample so far off the smoothed course, over the largest flow, may be an outlier; a finer meter's steps are not.
+LEAST_GATE = 0.01
+#: Commands that stay within this share of u_max are a hold; commands within `ZERO` of it are zero.
+HOLD, ZERO = 2e-3, 0.01
+#: A hold takes at least so long, s, and so many times longer than the ramp takes to cross it; and so many samples.
+SHORTEST_HOLD_S, LONGER_THAN_RAMP, HOLD_SAMPLES = 0.5, 3.0, 10
+#: A gap of so many usual steps of the clock is one: the other side of the valve was left out there.
+GAP = 10.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlowCurve:
+    """One branch: flow at the test's pressure drop over the command.
+
+    Attributes
+    ----------
+    read : ReadBranch
+        Its samples and their course, smoothed over 0.1 % of u_max (V, m³/s).
+    u, q, q_se : (C,) array
+        Means over cells of `CELL` u_max without outliers, in the order of rising command: V, m³/s, standard error (NaN
+        where a cell holds too few samples to tell it, as in a table).
+    sigma : float
+        Robust standard deviation of one sample about the course where the flow is small, m³/s.
+    colour : float
+        Long-run variance of the noise over its variance; 1 where no line tells it.
+    level : float
+        Flow that counts as flow, m³/s: the meter's floor, its noise or 0.5 % of the largest flow.
+    line : GatedLine or None
+        Through the straight part; None where there is none, which `no_line` explains.
+    """
+
+    read: ReadBranch
+    u: np.ndarray
+    q: np.ndarray
+    q_se: np.ndarray
+    sigma: float
+    colour: float
+    level: float
+    line: GatedLine | None
+    no_line: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PressureCurves:
+    """All ramps of one set at one pressure drop, on one side of the valve.
+
+    Attributes
+    ----------
+    source : str
+        Names of the files.
+    ramps : tuple of str
+        Each ramp's file, and its number in it.
+    dp : float or None
+        Nominal pressure drop, Pa.
+    rising, falling : FlowCurve or None
+        The branches.
+    q_max : float
+        Largest flow as recorded, m³/s.
+    u_top : float
+        Largest command, V.
+    at_zero : (N,) array
+        Flow in the later half of the holds at zero command after closing, m³/s; empty where there is no such hold.
+    """
+
+    source: str
+    ramps: tuple[str, ...]
+    dp: float | None
+    rising: FlowCurve | None
+    falling: FlowCurve | None
+    q_max: float
+    u_top: float
+    at_zero: np.ndarray
+
+    @property
+    def curves(self) -> tuple[FlowCurve, ...]:
+        """The branches that there are."""
+        return tuple(curve for curve in (self.rising, self.falling) if curve)
+
+    @property
+    def y_max(self) -> float:
+        """Largest flow at the nominal pressure drop, m³/s."""
+        return max(curve.read.y_max for curve in self.curves)
+
+    @property
+    def colour(self) -> float:
+        """Long-run variance of the meter's noise over its variance."""
+        return max(curve.colour for curve in self.curves)
+
+    @property
+    def counts(self) -> float:
+        """Flow that counts as flow on both branches, m³/s."""
+        return max(curve.level for curve in self.curves)
+
+
+def read_curves(
+    tests: Sequence[RampTest], options: IdentifyOptions, *, floor: float, lag: float
+) -> list[PressureCurves]:
+    """Read the curves of one side from one set of recordings, in the order of rising pressure drop.
+
+    Parameters
+    ----------
+    tests : sequence of RampTest
+        Commands of that side positive.
+    options : IdentifyOptions
+        Choices of the engineer.
+    floor : float
+        Flow below which the meter shows nothing, m³/s.
+    lag : float
+        Of the flow meter, s: taken out.
+
+    Raises
+    ------
+    InputError
+        For a recording without a ramp, without flow, or without a pressure drop beside others.
+    """
+    ramps = split_recordings(tests, options, lag)
+    pooled, groups = pool_ramps(ramps), group_by_pressure(ramps)
+    for item in pooled:
+        if item.branches == (None, None):
+            u = item.test.u
+            raise InputError(
+                f"'{item.test.source}' has no ramp from near zero up at {_said(nominal_dp(item.test))}: the command "
+                f"runs from {u.min():.2f} to {u.max():.2f} V, expected a sweep over half of it at least; record it so, "
+                "and give the compensator's input, not its output"
+            )
+    reads = [
+        None if branch is None else _read(branch, item, options.u_max, floor)
+        for item in pooled
+        for branch in item.branches
+    ]
+    curves = iter(_curves(reads, options))
+    return [
+        _at_pressure(item, group, next(curves), next(curves), options)
+        for item, group in zip(pooled, groups, strict=True)
+    ]
+
+
+def _said(dp: float | None) -> str:
+    return "an unknown pressure drop" if dp is None else f"{dp / 1e6:.3g} MPa"
+
+
+def _read(branch: Branch, item: PooledTest, u_max: float, floor: float) -> ReadBranch:
+    y = at_nominal_pressure(branch, nominal_dp(item.test))
+    return read_branch(branch, y, u_max=u_max, floor=floor, source=item.test.source)
+
+
+def _curves(reads: Sequence[ReadBranch | None], options: IdentifyOptions) -> list[FlowCurve | None]:
+    """Return a curve for each branch; straight parts are those of all together, or of each that has one by itself."""
+    reasons: dict[int, str] = {}
+    for index, read in enumerate(reads):
+        if read is not None:
+            try:
+                refuse_a_jump(read, options.u_max)
+            except InputError as error:
+                reasons[index] = str(error)
+    known = [index for index, read in enumerate(reads) if read is not None and index not in reasons]
+    found: dict[int, tuple[GatedLine, float]] = {}
+    # One meter has read all branches, and one valve has made them: together they tell more of noise and of bends.
+    for group in (known, *([index] for index in known)):
+        missing = [index for index in group if index not in found]
+        if not missing:
+            continue
+        try:
+            mine = [reads[index] for index in missing]
+            parts = find_straight_parts(mine, u_max=options.u_max, window=options.knee_window)
+        except InputError as error:
+            reasons |= {index: str(error) for index in missing}
+            continue
+        found |= dict(zip(missing, zip(parts.lines, parts.levels, strict=True), strict=True))
+    return [
+        read and _curve(read, *found.get(index, (None, None)), reasons.get(index, ""), options.u_max)
+        for index, read in enumerate(reads)
+    ]
+
+
+def _curve(read: ReadBranch, line: GatedLine | None, level: float | None, reason: str, u_max: float) -> FlowCurve:
+    """Average a branch over cells of the command, samples far off its smoothed course left out."""
+    u, y = read.branch.u, read.y
+    about = y - np.interp(u, *read.profile)
+    kept = np.abs(about) <= max(GATE * robust_sigma(about), LEAST_GATE * read.y_max)
+    u, y, about = u[kept], y[kept], about[kept]
+    cell = np.floor(u / (CELL * u_max)).astype(int)
+    filled, index, n = np.unique(cell, return_inverse=True, return_counts=True)
+
+    def mean(values: np.ndarray) -> np.ndarray:
+        return np.bincount(index, weights=values, minlength=filled.size) / n
+
+    # Noise with a memory averages out no better than 1/colour of its samples would, white.
+    colour = line.colour if line else 1.0
+    small = np.interp(u, *read.profile) < 0.05 * read.y_max
+    return FlowCurve(
+        read=read,
+        u=mean(u),
+        q=mean(y),
+        q_se=np.where(n < FEWEST_IN_CELL, np.nan, np.sqrt(mean(about**2) * np.minimum(colour, n) / n)),
+        sigma=robust_sigma(about[small] if small.sum() >= 20 else about),
+        colour=colour,
+        level=max(read.floor, USEFUL_FLOW * read.y_max) if level is None else level,
+        line=line,
+        no_line="" if line else reason,
+    )
+
+
+def _at_pressure(
+    item: PooledTest,
+    group: Sequence[Ramp],
+    rising: FlowCurve | None,
+    falling: FlowCurve | None,
+    options: IdentifyOptions,
+) -> PressureCurves:
+    branches = [branch for branch in item.branches if branch]
+    holds = [_hold_after_closing(ramp, options.u_max) for ramp in group]
+    return PressureCurves(
+        source=item.test.source,
+        ramps=item.ramps,
+        dp=nominal_dp(item.test),
+        rising=rising,
+        falling=falling,
+        q_max=max(flow_at_top(*smooth_profile(branch.u, branch.q, options.u_max)) for branch in branches),
+        u_top=max(float(branch.u.max()) for branch in branches),
+        at_zero=np.concatenate(holds),
+    )
+
+
+def _hold_after_closing(ramp: Ramp, u_max: float) -> np.ndarray:
+    """Return the flow in the later half of the hold at zero command that follows a ramp's falling branch, m³/s.
+
+    The first half is left to the valve, the hoses and the meter to come to rest. A ramp that ends at zero without
+    standing there has no such hold: the flow of its last volts is no flow at zero.
+    """
+    falling = [branch for branch in ramp.branches if not branch.rising]
+    if not falling:
+        return np.empty(0)
+    time, u, q = ramp.test.time, ramp.test.u, ramp.test.q
+    closed = int(np.flatnonzero(u > ZERO * u_max)[-1]) + 1 if np.any(u > ZERO * u_max) else 0
+    time, u, q = time[closed:], u[closed:], q[closed:]
+    usual = float(np.median(np.diff(ramp.test.time)))
+    gaps = np.flatnonzero(np.diff(time) > GAP * usual) if usual > 0 else np.empty(0, dtype=int)
+    if gaps.size:
+        time, u, q = time[: gaps[0] + 1], u[: gaps[0] + 1], q[: gaps[0] + 1]
+    if u.size < HOLD_SAMPLES:
+        return np.empty(0)
+    held = np.flatnonzero(np.abs(u - np.median(u)) <= HOLD * u_max)
+    rate = falling[-1].rate
+    crossed = 2 * HOLD * u_max / rate if rate > 0 else math.nan
+    seconds = float(time[held[-1]] - time[held[0]])
+    if seconds > 0 and not seconds >= np.fmax(SHORTEST_HOLD_S, LONGER_THAN_RAMP * crossed):
+        return np.empty(0)
+    hold = q[held]
+    return hold[hold.size // 2 :] if hold.size >= HOLD_SAMPLES else np.empty(0)
+

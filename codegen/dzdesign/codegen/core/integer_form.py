@@ -1,0 +1,306 @@
+"""The law of one side of a `Compensator` lowered to integers that the firmware can multiply, shift and compare, proved.
+
+With beta = B / (D S), k x_max/u_max and u_min0/u_max over 2^16 and x = c / C, c being the codes of command from zero
+on, the law (18) in counts, lowered inside the edge of E codes, is
+
+    compare = B_law (p c + o) + l c - (B_law - B) e max(E - c, 0),
+
+p, o, l and e rational. Times the common denominator every term is an integer; cancelling powers of two leaves
+``total / (divisor 2^shift)`` with an integer `total` of 64 bits, so one shift and one division by a small constant give
+the exactly rounded law. The division is a multiplication by a reciprocal that is proved exact for every dividend that
+can occur; where the target has 32-bit arithmetic only, it is an estimate and a proved number of corrections.
+"""
+
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import pairwise
+from math import ceil, lcm
+from typing import NamedTuple
+
+from dzdesign.core.errors import InputError
+from dzdesign.derivation.law import law
+from dzdesign.derivation.scaling import Line, evaluate_line
+from dzdesign.derivation.transition import evaluate_edge
+from dzdesign.design.compensator import Compensator
+
+INT32_MAX = 2**31 - 1
+INT64_MAX = 2**63 - 1
+#: Bits of the estimate's dividend and of its fraction.
+ESTIMATE_BITS = 16
+WORD_BITS = 32
+RECIPROCALS_TRIED = 128
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Estimate:
+    """Division without 64-bit arithmetic: ``((n >> shift) * factor) >> 16``, never too large, then `corrections`."""
+
+    shift: int
+    factor: int
+    corrections: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class IntegerForm:
+    """Constants of the core; see the module's text for the algebra.
+
+    ``total = B_law * (slope * c + offset) + (linear * c << linear_shift) + half - (B_law - B) * edge * max(E - c, 0)``
+    with B_law and B the tables interpolated without rounding;
+    ``compare = min(total >> shift, largest) / divisor``, so that no compare value exceeds the limit; the division is
+    ``(quotient * reciprocal) >> reciprocal_shift`` or the `estimate`.
+
+    Attributes
+    ----------
+    table : tuple of int
+        scale_beta times the numerators of the law's beta, then twice the smallest of them.
+    zero_table : tuple of int
+        The same of the certified beta at zero command; empty without an edge.
+    scale_beta : int
+        Factor of the tables.
+    slope, offset : int
+        32-bit signed.
+    edge : int
+        32 bits; 0 without an edge.
+    linear, linear_shift : int
+        Command term that beta does not touch.
+    half, shift, divisor : int
+        Rounding and denominator.
+    largest : int
+        Largest quotient that is divided: the one whose compare value is the limit.
+    exceeds : bool
+        Whether the law asks for more than the limit anywhere.
+    reciprocal, reciprocal_shift : int
+        Of the divisor.
+    estimate : Estimate
+        Of the division.
+    """
+
+    table: tuple[int, ...]
+    zero_table: tuple[int, ...]
+    scale_beta: int
+    slope: int
+    offset: int
+    edge: int
+    linear: int
+    linear_shift: int
+    half: int
+    shift: int
+    divisor: int
+    largest: int
+    exceeds: bool
+    reciprocal: int
+    reciprocal_shift: int
+    estimate: Estimate
+
+
+def integer_form(compensator: Compensator, sign: int = 1) -> IntegerForm:
+    """Lower the law of one side to integers and prove that nothing overflows and every division is exact.
+
+    Parameters
+    ----------
+    compensator : Compensator
+        The law in rationals.
+    sign : {1, -1}
+        Sign of the command.
+
+    Raises
+    ------
+    InputError
+        If the coefficients need more than 64-bit arithmetic.
+    """
+    c, side = compensator, compensator.side(sign)
+    terms = _terms(compensator, sign)
+    divisor, shift, common = _denominator(terms)
+    slope, offset, linear, edge = (int(value * common) for value in terms)
+    span = c.signals.command.span(sign)
+    scale_beta = _share((slope, offset, edge), (abs(slope) * span, abs(offset), edge * c.edge_codes))
+    linear, linear_shift = _odd_part(linear)
+    asked = _largest_quotient(compensator, sign, divisor)
+    if asked > INT32_MAX:
+        raise InputError(f"the law's quotient by {divisor} needs more than 31 bits; choose other scalings")
+    largest = (c.amplifier.compare_limit + 1) * divisor - 1
+    reciprocal, reciprocal_shift = _exact_reciprocal(divisor, largest)
+    form = IntegerForm(
+        table=_table(side.law_numerators, scale_beta),
+        zero_table=_table(side.beta_numerators, scale_beta) if c.edge_codes else (),
+        scale_beta=scale_beta,
+        slope=slope // scale_beta,
+        offset=offset // scale_beta,
+        edge=edge // scale_beta,
+        linear=linear,
+        linear_shift=linear_shift,
+        half=common // 2,
+        shift=shift,
+        divisor=divisor,
+        largest=largest,
+        exceeds=asked > largest,
+        reciprocal=reciprocal,
+        reciprocal_shift=reciprocal_shift,
+        estimate=_estimate(divisor, largest),
+    )
+    _prove_widths(form, compensator, sign)
+    return form
+
+
+class _Terms(NamedTuple):
+    """Rational factors of the law in counts, in the units of the table: p, o, l and e of the module's text."""
+
+    per_command: Fraction
+    constant: Fraction
+    plain: Fraction
+    per_edge_code: Fraction
+
+
+def _terms(compensator: Compensator, sign: int) -> _Terms:
+    """Return the law's terms: Eq. (18) is affine in beta, in counts beta (per_command c + constant) + plain c."""
+    c, side = compensator, compensator.side(sign)
+
+    def line(beta: int) -> Line:
+        return evaluate_line(
+            law(c.law_name),
+            beta=beta,
+            kappa=side.k_x_max_over_u_max,
+            u_min0_over_u_max=side.u_min0_over_u_max,
+            n_adc=c.signals.command.span(sign),
+            n_full=c.signals.compare_max,
+        )
+
+    without, whole = line(beta=0), line(beta=1)
+    beta_unit = c.beta_denominator * c.beta_step_codes
+    per_edge_code = Fraction(0)
+    if c.edge_codes:  # what one unit of the gap lowers at zero command, over the edge's codes
+        lowered = evaluate_edge(
+            beta_opening=1,
+            beta_closing=0,
+            u_min0_over_u_max=side.u_min0_over_u_max,
+            share_of_edge=0,
+            n_full=c.signals.compare_max,
+        )
+        per_edge_code = lowered / beta_unit / c.edge_codes
+    return _Terms(
+        per_command=(whole.slope - without.slope) / beta_unit,
+        constant=(whole.start - without.start) / beta_unit,
+        plain=without.slope,
+        per_edge_code=per_edge_code,
+    )
+
+
+def _denominator(terms: _Terms) -> tuple[int, int, int]:
+    """Return (divisor, shift, divisor 2^shift): what all terms times it are integers, the divisor odd."""
+    divisor, shift = _odd_part(lcm(*(value.denominator for value in terms)))
+    # Rounding to nearest needs half a unit, and a shift by a whole word of 32 bits costs nothing.
+    shift = max(shift, WORD_BITS)
+    return divisor, shift, divisor << shift
+
+
+def _odd_part(value: int) -> tuple[int, int]:
+    """Return (odd, shift) with ``odd << shift == value``; of zero (0, 0)."""
+    shift = (value & -value).bit_length() - 1 if value else 0
+    return value >> shift, shift
+
+
+def _table(numerators: tuple[int, ...], scale: int) -> tuple[int, ...]:
+    """Return the scaled nodes, then twice the smallest of them: the fallback's segment."""
+    return tuple(scale * numerator for numerator in (*numerators, *(min(numerators),) * 2))
+
+
+def _share(coefficients: tuple[int, ...], sizes: tuple[int, ...]) -> int:
+    """Return the smallest common factor of the coefficients that, moved into the tables, leaves `sizes` 32 bits."""
+    smallest = max(1, -(-max(sizes) // INT32_MAX))
+    factors = range(smallest, 2**16)
+    return next((factor for factor in factors if all(value % factor == 0 for value in coefficients)), 1)
+
+
+def _largest_quotient(compensator: Compensator, sign: int, divisor: int) -> int:
+    """Return the largest ``total >> shift``: the law's largest value at any node, and the half that rounds it."""
+    c, command = compensator, compensator.signals.command
+    # Every node that a code reaches, and the fallback's smallest beta: along dP the law is straight between them.
+    codes = [index * c.beta_step_codes for index in range(c.nodes(sign) - 1)]
+    codes += [c.signals.largest_difference(sign), -c.reverse_codes - 1]
+    # Along the command it is straight but for the edge's end.
+    corners = {0, min(c.edge_codes, command.span(sign)), command.span(sign)}
+    commands = [command.zero_code + command.direction(sign) * corner for corner in corners]
+    values = [c.drive(code, dp_code, sign) for dp_code in codes for code in commands]
+    if min(values) < 0:
+        raise InputError("the law asks for a negative drive somewhere; check k x_max/u_max and u_min0")
+    return int((max(values) * c.signals.compare_max + Fraction(1, 2)) * divisor)
+
+
+def _exact_reciprocal(divisor: int, largest: int) -> tuple[int, int]:
+    """Return (m, s) with ``n // divisor == n * m >> s`` for every n up to `largest`.
+
+    With m at or above 2^s / d and e = m d - 2^s the quotient is exact as long as ``n e < 2^s`` (for n = q d + r the
+    error n e / (d 2^s) must stay below 1/d).
+    """
+    if divisor == 1:
+        return 1, 0
+    exact = []
+    for shift in range(32, 64):
+        least = -(-(1 << shift) // divisor)
+        exact += [
+            (reciprocal, shift)
+            for reciprocal in range(least, least + RECIPROCALS_TRIED)
+            if reciprocal * largest < 1 << 64
+            and reciprocal < 1 << 32
+            and largest * (reciprocal * divisor - (1 << shift)) < 1 << shift
+        ]
+    if not exact:
+        raise InputError(f"no 32-bit reciprocal divides by {divisor} exactly up to {largest}")
+    # A multiplier of few ones tempts compilers to shifts and additions, which take longer than one long product.
+    return max(exact, key=lambda pair: _signed_digits(pair[0]))
+
+
+def _signed_digits(value: int) -> int:
+    """Return how many digits of a number are not zero in the signed binary form that has fewest of them."""
+    return (value ^ 3 * value).bit_count()
+
+
+def _estimate(divisor: int, largest: int) -> Estimate:
+    """Return the division by products of 32 bits.
+
+    With h = n >> s and m = floor(2^(16+s) / d), h m >> 16 is at most n/d, and less than it by under 2^s/d for the bits
+    of n that are dropped, h/2^16 < 1 for those of m, and 1 for the last shift.
+    """
+    shift = max(0, largest.bit_length() - ESTIMATE_BITS)
+    factor = (1 << (ESTIMATE_BITS + shift)) // divisor
+    if (largest >> shift) * factor >= 1 << 32:
+        raise InputError(f"a quotient of {largest} by {divisor} needs more than 32-bit arithmetic")
+    return Estimate(shift=shift, factor=factor, corrections=ceil((1 << shift) / divisor + 2) - 1)
+
+
+def segments_of(table: tuple[int, ...], step: int) -> list[tuple[int, int]]:
+    """Return (start, slope) of each segment, ``start + slope * dp``: the fallback first, then one a node.
+
+    Between nodes n and n + 1 the table times `step` is ``T[n] step + (T[n+1] - T[n]) (dp - n step)``.
+    """
+    if not table:
+        return []
+    pairs = pairwise(table[:-2])
+    return [
+        (table[-1] * step, 0),
+        *((left * step - (right - left) * node * step, right - left) for node, (left, right) in enumerate(pairs)),
+    ]
+
+
+def _prove_widths(form: IntegerForm, compensator: Compensator, sign: int) -> None:
+    """Prove that every intermediate value fits the type that the template gives it."""
+    span = compensator.signals.command.span(sign)
+    step = compensator.beta_step_codes
+    beta = max(form.table) * step
+    gap = beta if form.zero_table else 0
+    inner = max(abs(form.offset), abs(form.slope * span + form.offset))
+    straight = form.linear * span << form.linear_shift
+    checks = {
+        "the interpolated table": (beta, INT32_MAX),
+        "slope times command": (abs(form.slope) * span, INT32_MAX),
+        "the command-dependent factor": (inner, INT32_MAX),
+        "the edge's factor": (form.edge * compensator.edge_codes, INT32_MAX),
+        "the 64-bit sum": (beta * inner + straight + form.half + gap * form.edge * compensator.edge_codes, INT64_MAX),
+        "the command's own term": (form.linear, 2**32 - 1),
+    }
+    for what, (value, limit) in checks.items():
+        if value > limit:
+            raise InputError(
+                f"{what} needs {value.bit_length()} bits, more than the firmware's {limit.bit_length()}; "
+                "choose scalings with smaller common denominators"
+            )

@@ -1,0 +1,137 @@
+"""What a code stands for: every `#define` of the core that comes from the scalings of command and pressures."""
+
+from dataclasses import dataclass
+
+from dzdesign.codegen.core.constants import EXACT, Constant
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.signals import WEIGHT_SHIFT, PressureSignal
+
+HERE, SIGNALS = "codegen/dzdesign/codegen/core/signal_constants.py", "design/dzdesign/design/signals.py"
+DOWN = "the converter's code, rounded down"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SignalConstants:
+    """The codes of one sign of command, of both pressures, and of the segments that these choose."""
+
+    compensator: Compensator
+    sign: int
+    word_bits: int
+
+    @property
+    def passes_full(self) -> bool:
+        """True if a valid command may lie beyond full command."""
+        command = self.compensator.signals.command
+        ends = (command.direction(self.sign) * (code - command.zero_code) for code in command.valid_codes)
+        return max(ends) > command.span(self.sign)
+
+    def signals(self) -> list[Constant]:
+        """Return the codes of command and pressures."""
+        c = self.compensator
+        signals, command = c.signals, c.signals.command
+        span, direction = command.span(self.sign), command.direction(self.sign)
+        full_key = "full_code" if self.sign > 0 else "negative_full_code"
+        u_max_V = float(c.u_max_V) * self.sign
+
+        def volts(code: int) -> str:
+            return f"{direction * (code - command.zero_code) / span * u_max_V + 0.0:.4g} V"
+
+        low, high = command.valid_codes
+        keys = ("signals.command.zero_code", f"signals.command.{full_key}", "u_max_V")
+        valid = ("signals.command.valid_codes", *keys)
+        full = self._signal("COMMAND_SPAN", span, "Eq. (29), codes from zero to full command", f"{u_max_V:g} V", keys)
+        return [
+            self._signal("COMMAND_ZERO", command.zero_code, "Eq. (29), code of zero command", "0 V", keys[:1], DOWN),
+            self._signal("COMMAND_LOW", low, "Eq. (29), least valid code of the command", volts(low), valid, DOWN),
+            self._signal("COMMAND_HIGH", high, "Eq. (29), largest valid code of the command", volts(high), valid, DOWN),
+            *([full] if self.passes_full else []),
+            *self._sensor("A", signals.pressure_a),
+            *self._sensor("B", signals.pressure_b),
+            *([] if signals.like_sensors else self._weights()),
+            self._reverse(),
+            Constant(
+                symbol="WORD_TOP",
+                value=self.word_bits - 1,
+                equation="place of the top bit of a word, which is set after a subtraction below zero",
+                engineering=f"bit {self.word_bits - 1} of {self.word_bits}",
+                generator=HERE,
+            ),
+        ]
+
+    def _signal(
+        self, symbol: str, value: int, equation: str, engineering: str, data: tuple[str, ...], rounding: str = EXACT
+    ) -> Constant:
+        return Constant(
+            symbol=symbol, value=value, equation=equation, engineering=engineering, rounding=rounding, data=data,
+            generator=SIGNALS,
+        )  # fmt: skip
+
+    def _sensor(self, name: str, sensor: PressureSignal) -> list[Constant]:
+        key = f"signals.pressure_{name.lower()}"
+        codes = (f"{key}.zero_code", f"{key}.full_code", f"{key}.span_MPa")
+
+        def pressure(code: int) -> str:
+            return f"{float((code - sensor.zero_code) * sensor.per_code_MPa):.4g} MPa"
+
+        low, high = sensor.valid_codes
+        valid = (f"{key}.valid_codes", *codes)
+        what = f"text below Eq. (29), {{}} of sensor {name}, {float(sensor.per_code_MPa):.6g} MPa a code"
+        return [
+            self._signal(f"PRESSURE_{name}_ZERO", sensor.zero_code, what.format("code of no pressure"), "0 MPa",
+                         codes[:1], DOWN),
+            self._signal(f"PRESSURE_{name}_LOW", low, what.format("least valid code"), pressure(low), valid, DOWN),
+            self._signal(f"PRESSURE_{name}_HIGH", high, what.format("largest valid code"), pressure(high), valid, DOWN),
+        ]  # fmt: skip
+
+    def _weights(self) -> list[Constant]:
+        signals = self.compensator.signals
+        a, b = (float(each.per_code_MPa) for each in (signals.pressure_a, signals.pressure_b))
+        keys = tuple(
+            f"signals.pressure_{name}.{key}" for name in "ab" for key in ("span_MPa", "zero_code", "full_code")
+        )
+        weight = 2**WEIGHT_SHIFT
+        return [
+            self._signal("PRESSURE_A_WEIGHT", weight, "weight of a code of sensor A, in codes of sensor A",
+                         f"one code, times {weight}", ()),
+            self._signal("PRESSURE_B_WEIGHT", signals.weight_b, "weight of a code of sensor B, in codes of A",
+                         f"{b:.6g} MPa / {a:.6g} MPa = {b / a:.6g}, times {weight}", keys,
+                         "rounded to nearest"),
+            self._signal("WEIGHT_SHIFT", WEIGHT_SHIFT, "from weighted codes to codes of sensor A",
+                         f"1/2^{WEIGHT_SHIFT}", (), "the difference is rounded down"),
+        ]  # fmt: skip
+
+    def _reverse(self) -> Constant:
+        c = self.compensator
+        weighted = not c.signals.like_sensors
+        return self._signal(
+            "REVERSE",
+            c.reverse_codes << WEIGHT_SHIFT if weighted else c.reverse_codes,
+            "a pressure drop less than minus this means that a sensor has failed",
+            f"{float(c.signals.dp_MPa(c.reverse_codes)):.3f} MPa in codes of sensor A"
+            + (f", times {2**WEIGHT_SHIFT}" if weighted else ""),
+            ("reverse_codes", "signals.pressure_a.span_MPa"),
+            "a hundredth of the span, rounded down to a code",
+        )
+
+    def steps(self) -> list[Constant]:
+        """Return what finds a segment of the tables, and the edge's length."""
+        c = self.compensator
+        step, edge = c.beta_step_codes, c.edge_codes
+        width = f"{float(c.signals.dp_MPa(step)):.4f} MPa"
+        data = ("beta_step_codes",)
+        found = [
+            Constant(symbol="STEP_CODES", value=step, equation="width of a segment of beta, codes of sensor A",
+                     engineering=width, data=data, generator="design/dzdesign/design/beta_table.py"),
+            Constant(symbol="STEP_SHIFT", value=step.bit_length() - 1, equation="from codes to segments",
+                     engineering=f"1/{step} segment a code", data=data, rounding="the segment is rounded down",
+                     generator=HERE),
+        ]  # fmt: skip
+        if edge:
+            share = edge / c.signals.command.span(self.sign)
+            found.append(
+                Constant(symbol="EDGE_CODES", value=edge, equation="codes of command that the edge takes, u_edge",
+                         engineering=f"{share:.2%} of command, {share * float(c.u_max_V):.4g} V", data=("edge_codes",),
+                         rounding="the power of two below what was asked for",
+                         generator="design/dzdesign/design/options.py")
+            )  # fmt: skip
+        return found

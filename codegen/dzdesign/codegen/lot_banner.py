@@ -1,0 +1,57 @@
+"""What generated files say of a common setting: of how many valves it is, and whose recordings it shows."""
+
+from dataclasses import dataclass
+
+from dzdesign.codegen.comment_text import printable_name
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.lot_file import lot_document
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LotInWords:
+    """The same for a banner, for a README and for the words on a certificate.
+
+    Attributes
+    ----------
+    carrier : str
+        The valve that compensator.json holds.
+    banner : str
+        One line.
+    readme : str
+        A paragraph of Markdown.
+    certificate : str
+        A sentence beside the carrier's certificate.
+    """
+
+    carrier: str
+    banner: str
+    readme: str
+    certificate: str
+
+
+def lot_in_words(compensator: Compensator) -> LotInWords | None:
+    """Return the words on a common setting; None of a valve's own.
+
+    Parameters
+    ----------
+    compensator : Compensator
+        What the firmware is of.
+    """
+    count = compensator.common_valves
+    if not count:
+        return None
+    names = [printable_name(each.name) for each in compensator.lot if each.valve_sha256 == compensator.valve_sha256]
+    carrier = f"Valve {names[0]}" if names else "One valve"
+    digest = lot_document(compensator.lot).get("lot_sha256")
+    known = f"lot SHA-256 {digest}" if digest else "the file does not say which"
+    return LotInWords(
+        carrier=carrier,
+        banner=f"COMMON SETTING of {count} valves, {known}.",
+        readme=f"**This is a common setting of {count} valves**, not one valve's own.\n"
+        f"Lot SHA-256: {digest or 'not known'}. Recordings and certificate that these files name are those of one\n"
+        f"of them, the carrier: {carrier[0].lower()}{carrier[1:]}. `../compensator.json` lists all under `lot`.",
+        certificate=f"The certificate is that of one of the {count} valves of this common setting, "
+        f"{carrier[0].lower()}{carrier[1:]}; of the others codegen proved the same under their own bounds."
+        if digest
+        else f"The certificate is that of one of the {count} valves of this common setting.",
+    )

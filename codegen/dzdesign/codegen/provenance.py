@@ -1,0 +1,63 @@
+"""The manifest's account of every constant: C symbol -> equation -> engineering value -> datum -> file and hash."""
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from dzdesign.codegen.core.constants import Constant
+from dzdesign.design.compensator import Compensator
+
+
+def origin_of_constants(
+    compensator: Compensator, compensator_sha256: str, constants: Mapping[str, Sequence[Constant]]
+) -> dict[str, Any]:
+    """Return the manifest's keys on the constants and on the files that they came from.
+
+    Parameters
+    ----------
+    compensator : Compensator
+        With the valve it was designed from.
+    compensator_sha256 : str
+        Of compensator.json as it stands in the firmware.
+    constants : mapping
+        Of each file of the core, path to its constants: those that were printed into it.
+
+    Returns
+    -------
+    dict
+        ``constants``, a list, and ``origin``: hashes of compensator.json, valve.json and every ramp test.
+    """
+    valve = json.loads(compensator.valve_document)
+    valve_keys = _valve_keys(compensator, valve)
+    return {
+        "origin": {
+            "compensator_json": compensator_sha256,
+            "valve_json": compensator.valve_sha256,
+            "ramp_tests": [
+                {"source": str(entry["source"]), "sha256": str(entry["sha256"])} for entry in valve.get("made_from", ())
+            ],
+        },
+        "constants": [constant.entry(path, valve_keys) for path in sorted(constants) for constant in constants[path]],
+    }
+
+
+def _valve_keys(compensator: Compensator, valve: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
+    """Return which keys of valve.json `design` read for each key of compensator.json; all else are its options."""
+    found: dict[str, tuple[str, ...]] = {"u_max_V": ("u_max_V",)}
+    for sign in compensator.signals.signs:
+        name = "positive" if sign > 0 else "negative"
+        side, document = f"sides.{name}", valve["sides"][name]
+        guard = compensator.side(sign).certificate.guard
+        curve = f"{side}.guards.{guard}" if guard in document.get("guards", {}) else None
+        # A valve.json from before there was a choice of guards has one curve, in other places.
+        offset = f"{curve}.u_min0_V" if curve else f"{side}.reference.u_min_V"
+        bounds = (f"{curve}.beta", f"{curve}.certified_steps_V") if curve else (f"{side}.beta", f"{side}.certificate")
+        # With an edge the law's offset is that of the opening threshold.
+        opening = (f"{side}.opening_curve",) if compensator.edge_codes else ()
+        found |= {
+            f"{side}.u_min0_over_u_max": opening or (offset,),
+            f"{side}.k_x_max_over_u_max": (f"{side}.k_x_max_over_u_max", f"{side}.tests", *(opening or (offset,))),
+            f"{side}.beta": (offset, *bounds, f"{side}.trend"),
+            f"{side}.edge_beta": (*opening, f"{side}.trend"),
+        }
+    return found

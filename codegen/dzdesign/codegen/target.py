@@ -1,0 +1,221 @@
+"""What a target folder hands to the renderer: one flat, frozen plan of printed strings."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import PurePosixPath
+from types import MappingProxyType
+
+from dzdesign.codegen.telemetry.frame import Link
+from dzdesign.core.errors import DzdesignError, InputError
+from dzdesign.design.request import TargetInputs
+from dzdesign.design.signal_text import Converter
+from dzdesign.design.signals import Signals
+
+#: Products that the core may use: 32x32->64 bits, or none longer than 32 bits.
+ARITHMETICS = ("wide", "narrow")
+
+RENDERER_NAMES = frozenset(
+    {"banner", "project", "wiring", "firmware_origin", "bipolar", "core_sources", "core_headers", "common_setting"}
+)
+"""Names that the renderer itself passes to every template; a target's context may not use them."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Target:
+    """One microcontroller and its project files.
+
+    Parameters
+    ----------
+    name
+        Name on the command line, for example ``"cortex-m4"``; its folder is the same with underscores.
+    description
+        One line for ``--list-targets``.
+    compare_max
+        Compare value of 100 % duty; the core's ``DZ_COMPARE_MAX``. Fits an unsigned 16-bit register.
+    adc_code_max
+        Largest code of the converter, right-justified; the core's ``DZ_ADC_CODE_MAX``.
+    adc_full_V
+        Voltage at the pin that would be the code after the largest.
+    sample_Hz, tick_Hz
+        Samples and PWM periods in a second.
+    templates
+        Output path, relative to the firmware folder, to the template's file name in the target's ``templates/`` or in
+        those that the targets share.
+    context
+        Every value that a template prints, already a string.
+    board
+        Output paths of the files that are the user's to fill in; the rest is generated again as it is.
+    link
+        The serial line of its telemetry, or None if it sends none.
+    arithmetic
+        ``"wide"``: the core multiplies 32x32->64 bits; ``"narrow"``: nothing is longer than 32 bits.
+    takes_any_signals
+        True for a target without a converter and timer of its own, such as a library: it takes the scalings of any
+        compensator, and ``compare_max`` and ``adc_code_max`` are only what `design` uses if nobody says otherwise.
+    has_timer
+        True if it takes samples and ticks by a timer of its own, at `sample_Hz` and `tick_Hz` and no other rate.
+
+    Raises
+    ------
+    DzdesignError
+        If the plan is not printable as it stands.
+    """
+
+    name: str
+    description: str
+    compare_max: int
+    adc_code_max: int
+    adc_full_V: Fraction = Fraction(3)
+    sample_Hz: int = 1250
+    tick_Hz: int = 2500
+    templates: Mapping[str, str]
+    context: Mapping[str, str]
+    arithmetic: str = "wide"
+    takes_any_signals: bool = False
+    has_timer: bool = True
+    board: frozenset[str] = frozenset()
+    link: Link | None = None
+
+    def __post_init__(self) -> None:
+        if not re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", self.name):
+            raise DzdesignError(f"target name: expected words of a-z and 0-9 with hyphens, got {self.name!r}")
+        if self.arithmetic not in ARITHMETICS:
+            raise DzdesignError(f"target {self.name}: arithmetic must be one of {ARITHMETICS}, got {self.arithmetic!r}")
+        for label, value in (("compare_max", self.compare_max), ("adc_code_max", self.adc_code_max)):
+            if not 0 < value <= 0xFFFF:
+                raise DzdesignError(f"target {self.name}: {label} must fit 16 bits unsigned, got {value}")
+        for path in self.templates:
+            parts = PurePosixPath(path)
+            if parts.is_absolute() or ".." in parts.parts or "\\" in path:
+                raise DzdesignError(
+                    f"target {self.name}: output path must stay below the firmware folder, got {path!r}"
+                )
+        if strangers := sorted(self.board - self.templates.keys()):
+            raise DzdesignError(f"target {self.name}: board files {strangers} have no template")
+        for key, value in self.context.items():
+            if not isinstance(value, str):
+                raise DzdesignError(
+                    f"target {self.name}: context {key!r} must be printed text, got {type(value).__name__}"
+                )
+        if taken := sorted(RENDERER_NAMES & self.context.keys()):
+            raise DzdesignError(f"target {self.name}: context names {taken} belong to the renderer")
+        object.__setattr__(self, "templates", MappingProxyType(dict(self.templates)))
+        object.__setattr__(self, "context", MappingProxyType(dict(self.context)))
+
+    @property
+    def folder(self) -> str:
+        """Name of the target's folder: an identifier, because it is a package."""
+        return folder_of(self.name)
+
+    def inputs(self) -> TargetInputs:
+        """Return the converter and timer that a compensator for this target is designed for."""
+        return TargetInputs(
+            name=self.name,
+            converter=Converter(full_V=self.adc_full_V, levels=self.adc_code_max + 1),
+            compare_max=self.compare_max,
+            sample_Hz=self.sample_Hz,
+            tick_Hz=self.tick_Hz,
+        )
+
+    def check_signals(self, signals: Signals) -> None:
+        """Refuse a compensator that was designed for another converter or PWM.
+
+        Parameters
+        ----------
+        signals : Signals
+            Of the compensator.
+
+        Raises
+        ------
+        InputError
+            With the first scaling that differs.
+        """
+        for what, asked, has, fixed in (
+            ("largest compare value", signals.compare_max, self.compare_max, not self.takes_any_signals),
+            ("largest converter code", signals.code_max, self.adc_code_max, not self.takes_any_signals),
+            ("number of samples a second", signals.sample_Hz, self.sample_Hz, self.has_timer),
+            ("number of PWM periods a second", signals.tick_Hz, self.tick_Hz, self.has_timer),
+        ):
+            if fixed and asked != has:
+                raise InputError(
+                    f"the compensator's {what} is {asked}, but target {self.name} has {has}; "
+                    f"design it again with `dzdesign design --target {self.name}`"
+                )
+
+    def check_is_described(self, designed_for: TargetInputs) -> None:
+        """Refuse a compensator that says of this target what is not so.
+
+        Parameters
+        ----------
+        designed_for : TargetInputs
+            As the compensator states it, under this target's name.
+
+        Raises
+        ------
+        InputError
+            With the first number that differs.
+        """
+        for what, said, has in _inputs_compared(designed_for, self.inputs()):
+            if said != has:
+                raise InputError(
+                    f"the compensator says that target {self.name} has {float(said):g} ({what}), but it has "
+                    f"{float(has):g}; design it again with `dzdesign design --target {self.name}`"
+                )
+
+    def check_designed_for(self, designed_for: TargetInputs | None) -> str:
+        """Refuse a compensator of another target whose codes are other voltages or times here.
+
+        Parameters
+        ----------
+        designed_for : TargetInputs or None
+            As the compensator states it; None if it does not.
+
+        Returns
+        -------
+        str
+            What a person should know of a harmless difference; empty if there is none.
+
+        Raises
+        ------
+        InputError
+            With the first number that differs.
+        """
+        if designed_for is None:
+            return ""
+        theirs = designed_for.converter
+        word = f"the compensator was designed for target {designed_for.name}; {self.name} "
+        if self.takes_any_signals:
+            word += f"takes its codes as they are: {theirs.levels} codes over {float(theirs.full_V):g} V, "
+            word += f"{designed_for.compare_max} counts at full drive"
+            return "" if designed_for.name == self.name else word
+        for what, asked, has in _inputs_compared(designed_for, self.inputs()):
+            if asked != has:
+                raise InputError(
+                    f"the compensator was designed for target {designed_for.name} ({what}: {float(asked):g}), but "
+                    f"{self.name} has {float(has):g}; design it again with `dzdesign design --target {self.name}`"
+                )
+        return "" if designed_for.name == self.name else word + "has the same converter and timer"
+
+
+def _inputs_compared(one: TargetInputs, other: TargetInputs) -> tuple[tuple[str, Fraction | int, Fraction | int], ...]:
+    """Return what each number is, and it of both."""
+    return (
+        ("a converter's range in V", one.converter.full_V, other.converter.full_V),
+        ("a converter's codes", one.converter.levels, other.converter.levels),
+        ("counts at full drive", one.compare_max, other.compare_max),
+        ("samples a second", one.sample_Hz, other.sample_Hz),
+        ("PWM periods a second", one.tick_Hz, other.tick_Hz),
+    )
+
+
+def folder_of(name: str) -> str:
+    """Return the folder of a target's name.
+
+    Examples
+    --------
+    >>> folder_of("cortex-m4")
+    'cortex_m4'
+    """
+    return name.replace("-", "_")

@@ -1,0 +1,182 @@
+"""Recorded telemetry: frames of a firmware in, a ramp file out, scaled by the compensator of that firmware."""
+
+import struct
+from array import array
+from collections.abc import Iterator
+from dataclasses import astuple, dataclass
+from fractions import Fraction
+from pathlib import Path
+
+from dzdesign.codegen.project import SCHEMA, target_named
+from dzdesign.codegen.telemetry.frame import (
+    BETA_BITS,
+    STATUS_BITS,
+    STATUS_RELEASED,
+    TICKS_MODULUS,
+    Frame,
+    FrameReader,
+    Link,
+)
+from dzdesign.core.artefact_files import MANIFEST_NAME, TOOL, parse_document, read_bytes, sha256_of
+from dzdesign.core.errors import InputError
+from dzdesign.design.compensator_file import compensator_from_document
+from dzdesign.design.signals import PressureSignal
+
+COLUMNS = ("time_s", "u_V", "pA_MPa", "pB_MPa", "uO_V", "beta", "compare_a", "compare_b", "status")
+_ROW = struct.Struct("<9I")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Channel:
+    """One signal: its code of zero, and what one code more stands for."""
+
+    zero_code: int
+    per_code: Fraction
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scalings:
+    """What the codes in the frames of one firmware stand for.
+
+    Attributes
+    ----------
+    link : Link
+        Of the firmware's target.
+    sha256 : str
+        Of its compensator.json.
+    command, pressure_a, pressure_b : Channel
+        In V and MPa.
+    volts_out : Fraction
+        u_O of one count of the compare value.
+    """
+
+    link: Link
+    sha256: str
+    command: Channel
+    pressure_a: Channel
+    pressure_b: Channel
+    volts_out: Fraction
+
+    @property
+    def origin(self) -> int:
+        """What the frames of this firmware carry as theirs."""
+        return int(self.sha256[:4], 16)
+
+
+def scalings_of(folder: Path) -> Scalings:
+    """Return the scalings of a firmware folder.
+
+    Raises
+    ------
+    InputError
+        If it is no firmware of dzdesign, or its target sends no telemetry.
+    """
+    path = folder / MANIFEST_NAME
+    manifest = parse_document(read_bytes(path, "firmware manifest"), str(path), (SCHEMA,))
+    target = target_named(str(manifest.get("target")))
+    if target.link is None:
+        raise InputError(f"the target {target.name} of '{folder}' sends no telemetry; f28335 does")
+    content = read_bytes(folder / "compensator.json", "compensator file")
+    compensator = compensator_from_document(content, str(folder / "compensator.json"))
+    signals = compensator.signals
+    return Scalings(
+        link=target.link,
+        sha256=sha256_of(content),
+        command=Channel(
+            zero_code=signals.command.zero_code,
+            per_code=signals.command.direction(1) * compensator.u_max_V / signals.command.span(1),
+        ),
+        pressure_a=_pressure(signals.pressure_a),
+        pressure_b=_pressure(signals.pressure_b),
+        volts_out=compensator.u_max_V / signals.compare_max,
+    )
+
+
+def _pressure(sensor: PressureSignal) -> Channel:
+    return Channel(zero_code=sensor.zero_code, per_code=sensor.per_code_MPa)
+
+
+class Recording:
+    """Frames as they came, in 32 bytes each, and what was missed between them.
+
+    Attributes
+    ----------
+    lost, restarts : int
+        Frames that are missing between others; how often the count of PWM periods went back, as after a reset.
+    """
+
+    def __init__(self, scalings: Scalings) -> None:
+        self.scalings = scalings
+        self.lost = self.restarts = 0
+        self._rows = bytearray()
+        self._periods = array("q")  # since the first frame, and going on over a restart
+        self._last = 0
+
+    def __len__(self) -> int:
+        return len(self._periods)
+
+    @property
+    def duration_s(self) -> float:
+        """Time from the first frame to the last, in s."""
+        return self._periods[-1] / self.scalings.link.tick_Hz if self._periods else 0.0
+
+    @property
+    def faults(self) -> list[str]:
+        """Faults that any frame reports, in words."""
+        seen = 0
+        for row in _ROW.iter_unpack(self._rows):
+            seen |= row[-1]
+        return [text for bit, text in STATUS_BITS.items() if seen & bit]
+
+    def add(self, frame: Frame) -> None:
+        """Add a frame; one whose time lies before the last one's begins anew, one frame later."""
+        due = self.scalings.link.frame_ticks
+        step = (frame.ticks - self._last) % TICKS_MODULUS
+        if not self._periods:
+            now = 0
+        elif 0 < step < TICKS_MODULUS // 2:
+            now = self._periods[-1] + step
+            self.lost += max(round(step / due) - 1, 0)
+        else:
+            now = self._periods[-1] + due
+            self.restarts += 1
+        self._last = frame.ticks
+        self._rows += _ROW.pack(*astuple(frame))
+        self._periods.append(now)
+
+    def rows(self) -> Iterator[str]:
+        """Yield the lines of the table."""
+        scale = self.scalings
+        channels = (scale.command, scale.pressure_a, scale.pressure_b)
+        (u_zero, volts), (a_zero, a_MPa), (b_zero, b_MPa) = ((one.zero_code, float(one.per_code)) for one in channels)
+        volts_out = float(scale.volts_out)
+        for periods, row in zip(self._periods, _ROW.iter_unpack(self._rows), strict=True):
+            _, _, u_adc, p_a_adc, p_b_adc, beta, compare_a, compare_b, status = row
+            out = (compare_a - compare_b) * volts_out if status & STATUS_RELEASED else 0.0
+            volts_in, a_now, b_now = (u_adc - u_zero) * volts, (p_a_adc - a_zero) * a_MPa, (p_b_adc - b_zero) * b_MPa
+            yield (
+                f"{periods / scale.link.tick_Hz:.4f},{volts_in:.5f},{a_now:.5f},{b_now:.5f},"
+                f"{out:.5f},{beta / (1 << BETA_BITS):.5f},{compare_a},{compare_b},{status}\n"
+            )
+
+    def to_csv(self, reader: FrameReader) -> str:
+        """Return the ramp file: what was recorded and what was missed as comments, then the table.
+
+        Parameters
+        ----------
+        reader
+            That found the frames: it knows what was skipped.
+        """
+        comments = (
+            f"recorded by dzdesign {TOOL['version']} monitor, firmware of compensator SHA-256 {self.scalings.sha256}",
+            f"{len(self)} frames, {self.lost} lost, {reader.bad_crc} with a wrong CRC, {self.restarts} restarts",
+            "u_V: command u_i. uO_V: output u_O, negative of solenoid B, 0 while the output is held low; "
+            "to look at the valve without its "
+            'compensator: --columns "u=uO_V"',
+            "compare_a, compare_b: PWM compare values of the solenoids. status: bits, 128: output in use, "
+            + ", ".join(f"{bit}: {text}" for bit, text in STATUS_BITS.items()),
+            "The firmware does not measure the flow: add a column Q_Lmin, your flow meter's reading at each time_s. "
+            "The ramp of u_V, recorded by both, tells the shift between the two clocks",
+        )
+        head = "".join(f"# {comment}\n" for comment in comments)
+        return head + ",".join(COLUMNS) + "\n" + "".join(self.rows())

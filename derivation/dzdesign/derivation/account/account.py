@@ -1,0 +1,65 @@
+"""The whole account of the paper, in its order: every equation, and the theorems, each after what it rests on."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from dzdesign.derivation.account.equations import APPROACH, AT_REFERENCE, OFF_REFERENCE, PAPER_NUMBERS
+from dzdesign.derivation.account.flow_over_pressure import FLOW_OVER_PRESSURE
+from dzdesign.derivation.account.identifiability import IDENTIFIABILITY
+from dzdesign.derivation.account.implementation import CODES, IMPLEMENTATION
+from dzdesign.derivation.account.meter_floor import METER_FLOOR
+from dzdesign.derivation.account.proof import Verdict, prove
+from dzdesign.derivation.account.statement import Statement
+from dzdesign.derivation.account.target_flow import FULL_COMMAND, TARGET, TIES
+from dzdesign.derivation.account.transfer import SIMULATION_MODEL, TRANSFER_FUNCTION
+from dzdesign.derivation.account.zero_command import SHAPE, ZERO_COMMAND
+
+SECTIONS = {
+    "1 Proposed compensation approach": APPROACH,
+    "1.1 At the reference point": AT_REFERENCE,
+    "1.2 At a non-reference point": OFF_REFERENCE,
+    "2.1 Simulation model": SIMULATION_MODEL,
+    "3 Implementation of the compensator": IMPLEMENTATION,
+    "The law of this tool": TIES,
+    "Theorem 1: which flow the laws give": TARGET,
+    "Theorem 2: full command": FULL_COMMAND,
+    "Theorem 3: zero command": ZERO_COMMAND,
+    "Theorem 4: the law's shape": SHAPE,
+    "Theorem 5: codes and duty cycle": CODES,
+    "Theorem 6: transfer function": TRANSFER_FUNCTION,
+    "Theorem 7: flow over pressure drop": FLOW_OVER_PRESSURE,
+    "Theorem 8: what flow can tell": IDENTIFIABILITY,
+    "Theorem 9: the meter's floor": METER_FLOOR,
+}
+
+STATEMENTS = tuple(
+    replace(statement, section=section) for section, statements in SECTIONS.items() for statement in statements
+)
+
+__all__ = ["PAPER_NUMBERS", "SECTIONS", "STATEMENTS", "verify_statements"]
+
+
+def verify_statements(statements: Sequence[Statement] = STATEMENTS) -> tuple[Verdict, ...]:
+    """Derive each statement from the premises that it names.
+
+    Parameters
+    ----------
+    statements : sequence of Statement, optional
+        Each after those it rests on.
+
+    Returns
+    -------
+    tuple of Verdict
+        One per statement, in order.
+
+    Raises
+    ------
+    RequirementError
+        If the premises of a statement are circular or missing.
+
+    Examples
+    --------
+    >>> all(verdict.as_expected for verdict in verify_statements())
+    True
+    """
+    return prove(statements)

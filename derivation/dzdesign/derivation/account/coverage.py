@@ -1,0 +1,75 @@
+"""Which part of its range a proof covers: a statement that is proved on a part of it only has to say on which."""
+
+from functools import cache
+
+import sympy
+from sympy.core.relational import Relational
+from sympy.logic.boolalg import Boolean
+
+from dzdesign.derivation.account.statement import Case
+from dzdesign.derivation.symbols import DISTANCES
+
+
+@cache
+def is_exhaustive(cases: tuple[Case, ...], within: Boolean) -> bool:
+    """Return whether cases leave nothing out of what a statement is meant for.
+
+    Each case replaces symbols by others plus a distance of known sign, as ``dP1 = dP0 + above``; so it says which
+    comparisons hold. The cases are exhaustive if propositional logic alone shows that one of them is true.
+
+    Parameters
+    ----------
+    cases : tuple of Case
+    within : sympy Boolean
+        Comparisons that hold wherever the statement is meant to; true if that is everywhere.
+
+    Returns
+    -------
+    bool
+        True where there are no cases; False also where a case can't be read as comparisons.
+    """
+    if not cases:
+        return True
+    claims = [_claim(case) for case in cases]
+    if None in claims:
+        return False
+    meant = within.replace(
+        lambda part: isinstance(part, Relational),
+        lambda part: _is_above(part.gts - part.lts, isinstance(part, sympy.StrictGreaterThan | sympy.StrictLessThan)),
+    )
+    return not sympy.satisfiable(sympy.And(meant, *(sympy.Not(claim) for claim in claims)))
+
+
+def _claim(case: Case) -> sympy.Basic | None:
+    """Return what a case says of the symbols that it replaces, or None if that can't be read off."""
+    distances: dict[sympy.Symbol, sympy.Expr] = {}
+    claims = []
+    for name, value in case.at:
+        margin = name - value.xreplace(distances)
+        unknown = [distance for distance in DISTANCES if margin.has(distance)]
+        if not unknown:
+            claims += [_is_above(margin, strictly=False), _is_above(-margin, strictly=False)]
+            continue
+        solutions = sympy.solve(margin, unknown[0]) if len(unknown) == 1 else []
+        if len(solutions) != 1:
+            return None
+        distances[unknown[0]] = solutions[0]
+    for distance, value in distances.items():
+        claims.append(_is_above(value, strictly=distance.is_positive))
+    return sympy.And(*claims)
+
+
+def _is_above(margin: sympy.Expr, strictly: bool) -> Boolean:
+    """Return the claim that a margin is positive, or zero or more; equal margins give the same one."""
+    if strictly:
+        return sympy.Not(_is_above(-margin, strictly=False))
+    margin = sympy.expand(margin)
+    if not margin.could_extract_minus_sign():
+        return _proposition(margin, "zero or more")
+    # Of a margin and its negative one at least is zero or more: negative, or zero.
+    return sympy.Not(_proposition(-margin, "zero or more")) | _proposition(-margin, "zero")
+
+
+@cache
+def _proposition(margin: sympy.Expr, what: str) -> sympy.Dummy:
+    return sympy.Dummy(what)

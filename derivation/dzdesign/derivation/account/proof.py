@@ -1,0 +1,346 @@
+"""Proves statements from the premises that they name, and from nothing else.
+
+A premise has no grounds and is taken as given; anything else follows if its grounds, solved for its symbol, give each
+of its members exactly. Where they do not, the difference is factored: it says on which condition they would.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import sympy
+
+from dzdesign.core.errors import RequirementError
+from dzdesign.derivation.account.conditions import Finding, judge_condition
+from dzdesign.derivation.account.coverage import is_exhaustive
+from dzdesign.derivation.account.identity import agree
+from dzdesign.derivation.account.solving import solve_relations
+from dzdesign.derivation.account.statement import Case, Ground, Kind, Name, Outcome, Statement
+from dzdesign.derivation.account.steps import Relation, Step, derive_in_steps
+from dzdesign.derivation.account.symbol_units import find_unit_error
+
+
+@dataclass(frozen=True, kw_only=True)
+class CaseProof:
+    """The derivation of one case of a statement; most statements have a single one, without words.
+
+    Attributes
+    ----------
+    statement : Statement
+    where : str
+        The case in words.
+    derived : sympy.Expr
+        What the grounds give for the symbol.
+    discrepancies : tuple of sympy.Expr
+        Derived minus published, one per member; zero where they agree.
+    relations : tuple of Relation
+        The grounds at the values at which the case uses them.
+    solution : mapping
+        The statement's symbol and the eliminated ones, solved for.
+    reached : sympy.Expr
+        The form in which a derivation states the result: as published, or as derived where the two differ.
+    published : sympy.Expr
+        The last member's branch of this case, in the symbols of the statement.
+    """
+
+    statement: Statement
+    where: str
+    derived: sympy.Expr
+    discrepancies: tuple[sympy.Expr, ...]
+    relations: tuple[Relation, ...]
+    solution: Mapping[Name, sympy.Expr]
+    reached: sympy.Expr
+    published: sympy.Expr
+
+    @cached_property
+    def steps(self) -> tuple[Step, ...]:
+        """How the grounds lead to the result, one after another."""
+        return derive_in_steps(self.relations, self.statement, self.solution, self.reached)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verdict:
+    """What the engine found about one statement.
+
+    Attributes
+    ----------
+    statement : Statement
+    outcome : Outcome
+    words : str
+        The outcome with its condition, or the reason, in words.
+    as_expected : bool
+        Whether a correct account finds this.
+    proofs : tuple of CaseProof
+        One per case; empty for what is given and for what could not be solved.
+    necessary : bool or None
+        Whether the condition was proved necessary; None where there is none.
+    inherited : tuple of str
+        Grounds that follow only on a condition, which this statement therefore needs too.
+    limited_by : tuple of str
+        Grounds, and their grounds, that are proved on a part of their range only.
+    unit_error : str
+        What is wrong with its units; empty where they are right.
+    """
+
+    statement: Statement
+    outcome: Outcome
+    words: str
+    as_expected: bool
+    proofs: tuple[CaseProof, ...] = ()
+    necessary: bool | None = None
+    inherited: tuple[str, ...] = ()
+    limited_by: tuple[str, ...] = ()
+    unit_error: str = ""
+
+    @property
+    def number(self) -> str:
+        return self.statement.number
+
+    @property
+    def holds(self) -> bool:
+        """Whether other statements may rely on it."""
+        return self.outcome is not Outcome.DOES_NOT_FOLLOW
+
+    @property
+    def discrepancy(self) -> sympy.Expr | None:
+        """The first difference between what was derived and what is published, or None."""
+        differences = (value for proof in self.proofs for value in proof.discrepancies)
+        return next((sympy.factor(value) for value in differences if value != 0), None)
+
+
+def prove(statements: Sequence[Statement]) -> tuple[Verdict, ...]:
+    """Judge each statement from its grounds.
+
+    Parameters
+    ----------
+    statements : sequence of Statement
+        Premises and statements; each stands after its grounds.
+
+    Returns
+    -------
+    tuple of Verdict
+        One per statement, in order. A statement holds only if everything it rests on holds.
+
+    Raises
+    ------
+    RequirementError
+        If a number appears twice, or a statement rests on itself, on a later one, on an unknown one, or on a
+        copy of itself. As each statement rests on earlier ones only, no chain of premises can be circular.
+    """
+    earlier: dict[str, Statement] = {}
+    verdicts: dict[str, Verdict] = {}
+    order = [statement.number for statement in statements]
+    for statement in statements:
+        if statement.number in earlier:
+            raise RequirementError(f"{statement.number} is stated twice")
+        _check_grounds(statement, earlier, order)
+        verdicts[statement.number] = _with_units(judge(statement, earlier, verdicts))
+        earlier[statement.number] = statement
+    return tuple(verdicts.values())
+
+
+def _check_grounds(statement: Statement, earlier: Mapping[str, Statement], order: Sequence[str]) -> None:
+    for ground in statement.grounds:
+        if ground.number == statement.number:
+            raise RequirementError(f"{statement.number} is its own premise")
+        if ground.number in order and ground.number not in earlier:
+            raise RequirementError(
+                f"{statement.number} rests on {ground.number}, which stands after it: that may be circular"
+            )
+        if ground.number not in earlier:
+            raise RequirementError(f"{statement.number} rests on {ground.number}, which is not stated")
+        # A tie between `law.py` and the paper compares two transcriptions, so there a copy is the point.
+        # A special case of an earlier statement is a result; the statement itself is not.
+        premise = earlier[ground.number]
+        is_copy = premise.symbol == statement.symbol and agree(premise.members[-1], statement.members[-1])
+        if is_copy and statement.kind is not Kind.LAW and ground.derivative is None:
+            raise RequirementError(f"{statement.number} rests on a copy of itself, {ground.number}")
+
+
+def _with_units(verdict: Verdict) -> Verdict:
+    """Check the units too: what does not follow may be wrong in them, nothing else may."""
+    error = find_unit_error(verdict.statement)
+    expected = verdict.as_expected and not (error and verdict.holds)
+    return replace(verdict, unit_error=error, as_expected=expected)
+
+
+def judge(statement: Statement, earlier: Mapping[str, Statement], verdicts: Mapping[str, Verdict]) -> Verdict:
+    """Judge one statement by its logic alone.
+
+    Parameters
+    ----------
+    statement : Statement
+    earlier : mapping of str to Statement
+        Its grounds, by number.
+    verdicts : mapping of str to Verdict
+        What was found about them.
+
+    Returns
+    -------
+    Verdict
+    """
+
+    def verdict(outcome: Outcome, words: str, flawed: bool = False, **found: object) -> Verdict:
+        expected = outcome is statement.expected and not flawed
+        return Verdict(statement=statement, outcome=outcome, words=words, as_expected=expected, **found)
+
+    if statement.kind.is_given:
+        return verdict(Outcome.GIVEN, statement.kind.value)
+    proofs = _proofs(statement, earlier)
+    if isinstance(proofs, str):
+        return verdict(Outcome.DOES_NOT_FOLLOW, f"does not follow: {proofs}", flawed=True)
+    differences = [value for proof in proofs for value in proof.discrepancies if value != 0]
+    finding = _finding(statement, proofs, differences)
+    unsound = [ground.number for ground in statement.grounds if not verdicts[ground.number].holds]
+    if unsound:
+        words = f"rests on {', '.join(unsound)}, which does not follow"
+        return verdict(Outcome.DOES_NOT_FOLLOW, words, flawed=True, proofs=proofs)
+    inherited = tuple(dict.fromkeys(n for ground in statement.grounds for n in _conditional(verdicts[ground.number])))
+    outcome, words = finding.outcome, finding.words
+    if inherited and outcome is Outcome.FOLLOWS:
+        outcome, words = Outcome.FOLLOWS_IF, f"follows on the condition of {', '.join(inherited)}"
+    elif inherited and outcome is Outcome.FOLLOWS_IF:
+        words += f", and on the condition of {', '.join(inherited)}"
+    limits = tuple(dict.fromkeys(n for ground in statement.grounds for n in _limits(verdicts[ground.number])))
+    return verdict(
+        outcome,
+        words,
+        flawed=finding.flawed,
+        proofs=proofs,
+        necessary=finding.necessary,
+        inherited=inherited,
+        limited_by=limits,
+    )
+
+
+def _limits(verdict: Verdict) -> tuple[str, ...]:
+    own = (verdict.number,) if verdict.statement.scope or verdict.statement.provided else ()
+    return own + verdict.limited_by
+
+
+def _conditional(verdict: Verdict) -> tuple[str, ...]:
+    own = (verdict.number,) if verdict.necessary is not None else ()
+    return own + verdict.inherited if verdict.outcome is Outcome.FOLLOWS_IF else ()
+
+
+def _finding(statement: Statement, proofs: Sequence[CaseProof], differences: Sequence[sympy.Expr]) -> Finding:
+    if statement.condition is not None:
+        return judge_condition(statement.condition, differences)
+    if differences:
+        return Finding(Outcome.DOES_NOT_FOLLOW, "does not follow")
+    if statement.positive_if is None:
+        return Finding(Outcome.FOLLOWS, "follows")
+    claim = sympy.sstr(statement.positive_if)
+    if all(_sign_agrees(statement, case, proof) for case, proof in zip(_cases(statement), proofs, strict=True)):
+        return Finding(Outcome.FOLLOWS, f"follows; positive exactly if {claim}")
+    return Finding(Outcome.DOES_NOT_FOLLOW, f"does not follow: positive not exactly if {claim}", flawed=True)
+
+
+def _sign_agrees(statement: Statement, case: Case, proof: CaseProof) -> bool:
+    """Whether the derived value is positive in just the cases in which the claim is true."""
+    claim = statement.positive_if.xreplace(dict(case.at))
+    if claim == sympy.true:
+        return proof.derived.is_positive is True
+    if claim == sympy.false:
+        return proof.derived.is_nonpositive is True
+    # The claim's own margin, times something positive, is the value: the two have one sign.
+    if not isinstance(claim, sympy.StrictGreaterThan | sympy.StrictLessThan):
+        return False
+    return sympy.factor(sympy.cancel(sympy.factor(proof.derived) / (claim.gts - claim.lts))).is_positive is True
+
+
+def _cases(statement: Statement) -> tuple[Case, ...]:
+    return statement.cases or (Case(at=(), where=""),)
+
+
+def _proofs(statement: Statement, earlier: Mapping[str, Statement]) -> tuple[CaseProof, ...] | str:
+    """Derive every case, or say why one can't be."""
+    proofs = []
+    chosen: set[sympy.Basic] = set()
+    needed: set[sympy.Ne] = set()
+    for case in _cases(statement):
+        replacements = dict(case.at)
+        relations = tuple(_relation(earlier[ground.number], ground, replacements) for ground in statement.grounds)
+        provided = tuple(provision.xreplace(replacements) for provision in statement.provided)
+        found = solve_relations(relations, (statement.symbol, *statement.eliminate), provided)
+        if isinstance(found, str):
+            return found
+        solution = found.values
+        needed |= {one for one, here in zip(statement.provided, provided, strict=True) if here in found.needed}
+        derived = solution[statement.symbol]
+        branches = [_branch(member, replacements, solution, chosen) for member in statement.members]
+        if None in branches:
+            return f"a case does not decide between the branches of {statement.number} itself"
+        members = [branch.xreplace(replacements) for branch in branches]
+        published = [member.xreplace(solution) for member in members]
+        differences = tuple(sympy.S.Zero if agree(derived, member) else derived - member for member in published)
+        reached = derived if any(differences) else members[-1]
+        proofs.append(
+            CaseProof(
+                statement=statement,
+                where=case.where,
+                derived=derived,
+                discrepancies=differences,
+                relations=relations,
+                solution=solution,
+                reached=reached,
+                published=branches[-1],
+            )
+        )
+    idle = [sympy.sstr(one) for member in statement.members for one in _conditions(member) if one not in chosen]
+    if idle:
+        return f"no case stands for {', '.join(idle)}"
+    unneeded = [sympy.sstr(provision) for provision in statement.provided if provision not in needed]
+    if unneeded:
+        return f"the derivation does not need {', '.join(unneeded)}"
+    if not is_exhaustive(statement.cases, statement.within):
+        return "the cases leave something out"
+    limited = statement.within != sympy.true or not _meets_all_branches(statement, earlier)
+    if limited != bool(statement.scope):
+        return "it does not say where it is proved" if limited else "it is proved everywhere, and says where"
+    return tuple(proofs)
+
+
+def _conditions(member: sympy.Expr) -> list[sympy.Basic]:
+    return [condition for _, condition in member.args] if isinstance(member, sympy.Piecewise) else []
+
+
+def _meets_all_branches(statement: Statement, earlier: Mapping[str, Statement]) -> bool:
+    """Whether each branch of each piecewise ground is met in one of the cases."""
+    for ground in statement.grounds:
+        branches = [one.xreplace(dict(ground.at)) for one in _conditions(earlier[ground.number].members[ground.member])]
+        decided = [[branch.xreplace(dict(case.at)) == sympy.true for branch in branches] for case in _cases(statement)]
+        # The first that is true is met; the last one's condition is often just "otherwise".
+        if branches and {case.index(True) if True in case else None for case in decided} != set(range(len(branches))):
+            return False
+    return True
+
+
+def _branch(
+    member: sympy.Expr, case: Mapping[Name, sympy.Expr], solution: Mapping[Name, sympy.Expr], chosen: set[sympy.Basic]
+) -> sympy.Expr | None:
+    """Return a member, of a piecewise one the branch that holds in a case, whose condition joins `chosen`."""
+    if not isinstance(member, sympy.Piecewise):
+        return member
+    for value, condition in member.args:
+        decided = condition.xreplace(case).xreplace(solution)
+        if decided == sympy.true:
+            chosen.add(condition)
+            return value
+        if decided != sympy.false:
+            return None
+    return None
+
+
+def _relation(statement: Statement, ground: Ground, case: Mapping[Name, sympy.Expr]) -> Relation:
+    name, value = statement.symbol, statement.members[ground.member]
+    if ground.derivative is not None:
+        by, name = ground.derivative
+        value = sympy.diff(value, by)
+    # xreplace replaces all symbols at once, so that u_i -> -u_i does not eat its own result.
+    replacements = dict(ground.at)
+    return Relation(
+        ground=ground,
+        left=name.xreplace(replacements).xreplace(case),
+        right=value.xreplace(replacements).xreplace(case),
+    )

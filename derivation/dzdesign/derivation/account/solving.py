@@ -1,0 +1,165 @@
+"""Solves the grounds of a statement for its symbol and for what is eliminated, exactly, or says why not.
+
+Nothing is divided by what may be zero: a coefficient must be different from zero by the signs of its symbols, or by
+what the statement is provided with.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import sympy
+
+from dzdesign.derivation.account.identity import agree
+from dzdesign.derivation.account.statement import Name
+from dzdesign.derivation.account.steps import Relation
+
+_CONTRADICTION = "the premises contradict each other"
+_SEVERAL = "the premises allow several values"
+
+Sides = tuple[sympy.Expr, sympy.Expr]
+#: Expressions known not to be zero, with the provision that says so; None where another value does.
+_Nonzero = Sequence[tuple[sympy.Expr, sympy.Ne | None]]
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """The unknowns in the symbols that remain, and which of the provisions were needed to divide."""
+
+    values: Mapping[Name, sympy.Expr]
+    needed: frozenset[sympy.Ne]
+
+
+@lru_cache(maxsize=4096)
+def solve_relations(
+    relations: tuple[Relation, ...], unknowns: tuple[Name, ...], provided: tuple[sympy.Ne, ...]
+) -> Solution | str:
+    """Solve relations for unknowns.
+
+    Parameters
+    ----------
+    relations : tuple of Relation
+        The grounds of one case.
+    unknowns : tuple of symbols
+        What is wanted.
+    provided : tuple of sympy.Ne
+        What may be divided by although its symbols' signs do not tell that it is not zero.
+
+    Returns
+    -------
+    Solution or str
+        Or the reason why there is no such thing.
+    """
+    # A piecewise expression none of whose cases holds is nan to SymPy.
+    if any(relation.right.has(sympy.Piecewise, sympy.nan) for relation in relations):
+        return "the case of a piecewise premise is not decided"
+    solved: dict[Name, sympy.Expr] = {}
+    needed: set[sympy.Ne] = set()
+    nonzero = [(provision.lhs - provision.rhs, provision) for provision in provided]
+    sides = [(relation.left, relation.right) for relation in relations]
+    while sides:
+        index, name = _choose(sides, [name for name in unknowns if name not in solved], nonzero)
+        left, right = sides.pop(index)
+        if name is None:  # no unknown is left in it: it must be true by itself
+            if not agree(left, right):
+                return _CONTRADICTION
+            continue
+        found = _solve_for(name, left, right, nonzero)
+        if isinstance(found, str):
+            return found
+        value, used = found
+        if _has_wrong_sign(name, value):
+            return _CONTRADICTION
+        if name.is_nonzero:  # then what it equals is not zero either
+            nonzero.append((sympy.numer(sympy.factor(value)), None))
+        solved[name] = value
+        needed |= used
+        sides = [tuple(side.xreplace({name: value}) for side in pair) for pair in sides]
+    values = _put_back(solved, unknowns)
+    return values if isinstance(values, str) else Solution(values, frozenset(needed))
+
+
+def _choose(sides: Sequence[Sides], names: Sequence[Name], nonzero: _Nonzero) -> tuple[int, Name | None]:
+    """Return the next relation and what to solve it for, None if no unknown is left in it.
+
+    One that gives an unknown as it stands comes first, then one with a single unknown, then one that can be solved.
+    """
+    for index, (left, right) in enumerate(sides):
+        if left in names and not right.has(left):
+            return index, left
+    inside = [[name for name in names if left.has(name) or right.has(name)] for left, right in sides]
+    for index, found in enumerate(inside):
+        if len(found) < 2:
+            return index, found[0] if found else None
+    for index, (left, right) in enumerate(sides):
+        for name in inside[index]:
+            if not isinstance(_solve_for(name, left, right, nonzero), str):
+                return index, name
+    return 0, inside[0][0]
+
+
+def _solve_for(
+    name: Name, left: sympy.Expr, right: sympy.Expr, nonzero: _Nonzero
+) -> tuple[sympy.Expr, frozenset[sympy.Ne]] | str:
+    """Return the only value at which two sides are equal, and the provisions that it takes; or why there is none."""
+    if left == name and not right.has(name):
+        return right, frozenset()
+    difference = sympy.factor(left - right)
+    coefficient = sympy.factor(sympy.diff(difference, name))
+    if not coefficient.has(name):
+        found = [sympy.factor(-difference.xreplace({name: sympy.S.Zero}) / coefficient)] if coefficient != 0 else []
+        divisors = [coefficient]
+    else:
+        found = sympy.solve(difference, name)
+        # What SymPy's solver divides by without a word: the factors without the unknown, and its result's denominator.
+        divisors = [factor for factor in sympy.Mul.make_args(difference) if not factor.has(name)]
+        divisors += [sympy.denom(sympy.together(value)) for value in found]
+    if len(found) != 1:
+        return _SEVERAL if found else _CONTRADICTION
+    used: set[sympy.Ne] = set()
+    for divisor in divisors:
+        zero = _possible_zero(divisor, nonzero, used)
+        if zero is not None:
+            return f"{sympy.sstr(zero)}, by which the derivation divides, may be zero"
+    return found[0], frozenset(used)
+
+
+def _possible_zero(divisor: sympy.Expr, nonzero: _Nonzero, used: set[sympy.Ne]) -> sympy.Expr | None:
+    """Return a factor that may be zero, or None; the provisions that rule it out for the others join `used`."""
+    for factor in sympy.Mul.make_args(sympy.factor(divisor)):
+        base, exponent = factor.as_base_exp()
+        base = sympy.logcombine(base)
+        if isinstance(base, sympy.log):  # zero exactly where its argument is one
+            base = sympy.numer(sympy.together(base.args[0] - 1))
+        if base.is_nonzero or exponent.is_negative:
+            continue
+        excluded = [provision for known, provision in nonzero if _divides(base, known)]
+        if not excluded:
+            return base
+        used |= {excluded[0]} - {None}
+    return None
+
+
+def _divides(factor: sympy.Expr, product: sympy.Expr) -> bool:
+    """Whether a product that is not zero has a factor, which then is not zero either."""
+    return any(
+        sympy.cancel(factor / other.as_base_exp()[0]).is_nonzero for other in sympy.Mul.make_args(sympy.factor(product))
+    )
+
+
+def _put_back(solved: dict[Name, sympy.Expr], unknowns: tuple[Name, ...]) -> dict[Name, sympy.Expr] | str:
+    """Put later solutions into earlier ones, so that no unknown is left in any."""
+    solution: dict[Name, sympy.Expr] = {}
+    for name, value in reversed(solved.items()):
+        solution[name] = value.xreplace(solution)
+    undetermined = [str(unknown) for unknown in unknowns if unknown not in solution or solution[unknown].has(*unknowns)]
+    if undetermined:
+        return f"the premises do not determine {', '.join(undetermined)}"
+    if any(_has_wrong_sign(name, value) for name, value in solution.items()):
+        return _CONTRADICTION
+    return solution
+
+
+def _has_wrong_sign(name: Name, value: sympy.Expr) -> bool:
+    """Whether a value is one that its symbol can't have."""
+    return bool((name.is_nonnegative and value.is_negative) or (name.is_positive and value.is_nonpositive))

@@ -1,0 +1,244 @@
+"""What ties the law of `law.py` to the paper's equations; theorems 1 and 2: which flow it gives, and full command."""
+
+import sympy
+
+from dzdesign.derivation.account.published import FIRST, SECOND, VALVES
+from dzdesign.derivation.account.statement import Case, Condition, Ground, Kind, Outcome, Statement, Value
+from dzdesign.derivation.law import law
+from dzdesign.derivation.symbols import (
+    K_0,
+    K_1,
+    Q_O,
+    C_d,
+    Q,
+    Q_O_prime,
+    W,
+    above,
+    below,
+    beta,
+    dP,
+    dP0,
+    dP1,
+    drive_left,
+    gamma_0,
+    gamma_1,
+    headroom,
+    k,
+    rho,
+    u_0,
+    u_i,
+    u_i_prime,
+    u_max,
+    u_min,
+    u_min0,
+    u_min1,
+    u_no,
+    u_O,
+    x,
+    x_max,
+)
+
+_PAPER_LAW = law("paper")
+_TARGET_LAW = law("target")
+_DRIVE_LEFT_OVER = "with k x_max = u_max - u_min0, the command left above the threshold"
+
+#: What `law.py` states against what the paper derives.
+TIES = (
+    Statement(
+        number="L1",
+        title="the law `paper` is Eq. (18)",
+        kind=Kind.LAW,
+        symbol=u_O,
+        members=(_PAPER_LAW.output,),
+        grounds=(Ground(number="(18)"),),
+    ),
+    Statement(
+        number="L2",
+        title="the selector gives the law `paper`, at beta = 1 up to dP0: Eq. (14)",
+        kind=Kind.LAW,
+        symbol=u_O,
+        members=(sympy.Piecewise((_PAPER_LAW.output, dP1 > dP0), (_PAPER_LAW.output.subs(beta, 1), dP1 <= dP0)),),
+        grounds=(
+            Ground(number="u_O", at=((u_0, u_no),), where="with u_no for u_0"),
+            Ground(number="(7)"),
+            Ground(number="(13)"),
+        ),
+        eliminate=(u_no, u_0),
+        cases=(
+            Case(at=((dP1, dP0 - below),), where="dP <= dP0"),
+            Case(at=((dP1, dP0 + above),), where="dP > dP0"),
+        ),
+    ),
+    Statement(
+        number="L3",
+        title="the law `target`",
+        kind=Kind.CHOICE,
+        symbol=u_O,
+        members=(_TARGET_LAW.output,),
+        see=("T1d", "T1e"),
+        note=_TARGET_LAW.note,
+    ),
+)
+
+
+def _flow(law_number: str, threshold: sympy.Symbol, pressure: sympy.Symbol) -> tuple[Ground, ...]:
+    """What gives the valve's flow under a law, beyond the threshold at one pressure drop."""
+    return (
+        Ground(
+            number="(1)",
+            at=(
+                (dP, pressure),
+                (u_i, threshold + u_i_prime),
+                (u_min, threshold),
+                (u_max, threshold + u_i_prime + headroom),
+            ),
+            where=f"at dP = {pressure}, beyond the threshold",
+        ),
+        Ground(number="(11)"),
+        Ground(number="Fig. 3, command", at=((u_min0, threshold),), where=f"at dP = {pressure}"),
+        Ground(number=law_number),
+    )
+
+
+_BEYOND = "0 <= u_i <= u_max, up to the spool's stop"
+_AT_DP1 = (Ground(number="(5)"), Ground(number="gamma_1"), Ground(number="(15)"), Ground(number="(16)"))
+_UNKNOWN_AT_DP1 = (x, u_i_prime, u_O, u_min1, gamma_1, K_1, Q_O_prime)
+
+#: Theorem 1: which flow the laws give.
+TARGET = (
+    Statement(
+        number="T1a",
+        title="at the reference the law (14) gives the wanted flow (9)",
+        kind=Kind.THEOREM,
+        scope=_BEYOND,
+        symbol=Q,
+        members=(Q_O,),
+        grounds=(*_flow("(14)", u_min0, dP0), *(Ground(number=number) for number in ("(9)", "(8)", "gamma_0"))),
+        eliminate=(x, u_i_prime, u_O, Q_O, K_0, gamma_0),
+    ),
+    Statement(
+        number="T1b",
+        title="flow that the law (18) gives off the reference",
+        kind=Kind.THEOREM,
+        scope=_BEYOND,
+        symbol=Q,
+        members=(
+            Q_O_prime + gamma_1 * (1 - beta) * (1 - k * x_max / u_max) * u_i / k,
+            Q_O_prime * (beta + (1 - beta) * u_max / (k * x_max)),
+        ),
+        grounds=(*_flow("(18)", u_min1, dP1), *_AT_DP1),
+        eliminate=_UNKNOWN_AT_DP1,
+        values=tuple(
+            Value(
+                label=f"flow over the target, {valve.name}",
+                of=beta + (1 - beta) * u_max / (k * x_max),
+                at=valve.at(),
+                unit="1",
+            )
+            for valve in VALVES
+        ),
+        note=f"Above the target wherever beta < 1 and k x_max < u_max. The numbers: {_DRIVE_LEFT_OVER}.",
+    ),
+    Statement(
+        number="T1c",
+        title="the law (18) meets the target (16)",
+        kind=Kind.THEOREM,
+        scope=_BEYOND,
+        symbol=Q,
+        members=(Q_O_prime,),
+        grounds=(*_flow("(18)", u_min1, dP1), *_AT_DP1),
+        eliminate=_UNKNOWN_AT_DP1,
+        condition=Condition(
+            any_of=((sympy.Eq(beta, 1),), (sympy.Eq(k * x_max, u_max),)),
+            for_all=(u_i,),
+            ruled_out_by=tuple((name, value) for name, value in FIRST.at() if name in (u_max, beta, k)),
+            discrepancy=C_d * W * sympy.sqrt(2 * dP1 / rho) * (1 - beta) * (1 - k * x_max / u_max) * u_i / k,
+        ),
+        expected=Outcome.DOES_NOT_FOLLOW,
+        corrected_by="T1d",
+    ),
+    Statement(
+        number="T1d",
+        title="the law `target` meets the target (16)",
+        kind=Kind.THEOREM,
+        scope=_BEYOND,
+        symbol=Q,
+        members=(Q_O_prime,),
+        grounds=(*_flow("L3", u_min1, dP1), *_AT_DP1),
+        eliminate=_UNKNOWN_AT_DP1,
+    ),
+    Statement(
+        number="drive left",
+        title="drive that is not used",
+        kind=Kind.DEFINITION,
+        symbol=drive_left,
+        members=(u_max - u_O,),
+    ),
+    Statement(
+        number="T1e",
+        title="drive that the law `target` leaves unused at full command",
+        kind=Kind.THEOREM,
+        symbol=drive_left,
+        members=(u_max - k * x_max - beta * u_min0,),
+        grounds=(
+            Ground(number="drive left"),
+            Ground(number="L3", at=((u_i, u_max),), where="at u_i = u_max"),
+        ),
+        eliminate=(u_O,),
+        values=tuple(Value(label=f"at 5 MPa, {valve.name}", at=valve.at(), unit="V") for valve in (FIRST, SECOND)),
+        note="(1 - beta) u_min0 where k x_max = u_max - u_min0: the target asks for x_max and not for more, though at "
+        "a lower threshold the same command could open further. In flow it is what T1b gives above the target.",
+    ),
+    Statement(
+        number="(6c)",
+        title="compensation signal that meets the target (16), what (6) should read",
+        kind=Kind.CORRECTED,
+        symbol=u_no,
+        members=(u_0 - (1 - beta) * u_min0,),
+        grounds=(
+            Ground(number="u_O", at=((u_0, u_no),), where="with u_no for u_0"),
+            Ground(number="Fig. 3, command", at=((u_min0, u_min1),), where="at dP = dP1"),
+            Ground(number="(11)"),
+            Ground(
+                number="(10)",
+                at=((Q_O, Q_O_prime), (dP0, dP1)),
+                where="at dP = dP1",
+            ),
+            Ground(number="(16)"),
+            Ground(number="(15)"),
+            Ground(number="gamma_1"),
+            Ground(number="(5)"),
+            Ground(number="(13)"),
+        ),
+        eliminate=(u_O, u_i_prime, x, Q_O_prime, K_1, gamma_1, u_min1, u_0),
+        note="Only the threshold is corrected, not the gain: this is the law `target`.",
+    ),
+)
+
+#: Theorem 2: full command.
+FULL_COMMAND = (
+    Statement(
+        number="T2a",
+        title="output of the law (18) at full command",
+        kind=Kind.THEOREM,
+        symbol=u_O,
+        members=(u_max + beta * (k * x_max + u_min0 - u_max),),
+        grounds=(Ground(number="(18)", at=((u_i, u_max),), where="at u_i = u_max"),),
+    ),
+    Statement(
+        number="T2b",
+        title="full command gives full drive at every pressure drop",
+        kind=Kind.THEOREM,
+        symbol=u_O,
+        members=(u_max,),
+        grounds=(Ground(number="T2a"),),
+        condition=Condition(
+            any_of=((sympy.Eq(k * x_max, u_max - u_min0),),),
+            for_all=(beta,),
+            discrepancy=beta * (k * x_max + u_min0 - u_max),
+        ),
+        expected=Outcome.FOLLOWS_IF,
+        note="With less travel, as where the spool meets its stop at 8-8.5 V (section 4.2), full command asks for less "
+        "than full drive; with more, for drive that is not there.",
+    ),
+)

@@ -1,0 +1,314 @@
+"""Eqs. (19)-(28): the simulation model in time and under the Laplace transform, and what the paper leaves out of it."""
+
+import sympy
+
+from dzdesign.derivation.account.statement import Condition, Ground, Kind, Outcome, Statement
+from dzdesign.derivation.plant import PLANT_EQUATIONS, current_time_constant
+from dzdesign.derivation.symbols import (
+    G_0,
+    B_e,
+    C_d,
+    F_e,
+    F_eL,
+    G,
+    I_s,
+    K_a,
+    K_et,
+    K_fi,
+    K_i,
+    L_c,
+    Q,
+    Q_s,
+    R_c,
+    U_e,
+    U_i,
+    U_if,
+    W,
+    X_e,
+    a,
+    di_dt,
+    dP,
+    dv_dt,
+    dx_e_dt,
+    f_e,
+    f_eL,
+    headroom,
+    i,
+    i_init,
+    m_e,
+    r_p,
+    rho,
+    s,
+    t,
+    u_e,
+    u_i,
+    u_i_prime,
+    u_if,
+    u_max,
+    u_min,
+    v_init,
+    x,
+    x_e,
+    x_init,
+    x_ov,
+)
+
+_FLOW_PER_TRAVEL = C_d * W * sympy.sqrt(2 * dP / rho)
+
+_TITLES = {
+    "(19)": ("proportional amplifier", "Its gain is printed K_e, the name of the flow gain in Eq. (2); here K_a."),
+    "(20)": ("coil", ""),
+    "(21)": ("current feedback", ""),
+    "(22)": ("solenoid force", "Linear in the current, and the same at every position: a good proportional solenoid."),
+    "(23)": ("motion of the armature", "No friction and no stop; the load force f_eL is left open."),
+    "(24)": (
+        "flow across the edge",
+        "As printed, with the armature's travel for the opening: a valve without overlap.",
+    ),
+}
+
+
+def _premise(number: str) -> Statement:
+    title, note = _TITLES[number]
+    equation = PLANT_EQUATIONS[number]
+    see = {"(24)": ("T6d",)}.get(number, ())
+    return Statement(
+        number=number,
+        title=title,
+        kind=Kind.PREMISE,
+        symbol=equation.lhs,
+        members=(equation.rhs,),
+        see=see,
+        note=note,
+    )
+
+
+def _transformed(transform: sympy.Expr, order: int, *initial: sympy.Symbol) -> sympy.Expr:
+    """Return the Laplace transform of a derivative, by SymPy's rule and not by ours."""
+    signal = sympy.Function("signal")
+    derivative = sympy.diff(signal(t), t, order)
+    rule = sympy.laplace_correspondence(
+        sympy.laplace_transform(derivative, t, s, noconds=True), {signal: transform.func}
+    )
+    return sympy.laplace_initial_conds(rule, t, {signal: list(initial)})
+
+
+#: Each signal of Eqs. (19)-(24) and its Laplace transform; the equations are linear with constant coefficients.
+LAPLACE = (
+    (u_e, U_e),
+    (u_i, U_i),
+    (u_if, U_if),
+    (i, I_s),
+    (di_dt, _transformed(I_s, 1, i_init)),
+    (f_e, F_e),
+    (f_eL, F_eL),
+    (x_e, X_e),
+    (dx_e_dt, _transformed(X_e, 1, x_init)),
+    (dv_dt, _transformed(X_e, 2, x_init, v_init)),
+    (Q, Q_s),
+)
+
+
+def laplace(number: str, where: str = "under the Laplace transform") -> Ground:
+    """Return a plant equation as a ground, transformed term by term.
+
+    Parameters
+    ----------
+    number : str
+        One of Eqs. (19)-(24).
+    where : str, optional
+
+    Returns
+    -------
+    Ground
+
+    Raises
+    ------
+    ValueError
+        If the equation is not linear and homogeneous in the signals, so that its transform is another one.
+    """
+    equation = PLANT_EQUATIONS[number]
+    signals = [signal for signal, _ in LAPLACE if equation.has(signal)]
+    terms = sympy.Poly(equation.lhs - equation.rhs, *signals).monoms()
+    if any(sum(powers) != 1 for powers in terms):
+        raise ValueError(f"{number} is not linear in {signals}")
+    return Ground(number=number, at=LAPLACE, where=where)
+
+
+#: Section 2.1.
+SIMULATION_MODEL = (
+    *(_premise(number) for number in PLANT_EQUATIONS),
+    Statement(
+        number="(25)",
+        title="amplifier and coil, transformed",
+        kind=Kind.PAPER,
+        symbol=U_e,
+        members=(K_a * (U_i - K_fi * I_s), (R_c + r_p) * I_s + I_s * L_c * s),
+        grounds=(laplace("(19)"), laplace("(21)"), laplace("(20)")),
+        eliminate=(U_if, I_s),
+        condition=Condition(
+            any_of=((sympy.Eq(i_init, 0),),), for_all=(s,), discrepancy=-L_c * i_init, words="(Assumption 4)"
+        ),
+        expected=Outcome.FOLLOWS_IF,
+        note="Printed without its middle, U_e(s).",
+    ),
+    Statement(
+        number="(26)",
+        title="solenoid force, transformed",
+        kind=Kind.PAPER,
+        symbol=F_e,
+        members=(K_i * I_s,),
+        grounds=(laplace("(22)"),),
+    ),
+    Statement(
+        number="(27)",
+        title="motion, transformed",
+        kind=Kind.PAPER,
+        symbol=F_e,
+        members=(K_i * I_s, (m_e * s**2 + B_e * s + K_et) * X_e + F_eL),
+        grounds=(laplace("(23)"), Ground(number="(26)")),
+        eliminate=(I_s,),
+        condition=Condition(
+            any_of=((sympy.Eq(x_init, 0), sympy.Eq(v_init, 0)),),
+            for_all=(s,),
+            discrepancy=-(m_e * s + B_e) * x_init - m_e * v_init,
+            words="(Assumption 4)",
+        ),
+        expected=Outcome.FOLLOWS_IF,
+        note="Printed without its left end, F_e(s).",
+    ),
+    Statement(
+        number="(28)",
+        title="flow, transformed",
+        kind=Kind.PAPER,
+        symbol=Q_s,
+        members=(C_d * W * X_e * sympy.sqrt(2 * dP / rho),),
+        grounds=(
+            Ground(
+                number="(24)",
+                at=((Q, Q_s), (x_e, X_e.func(s + a))),
+                where="transformed, with dP falling as exp(-2 a t), so that x_e exp(-a t) becomes X_e(s + a)",
+            ),
+        ),
+        condition=Condition(
+            any_of=((sympy.Eq(a, 0),),),
+            # The transform of a unit step.
+            witness=((X_e, 1 / s), (X_e.func(s + a), 1 / (s + a))),
+            for_all=(s,),
+            discrepancy=_FLOW_PER_TRAVEL * (X_e.func(s + a) - X_e),
+            words="(a constant pressure drop, Assumption 4)",
+        ),
+        expected=Outcome.FOLLOWS_IF,
+        note="Shown for a pressure drop that falls as exp(-2 a t) during a step: flow and travel are in "
+        "proportion only at a = 0.",
+    ),
+)
+
+_RESISTANCE = R_c + r_p + K_a * K_fi
+
+#: Theorem 6.
+TRANSFER_FUNCTION = (
+    Statement(
+        number="T6a",
+        title="current loop, from command to coil current",
+        kind=Kind.THEOREM,
+        symbol=I_s,
+        members=(
+            K_a * U_i / (_RESISTANCE + L_c * s),
+            K_a / _RESISTANCE * U_i / (1 + current_time_constant() * s),
+        ),
+        grounds=(
+            Ground(number="(25)", member=0, where="left side"),
+            Ground(number="(25)", member=1, where="right side"),
+        ),
+        eliminate=(U_e,),
+        expected=Outcome.FOLLOWS_IF,
+        note="Time constant L_c / (R_c + r_p + K_a K_fi): the feedback makes the coil faster by the factor "
+        "1 + K_a K_fi / (R_c + r_p), and makes the current depend less on the coil's temperature by the same factor.",
+    ),
+    Statement(
+        number="transfer function",
+        title="transfer function from command to flow",
+        kind=Kind.DEFINITION,
+        symbol=G,
+        members=(Q_s / U_i,),
+    ),
+    Statement(
+        number="T6b",
+        title="transfer function of Eqs. (19)-(24) without load force",
+        kind=Kind.THEOREM,
+        symbol=G,
+        members=(_FLOW_PER_TRAVEL * K_i * K_a / ((L_c * s + _RESISTANCE) * (m_e * s**2 + B_e * s + K_et)),),
+        grounds=(
+            Ground(number="transfer function"),
+            Ground(number="(28)"),
+            Ground(number="(27)", member=1, at=((F_eL, sympy.S.Zero),), where="right side, F_eL = 0"),
+            Ground(number="(26)"),
+            Ground(number="T6a"),
+        ),
+        eliminate=(Q_s, X_e, F_e, I_s),
+        expected=Outcome.FOLLOWS_IF,
+        note="Third order. All coefficients of both factors are positive, so it is stable for every set of parameters.",
+    ),
+    Statement(
+        number="T6c",
+        title="static gain from command to flow",
+        kind=Kind.THEOREM,
+        symbol=G_0,
+        members=(_FLOW_PER_TRAVEL * K_i * K_a / (_RESISTANCE * K_et),),
+        grounds=(Ground(number="T6b", at=((G, G_0), (s, sympy.S.Zero)), where="at s = 0"),),
+        expected=Outcome.FOLLOWS_IF,
+        note="By the final value theorem, which the stability of T6b allows.",
+    ),
+    Statement(
+        number="overlap",
+        title="opening of the edge: travel beyond the overlap",
+        kind=Kind.DEFINITION,
+        symbol=x,
+        members=(x_e - x_ov,),
+    ),
+    Statement(
+        number="T6d",
+        title="Eq. (24) is the dead-zone model (1) beyond the threshold",
+        kind=Kind.THEOREM,
+        scope="a command from the threshold to full command",
+        symbol=Q,
+        members=(_FLOW_PER_TRAVEL * x_e,),
+        grounds=(
+            Ground(
+                number="(1)",
+                at=((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom)),
+                where="beyond the threshold",
+            ),
+            Ground(number="overlap"),
+        ),
+        eliminate=(x,),
+        # Section 2.2: the simulated spool's dead zone is 54 % of its 1.8 mm.
+        condition=Condition(
+            any_of=((sympy.Eq(x_ov, 0),),),
+            ruled_out_by=((x_ov, sympy.Rational(972, 10**6)),),
+            discrepancy=-_FLOW_PER_TRAVEL * x_ov,
+        ),
+        expected=Outcome.DOES_NOT_FOLLOW,
+        corrected_by="T6e",
+        note="If the dead zone is overlap (our reading: 54 % of 1.8 mm, 0.97 mm), Eq. (24) lacks it; a preload within "
+        "f_eL would be another explanation.",
+    ),
+    Statement(
+        number="T6e",
+        title="flow across an edge with overlap, opened",
+        kind=Kind.CORRECTED,
+        scope="a command from the threshold to full command",
+        symbol=Q,
+        members=(_FLOW_PER_TRAVEL * (x_e - x_ov),),
+        grounds=(
+            Ground(
+                number="(1)",
+                at=((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom)),
+                where="beyond the threshold",
+            ),
+            Ground(number="overlap"),
+        ),
+        eliminate=(x,),
+    ),
+)

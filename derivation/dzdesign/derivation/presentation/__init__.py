@@ -1,0 +1,1 @@
+"""Presentation: the account enters; text, LaTeX, HTML and JSON leave."""

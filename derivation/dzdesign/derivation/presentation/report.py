@@ -1,0 +1,224 @@
+"""Renders the account of the paper for a terminal, for machines, for LaTeX and for a browser."""
+
+from collections.abc import Callable, Sequence
+
+from sympy.core.function import AppliedUndef
+
+from dzdesign.core.errors import InputError, RequirementError, nearest
+from dzdesign.derivation.account.equations import PAPER_NUMBERS
+from dzdesign.derivation.account.proof import Verdict
+from dzdesign.derivation.account.statement import Outcome, Statement
+from dzdesign.derivation.account.symbol_units import print_unit
+from dzdesign.derivation.presentation.content import SOURCE, Content, Entry, Term
+from dzdesign.derivation.presentation.glossary import MEANINGS
+from dzdesign.derivation.presentation.html import write_html
+from dzdesign.derivation.presentation.json_document import write_json
+from dzdesign.derivation.presentation.latex import write_latex
+from dzdesign.derivation.presentation.prose import Formula, Words, parse_prose
+from dzdesign.derivation.presentation.text import write_text
+from dzdesign.derivation.presentation.wording import describe, refer
+
+_WRITERS: dict[str, Callable[[Content], str]] = {
+    "text": write_text,
+    "json": write_json,
+    "latex": write_latex,
+    "html": write_html,
+}
+FORMATS = tuple(_WRITERS)
+_COUNTED = {
+    Outcome.GIVEN: "taken as given",
+    Outcome.FOLLOWS: "follow",
+    Outcome.FOLLOWS_IF: "follow on a condition",
+    Outcome.DOES_NOT_FOLLOW: "do not follow",
+}
+
+
+def check_format(format: str) -> None:
+    """Refuse a format that there is not.
+
+    Parameters
+    ----------
+    format : str
+
+    Raises
+    ------
+    InputError
+        If it is none of `FORMATS`.
+    """
+    if format not in FORMATS:
+        known = ", ".join(FORMATS)
+        raise InputError(f"unknown format {format!r}{nearest(format, FORMATS)}: choose one of {known}")
+
+
+def render(verdicts: Sequence[Verdict], format: str, only: Sequence[str] | None = None) -> str:
+    """Render an account as one document.
+
+    Parameters
+    ----------
+    verdicts : sequence of Verdict
+        What `verify_statements` returns.
+    format : str
+        One of `FORMATS`: ``text``, ``json`` (schema ``dzdesign.derivation/2``), ``latex`` (a document that
+        compiles by itself) or ``html`` (one page without scripts that needs no network).
+    only : sequence of str, optional
+        Numbers of the statements to show, such as `closure` returns; all of them unless given.
+
+    Returns
+    -------
+    str
+        The document, with a newline at its end.
+
+    Raises
+    ------
+    InputError
+        If there is no such format.
+    RequirementError
+        If all is to be shown, and an equation of the paper is missing.
+    """
+    check_format(format)
+    numbers = [verdict.number for verdict in verdicts]
+    missing = [number for number in PAPER_NUMBERS if number not in numbers]
+    if only is None and missing:
+        raise RequirementError(f"the account leaves out {', '.join(missing)} of the paper's equations")
+    return _WRITERS[format](compose(verdicts, numbers if only is None else only))
+
+
+def closure(statements: Sequence[Statement], wanted: Sequence[str]) -> tuple[str, ...]:
+    """Return the numbers of some statements and of all that they rest on, in the order of the account.
+
+    Parameters
+    ----------
+    statements : sequence of Statement
+        Each after those it rests on.
+    wanted : sequence of str
+        As a person writes them: ``(18)``, ``18``, ``T3b``, ``t3b``; several in one, with commas between.
+
+    Returns
+    -------
+    tuple of str
+
+    Raises
+    ------
+    InputError
+        If there is no such statement.
+
+    Examples
+    --------
+    >>> from dzdesign.derivation.account.account import STATEMENTS
+    >>> closure(STATEMENTS, ["2"])
+    ('Fig. 3, line', 'K_e', '(2)')
+    """
+    numbers = {statement.number.lower(): statement.number for statement in statements}
+    needed: set[str] = set()
+    for text in wanted:
+        # A comma may also be part of a name: Fig. 3, line.
+        parts = [text] if _key(text, numbers) in numbers else text.split(",")
+        needed.update(_number(part, numbers) for part in parts)
+    for statement in reversed(statements):
+        if statement.number in needed:
+            needed.update(ground.number for ground in statement.grounds)
+    return tuple(statement.number for statement in statements if statement.number in needed)
+
+
+def _key(text: str, numbers: dict[str, str]) -> str:
+    key = text.strip().lower()
+    return f"({key})" if f"({key})" in numbers else key
+
+
+def _number(text: str, numbers: dict[str, str]) -> str:
+    key = _key(text, numbers)
+    if key not in numbers:
+        near = nearest(key, numbers) or nearest(f"({key})", numbers)
+        for lower, number in numbers.items():
+            near = near.replace(f"'{lower}'", f"'{number}'")
+        raise InputError(f"no statement '{text.strip()}'{near}; give one such as 18, 6c or T3b")
+    return numbers[key]
+
+
+# --- what the report says of the whole ------------------------------------------------------------------------
+
+
+def compose(verdicts: Sequence[Verdict], shown: Sequence[str]) -> Content:
+    """Say what the account found, of the statements to show.
+
+    Parameters
+    ----------
+    verdicts : sequence of Verdict
+        What `verify_statements` returns.
+    shown : sequence of str
+        Numbers of the statements to show.
+
+    Returns
+    -------
+    Content
+    """
+    book = {verdict.number: verdict for verdict in verdicts}
+    entries = {number: describe(book[number], book) for number in shown}
+    sections: dict[str, list[Entry]] = {}
+    for entry in entries.values():
+        sections.setdefault(entry.verdict.statement.section, []).append(entry)
+    table = tuple(entries[number] for number in PAPER_NUMBERS if number in entries)
+    partial = len(shown) < len(book)
+    return Content(
+        title="Derivation of the dead-zone compensation law" + (", in part" if partial else ""),
+        source=SOURCE,
+        summary=_summary([entry.verdict for entry in entries.values()], [entry.verdict for entry in table]),
+        wrong=tuple(_fault(entry) for entry in entries.values() if _is_wrong(entry.verdict)),
+        conditional=tuple(
+            (*_headed(entry), *entry.judgement)
+            for entry in entries.values()
+            if entry.verdict.outcome is Outcome.FOLLOWS_IF
+        ),
+        table=table,
+        glossary=_glossary([entry.verdict.statement for entry in entries.values()]),
+        sections=tuple((section, tuple(members)) for section, members in sections.items()),
+    )
+
+
+def _glossary(statements: Sequence[Statement]) -> tuple[Term, ...]:
+    """Explain the symbols that occur, in the order of the account."""
+    replaced = [pair for one in statements for ground in one.grounds for pair in ground.at]
+    replaced += [pair for one in statements for case in one.cases for pair in case.at]
+    sides = [side for one in statements for side in (one.symbol, *one.members)] + [value for _, value in replaced]
+    used = set().union(*(side.free_symbols | {part.func for part in side.atoms(AppliedUndef)} for side in sides))
+    return tuple(
+        Term(Formula((name,)), parse_prose(meaning), print_unit(name))
+        for name, meaning in MEANINGS.items()
+        if name in used or name.func in used
+    )
+
+
+def _summary(verdicts: Sequence[Verdict], paper: Sequence[Verdict]) -> tuple[Words, ...]:
+    wrong = [verdict for verdict in verdicts if not verdict.as_expected]
+    expected = (
+        f"{len(verdicts) - len(wrong)} of {len(verdicts)} statements have the verdict expected of them, "
+        "those that do not hold included"
+    )
+    lines: list[Words] = [(expected + ("; these are not:" if wrong else "."),)]
+    for verdict in wrong:
+        expected = f" should be found to be “{verdict.statement.expected.value}”, but: "
+        unit = f"; its units: {verdict.unit_error}" if verdict.unit_error else ""
+        lines.append((refer(verdict.statement), expected, *parse_prose(verdict.words), unit, "."))
+    if paper:
+        which = f"the {len(paper)} equations" if len(paper) > 1 else "the one equation"
+        counts = "; ".join(
+            f"{words}: {sum(verdict.outcome is outcome for verdict in paper)}" for outcome, words in _COUNTED.items()
+        )
+        lines.append((f"Of {which} of the paper shown here, {counts}.",))
+    return tuple(lines)
+
+
+def _is_wrong(verdict: Verdict) -> bool:
+    return verdict.outcome is Outcome.DOES_NOT_FOLLOW or bool(verdict.statement.corrected_by)
+
+
+def _fault(entry: Entry) -> Words:
+    words = (*_headed(entry), *(entry.judgement or ("the paper's choice; it does not meet the target (16).",)))
+    if entry.correction is None:
+        return words
+    display = entry.correction.display
+    return (*words, " ", *entry.correction.words, *((" ", display) if display else ()))
+
+
+def _headed(entry: Entry) -> Words:
+    return (refer(entry.verdict.statement), " ", *entry.title, ": ")

@@ -1,0 +1,195 @@
+"""The certificate: that the offset, at every pressure code, stays under the lower bound of the guarded threshold.
+
+`design` proves it for the table that it chooses, and `codegen` and `verify` prove it again for a compensator that comes
+from a file: a file can be edited, and the firmware's header would go on promising what no longer holds.
+"""
+
+from collections.abc import Sequence
+from dataclasses import fields
+from fractions import Fraction
+
+from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.design.beta_table import STEP_CODES, OffsetCeiling, OffsetCurve, offset_ceiling
+from dzdesign.design.compensator import Certificate, Compensator
+from dzdesign.design.signals import Signals
+from dzdesign.identify.fitting.guard_curve import GuardCurve
+from dzdesign.identify.valve.model import SideModel
+from dzdesign.identify.valve.valve_file import valve_from_document
+
+#: Of a loss in V: tenths of a microvolt.
+LOSS_DIGITS = 7
+
+
+def certify(
+    side: SideModel,
+    curve: OffsetCurve,
+    ceiling: OffsetCeiling,
+    *,
+    guard: str,
+    signals: Signals,
+    u_max_V: Fraction,
+    u_min0: Fraction,
+    table: Sequence[int],
+    denominator: int,
+) -> Certificate:
+    """Prove the certificate of one side, in exact arithmetic, at every pressure code.
+
+    Parameters
+    ----------
+    side : SideModel
+        What was identified.
+    curve, ceiling : OffsetCurve, OffsetCeiling
+        `guarded_curve`, and what `offset_ceiling` leaves of it for the converter's error, rounding and dither.
+    guard : str
+        The threshold that is protected.
+    signals : Signals
+        Scalings.
+    u_max_V : Fraction
+        Full command.
+    u_min0 : Fraction
+        Of the law, over u_max.
+    table : sequence of int
+        Nodes of beta over `denominator`.
+    denominator : int
+        Unit of the nodes.
+
+    Raises
+    ------
+    RequirementError
+        If the offset exceeds the ceiling anywhere.
+    """
+    losses = _losses_V(curve, ceiling, signals, table, u_min0 * u_max_V / denominator)
+    return Certificate(
+        confidence=side.confidence,
+        guard=guard,
+        level_L_min=side.level_L_min,
+        dp_MPa=(curve.dp_MPa[0], curve.dp_MPa[-1]),
+        smallest_margin_V=_smallest_margin(ceiling, table, u_min0, denominator) * u_max_V,
+        mean_loss_V=round(sum(losses) / len(losses), LOSS_DIGITS),
+        largest_loss_V=round(max(losses), LOSS_DIGITS),
+    )
+
+
+def prove_certificates(compensator: Compensator) -> None:
+    """Prove the certificates of a compensator again, from the valve in it.
+
+    Raises
+    ------
+    InputError
+        If one does not follow, with the first statement that differs.
+    """
+    valve = valve_from_document(compensator.valve_document.encode(), "compensator.json: valve")
+    signals, dither = compensator.signals, compensator.amplifier.dither_counts
+    for sign in signals.signs:
+        name = "positive" if sign > 0 else "negative"
+        law, model = compensator.side(sign), valve.sides.get(name)
+        if model is None:
+            raise InputError(f"the compensator drives the {name} side, but its valve has none; design it again")
+        stated = law.certificate
+        curve = guarded_curve(model, stated.guard, compensator.below_reference)
+        reserve = Fraction(dither, signals.compare_max)
+        ceiling = offset_ceiling(curve, signals, compensator.u_max_V, sign=sign, reserve=reserve)
+        try:
+            proved = certify(
+                model,
+                curve,
+                ceiling,
+                guard=stated.guard,
+                signals=signals,
+                u_max_V=compensator.u_max_V,
+                u_min0=law.u_min0_over_u_max,
+                table=law.beta_numerators,
+                denominator=compensator.beta_denominator,
+            )
+        except RequirementError as error:
+            raise InputError(f"the {name} side's certificate does not hold: {error}; design it again") from error
+        for field in fields(Certificate):
+            said, found = getattr(stated, field.name), getattr(proved, field.name)
+            if said != found:
+                raise InputError(
+                    f"the {name} side's certificate says {field.name} = {_words(said)}, but {_words(found)} follows "
+                    "from its valve; design it again"
+                )
+
+
+def _words(value: object) -> str:
+    if isinstance(value, tuple):
+        return " to ".join(map(_words, value))
+    return f"{float(value):.6g}" if isinstance(value, Fraction) else str(value)
+
+
+def guarded_curve(side: SideModel, guard: str, below_reference: str) -> OffsetCurve:
+    """Return the certified offset of the threshold that is to be guarded.
+
+    Raises
+    ------
+    InputError
+        If the valve has no curve for that guard; why, and what to do.
+    """
+    if not side.beta_dp_MPa:
+        raise InputError(
+            "the valve was identified without a pressure drop, so no offset can be certified at any pressure; "
+            "record the ramp test again with a column of dP (or pA and pB), or declare it: identify --dp \"1 MPa\""
+        )
+    curve = _curve_of(side, guard)
+    u_min0 = Fraction(repr(curve.u_min0_V))
+    return OffsetCurve(
+        dp_MPa=tuple(Fraction(repr(value)) for value in curve.beta_dp_MPa),
+        offset_V=tuple(Fraction(repr(value)) * u_min0 for value in curve.beta),
+        steps_V=tuple(Fraction(repr(step)) for step in curve.certified_steps_V),
+        lowest_V=min(Fraction(repr(bound)) for bound in curve.u_lower_V),
+        hold_below_MPa=hold_below(side, below_reference),
+    )
+
+
+def hold_below(side: SideModel, below_reference: str) -> Fraction | None:
+    """Return the pressure drop below which beta is held at 1, MPa; None where the tests are followed there."""
+    return Fraction(repr(side.reference_dp_MPa)) if below_reference == "hold" else None
+
+
+def _curve_of(side: SideModel, guard: str) -> GuardCurve:
+    """Return the curve that certifies a threshold; refuse one that valve.json does not have, and say why."""
+    if guard in side.guards:
+        return side.guards[guard]
+    raise InputError(
+        f"the ramp tests bound the {' and the '.join(side.guards)} threshold, but the {guard} one is to be guarded; "
+        + _remedy(side, guard)
+    )
+
+
+def _remedy(side: SideModel, guard: str) -> str:
+    has_rising, has_falling = side.tests[0].rising is not None, side.tests[0].falling is not None
+    if guard != "opening" and not has_falling:
+        return "record the falling branch too, or accept flow at zero command after closing with --guard opening"
+    if guard != "closing" and not has_rising:
+        return "record the rising branch too, or take --guard closing, the safer one"
+    return (
+        "make valve.json again with `dzdesign identify`; if it is still missing, no offset lies under that threshold's "
+        "bounds: take one that is there"
+    )
+
+
+def _smallest_margin(ceiling: OffsetCeiling, table: tuple[int, ...], u_min0: Fraction, denominator: int) -> Fraction:
+    """Return the least distance over u_max between ceiling and offset on the certified codes; never negative."""
+    scale = denominator * STEP_CODES
+    margins = []
+    for code in ceiling.certified or range(len(ceiling.limit)):
+        index, share = divmod(code, STEP_CODES)
+        beta = Fraction(table[index] * (STEP_CODES - share) + table[index + 1] * share, scale)
+        margins.append(ceiling.limit[code] - beta * u_min0)
+    smallest = min(margins)
+    if smallest < 0:
+        raise RequirementError(f"the offset exceeds the certified one by {float(-smallest):.2e} of u_max")
+    return smallest
+
+
+def _losses_V(
+    curve: OffsetCurve, ceiling: OffsetCeiling, signals: Signals, table: tuple[int, ...], unit_V: Fraction
+) -> list[float]:
+    """Return by how much the table's offset lies under the certified curve at each certified code, V."""
+    losses = []
+    for code in ceiling.certified or range(1):
+        index, share = divmod(code, STEP_CODES)
+        numerator = Fraction(table[index] * (STEP_CODES - share) + table[index + 1] * share, STEP_CODES)
+        losses.append(float(curve.at(signals.dp_MPa(code)) - numerator * unit_V))
+    return losses

@@ -1,0 +1,192 @@
+"""What a design costs, in a person's words: dead zone that remains, flow at the edge, drive at full command."""
+
+from fractions import Fraction
+
+from dzdesign.core.errors import InputError
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.drive import RAMP_UNIT
+from dzdesign.design.signal_descriptions import unseen_failures
+from dzdesign.identify.valve.model import SideModel, TestResult, ValveModel
+
+
+def costs_of(compensator: Compensator, valve: ValveModel) -> tuple[str, ...]:
+    """Return one line per test and per choice.
+
+    Raises
+    ------
+    InputError
+        If the largest output does not open the valve.
+    """
+    lines = list(hidden_failures(compensator, valve))
+    for sign in compensator.signals.signs:
+        name = "positive" if sign > 0 else "negative"
+        label = "" if compensator.negative is None else f"{name} side, "
+        side = valve.sides[name]
+        lines += [label + _cost_of_test(compensator, test, sign) for test in side.tests]
+        lines += [label + line for line in _cost_of_side(compensator, side, sign)]
+    low, high = (float(end) for end in compensator.positive.certificate.dp_MPa)
+    beyond = f"outside {low:.2f} to {high:.2f} MPa" if high > low else f"at any pressure drop but {low:.2f} MPa"
+    lines.append(
+        f"{beyond} the nearest tested beta is held and nothing is certified; "
+        f"a pressure difference below -{compensator.reverse_codes} codes is taken as a failed sensor: smallest beta"
+    )
+    if compensator.negative is None and valve.sides.get("negative") is not None:
+        lines.append(
+            "the valve's negative side is left out: the command has one sign; give a --command-signal of both to drive "
+            "two solenoids"
+        )
+    return tuple(lines + _cost_of_options(compensator))
+
+
+def hidden_failures(compensator: Compensator, valve: ValveModel) -> tuple[str, ...]:
+    """Return one line for each failure of a signal that the firmware can't see; the first of `costs_of`."""
+    lines = unseen_failures(compensator.signals)
+    for sign in compensator.signals.signs:
+        name = "positive" if sign > 0 else "negative"
+        label = "" if compensator.negative is None else f"{name} side, "
+        if valve.sides[name].trend == "increasing":
+            lines.append(
+                f"{label}the threshold grows with the pressure drop, so a pressure signal that reads too high raises "
+                "the offset: a broken wire of sensor B is not recognised unless it has a live zero; monitor the "
+                "sensors outside"
+            )
+    return tuple(lines)
+
+
+def _cost_of_test(compensator: Compensator, test: TestResult, sign: int) -> str:
+    """Say what remains at one tested pressure drop."""
+    signals, u_max = compensator.signals, float(compensator.u_max_V)
+    code = round(signals.dp_code(Fraction(repr(test.dp_MPa))))
+    offset, at_edge, full, edge = _corners(compensator, code, sign)
+    left = remaining_dead_zone(compensator, test, sign)
+    parts = [f"{test.dp_MPa:.2f} MPa: offset {offset * u_max:.3f} V"]
+    for name, knee in (("opening", test.u_knee_rising_V), ("closing", test.u_knee_falling_V)):
+        if knee is not None and knee >= offset * u_max:
+            parts.append(f"dead zone that remains on {name} {left[name]:.2%} of command (knee)")
+        elif knee is not None:
+            above = offset * u_max - knee
+            parts.append(f"flow at zero command on {name}: the offset lies {above:.3f} V above the knee")
+    if edge and test.u_knee_falling_V is not None:
+        flow = test.slope_L_min_V * max(at_edge * u_max - test.u_knee_falling_V, 0.0)
+        parts.append(f"flow on closing at the edge's end {flow:.2f} L/min")
+    limit = compensator.amplifier.compare_limit / signals.compare_max
+    if limit <= offset or limit <= (test.u_knee_rising_V or 0.0) / u_max:
+        raise InputError(
+            f"the largest output is {limit:.1%} of full drive, but the valve opens at "
+            f"{max(offset, (test.u_knee_rising_V or 0.0) / u_max):.1%} at {test.dp_MPa:.2f} MPa, so nothing would ever "
+            "flow; give a larger --output-max"
+        )
+    if limit < full:
+        reached = edge + (1 - edge) * (limit - at_edge) / (full - at_edge)
+        parts.append(f"the largest drive, {limit:.2%}, is reached at {reached:.1%} of command")
+    else:
+        parts.append(f"drive at full command {full:.2%}")
+    return ", ".join(parts)
+
+
+def remaining_dead_zone(compensator: Compensator, test: TestResult, sign: int = 1) -> dict[str, float]:
+    """Return the dead zone that the law leaves at a tested pressure drop, as a share of command.
+
+    Parameters
+    ----------
+    compensator : Compensator
+        The law.
+    test : TestResult
+        Knees of a valve at its pressure drop; it need not be the valve that the law was designed for.
+    sign : {1, -1}
+        Of the command.
+
+    Returns
+    -------
+    dict
+        "opening" and "closing", those recorded: the share up to the knee; 0 where flow passes at zero command.
+    """
+    code = round(compensator.signals.dp_code(Fraction(repr(test.dp_MPa))))
+    offset, at_edge, full, edge = _corners(compensator, code, sign)
+    knees = {"opening": test.u_knee_rising_V, "closing": test.u_knee_falling_V}
+    shares = {name: knee / float(compensator.u_max_V) for name, knee in knees.items() if knee is not None}
+    return {name: max(_residual(knee, offset, at_edge, full, edge), 0.0) for name, knee in shares.items()}
+
+
+def _corners(compensator: Compensator, dp_code: int, sign: int) -> tuple[float, float, float, float]:
+    """Return the drive at zero command, at the edge's end and at full command, over full, and the edge's share."""
+    command = compensator.signals.command
+    span, edge = command.span(sign), compensator.edge_codes
+    at = (command.zero_code + command.direction(sign) * from_zero for from_zero in (0, edge, span))
+    offset, at_edge, full = (float(compensator.drive(code, dp_code, sign)) for code in at)
+    return offset, at_edge, full, edge / span
+
+
+def _residual(knee: float, offset: float, at_edge: float, full: float, edge: float) -> float:
+    """Return the command at which the drive reaches a threshold: two straight parts, with their corner at the edge."""
+    if knee <= at_edge and edge:
+        return edge * (knee - offset) / (at_edge - offset) if at_edge > offset else 0.0
+    return edge + (1 - edge) * (knee - at_edge) / (full - at_edge)
+
+
+def _cost_of_side(compensator: Compensator, side: SideModel, sign: int) -> list[str]:
+    lines = []
+    crossed = [f"{test.dp_MPa:.2f}" for test in side.tests if test.closes_above_opening]
+    if crossed:
+        lines.append(
+            f"accepted, branch-order: at {', '.join(crossed)} MPa the valve seems to close above where it opens, so "
+            "flow at zero command is possible"
+        )
+    certificate = compensator.side(sign).certificate
+    lines.append(
+        f"the table's offset stays {1e3 * certificate.mean_loss_V:.2f} mV under the certified curve on average, "
+        f"{1e3 * certificate.largest_loss_V:.2f} mV at most{_of_which_dither(compensator)}"
+    )
+    guard = certificate.guard
+    if guard != "closing":
+        lines.append(
+            f"the {guard} threshold is guarded: at zero command, after closing, flow may remain, up to what the valve "
+            "passes between its closing threshold and this offset"
+        )
+    return lines
+
+
+def _cost_of_options(compensator: Compensator) -> list[str]:
+    signals, amplifier = compensator.signals, compensator.amplifier
+    lines = []
+    if amplifier.dither_counts:
+        peak = amplifier.dither_counts / signals.compare_max
+        frequency = signals.tick_Hz / (2 * amplifier.dither_ticks)
+        lines.append(
+            f"dither of {frequency:.4g} Hz (half a wave is a whole number of PWM periods) and ±{peak:.2%} of full "
+            "drive: the offset stands lower by that much, so that zero command stays shut at the wave's top"
+        )
+    if compensator.edge_codes:
+        lines.append(f"the edge is a power of two in codes of command: {compensator.edge_codes}")
+    if amplifier.has_ramp:
+        lines.append(
+            f"ramps: {_ramp_text(compensator)}; they hold for zero command too: the valve closes no faster than they "
+            "let it"
+        )
+    if amplifier.window_codes:
+        share = amplifier.window_codes / signals.command.span(1)
+        lines.append(
+            f"coming from the other sign a command must pass zero by {share:.2%} before its solenoid is driven: that "
+            "much dead zone remains then, if the lines above say less"
+        )
+    return lines
+
+
+def _of_which_dither(compensator: Compensator) -> str:
+    counts = compensator.amplifier.dither_counts
+    if not counts:
+        return ""
+    peak = counts / compensator.signals.compare_max * float(compensator.u_max_V)
+    return f", of which {1e3 * peak:.2f} mV are the dither's peak"
+
+
+def _ramp_text(compensator: Compensator) -> str:
+    """Say how long a command takes from zero to full and back, of each sign."""
+    signals, amplifier = compensator.signals, compensator.amplifier
+    parts = []
+    for place, sign in enumerate(signals.signs):
+        for way, steps in (("up", amplifier.ramp_up), ("down", amplifier.ramp_down)):
+            name = f"{'positive ' if sign > 0 else 'negative '}{way}" if compensator.negative is not None else way
+            seconds = signals.command.span(sign) * RAMP_UNIT / (steps[place] * signals.sample_Hz) if steps[place] else 0
+            parts.append(f"{name} {seconds:.4g} s" if seconds else f"{name} at once")
+    return ", ".join(parts)

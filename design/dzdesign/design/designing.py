@@ -1,0 +1,221 @@
+"""`design`: a `ValveModel` and an engineer's choices in, a proved `Compensator` out."""
+
+from dataclasses import replace
+from fractions import Fraction
+
+from dzdesign.core.artefact_files import sha256_of, to_json
+from dzdesign.core.errors import InputError
+from dzdesign.derivation.law import law
+from dzdesign.design.beta_table import STEP_CODES, OffsetCeiling, OffsetCurve, choose_beta_table, offset_ceiling
+from dzdesign.design.certificate import certify, guarded_curve, hold_below
+from dzdesign.design.compensator import Compensator, SideLaw
+from dzdesign.design.costs import costs_of
+from dzdesign.design.options import DesignOptions
+from dzdesign.design.quantise import Units, finest_units
+from dzdesign.design.signals import Signals
+from dzdesign.identify.fitting.guard_curve import GUARDS
+from dzdesign.identify.valve.model import SideModel, ValveModel
+from dzdesign.identify.valve.valve_file import valve_from_document
+
+#: Share of the sensor's span by which the difference may read negative before it counts as a failed sensor.
+REVERSE_SHARE = Fraction(1, 100)
+#: Standard errors by which the edge's end stands above the opening threshold.
+EDGE_ERRORS = 3
+
+
+def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes: bytes | None = None) -> Compensator:
+    """Design the compensator of a valve, every coefficient rational and the certificate proved on them.
+
+    Parameters
+    ----------
+    valve : ValveModel
+        From `dzdesign.identify.identify` or valve.json.
+    options : DesignOptions, optional
+        Choices of the engineer.
+    valve_bytes : bytes, optional
+        The file the valve was read from, for its hash; without it the hash is of the document as it would be written.
+
+    Raises
+    ------
+    InputError
+        If the law can't be used for this valve.
+    RequirementError
+        If a proof fails.
+    """
+    options = options or DesignOptions()
+    document = valve_bytes.decode() if valve_bytes is not None else to_json(valve.to_document())
+    # The file's rounded numbers, so that the same valve gives the same firmware by whichever way it comes here.
+    valve = valve_from_document(document.encode(), "valve.json")
+    signals = options.signals
+    law(options.law_name)
+    u_max = Fraction(repr(valve.u_max_V))
+    edge_codes = options.edge_codes()
+    units = finest_units(signals, edge_codes)
+    if len(signals.signs) == 2:
+        _refuse_two_signs(valve, options.guard)
+    laws = {}
+    for sign in signals.signs:
+        name = "positive" if sign > 0 else "negative"
+        side = valve.positive if sign > 0 else valve.sides[name]
+        laws[name] = _side_law(side, options, u_max, sign, units)
+    compensator = Compensator(
+        law_name=options.law_name,
+        below_reference=options.below_reference,
+        signals=signals,
+        u_max_V=u_max,
+        positive=laws["positive"],
+        negative=laws.get("negative"),
+        beta_denominator=units.beta,
+        beta_step_codes=STEP_CODES,
+        reverse_codes=int(REVERSE_SHARE * (signals.pressure_a.full_code - signals.pressure_a.zero_code)),
+        edge_codes=edge_codes,
+        amplifier=options.amplifier(),
+        costs=(),
+        valve_document=document,
+        valve_sha256=sha256_of(document.encode()),
+        request=options.request,
+    )
+    for sign in signals.signs:
+        prove_monotone(compensator, sign)
+    return replace(compensator, costs=costs_of(compensator, valve))
+
+
+def _side_law(side: SideModel, options: DesignOptions, u_max: Fraction, sign: int, units: Units) -> SideLaw:
+    """Choose the coefficients and tables of one side, and prove its certificate."""
+    signals = options.signals
+    if "branch-order" not in options.accept:
+        _refuse_crossed_branches(side)
+    certified = guarded_curve(side, options.guard, options.below_reference)
+    opening = _opening_curve(side, options) if options.edge else None
+    reference = Fraction(repr(side.reference_dp_MPa))
+    top = (opening or certified).at(reference)
+    # Half a count less, because the compare value of the offset may be rounded up.
+    u_min0 = over(top / u_max - Fraction(1, 2 * signals.compare_max), "down", units.coefficient)
+    if u_min0 <= 0:
+        raise InputError(f"u_min0 is {float(top):.4f} V, less than one count of the PWM: no dead zone")
+    above_one = side.trend == "increasing" or options.below_reference == "extend"
+    dither = Fraction(options.amplifier().dither_counts, signals.compare_max)
+    ceiling = offset_ceiling(certified, signals, u_max, sign=sign, reserve=dither)
+    if min(ceiling.limit) <= 0:
+        raise InputError("the dither's peak leaves no offset under the certified one; make it smaller")
+
+    def table(under: OffsetCeiling) -> tuple[int, ...]:
+        return choose_beta_table(under, u_min0, side.trend, denominator=units.beta, above_one=above_one)
+
+    beta = table(ceiling)
+    edge_beta = None
+    if opening is not None:
+        upper = table(_opening_ceiling(opening, signals, u_max, sign))
+        edge_beta = tuple(map(max, upper, beta))
+    return SideLaw(
+        k_x_max_over_u_max=over(travel(side, u_max, top), "nearest", units.coefficient),
+        u_min0_over_u_max=u_min0,
+        beta_numerators=beta,
+        edge_numerators=edge_beta,
+        certificate=certify(
+            side,
+            certified,
+            ceiling,
+            guard=options.guard,
+            signals=signals,
+            u_max_V=u_max,
+            u_min0=u_min0,
+            table=beta,
+            denominator=units.beta,
+        ),
+    )
+
+
+def _refuse_crossed_branches(side: SideModel) -> None:
+    """Refuse knees in an order that no valve has: the guarded one is not where the valve closes."""
+    for test in side.tests:
+        if test.closes_above_opening:
+            raise InputError(
+                f"'{test.source}': the valve closes ({test.u_knee_falling_V:.3f} V) above where it opens "
+                f"({test.u_knee_rising_V:.3f} V), as no valve does, so flow at zero command is possible; run "
+                "`identify` again with the meter's true --meter-lag or a right column of time, or take it as it is by "
+                "--accept branch-order"
+            )
+
+
+def _refuse_two_signs(valve: ValveModel, guard: str) -> None:
+    """Refuse a command of both signs where a side was not tested, or does not bound the guarded threshold."""
+    if "negative" not in valve.sides:
+        raise InputError(
+            "the command has both signs, but the valve's negative side was not tested; record its ramps, or give a "
+            "command of one sign"
+        )
+    guards = {name: valve.sides[name].guards for name in ("positive", "negative")}
+    lacking = [name for name, found in guards.items() if guard not in found]
+    if not lacking:
+        return
+    common = [name for name in GUARDS if all(name in found for found in guards.values())]
+    raise InputError(
+        f"the {' and the '.join(lacking)} side's ramp tests do not bound the {guard} threshold, which is to be "
+        "guarded; "
+        + (f"take --guard {common[0]}, or " if common else "no guard serves both sides: ")
+        + "record both branches of both sides"
+    )
+
+
+def _opening_curve(side: SideModel, options: DesignOptions) -> OffsetCurve:
+    """Return where the edge ends and the law goes on: the opening threshold, and its error on top.
+
+    A law that starts above the threshold only shortens the dead zone that is left; one that starts below lengthens it.
+    """
+    opening = side.opening_curve
+    if opening is None:
+        raise InputError(
+            "an edge ends at the opening threshold, of which valve.json has no curve; record the rising branch with a "
+            "column of dP, make valve.json again, or leave out --edge"
+        )
+    error = max(opening.u_se_V)
+    offset = [Fraction(repr(value)) + EDGE_ERRORS * Fraction(repr(error)) for value in opening.u_V]
+    return OffsetCurve(
+        dp_MPa=tuple(Fraction(repr(value)) for value in opening.dp_MPa),
+        offset_V=tuple(offset),
+        steps_V=(),
+        lowest_V=min(offset),
+        hold_below_MPa=hold_below(side, options.below_reference),
+    )
+
+
+def _opening_ceiling(opening: OffsetCurve, signals: Signals, u_max: Fraction, sign: int) -> OffsetCeiling:
+    """Return the opening threshold at every pressure code: no bound, so neither the converter's error counts."""
+    codes = range(signals.largest_difference(sign) + 1)
+    return OffsetCeiling(limit=tuple(opening.at(signals.dp_MPa(code)) / u_max for code in codes), certified=range(0))
+
+
+def travel(side: SideModel, u_max: Fraction, offset_V: Fraction) -> Fraction:
+    """Return k x_max/u_max for a law whose offset is u_min0: from there to the command of full flow on opening.
+
+    Identification gives k x_max from the knee on. The law starts lower, at the guarded offset; without the difference
+    full command would not reach full flow (u_O(u_max) = u_max exactly if k x_max = u_max - u_min0).
+    """
+    reference = min(side.tests, key=lambda test: abs(test.dp_MPa - side.reference_dp_MPa))
+    knee = reference.u_knee_rising_V if reference.u_knee_rising_V is not None else reference.u_knee_falling_V
+    below_knee = max(Fraction(repr(knee)) - offset_V, Fraction(0))
+    travel = Fraction(repr(side.k_x_max_over_u_max)) + below_knee / u_max
+    return min(travel, 1 - offset_V / u_max)  # beyond full drive there is nothing
+
+
+def over(value: Fraction, rounding: str, unit: int) -> Fraction:
+    """Return `value` as an integer over `unit`, rounded to nearest or down."""
+    scaled = value * unit
+    numerator = scaled.numerator // scaled.denominator if rounding == "down" else round(scaled)
+    return Fraction(numerator, unit)
+
+
+def prove_monotone(compensator: Compensator, sign: int) -> None:
+    """Prove that more command gives more drive, at every pressure: the gain is affine in beta, so its ends decide.
+
+    Inside the edge the drive rises faster still: what the edge takes away falls with the command.
+    """
+    chosen, side = law(compensator.law_name), compensator.side(sign)
+    numerators = side.law_numerators
+    betas = [Fraction(end, compensator.beta_denominator) for end in (min(numerators), max(numerators))]
+    if min(chosen.evaluate_gain(beta, side.k_x_max_over_u_max) for beta in betas) <= 0:
+        raise InputError(
+            f"law '{chosen.name}' would fall with rising command: beta (1 - k x_max/u_max) must stay below 1, but "
+            f"k x_max/u_max = {float(side.k_x_max_over_u_max):.3f}; use --law target"
+        )

@@ -1,0 +1,304 @@
+"""One setting for many valves: the largest offset that over-compensates none of them.
+
+Its offset lies, at every pressure code, under the least of the valves' certified ceilings. That is proved as for one
+valve, by `certify`, for every valve that comes within `CLEAR` of the least ceiling anywhere; the others lie above it by
+more than a million times the error of the double precision in which that was found. That it lies under the bounds of
+every valve is proved of each of them, by `prove_lot`, here and wherever the file is read.
+
+A compensator's file holds the valve that its certificate follows from. The common one holds a real valve of the batch,
+its *carrier*, and never an invented one with the least thresholds of all: no ramp test ever showed that.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from math import ceil, floor
+
+import numpy as np
+
+from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.design.beta_table import OffsetCeiling, OffsetCurve, choose_beta_table, offset_ceiling, pressures_MPa
+from dzdesign.design.certificate import certify, guarded_curve, prove_certificates
+from dzdesign.design.compensator import Certificate, Compensator, SideLaw
+from dzdesign.design.costs import costs_of
+from dzdesign.design.designing import over, prove_monotone, travel
+from dzdesign.design.lot import LotMargin, LotValve, prove_lot
+from dzdesign.design.quantise import finest_units
+from dzdesign.design.signals import Signals
+from dzdesign.identify.valve.model import SideModel, ValveModel
+from dzdesign.identify.valve.valve_file import valve_from_document
+
+#: Of u_max: a ceiling that is nowhere this near to the least one can't be the least by a rounding error (1e-12).
+CLEAR = 1e-6
+#: Pressure drops closer than this are one, MPa: where a double may fall on either side of a tested pressure drop.
+NEAR_MPa = 1e-9
+#: What all compensators of a batch must have in common.
+SHARED = ("law_name", "below_reference", "signals", "u_max_V", "beta_denominator", "edge_codes", "amplifier")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Designed:
+    """A valve of the batch, as its file has it, and its own compensator."""
+
+    valve: ValveModel
+    own: Compensator
+
+    @classmethod
+    def of(cls, own: Compensator) -> "Designed":
+        """Return a compensator with the valve that it was designed from."""
+        return cls(valve=valve_from_document(own.valve_document.encode(), "compensator.json: valve"), own=own)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CommonSetting:
+    """One compensator for all valves.
+
+    Attributes
+    ----------
+    compensator : Compensator
+        The common law; the valve in it is the carrier's.
+    carrier : str
+        Name of the valve whose trend the law follows and whose certificate the file states.
+    dp_MPa : tuple of float
+        Pressure drops that every valve was tested over: inside, the setting is certified for each of them.
+    binding : tuple of str
+        Valves that hold the offset down somewhere; for these `proved` has an exact certificate.
+    proved : mapping of str to tuple of Certificate
+        Name to a certificate per sign of command.
+    margins : tuple of LotMargin
+        Of every valve of the batch: how far the offset stays under its bound.
+    """
+
+    compensator: Compensator
+    carrier: str
+    dp_MPa: tuple[float, float]
+    binding: tuple[str, ...]
+    proved: Mapping[str, tuple[Certificate, ...]]
+    margins: tuple[LotMargin, ...]
+
+    @property
+    def worst(self) -> LotMargin:
+        """The margin of the valve that has the least."""
+        return min(self.margins, key=lambda each: each.margin_V)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Side:
+    """One sign of command of all valves: curves, and the exact ceilings of those that are binding."""
+
+    sign: int
+    models: Mapping[str, SideModel]
+    curves: Mapping[str, OffsetCurve]
+    exact: Mapping[str, OffsetCeiling]
+    least: OffsetCeiling
+    nearness: Mapping[str, float]
+
+
+def common_setting(batch: Mapping[str, Designed]) -> CommonSetting:
+    """Return the largest setting, under one direction of the threshold, that is certified for every valve.
+
+    Parameters
+    ----------
+    batch : mapping of str to Designed
+        Name to valve and own compensator; two at least.
+
+    Raises
+    ------
+    InputError
+        If there is no such setting: valves designed with other options, without a common pressure drop, or with an
+        edge, whose end is no bound.
+    RequirementError
+        If a proof fails.
+    """
+    first = _shared_design(batch)
+    sides = [_side(batch, first, sign) for sign in first.signals.signs]
+    best: tuple[float, str, dict[int, SideLaw]] | None = None
+    for carrier in _carriers(batch, sides):
+        try:
+            laws = {side.sign: _law(side, carrier, first) for side in sides}
+        except RequirementError:  # no table of that carrier's direction lies under the least ceiling
+            continue
+        gain = sum(float(law.u_min0_over_u_max * sum(law.beta_numerators)) for law in laws.values())
+        if best is None or gain > best[0]:
+            best = gain, carrier, laws
+    if best is None:
+        raise InputError("no law of one direction lies under the least guarded offset of all valves")
+    _, carrier, laws = best
+    compensator = replace(
+        batch[carrier].own,
+        positive=laws[1],
+        negative=laws.get(-1),
+        costs=(),
+        common_valves=len(batch),
+        lot=_lot(batch, first, sides),
+    )
+    for side in sides:
+        prove_monotone(compensator, side.sign)
+    prove_certificates(compensator)
+    margins = prove_lot(compensator)
+    proved = {
+        name: tuple(_certified(side, name, laws[side.sign], first) for side in sides if name in side.exact)
+        for name in batch
+        if any(name in side.exact for side in sides)
+    }
+    line = (
+        f"common setting of {len(batch)} valves: under the bounds of each, with that valve's own confidence; this file "
+        f"holds the valve {carrier}, for which the lines above are"
+    )
+    compensator = replace(compensator, costs=(*costs_of(compensator, batch[carrier].valve), line))
+    return CommonSetting(
+        compensator=compensator,
+        carrier=carrier,
+        dp_MPa=_common_interval(side.curves for side in sides),
+        binding=tuple(proved),
+        proved=proved,
+        margins=margins,
+    )
+
+
+def _lot(batch: Mapping[str, Designed], first: Compensator, sides: Sequence[_Side]) -> tuple[LotValve, ...]:
+    """Return the valves with the bounds of the threshold that their compensators guard."""
+    guards = {side.sign: first.side(side.sign).certificate.guard for side in sides}
+    return tuple(
+        LotValve.of(name, each.own.valve_sha256, {side.sign: side.models[name] for side in sides}, guards)
+        for name, each in batch.items()
+    )
+
+
+def _shared_design(batch: Mapping[str, Designed]) -> Compensator:
+    """Return one compensator, whose options are those of all; refuse valves that were designed otherwise."""
+    if len(batch) < 2:
+        raise InputError(f"a common setting needs two valves or more, got {len(batch)}")
+    name, first = next((name, each.own) for name, each in batch.items())
+    for other, each in batch.items():
+        unlike = [field for field in SHARED if getattr(each.own, field) != getattr(first, field)]
+        if each.own.positive.certificate.guard != first.positive.certificate.guard:
+            unlike.append("guard")
+        if unlike:
+            raise InputError(f"{other} and {name} are designed with another {unlike[0]}, so no setting serves both")
+    if first.edge_codes:
+        raise InputError("with --edge the law follows each valve's opening threshold, so no setting serves all")
+    return first
+
+
+def _common_interval(sides: Iterable[Mapping[str, OffsetCurve]]) -> tuple[float, float]:
+    """Return the pressure drops that all curves cover, MPa."""
+    ends = [(curve.dp_MPa[0], curve.dp_MPa[-1], name) for curves in sides for name, curve in curves.items()]
+    low, _, highest = max(ends, key=lambda one: one[0])
+    _, high, lowest = min(ends, key=lambda one: one[1])
+    if low > high:
+        raise InputError(
+            f"the valves have no tested pressure drop in common ({highest} begins at {float(low):g} MPa, {lowest} ends "
+            f"at {float(high):g} MPa), so no setting is certified for all"
+        )
+    return float(low), float(high)
+
+
+def _side(batch: Mapping[str, Designed], first: Compensator, sign: int) -> _Side:
+    """Find the least ceiling of one sign of command: in doubles over all valves, exactly over those near it."""
+    label = "positive" if sign > 0 else "negative"
+    signals, u_max = first.signals, first.u_max_V
+    reserve = Fraction(first.amplifier.dither_counts, signals.compare_max)
+    models = {name: each.valve.sides[label] for name, each in batch.items()}
+    guard = first.side(sign).certificate.guard
+    curves = {name: guarded_curve(model, guard, first.below_reference) for name, model in models.items()}
+    low, high = _common_interval([curves])
+    least, near = _near_the_least(curves, signals, float(u_max), sign)
+    exact = {
+        name: offset_ceiling(curves[name], signals, u_max, sign=sign, reserve=reserve)
+        for name, distance in near.items()
+        if distance < CLEAR
+    }
+    limits = zip(*(each.limit for each in exact.values()), strict=True)
+    certified = range(ceil(signals.dp_code(Fraction(repr(low)))), floor(signals.dp_code(Fraction(repr(high)))) + 1)
+    ceiling = OffsetCeiling(limit=tuple(map(min, limits)), certified=certified)
+    if min(ceiling.limit) <= 0:
+        raise InputError("one of the valves leaves no positive offset for a common setting")
+    return _Side(sign=sign, models=models, curves=curves, exact=exact, least=ceiling, nearness=least)
+
+
+def _near_the_least(
+    curves: Mapping[str, OffsetCurve], signals: Signals, u_max_V: float, sign: int
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Return how far each valve's ceiling lies above the least of all, over u_max: on average, and where it is least.
+
+    The rounding and the dither lower all ceilings alike, so they are left out.
+    """
+    low, high = signals.difference_error(sign)
+    dp_MPa = np.array([float(dp) for dp in pressures_MPa(signals, low, signals.largest_difference(sign) + high)])
+    limits = np.array([_limit(curve, dp_MPa) / u_max_V for curve in curves.values()])
+    limits = np.lib.stride_tricks.sliding_window_view(limits, high - low + 1, axis=1).min(axis=2)
+    above = limits - limits.min(axis=0)
+    mean = dict(zip(curves, map(float, above.mean(axis=1)), strict=True))
+    return mean, dict(zip(curves, map(float, above.min(axis=1)), strict=True))
+
+
+def _limit(curve: OffsetCurve, dp_MPa: np.ndarray) -> np.ndarray:
+    """Return in doubles what `offset_ceiling` limits the offset to, V: the curve and, where tested, its bound."""
+    nodes, offset = (np.array([float(value) for value in values]) for values in (curve.dp_MPa, curve.offset_V))
+    value = np.interp(dp_MPa, nodes, offset)
+    if curve.hold_below_MPa is not None:
+        hold = float(curve.hold_below_MPa)
+        value = np.where(dp_MPa <= hold + NEAR_MPa, np.minimum(value, np.interp(hold, nodes, offset)), value)
+    steps = curve.steps_V or (curve.lowest_V,)
+    for left, right, step in zip(nodes, nodes[1:] if curve.steps_V else nodes, steps, strict=False):
+        between = (dp_MPa >= left - NEAR_MPa) & (dp_MPa <= right + NEAR_MPa)
+        value = np.where(between, np.minimum(value, float(step)), value)
+    return value
+
+
+def _carriers(batch: Mapping[str, Designed], sides: Sequence[_Side]) -> list[str]:
+    """Return, for each trend that a valve has, the valve of that trend whose own ceilings are nearest to the least."""
+    nearest: dict[tuple[str | None, ...], tuple[float, str]] = {}
+    for name in batch:
+        trends = tuple(side.models[name].trend for side in sides)
+        distance = sum(side.nearness[name] for side in sides)
+        nearest[trends] = min(nearest.get(trends, (np.inf, "")), (distance, name))
+    return [name for _, name in sorted(nearest.values())]
+
+
+def _law(side: _Side, carrier: str, first: Compensator) -> SideLaw:
+    """Choose the common coefficients and table of one side; certified for the carrier."""
+    model, u_max = side.models[carrier], first.u_max_V
+    reference = Fraction(repr(model.reference_dp_MPa))
+    top = min(curve.at(reference) for curve in side.curves.values())
+    scale = finest_units(first.signals, edge_codes=0).coefficient
+    u_min0 = over(top / u_max - Fraction(1, 2 * first.signals.compare_max), "down", scale)
+    if u_min0 <= 0:
+        raise InputError("the least offset of all valves is less than one count of the PWM")
+    table = choose_beta_table(
+        side.least,
+        u_min0,
+        model.trend,
+        denominator=first.beta_denominator,
+        above_one=model.trend == "increasing" or first.below_reference == "extend",
+    )
+    # The longest travel: full command fully opens every valve.
+    longest = max(travel(each, u_max, top) for each in side.models.values())
+    law = SideLaw(
+        k_x_max_over_u_max=over(longest, "nearest", scale),
+        u_min0_over_u_max=u_min0,
+        beta_numerators=table,
+        certificate=first.side(side.sign).certificate,
+    )
+    return replace(law, certificate=_certified(side, carrier, law, first))
+
+
+def _certified(side: _Side, name: str, law: SideLaw, first: Compensator) -> Certificate:
+    """Prove the common law for one valve, on the whole interval that it was tested over."""
+    reserve = Fraction(first.amplifier.dither_counts, first.signals.compare_max)
+    curve = side.curves[name]
+    own = side.exact.get(name) or offset_ceiling(
+        curve, first.signals, first.u_max_V, sign=side.sign, reserve=reserve
+    )
+    return certify(
+        side.models[name],
+        curve,
+        own,
+        guard=first.side(side.sign).certificate.guard,
+        signals=first.signals,
+        u_max_V=first.u_max_V,
+        u_min0=law.u_min0_over_u_max,
+        table=law.beta_numerators,
+        denominator=first.beta_denominator,
+    )

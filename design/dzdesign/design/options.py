@@ -1,0 +1,160 @@
+"""The engineer's choices for `design`."""
+
+from dataclasses import dataclass, field
+from fractions import Fraction
+from math import ceil, floor
+
+from dzdesign.core.errors import InputError, nearest
+from dzdesign.design.compensator import BELOW_REFERENCE
+from dzdesign.design.drive import RAMP_UNIT, Amplifier
+from dzdesign.design.request import DesignRequest
+from dzdesign.design.signals import Signals
+from dzdesign.identify.fitting.guard_curve import GUARDS
+
+#: Largest edge, dither and window, of full command or drive.
+LARGEST_EDGE = Fraction(1, 10)
+LARGEST_DITHER = Fraction(1, 10)
+LARGEST_WINDOW = Fraction(1, 10)
+#: Frequencies that a proportional valve's dither has, Hz.
+DITHER_HZ = (100.0, 300.0)
+LONGEST_RAMP_S = 600.0
+#: Warnings of `identify` for which a valve is refused unless they are accepted.
+ACCEPTABLE = ("branch-order",)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DesignOptions:
+    """Choices of the engineer.
+
+    Attributes
+    ----------
+    law_name : str
+        ``paper`` (Eq. 18) or ``target`` (meets Eq. 16).
+    signals : Signals
+        Scalings of the converter and the PWM.
+    guard : {"closing", "mean", "opening"}
+        The threshold that the certificate must protect. Zero command comes after closing, so a valve of which no
+        falling branch was recorded is refused unless "opening" is asked for.
+    below_reference : {"hold", "extend"}
+        For dP <= dP0 hold beta = 1 (the paper, Eq. 7), or follow the tests there, beta above 1.
+    edge : Fraction
+        Share of full command over which the drive runs from the closing to the opening threshold; 0: none.
+    window : Fraction
+        Of a command of both signs: share of full command that it must pass zero by before the other side is driven.
+    ramp_up_s, ramp_down_s : tuple of float
+        Time of the command from zero to full, and back, s: positive, then negative command. 0: no limit.
+    dither_Hz, dither_peak : float, Fraction
+        Frequency of the dither, a square wave, and its peak (half its height) over full drive; 0: none.
+    output_max : Fraction
+        Largest drive over full drive.
+    accept : tuple of str
+        Codes of warnings, of `ACCEPTABLE`, for which the valve is not refused.
+    request : DesignRequest or None
+        The target and the texts that these were read from, to be kept in compensator.json.
+    """
+
+    law_name: str = "paper"
+    signals: Signals = field(default_factory=Signals)
+    guard: str = "closing"
+    below_reference: str = "hold"
+    edge: Fraction = Fraction(0)
+    window: Fraction = Fraction(1, 100)
+    ramp_up_s: tuple[float, float] = (0.0, 0.0)
+    ramp_down_s: tuple[float, float] = (0.0, 0.0)
+    dither_Hz: float = 0.0
+    dither_peak: Fraction = Fraction(0)
+    output_max: Fraction = Fraction(1)
+    accept: tuple[str, ...] = ()
+    request: DesignRequest | None = None
+
+    def __post_init__(self) -> None:
+        for what, given, known in (
+            ("guard", self.guard, GUARDS),
+            ("choice below dP0", self.below_reference, BELOW_REFERENCE),
+        ):
+            if given not in known:
+                raise InputError(
+                    f"the {what} is '{given}'{nearest(given, known)}, expected {', '.join(known[:-1])} or {known[-1]}"
+                )
+        for code in self.accept:
+            if code not in ACCEPTABLE:
+                raise InputError(
+                    f"the warning to accept is '{code}'{nearest(code, ACCEPTABLE)}, expected "
+                    f"{' or '.join(ACCEPTABLE)}: no other one stops a design"
+                )
+        for what, share, limit in (
+            ("edge", self.edge, LARGEST_EDGE),
+            ("dither", self.dither_peak, LARGEST_DITHER),
+            ("zero window", self.window, LARGEST_WINDOW),
+        ):
+            if not 0 <= share <= limit:
+                raise InputError(f"the {what} is {float(share):.3%}, expected 0 to {float(limit):.0%}")
+        if not 0 < self.output_max <= 1:
+            raise InputError(f"the largest output is {float(self.output_max):.3%}, expected more than 0, up to 100 %")
+        if bool(self.dither_Hz) != bool(self.dither_peak):
+            raise InputError("a dither needs both, a frequency and a peak, such as '150 Hz 1 %'")
+        if self.dither_Hz and not DITHER_HZ[0] <= self.dither_Hz <= DITHER_HZ[1]:
+            raise InputError(
+                f"the dither's frequency is {self.dither_Hz:g} Hz, expected {DITHER_HZ[0]:g} to {DITHER_HZ[1]:g} Hz"
+            )
+        for seconds in self.ramp_up_s + self.ramp_down_s:
+            if not 0 <= seconds <= LONGEST_RAMP_S or 0 < seconds < 1 / self.signals.sample_Hz:
+                raise InputError(
+                    f"a ramp takes {seconds:g} s, expected 0 (none), or from one sample, "
+                    f"{1 / self.signals.sample_Hz:g} s, to {LONGEST_RAMP_S:g} s"
+                )
+
+    def edge_codes(self) -> int:
+        """Return the codes of the edge: the largest power of two within its share of the shorter command."""
+        if not self.edge:
+            return 0
+        span = min(self.signals.command.span(sign) for sign in self.signals.signs)
+        codes = int(self.edge * span)
+        if codes < 1:
+            raise InputError(
+                f"an edge of {float(self.edge):.3%} is less than one code of the command, 1/{span}; give more"
+            )
+        return 1 << (codes.bit_length() - 1)
+
+    def amplifier(self) -> Amplifier:
+        """Return the amplifier's options in the firmware's integers."""
+        signals, command = self.signals, self.signals.command
+        spans = tuple(command.span(sign) if sign in signals.signs else 0 for sign in (1, -1))
+        both = len(signals.signs) == 2
+        return Amplifier(
+            window_codes=round(self.window * min(spans)) if both else 0,
+            ramp_up=self._ramp(self.ramp_up_s, spans),
+            ramp_down=self._ramp(self.ramp_down_s, spans),
+            dither_counts=self._dither_counts(),
+            dither_ticks=self._dither_ticks(),
+            compare_limit=int(self.output_max * signals.compare_max),
+        )
+
+    def _dither_counts(self) -> int:
+        counts = round(self.dither_peak * self.signals.compare_max)
+        if self.dither_peak and not counts:
+            raise InputError(
+                f"a dither of {float(self.dither_peak):.4%} is less than half a count of the PWM, "
+                f"1/{self.signals.compare_max}; give more, or leave it out"
+            )
+        return counts
+
+    def _dither_ticks(self) -> int:
+        """Return the PWM periods of half a wave: the nearest frequency within `DITHER_HZ`."""
+        if not self.dither_Hz:
+            return 1
+        half = self.signals.tick_Hz / 2
+        slowest, fastest = floor(half / DITHER_HZ[0]), ceil(half / DITHER_HZ[1])
+        if fastest > slowest:
+            raise InputError(
+                f"no whole number of PWM periods, {self.signals.tick_Hz} a second, makes a dither of "
+                f"{DITHER_HZ[0]:g} to {DITHER_HZ[1]:g} Hz; leave it out"
+            )
+        return min(max(round(half / self.dither_Hz), fastest), slowest)
+
+    def _ramp(self, seconds: tuple[float, float], spans: tuple[int, ...]) -> tuple[int, int]:
+        """Return the steps a sample; at least one unit, so that a ramp never stands still."""
+        return tuple(
+            max(1, round(RAMP_UNIT * span / (time * self.signals.sample_Hz))) if time and span else 0
+            for time, span in zip(seconds, spans, strict=True)
+        )

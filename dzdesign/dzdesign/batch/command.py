@@ -1,0 +1,245 @@
+"""`dzdesign batch`: calibrate many valves, in one table with the reasons of those that could not be."""
+
+import argparse
+import contextlib
+import errno
+import os
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from dzdesign.batch.anomalies import oddities_of
+from dzdesign.batch.calibration import Outcome, Task
+from dzdesign.batch.lot_setting import common_of, without_binding
+from dzdesign.batch.results import Results
+from dzdesign.batch.runners import run_local, run_on_cluster
+from dzdesign.batch.summary import print_batch, summary_of
+from dzdesign.batch.table import read_back, rows_of, table_files
+from dzdesign.batch.valves import Valve, valves_of
+from dzdesign.command_line.design_options import design_options
+from dzdesign.command_line.identify_options import IDENTIFY_NAMES, identify_options, record_of
+from dzdesign.core.artefact_files import read_bytes, to_json, write_file, write_files
+from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.folder_swap import alone_in
+from dzdesign.design.request import DEFAULTS
+from dzdesign.recordings import rows_to_skip
+from dzdesign.terminal.progress import say, with_bar
+
+#: Of a disk, and of what a user may take of it; Windows knows no such limit.
+FULL = (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC))
+#: Processes for each processor: more only take memory.
+MOST_A_PROCESSOR = 4
+#: Options of `identify` that a valve may have of its own, beside those of `design` and the target.
+IDENTIFY = (*IDENTIFY_NAMES, "columns", "dp", "skip_rows")
+
+
+def run_batch(args: argparse.Namespace) -> int:
+    """Calibrate the valves of a folder or a list; raise at the end if any could not be."""
+    output = Path(args.output)
+    document, report = calibrate_lot(args)
+    if args.json:
+        print(to_json({**document, "report": report and str(report)}), end="")
+    else:
+        print_batch(document, str(output), report is not None)
+    if document["failed"]:
+        raise RequirementError(
+            f"{len(document['failed'])} of {document['valves']} valves are not calibrated; their reasons are in "
+            f"'{output / 'valves.csv'}'"
+        )
+    return 0
+
+
+def calibrate_lot(args: argparse.Namespace) -> tuple[dict[str, Any], Path | None]:
+    """Calibrate the valves of a folder or a list; return batch.json, and where the report is if there is one.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Of the command.
+
+    Raises
+    ------
+    InputError
+        If no valve could be calibrated so: a wrong option, list or folder. A valve that can't is no error.
+    """
+    source, output = Path(args.source), Path(args.output)
+    jobs = _jobs(args.jobs, args.dask)
+    _check_options(args)
+    if source.is_dir() and output.resolve().is_relative_to(source.resolve()):
+        raise InputError(f"'{output}' lies in '{source}', whose subfolders are the valves; choose another with -o")
+    valves = valves_of(source, args.pattern, (*IDENTIFY, *DEFAULTS, "target"))
+    plant = _plant(args)
+    results = Results(output)
+    with _only_batch(output), _room_in(output):
+        return _calibrate(args, valves, plant, results, jobs)
+
+
+@contextlib.contextmanager
+def _only_batch(output: Path) -> Iterator[None]:
+    """Keep a second batch out of the folder: each would take up the other's half, with other options perhaps."""
+    with contextlib.ExitStack() as stack:
+        try:
+            stack.enter_context(alone_in(output))
+        except OSError as error:
+            raise InputError(
+                f"another batch is writing into '{output}'; wait until it has ended, or choose another folder with -o"
+            ) from error
+        yield
+
+
+@contextlib.contextmanager
+def _room_in(output: Path) -> Iterator[None]:
+    """Say of a full disk what to do: another place, as every command says, would leave behind what is done."""
+    try:
+        yield
+    except InputError as error:
+        if not _is_full(error):
+            raise
+        raise InputError(
+            f"no space is left to write into '{output}'; make room and give the same command again: it takes up the "
+            "valves that are done"
+        ) from error
+
+
+def _is_full(error: InputError) -> bool:
+    return isinstance(error.__cause__, OSError) and error.__cause__.errno in FULL
+
+
+def _calibrate(
+    args: argparse.Namespace, valves: list[Valve], plant: tuple[str, bytes] | None, results: Results, jobs: int
+) -> tuple[dict[str, Any], Path | None]:
+    output = results.folder
+    results.begin([valve.name for valve in valves])
+    waiting = [valve for valve in with_bar(valves, "reading") if not _is_done(results, _task(valve, args, plant))]
+    say(f"{len(valves)} valves, {len(valves) - len(waiting)} of them done before")
+    tasks = (_task(valve, args, plant) for valve in waiting)
+    outcomes = run_on_cluster(tasks, args.dask) if args.dask else run_local(tasks, useful_jobs(jobs, len(waiting)))
+    unwritten = _write_all(results, outcomes, len(waiting))
+    found = {valve.name: read_back(results, valve.name, unwritten) for valve in with_bar(valves, "making the table")}
+    common, why_not = common_of(found)
+    rows = rows_of(found, common, {valve.name: _record(valve, args) for valve in valves})
+    files = table_files(rows)
+    without = without_binding(found, common)
+    document = summary_of(rows, common, why_not, files=files, verified=args.verify, without_binding=without)
+    document["oddities"] = oddities_of(found, output, valves)
+    if common is not None:
+        from dzdesign.design.compensator_file import compensator_document
+
+        files["common_compensator.json"] = to_json(compensator_document(common.compensator)).encode()
+    else:
+        (output / "common_compensator.json").unlink(missing_ok=True)  # of an earlier run with other valves
+    write_files(output, files, "-o")
+    results.write_summary(document)
+    return document, _write_report(output)
+
+
+def _write_report(output: Path) -> Path | None:
+    """Write the report of the lot from the files, as `dzdesign report` does; a lot too large for one has its table."""
+    from dzdesign.report.lot.report import report_of_lot
+    from dzdesign.report.valve_report import REPORT_NAME
+
+    path = output / REPORT_NAME
+    try:
+        write_file(path, report_of_lot(output).html)
+    except InputError as error:
+        path.unlink(missing_ok=True)  # of an earlier run: it would pass for one of this
+        say(f"no {REPORT_NAME}: {error}")
+        return None
+    return path
+
+
+def _jobs(text: str | None, dask: str | None) -> int:
+    """Return how many processes --jobs asks for."""
+    if text is None:
+        return os.cpu_count() or 1
+    if dask:
+        raise InputError("--jobs is for this machine; with --dask its workers decide, so leave it out")
+    if not re.fullmatch(r"[1-9]\d{0,3}", text, re.ASCII):
+        raise InputError(f"--jobs is '{text}', expected a number of processes such as 4")
+    return int(text)
+
+
+def useful_jobs(jobs: int, waiting: int) -> int:
+    """Return so many processes as have something to do: a thousand of them would fill a machine and never begin.
+
+    Parameters
+    ----------
+    jobs : int
+        That are asked for.
+    waiting : int
+        Valves to calibrate.
+    """
+    most = MOST_A_PROCESSOR * (os.cpu_count() or 1)
+    if jobs > most and waiting > most:
+        say(f"--jobs {jobs}: {most} processes, as this machine has {os.cpu_count() or 1} processors")
+    return min(jobs, max(min(most, waiting), 2))  # two, so that a valve that kills its process does not end this one
+
+
+def _check_options(args: argparse.Namespace) -> None:
+    """Refuse what no valve could be calibrated with, before any is; a valve's own options are its own affair."""
+    from dzdesign.codegen.project import target_named
+    from dzdesign.identify.reading.column_labels import parse_columns
+
+    identify_options(args)
+    record_of(args.record)
+    design_options(args, target_named(args.target).inputs())
+    rows_to_skip(args.skip_rows)
+    if args.columns:
+        parse_columns(args.columns)
+
+
+def _plant(args: argparse.Namespace) -> tuple[str, bytes] | None:
+    """Return name and content of the plant's file, which must be one."""
+    if args.plant is None:
+        return None
+    if not args.verify:
+        raise InputError("--plant is of the verification; give --verify too, or leave it out")
+    from dzdesign.verify.closed_loop.plant import read_plant
+
+    read_plant(Path(args.plant))
+    return Path(args.plant).name, read_bytes(Path(args.plant), "plant")
+
+
+def _task(valve: Valve, args: argparse.Namespace, plant: tuple[str, bytes] | None) -> Task:
+    """Read a valve's recordings; where they can't be read the task says why."""
+    options = {**vars(args), **valve.overrides}
+    record = _record(valve, args)
+    recordings, refused = [], ""
+    try:
+        recordings = [(path.name, read_bytes(path, "ramp file")) for path in valve.recordings()]
+    except InputError as error:
+        refused = str(error)
+    return Task(
+        name=valve.name,
+        recordings=tuple(recordings),
+        # Without a record the task is what it was before there were records: an earlier run is taken up.
+        identify={name: options[name] for name in IDENTIFY if options[name] is not None}
+        | ({"record": record} if record else {}),
+        design={name: options[name] for name in DEFAULTS if options[name] is not None},
+        target=options["target"],
+        verify=args.verify,
+        plant=plant,
+        refused=refused,
+    )
+
+
+def _record(valve: Valve, args: argparse.Namespace) -> dict[str, str]:
+    return {**record_of(args.record), **valve.record}
+
+
+def _is_done(results: Results, task: Task) -> bool:
+    return results.is_done(task.name, task.digest)
+
+
+def _write_all(results: Results, outcomes: Iterator[Outcome], count: int) -> dict[str, str]:
+    """Write each valve's folder as it comes; return the reasons of those that could not be written."""
+    unwritten: dict[str, str] = {}
+    for _, outcome in zip(with_bar(range(count), "valves"), outcomes, strict=True):
+        try:
+            results.write(outcome)
+        except InputError as error:
+            if _is_full(error):  # no other would find room either, and each would count as failed
+                raise
+            unwritten[outcome.name] = str(error)
+    return unwritten

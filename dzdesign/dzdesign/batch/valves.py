@@ -1,0 +1,206 @@
+"""Which valves a batch has: one subfolder of recordings a valve, or a CSV file with one row a valve."""
+
+import csv
+import io
+import os
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from dzdesign.core.artefact_files import read_bytes
+from dzdesign.core.errors import InputError, nearest
+from dzdesign.identify.valve.test_record import checked_record
+from dzdesign.recordings import expand
+
+#: What recordings are called in a valve's folder where no --pattern says so; notes and photographs may lie beside them.
+RECORDINGS = ("csv", "txt", "tsv", "dat", "gz", "tdms", "mat", "h5", "hdf5", "parquet", "feather", "arrow")
+#: A column of the CSV file that is an entry of each valve's record: record.serial.
+RECORD = "record."
+#: A name is a folder's on every system and a cell's in every spreadsheet.
+NAME = re.compile(r"[^\W_][\w .+-]{0,99}(?<![. ])")
+RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
+DIGITS = re.compile(r"([0-9]+)")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Valve:
+    """One valve of the batch.
+
+    Attributes
+    ----------
+    name : str
+        By which it stands in the table, and its folder's name.
+    patterns : tuple of str
+        Names of its recordings, or patterns.
+    overrides : mapping of str to str
+        Options that are different for this valve, as on the command line.
+    record : mapping of str to str
+        Entries of its record, beside those of all valves.
+    """
+
+    name: str
+    patterns: tuple[str, ...]
+    overrides: Mapping[str, str] = field(default_factory=dict)
+    record: Mapping[str, str] = field(default_factory=dict)
+
+    def recordings(self) -> list[Path]:
+        """Return its recordings.
+
+        Raises
+        ------
+        InputError
+            If there are none, or one is named twice.
+        """
+        return list(self.matched())
+
+    def matched(self) -> dict[Path, str]:
+        """Return its recordings, each with the pattern that names it; see `recordings`."""
+        if not self.patterns:
+            raise InputError(f"valve '{self.name}' has no recording; expected files such as ramp_1MPa.csv")
+        found: dict[Path, str] = {}
+        places: dict[str, str] = {}
+        for pattern in self.patterns:
+            for path in expand([pattern]):
+                place = os.path.abspath(path)
+                if place in places:
+                    raise InputError(
+                        f"valve '{self.name}' takes the file '{path.name}' twice, by '{Path(places[place]).name}' and "
+                        f"by '{Path(pattern).name}' of its column files; make each of them match other files"
+                    )
+                found[path] = places[place] = pattern
+        return found
+
+
+def by_name(name: str) -> tuple[tuple[tuple[str, int, str], ...], str]:
+    """Return what to sort a valve by: its name, the numbers in it as numbers.
+
+    Parameters
+    ----------
+    name : str
+        Of a valve.
+
+    Examples
+    --------
+    >>> sorted(["V10", "V2", "V1b", "V1"], key=by_name)
+    ['V1', 'V1b', 'V2', 'V10']
+    """
+    words, numbers = DIGITS.split(name)[::2], [digits.lstrip("0") for digits in DIGITS.findall(name)]
+    # By length first: a number may have more digits than Python makes an int of.
+    parts = ((word, len(digits), digits) for word, digits in zip(words, [*numbers, ""], strict=True))
+    return tuple(parts), name
+
+
+def valves_of(source: Path, pattern: str | None, options: Collection[str]) -> list[Valve]:
+    """Return the valves that a folder or a CSV file names, in the order of their names; see `by_name`.
+
+    Parameters
+    ----------
+    source : Path
+        A folder with one subfolder a valve, or a CSV file with the columns name, files, any option, and record.NAME.
+    pattern : str or None
+        Of the recordings in a subfolder; None takes all that are called as recordings are.
+    options : collection of str
+        Names of the options that a column of the CSV file may override.
+
+    Raises
+    ------
+    InputError
+        If there is no valve, or a name or a column can't be one.
+    """
+    if source.is_dir():
+        valves = _of_folder(source, pattern)
+    else:
+        if pattern is not None:
+            raise InputError(f"--pattern is for a folder, and '{source}' is none; write patterns in its column files")
+        valves = _of_table(source, options)
+    if not valves and source.is_dir() and _recordings_in(source, pattern):
+        raise InputError(
+            f"'{source}' holds recordings itself, of one valve; give the folder that holds it, or use `dzdesign "
+            "identify`"
+        )
+    if not valves:
+        raise InputError(f"'{source}' names no valve; expected one subfolder of recordings, or one row, a valve")
+    _check_names([valve.name for valve in valves], source)
+    return sorted(valves, key=lambda valve: by_name(valve.name))
+
+
+def _of_folder(folder: Path, pattern: str | None) -> list[Valve]:
+    try:
+        visible = [path for path in sorted(folder.iterdir()) if not path.name.startswith(".")]
+    except OSError as error:
+        raise InputError(f"'{folder}' can't be read: {error.strerror}; check who may read it") from error
+    # A link to a folder that is gone was a valve: its reason is that the file can't be read.
+    gone = {path: (str(path),) for path in visible if path.is_symlink() and not path.exists()}
+    folders = [path for path in visible if path in gone or path.is_dir()]
+    return [
+        Valve(name=path.name, patterns=gone.get(path) or tuple(_recordings_in(path, pattern))) for path in folders
+    ]
+
+
+def _recordings_in(folder: Path, pattern: str | None) -> list[str]:
+    found = folder.glob(pattern) if pattern else (p for p in folder.iterdir() if p.suffix[1:].lower() in RECORDINGS)
+    return sorted(str(path) for path in found if path.is_file() and not path.name.startswith("."))
+
+
+def _of_table(path: Path, options: Collection[str]) -> list[Valve]:
+    """Read the CSV file; a pattern of its column `files` is relative to its folder."""
+    try:
+        text = read_bytes(path, "list of valves").decode("utf-8-sig")
+        rows = list(csv.reader(io.StringIO(text, newline=""), strict=True))
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"'{path}' is no CSV in UTF-8: {error}; first row name,files") from error
+    if not any(cell.strip() for row in rows for cell in row):
+        raise InputError(f"'{path}' is empty, expected a list of valves with a first row name,files")
+    if len(rows[0]) == 1 and (other := next((mark for mark in ";\t" if mark in rows[0][0]), None)):
+        raise InputError(
+            f"'{path}' parts its columns by {'a tab' if other == chr(9) else repr(other)}, expected a comma; save it "
+            "as CSV with commas (a ';' parts the patterns in the column files)"
+        )
+    heading = [_heading(label.strip()) for label in rows[0]]
+    known = ("name", "files", *options)
+    for label in heading:
+        if label not in known and not label.startswith(RECORD):
+            raise InputError(
+                f"'{path}' has a column '{label[:40]}'{nearest(label, known)}, expected name, files, options of "
+                "identify and design, and entries of the record such as record.serial"
+            )
+    names = [label.removeprefix(RECORD) for label in heading if label.startswith(RECORD)]
+    checked_record(((name, "-") for name in names), f"'{path}', its columns {RECORD}NAME")
+    if len(set(heading)) < len(heading) or not {"name", "files"} <= set(heading):
+        raise InputError(f"'{path}' has the columns {', '.join(heading)}, expected name and files, each column once")
+    valves = []
+    for number, row in enumerate(rows[1:], start=2):
+        if not any(cell.strip() for cell in row):
+            continue
+        if len(row) != len(heading):
+            raise InputError(f"'{path}' row {number} has {len(row)} cells, expected {len(heading)} as in its first row")
+        cells = {label: cell.strip() for label, cell in zip(heading, row, strict=True)}
+        name, files = cells.pop("name"), cells.pop("files")
+        patterns = [str(path.parent / part.strip()) for part in files.split(";") if part.strip()]
+        filled = {label: cell for label, cell in cells.items() if cell}
+        record = {label.removeprefix(RECORD): cell for label, cell in filled.items() if label.startswith(RECORD)}
+        overrides = {label: cell for label, cell in filled.items() if not label.startswith(RECORD)}
+        valves.append(Valve(name=name, patterns=tuple(patterns), overrides=overrides, record=record))
+    return valves
+
+
+def _heading(label: str) -> str:
+    """Return a column's name as options are spelt inside; an entry of the record keeps its own spelling."""
+    return label if label.startswith(RECORD) else label.replace("-", "_")
+
+
+def _check_names(names: Sequence[str], source: Path) -> None:
+    """Refuse names that can't be a folder's everywhere, and two that are one where case is not told apart."""
+    seen: dict[str, str] = {}
+    for name in names:
+        if not NAME.fullmatch(name) or RESERVED.fullmatch(name):
+            raise InputError(
+                f"'{source}' has a valve named '{name[:100]}', expected up to 100 letters, digits, blanks and . _ + -, "
+                "a letter or digit first; rename it"
+            )
+        if seen.get(name.casefold()) == name:
+            raise InputError(f"'{source}' has two valves named '{name}'; rename one, or put all files of it in one row")
+        if name.casefold() in seen:
+            raise InputError(f"'{source}' has the valves '{seen[name.casefold()]}' and '{name}'; rename one")
+        seen[name.casefold()] = name

@@ -1,0 +1,167 @@
+"""`dzdesign doctor`: which compilers, simulators and packages are there, what each is for, and how to get the rest."""
+
+import argparse
+import platform
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import asdict, dataclass
+
+from dzdesign.core.artefact_files import to_json
+from dzdesign.core.errors import DzdesignError
+
+TINY = "int dz_tiny(int a);\nint dz_tiny(int a) { return 3 * a; }\n"
+#: A program that says nothing of its version within this time is taken as it is, s.
+PATIENCE_S = 20
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tool:
+    """A program that dzdesign can use: how it says its version, what it is for, and where it comes from."""
+
+    name: str
+    ask: tuple[str, ...] = ("--version",)
+    purpose: str
+    debian: str
+    macos: str
+    windows: str
+
+
+TI = "https://www.ti.com/tool/C2000-CGT"
+#: One of these is the main job: without it nothing can be verified.
+COMPILERS = (
+    Tool(name="gcc", purpose="verify", debian="apt install gcc libc6-dev", macos="xcode-select --install",
+         windows="winget install BrechtSanders.WinLibs.POSIX.UCRT"),
+    Tool(name="clang", purpose="verify", debian="apt install clang", macos="xcode-select --install",
+         windows="winget install LLVM.LLVM"),
+    Tool(name="zig", ask=("version",), purpose="verify, where there is no other compiler",
+         debian="pip install dzdesign[zig]", macos="pip install dzdesign[zig]", windows="pip install dzdesign[zig]"),
+)  # fmt: skip
+OPTIONAL = (
+    Tool(name="arm-none-eabi-gcc", purpose="verify --machine-code: Cortex-M4",
+         debian="apt install gcc-arm-none-eabi libnewlib-arm-none-eabi", macos="brew install --cask gcc-arm-embedded",
+         windows="winget install Arm.GnuArmEmbeddedToolchain"),
+    Tool(name="qemu-system-arm", purpose="verify --machine-code: Cortex-M4", debian="apt install qemu-system-arm",
+         macos="brew install qemu", windows="winget install SoftwareFreedomConservancy.QEMU"),
+    Tool(name="avr-gcc", purpose="verify --machine-code: AVR", debian="apt install gcc-avr avr-libc",
+         macos="brew install osx-cross/avr/avr-gcc", windows="winget install ZakKemble.avr-gcc"),
+    Tool(name="simavr", ask=("--help",), purpose="verify --machine-code: AVR", debian="apt install simavr",
+         macos="brew install osx-cross/avr/simavr", windows="only in WSL: apt install simavr"),
+    Tool(name="frama-c", purpose="verify --proof", debian="apt install frama-c-base", macos="opam install frama-c",
+         windows="only in WSL: apt install frama-c-base"),
+    Tool(name="cl2000", ask=("-version",), purpose="to build for f28335 and f280049c; dzdesign does not call it",
+         debian=TI, macos=TI, windows=TI),
+    Tool(name="make", purpose="make demo, make test", debian="apt install make", macos="xcode-select --install",
+         windows="winget install ezwinports.make"),
+)  # fmt: skip
+SYSTEMS = {"debian": "Debian, Ubuntu", "macos": "macOS", "windows": "Windows"}
+
+
+def run_doctor(args: argparse.Namespace) -> int:
+    """Say what is there; 1 if no C compiler works, for then nothing can be verified."""
+    programs = {tool.name: _found(tool) for tool in (*COMPILERS, *OPTIONAL)}
+    packages = _packages()
+    works, text = _compiles()
+    missing = [name for name, version in packages.items() if version is None and name != "ziglang"]
+    document = {
+        "dzdesign": _version("dzdesign"),
+        "python": platform.python_version(),
+        "system": platform.platform(),
+        "compiles": works,
+        "compiler": text,
+        "programs": programs,
+        "packages": packages,
+        "to_get": [asdict(tool) for tool in _lacking(programs)],
+        "holds": works and not missing,
+    }
+    if args.json:
+        print(to_json(document), end="")
+    else:
+        _print(document, programs, missing)
+    return 0 if document["holds"] else 1
+
+
+def _found(tool: Tool) -> dict[str, str] | None:
+    """Return path and version of a program, or None."""
+    from dzdesign.verify.toolchain.host_compiler import find_zig
+
+    path = find_zig() if tool.name == "zig" else shutil.which(tool.name)
+    if path is None:
+        return None
+    try:
+        done = subprocess.run(
+            [path, *tool.ask], capture_output=True, text=True, errors="replace", timeout=PATIENCE_S, check=False,
+            stdin=subprocess.DEVNULL,
+        )  # fmt: skip
+    except (OSError, subprocess.TimeoutExpired) as error:
+        return {"path": path, "version": f"does not run: {error}"}
+    number = re.search(r"\d+\.\d+(?:\.\d+)?\S*", done.stdout + done.stderr) if tool.ask != ("--help",) else None
+    return {"path": path, "version": number.group().rstrip(",)") if number else ""}
+
+
+def _packages() -> dict[str, str | None]:
+    """Return the version of each package that dzdesign needs, and of ziglang; None: missing."""
+    from importlib.metadata import PackageNotFoundError, requires
+
+    try:
+        needed = [line for line in requires("dzdesign") or () if "extra ==" not in line]
+    except PackageNotFoundError:  # run from its sources
+        needed = []
+    names = sorted({re.split(r"[^\w.-]", line)[0] for line in needed}, key=str.lower)
+    return {name: _version(name) for name in (*names, "ziglang")}
+
+
+def _version(package: str) -> str | None:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
+
+
+def _compiles() -> tuple[bool, str]:
+    """Compile a tiny shared library, load it and call it; return whether that works, and with what or why not."""
+    from dzdesign.verify.toolchain.host_compiler import host_compiler, load_library
+
+    try:
+        compiler = host_compiler()
+        answer = load_library({"tiny.c": TINY}, "a tiny library").dz_tiny(14)
+    except (DzdesignError, OSError, AttributeError) as error:
+        return False, str(error)
+    return (True, compiler) if answer == 42 else (False, f"{compiler}: its library counts 3 * 14 = {answer}")
+
+
+def _lacking(programs: dict[str, dict[str, str] | None]) -> list[Tool]:
+    """Return the tools to name: one compiler is enough, and cl2000 is for those who flash with CCS."""
+    one_is_there = any(programs[tool.name] for tool in COMPILERS)
+    return [
+        tool for tool in (*COMPILERS, *OPTIONAL) if not programs[tool.name] and not (tool in COMPILERS and one_is_there)
+    ]
+
+
+def _print(document: dict, programs: dict[str, dict[str, str] | None], missing: list[str]) -> None:
+    from dzdesign.terminal.page import new_console, new_table, put_line
+
+    console = new_console()
+    put_line(console, f"dzdesign {document['dzdesign']}, Python {document['python']}, {document['system']}")
+    table = new_table("Programs", "program", "version", "for", words=(0, 1, 2))
+    for tool in (*COMPILERS, *OPTIONAL):
+        found = programs[tool.name] or {"version": "not found"}
+        table.add_row(tool.name, found["version"] or "found", tool.purpose)
+    console.print(table)
+    versions = ", ".join(f"{name} {version or 'MISSING'}" for name, version in document["packages"].items())
+    put_line(console, f"Python packages: {versions.replace('ziglang MISSING', 'ziglang (optional) not there')}")
+    lacking = _lacking(programs)
+    if lacking:
+        table = new_table("How to get the rest", "program", *SYSTEMS.values(), words=(0, 1, 2, 3))
+        for tool in lacking:
+            table.add_row(tool.name, tool.debian, tool.macos, tool.windows)
+        console.print(table)
+    if missing:
+        put_line(console, f"Missing packages: {sys.executable} -m pip install {' '.join(missing)}")
+    if document["compiles"]:
+        put_line(console, f"A library was compiled, loaded and called with {document['compiler']}: verify can run.")
+    else:
+        put_line(console, f"NO C COMPILER WORKS: {document['compiler']}")

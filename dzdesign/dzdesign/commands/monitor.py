@@ -1,0 +1,156 @@
+"""`dzdesign monitor`: what a firmware sends over its serial line becomes a ramp file, whole or not at all."""
+
+import argparse
+import contextlib
+import signal
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dzdesign.core.artefact_files import check_file_may_be_written, to_json, write_file
+from dzdesign.core.errors import InputError, one_line
+from dzdesign.terminal.progress import say
+
+if TYPE_CHECKING:
+    import serial
+
+    from dzdesign.codegen.telemetry.frame import FrameReader
+    from dzdesign.codegen.telemetry.recording import Recording
+
+#: A line with a firmware on it shows a frame within this time.
+FIRST_FRAME_S = 3.0
+#: The longest that a look at the line takes: Ctrl-C is noticed after it.
+LOOK_S = 0.1
+
+
+def run_monitor(args: argparse.Namespace) -> int:
+    """Record the telemetry of a firmware; 1 if the line broke before the time that was asked for."""
+    from dzdesign.codegen.telemetry.frame import FrameReader
+    from dzdesign.codegen.telemetry.recording import Recording, scalings_of
+
+    output, seconds = Path(args.output), _positive(args.seconds, "--seconds", "60")
+    check_file_may_be_written(output)
+    if output.exists() and output.stat().st_size:
+        raise InputError(f"'{output}' exists, and a recording is not to be had again; choose another name with -o")
+    scalings = scalings_of(Path(args.firmware))
+    baud = _positive(args.baud, "--baud", "115200") or scalings.link.baud
+    recording, reader = Recording(scalings), FrameReader()
+    with _open_port(args.port, baud) as port, _until_interrupted() as stop:
+        say(f"listening to {args.port} at {baud:g} bit/s; Ctrl-C ends the recording")
+        broken = _record(port, recording, reader, stop, seconds)
+    if not recording:
+        raise _nothing(args.port, baud, reader)
+    write_file(output, recording.to_csv(reader))
+    _report(args, recording, reader)
+    if broken:
+        say(f"the recording ended because {broken}; what came until then is written")
+    return 1 if broken else 0
+
+
+def _positive(text: str | None, option: str, example: str) -> float | None:
+    if text is None:
+        return None
+    with contextlib.suppress(ValueError):
+        if 0 < (value := float(text)) < 1e9:
+            return value
+    raise InputError(f"{option} is '{text}', expected a positive number such as {example}")
+
+
+@contextlib.contextmanager
+def _until_interrupted() -> Iterator[threading.Event]:
+    """Turn Ctrl-C into an event, so that no frame is cut in two; then put back what it did before."""
+    stop = threading.Event()
+    before = signal.signal(signal.SIGINT, lambda *_: stop.set())
+    try:
+        yield stop
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _open_port(name: str, baud: float) -> "serial.Serial":
+    """Open a serial port for this program alone, or say in one sentence why not."""
+    import serial
+    from serial.tools import list_ports
+
+    try:
+        alone = {"exclusive": True} if sys.platform != "win32" else {}  # Windows knows nothing else
+        return serial.Serial(name, int(baud), timeout=LOOK_S, **alone)
+    except (OSError, ValueError) as error:
+        known = ", ".join(sorted(port.device for port in list_ports.comports())) or "none"
+        raise InputError(
+            f"the port '{name}' can't be opened at {baud:g} bit/s ({error}); ports of this machine: {known}"
+        ) from error
+
+
+def _record(
+    port: "serial.Serial",
+    recording: "Recording",
+    reader: "FrameReader",
+    stop: threading.Event,
+    seconds: float | None,
+) -> str:
+    """Record until told to stop or the time is over; return why it ended before that, or nothing."""
+    begin, first = time.monotonic(), None
+    hint = False
+    while not stop.is_set():
+        now = time.monotonic()
+        if seconds is not None and now - (first or begin) >= (seconds if first else max(seconds, FIRST_FRAME_S)):
+            break
+        if first is None and not hint and now - begin > FIRST_FRAME_S:
+            hint = True
+            say("no frame yet; is the firmware running, and GPIO29 on the adapter's input?")
+        try:
+            octets = port.read(max(port.in_waiting, 1))
+        except OSError as error:  # the adapter was pulled out
+            return f"the port broke ({error})"
+        for frame in reader.feed(octets):
+            if frame.origin != recording.scalings.origin:
+                return _other_firmware(frame.origin, recording)
+            first = first or time.monotonic()
+            recording.add(frame)
+    return ""
+
+
+def _other_firmware(origin: int, recording: "Recording") -> str:
+    """Refuse frames whose scalings are not known; what came before them, if anything did, is worth keeping."""
+    own = recording.scalings.origin
+    text = f"the frames are of the compensator whose SHA-256 begins with {origin:04x}, not {own:04x}"
+    if recording:
+        return text
+    raise InputError(f"{text} as in --firmware; give the folder that the device was built from")
+
+
+def _nothing(port: str, baud: float, reader: "FrameReader") -> InputError:
+    seen = f"{reader.skipped} octets" if reader.skipped else "nothing"
+    why = "check the wiring of GPIO29"
+    if reader.skipped:
+        why = "check --baud"
+    if reader.other_version:
+        why = "check --baud, and that firmware and dzdesign are of one version"
+    return InputError(f"no frame came from '{port}' at {baud:g} bit/s, but {seen}; nothing was written; {why}")
+
+
+def _report(args: argparse.Namespace, recording: "Recording", reader: "FrameReader") -> None:
+    faults = recording.faults
+    if args.json:
+        document = {
+            "file": args.output,
+            "frames": len(recording),
+            "seconds": recording.duration_s,
+            "lost": recording.lost,
+            "bad_crc": reader.bad_crc,
+            "octets_skipped": reader.skipped,
+            "restarts": recording.restarts,
+            "faults": faults,
+        }
+        print(to_json(document), end="")
+        return
+    print(
+        f"{len(recording)} frames in {recording.duration_s:.2f} s: {recording.lost} lost, {reader.bad_crc} with a "
+        f"wrong CRC, {reader.skipped} octets skipped, {recording.restarts} restarts of the firmware"
+    )
+    print(f"Faults: {', '.join(faults) if faults else 'none'}")
+    print(one_line(f"Written: {args.output}; add a column Q_Lmin from your flow meter for `dzdesign identify`"))

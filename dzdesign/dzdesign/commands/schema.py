@@ -1,0 +1,75 @@
+"""`dzdesign schema`: the JSON Schemas of the artefacts, each kept in the room that writes the artefact."""
+
+import argparse
+import json
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from dzdesign.core.errors import InputError, nearest
+
+#: Name -> (package that keeps it, the artefact, the command that writes it), in the order of the pipeline.
+SCHEMAS: Mapping[str, tuple[str, str, str]] = MappingProxyType(
+    {
+        "valve": ("dzdesign.identify", "valve.json", "identify"),
+        "compensator": ("dzdesign.design", "compensator.json", "design"),
+        "firmware": ("dzdesign.codegen", "manifest.json of a firmware", "codegen"),
+        "evidence": ("dzdesign.verify", "verification.json", "verify"),
+        "assessment": ("dzdesign.assess", "assessment.json", "assess"),
+        "batch": ("dzdesign.batch", "batch.json", "batch"),
+        "reproduction": ("dzdesign.reproduce", "reproduction.json", "reproduce"),
+        "derivation": ("dzdesign.derivation", "derivation.json", "derive --format json"),
+    }
+)
+
+
+def schema_text(name: str) -> str:
+    """Return a schema (JSON Schema, draft 2020-12) as the text of its file.
+
+    Parameters
+    ----------
+    name : str
+        One of `SCHEMAS`.
+
+    Raises
+    ------
+    InputError
+        If there is no such schema.
+
+    Examples
+    --------
+    >>> schema_text("valve").startswith("{")
+    True
+    """
+    if name not in SCHEMAS:
+        raise InputError(
+            f"there is no schema '{name[:40]}'{nearest(name, SCHEMAS)}; expected one of {', '.join(SCHEMAS)}"
+        )
+    return (Path(str(files(SCHEMAS[name][0]))) / "schemas" / f"{name}.schema.json").read_text(encoding="utf-8")
+
+
+def schema_document(name: str) -> dict[str, Any]:
+    """Return a schema as `json` reads it.
+
+    Parameters
+    ----------
+    name : str
+        One of `SCHEMAS`.
+    """
+    return json.loads(schema_text(name))
+
+
+def run_schema(args: argparse.Namespace) -> int:
+    """Print one schema, or which there are."""
+    if args.name is not None:
+        print(schema_text(args.name), end="")
+    elif args.json:
+        listing = [{"name": name, "artefact": artefact} for name, (_, artefact, _) in SCHEMAS.items()]
+        print(json.dumps({"schemas": listing}, indent=2))
+    else:
+        width = max(map(len, SCHEMAS))
+        for name, (_, artefact, command) in SCHEMAS.items():
+            print(f"{name:{width}}  {artefact}, made by `dzdesign {command}`")
+    return 0

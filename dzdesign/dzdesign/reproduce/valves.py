@@ -1,0 +1,292 @@
+"""The valves of the paper: plant parameters recovered by a constrained fit from the figures that it prints.
+
+Table 1 is an image, so its values are not in the text. What the text prints of a valve without compensator (dead zones
+and largest flows at both pressure drops; of the simulated one also how far its spool moves) determines its parameters
+at rest; all else that is printed is then a prediction. Nothing printed determines the dynamics, nor the scale of the
+forces: both are those of the default plant. Nor does the paper show a closing branch: no hysteresis is recovered.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from functools import cache
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from dzdesign.core.errors import RequirementError
+from dzdesign.derivation.account.published import (
+    DP0_MPA,
+    DP1_MPA,
+    FIRST,
+    METER_FLOOR_L_MIN,
+    SECOND,
+    SIMULATION,
+    U_MAX_V,
+    PublishedValve,
+)
+from dzdesign.verify.closed_loop.plant import L_MIN, MPA, Plant
+
+if TYPE_CHECKING:
+    import casadi
+
+#: At least this much overlap, mm: less than what the ripple of the PWM, which the paper's simulation lacks, would
+#: open at zero command.
+LEAST_OVERLAP_MM = 0.005
+#: Of a valve without a visible stop: no displacement comes near it.
+NO_STOP_MM = 10.0
+#: Digits of the recovered parameters: more than any solver's tolerance, so that the same fit gives the same bytes.
+DIGITS = 7
+#: A parameter as close as this to its bound, over its scale, is held by it.
+AT_BOUND = 1e-6
+#: Half digits by which a fit may miss a figure. Only one is missed by more than one: no flow starts before the spool
+#: moves, Eq. (24), but the paper reads 54 % of displacement and 53.5 % of flow.
+LARGEST_MISFIT = 1.5
+#: Parameter -> size to scale it by, least value.
+RECOVERED: Mapping[str, tuple[float, float]] = MappingProxyType(
+    {
+        "preload_N": (30.0, 0.0),
+        "pressure_force_N_MPa": (0.3, 0.0),
+        "flow_force_N_mm_MPa": (1.5, 0.0),
+        "C_d_W_mm": (3.0, 1e-3),
+        "K_et_N_m": (15000.0, 100.0),
+        "overlap_mm": (0.1, LEAST_OVERLAP_MM),
+    }
+)
+SOLVER = MappingProxyType(
+    {
+        "ipopt.print_level": 0,
+        "ipopt.sb": "yes",
+        "print_time": False,
+        "ipopt.tol": 1e-12,
+        "ipopt.bound_relax_factor": 0.0,
+    }
+)
+#: What only the simulated valve's displacement tells; the tested ones are "identical" (section 2.1), so they take it.
+FROM_DISPLACEMENT = ("K_et_N_m", "overlap_mm")
+NOT_PRINTED = ("hysteresis_V", "droop_MPa_L_min2", "stroke_mm")
+
+
+class Printed(NamedTuple):
+    """A printed figure: what it is, its unit, as printed, and what the plant at rest has for it, in its parameters."""
+
+    name: str
+    unit: str
+    published: str
+    at_rest: "casadi.SX"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FittedFigure:
+    """A printed figure that went into a fit: what it is, its unit, as printed, what the fit gives, and their distance
+    over half a unit of the last printed digit."""
+
+    name: str
+    unit: str
+    published: str
+    fitted: float
+    misfit: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecoveredValve:
+    """A valve of the paper as a plant.
+
+    Attributes
+    ----------
+    published : PublishedValve
+        What the paper prints of it.
+    plant : Plant
+        Its parameters; those in `rounding` are recovered, the others are the default plant's or of another valve.
+    rounding : mapping of str to float
+        Recovered parameter -> by how much it may be off for the rounding of the printed figures.
+    figures : tuple of FittedFigure
+        What went into the fit.
+    at_bound : tuple of str
+        Parameters that a bound of the fit holds.
+    level_L_min : float
+        Flow from which on the paper sees flow: its meter's floor, zero in its simulation.
+    """
+
+    published: PublishedValve
+    plant: Plant
+    rounding: Mapping[str, float]
+    figures: tuple[FittedFigure, ...]
+    at_bound: tuple[str, ...]
+    level_L_min: float
+
+    def to_document(self) -> dict[str, Any]:
+        """Return the parameters, each marked as recovered or not, and the fit."""
+        return {
+            "valve": self.published.name,
+            "parameters": {
+                field.name: {
+                    "value": getattr(self.plant, field.name),
+                    "recovered": field.name in self.rounding,
+                    "origin": self._origin(field.name),
+                    "rounding": self.rounding.get(field.name),
+                }
+                for field in fields(Plant)
+            },
+            "fitted_to": [
+                {name: getattr(figure, name) for name in ("name", "unit", "published", "fitted", "misfit")}
+                for figure in self.figures
+            ],
+            "at_bound": list(self.at_bound),
+            "level_L_min": self.level_L_min,
+        }
+
+    def _origin(self, name: str) -> str:
+        if name in self.rounding:
+            return "fit to the printed figures" + (", held by its bound" if name in self.at_bound else "")
+        if name in FROM_DISPLACEMENT:
+            return f"of the {SIMULATION.name}'s fit"
+        return "assumed: none is printed" if name in NOT_PRINTED else "default plant"
+
+
+def half_digit(published: str) -> float:
+    """Return half a unit of the last printed digit.
+
+    Examples
+    --------
+    >>> half_digit("53.5"), half_digit("15")
+    (0.05, 0.5)
+    """
+    return 0.5 * 10.0 ** -len(published.partition(".")[2])
+
+
+@cache
+def recover_valves() -> tuple[RecoveredValve, ...]:
+    """Recover the simulated valve, then both tested ones with its spring and its edge.
+
+    Raises
+    ------
+    RequirementError
+        If a fit misses a figure that determines it.
+    """
+    simulated = _recover(SIMULATION, Plant(), tuple(RECOVERED), 0.0)
+    free = tuple(name for name in RECOVERED if name not in FROM_DISPLACEMENT)
+    tested = (_recover(valve, simulated.plant, free, float(METER_FLOOR_L_MIN)) for valve in (FIRST, SECOND))
+    return (simulated, *tested)
+
+
+def _recover(valve: PublishedValve, base: Plant, free: tuple[str, ...], level_L_min: float) -> RecoveredValve:
+    """Fit the `free` parameters of a plant at rest to what is printed of a valve."""
+    import casadi as ca
+
+    base = replace(base, u_max_V=float(U_MAX_V), hysteresis_V=0.0, droop_MPa_L_min2=0.0, stroke_mm=NO_STOP_MM)
+    scale, least = np.array([RECOVERED[name] for name in free]).T
+    scaled = ca.SX.sym("parameters", len(free))
+    values = {field.name: getattr(base, field.name) for field in fields(Plant)}
+    values |= {name: scaled[index] * scale[index] for index, name in enumerate(free)}
+    printed = _printed_at_rest(valve, values, level_L_min)
+    half = np.array([half_digit(each.published) for each in printed])
+    fitted = ca.vertcat(*(each.at_rest for each in printed))
+    misfit = (fitted - np.array([float(each.published) for each in printed])) / half
+    solver = ca.nlpsol("recover", "ipopt", {"x": scaled, "f": ca.sumsqr(misfit)}, dict(SOLVER))
+    solution = np.asarray(solver(x0=np.maximum(1.0, 2 * least / scale), lbx=least / scale)["x"]).ravel()
+    held = solution - least / scale < AT_BOUND
+    solution[held] = (least / scale)[held]
+    evaluate = ca.Function("fitted", [scaled], [fitted, misfit, ca.jacobian(misfit, scaled)])
+    at, misfits, slopes = (np.asarray(value) for value in evaluate(solution))
+    if not solver.stats()["success"] or np.abs(misfits).max() > LARGEST_MISFIT:
+        raise RequirementError(
+            f"the parameters of the {valve.name} can't be recovered: its figures are missed by up to "
+            f"{np.abs(misfits).max():.3g} half digits ({solver.stats()['return_status']})"
+        )
+    spread = np.zeros(len(free))  # every figure off by its half digit, all in the worst direction
+    spread[~held] = np.abs(np.linalg.pinv(slopes[:, ~held])).sum(axis=1)
+    return RecoveredValve(
+        published=valve,
+        plant=replace(base, **_with_digits(free, solution * scale, DIGITS)),
+        rounding=_with_digits(free, spread * scale, 2),
+        figures=tuple(
+            FittedFigure(name=each.name, unit=each.unit, published=each.published, fitted=round(float(value), 6),
+                         misfit=round(float(miss), 4))
+            for each, value, miss in zip(printed, at.ravel(), misfits.ravel(), strict=True)
+        ),
+        at_bound=tuple(name for name, bound in zip(free, held, strict=True) if bound),
+        level_L_min=level_L_min,
+    )  # fmt: skip
+
+
+def _with_digits(names: tuple[str, ...], values: np.ndarray, digits: int) -> dict[str, float]:
+    return {name: float(f"{value:.{digits}g}") for name, value in zip(names, values, strict=True)}
+
+
+def _printed_at_rest(valve: PublishedValve, values: Mapping[str, Any], level_L_min: float) -> list[Printed]:
+    """Return every figure that the fit may use, for the plant at rest."""
+    printed = []
+    for dp_MPa, dead_zone, flow in (
+        (DP0_MPA, valve.dead_zone0_percent, valve.flow0),
+        (DP1_MPA, valve.dead_zone1_percent, valve.flow1),
+    ):
+        rest = AtRest(values, dp_MPa)
+        seen_V = rest.opens_V + level_L_min / rest.flow_per_volt
+        largest = rest.flow_per_volt * (U_MAX_V - rest.opens_V)
+        printed.append(Printed(f"dead zone at {dp_MPa} MPa", "%", dead_zone, 100 * seen_V / U_MAX_V))
+        printed.append(Printed(f"largest flow at {dp_MPa} MPa", "L/min", flow, largest))
+    if valve.stroke0_mm:
+        rest, at = AtRest(values, DP0_MPA), f"at {DP0_MPA} MPa"
+        moves_percent = 100 * rest.moves_V / U_MAX_V
+        printed.append(Printed(f"displacement {at}", "mm", valve.stroke0_mm, rest.position_mm(U_MAX_V)))
+        moves = valve.displacement_dead_zone0_percent
+        printed.append(Printed(f"displacement's dead zone {at}", "%", moves, moves_percent))
+    return printed
+
+
+class AtRest:
+    """The plant at rest at one pressure drop, Eqs. (19)-(24) with d/dt = 0, between its edge and its stop.
+
+    Parameters
+    ----------
+    values : mapping
+        Parameters by the names of `Plant`, as numbers or CasADi expressions.
+    dp_MPa : float
+        Across the edge.
+
+    Attributes
+    ----------
+    moves_V, opens_V : number or casadi.SX
+        Commands from which on the spool moves and the edge is open.
+    flow_per_volt : number or casadi.SX
+        L/min per V beyond.
+    """
+
+    def __init__(self, values: Mapping[str, Any], dp_MPa: float) -> None:
+        import casadi as ca
+
+        from dzdesign.derivation import plant as equations
+        from dzdesign.derivation.lowering import lower
+
+        current = lower(equations.steady_state_current(), (equations.INPUTS[0], *equations.PARAMETERS))
+        electrical = ("K_a", "K_fi_V_A", "K_i_N_A", "R_c_ohm", "r_p_ohm", "L_c_H", "m_e_kg", "B_e_N_s_m", "K_et_N_m")
+        amperes_per_volt = current(1.0, *(values[name] for name in electrical))  # Eqs. (19)-(21)
+        newtons_per_volt = values["K_i_N_A"] * amperes_per_volt  # Eq. (22)
+        stiffness = values["K_et_N_m"] * 1e-3  # N/mm
+        # Eq. (23) at rest: K_i i = K_et x + f_eL, the flow force in f_eL growing with the opening.
+        load = values["preload_N"] - values["pressure_force_N_MPa"] * dp_MPa
+        stiffness_open = stiffness + values["flow_force_N_mm_MPa"] * dp_MPa
+        self._mm_per_volt = newtons_per_volt / stiffness_open
+        self._overlap_mm = values["overlap_mm"]
+        self.moves_V = load / newtons_per_volt
+        self.opens_V = (load + stiffness * values["overlap_mm"]) / newtons_per_volt
+        flow = lower(equations.flow(), (equations.STATE[1], *equations.FLOW_PARAMETERS), {"sqrt": ca.sqrt})
+        per_mm = flow(1e-3, 1.0, values["C_d_W_mm"] * 1e-3, values["rho_kg_m3"], dp_MPa * MPA) / L_MIN  # Eq. (24)
+        self.flow_per_volt = per_mm * self._mm_per_volt
+
+    def position_mm(self, u_V: float) -> Any:
+        """Return the displacement at a command beyond the edge, mm."""
+        return self._overlap_mm + self._mm_per_volt * (u_V - self.opens_V)
+
+
+def at_rest(plant: Plant, dp_MPa: float) -> AtRest:
+    """Return a plant at rest, as numbers; the supply's droop and the play must be none.
+
+    Parameters
+    ----------
+    plant : Plant
+    dp_MPa : float
+        Across the edge.
+    """
+    return AtRest({field.name: getattr(plant, field.name) for field in fields(Plant)}, dp_MPa)

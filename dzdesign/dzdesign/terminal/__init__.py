@@ -1,0 +1,1 @@
+"""The terminal and the notebook: results enter, tables, progress and summaries leave."""

@@ -1,0 +1,78 @@
+"""What `print` says of each result: some lines of plain text, the first of which alone names it."""
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+from dzdesign.core.errors import one_line
+from dzdesign.terminal.notebook import VERDICTS, side_lines
+
+if TYPE_CHECKING:
+    from dzdesign.codegen.project import Firmware
+    from dzdesign.design.compensator import Compensator
+    from dzdesign.identify.valve.model import BranchResult, ValveModel
+    from dzdesign.verify.verification import Verification
+
+
+def _knee(branch: "BranchResult | None") -> str:
+    return "not recorded" if branch is None else f"{branch.knee_V:.3f} ± {branch.knee_se_V:.3f}"
+
+
+def valve_summary(valve: "ValveModel") -> str:
+    """Return full command, each test's knees and bound, what the law takes, the trend, and the warnings' codes."""
+    count = len(valve.made_from)
+    lines = [
+        f"Valve of {valve.u_max_V:g} V, {' and '.join(valve.sides)} side{'s' * (len(valve.sides) > 1)}, from {count} "
+        f"recording{'s' * (count != 1)}"
+    ]
+    for name, side in valve.sides.items():
+        lines.append(f"  {name} side, thresholds in V:")
+        for test in side.tests:
+            at = "dP unknown" if test.dp_MPa is None else f"{test.dp_MPa:.3f} MPa"
+            lines.append(
+                f"    {at}: knee opening {_knee(test.rising)}, closing {_knee(test.falling)}; lower bound of "
+                f"the {side.guard} threshold {test.u_guard_lower_V:.3f}; largest flow {test.q_max_L_min:.2f} L/min"
+            )
+        lines += [f"    {line}" for line in side_lines(side)]
+    codes = list(dict.fromkeys(warning.code for warning in valve.warnings))
+    lines.append(f"  warnings: {', '.join(codes) or 'none'}" + ("; their texts are in .warnings" if codes else ""))
+    return "\n".join(map(one_line, lines))
+
+
+def compensator_summary(compensator: "Compensator") -> str:
+    """Return target and law, the offset and certificate of each side, and the costs."""
+    target = f" for {compensator.request.target.name}" if compensator.request else ""
+    lines = [f"Compensator{target}, law {compensator.law_name}, of a valve of {float(compensator.u_max_V):g} V"]
+    for sign in compensator.signals.signs:
+        side = compensator.side(sign)
+        low, high = (float(end) for end in side.certificate.dp_MPa)
+        lines.append(
+            f"  {'positive' if sign > 0 else 'negative'} commands: u_min0/u_max = {float(side.u_min0_over_u_max):.5f}, "
+            f"k x_max/u_max = {float(side.k_x_max_over_u_max):.5f}; certified from {low:.3f} to {high:.3f} MPa with "
+            f"{100 * side.certificate.confidence:.6g} % confidence, guarding {side.certificate.guard}"
+        )
+    return "\n".join(map(one_line, [*lines, *(f"  cost: {line}" for line in compensator.costs)]))
+
+
+def firmware_summary(firmware: "Firmware") -> str:
+    """Return target and law, and the files."""
+    head = f"Firmware for {firmware.manifest['target']}, law {firmware.manifest['law']}, {len(firmware.files)} files"
+    note = [f"  {firmware.note}"] if firmware.note else []
+    return "\n".join(map(one_line, [head, *(f"  {name}" for name in firmware.files), *note]))
+
+
+def verification_summary(verification: "Verification") -> str:
+    """Return the verdict, every requirement with its figures, and what was not tried."""
+    from dzdesign.verify.requirements import untried_of
+
+    checks = [f"  {VERDICTS[check.holds]}: {check.name}: {check.text}" for check in verification.checks]
+    untried = [f"  NOT TRIED: {name}".replace("`", "") for name in untried_of(verification.document)]
+    return "\n".join(map(one_line, [f"Verification: {verification.verdict}", *checks, *untried]))
+
+
+#: Class of a result -> its summary, for `dzdesign.core.result_display`.
+SUMMARIES: Mapping[str, Callable[[Any], str]] = {
+    "ValveModel": valve_summary,
+    "Compensator": compensator_summary,
+    "Firmware": firmware_summary,
+    "Verification": verification_summary,
+}

@@ -1,1 +1,0 @@
-"""The bundled example: small ramp tests of a simulated valve like the paper's, and the plant that made them."""

@@ -1,0 +1,121 @@
+"""Why a knee is known badly: the meter's noise, a bend where a straight line was laid, or levels too far apart.
+
+The errors of `GatedLine` count whatever departs from the line, and rightly so; but slower ramps help against noise
+only. One valve has made all branches, so a bend departs from the line in the same way in each of them; noise, fast or
+slow, does not. What the branches' departures have in common is the valve's, the rest the meter's.
+"""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from dzdesign.identify.knees.characteristic import BranchShape
+from dzdesign.identify.knees.prepared_tests import DescribedTest
+from dzdesign.identify.valve.model import SideModel, TestResult, Warning_
+
+#: Standard error of a knee, over u_max, above which it decides what the compensator gives up.
+NOISY = 2.5e-3
+#: A bend is to blame where the noise alone would leave less than this share of the error.
+BLAME = 0.5
+#: Parts of the straight part, in the order of the command, in which departures from the line are averaged; fewest.
+PARTS, FEWEST_PARTS = 8, 4
+
+
+def about_errors(
+    side: SideModel, tests: tuple[DescribedTest, ...], u_max: float, window: tuple[float, float]
+) -> Iterator[Warning_]:
+    """Yield a warning for each test whose knees are known badly, with the reason.
+
+    Parameters
+    ----------
+    side : SideModel
+        What was identified.
+    tests : tuple of DescribedTest
+        What it was identified from.
+    u_max : float
+        Full command, V.
+    window : tuple of float
+        Of --knee-window, as shares.
+    """
+    if all(test.u_knee_se_V <= NOISY * u_max for test in side.tests):
+        return
+    shapes = [[shape for shape in item.shapes if shape] for item in tests]
+    left = _left_without_the_bend([shape for group in shapes for shape in group if _has_noise(shape)])
+    for test, group in zip(side.tests, shapes, strict=True):
+        if test.u_knee_se_V <= NOISY * u_max:
+            continue
+        if not any(map(_has_noise, group)):
+            yield _coarse(test)
+        elif left < BLAME:
+            yield _bent(test, left, window)
+        else:
+            yield _noisy(test, alone=len(tests) == len(group) == 1)
+
+
+def _has_noise(shape: BranchShape) -> bool:
+    """Tell whether a line goes through noisy samples; one from level to level of a table has no residuals."""
+    return shape.line.roughness.n > 0
+
+
+def _left_without_the_bend(shapes: Sequence[BranchShape]) -> float:
+    """Return which share of the departures from the lines is not common to all branches; 1 where that can't be told."""
+    count = min((PARTS, *(int(np.sum(shape.line.kept & ~shape.line.censored)) // 2 for shape in shapes)))
+    if len(shapes) < 2 or count < FEWEST_PARTS:
+        return 1.0
+    departures = np.array([_departures(shape, count) for shape in shapes])
+    own = departures - departures.mean(axis=0)
+    every = float(np.sum(departures**2)) * (len(shapes) - 1) / len(shapes)
+    return min(float(np.sqrt(np.sum(own**2) / every)), 1.0) if every > 0 else 1.0
+
+
+def _departures(shape: BranchShape, count: int) -> np.ndarray:
+    """Return the means of the departures from a branch's line in parts of it, over the flow of the straight part."""
+    line, seen = shape.line, shape.line.kept & ~shape.line.censored
+    u, y = shape.read.branch.u[seen], shape.read.y[seen]
+    order = np.argsort(u, kind="stable")
+    residual = (y - line.slope * (u - line.knee))[order] / (line.slope * np.ptp(u))
+    return np.array([part.mean() for part in np.array_split(residual, count)])
+
+
+def _noisy(test: TestResult, alone: bool) -> Warning_:
+    return Warning_(
+        code="noise",
+        text=(
+            f"a knee is known to {1e3 * test.u_knee_se_V:.0f} mV only (one standard error; noise "
+            f"{test.noise_L_min:.3g} L/min, {test.noise_colour:.0f} times as harmful as white noise): its "
+            "bound lies several times that lower. Record slower ramps, or repeat them"
+            + ("; one branch alone can't tell noise from a bend of the flow, see --plots" if alone else "")
+        ),
+        source=test.source,
+    )
+
+
+def _bent(test: TestResult, left: float, said: tuple[float, float]) -> Warning_:
+    branches = [branch for branch in (test.rising, test.falling) if branch]
+    worst = max(branches, key=lambda branch: branch.knee_se_V)
+    (low, high), asked = ([100 * share for share in shares] for shares in (worst.straight, said))
+    widened = f" (--knee-window {asked[0]:.3g}-{asked[1]:.3g}, widened as far as a line goes)"
+    widened = widened if worst.straight != said else ""
+    return Warning_(
+        code="bend",
+        text=(
+            f"a knee is known to {1e3 * test.u_knee_se_V:.0f} mV only (one standard error), because the flow bends "
+            f"between {low:.3g} and {high:.3g} % of its largest{widened}, where a straight line is laid; the meter's "
+            f"noise would leave {1e3 * left * test.u_knee_se_V:.0f} mV at most, so slower ramps help little. The "
+            "knee's bound lies several times the error lower. See --plots, and give the --knee-window in which the "
+            "flow is straight"
+        ),
+        source=test.source,
+    )
+
+
+def _coarse(test: TestResult) -> Warning_:
+    return Warning_(
+        code="coarse-levels",
+        text=(
+            f"a knee is known to {1e3 * test.u_knee_se_V:.0f} mV only, because so few levels of the command lie in the "
+            "straight part that the line goes from level to level: the bound lies several times that lower. Record a "
+            "ramp, or levels closer together"
+        ),
+        source=test.source,
+    )

@@ -1,0 +1,274 @@
+"""What is weak in the pressure drop of recordings: a stuck sensor, a number typed in, flows that contradict it."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from dzdesign.identify.ramps.pooling import SAME_PRESSURE
+from dzdesign.identify.ramps.splitting import SHUT, despiked
+from dzdesign.identify.reading.named_pressure import claimed_pressures, contradicts
+from dzdesign.identify.reading.ramp_files import RampTest
+from dzdesign.identify.valve.model import TestResult, Warning_
+
+MPA = 1e6
+L_MIN = 1e-3 / 60
+#: Pressure drops that differ by less than this share are one number: averaging may round the last digit.
+ONE_NUMBER = 1e-12
+#: A pressure drop stands still if all but the outermost readings lie within this share of it, or on so few levels of
+#: the converter: two a port to either side.
+STANDS_STILL, LEVELS, OUTERMOST = 0.05, 9, 0.005
+#: Means that differ by more than this factor are of several pressure drops, or of none that stands still.
+APART = 1.2
+#: Share by which flows at one command may differ where the pressure drop is the same, beyond what the means of the
+#: pressure drop say, for flow grows as its root: a repeated ramp, warmer oil. So may those that files' names state.
+SAME_FLOW = 0.1
+#: Flows are compared within this share of the largest command that all recordings reach.
+NEAR_TOP = 0.02
+#: A flow below this share of the largest one is none to compare: the command does not open the valve.
+SMALL_FLOW = 0.05
+#: A sensor scatters if its reading changes from row to row in this share of them, among so many levels: one whose last
+#: digit only flickers where a level ends may well stand still at another pressure, for fewer rows than these.
+CHANGES, SCATTERED_LEVELS, ROWS = 0.2, 4, 100
+#: Share by which the flows of recordings that are taken as one test may differ: twice what warmer oil or a repeated
+#: ramp may do, and what pressure drops of a factor of 1.7 do.
+GROSSLY_APART = 0.3
+#: Flow gains of two tests contradict their pressure drops if that at the higher one is less than this share of the
+#: other, or differs by these factors from the root: by 0.70 from 0.5 to 5 MPa does that of the paper's valve, and one
+#: that keeps its flow the same by less than 2.5 up to a range of 1 to 6.
+FALLS, GROWS_TOO_LITTLE, GROWS_TOO_MUCH = 0.9, 2.5, 1.75
+#: Said of both kinds of contradiction.
+WHAT_FOLLOWS = "Thresholds may be assigned to wrong pressure drops, so the certificate may not hold"
+#: A recording that comes to this share of the largest command shows what flows there.
+FULL_SWEEP = 0.95
+
+
+def about_a_stuck_sensor(tests: Sequence[RampTest]) -> Iterator[Warning_]:
+    """Yield a warning if the recordings of one side show one pressure drop, noise aside, and must have several.
+
+    Parameters
+    ----------
+    tests : sequence of RampTest
+        Of one side, its commands and flows positive.
+    """
+    recorded = [test.dp for test in tests if test.dp is not None and not test.dp_is_declared]
+    if len(tests) < 2 or len(recorded) < len(tests):
+        return
+    means = [float(dp.mean()) for dp in recorded]
+    if min(means) <= 0 or max(means) > APART * min(means):
+        return
+    every = np.concatenate(recorded)
+    low, middle, high = (float(value) for value in np.quantile(every, [OUTERMOST, 0.5, 1 - OUTERMOST]))
+    if not _stands_still(every, low, middle, high):
+        return
+    explained = max(means) / min(means)
+    top, flows = _flows_at_one_command(tests)
+    claims = claimed_pressures([test.source for test in tests])
+    signs = []
+    if min(flows) > 0 and max(flows) > (1 + SAME_FLOW) * explained**0.5 * min(flows):
+        signs.append(f"the flows at {top:.3g} V differ by {max(flows) / min(flows) - 1:.0%}")
+    if claims and max(claims) > (1 + SAME_FLOW) * explained * min(claims):
+        signs.append("the files' names say different ones")
+    if signs:
+        one = high - low <= ONE_NUMBER * high
+        about = f"{high / MPA:.6g} MPa in every row of" if one else f"{low / MPA:.4g} to {high / MPA:.4g} MPa in"
+        yield Warning_(
+            code="pressure-stuck",
+            text=(
+                f"the pressure drop is {about} all {len(tests)} recordings, but "
+                f"{' and '.join(signs)}: the sensor is stuck, or the column is another's, and ramps of different "
+                "pressure drops are taken for one test, whose knees are known badly for that reason (or it is one "
+                "pressure drop, and the valve, its supply or oil was not the same). Leave that column out and declare "
+                "the pressure drops by [dp], or record again"
+            ),
+            source=None,
+        )
+
+
+def _stands_still(every: np.ndarray, low: float, middle: float, high: float) -> bool:
+    """Tell whether readings are one number and the noise of a converter."""
+    if high - low <= STANDS_STILL * middle:
+        return True
+    inner = every[(every >= low) & (every <= high)]
+    # One level computed from two ports, or averaged, differs in its last digits.
+    return middle > 0 and np.unique(np.round(inner / middle, 6)).size <= LEVELS
+
+
+def _flows_at_one_command(tests: Sequence[RampTest]) -> tuple[float, list[float]]:
+    """Return the largest command that all recordings reach, V, and each one's flow there; zero where that is small."""
+    top = min(float(despiked(test.u).max()) for test in tests)
+    flows = []
+    for test in tests:
+        away = np.abs(test.u - top)
+        flows.append(float(np.median(test.q[away <= max(NEAR_TOP * top, away.min())])))
+    return top, [flow if flow > SMALL_FLOW * max(flows) else 0.0 for flow in flows]
+
+
+def about_stuck_recordings(tests: Sequence[RampTest]) -> Iterator[Warning_]:
+    """Yield a warning for each recording whose pressure drop is one number to the last digit, and should not be.
+
+    That is so where other recordings' readings scatter, or where the file's name says another pressure.
+
+    Parameters
+    ----------
+    tests : sequence of RampTest
+        Of one side, its commands and flows positive.
+    """
+    scatters = any(_scatters(test) for test in tests)
+    for test in sorted(tests, key=lambda test: test.source):
+        if not is_one_number(test):
+            continue
+        dp = float(test.dp[0])
+        stated = contradicts(test.source.rpartition("/")[2], dp)
+        signs = ["that of other recordings scatters"] if scatters and test.u.size >= ROWS else []
+        signs += [f"the file's name says {stated}"] if stated else []
+        if signs:
+            yield Warning_(
+                code="pressure-stuck",
+                text=(
+                    f"the pressure drop is {dp / MPA:.6g} MPa to the last digit in every row, but "
+                    f"{' and '.join(signs)}: the sensor is stuck or too coarse to show anything, or the number "
+                    f"was typed in. {WHAT_FOLLOWS}. Leave that column out and declare the pressure drop by [dp], or "
+                    "record again"
+                ),
+                source=test.source,
+            )
+
+
+def about_typed_pressures(tests: Sequence[RampTest]) -> Iterator[Warning_]:
+    """Yield a warning for each recording, if the pressure drop of every one is one number: nothing was measured.
+
+    Parameters
+    ----------
+    tests : sequence of RampTest
+        Of one side, its commands and flows positive.
+    """
+    recorded = [test for test in tests if test.dp is not None and not test.dp_is_declared]
+    if not all(is_one_number(test) for test in recorded):
+        return
+    for test in sorted(recorded, key=lambda test: (float(test.dp[0]), test.source)):
+        yield Warning_(
+            code="declared-pressure",
+            text=(
+                f"the pressure drop is {float(test.dp[0]) / MPA:.6g} MPa in every row: typed in, not measured "
+                "(or the sensor is too coarse to show anything): if it sags under flow, the knee is found too low "
+                "(21 mV for 5 % on a 10 V valve like the example's). Record what a sensor reads"
+            ),
+            source=test.source,
+        )
+
+
+def is_one_number(test: RampTest) -> bool:
+    """Tell whether a recorded pressure drop is one number to the last digit.
+
+    Parameters
+    ----------
+    test : RampTest
+        One whose pressure drop was declared, or is unknown, says nothing.
+    """
+    if test.dp is None or test.dp_is_declared or test.dp.size < 2:
+        return False
+    return float(np.ptp(test.dp)) <= ONE_NUMBER * abs(float(test.dp[0]))
+
+
+def _scatters(test: RampTest) -> bool:
+    if test.dp is None or test.dp_is_declared:
+        return False
+    low, high = np.quantile(test.dp, [OUTERMOST, 1 - OUTERMOST])
+    inner = test.dp[(test.dp >= low) & (test.dp <= high)]
+    return float(np.mean(np.diff(test.dp) != 0)) > CHANGES and np.unique(inner).size >= SCATTERED_LEVELS
+
+
+def about_mixtures(tests: Sequence[RampTest]) -> Iterator[Warning_]:
+    """Yield a warning for each pressure drop at which recordings, taken as one test, differ grossly in their flow.
+
+    Parameters
+    ----------
+    tests : sequence of RampTest
+        Of one side, its commands and flows positive.
+    """
+    highest = max(float(despiked(test.u).max()) for test in tests)
+    whole = [test for test in tests if despiked(test.u).max() >= FULL_SWEEP * highest]
+    for dp, group in _at_one_pressure(whole):
+        top, flows = _flows_at_one_command(group)
+        if min(flows) <= 0 or max(flows) <= (1 + GROSSLY_APART) * min(flows):
+            continue
+        least, most = (group[flows.index(extreme(flows))].source for extreme in (min, max))
+        yield Warning_(
+            code="flow-contradicts-dp",
+            text=(
+                f"recordings that are taken as one test, at {dp / MPA:.4g} MPa, differ in their flow at {top:.3g} V: "
+                f"{min(flows) / L_MIN:.3g} L/min in '{least}', {max(flows) / L_MIN:.3g} L/min in '{most}'. Flow grows "
+                "as the root of the pressure drop (Eq. 1), so one of them was recorded at another pressure drop "
+                "(misread from its name, declared wrongly, a stuck sensor), or its unit of Q or its supply is "
+                f"another. {WHAT_FOLLOWS}. Correct [dp] or the columns, or leave that recording out"
+            ),
+            source=None,
+        )
+
+
+def _at_one_pressure(tests: Sequence[RampTest]) -> Iterator[tuple[float, list[RampTest]]]:
+    """Yield recordings of one pressure drop, two or more, their flows brought to it, and that, Pa.
+
+    A recording that was run at several pressure drops, or whose valve is never shut, belongs to none.
+    """
+    steady = []
+    for test in tests:
+        shut = test.dp[test.u <= SHUT * test.u.max()] if test.dp is not None else np.empty(0)
+        low, dp, high = np.quantile(shut, [0.05, 0.5, 0.95]) if shut.size else (0.0, 0.0, 0.0)
+        if 0 < high < APART * low:
+            at_nominal = np.sqrt(dp / np.maximum(test.dp, SMALL_FLOW * dp))
+            steady.append((float(dp), replace(test, q=test.q * at_nominal)))
+    steady.sort(key=lambda pair: (pair[0], pair[1].source))
+    while steady:
+        lowest = steady[0][0]
+        group = [test for dp, test in steady if dp <= (1 + SAME_PRESSURE) * lowest]
+        if len(group) > 1:
+            yield lowest, group
+        steady = steady[len(group) :]
+
+
+def about_flow_gains(tests: Sequence[TestResult]) -> Iterator[Warning_]:
+    """Yield a warning for each test whose flow gain contradicts its pressure drop, by those of the other tests.
+
+    The gain beyond the knee, and not the flow at one command, is compared: a supply at its limit and a knee that moves
+    leave it as it is.
+
+    Parameters
+    ----------
+    tests : sequence of TestResult
+        Of one side, in the order of rising pressure drop.
+    """
+    left = [test for test in tests if test.dp_MPa is not None and test.slope_L_min_V > 0]
+    # Without the worst one the others may agree; of two, either may be wrong, and both are named.
+    while len(left) > 1:
+        against = [[other for other in left if _contradict(test, other)] for test in left]
+        per_root = [test.slope_L_min_V / float(test.dp_MPa or 1) ** 0.5 for test in left]
+        usual = float(np.median(per_root))
+        worst = max(range(len(left)), key=lambda at: (len(against[at]), abs(np.log(per_root[at] / usual))))
+        if not against[worst]:
+            return
+        test, other = left.pop(worst), against[worst][0]
+        expected = float(np.median([value for at, value in enumerate(per_root) if at != worst]))
+        expected *= float(test.dp_MPa or 1) ** 0.5
+        yield Warning_(
+            code="flow-contradicts-dp",
+            text=(
+                f"beyond the knee the flow grows by {test.slope_L_min_V:.3g} L/min a volt at {test.dp_MPa:.4g} MPa, "
+                f"expected about {expected:.3g}, as the root of the pressure drop (Eq. 1), since it grows by "
+                f"{other.slope_L_min_V:.3g} at {other.dp_MPa:.4g} MPa ('{other.source}'): a pressure drop of one of "
+                "them is wrong (misread from a file's name, a wrong unit, a stuck sensor, ports swapped), or the unit "
+                f"of Q, or the supply is at its limit, or the valve compensates its pressure. {WHAT_FOLLOWS}. Correct "
+                "it, or leave that recording out"
+            ),
+            source=test.source,
+        )
+
+
+def _contradict(one: TestResult, other: TestResult) -> bool:
+    """Tell whether the flow gains of two tests can't be of one valve at their pressure drops."""
+    low, high = sorted((one, other), key=lambda test: test.dp_MPa or 0.0)
+    pressures = float(high.dp_MPa or 1) / float(low.dp_MPa or 1)
+    gains = high.slope_L_min_V / low.slope_L_min_V
+    grown = gains / pressures**0.5
+    return pressures > APART and (gains < FALLS or not 1 / GROWS_TOO_LITTLE < grown < GROWS_TOO_MUCH)

@@ -1,0 +1,254 @@
+"""The constrained fits in CasADi: knees and slopes of all ramp tests jointly; the offset curve under its bounds."""
+
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dzdesign.core.errors import InputError
+from dzdesign.identify.fitting.casadi_problems import ONE_AT_A_TIME, branch_numbers, offset_solver, solver_with_numbers
+from dzdesign.identify.knees.characteristic import BranchShape
+
+if TYPE_CHECKING:
+    import casadi as ca
+
+logger = logging.getLogger(__name__)
+
+#: A constraint is active when its slack is below this share of u_max.
+ACTIVE = 1e-7
+#: No test outweighs another by more than this, however quiet its meter was.
+LARGEST_WEIGHT = 1e4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KneeFit:
+    """Result of the joint fit; one row a test, columns rising and falling (NaN where a branch is missing).
+
+    Attributes
+    ----------
+    knee, knee_se : (T, 2) array
+        Knees in V and their standard errors (coloured noise counted).
+    slope : (T, 2) array
+        Slopes at the nominal pressure drop, m³/(s V).
+    active : tuple of str
+        The monotonicity constraints that hold with equality.
+    iterations : int
+        Of the solver.
+    """
+
+    knee: np.ndarray
+    knee_se: np.ndarray
+    slope: np.ndarray
+    active: tuple[str, ...]
+    iterations: int
+
+
+def fit_knees(
+    shapes: list[tuple[BranchShape | None, BranchShape | None]],
+    *,
+    floor: float,
+    u_max: float,
+    trend: str,
+    ordered: int = 1,
+) -> KneeFit:
+    """Fit knees and slopes of all ramp tests jointly, the knees monotone in the pressure drop.
+
+    Model, per test and branch: ``y = slope (u - knee)`` inside the knee window, y being the flow brought to the nominal
+    pressure drop. A reading below the meter's floor enters by its probability (a Tobit term), not as a zero.
+
+    Parameters
+    ----------
+    shapes : list of pairs
+        Rising and falling branch of each test, in the order of rising pressure drop.
+    floor : float
+        Meter floor, m³/s.
+    u_max : float
+        Full command, V.
+    trend : {"decreasing", "increasing", "flat"}
+        Direction in which the knees must run; "flat" leaves them free.
+    ordered : int
+        Column of the branch whose knees must run that way (1: falling); the other branch may run otherwise.
+
+    Raises
+    ------
+    InputError
+        If the solver does not converge.
+    """
+    where = [(row, column) for row, pair in enumerate(shapes) for column, shape in enumerate(pair) if shape]
+    mine = [shapes[row][column] for row, column in where]
+    scales = [_expected_errors(shape) for shape in mine]
+    numbers = [branch_numbers(shape, scale, floor, u_max) for shape, scale in zip(mine, scales, strict=True)]
+    chain = tuple(index for index, (_, column) in enumerate(where) if column == ordered and trend != "flat")
+    order = _order_knees(mine, scales, chain if len(chain) > 1 else (), increasing=trend == "increasing")
+    with ONE_AT_A_TIME:
+        solver, known = solver_with_numbers(numbers, order.chain, order.steps)
+        solution = solver(x0=order.start, p=known, lbg=0.0, ubg=np.inf)
+        said = solver.stats()
+        best, slack = np.asarray(solution["x"]).ravel(), np.asarray(solution["g"]).ravel() * order.unit
+        hessian = _hessian_of_cost(solver, best, known)
+    _log("knees", said)
+    if not said["success"]:
+        raise InputError(
+            f"the joint fit did not converge ({said['return_status']}); "
+            "look at the ramp tests, and leave out the one that is unlike the others"
+        )
+    variance = np.diag(np.linalg.inv(hessian))
+    knee, knee_se, slope = (np.full((len(shapes), 2), np.nan) for _ in range(3))
+    for index, ((row, column), shape, (slope_scale, knee_scale)) in enumerate(zip(where, mine, scales, strict=True)):
+        last = len(where) + index
+        knee[row, column] = shape.knee + best[last] * knee_scale
+        knee_se[row, column] = np.sqrt(variance[last] * shape.colour) * knee_scale
+        slope[row, column] = (1 + best[index] * slope_scale) * shape.slope
+    return KneeFit(
+        knee=knee,
+        knee_se=knee_se,
+        slope=slope,
+        active=tuple(
+            f"{'falling' if ordered else 'rising'} knee of test {where[index][0] + 1} to {where[following][0] + 1}"
+            for (index, following), gap in zip(pairwise(order.chain), slack, strict=True)
+            if gap < ACTIVE * u_max
+        ),
+        iterations=int(said["iter_count"]),
+    )
+
+
+def _log(name: str, said: Mapping[str, Any]) -> None:
+    status, seconds = said["return_status"], said.get("t_wall_total", 0.0)
+    logger.debug("%s: %s after %d iterations, %.3f s", name, status, said.get("iter_count", 0), seconds)
+
+
+def _hessian_of_cost(solver: "ca.Function", at: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Return the second derivatives of a solver's objective, which it has for its own steps: the upper triangle."""
+    import casadi as ca
+
+    constraints = solver.size1_out("g")
+    upper = np.asarray(ca.DM(solver.get_function("nlp_hess_l")(at, known, 1, np.zeros(constraints))))
+    return upper + np.triu(upper, 1).T
+
+
+def _expected_errors(shape: BranchShape) -> tuple[float, float]:
+    """Return rough standard errors of slope (relative) and knee (V): in their units the fit is well scaled."""
+    n = max(float(shape.bins.n.sum()), 1.0)
+    knee = shape.sigma / (shape.slope * np.sqrt(n))
+    return knee * shape.slope / shape.y_max, knee
+
+
+@dataclass(frozen=True, slots=True)
+class _Order:
+    """Which knees must run one way; as `solver_with_numbers` takes it.
+
+    `chain` has their branches, `start` the unknowns (2B,) at which they do. Per step of the chain `unit` is in V what
+    its distance is measured in, and `steps` (S, 3) that distance where the lines have their zeros and by how much the
+    next knee and the one before add to it.
+    """
+
+    chain: tuple[int, ...]
+    start: np.ndarray
+    unit: np.ndarray
+    steps: np.ndarray
+
+
+def _order_knees(
+    shapes: list[BranchShape], scales: list[tuple[float, float]], chain: tuple[int, ...], *, increasing: bool
+) -> _Order:
+    start = np.zeros(2 * len(shapes))
+    if not chain:
+        return _Order(chain, start, np.zeros(0), np.zeros((0, 3)))
+    mine, slots = [shapes[index] for index in chain], np.array(chain)
+    slope_scale, knee_scale = np.array([scales[index] for index in chain]).T
+    steeper, later = _ordered_start(mine, increasing=increasing)
+    start[slots], start[len(shapes) + slots] = steeper / slope_scale, later / knee_scale
+    unit = np.maximum(knee_scale[1:], knee_scale[:-1])  # a standard error, of the worse of the two
+    steps = np.array([np.diff([shape.knee for shape in mine]), knee_scale[1:], -knee_scale[:-1]]) / unit
+    return _Order(chain, start, unit, (steps if increasing else -steps).T)
+
+
+def _ordered_start(shapes: list[BranchShape], *, increasing: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Return relative changes of slopes, and changes of knees in V, after which the knees run one way.
+
+    The zeros of the lines are brought in order by their errors, and each line is turned about its new zero. From a
+    start that breaks the order by thousands of standard errors, as a quiet meter gives it, IPOPT finds no way back and
+    reports an infeasible problem.
+    """
+    from scipy.optimize import isotonic_regression
+
+    weights = []
+    for shape in shapes:
+        bins, centre = shape.bins, np.average(shape.bins.u, weights=shape.bins.n)
+        spread = np.sum(bins.n * (bins.u - centre) ** 2 + bins.c_uu)
+        lever = 1 / bins.n.sum() + (centre - shape.knee) ** 2 / spread
+        weights.append((shape.slope / shape.sigma) ** 2 / lever)
+    knees = np.array([shape.knee for shape in shapes])
+    ordered = isotonic_regression(knees, weights=weights, increasing=increasing).x
+    steeper = []
+    for shape, knee in zip(shapes, ordered, strict=True):
+        bins = shape.bins
+        rise = np.sum(bins.n * bins.y * (bins.u - knee) + bins.c_uy)
+        steeper.append(rise / np.sum(bins.n * (bins.u - knee) ** 2 + bins.c_uu) / shape.slope - 1)
+    return np.array(steeper), ordered - knees
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OffsetFit:
+    """The law's offset over the pressure drop: u_min0 in V, beta (T,) at the tests, and the active bounds (T,) bool."""
+
+    u_min0: float
+    beta: np.ndarray
+    active: np.ndarray
+
+
+def fit_offset(
+    guard: np.ndarray, guard_se: np.ndarray, ceiling: np.ndarray, reference: int, *, u_max: float, trend: str
+) -> OffsetFit:
+    """Fit u_min0 and beta(dP) so that beta u_min0 is as near to the guarded thresholds as its bounds allow.
+
+    The weights are the information of the joint fit about each threshold, so this is that fit's likelihood to second
+    order, with the other parameters at their best. beta is monotone, 1 at the reference (Eqs. 5, 7), and
+    ``beta u_min0 <= ceiling`` at every node; between nodes the chord lies under the ceiling because `ceiling[i]`
+    already is the lower of the bounds on both sides (see `bounds.staircase`).
+
+    Parameters
+    ----------
+    guard, guard_se : (T,) array
+        Guarded thresholds and standard errors, V, in the order of rising pressure drop.
+    ceiling : (T,) array
+        Largest offset that the certificate allows at each test, V.
+    reference : int
+        Index of the test at dP0.
+    u_max : float
+        Full command, V.
+    trend : {"decreasing", "increasing", "flat"}
+        "flat" makes beta 1 everywhere.
+
+    Raises
+    ------
+    InputError
+        If no positive offset meets the bounds.
+    """
+    if ceiling.min() <= 0:
+        raise InputError(
+            f"the threshold's lower bound is {ceiling.min():.3f} V, not above zero: no dead zone can be compensated "
+            "without opening the valve at zero command; check the ramp tests and the meter's zero"
+        )
+    lowest = float(ceiling.min())
+    largest = max(float(guard_se.max()), np.finfo(float).tiny)  # an exact table has no errors
+    weight = (largest / np.maximum(guard_se, largest / np.sqrt(LARGEST_WEIGHT))) ** 2
+    known = np.concatenate([(guard - lowest) * 1e3, (ceiling - lowest) * 1e3, weight / weight.max()])
+    low, high = {"decreasing": (-np.inf, 0.0), "increasing": (0.0, np.inf), "flat": (0.0, 0.0)}[trend]
+    with ONE_AT_A_TIME:
+        solver = offset_solver(guard.size)
+        solution = solver(x0=0.1, p=known, lbx=0.0, lbg=low, ubg=high)
+        said = solver.stats()
+        slack = np.maximum(np.asarray(solution["x"]).ravel(), 0.0) / 1e3
+    _log("offset", said)
+    found = ceiling - slack
+    wrong_way = {"decreasing": np.diff(found), "increasing": -np.diff(found), "flat": np.abs(np.diff(found))}[trend]
+    if not said["success"] or np.any(wrong_way > 2 * ACTIVE * u_max):
+        raise InputError(
+            f"beta(dP) could not be fitted under its bounds ({said['return_status']}); "
+            "check that the ramp tests belong to one valve"
+        )
+    return OffsetFit(u_min0=float(found[reference]), beta=found / found[reference], active=slack < ACTIVE * u_max)

@@ -1,0 +1,240 @@
+"""From the thresholds of both branches to what each guard certifies: bounds, staircase, the law's offset."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dzdesign.core.errors import InputError
+from dzdesign.identify.fitting.bounds import excess_departure, lower_bounds, staircase
+from dzdesign.identify.fitting.constrained_fits import KneeFit, fit_knees, fit_offset
+from dzdesign.identify.fitting.guard_curve import GuardCurve, OpeningCurve
+from dzdesign.identify.knees.prepared_tests import MPA, DescribedTests
+from dzdesign.identify.options import IdentifyOptions
+
+#: Branch (column of the fit) whose threshold a guard protects; "mean" is of both.
+COLUMNS = {"opening": 0, "closing": 1}
+#: Standard errors by which the tail's zero must lie below the knee, in one test or in all together, to be taken for a
+#: soft edge. At 3 one sharp valve in a hundred was, and beta(5 MPa) scattered by 7e-4 instead of 2.6e-4; which soft
+#: edges are found hardly changes (a width of 0.6 V always is, with any meter).
+SOFT_SIGNIFICANCE = 3.5
+#: Standard errors of a lag that was found, against which the bounds guard.
+LAG_ERRORS = 3.0
+#: Errors below this share of u_max weigh alike: an exact table has none.
+FINEST_ERROR = 1e-5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OrderedKnees:
+    """Knees of which those of one branch run the way of the trend.
+
+    Attributes
+    ----------
+    column : int
+        That branch: 0 rising, 1 falling.
+    fit : KneeFit
+        The fit under the trend; the free one where there is none.
+    departure : (T,) array
+        How far each of its knees departs from that direction, V, beyond its own error: data that contradict the
+        certificate's one premise have to pay for it.
+    """
+
+    column: int
+    fit: KneeFit
+    departure: np.ndarray
+
+    @property
+    def knee(self) -> np.ndarray:
+        """Knees of that branch, V."""
+        return self.fit.knee[:, self.column]
+
+    @property
+    def knee_se(self) -> np.ndarray:
+        """Their standard errors, V."""
+        return self.fit.knee_se[:, self.column]
+
+
+@dataclass(frozen=True, slots=True)
+class Threshold:
+    """A guarded threshold, its standard errors and simultaneous lower bounds (V), all (T,)."""
+
+    value: np.ndarray
+    se: np.ndarray
+    bound: np.ndarray
+
+
+def order_knees(
+    group: DescribedTests, free: KneeFit, direction: str, column: int, options: IdentifyOptions, *, alone: bool = False
+) -> OrderedKnees:
+    """Fit the knees again under the trend's direction, and see how far they depart from it.
+
+    Parameters
+    ----------
+    group : DescribedTests
+        The ramp tests.
+    free : KneeFit
+        Fit without a direction.
+    direction : {"decreasing", "increasing", "flat"}
+        Of the side's threshold.
+    column : int
+        Branch whose knees must run that way: 0 rising, 1 falling.
+    options : IdentifyOptions
+        Choices of the engineer.
+    alone : bool
+        Leave the other branch out: the likelihood is a sum over branches, so it does not move this one.
+
+    Raises
+    ------
+    InputError
+        If the fit does not converge.
+    """
+    if len(group.tests) < 2:
+        return OrderedKnees(column=column, fit=free, departure=np.zeros(1))
+    knee, knee_se = free.knee[:, column], free.knee_se[:, column]
+    budget = options.flat_change * options.u_max
+    if direction == "flat":
+        departure = excess_departure(np.abs(knee - knee.mean()), knee_se, budget)
+        return OrderedKnees(column=column, fit=free, departure=departure)
+    shapes = [item.shapes for item in group.tests]
+    if alone:
+        shapes = [tuple(shape if place == column else None for place, shape in enumerate(pair)) for pair in shapes]
+    fit = fit_knees(shapes, floor=group.floor, u_max=options.u_max, trend=direction, ordered=column)
+    departure = excess_departure(np.abs(knee - fit.knee[:, column]), knee_se, budget)
+    return OrderedKnees(column=column, fit=fit, departure=departure)
+
+
+def bound_threshold(group: DescribedTests, knees: OrderedKnees, options: IdentifyOptions) -> Threshold:
+    """Bound the knee, or the tail's zero where that lies below the knee by more than its error: a soft edge."""
+    shapes = [item.shapes[knees.column] for item in group.tests]
+    knee, knee_se = knees.knee, knees.knee_se
+    zero = np.array([shape.tail.zero for shape in shapes])
+    zero_se = np.array([shape.tail.zero_se for shape in shapes])
+    shared = knees.departure.max() + _lag_budget(group, knees.column)
+    # What was subtracted as the meter's zero has an error of its own, which moves all readings of a test together.
+    subtracted = np.array([se * math.sqrt(shape.colour) for se, shape in zip(group.zero_se, shapes, strict=True)])
+    knee_se = np.hypot(knee_se, subtracted / [shape.slope for shape in shapes])
+    zero_se = np.hypot(zero_se, subtracted / [shape.tail.slope for shape in shapes])
+    # A zero error of the meter moves each zero by the error over the slope of the line that was extrapolated.
+    knee_budget = shared + np.array([options.meter_zero / shape.slope for shape in shapes])
+    zero_budget = shared + np.array([options.meter_zero / shape.tail.slope for shape in shapes])
+    # A soft edge passes flow below the knee. Where the tail agrees with the knee's line, that line is all there is.
+    gap, error = knee - zero, np.hypot(knee_se, zero_se)
+    # One edge has passed the flow of all tests, so together they show a softness that none shows alone.
+    together = np.sum(gap / error**2) > SOFT_SIGNIFICANCE * math.sqrt(np.sum(error**-2))
+    soft = (gap > SOFT_SIGNIFICANCE * error) | (together & (gap > 0))
+    knee_bound = lower_bounds(knee, knee_se, options.confidence, knee_budget)
+    zero_bound = lower_bounds(zero, zero_se, options.confidence, zero_budget)
+    return Threshold(
+        np.where(soft, zero, knee),
+        np.where(soft, zero_se, knee_se),
+        np.where(soft, np.minimum(knee_bound, zero_bound), knee_bound),
+    )
+
+
+def _lag_budget(group: DescribedTests, column: int) -> float:
+    """Return by how much an error of a lag that was found may have moved the guarded thresholds, V."""
+    if group.lag.origin != "identified":
+        return 0.0
+    rates = [item.branches[column].rate for item in group.tests]
+    return LAG_ERRORS * group.lag.se * float(np.nanmax(rates))
+
+
+def mean_threshold(one: Threshold, other: Threshold) -> Threshold:
+    """Return the mean of both branches' thresholds, its error as large as their covariance could make it.
+
+    The branches have no sample in common, but slow noise, the correction of the lag and the meter's zero act on both,
+    and how much they share is not known. The standard error of a sum is never above the sum of standard errors (their
+    correlation is at most 1), so half of that is taken; the mean of two bounds, each of the same number of standard
+    errors, is then the mean's bound at the same confidence, with no allowance for a second set of tests.
+    """
+    return Threshold((one.value + other.value) / 2, (one.se + other.se) / 2, (one.bound + other.bound) / 2)
+
+
+def fit_guard_curve(
+    threshold: Threshold, dp: Sequence[float | None], reference: int, direction: str, u_max: float
+) -> tuple[GuardCurve, np.ndarray]:
+    """Fit the law's offset under the staircase of one threshold's bounds.
+
+    Parameters
+    ----------
+    threshold : Threshold
+        What is guarded, T tests.
+    dp : sequence of float or None
+        Pressure drops of the tests, Pa, rising; None where they are unknown.
+    reference : int
+        Index of the test at dP0.
+    direction : {"decreasing", "increasing", "flat"}
+        Of the trend.
+    u_max : float
+        Full command, V.
+
+    Returns
+    -------
+    tuple
+        The curve, and which of its bounds hold with equality, (T,) bool.
+
+    Raises
+    ------
+    InputError
+        If no positive offset meets the bounds.
+    """
+    steps, ceiling = staircase(threshold.bound, direction)
+    offset = fit_offset(threshold.value, threshold.se, ceiling, reference, u_max=u_max, trend=direction)
+    known = dp[0] is not None
+    curve = GuardCurve(
+        u_min0_V=offset.u_min0,
+        beta_dp_MPa=tuple(value / MPA for value in dp) if known else (),
+        beta=tuple(float(value) for value in offset.beta) if known else (),
+        certified_steps_V=tuple(float(step) for step in steps),
+        u_lower_V=tuple(float(value) for value in threshold.bound),
+        u_threshold_V=tuple(float(value) for value in threshold.value),
+    )
+    return curve, offset.active
+
+
+def opening_curve(
+    rising: OrderedKnees, direction: str, guards: Mapping[str, GuardCurve], u_max: float
+) -> OpeningCurve | None:
+    """Return where useful flow begins on opening, from the knees of the rising branch; None where dP is unknown.
+
+    Parameters
+    ----------
+    rising : OrderedKnees
+        Knees of the rising branch under the trend.
+    direction : {"decreasing", "increasing", "flat"}
+        Of the trend.
+    guards : mapping of str to GuardCurve
+        Curves below which it must not lie.
+    u_max : float
+        Full command, V.
+    """
+    dp = next(iter(guards.values())).beta_dp_MPa
+    if not dp:
+        return None
+    knee, se = rising.knee, rising.knee_se
+    if direction == "flat":
+        knee = np.full_like(knee, np.average(knee, weights=np.maximum(se, FINEST_ERROR * u_max) ** -2))
+    # The larger of two curves that run one way runs that way too.
+    highest = np.max([knee, *(curve.u_offset_V for curve in guards.values())], axis=0)
+    return OpeningCurve(dp_MPa=dp, u_V=tuple(map(float, highest)), u_se_V=tuple(map(float, se)))
+
+
+def further_guards(
+    thresholds: Mapping[str, Threshold],
+    dp: Sequence[float | None],
+    reference: int,
+    direction: str,
+    u_max: float,
+) -> dict[str, GuardCurve]:
+    """Fit the curves of further thresholds; one whose bounds leave no positive offset is left out.
+
+    `design` then refuses that guard and says which there are, so nothing is lost without a word.
+    """
+    curves = {}
+    for name, threshold in thresholds.items():
+        try:
+            curves[name], _ = fit_guard_curve(threshold, dp, reference, direction, u_max)
+        except InputError:
+            continue
+    return curves

@@ -1,0 +1,129 @@
+"""`identify`: ramp tests in, `ValveModel` out, each side of the valve on its own."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from dzdesign.core.errors import InputError
+from dzdesign.identify.data_quality.clipped_meter import without_clipping
+from dzdesign.identify.data_quality.pressures import (
+    about_a_stuck_sensor,
+    about_mixtures,
+    about_stuck_recordings,
+    about_typed_pressures,
+)
+from dzdesign.identify.data_quality.quality import most_serious_first
+from dzdesign.identify.data_quality.recordings import about_recordings
+from dzdesign.identify.knees.prepared_tests import L_MIN
+from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.ramps.sides import tests_of_side
+from dzdesign.identify.reading.ramp_files import RampTest
+from dzdesign.identify.side import IdentifiedSide, identify_side
+from dzdesign.identify.valve.model import SIDES, ValveModel, Warning_
+
+#: What ramps of several pressure drops show where a stuck sensor has made one test of them: no word on meter or valve.
+ALSO_OF_A_MIXTURE = ("noise", "bend")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Identified:
+    """The model of a valve, and per side what it was found from."""
+
+    model: ValveModel
+    sides: dict[str, IdentifiedSide]
+
+
+def identify(
+    tests: Sequence[RampTest], options: IdentifyOptions | None = None, record: Mapping[str, str] | None = None
+) -> ValveModel:
+    """Identify k x_max/u_max, the thresholds and beta(dP) of a valve from ramp tests.
+
+    Parameters
+    ----------
+    tests : sequence of RampTest
+        Recordings, in any order; each may hold several ramps, and ramps at one pressure drop are one test. A single
+        recording may lack the pressure drop. A bipolar valve's recordings may hold both sides or one each.
+    options : IdentifyOptions, optional
+        Choices of the engineer.
+    record : mapping of str to str, optional
+        Who and what; it is handed on as it is.
+
+    Returns
+    -------
+    ValveModel
+        The law's parameters (Eqs. 5, 11), with bounds, warnings and provenance.
+
+    Raises
+    ------
+    InputError
+        Where no threshold can be given, with the reason.
+    """
+    return identify_sides(tests, options, record).model
+
+
+def identify_sides(
+    tests: Sequence[RampTest], options: IdentifyOptions | None = None, record: Mapping[str, str] | None = None
+) -> Identified:
+    """Identify a valve as `identify` does, and return beside it what each side was found from."""
+    options = options or IdentifyOptions()
+    if not tests:
+        raise InputError("no ramp tests were given; expected at least one file")
+    sides: dict[str, IdentifiedSide] = {}
+    warnings: list[Warning_] = []
+    for name, sign in SIDES.items():
+        mine = tests_of_side(tests, sign, options.u_max)
+        if not mine:
+            continue
+        stuck = tuple(about_a_stuck_sensor(mine))
+        mixed = stuck or tuple(about_mixtures(mine))
+        pressures = stuck or (*mixed, *_about_single_pressures(mine))
+        mine, own, clipped = without_clipping(mine, options)
+        try:
+            sides[name] = identify_side(mine, own)
+        except InputError as error:
+            # Ramps of several pressures taken for one test may be refused for any reason: the cause is this.
+            reason = f"{error}; it may be that {mixed[0].text}" if mixed else str(error)
+            if not sides:
+                raise InputError(reason) from error
+            warnings.append(Warning_(code="side-refused", text=f"the {name} side is missing: {reason}", source=None))
+            continue
+        prefix = f"{name} side: " if len(sides) > 1 else ""
+        own_words = [item for item in sides[name].warnings if not mixed or item.code not in ALSO_OF_A_MIXTURE]
+        warnings += [replace(item, text=prefix + item.text) for item in (*pressures, *clipped, *own_words)]
+    lag = next(iter(sides.values())).described.lag
+    model = ValveModel(
+        u_max_V=options.u_max,
+        meter_floor_L_min=max(side.described.floor for side in sides.values()) / L_MIN,
+        meter_lag_s=lag.seconds,
+        meter_lag_is=lag.origin,
+        meter_zero_L_min=options.meter_zero / L_MIN,
+        knee_window=options.knee_window,
+        sides={name: side.model for name, side in sides.items()},
+        warnings=most_serious_first(
+            (*about_recordings(tests), *([_about_two_sides()] if len(sides) > 1 else []), *warnings)
+        ),
+        made_from=tuple(
+            dict.fromkeys(file for side in sides.values() for item in side.described.tests for file in item.files)
+        ),
+        record=record or {},
+    )
+    return Identified(model=model, sides=sides)
+
+
+def _about_single_pressures(mine: Sequence[RampTest]) -> list[Warning_]:
+    """Return what is weak in the pressure drop of single recordings; of a stuck one not that it was typed in."""
+    stuck = list(about_stuck_recordings(mine))
+    known = {item.source for item in stuck}
+    return stuck + [item for item in about_typed_pressures(mine) if item.source not in known]
+
+
+def _about_two_sides() -> Warning_:
+    """Say that a design for commands of one sign, which is the default, leaves one side out."""
+    return Warning_(
+        code="two-sides",
+        text=(
+            "both sides are identified, but a command of one sign, which `design` assumes, drives the positive side "
+            "only: the negative one is then left out of the firmware. Give `design` a --command-signal of both signs, "
+            "such as '-10..10 V x 0.15 + 1.5 V'"
+        ),
+        source=None,
+    )

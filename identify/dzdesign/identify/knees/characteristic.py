@@ -1,0 +1,289 @@
+"""What the branches show of the valve's characteristic: plateau, knee, first flow seen, noise."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dzdesign.identify.knees.linear_fits import find_straight_parts
+from dzdesign.identify.knees.linear_region import GATE, GatedLine, ReadBranch, colour_of_blocks, fit_line
+from dzdesign.identify.knees.noise import colour_factor, measure_roughness, robust_sigma
+from dzdesign.identify.knees.profile import crossing, flow_at_top, hole_within, smooth_profile
+from dzdesign.identify.ramps.branches import Bins, bin_branch
+
+#: Standard deviations of a shut reading above which the mean of a bin is flow.
+FIRST_SEEN = 5.0
+#: The tail runs from the first flow seen to this multiple of it.
+TAIL = 3.0
+#: Fewest samples in the tail for a line.
+TAIL_SAMPLES = 12
+#: Fewest levels of the command in the tail for a line: the steps of a staircase may put all of it at one.
+TAIL_LEVELS = 3
+#: Rounds in which censored samples of the tail are filled in and its line laid: each leaves a third of the error.
+TAIL_ROUNDS = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Tail:
+    """What the meter sees of the edge: a line through the first flows that count.
+
+    Attributes
+    ----------
+    zero, zero_se : float
+        Its zero and the standard error, V.
+    slope : float
+        m³/(s V).
+    at_level, at_level_se : float
+        Command at which it reaches the flow that counts as flow, and the standard error, V.
+    hole : tuple of float or None
+        Commands between which rows are missing, if flow begins there, V: then `zero` is the lower of them.
+    """
+
+    zero: float
+    zero_se: float
+    slope: float
+    at_level: float
+    at_level_se: float
+    hole: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BranchShape:
+    """One branch of one ramp test, described.
+
+    Attributes
+    ----------
+    rising : bool
+        Direction of the command.
+    bins : Bins
+        Sufficient statistics of the knee window, outliers left out (V, m³/s at the nominal pressure drop).
+    y_max : float
+        Largest flow at the nominal pressure drop, m³/s.
+    slope, knee : float
+        Start values: the straight line over the knee window, m³/(s V), and its zero, V.
+    sigma : float
+        Robust standard deviation of one sample about the line, m³/s.
+    colour : float
+        Long-run variance over variance of one sample (1 for white noise, more for coloured noise or a bent line).
+    window : tuple of float
+        Flows between which the characteristic was found straight, over the largest flow.
+    level : float
+        Flow that counts as flow, m³/s: the meter's floor, its noise or `USEFUL_FLOW`, whichever is largest.
+    tail : Tail
+        The first flows that count.
+    onset, onset_se : float
+        Where the valve opens (or closes), as far as the meter shows it, and the standard error, V.
+    saturates : bool
+        True if the flow at full command lies clearly below the straight line.
+    outliers : int
+        Samples gated out of the window.
+    dropped : float
+        Share of the samples that drop out: that read below the floor where no flow below it is credible.
+    read, line : ReadBranch, GatedLine
+        The samples that all this was read from, and which of them the line rests on.
+    """
+
+    rising: bool
+    bins: Bins
+    y_max: float
+    slope: float
+    knee: float
+    sigma: float
+    colour: float
+    window: tuple[float, float]
+    level: float
+    tail: Tail
+    onset: float
+    onset_se: float
+    saturates: bool
+    outliers: int
+    dropped: float
+    read: ReadBranch
+    line: GatedLine
+
+
+def describe_branches(reads: Sequence[ReadBranch], *, u_max: float, window: tuple[float, float]) -> list[BranchShape]:
+    """Describe all branches of a valve: where the straight part lies, its line, its noise, and the tail below it.
+
+    Parameters
+    ----------
+    reads : sequence of ReadBranch
+        All branches of all ramp tests: one meter has read them, so they tell its noise together.
+    u_max : float
+        Full command, V.
+    window : tuple of float
+        Shares of the largest flow between which the characteristic is taken as straight.
+
+    Raises
+    ------
+    InputError
+        If a window holds too few samples for a line, or the flow does not rise in it.
+    """
+    parts = find_straight_parts(reads, u_max=u_max, window=window)
+    return [
+        _describe(read, line, level, noise, parts.correlation, u_max)
+        for read, line, level, noise in zip(reads, parts.lines, parts.levels, parts.noises, strict=True)
+    ]
+
+
+def _describe(
+    read: ReadBranch, line: GatedLine, level: float, noise: float, correlation: float, u_max: float
+) -> BranchShape:
+    branch = read.branch
+    tail = _find_tail(read, level, line, noise, correlation, u_max)
+    onset, onset_se = _find_onset(read, tail, level, noise)
+    return BranchShape(
+        rising=branch.rising,
+        bins=bin_branch(branch.u[line.kept], read.y[line.kept], line.censored[line.kept], u_max),
+        y_max=read.y_max,
+        slope=line.slope,
+        knee=line.knee,
+        sigma=line.sigma,
+        colour=line.colour,
+        window=line.window,
+        level=level,
+        tail=tail,
+        onset=onset,
+        onset_se=onset_se,
+        saturates=read.y_max < 0.93 * line.slope * (branch.u.max() - line.knee),
+        outliers=line.outliers,
+        dropped=line.dropped,
+        read=read,
+        line=line,
+    )
+
+
+def find_meter_floor(u: np.ndarray, q: np.ndarray, u_max: float) -> float | None:
+    """Return the flow at which the meter wakes up, m³/s, or 0 if it shows no floor; None if that can't be told.
+
+    A meter with a floor reads (about) zero, then jumps: between its noise and its floor there are next to no
+    readings, although the ramp sweeps those flows at the same pace as the flows above. Where rows are missing the ramp
+    did not sweep them, and the flows that nobody recorded look like a floor.
+    """
+    u_profile, q_profile = smooth_profile(u, q, u_max)
+    q_max = flow_at_top(u_profile, q_profile)
+    start, half = (crossing(u_profile, q_profile, share * q_max) for share in (0.12, 0.5))
+    straight = int(np.sum((u >= start) & (u <= half)))
+    density = straight / (0.38 * q_max)  # readings per unit of flow where the valve is known to open smoothly
+    shut = q[u < 0.5 * start]
+    if shut.size < 5 or straight < 100 or u_profile.size < 200:  # a staircase skips flows, whatever the meter
+        return 0.0
+    noise = robust_sigma(shut)
+    lowest = max(3 * noise, 1e-3 * q_max)
+    # Near the opening only: far below it, thousands of shut readings would put some of their noise into the gap.
+    # It reaches down to where the profile leaves the noise, or a soft edge's small flows would be cut off and missed.
+    near = u > min(start - 0.5 * (half - start), crossing(u_profile, q_profile, lowest))
+    readings = np.sort(q[near & (q > lowest) & (q < 0.5 * q_max)])
+    expected = density * (readings - lowest)
+    gap = np.flatnonzero((np.arange(readings.size) < 0.1 * expected) & (expected > 20))
+    floor = float(readings[gap[-1]]) if gap.size else 0.0
+    swept = (crossing(u_profile, q_profile, flow) for flow in (lowest, floor))
+    return None if floor and hole_within(u_profile, *swept, u_max) else floor
+
+
+def _without_outliers(u: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the samples within `GATE` robust standard deviations of their line, in three rounds."""
+    kept = np.ones(u.size, dtype=bool)
+    for _ in range(3):
+        slope, zero = fit_line(u[kept], y[kept])
+        residual = y - slope * (u - zero)
+        sigma = robust_sigma(residual)
+        inside = np.abs(residual - np.median(residual)) <= GATE * sigma
+        if inside.sum() < TAIL_SAMPLES or np.ptp(u[inside]) == 0:
+            break
+        kept = inside
+    return u[kept], y[kept]
+
+
+def _with_censored(
+    u: np.ndarray, y: np.ndarray, u_cut: np.ndarray, floor: float, sigma: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the samples of a tail and, for those that read below the floor, what they would have read on average.
+
+    Left out, they would lift the line's lower end, where only the noise's upper half is seen, and every sharp edge
+    would look a little soft. Expectation and maximisation take turns (a Tobit line); where flow below the floor is not
+    credible, a zero is a drop-out.
+    """
+    slope, zero = fit_line(u, y)
+    if not u_cut.size or not slope > 0:
+        return u, y
+    from scipy.special import erfcx
+
+    for _ in range(TAIL_ROUNDS):
+        line = slope * (u_cut - zero)
+        credible = line < floor + GATE * sigma
+        below = (line[credible] - floor) / (math.sqrt(2) * sigma)
+        # The mean of a normal law cut off above: mu - sigma phi/Phi, by the scaled error function exact far below too.
+        filled = line[credible] - sigma * math.sqrt(2 / math.pi) / erfcx(below)
+        u_all, y_all = np.concatenate([u, u_cut[credible]]), np.concatenate([y, filled])
+        slope, zero = fit_line(u_all, y_all)
+        if not slope > 0:
+            return u, y
+    return u_all, y_all
+
+
+def _find_onset(read: ReadBranch, tail: Tail, level: float, noise: float) -> tuple[float, float]:
+    """Return where flow starts and the standard error, V: the first flow seen, or the tail's zero if that is lower.
+
+    Of a noisy meter the first flow seen comes late, and the tail tells more; a quiet one shows flows far too small to
+    count, below the tail. Of a meter whose noise is not seen, as in a table, nothing less than what counts is flow.
+    """
+    least = max(read.floor, FIRST_SEEN * noise) if noise > 0 else level
+    u, y = read.profile
+    first = crossing(u, y, least)
+    if first >= tail.zero:
+        return tail.zero, tail.zero_se
+    at = int(np.clip(np.searchsorted(u, first), 1, u.size - 1))
+    return first, float(u[at] - u[at - 1])
+
+
+def _find_tail(
+    read: ReadBranch, level: float, line: GatedLine, noise: float, correlation: float, u_max: float
+) -> Tail:
+    """Extrapolate the first flow seen to zero: the valve opens (or closes) no later than this, as far as can be seen.
+
+    A soft edge passes flow below the knee. What the meter sees of it is the tail from `level` to `TAIL` times it; the
+    line through the tail crosses zero at or below the knee's. What happens below `level` stays hidden.
+    """
+    u, profile = read.branch.u, read.profile
+    first, last = crossing(*profile, level), crossing(*profile, TAIL * level)
+    hole = hole_within(profile[0], first, first, u_max)
+    if hole:
+        return _tail_in_a_hole(profile[0], first, level, hole)
+    tail = (u >= first) & (u <= last)
+    seen = tail & (read.branch.q >= 0.5 * read.floor)
+    if seen.sum() >= TAIL_SAMPLES and np.unique(u[seen]).size >= TAIL_LEVELS:
+        u_tail, y_tail = _without_outliers(u[seen], read.y[seen])
+        u_tail, y_tail = _with_censored(u_tail, y_tail, u[tail & ~seen], read.floor, line.sigma)
+        tail_slope, onset = fit_line(u_tail, y_tail)
+        if tail_slope > 0.1 * line.slope:  # else a notch or a leak: no line, so the chord below
+            residual = y_tail - tail_slope * (u_tail - onset)
+            sigma = math.sqrt(np.sum(residual**2) / (u_tail.size - 2))
+            sigma = sigma if seen.sum() == tail.sum() else max(sigma, line.sigma)  # what was filled in does not scatter
+            roughness = measure_roughness(u_tail, residual)
+            colour = max(colour_of_blocks(residual, max(sigma, 1e-12)), colour_factor(correlation, roughness, sigma))
+            spread = np.sum((u_tail - u_tail.mean()) ** 2)
+            at_level = onset + level / tail_slope
+            errors = [
+                sigma * math.sqrt((1 / u_tail.size + (u_tail.mean() - at) ** 2 / spread) * colour) / tail_slope
+                for at in (onset, at_level)
+            ]
+            return Tail(onset, errors[0], tail_slope, at_level, errors[1])
+    # Too few samples for a line, as in a staircase test: the chord, its ends known to one level of the command.
+    at = int(np.clip(np.searchsorted(profile[0], first), 1, profile[0].size - 1))
+    gap = float(profile[0][at] - profile[0][at - 1])
+    width = max(last - first, gap)
+    chord = (TAIL - 1) * level / width
+    error = gap + noise / chord
+    # At the level before, less flows than counts, so the zero is not below it.
+    return Tail(max(first - level / chord, float(profile[0][at - 1])), error, chord, first, error)
+
+
+def _tail_in_a_hole(u: np.ndarray, first: float, level: float, hole: tuple[float, float]) -> Tail:
+    """Return what can be said where rows are missing in which the flow begins: no sooner than at their lower end.
+
+    What lies above them may be straight, and its zero far above a soft edge that nobody recorded.
+    """
+    low, high = hole
+    return Tail(low, float(np.median(np.diff(u))), level / (high - low), first, high - low, hole)

@@ -1,0 +1,270 @@
+"""Ramp tests made comparable: zero error out, branches apart, at the nominal pressure drop, in order, described."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dzdesign.core.errors import InputError
+from dzdesign.identify.knees.characteristic import BranchShape, describe_branches, find_meter_floor
+from dzdesign.identify.knees.linear_region import ReadBranch, read_branch
+from dzdesign.identify.knees.meter_lag import MeterLag, find_lag
+from dzdesign.identify.knees.noise import robust_sigma
+from dzdesign.identify.knees.profile import flow_at_top, smooth_profile
+from dzdesign.identify.knees.refusals import refuse_a_jump, refuse_a_shut_valve, refuse_a_wrong_pressure
+from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.ramps.branches import Branch, at_nominal_pressure
+from dzdesign.identify.ramps.pooling import PooledTest, pool_ramps
+from dzdesign.identify.ramps.splitting import Ramp, despiked, nominal_dp, split_ramps
+from dzdesign.identify.reading.ramp_files import RampTest
+
+MPA = 1e6
+L_MIN = 1e-3 / 60
+#: A recording whose command moves by less than this share of u_max is no part of a ramp.
+SMALLEST_SWEEP = 0.1
+#: A recording that comes to this share of the largest command is whole: the valve must have opened in it.
+FULL_SWEEP = 0.95
+#: Commands within this share of u_max are at rest; a wider one is taken where so few readings would be left.
+AT_REST, FEWEST_AT_REST = (0.01, 0.03, 0.1), 20
+#: Share of the largest flow that is a flow for certain, and share of the command there that lies far below it.
+FIRST_FLOW, FAR_BELOW = 0.2, 0.5
+#: A reading at rest below this share of the largest flow is no zero error.
+ZERO_SHARE = 2e-3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DescribedTest:
+    """One ramp test with its nominal pressure drop (Pa, None if unknown), its branches and their shapes.
+
+    `ramps` are the ramps in it, `files` the source and SHA-256 of every file in it.
+    """
+
+    test: RampTest
+    dp: float | None
+    branches: tuple[Branch | None, Branch | None]
+    shapes: tuple[BranchShape | None, BranchShape | None]
+    q_max: float
+    ramps: tuple[str, ...]
+    files: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DescribedTests:
+    """All ramp tests of a valve, in the order of rising pressure drop.
+
+    Attributes
+    ----------
+    tests : tuple of DescribedTest
+        All with the same branches.
+    floor : float
+        Meter floor, given or found, m³/s.
+    lag : MeterLag
+        Of the meter, declared or found.
+    zero_L_min : dict
+        Source -> flow read at zero command, where it is not zero; it has been subtracted.
+    zero_se : tuple of float
+        Standard error of what was subtracted from each of `tests`, as of white noise, m³/s; 0 where nothing was.
+    """
+
+    tests: tuple[DescribedTest, ...]
+    floor: float
+    lag: MeterLag
+    zero_L_min: dict[str, float]
+    zero_se: tuple[float, ...]
+
+
+def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> DescribedTests:
+    """Make ramp tests comparable and describe their branches.
+
+    Parameters
+    ----------
+    tests : sequence of RampTest
+        In any order.
+    options : IdentifyOptions
+        Choices of the engineer.
+
+    Raises
+    ------
+    InputError
+        For a test that holds no ramp or no flow, and for tests that can't stand beside one another.
+    """
+    if not tests:
+        raise InputError("no ramp tests were given; expected at least one file")
+    zeros = [_reading_at_zero(test, options.u_max) for test in tests]
+    zero_se = {test.source: se for test, (_, se) in zip(tests, zeros, strict=True)}
+    tests = [replace(test, q=test.q - zero) for test, (zero, _) in zip(tests, zeros, strict=True)]
+    ramps = split_recordings(tests, options, options.meter_lag or 0.0)
+    lag = find_lag(ramps, options)
+    pooled = pool_ramps(ramps if lag.origin != "identified" else split_recordings(tests, options, lag.seconds))
+    _refuse_what_shows_no_dead_zone(pooled, options)
+    floor = options.meter_floor if options.meter_floor is not None else found_floor(pooled, options)
+    reads = [read for item in pooled for read in _read(item, floor, options.u_max)]
+    for read in reads:
+        refuse_a_jump(read, options.u_max)
+    shapes = iter(describe_branches(reads, u_max=options.u_max, window=options.knee_window))
+    described = [_describe(item, shapes, options.u_max) for item in pooled]
+    described = _in_order_of_pressure(described)
+    _refuse_mixed_branches(described)
+    return DescribedTests(
+        tests=tuple(described),
+        floor=floor,
+        lag=lag,
+        zero_L_min={test.source: zero / L_MIN for test, (zero, _) in zip(tests, zeros, strict=True) if zero},
+        # Of several recordings pooled to one test, the worst: each stands for its own part of the ramp.
+        zero_se=tuple(max(zero_se.get(name, 0.0) for name, _ in item.files) for item in described),
+    )
+
+
+def _reading_at_zero(test: RampTest, u_max: float) -> tuple[float, float]:
+    """Return what the meter reads at zero command where that is not zero, and its standard error, m³/s.
+
+    It is the meter's zero error, or a leak. Thousands of readings at rest tell it far better than any declared bound;
+    zeros are returned where it does not stand out.
+    """
+    rest = readings_at_rest(test, u_max)
+    if rest.size < FEWEST_AT_REST:
+        return 0.0, 0.0
+    zero, error = float(np.median(rest)), _error_of_median(rest)
+    stands_out = abs(zero) > max(5 * error, ZERO_SHARE * float(np.abs(test.q).max()))
+    return (zero, float(error)) if stands_out else (0.0, 0.0)
+
+
+def readings_at_rest(test: RampTest, u_max: float) -> np.ndarray:
+    """Return the flows read where the command rests, m³/s; fewer than `FEWEST_AT_REST` if it does so nowhere.
+
+    Of the hold before the first ramp only the later half counts, and none of it if it still drifts: hoses and meter may
+    be filling. Where the command hardly rests, what the meter reads far below the first flow serves as well.
+    """
+    flowing = np.abs(test.q) > FIRST_FLOW * np.abs(test.q).max()
+    opens = float(np.quantile(np.abs(test.u[flowing]), 0.01)) if flowing.any() else 0.0
+    rest = test.q[:0]
+    for share in AT_REST:
+        at_rest = np.abs(test.u) <= share * u_max
+        if share > AT_REST[0] and share * u_max > FAR_BELOW * opens:
+            break  # the valve may be open there
+        rest = _without_filling(test, at_rest)
+        if rest.size >= FEWEST_AT_REST:
+            break
+    return rest
+
+
+def _without_filling(test: RampTest, at_rest: np.ndarray) -> np.ndarray:
+    before = int(np.argmin(at_rest)) if not at_rest.all() else 0
+    third, fourth = test.q[before // 2 : 3 * before // 4], test.q[3 * before // 4 : before]
+    drifts = third.size >= 5 and abs(np.median(third) - np.median(fourth)) > 5 * _error_of_median(fourth)
+    return test.q[at_rest & (np.arange(at_rest.size) >= (before if drifts else before // 2))]
+
+
+def _error_of_median(values: np.ndarray) -> float:
+    return robust_sigma(values) / np.sqrt(values.size)
+
+
+def split_recordings(tests: Sequence[RampTest], options: IdentifyOptions, lag: float) -> list[Ramp]:
+    """Split every recording into ramps; refuse what has no ramp, too large a command, a wrong pressure, or no flow.
+
+    Parameters
+    ----------
+    tests : sequence of RampTest
+        In any order.
+    options : IdentifyOptions
+        Choices of the engineer.
+    lag : float
+        Of the flow meter, s.
+    """
+    ramps = []
+    highest = max(float(despiked(test.u).max()) for test in tests)
+    for test in tests:
+        top = float(despiked(test.u).max())
+        if top > 1.05 * options.u_max:
+            raise InputError(
+                f"'{test.source}': the command reaches {top:.2f} V, above u_max = {options.u_max:g} V; give --u-max"
+            )
+        if test.dp is None and len(tests) > 1:
+            raise InputError(
+                f"'{test.source}' has no column of dP (or pA and pB); several ramp tests can only be told apart by it: "
+                "record it, or declare it by --dp or [dp]"
+            )
+        if lag > 0 and not np.ptp(test.time) > 0:
+            raise InputError(
+                f"'{test.source}': the time stands still at {test.time[0]:g} s, so the meter's lag can't be taken out; "
+                "correct the column of time, or leave out --meter-lag"
+            )
+        mine = split_ramps(test, lag)
+        if np.ptp(test.u) < SMALLEST_SWEEP * options.u_max or not any(ramp.branches for ramp in mine):
+            raise _no_ramp(test)
+        for ramp in mine:
+            refuse_a_wrong_pressure(test.source, ramp.dp)
+        for item in pool_ramps(mine) if top >= FULL_SWEEP * highest else ():  # a fragment may well see no flow
+            refuse_a_shut_valve(item.test.source, item.branches, options.u_max)
+        ramps += mine
+    return ramps
+
+
+def _no_ramp(test: RampTest) -> InputError:
+    return InputError(
+        f"'{test.source}' holds no ramp of the command from near zero up: it runs from {test.u.min():.2f} to "
+        f"{test.u.max():.2f} V, expected a sweep over half of the command at least, without jumps; record it so, from "
+        "below the threshold"
+    )
+
+
+def _refuse_what_shows_no_dead_zone(pooled: list[PooledTest], options: IdentifyOptions) -> None:
+    """Refuse a pressure drop without a whole branch, and a recording or a test whose valve never opens."""
+    for item in pooled:
+        if item.branches == (None, None):
+            raise _no_ramp(item.test)
+        refuse_a_shut_valve(item.test.source, item.branches, options.u_max)
+
+
+def found_floor(pooled: list[PooledTest], options: IdentifyOptions) -> float:
+    """Return the largest meter floor that any branch shows (one meter, so one floor), m³/s; 0 if none can tell.
+
+    Parameters
+    ----------
+    pooled : list of PooledTest
+        All of them.
+    options : IdentifyOptions
+        Choices of the engineer.
+    """
+    branches = (branch for item in pooled for branch in item.branches if branch is not None)
+    floors = (find_meter_floor(branch.u, branch.q, options.u_max) for branch in branches)
+    return max((floor for floor in floors if floor is not None), default=0.0)
+
+
+def _read(item: PooledTest, floor: float, u_max: float) -> Iterator[ReadBranch]:
+    """Bring the flows of a test's branches to its nominal pressure drop."""
+    dp = nominal_dp(item.test)
+    for branch in filter(None, item.branches):
+        y = at_nominal_pressure(branch, dp)
+        yield read_branch(branch, y, u_max=u_max, floor=floor, source=item.test.source)
+
+
+def _describe(item: PooledTest, shapes: Iterator[BranchShape], u_max: float) -> DescribedTest:
+    """Put a test together; `shapes` gives those of its branches next."""
+    mine = tuple(next(shapes) if branch else None for branch in item.branches)
+    q_max = max(flow_at_top(*smooth_profile(branch.u, branch.q, u_max)) for branch in item.branches if branch)
+    return DescribedTest(
+        test=item.test,
+        dp=nominal_dp(item.test),
+        branches=item.branches,
+        shapes=mine,
+        q_max=q_max,
+        ramps=item.ramps,
+        files=item.files,
+    )
+
+
+def _in_order_of_pressure(described: list[DescribedTest]) -> list[DescribedTest]:
+    """Sort by pressure drop; what was read of all ramps together may fall together with the next test's by a hair."""
+    return sorted(described, key=lambda item: (item.dp or 0.0, item.test.source))
+
+
+def _refuse_mixed_branches(described: list[DescribedTest]) -> None:
+    """Refuse tests of which some have a branch that others lack: they can't be compared."""
+    for column, name in ((0, "rising"), (1, "falling")):
+        lacking = [item.test.source for item in described if item.shapes[column] is None]
+        if lacking and len(lacking) < len(described):
+            raise InputError(
+                f"'{lacking[0]}' has no {name} branch while other ramp tests have one; "
+                "record every pressure drop up and down, or leave that file out"
+            )

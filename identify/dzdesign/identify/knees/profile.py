@@ -1,0 +1,85 @@
+"""The course of the flow over the command, smoothed: where it crosses a level, and what it is at full command."""
+
+import numpy as np
+
+from dzdesign.identify.ramps.branches import bin_index
+
+#: Share of the command's range, from the top, over which the largest flow is read.
+TOP = 0.05
+#: Points off that line by more than so many robust standard deviations, and this share of the flow, are left out.
+TOP_GATE, SMALLEST_MISS = 6.0, 0.05
+#: A step between two points of a profile is a hole, rows that are missing, beyond so many usual steps, and this share
+#: of u_max.
+USUAL_STEPS, SMALLEST_HOLE = 4.0, 2e-3
+
+
+def smooth_profile(u: np.ndarray, y: np.ndarray, u_max: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return command and flow averaged over bins of u and freed of single spikes (medians of five bins)."""
+    index, size = bin_index(u, u_max)
+    n = np.bincount(index)
+    u_mean = np.bincount(index, weights=u) / n
+    y_mean = np.bincount(index, weights=y) / n
+    if size < 200:  # one level a step, as a staircase test gives: nothing to smooth over
+        return u_mean, y_mean
+    padded = np.pad(y_mean, 2, mode="edge")
+    return u_mean, np.sort(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)[:, 2]
+
+
+def crossing(u: np.ndarray, y: np.ndarray, level: float) -> float:
+    """Return the command that best parts the profile below `level` from that above it (linear between its points).
+
+    Fewest points are on the wrong side of it, so a few drop-outs far above it do not move it.
+    """
+    below = y < level
+    wrong = np.concatenate(([0], np.cumsum(~below))) + np.concatenate((np.cumsum(below[::-1])[::-1], [0]))
+    last = u.size - 1 - int(np.argmin(wrong[::-1]))
+    if last < 0:
+        return float(u[0])
+    if last + 1 == u.size:
+        return float(u[-1])
+    share = (level - y[last]) / (y[last + 1] - y[last])
+    return float(u[last] + share * (u[last + 1] - u[last]))
+
+
+def hole_within(u: np.ndarray, low: float, high: float, u_max: float) -> tuple[float, float] | None:
+    """Return the widest stretch without samples that shares a command with [low, high], or None; V.
+
+    Parameters
+    ----------
+    u : (P,) array
+        Commands of a profile, rising, V. Where all steps are wide, as of a staircase, none is a hole.
+    low, high : float
+        Commands between which it matters, V.
+    u_max : float
+        Full command, V.
+    """
+    steps = np.diff(u)
+    if not steps.size:
+        return None
+    wide = steps > max(USUAL_STEPS * float(np.median(steps)), SMALLEST_HOLE * u_max)
+    here = np.flatnonzero(wide & (u[:-1] <= high) & (u[1:] >= low))
+    if not here.size:
+        return None
+    at = here[np.argmax(steps[here])]
+    return float(u[at]), float(u[at + 1])
+
+
+def flow_at_top(u_profile: np.ndarray, y_profile: np.ndarray) -> float:
+    """Return the flow at the largest command: the line through the top `TOP` of its range, read at the end.
+
+    Points that lie off the others' line are left out: a run of drop-outs is as long as a bin or two.
+    """
+    top = u_profile >= u_profile[-1] - TOP * np.ptp(u_profile)
+    u, y = u_profile[top], y_profile[top]
+    if u.size < 5:
+        return float(np.median(y))
+    # First a line that a quarter of the points can't move, by the medians of the slopes over half of the range.
+    half = u.size // 2
+    rough = np.median((y[half:] - y[: u.size - half]) / (u[half:] - u[: u.size - half]))
+    miss = y - rough * u
+    miss = np.abs(miss - np.median(miss))
+    kept = miss <= max(TOP_GATE * 1.4826 * np.median(miss), SMALLEST_MISS * float(np.median(y)))
+    u, y = u[kept], y[kept]
+    u_mean, y_mean = u.mean(), y.mean()
+    slope = np.sum((u - u_mean) * (y - y_mean)) / np.sum((u - u_mean) ** 2)
+    return float(y_mean + slope * (u_profile[-1] - u_mean))

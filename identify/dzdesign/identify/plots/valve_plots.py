@@ -1,0 +1,270 @@
+"""Plots of an identified valve: what each threshold rests on, what is certified, and the law's offset beside it.
+
+Only what was identified is drawn: nothing is fitted or smoothed here. A lower bound is drawn at its test alone and the
+staircase between tests, because a chord between two bounds is certified by nothing.
+"""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dzdesign.identify.identification import Identified
+from dzdesign.identify.knees.characteristic import BranchShape
+from dzdesign.identify.knees.prepared_tests import L_MIN, DescribedTest
+from dzdesign.identify.plots.frame import finish, new_figure, plot_style, saved
+from dzdesign.identify.side import IdentifiedSide
+from dzdesign.identify.valve.model import SideModel, TestResult, ValveModel
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+#: Points of a branch that a panel shows at most; a record's 10 000 would hide one another.
+MOST_POINTS = 1500
+#: Residuals beyond this many sigma are drawn at this edge, so that a drop-out does not flatten the others.
+RESIDUAL_EDGE = 8.0
+#: Rising and falling: they differ in hue for the colour-blind (Okabe and Ito), in lightness in print, and in marker.
+COLOURS, MARKERS, NAMES = ("#0072B2", "#E69F00"), ("^", "v"), ("opening", "closing")
+BLACK, GREEN, PURPLE, GREY = "#000000", "#009E73", "#A0467A", "#6E6E6E"
+
+
+def plot_files(found: Identified) -> dict[str, bytes]:
+    """Draw an identified valve, each plot as SVG and as PNG; the same valve gives the same bytes.
+
+    Parameters
+    ----------
+    found : Identified
+        Of `identify_sides`.
+
+    Returns
+    -------
+    dict
+        File name -> content: ``flow_<dP>_MPa`` for each pressure drop, ``thresholds`` and, where beta runs over several
+        pressure drops, ``beta``; of a valve with two sides each name starts with its side's.
+    """
+    files = {}
+    with plot_style():
+        for name, figure in draw_figures(found):
+            for suffix in ("svg", "png"):
+                files[f"{name}.{suffix}"] = saved(figure, suffix)
+    return files
+
+
+def draw_figures(found: Identified) -> Iterator[tuple[str, "Figure"]]:
+    """Return each plot's name and figure, one after the other.
+
+    Parameters
+    ----------
+    found : Identified
+        Of `identify_sides`.
+    """
+    for name, side in found.sides.items():
+        prefix = f"{name}_" if len(found.sides) > 1 else ""
+        for row, flow in enumerate(_flow_names(side.model.tests)):
+            yield prefix + flow, _flow_figure(found.model, side, row)
+        yield f"{prefix}thresholds", _thresholds_figure(side.model)
+        if len(side.model.beta) > 1:
+            yield f"{prefix}beta", _beta_figure(side.model)
+
+
+def _flow_names(tests: tuple[TestResult, ...]) -> list[str]:
+    """Return a name for each pressure drop, with as many digits as tell them apart."""
+    if tests[0].dp_MPa is None:
+        return ["flow"]
+    for digits in range(3, 17):
+        names = [f"flow_{test.dp_MPa:.{digits}g}_MPa" for test in tests]
+        if len(set(names)) == len(names):
+            break
+    return names
+
+
+# Flow over command ---------------------------------------------------------------------------------------------------
+
+
+def _flow_figure(valve: ValveModel, side: IdentifiedSide, row: int) -> "Figure":
+    """Draw one ramp test: the whole range, its edge enlarged, and the residuals about the straight lines."""
+    item, test = side.described.tests[row], side.model.tests[row]
+    figure = new_figure(6.6, *_flow_title(side.model, test))
+    panels = figure.subplot_mosaic([["flow", "edge"], ["residual", "edge"]], height_ratios=(2, 1), width_ratios=(3, 2))
+    flow, edge, residual = (panels[name] for name in ("flow", "edge", "residual"))
+    branches = [
+        (column, shape, _knees(test)[column], side.knees.slope[row, column])
+        for column, shape in enumerate(item.shapes)
+        if shape
+    ]
+    whole = (0.0, max(shape.read.branch.u.max() for _, shape, _, _ in branches))
+    near, flows = _edge_limits(valve, test, item)
+    for axes, limits, size in ((flow, whole, 4.5), (edge, near, 7)):
+        for column, shape, _, _ in branches:
+            _draw_samples(axes, shape, column, *limits)
+        for column, shape, knee, slope in branches:
+            _draw_line(axes, shape, column, knee, slope / L_MIN)
+        for column, _, knee, _ in branches:
+            axes.plot(knee, 0, MARKERS[column], ms=size, color=COLOURS[column], mec=BLACK, mew=0.8,
+                      label=f"knee {NAMES[column]}", zorder=5)  # fmt: skip
+        for column, _, _, _ in branches:  # hollow and larger: a knee at the same command shows inside it
+            axes.plot(_onsets(test)[column], 0, MARKERS[column], ms=1.8 * size, mfc="none", mec=COLOURS[column],
+                      mew=1.6, label=f"onset {NAMES[column]}", zorder=6)  # fmt: skip
+        axes.axvline(test.u_guard_lower_V, color=BLACK, ls="-.", lw=1.2, label="certified bound")
+        if valve.meter_floor_L_min > 0:
+            axes.axhline(valve.meter_floor_L_min, color=GREY, ls=":", lw=1.5, label="meter's floor")
+    for column, shape, knee, slope in branches:
+        _draw_residuals(residual, shape, column, knee, slope)
+    at = "" if test.dp_MPa is None else f" at {test.dp_MPa:.3f} MPa"
+    top = max(shape.y_max for _, shape, _, _ in branches) / L_MIN  # a spike beyond it would flatten all the rest
+    flow.set(ylabel=f"flow Q{at} (L/min)", title="whole range", xlim=whole, ylim=(-0.08 * top, 1.1 * top))
+    edge.set(xlabel="command u (V)", ylabel=f"flow Q{at} (L/min)", title="the edge, enlarged", xlim=near, ylim=flows)
+    sigma = " / ".join(f"{shape.sigma / L_MIN:.2g}" for _, shape, _, _ in branches)
+    residual.set(xlabel="command u (V)", ylabel="residual (σ)", xlim=whole)
+    residual.set(ylim=(-1.15 * RESIDUAL_EDGE, 1.15 * RESIDUAL_EDGE), yticks=(-6, -3, 0, 3, 6))
+    residual.set_title(f"about the straight lines, in their windows; σ = {sigma} L/min")
+    return finish(figure, 2)
+
+
+def _flow_title(side: SideModel, test: TestResult) -> tuple[str, str, str]:
+    """Return the lines that say which test it is and what was found in it."""
+
+    def pair(values: tuple[float | None, float | None]) -> str:
+        return ", ".join(f"{name} {u:.3f} V" for name, u in zip(NAMES, values, strict=True) if u is not None)
+
+    at = "pressure drop not recorded" if test.dp_MPa is None else f"{test.dp_MPa:.3f} MPa"
+    return (
+        f"{at}: {test.source}",
+        f"knee {pair(_knees(test))} (s.e. {1e3 * test.u_knee_se_V:.1f} mV); onset {pair(_onsets(test))}",
+        f"{side.guard} threshold {test.u_guard_V:.3f} V, certified above {test.u_guard_lower_V:.3f} V "
+        f"({_percent(side)} for all tests together); {test.outliers} outliers left out",
+    )
+
+
+def _percent(side: SideModel) -> str:
+    return f"{100 * side.confidence:.6g} %"
+
+
+def _knees(test: TestResult) -> tuple[float | None, float | None]:
+    return test.u_knee_rising_V, test.u_knee_falling_V
+
+
+def _onsets(test: TestResult) -> tuple[float | None, float | None]:
+    return test.u_onset_rising_V, test.u_onset_falling_V
+
+
+def _edge_limits(
+    valve: ValveModel, test: TestResult, item: DescribedTest
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return the ranges of command (V) and flow (L/min) that show knees, onsets, bound and floor."""
+    marks = [u for u in (*_knees(test), *_onsets(test), test.u_guard_lower_V) if u is not None]
+    room = max(0.5 * (max(marks) - min(marks)), 0.01 * valve.u_max_V)
+    low, high = max(min(marks) - room, 0.0), max(marks) + room
+    noise = max(shape.sigma for shape in item.shapes if shape) / L_MIN
+    first_knee = min(u for u in _knees(test) if u is not None)
+    top = max(1.1 * test.slope_L_min_V * (high - first_knee), 2 * valve.meter_floor_L_min, 6 * noise)
+    return (low, high), (-0.15 * top, top)
+
+
+def _thinned(points: np.ndarray) -> np.ndarray:
+    """Return every so-manieth, at most `MOST_POINTS`."""
+    return points[:: max(1, -(-points.size // MOST_POINTS))]
+
+
+def _draw_samples(axes: "Axes", shape: BranchShape, column: int, low: float, high: float) -> None:
+    """Draw the samples of a branch between two commands, at the nominal pressure drop."""
+    u = shape.read.branch.u
+    at = _thinned(np.flatnonzero((u >= low) & (u <= high)))
+    axes.plot(u[at], shape.read.y[at] / L_MIN, MARKERS[column], ms=4 if at.size < 300 else 2, color=COLOURS[column],
+              alpha=0.35, mew=0, rasterized=True, label=f"samples {NAMES[column]}", zorder=2)  # fmt: skip
+
+
+def _draw_line(axes: "Axes", shape: BranchShape, column: int, knee: float, slope: float) -> None:
+    """Draw the straight line (V, L/min/V): solid where samples bear it, dashed from there to its zero, the knee."""
+    inside = shape.read.branch.u[shape.line.inside]
+    ends = np.array([inside.min(), inside.max()])
+    reach = np.array([knee, max(ends[0], knee)])
+    axes.plot(ends, slope * (ends - knee), "-", color=COLOURS[column], lw=2, label=f"line {NAMES[column]}", zorder=4)
+    axes.plot(reach, slope * (reach - knee), "--", color=COLOURS[column], lw=1.6, zorder=4)
+
+
+def _draw_residuals(axes: "Axes", shape: BranchShape, column: int, knee: float, slope: float) -> None:
+    """Draw how far the window's samples lie from the line, over sigma; gated ones are marked, all of them."""
+    line, u = shape.line, shape.read.branch.u
+    miss = np.clip((shape.read.y - slope * (u - knee)) / shape.sigma, -RESIDUAL_EDGE, RESIDUAL_EDGE)
+    used = _thinned(np.flatnonzero(line.kept & ~line.censored))
+    gated = np.flatnonzero(line.inside & ~line.kept)
+    axes.plot(u[used], miss[used], MARKERS[column], ms=4 if used.size < 300 else 2, color=COLOURS[column],
+              alpha=0.35, mew=0, rasterized=True, zorder=2)  # fmt: skip
+    if gated.size:
+        axes.plot(u[gated], miss[gated], "x", ms=5, mew=1.3, color=BLACK, rasterized=True, zorder=3,
+                  label=f"outlier (beyond {RESIDUAL_EDGE:g} σ: at the edge)")  # fmt: skip
+    axes.axhline(0, color=BLACK, lw=0.8)
+
+
+# Over the pressure drop ----------------------------------------------------------------------------------------------
+
+
+def _pressures(side: SideModel) -> np.ndarray:
+    """Return the tested pressure drops, MPa; a single one that was not recorded stands at zero, without a number."""
+    return np.array([test.dp_MPa or 0.0 for test in side.tests])
+
+
+def _label_pressure(axes: "Axes", side: SideModel) -> None:
+    if side.tests[0].dp_MPa is None:
+        axes.set(xlabel="pressure drop dP (not recorded)", xticks=[])
+    else:
+        axes.set_xlabel("pressure drop dP (MPa)")
+
+
+def _thresholds_figure(side: SideModel) -> "Figure":
+    """Draw knees, guarded threshold with its bound, the certified staircase and the law's offset."""
+    dp = _pressures(side)
+    guard = np.array([test.u_guard_V for test in side.tests])
+    bound = np.array([test.u_guard_lower_V for test in side.tests])
+    change, error = (1e3 * (value or 0) for value in (side.trend_change_V, side.trend_change_se_V))
+    trend = f"; {side.trend}: {change:.0f} ± {error:.0f} mV over the range" if side.trend else ""
+    figure = new_figure(
+        5.4,
+        f"Thresholds of {len(dp)} pressure drop{'s' if len(dp) > 1 else ''}: {side.tests[0].source}"
+        + (f" to {side.tests[-1].source}" if len(dp) > 1 else ""),
+        f"{side.guard} threshold guarded ({_percent(side)} for all tests together){trend}",
+        f"u_min0 = {side.u_min0_V:.4f} V" + (f" at dP0 = {side.reference_dp_MPa:.3f} MPa" if side.beta else ""),
+    )
+    axes = figure.subplots()
+    for column, name in enumerate(NAMES):
+        if _knees(side.tests[0])[column] is not None:
+            knee = [_knees(test)[column] for test in side.tests]
+            error = [test.u_knee_se_V for test in side.tests]
+            axes.errorbar(dp, knee, yerr=error, fmt=MARKERS[column], ls="", ms=5, capsize=5, color=COLOURS[column],
+                          mec=BLACK, mew=0.6, label=f"knee {name} ± s.e.", zorder=4)  # fmt: skip
+    axes.vlines(dp, bound, guard, color=GREY, lw=7, alpha=0.35, label="from lower bound to threshold", zorder=1)
+    axes.plot(dp, guard, "s", ms=8.5, mfc="none", mec=BLACK, mew=1.2, label="guarded threshold", zorder=5)
+    axes.plot(dp, bound, "_", ms=12, mew=2, color=BLACK, label="lower bound, at the test", zorder=5)
+    if len(dp) > 1:
+        axes.stairs(side.certified_steps_V, dp, baseline=None, color=GREEN, lw=2, label="certified staircase")
+    offset = side.u_min0_V * np.array(side.beta or (1.0,))
+    axes.plot(dp, offset, "D--", ms=4, lw=1.4, color=PURPLE, label="largest certified offset", zorder=6)
+    axes.set_ylabel("command u (V)")
+    _label_pressure(axes, side)
+    return finish(figure, 2)
+
+
+def _beta_figure(side: SideModel) -> "Figure":
+    """Draw beta with its nodes under what the bounds allow: the staircase and the bounds themselves, over u_min0."""
+    dp, u_min0 = _pressures(side), side.u_min0_V
+    beta = np.array(side.beta)
+    steps = np.array(side.certified_steps_V) / u_min0
+    bound = np.array([test.u_guard_lower_V for test in side.tests]) / u_min0
+    figure = new_figure(
+        5.0,
+        f"β over {dp[0]:.3f} to {dp[-1]:.3f} MPa: {side.tests[0].source} to {side.tests[-1].source}",
+        f"β = {beta[0]:.4f} to {beta[-1]:.4f}, 1 at dP0 = {side.reference_dp_MPa:.3f} MPa "
+        f"(u_min0 = {u_min0:.4f} V); bounds: {_percent(side)} for all tests together",
+    )
+    axes = figure.subplots()
+    axes.plot(dp, bound, "_", ms=14, mew=2, color=BLACK, label="lower bound / u_min0, at the test", zorder=5)
+    axes.stairs(steps, dp, baseline=None, color=GREEN, lw=2, label="certified staircase / u_min0", zorder=3)
+    axes.plot(dp, beta, "D--", ms=5, lw=1.6, color=PURPLE, label="β(dP), straight between its nodes", zorder=4)
+    axes.plot(side.reference_dp_MPa, 1, "o", ms=13, mfc="none", mec=BLACK, mew=1.2, label="dP0, where β = 1")
+    low = axes.get_ylim()[0]
+    axes.stairs(steps, dp, baseline=low, fill=True, color=GREEN, alpha=0.12, label="allowed by all bounds together")
+    axes.set(ylabel="β (no unit)", ylim=(low, None))
+    _label_pressure(axes, side)
+    return finish(figure, 2)

@@ -1,0 +1,108 @@
+"""Ramps at one pressure drop are one test, with more data: from one recording or from several, in any order."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dzdesign.identify.ramps.branches import Branch
+from dzdesign.identify.ramps.splitting import Ramp
+from dzdesign.identify.reading.ramp_files import RampTest
+
+#: Ramps whose pressure drops differ by less than this share are one test.
+SAME_PRESSURE = 0.02
+#: Files that the name of a test lists.
+NAMED_FILES = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PooledTest:
+    """All ramps at one pressure drop.
+
+    Attributes
+    ----------
+    test : RampTest
+        Their samples, one ramp after the other; `source` names the files, and the ramps of a file with several tests.
+    branches : tuple of Branch or None
+        Rising and falling, of all ramps; None where no ramp has any.
+    ramps : tuple of str
+        Each ramp's file, and its number in it.
+    files : tuple of (str, str)
+        Source and SHA-256 of every file in it.
+    """
+
+    test: RampTest
+    branches: tuple[Branch | None, Branch | None]
+    ramps: tuple[str, ...]
+    files: tuple[tuple[str, str], ...]
+
+
+def pool_ramps(ramps: Sequence[Ramp]) -> list[PooledTest]:
+    """Gather ramps by pressure drop, in the order of rising pressure drop.
+
+    Parameters
+    ----------
+    ramps : sequence of Ramp
+        Of all recordings; where a pressure drop is unknown they are one test.
+    """
+    return [_pooled(group) for group in group_by_pressure(ramps)]
+
+
+def group_by_pressure(ramps: Sequence[Ramp]) -> list[list[Ramp]]:
+    """Return ramps in groups of one pressure drop each, in the order of rising pressure drop."""
+    groups: list[list[Ramp]] = []
+    for ramp in sorted(ramps, key=lambda ramp: (ramp.dp or 0.0, ramp.test.source, ramp.number, ramp.test.sha256)):
+        known = [other.dp or 0.0 for other in groups[-1]] if groups else []
+        if groups and (ramp.dp or 0.0) - np.mean(known) <= SAME_PRESSURE * (ramp.dp or 0.0):
+            groups[-1].append(ramp)
+        else:
+            groups.append([ramp])
+    return [sorted(group, key=lambda ramp: (ramp.test.source, ramp.test.sha256, ramp.number)) for group in groups]
+
+
+def _pooled(group: list[Ramp]) -> PooledTest:
+    first = group[0].test
+    dp = None if first.dp is None else np.concatenate([ramp.test.dp for ramp in group])
+    time, u, q = (np.concatenate([getattr(ramp.test, name) for ramp in group]) for name in ("time", "u", "q"))
+    test = RampTest(
+        source=_name(group),
+        sha256=first.sha256,
+        time=time,
+        u=u,
+        q=q,
+        dp=dp,
+        dp_is_declared=any(ramp.test.dp_is_declared for ramp in group),
+    )
+    return PooledTest(
+        test=test,
+        branches=(_joined(group, rising=True), _joined(group, rising=False)),
+        ramps=tuple(_name([ramp], every=True) for ramp in group),
+        files=tuple(dict.fromkeys((ramp.test.source, ramp.test.sha256) for ramp in group)),
+    )
+
+
+def _joined(group: list[Ramp], rising: bool) -> Branch | None:
+    """Return the branches of one direction as one; None unless they span half of the command together."""
+    parts = [branch for ramp in group for branch in ramp.branches if branch.rising == rising]
+    if not parts:
+        return None
+    u, q = (np.concatenate([getattr(part, name) for part in parts]) for name in ("u", "q"))
+    if np.ptp(u) < 0.5 * max(branch.u.max() for ramp in group for branch in ramp.branches):
+        return None
+    dp = None if parts[0].dp is None else np.concatenate([part.dp for part in parts])
+    rates = np.array([part.rate for part in parts])
+    rate = float(np.nanmax(rates)) if np.isfinite(rates).any() else math.nan
+    return Branch(rising=rising, u=u, q=q, dp=dp, rate=rate)
+
+
+def _name(group: list[Ramp], every: bool = False) -> str:
+    """Return the files of a group of ramps, and which ramps of a file if not all are in it, or if `every` is set."""
+    names = []
+    for file in dict.fromkeys((ramp.test.source, ramp.test.sha256) for ramp in group):
+        mine = [ramp for ramp in group if (ramp.test.source, ramp.test.sha256) == file]
+        some = len(mine) < mine[0].of or (every and mine[0].of > 1)
+        numbers = ", ".join(str(ramp.number) for ramp in mine)
+        names.append(f"{file[0]} (ramp{'s' if len(mine) > 1 else ''} {numbers})" if some else file[0])
+    more = len(names) - NAMED_FILES
+    return ", ".join(names[:NAMED_FILES]) + (f" and {more} more" if more > 0 else "")

@@ -1,0 +1,56 @@
+"""The two sides of a bipolar valve: the negative one, mirrored, is a positive one."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from dzdesign.identify.ramps.splitting import despiked
+from dzdesign.identify.reading.ramp_files import RampTest
+
+#: A recording shows a side if its command goes that far into it, over u_max.
+SMALLEST_SWEEP = 0.1
+#: Commands within this share of u_max are at rest: they belong to both sides.
+AT_REST = 0.01
+
+
+def tests_of_side(tests: Sequence[RampTest], sign: int, u_max: float) -> list[RampTest]:
+    """Return the recordings that show one side, commands and flows of that side positive.
+
+    Parameters
+    ----------
+    tests : sequence of RampTest
+    sign : int
+        1 for positive commands, -1 for negative ones.
+    u_max : float
+        Full command, V.
+    """
+    mine = []
+    for test in tests:
+        both = [_reaches(test, side, u_max) for side in (1, -1)]
+        # What shows neither side is refused with the positive one.
+        if both[0 if sign > 0 else 1] or (sign > 0 and not any(both)):
+            own = _without_the_other(test, sign, u_max) if all(both) else test
+            mine.append(_mirrored(own) if sign < 0 else own)
+    return mine
+
+
+def _reaches(test: RampTest, sign: int, u_max: float) -> bool:
+    return test.u.size > 0 and bool((sign * despiked(test.u)).max() >= SMALLEST_SWEEP * u_max)
+
+
+def _without_the_other(test: RampTest, sign: int, u_max: float) -> RampTest:
+    """Leave out the other side: its flow and, in some recordings, its pressure drop have the other sign."""
+    own = sign * test.u >= -AT_REST * u_max
+    dp = None if test.dp is None else test.dp[own]
+    return replace(test, time=test.time[own], u=test.u[own], q=test.q[own], dp=dp)
+
+
+def _mirrored(test: RampTest) -> RampTest:
+    """Return a recording with its command reversed; flow and pressure drop too, where they change sign with it."""
+    open_ = test.u <= 0.8 * test.u.min()
+    q = -test.q if np.median(test.q[open_]) < 0 else test.q
+    dp = test.dp
+    if dp is not None and np.median(dp[open_]) < 0:
+        dp = np.abs(dp)  # at rest it may still have the other side's sign
+    return replace(test, u=-test.u, q=q, dp=dp)

@@ -1,0 +1,1 @@
+"""Reading: recordings of any format enter, `RampTest`s in SI units leave."""

@@ -1,0 +1,252 @@
+"""Labels of columns: which column is which quantity of a ramp test, by its label or by the engineer's word."""
+
+import re
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from math import isclose
+
+from dzdesign.core.errors import InputError, nearest
+from dzdesign.core.units import measures, si_factor
+from dzdesign.identify.reading.table import Table, clean_label
+
+#: Spelling in a header (lower case, letters only) -> quantity of a ramp test.
+COLUMN_NAMES = {
+    "time": "time", "t": "time",
+    "u": "u", "command": "u",
+    "dp": "dP", "δp": "dP", "deltap": "dP",
+    "pa": "pA", "pb": "pB",
+    "q": "Q", "flow": "Q",
+}  # fmt: skip
+QUANTITY_OF_COLUMN = {"time": "time", "u": "voltage", "dP": "pressure", "pA": "pressure", "pB": "pressure", "Q": "flow"}
+#: How a column is best named, for the messages.
+EXAMPLE_LABELS = {"time": "time_s", "u": "u_V", "dP": "dP_MPa", "pA": "pA_MPa", "pB": "pB_MPa", "Q": "Q_Lmin"}
+EXAMPLE_UNITS = {"time": "s", "u": "V", "dP": "MPa", "pA": "MPa", "pB": "MPa", "Q": "L/min"}
+#: Labels among which the one that was meant is looked for.
+MOST_MEANT = 200
+#: Units of a command that is a share of u_max.
+PER_CENT = ("%", "pct", "percent")
+TELLING = ("time", "voltage", "pressure", "flow")
+#: Characters of a label in which a quantity is looked for.
+LONGEST_NAME = 80
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Column:
+    """A column that was found: its label in the file, and its unit ("" if none is known).
+
+    Attributes
+    ----------
+    label, unit : str
+        As the file or ``--columns`` says.
+    stated : str
+        The unit that the file states, where ``--columns`` says another or a range.
+    """
+
+    label: str
+    unit: str
+    stated: str = ""
+
+
+def parse_columns(text: str | Mapping[str, str]) -> dict[str, str]:
+    """Read what ``--columns`` or the table ``columns`` of the options says: quantity -> label in the file.
+
+    Parameters
+    ----------
+    text : str or mapping
+        ``"u=AO0:V, Q=Flow (L/min)"``, or the same as a mapping. A quantity is one of time, u, dP, pA, pB, Q; a label
+        stands as in the file, and a unit that it lacks follows after a colon. A comma parts two entries only before
+        another ``quantity=``, so a label may hold one.
+
+    Raises
+    ------
+    InputError
+        If a quantity is unknown or named twice, or a label is missing.
+
+    Examples
+    --------
+    >>> parse_columns("u=AO0:V, Q=Flow (L/min)")
+    {'u': 'AO0:V', 'Q': 'Flow (L/min)'}
+    """
+    if isinstance(text, str):
+        entries = [entry.partition("=")[::2] for entry in re.split(r"[,;]\s*(?=\w+\s*=)", text)]
+    else:
+        entries = list(text.items())
+    columns: dict[str, str] = {}
+    for name, label in entries:
+        name, label = name.strip(), clean_label(label)
+        quantity = COLUMN_NAMES.get(name.lower())
+        if quantity is None:
+            raise InputError(
+                f"--columns names '{name}', expected {', '.join(QUANTITY_OF_COLUMN)}{nearest(name, QUANTITY_OF_COLUMN)}"
+                '; write for example --columns "u=AO0:V, Q=Flow (L/min)"'
+            )
+        if quantity in columns:
+            raise InputError(f"--columns names {quantity} twice; keep one")
+        if not label:
+            raise InputError(f"--columns gives no label for {quantity}; write for example {quantity}=AO0:V")
+        columns[quantity] = label
+    return columns
+
+
+def find_columns(table: Table, chosen: Mapping[str, str]) -> dict[str, Column]:
+    """Return quantity -> column of a table: those that were chosen, the others by their labels.
+
+    Parameters
+    ----------
+    table : Table
+        As recorded.
+    chosen : mapping
+        Quantity -> label, or label and unit with a colon between them, as `parse_columns` gives it.
+
+    Raises
+    ------
+    InputError
+        If a quantity has no column, or two, or a chosen label is not in the table.
+    """
+    columns = {quantity: _chosen_column(table, quantity, label) for quantity, label in chosen.items()}
+    taken = {column.label for column in columns.values()}
+    pressures = {"dP", "pA", "pB"} if "dP" in chosen or {"pA", "pB"} <= chosen.keys() else set()
+    for label in table.labels:
+        quantity, unit = split_label(label)
+        if quantity is None or label in taken or quantity in chosen.keys() | pressures:
+            continue
+        own = unit
+        unit = own if own and (fits(own, quantity) or label not in table.units) else table.units.get(label, "")
+        unit = "s" if quantity == "time" and not fits(unit, "time") and table.is_clock(label) else unit
+        if quantity in columns and not fits(unit, quantity):
+            continue  # an oil temperature T_degC beside the time t_s, a set point Q_set beside Q_Lmin
+        if quantity in columns and fits(columns[quantity].unit, quantity):
+            raise InputError(
+                f"'{table.path}'{table.header} has two columns of {quantity}: '{columns[quantity].label}' and "
+                f"'{label}'; keep one, give the other another name, or choose by --columns"
+            )
+        _refuse_two_units(table, quantity, label, own)
+        columns[quantity] = Column(label=label, unit=unit)
+    if ("pA" in columns) != ("pB" in columns) and "dP" not in columns:
+        have, lack = ("pA", "pB") if "pA" in columns else ("pB", "pA")
+        raise InputError(
+            f"'{table.path}'{table.header} has a column of {have} but none of {lack}; expected both, or dP"
+        )
+    for quantity in ("time", "u", "Q"):
+        if quantity not in columns:
+            raise _missing_column(quantity, table, columns)
+    return columns
+
+
+def _chosen_column(table: Table, quantity: str, text: str) -> Column:
+    """Return the column that was chosen: the whole text is its label, or else what stands before the last colon."""
+    label, colon, unit = (text, "", "") if text in table.labels else text.rpartition(":")
+    label, unit = (clean_label(label), unit.strip()) if colon else (text, "")
+    if label not in table.labels:
+        raise table.no_column(label, f"--columns names for {quantity}")
+    if table.labels.count(label) > 1:
+        raise InputError(f"'{table.path}'{table.header} has {table.labels.count(label)} columns '{label}'; rename one")
+    _, own = split_label(label)
+    bracketed = bool(re.search(r"[\[(]", label))
+    stated = (own if bracketed or is_signal_or_telling(own) else "") or table.units.get(label, "")
+    if not unit:
+        _refuse_two_units(table, quantity, label, own)
+    unit = unit or (own if bracketed or fits(own, quantity) else "") or table.units.get(label, "")
+    if quantity == "time" and not fits(unit, "time") and table.is_clock(label):
+        unit = "s"
+    if not unit:
+        raise InputError(
+            f"'{table.path}' column '{label}' has no unit; write for example "
+            f'--columns "{quantity}={label}:{EXAMPLE_UNITS[quantity]}"'
+        )
+    return Column(label=label, unit=unit, stated=stated)
+
+
+def _refuse_two_units(table: Table, quantity: str, label: str, own: str) -> None:
+    """Refuse a label whose unit is another than the one that the file states beside it."""
+    beside = table.units.get(label, "")
+    if beside and fits(own, quantity) and is_signal_or_telling(beside) and not same_unit(own, beside, quantity):
+        raise InputError(
+            f"'{table.path}' column '{label}' says '{own}' in its label, and '{beside[:LONGEST_NAME]}' is stated as "
+            f'its unit beside it; correct one, or say which it is, for example --columns "{quantity}={label}:{own}"'
+        )
+
+
+def same_unit(one: str, other: str, column: str) -> bool:
+    """Tell whether two units are the same for a column of that quantity, however they are spelled.
+
+    Examples
+    --------
+    >>> same_unit("Lmin", "l/min", "Q"), same_unit("Lmin", "l/h", "Q"), same_unit("V", "%", "u")
+    (True, False, False)
+    """
+    if one.lower() in PER_CENT or other.lower() in PER_CENT:
+        return one.lower() in PER_CENT and other.lower() in PER_CENT
+    kinds = [QUANTITY_OF_COLUMN[column], "voltage", "current"]
+    kind = next((kind for kind in kinds if measures(one, kind) and measures(other, kind)), None)
+    return kind is not None and isclose(si_factor(one, kind), si_factor(other, kind), rel_tol=1e-9)
+
+
+def is_signal_or_telling(unit: str) -> bool:
+    """Tell whether a unit is one of a ramp test's quantities or of a current."""
+    return is_telling(unit) or measures(unit, "current")
+
+
+def split_label(label: str) -> tuple[str | None, str]:
+    """Split a column's label into the quantity (None if it is not one of a ramp test's) and its unit.
+
+    Examples
+    --------
+    >>> split_label("dP_MPa"), split_label("Q [L/min]"), split_label("u (V)"), split_label("u")
+    (('dP', 'MPa'), ('Q', 'L/min'), ('u', 'V'), ('u', ''))
+    >>> split_label("t/s"), split_label("p_diff/bar"), split_label("Flow in l/min")
+    (('time', 's'), (None, 'bar'), ('Q', 'l/min'))
+    """
+    bare = clean_label(label)
+    # By hand: a regular expression for both brackets takes the cube of the label's length.
+    bracket = re.compile(r"[\[(]").search(bare, 1)
+    if bracket and bare[-1] in "])":
+        name, unit = bare[: bracket.start()].rstrip(" /"), bare[bracket.end() : -1].strip()
+    else:  # the unit follows the last underscore; L_min, as artefacts spell it, has one itself
+        match = re.fullmatch(r"(.+?)_([lL]_min|[^_]*)", bare)
+        name, unit = match.groups() if match else ("", bare)
+    for candidate, its_unit in ((name, unit), (bare, "")):
+        quantity = _quantity_named(candidate)
+        if quantity:
+            return quantity, its_unit
+    return _after_a_blank_or_slash(bare) if not bracket else (None, unit)
+
+
+def _quantity_named(name: str) -> str | None:
+    return COLUMN_NAMES.get(re.sub(r"[\s_]", "", name[:LONGEST_NAME]).lower())
+
+
+def _after_a_blank_or_slash(label: str) -> tuple[str | None, str]:
+    """Split ``p / bar``, ``Druck in bar`` and ``flow l/min``; what follows must be a unit of a ramp test."""
+    for name, unit in (label.rpartition(" ")[::2], label.partition("/")[::2], label.rpartition("_")[::2]):
+        unit = unit.strip()
+        if name and is_telling(unit):
+            name = name.rstrip(" /,").removesuffix(" in")
+            return _quantity_named(name), unit
+    return None, label.rpartition("_")[2]
+
+
+def is_telling(unit: str) -> bool:
+    """Tell whether a unit says by itself which quantity of a ramp test it may be of."""
+    return unit.lower() in PER_CENT or any(measures(unit, quantity) for quantity in TELLING)
+
+
+def _missing_column(quantity: str, table: Table, columns: Collection[str]) -> InputError:
+    """Return the error that names the columns found, and the one that may have been meant."""
+    unused = [label for label in table.labels[:MOST_MEANT] if split_label(label)[0] not in columns]
+    bare = {re.split(r"[_\[(]", label)[0].strip().lower(): label for label in unused}
+    spellings = [name for name, its in COLUMN_NAMES.items() if its == quantity]
+    meant = [bare[near] for name in spellings for near in get_close_matches(name, bare, n=1)]
+    kind = QUANTITY_OF_COLUMN[quantity]
+    meant += [label for label in unused if measures(table.units.get(label, "") or split_label(label)[1], kind)]
+    hint = f" (did you mean '{meant[0]}'? name it {EXAMPLE_LABELS[quantity]})" if meant else ""
+    return InputError(
+        f"'{table.path}' has no column of {quantity} (columns found: {table.found()}){hint}; "
+        "expected names with units such as time_s,u_V,dP_MPa,Q_Lmin, or --columns"
+    )
+
+
+def fits(unit: str, column: str) -> bool:
+    """Tell whether a column of that quantity may be in that unit."""
+    return measures(unit, QUANTITY_OF_COLUMN[column]) or (column == "u" and unit.lower() in PER_CENT)

@@ -1,0 +1,160 @@
+"""A table as recorded: labelled columns of numbers, from whatever file; what the readers give to `ramp_files`.
+
+A reader gives a file as several tables, one after the other: some hundred thousand rows each, with the same labels.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, final
+
+import numpy as np
+
+from dzdesign.core.errors import InputError, nearest, one_line
+
+if TYPE_CHECKING:
+    from dzdesign.identify.reading.time_stamps import Stamps
+
+#: Characters of a cell, and columns of a file, that a message quotes.
+QUOTED_CHARACTERS, QUOTED_COLUMNS = 40, 12
+#: Characters of a library's own error that are quoted.
+LONGEST_REASON = 200
+
+
+def clean_label(label: str) -> str:
+    """Return a column's label without the blanks and quotes around it."""
+    return label.strip(' \t"')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table(ABC):
+    """Labelled columns: the next rows of a file.
+
+    Attributes
+    ----------
+    path : Path
+        The file, for messages.
+    labels : tuple of str
+        In the order of the file; one may repeat.
+    units : mapping
+        Label -> unit, where the file states it beside the label and not in it.
+    comments : str
+        The lines that stand above the labels, as they are in the file.
+    """
+
+    path: Path
+    labels: tuple[str, ...]
+    units: Mapping[str, str] = field(default_factory=dict)
+    comments: str = ""
+
+    @abstractmethod
+    def numbers(self, label: str) -> np.ndarray:
+        """Return a column as float64, NaN where a sample is missing; InputError where a cell is no number."""
+
+    @abstractmethod
+    def length(self, label: str) -> int:
+        """Return how many samples a column has, as far as the reader knows."""
+
+    @abstractmethod
+    def place(self, row: int) -> str:
+        """Return where a sample stands, in the words of a person who opens the file: ``row 8``."""
+
+    @property
+    def header(self) -> str:
+        """Where the labels stand, with a blank before it, or nothing."""
+        return ""
+
+    def cell(self, label: str, row: int) -> str:
+        """Return what stands in a cell, for messages."""
+        return f"{self.numbers(label)[row]:g}"
+
+    def is_clock(self, label: str) -> bool:
+        """Tell whether a column holds dates or times of day, which `numbers` can't give and `seconds` can."""
+        return False
+
+    def seconds(self, label: str, stamps: "Stamps") -> np.ndarray:
+        """Return a column of dates or times of day, as `is_clock` tells, as seconds since the first row of the file."""
+        raise TypeError(f"column '{label}' holds numbers")
+
+    def found(self) -> str:
+        """Return the labels for a message, the first `QUOTED_COLUMNS` of them."""
+        labels = ", ".join(label[:QUOTED_CHARACTERS] for label in self.labels[:QUOTED_COLUMNS])
+        return labels + (", ..." if len(self.labels) > QUOTED_COLUMNS else "")
+
+    def no_column(self, label: str, wanted_by: str) -> InputError:
+        """Return the error for a label that is none of the table's, with the nearest one."""
+        return InputError(
+            f"'{self.path}' has no column '{label}', which {wanted_by} (columns found: {self.found()})"
+            f"{nearest(label, self.labels)}; write the label as it stands in the file"
+        )
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Samples:
+    """A column that is read where it is needed: its type, its length, and what gives the samples [start, stop)."""
+
+    dtype: np.dtype
+    size: int
+    read: Callable[[int, int], np.ndarray]
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ArrayTable(Table):
+    """A table whose columns are arrays: from TDMS, MAT, HDF5, Parquet, Feather.
+
+    Attributes
+    ----------
+    columns : mapping
+        Label -> samples of the whole file.
+    start, stop : int
+        Rows of the file that are in this table.
+    format : str
+        Of the file, for messages.
+    """
+
+    columns: Mapping[str, Samples]
+    start: int
+    stop: int
+    format: str
+
+    def length(self, label: str) -> int:
+        """Return how many samples a column has in the whole file."""
+        return self.columns[label].size
+
+    def numbers(self, label: str) -> np.ndarray:
+        """Return a column as float64."""
+        column = self.columns[label]
+        if column.dtype.kind not in "fiub":
+            first = np.asarray(self._read(label, 0, 1))
+            raise InputError(
+                f"'{self.path}' column '{label}' holds no numbers (first: '{str(first)[:QUOTED_CHARACTERS]}'); "
+                "give another column by --columns, or save it as numbers"
+            )
+        start, stop = (min(row, column.size) for row in (self.start, self.stop))
+        return np.asarray(self._read(label, start, stop)).astype(np.float64)
+
+    def place(self, row: int) -> str:
+        """Return ``sample 8``: such files have no rows that an editor would count."""
+        return f"sample {self.start + row + 1}"
+
+    def _read(self, label: str, start: int, stop: int) -> np.ndarray:
+        return self.columns[label].read(start, stop)
+
+
+def unreadable(path: Path, name: str, error: Exception) -> InputError:
+    """Return the error for a file that a library can't read.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    name : str
+        Of its format.
+    error : Exception
+        The library's own.
+    """
+    reason = one_line(str(error).strip().partition("\n")[0])[:LONGEST_REASON] or type(error).__name__
+    return InputError(f"'{path}' is not a {name} file that can be read ({reason}); save it again, or export it as CSV")

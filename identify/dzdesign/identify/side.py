@@ -1,0 +1,228 @@
+"""One side of a valve: ramp tests in, `SideModel` out. The pipeline: describe, fit, bound, the law's offset."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dzdesign.core.errors import InputError
+from dzdesign.identify.data_quality.quality import find_warnings
+from dzdesign.identify.fitting.bounds import Trend, find_trend
+from dzdesign.identify.fitting.constrained_fits import KneeFit, fit_knees
+from dzdesign.identify.fitting.guard_curve import GUARDS, GuardCurve, OpeningCurve
+from dzdesign.identify.fitting.guarding import (
+    COLUMNS,
+    OrderedKnees,
+    Threshold,
+    bound_threshold,
+    fit_guard_curve,
+    further_guards,
+    mean_threshold,
+    opening_curve,
+    order_knees,
+)
+from dzdesign.identify.knees.prepared_tests import L_MIN, MPA, DescribedTest, DescribedTests, describe_tests
+from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.reading.ramp_files import RampTest
+from dzdesign.identify.valve.model import BranchResult, SideModel, TestResult, Warning_
+
+#: dP0 names the tested pressure drop within this share of it.
+REFERENCE_TOLERANCE = 0.1
+#: dP0 of the paper, taken where the user names none: the test nearest to it.
+PAPER_DP0 = 1 * MPA
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class IdentifiedSide:
+    """What was found about one side, and what it was found from."""
+
+    model: SideModel
+    described: DescribedTests
+    knees: KneeFit
+    warnings: tuple[Warning_, ...]
+
+
+def identify_side(tests: Sequence[RampTest], options: IdentifyOptions) -> IdentifiedSide:
+    """Identify the side of positive commands.
+
+    Parameters
+    ----------
+    tests : sequence of RampTest
+        In any order.
+    options : IdentifyOptions
+        Choices of the engineer.
+
+    Raises
+    ------
+    InputError
+        Where no threshold can be given, with the reason.
+    """
+    group = describe_tests(tests, options)
+    trend, free, guarded = _fit_with_trend(group, options)
+    model = _side_model(group, trend, free, guarded, options)
+    return IdentifiedSide(
+        model=model,
+        described=group,
+        knees=guarded.fit,
+        warnings=find_warnings(model, group, guarded.departure, options),
+    )
+
+
+def _fit_with_trend(group: DescribedTests, options: IdentifyOptions) -> tuple[Trend, KneeFit, OrderedKnees]:
+    """Fit the knees freely, see which way the guarded ones run, and fit them again under that direction."""
+    free = fit_knees([item.shapes for item in group.tests], floor=group.floor, u_max=options.u_max, trend="flat")
+    dp = np.array([item.dp or math.nan for item in group.tests])
+    column = _guarded_column(group.tests)
+    budget = options.flat_change * options.u_max
+    trend = find_trend(dp, free.knee[:, column], free.knee_se[:, column], options.u_max, budget)
+    return trend, free, order_knees(group, free, trend.direction, column, options)
+
+
+def _guarded_column(described: tuple[DescribedTest, ...]) -> int:
+    """Return 1 (the falling branch) wherever there is one, else 0: zero command comes after closing."""
+    return 1 if described[0].shapes[1] else 0
+
+
+def _reference(described: tuple[DescribedTest, ...], dp0: float | None) -> int:
+    """Return the index of the test at dP0."""
+    if described[0].dp is None:
+        if dp0 is not None:
+            raise InputError(
+                f"dP0 = {dp0 / MPA:g} MPa was asked for, but '{described[0].test.source}' has no column of dP"
+            )
+        return 0
+    dp = np.array([item.dp for item in described])
+    index = int(np.argmin(np.abs(np.log(dp / (dp0 or PAPER_DP0)))))
+    if dp0 is not None and abs(dp[index] - dp0) > REFERENCE_TOLERANCE * dp0:
+        tested = ", ".join(f"{value / MPA:.3g}" for value in dp)
+        raise InputError(f"dP0 = {dp0 / MPA:g} MPa is not among the tested pressure drops ({tested} MPa)")
+    return index
+
+
+def _side_model(
+    group: DescribedTests, trend: Trend, free: KneeFit, guarded: OrderedKnees, options: IdentifyOptions
+) -> SideModel:
+    """Assemble one side: guarded thresholds, the curves that may be certified of them, and k x_max."""
+    described, knees = group.tests, guarded.fit
+    threshold = bound_threshold(group, guarded, options)
+    reference = _reference(described, options.dp0)
+    dp = [item.dp for item in described]
+    curve, active = fit_guard_curve(threshold, dp, reference, trend.direction, options.u_max)
+    guard = next(name for name, column in COLUMNS.items() if column == guarded.column)
+    guards, opening = _all_curves(group, free, {guard: (guarded, threshold, curve)}, trend, reference, options)
+    slope = float(np.nanmean(knees.slope[reference]))
+    y_max = float(np.mean([shape.y_max for shape in described[reference].shapes if shape]))
+    k_x_max = y_max / slope  # Eq. (11) at full stroke: Q_max = slope (k x_max)
+    known = described[0].dp is not None
+    several = len(described) > 1
+    return SideModel(
+        tests=tuple(_test_result(group, knees, row, threshold) for row in range(len(described))),
+        reference_dp_MPa=described[reference].dp / MPA if known else None,
+        k_x_max_over_u_max=k_x_max / options.u_max,
+        k_V_mm=k_x_max / (options.x_max * 1e3) if options.x_max else None,
+        trend=trend.direction if several else None,
+        trend_change_V=trend.change if several else None,
+        trend_change_se_V=trend.change_se if several else None,
+        trend_p=trend.p_value if several else None,
+        confidence=options.confidence,
+        guard=guard,
+        guards=guards,
+        opening_curve=opening,
+        level_L_min=max(shape.level for item in described for shape in item.shapes if shape) / L_MIN,
+        active_constraints=knees.active
+        + tuple(f"offset at test {row + 1}" for row, holds in enumerate(active) if holds),
+    )
+
+
+def _all_curves(
+    group: DescribedTests,
+    free: KneeFit,
+    found: dict[str, tuple[OrderedKnees, Threshold, GuardCurve]],
+    trend: Trend,
+    reference: int,
+    options: IdentifyOptions,
+) -> tuple[dict[str, GuardCurve], OpeningCurve | None]:
+    """Return the curve of every guard that the branches allow, and where the valve opens.
+
+    The trend is the one found on the guarded branch: one edge opens and closes. A branch that runs otherwise departs
+    from it, and its bounds are lowered by the departure.
+    """
+    ((guard, (guarded, threshold, curve)),) = found.items()
+    knees, thresholds = {guard: guarded}, {guard: threshold}
+    other = "opening" if guard == "closing" else "closing"
+    if group.tests[0].shapes[COLUMNS[other]]:
+        try:
+            knees[other] = order_knees(group, free, trend.direction, COLUMNS[other], options, alone=True)
+        except InputError:
+            # Its knees have no order that the solver finds: that guard is not on offer, and `design` says so.
+            pass
+        else:
+            thresholds[other] = bound_threshold(group, knees[other], options)
+            thresholds["mean"] = mean_threshold(threshold, thresholds[other])
+    further = {name: item for name, item in thresholds.items() if name != guard}
+    dp = [item.dp for item in group.tests]
+    curves = {guard: curve} | further_guards(further, dp, reference, trend.direction, options.u_max)
+    guards = {name: curves[name] for name in GUARDS if name in curves}
+    if "opening" not in knees:
+        return guards, None
+    return guards, opening_curve(knees["opening"], trend.direction, guards, options.u_max)
+
+
+def _test_result(group: DescribedTests, knees: KneeFit, row: int, guarded: Threshold) -> TestResult:
+    """Return one row of valve.json's tests."""
+    item = group.tests[row]
+    shapes = [shape for shape in item.shapes if shape]
+    return TestResult(
+        source=item.test.source,
+        dp_MPa=None if item.dp is None else item.dp / MPA,
+        rising=_branch_result(group, knees, row, 0),
+        falling=_branch_result(group, knees, row, 1),
+        not_observable=_not_observable(group, row),
+        u_guard_V=float(guarded.value[row]),
+        u_guard_lower_V=float(guarded.bound[row]),
+        slope_L_min_V=float(np.nanmean(knees.slope[row])) / L_MIN,
+        q_max_L_min=item.q_max / L_MIN,
+        saturates=all(shape.saturates for shape in shapes),
+        noise_L_min=max(shape.sigma for shape in shapes) / L_MIN,
+        noise_colour=max(shape.colour for shape in shapes),
+        outliers=sum(shape.outliers for shape in shapes),
+        ramps=item.ramps,
+    )
+
+
+def _branch_result(group: DescribedTests, knees: KneeFit, row: int, column: int) -> BranchResult | None:
+    shape = group.tests[row].shapes[column]
+    if shape is None:
+        return None
+    return BranchResult(
+        knee_V=float(knees.knee[row, column]),
+        knee_se_V=float(knees.knee_se[row, column]),
+        level_V=shape.tail.at_level,
+        level_se_V=shape.tail.at_level_se,
+        onset_V=shape.onset,
+        onset_se_V=shape.onset_se,
+        straight=shape.window,
+    )
+
+
+def _not_observable(group: DescribedTests, row: int) -> dict[str, str]:
+    """Say of thresholds that can't be seen why; what valve.json gives instead is said too."""
+    reasons = {}
+    for direction, shape in zip(("rising", "falling"), group.tests[row].shapes, strict=True):
+        if shape is None:
+            for name in ("knee", "level", "onset"):
+                reasons[f"u_{name}_{direction}_V"] = f"there is no {direction} branch"
+        elif shape.tail.hole:
+            low, high = shape.tail.hole
+            for name in ("level", "onset"):
+                reasons[f"u_{name}_{direction}_V"] = (
+                    f"rows are missing from {low:.3f} to {high:.3f} V, where the flow begins; the onset's value is the "
+                    "lower end"
+                )
+        elif group.floor > 0:
+            reasons[f"u_onset_{direction}_V"] = (
+                f"the meter shows nothing below {group.floor / L_MIN:.2f} L/min; the value is the tail above that "
+                "flow, extrapolated to zero"
+            )
+    return reasons

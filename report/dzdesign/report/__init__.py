@@ -1,0 +1,1 @@
+"""Report: artefacts enter, one HTML page leaves, of a valve or of a lot."""

@@ -1,0 +1,151 @@
+"""What lies in an artefact folder and around it, read once."""
+
+import contextlib
+from pathlib import Path
+
+from dzdesign.core.artefact_files import MANIFEST_NAME, parse_document, sha256_of
+from dzdesign.core.errors import InputError
+
+EVIDENCE_SCHEMA, FIRMWARE_SCHEMA = "dzdesign.evidence/1", "dzdesign.firmware/1"
+#: Of a folder around evidence and firmware, beside those of other valves.
+BATCH_VALVE_SCHEMA = "dzdesign.batch-valve/1"
+VERIFICATION_NAME = "verification.json"
+#: No larger file is read, and no more of them in a folder: an artefact is far smaller.
+LARGEST, MOST = 32 * 2**20, 500
+#: The schema stands in the first bytes of an artefact.
+HEAD = 512
+
+
+def shelf_of(folder: Path) -> dict[str, bytes]:
+    """Return what dzdesign made in a folder and in the folders in it, by name below it.
+
+    Of an evidence or firmware folder the folder around it is looked at too: what it was made from lies there.
+
+    Parameters
+    ----------
+    folder : Path
+        Of artefacts.
+
+    Raises
+    ------
+    InputError
+        If it is no folder, can't be read, or has nothing of dzdesign's.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise InputError(f"'{folder}' is no folder, expected one with artefacts of dzdesign; check the name")
+    try:
+        folder = folder.resolve()
+        root = folder.parent if _is_one_stage(folder) else folder
+        within = sorted(place for place in root.iterdir() if place.is_dir() and not place.name.startswith("."))
+        named = _files_in(folder, root)
+    except OSError as error:
+        raise InputError(f"'{folder}' can't be read: {error.strerror or error}") from error
+    evidence = (folder / VERIFICATION_NAME).is_file()
+    others = _evidence_of_others(folder, within)
+    shelf: dict[str, bytes] = {}
+    for place in dict.fromkeys((root, *within[:MOST], folder)):  # in one order whichever was named: same bytes
+        if place == folder:
+            shelf |= named
+        elif place not in others and not (evidence and (place / VERIFICATION_NAME).is_file()):  # only the one named
+            with contextlib.suppress(OSError):  # a neighbour that is not ours to read
+                shelf |= _files_in(place, root)
+    if not any(name.endswith(".json") for name in shelf):
+        raise InputError(
+            f"'{folder}' has no artefact of dzdesign, expected verification.json, firmware, compensator.json or "
+            "valve.json; give the folder that `dzdesign demo`, `verify` or `codegen` wrote"
+        )
+    return shelf
+
+
+def places_of(folder: Path) -> tuple[str, ...]:
+    """Return how the names of a folder's own files begin on its shelf; what else lies there was only looked around for.
+
+    Parameters
+    ----------
+    folder : Path
+        As `shelf_of` takes it.
+    """
+    return (f"{folder.resolve().name}/",) if _is_one_stage(folder) else ("",)
+
+
+def _evidence_of_others(folder: Path, within: list[Path]) -> set[Path]:
+    """Return the folders of evidence that are of another firmware than the one that was named, if one is of it."""
+    if not (folder / MANIFEST_NAME).is_file() or (folder / VERIFICATION_NAME).is_file():
+        return set()
+    digest = sha256_of((folder / MANIFEST_NAME).read_bytes()).encode()
+    evidence = [place for place in within if _is_small(place / VERIFICATION_NAME)]
+    # The hash stands in the file of what was made from it, and nowhere else.
+    ours = {place for place in evidence if digest in (place / VERIFICATION_NAME).read_bytes()}
+    return set(evidence) - ours if ours else set()
+
+
+def _is_small(path: Path) -> bool:
+    with contextlib.suppress(OSError):
+        return path.is_file() and path.stat().st_size <= LARGEST
+    return False
+
+
+def _is_one_stage(folder: Path) -> bool:
+    """Tell evidence and firmware from a folder that holds them; a valve's of a batch has a manifest too."""
+    if (folder / VERIFICATION_NAME).is_file():
+        return True
+    path = folder / MANIFEST_NAME
+    if not path.is_file():
+        return False
+    try:
+        parse_document(path.read_bytes(), MANIFEST_NAME, (BATCH_VALVE_SCHEMA,))
+    except InputError:
+        return True
+    return False
+
+
+def _files_in(place: Path, root: Path) -> dict[str, bytes]:
+    """Return JSON of this tool, the evidence's CSV and what a manifest lists, by name below `root`."""
+    evidence = (place / VERIFICATION_NAME).is_file()
+    suffixes = (".json", ".csv") if evidence else (".json",)
+    paths = [path for path in sorted(place.iterdir()) if path.suffix in suffixes]
+    files = {}
+    for path in paths[:MOST]:
+        if path.is_file() and path.stat().st_size <= LARGEST:
+            content = path.read_bytes()
+            if path.suffix == ".csv" or b'"dzdesign.' in content[:HEAD]:
+                files[path.relative_to(root).as_posix()] = content
+    listed = listing(files.get((place / MANIFEST_NAME).relative_to(root).as_posix()))
+    for name in list(listed)[:MOST]:
+        path = place / name
+        inside = path.resolve().is_relative_to(place)  # a name in a manifest is somebody's text
+        if inside and path.is_file() and path.stat().st_size <= LARGEST:
+            files[path.relative_to(root).as_posix()] = path.read_bytes()
+    return files
+
+
+def is_of(content: bytes, schema: str) -> bool:
+    """Tell whether a file's first bytes name a schema.
+
+    Parameters
+    ----------
+    content : bytes
+        Of the file.
+    schema : str
+        Such as ``dzdesign.valve/1``.
+    """
+    return f'"{schema}"'.encode() in content[:HEAD]
+
+
+def listing(manifest: bytes | None) -> dict[str, str]:
+    """Return the files that a manifest lists, with their hashes; none of what is no manifest.
+
+    Parameters
+    ----------
+    manifest : bytes or None
+        Of an evidence or firmware folder.
+    """
+    if manifest is None:
+        return {}
+    try:
+        files = parse_document(manifest, MANIFEST_NAME, (EVIDENCE_SCHEMA, FIRMWARE_SCHEMA)).get("files")
+    except InputError:
+        return {}
+    listed = files.items() if isinstance(files, dict) else ()
+    return {name: str(digest) for name, digest in listed if ".." not in name.split("/") and "\0" not in name}

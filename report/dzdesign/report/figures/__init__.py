@@ -1,0 +1,1 @@
+"""Figures of the report: SVG that takes its colours from the page."""

@@ -1,0 +1,186 @@
+"""report.html of a lot: from how many valves are calibrated to the hashes, in the style of the report of one valve."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from dzdesign.batch.calibration import DOES_NOT_HOLD
+from dzdesign.batch.summary import lacking_lines
+from dzdesign.report.lot.folder import Lot, lot_of
+from dzdesign.report.lot.sections import HEADINGS, sections_of, spreads_of
+from dzdesign.report.lot.spread import FAR, TWENTY, Spread
+from dzdesign.report.lot.tables import named
+from dzdesign.report.page import render_page
+from dzdesign.report.sections.cells import whole
+from dzdesign.report.summary import Figure, Headline
+from dzdesign.report.valve_report import Report
+
+#: Valves that the verdict names, and oddities.
+IN_VERDICT, ODD_IN_VERDICT = 8, 3
+
+
+def report_of_lot(folder: Path) -> Report:
+    """Make the report of the folder of a batch.
+
+    Parameters
+    ----------
+    folder : Path
+        Finished or stopped.
+
+    Raises
+    ------
+    InputError
+        If it is not what `dzdesign batch` writes.
+    """
+    return make_lot_report(lot_of(folder))
+
+
+def make_lot_report(lot: Lot) -> Report:
+    """Make the report of a lot.
+
+    Parameters
+    ----------
+    lot : Lot
+        Of `lot_of`.
+    """
+    verdict = lot_headline(lot)
+    spreads = spreads_of(lot)
+    missing = list(lot.missing)
+    if lot.complete and lot.calibrated and not lot.document["verified"]:
+        missing.append("the evidence of each valve: `dzdesign batch --verify` makes it")
+    html = render_page(
+        title=f"Lot of {whole(lot.expected)} valve{'' if lot.expected == 1 else 's'}",
+        verdict=verdict,
+        figures=key_figures_of_lot(lot, spreads),
+        headings=HEADINGS,
+        sections=sections_of(lot, spreads),
+        missing=missing,
+    )
+    refuted = verdict.kind == "bad" or bool(lot.failed)
+    return Report(
+        html=html,
+        kind=verdict.kind,
+        holds=False if refuted else True if verdict.kind == "good" else None,
+        verdict=verdict.text,
+        faults=lot.faults,
+        missing=tuple(missing),
+    )
+
+
+def lot_headline(lot: Lot) -> Headline:
+    """Return the verdict: good only if every valve is calibrated and verified, and every file fits.
+
+    Parameters
+    ----------
+    lot : Lot
+    """
+    more = len(lot.oddities) - ODD_IN_VERDICT
+    odd = [f"odd: {text}" for text in lot.oddities[:ODD_IN_VERDICT]]
+    simulated = [row["name"] for row in lot.calibrated if "simulated" in row["warnings"].split()]
+    if simulated:
+        odd.insert(0, f"SIMULATED recordings, not of measured valves: {named(simulated, IN_VERDICT)}")
+    odd += lacking_lines(lot.common() or {})
+    odd += [f"odd: {more} more, under “What the recordings leave open”"] if more > 0 else []
+    return replace(_verdict(lot), cautions=tuple(odd))
+
+
+def _verdict(lot: Lot) -> Headline:
+    if lot.faults:
+        return Headline(
+            kind="bad", sign="✗", text="THE FILES DO NOT BELONG TOGETHER. No verdict stands.", reasons=lot.faults
+        )
+    done, count, expected = len(lot.calibrated), len(lot.rows), lot.expected
+    reasons = _not_calibrated(lot)
+    if not lot.complete:
+        text = f"NOT FINISHED: {whole(count)} of {whole(expected)} valves tried, {whole(done)} calibrated"
+        return Headline(kind="open", sign="?", text=text, reasons=reasons)
+    if not count:
+        return Headline(kind="open", sign="?", text="NOT KNOWN: the table is not here")
+    words = f"{whole(done)} of {whole(count)} valves calibrated"
+    if not done:
+        text = f"NONE of {whole(count)} valves calibrated" if count > 1 else "The valve is NOT calibrated"
+        return Headline(kind="bad", sign="✗", text=text, reasons=reasons)
+    if reasons:
+        refuted = any(row["status"] == DOES_NOT_HOLD for row in lot.failed)
+        text = f"{words}, {whole(count - done)} NOT"
+        return Headline(
+            kind="bad" if refuted else "open", sign="✗" if refuted else "!", text=text, reasons=reasons
+        )
+    if not lot.document["verified"]:
+        return Headline(kind="open", sign="?", text=f"{words}; their firmware is NOT VERIFIED")
+    return Headline(kind="good", sign="✓", text=f"{words}, and the firmware of each is verified")
+
+
+def _not_calibrated(lot: Lot) -> tuple[str, ...]:
+    """Return for each status how many valves have it, and which."""
+    counts = Counter(row["status"] for row in lot.failed)
+    return tuple(
+        f"{whole(count)} {status}: {named([row['name'] for row in lot.failed if row['status'] == status], IN_VERDICT)}"
+        for status, count in counts.most_common()
+    )
+
+
+def key_figures_of_lot(lot: Lot, spreads: Sequence[Spread]) -> tuple[Figure, ...]:
+    """Return the numbers that matter.
+
+    Parameters
+    ----------
+    lot : Lot
+    spreads : sequence of Spread
+        Of `spreads_of`.
+    """
+    by_column = {spread.side + spread.quantity.column: spread for spread in spreads}
+    figures = [_counts(lot), _look(lot, spreads)]
+    for column, label, note in (
+        ("dead_zone_opening_percent", "Dead zone left on opening", "of command, the worst of a valve's pressure drops"),
+        ("dead_zone_closing_percent", "Dead zone left on closing", "of command, the worst of a valve's pressure drops"),
+        ("common_extra_dead_zone_percent", "Cost of one common setting", "more dead zone than with each valve's own"),
+        ("knee_opening_V", "Threshold: knee on opening", "at dP0"),
+    ):
+        of_sides = [by_column[side + column] for side in lot.sides if side + column in by_column]
+        if of_sides:
+            figures.append(_spread_figure(label, note, of_sides))
+    return tuple(figures)
+
+
+def _counts(lot: Lot) -> Figure:
+    failed = Counter(row["status"] for row in lot.failed)
+    note = ", ".join(f"{whole(count)} {status}" for status, count in failed.most_common()) or "none left out"
+    if lot.complete and lot.calibrated:
+        note += "; verified" if lot.document["verified"] else "; not verified"
+    kind = "text" if not lot.failed else "bad" if DOES_NOT_HOLD in failed or not lot.calibrated else "open"
+    return Figure(
+        label="Calibrated", value=f"{whole(len(lot.calibrated))} of {whole(lot.expected)}", note=note, kind=kind
+    )
+
+
+def _look(lot: Lot, spreads: Sequence[Spread]) -> Figure:
+    """Return how many valves need a look: those not calibrated, and those far from the rest."""
+    far = {name for spread in spreads for name, _ in spread.far()}
+    warned = sum(bool(row["warnings"]) for row in lot.calibrated)
+    known = any(spread.limits for spread in spreads)
+    parts = [
+        f"{whole(len(lot.failed))} not calibrated",
+        f"{whole(len(far))} beyond {FAR:g} robust s.d. in some quantity" if known else "too few to say which lie far",
+    ]
+    return Figure(
+        label="Need a look",
+        value=whole(len(lot.failed) + len(far)),
+        note=f"{', '.join(parts)}. {whole(warned)} have a warning of their recordings",
+    )
+
+
+def _spread_figure(label: str, note: str, spreads: Sequence[Spread]) -> Figure:
+    """Return median, the middle nine tenths and the largest of a quantity, of each side."""
+    unit, digits = spreads[0].quantity.unit, spreads[0].quantity.digits
+    medians = " and ".join(f"{spread.at['0.5']:.{digits}f}" for spread in spreads)
+    parts = []
+    for spread in spreads:
+        least, low, high, most = (f"{spread.at[q]:.{digits}f}" for q in ("0", "0.05", "0.95", "1"))
+        side = f"{spread.side.rstrip('_')}: " if spread.side else ""
+        if len(spread.values) < TWENTY:
+            parts.append(f"{side}all from {least} to {most} {unit}")
+        else:
+            parts.append(f"{side}5 to 95 % of the valves {low} to {high} {unit}, at most {most} {unit}")
+    return Figure(label=label, value=f"{medians} {unit}", note=f"median, {note}; {'; '.join(parts)}")

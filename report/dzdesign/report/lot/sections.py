@@ -1,0 +1,295 @@
+"""What stands in each section of the report of a lot."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from dzdesign.batch.reasons import reason_groups
+from dzdesign.batch.summary import checked_lines, lacking_lines, span
+from dzdesign.report.lot.figures import lot_style, order_figure, spread_figure
+from dzdesign.report.lot.folder import Lot
+from dzdesign.report.lot.spread import FAR, FEWEST, QUANTITIES, TWENTY, Spread, spread_of
+from dzdesign.report.lot.tables import (
+    failed_table,
+    far_table,
+    holding_table,
+    named,
+    provenance_table,
+    spread_table,
+    valves_table,
+    warnings_table,
+)
+from dzdesign.report.page import Section
+from dzdesign.report.sections.cells import whole
+
+#: Anchor and heading of every section, in their order.
+HEADINGS = (
+    ("failed", "Not calibrated"),
+    ("spread", "Spread of the lot"),
+    ("far", "Far from the rest"),
+    ("left", "Dead zone that remains"),
+    ("common", "One setting for all"),
+    ("valves", "The valves"),
+    ("recordings", "What the recordings leave open"),
+    ("warnings", "Warnings: what is not covered"),
+    ("provenance", "Provenance"),
+)
+#: Of every report of a lot.
+NOT_PROVED = (
+    "A valve counts as calibrated if it was identified, its compensator designed and its C made. That the C does what "
+    "the law says is known of those that were verified.",
+    "The common setting is certified for each valve of this batch with the confidence of that valve's own bounds, not "
+    "for all of them at once. Of a valve that is not in the batch it says nothing.",
+    "Spread is of the valves and of the bench: a meter or an oil temperature that drifts while a lot is measured looks "
+    "like valves that differ. Measure one valve again at the end of the lot to tell.",
+    "Far from the rest is a place to look, no verdict: such a valve is calibrated as certainly as any other.",
+    "Quantiles are those of the valves that were calibrated; the others have no numbers.",
+)
+
+
+def spreads_of(lot: Lot) -> tuple[Spread, ...]:
+    """Return how every quantity scatters that some valve has.
+
+    Parameters
+    ----------
+    lot : Lot
+    """
+    found = (spread_of(lot.calibrated, column, side) for side in lot.sides for column in QUANTITIES if lot.calibrated)
+    return tuple(spread for spread in found if spread is not None)
+
+
+def sections_of(lot: Lot, spreads: Sequence[Spread]) -> dict[str, Section]:
+    """Return every section by its anchor.
+
+    Parameters
+    ----------
+    lot : Lot
+    spreads : sequence of Spread
+        Of `spreads_of`.
+    """
+    with lot_style():
+        made = {
+            "failed": _failed_section(lot),
+            "spread": _spread_section(lot, spreads),
+            "far": _far_section(spreads),
+            "left": _left_section(lot, spreads),
+            "common": _common_section(lot, spreads),
+            "valves": _valves_section(lot, spreads),
+            "recordings": _recordings_section(lot),
+            "warnings": Section(lines=NOT_PROVED),
+            "provenance": _provenance_section(lot),
+        }
+    return {name: made[name] for name, _ in HEADINGS}
+
+
+def _of(spreads: Sequence[Spread], *columns: str) -> list[Spread]:
+    return [spread for column in columns for spread in spreads if spread.quantity.column == column]
+
+
+def _failed_section(lot: Lot) -> Section:
+    if not lot.failed:
+        return Section(lines=("Every valve that was tried is calibrated.",) if lot.rows else ())
+    groups = reason_groups(lot.failed)
+    many = "1 valve" if len(lot.failed) == 1 else f"{whole(len(lot.failed))} valves"
+    kinds = "1 kind" if len(groups) == 1 else f"{len(groups)} kinds"
+    return Section(
+        note="The reason of a valve also stands in its `reason.txt`. Correct what it says, then run the same "
+        "`dzdesign batch` again: only what changed is done anew.",
+        lines=(
+            f"{many}, {kinds} of reason; what differs between the valves of a kind is … in the reason and stands "
+            "behind the name.",
+        ),
+        tables=(failed_table(groups, lot.failed),),
+    )
+
+
+def _spread_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
+    if not spreads:
+        return Section(missing="No valve is calibrated, so there is nothing to compare.")
+    figures = []
+    for side in lot.sides:
+        own = [spread for spread in spreads if spread.side == side]
+        of, words = (f"-{side.rstrip('_')}", f" {side.rstrip('_').capitalize()} commands.") if side else ("", "")
+        figures += [
+            spread_figure(
+                f"thresholds{of}", _of(own, "knee_opening_V", "knee_closing_V"),
+                "Thresholds of the calibrated valves at dP0: the knee, where the straight part of the flow meets zero, "
+                f"on opening and on closing, on one scale; their distance is the hysteresis.{words}", one_scale=True,
+            ),
+            spread_figure(
+                f"law{of}", _of(own, "offset_V", "k_x_max_over_u_max", "beta_at_highest_dp"),
+                "What the laws of the valves differ in: the offset at dP0, which lies under the threshold's bound; the "
+                f"travel k x_max/u_max from the threshold to full flow; β at the highest tested pressure drop.{words}",
+                one_scale=False,
+            ),
+        ]  # fmt: skip
+        first = _of(own, "knee_opening_V", "knee_closing_V")[:1]
+        figures += [
+            order_figure(
+                f"order{of}", spread,
+                "The same knee in the order of the names. Where names count up as the valves were measured, a slope or "
+                f"a step here is a drift of the bench or of the production.{words}",
+            )
+            for spread in first
+        ]  # fmt: skip
+    return Section(
+        lines=tuple(_lot_lines(lot)),
+        figures=tuple(figure for figure in figures if figure),
+        tables=(spread_table(spreads),),
+    )
+
+
+def _lot_lines(lot: Lot) -> list[str]:
+    """Say at which pressure drops the numbers hold, and which way the thresholds move."""
+    lines = []
+    for side in lot.sides:
+        of = f"{side.rstrip('_').capitalize()} commands: " if side else ""
+        rows = [row for row in lot.calibrated if row[f"{side}dp0_MPa"] is not None]
+        if not rows:
+            lines.append(f"{of}no valve was tested.")
+            continue
+        ends = [_span([row[side + key] for row in rows]) for key in ("dp0_MPa", "highest_dp_MPa")]
+        trends: dict[str, int] = {}
+        for row in rows:
+            trends[row[f"{side}trend"] or "not known"] = trends.get(row[f"{side}trend"] or "not known", 0) + 1
+        counts = ", ".join(f"{word} in {whole(n)}" for word, n in sorted(trends.items(), key=lambda one: -one[1]))
+        lines.append(
+            f"{of}dP0 is {ends[0]} MPa, the highest tested pressure drop {ends[1]} MPa. Threshold over the pressure "
+            f"drop: {counts} valves."
+        )
+    return lines
+
+
+def _span(values: Sequence[float | None]) -> str:
+    known = [value for value in values if value is not None]
+    if not known:
+        return "not known"
+    low, high = f"{min(known):.3g}", f"{max(known):.3g}"
+    return low if low == high else f"{low} to {high}"
+
+
+def _far_section(spreads: Sequence[Spread]) -> Section:
+    judged = [spread for spread in spreads if spread.limits]
+    if not judged:
+        return Section(
+            lines=(f"Which valves lie far from the rest is said of lots of {FEWEST} calibrated valves or more.",)
+        )
+    rule = (
+        f"The rule: further from the lot's median than {FAR:g} robust standard deviations, 1.4826 times the median "
+        "absolute deviation, in one of the quantities. Of a normal lot one valve in 2000 lies there in each quantity "
+        "by chance. No verdict: these valves are calibrated; look for a mix-up, a part, or the recording."
+    )
+    table = far_table(judged)
+    return Section(lines=(rule, *([] if table else ["No valve lies there."])), tables=(table,) if table else ())
+
+
+def _left_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
+    if not spreads:
+        return Section(missing="No valve is calibrated.")
+    figures = []
+    for side in lot.sides:
+        own = [spread for spread in spreads if spread.side == side]
+        of, words = (f"-{side.rstrip('_')}", f", {side.rstrip('_')} commands") if side else ("", "")
+        figures.append(
+            spread_figure(
+                f"left{of}", _of(own, "dead_zone_opening_percent", "dead_zone_closing_percent"),
+                f"Dead zone that each valve's own compensator leaves, in per cent of command{words}: at the pressure "
+                "drop of its tests where it is largest.", one_scale=True,
+            )
+        )  # fmt: skip
+    return Section(figures=tuple(figure for figure in figures if figure))
+
+
+def _common_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
+    common = lot.common()
+    if common is None:
+        if not lot.complete:
+            return Section(missing="The common setting is made at the end of a batch.")
+        why = lot.document["common_setting"].get("why_not", "not known")
+        return Section(missing=f"There is no common setting: {why}.", optional=True)
+    costs = _of(spreads, "common_extra_dead_zone_percent")
+    lines = [
+        "The largest offset that over-compensates none of the valves, certified for each of them "
+        f"{span(*common['dp_MPa'])}, is in {common['file']}; its trend is that of {common['carrier']}.",
+        *(
+            f"{line[0].upper()}{line[1:]}. The C made of the file is compared with all bounds by dzdesign verify."
+            for line in checked_lines(common)
+        ),
+        *(f"{line}." for line in lacking_lines(common)),
+        *(_cost_line(spread) for spread in costs),
+        f"It is held down by {named(common['binding'])}.",
+        *_without_lines(common.get("without_binding"), len(lot.calibrated)),
+    ]
+    figure = spread_figure(
+        "common", costs,
+        "What one setting for all costs each valve: the dead zone that it leaves on opening less what the valve's own "
+        "setting leaves, at the worst pressure drop of its tests. The valves that hold the setting down stand at the "
+        "left.", one_scale=True,
+    )  # fmt: skip
+    table = holding_table(lot)
+    return Section(lines=tuple(lines), figures=(figure,) if figure else (), tables=(table,) if table else ())
+
+
+def _cost_line(spread: Spread) -> str:
+    side = f"{spread.side.rstrip('_').capitalize()} side: it" if spread.side else "It"
+    return (
+        f"{side} leaves more dead zone than each valve's own setting: {_three(spread.at, len(spread.values))} "
+        f"({spread.name_at('1')})."
+    )
+
+
+def _three(at: Mapping[str, float], count: int) -> str:
+    """Say a cost at the median valve, at one in twenty if there are so many, and at worst."""
+    twentieth = f"{at['0.95']:.2f} % at one in twenty, " if count >= TWENTY else ""
+    return f"{at['0.5']:.2f} % of command at the median valve, {twentieth}{at['1']:.2f} % at worst"
+
+
+def _without_lines(without: Mapping[str, Any] | None, count: int) -> list[str]:
+    """Say what the setting would cost without the valves that hold it down."""
+    if without is None:
+        return []
+    if "why_not" in without:
+        return [f"Without them there is no common setting of the others: {without['why_not']}."]
+    lines = []
+    for column, at in without["quantiles"].items():
+        side = f" on the {column.partition('_')[0]} side" if column.startswith(("positive", "negative")) else ""
+        lines.append(
+            f"With settings of their own for {named(without['left_out'], 5)}, the common setting of the others would "
+            f"cost{side} {_three(at, count - len(without['left_out']))}."
+        )
+    return lines
+
+
+def _valves_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
+    table = valves_table(lot, {name for spread in spreads for name, _ in spread.far()})
+    return Section(
+        note="Each calibrated valve has a folder `valves/NAME` beside this page, with its valve.json, "
+        "compensator.json and firmware: `dzdesign report valves/NAME`, run in the folder of this page, makes its own "
+        "report.",
+        tables=(table,) if table else (),
+    )
+
+
+def _recordings_section(lot: Lot) -> Section:
+    table = warnings_table(lot)
+    odd = tuple(f"Odd: {text}." for text in lot.oddities)
+    if table is None:
+        none = ("No recording of a calibrated valve has a warning.",) if lot.calibrated else ()
+        return Section(lines=(*odd, *none))
+    return Section(
+        lines=odd,
+        note="None of these stops a calibration. The text of each valve, with its numbers, stands in its report and in "
+        "its valve.json; what to do about a code stands in the documentation under “Warning codes”.",
+        tables=(table,),
+    )
+
+
+def _provenance_section(lot: Lot) -> Section:
+    lines = []
+    if lot.complete and lot.rows:
+        hashed = sum(bool(row["inputs_sha256"]) for row in lot.rows)
+        lines.append(
+            f"The table has, for {whole(hashed)} of its {whole(len(lot.rows))} valves, the SHA-256 of recordings and "
+            "options, and of a calibrated one those of valve.json, compensator.json and the firmware's manifest"
+            + ("; the latter were compared with the folders of the valves." if lot.compared else ".")
+        )
+    return Section(lines=tuple(lines), tables=(provenance_table(lot),))

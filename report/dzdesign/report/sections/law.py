@@ -1,0 +1,89 @@
+"""The law's derivation, as the report shows it: proved anew when the report is made."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+
+from dzdesign.derivation.account.equations import APPROACH, AT_REFERENCE, OFF_REFERENCE
+from dzdesign.derivation.account.proof import prove
+from dzdesign.derivation.account.statement import Outcome
+from dzdesign.derivation.account.target_flow import TARGET, TIES
+from dzdesign.derivation.law import law
+from dzdesign.derivation.presentation.content import Entry, Term
+from dzdesign.derivation.presentation.html import Page
+from dzdesign.derivation.presentation.prose import Words, parse_prose
+from dzdesign.derivation.presentation.report import closure, compose
+
+#: All that the laws rest on: sections of the account. Of the others some take a second to import.
+STATEMENTS = (*APPROACH, *AT_REFERENCE, *OFF_REFERENCE, *TIES, *TARGET)
+#: The statement of the account that ends the derivation of each law: Eq. (18), and that the other meets the target.
+STATED_AS = {"paper": "(18)", "target": "T1d"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LawAccount:
+    """Where a law comes from.
+
+    Attributes
+    ----------
+    note : Words
+        What the law does and does not achieve.
+    main : tuple of Entry
+        The law, and before it what it rests on directly; with their steps.
+    rest : tuple of Entry
+        What these rest on, in the account's order.
+    glossary : tuple of Term
+        The symbols.
+    page : Page
+        Writes words and formulas.
+    """
+
+    note: Words
+    main: tuple[Entry, ...]
+    rest: tuple[Entry, ...]
+    glossary: tuple[Term, ...]
+    page: Page
+
+    @property
+    def holds(self) -> bool:
+        """Whether every statement has the verdict that the account expects."""
+        return all(entry.verdict.as_expected for entry in (*self.main, *self.rest))
+
+    def outcome(self, entry: Entry) -> str:
+        """Return the kind of a verdict's cell.
+
+        Parameters
+        ----------
+        entry : Entry
+        """
+        if not entry.verdict.as_expected or entry.verdict.outcome is Outcome.DOES_NOT_FOLLOW:
+            return "bad"
+        return {Outcome.FOLLOWS: "good", Outcome.FOLLOWS_IF: "open"}.get(entry.verdict.outcome, "text")
+
+
+@cache
+def account_of(law_name: str) -> LawAccount:
+    """Derive a law from the paper's premises.
+
+    Parameters
+    ----------
+    law_name : str
+        Of compensator.json.
+    """
+    number = STATED_AS[law_name]
+    numbers = closure(STATEMENTS, [number])
+    statements = [statement for statement in STATEMENTS if statement.number in numbers]
+    content = compose(prove(statements), numbers)
+    entries = [entry for _, section in content.sections for entry in section]
+    direct = {ground.number for ground in statements[-1].grounds} | {number}
+    return LawAccount(
+        note=parse_prose(law(law_name).note),
+        main=_in(entries, direct),
+        rest=_in(entries, set(numbers) - direct),
+        glossary=content.glossary,
+        page=Page(set(numbers)),
+    )
+
+
+def _in(entries: Sequence[Entry], numbers: set[str]) -> tuple[Entry, ...]:
+    return tuple(entry for entry in entries if entry.number in numbers)

@@ -1,0 +1,152 @@
+"""The compiled core against the law in volts at 50 digits, and the faults in the scaling that this must see."""
+
+import random
+from fractions import Fraction
+
+import casadi
+import numpy as np
+import pytest
+import sympy
+
+from dzdesign.core.artefact_files import write_folder
+from dzdesign.derivation import scaling
+from dzdesign.derivation.law import LAW_NAMES, law
+from dzdesign.derivation.scaling import COMMAND_CODE, COMPARE_VALUE, Line
+from dzdesign.derivation.symbols import beta, k, n_adc, n_full, u_i, u_max, u_min0, u_O, x_max
+from tests.support.synthetic import needs_compiler
+
+DIGITS = 50
+U_MAX_V, X_MAX_M = sympy.Integer(10), sympy.Rational(18, 10_000)
+#: The nearest a value that is no tie comes to one is 1/(2 * 2^62); the 50 digits err by far less.
+TIE = sympy.Float("1e-30", DIGITS)
+CORNERS = [(command, dp) for command in (0, 1, 4094, 4095) for dp in (-4095, -41, -40, 0, 1, 63, 64, 4094, 4095)]
+
+
+def rational(value) -> sympy.Rational:
+    """Return a fraction, or a double, exactly."""
+    return sympy.Rational(value.numerator, value.denominator) if isinstance(value, Fraction) else sympy.Rational(value)
+
+
+def test_the_scaling_is_anchored_at_numbers():
+    """Typed here, not taken from the statement: 10 V is code 4095, full drive 60000 counts, 20 MPa code 4095."""
+    codes = [COMMAND_CODE.subs({u_i: volts, u_max: 10, n_adc: 4095}) for volts in (0, 5, 10)]
+    counts = [COMPARE_VALUE.subs({u_O: volts, u_max: 10, n_full: 60000}) for volts in (0, 5, 10)]
+    assert codes == [0, sympy.Rational(4095, 2), 4095]
+    assert counts == [0, 30000, 60000]
+    assert [scaling.pressure_drop(code, span=20, code_max=4095) for code in (-4095, 0, 819, 4095)] == [-20, 0, 4, 20]
+
+
+def stated_compare(compensator, command: int, dp_code: int) -> int:
+    """Go the way of the signal in volts: code -> u_i -> law -> u_O -> compare value, nearest count, limited."""
+    signals = compensator.signals
+    volts = U_MAX_V * command / signals.code_max
+    values = {
+        u_i: volts,
+        beta: rational(compensator.beta(dp_code)),
+        k: rational(compensator.positive.k_x_max_over_u_max) * U_MAX_V / X_MAX_M,
+        x_max: X_MAX_M,
+        u_max: U_MAX_V,
+        u_min0: rational(compensator.positive.u_min0_over_u_max) * U_MAX_V,
+    }
+    output = sympy.N(law(compensator.law_name).output.subs(values), DIGITS)
+    counts = sympy.N(COMPARE_VALUE.subs({u_O: output, u_max: U_MAX_V, n_full: signals.compare_max}), DIGITS)
+    nearest = int(sympy.floor(counts + sympy.Rational(1, 2) + TIE))  # a half goes up
+    return min(max(nearest, 0), signals.compare_max)
+
+
+def wrong_codes(compensator, folder, seed: int) -> int:
+    """Count where the compiled core differs from `stated_compare`, of 300 random pairs of codes and the corners."""
+    from dzdesign.codegen.project import generate
+    from dzdesign.verify.toolchain.host_compiler import load_library
+
+    firmware = generate(compensator, "f28335")
+    write_folder(folder, firmware.files, firmware.manifest)
+    library = load_library({name: (folder / "core" / name).read_text() for name in ("dz_comp.c", "dz_comp.h")}, "core")
+    draw = random.Random(seed)
+    pairs = CORNERS + [(draw.randint(0, 4095), draw.randint(-200, 4095)) for _ in range(300)]
+    wrong = 0
+    for command, dp_code in pairs:
+        back = draw.randint(0, 4095 - abs(dp_code))  # any two pressures with this difference
+        p_a, p_b = (back + dp_code, back) if dp_code >= 0 else (back, back - dp_code)
+        found = library.dz_comp(command, p_a, p_b) & 0xFFFF
+        wrong += found != stated_compare(compensator, command, dp_code)
+    return wrong
+
+
+@pytest.fixture(params=LAW_NAMES)
+def compensator(request, example_valve):
+    from dzdesign.design.designing import design
+    from dzdesign.design.options import DesignOptions
+
+    return design(example_valve, DesignOptions(law_name=request.param))
+
+
+@needs_compiler
+@pytest.mark.parametrize("seed", [31, 32])
+def test_the_core_gives_the_count_nearest_to_the_law_in_volts(compensator, seed, tmp_path):
+    assert wrong_codes(compensator, tmp_path / "fw", seed) == 0
+
+
+FAULTS = {
+    "converter of 4096": lambda line: Line(slope=line.slope.subs(n_adc, n_adc + 1), start=line.start),
+    # Eq. (30) as printed adds u_min0 in volts to counts of the command.
+    "u_min0 left in volts": lambda line: Line(slope=line.slope, start=line.start * U_MAX_V / n_adc),
+}
+
+
+@needs_compiler
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_in_the_scaling_is_seen_in_the_core(fault, example_compensator, tmp_path, monkeypatch):
+    """Design, codegen and verify share the scaling, so they agree on a wrong one; the way in volts does not."""
+    true_line = scaling.law_in_counts
+    monkeypatch.setattr(scaling, "law_in_counts", lambda each: FAULTS[fault](true_line(each)))
+    assert wrong_codes(example_compensator, tmp_path / "fw", seed=33) > 100
+
+
+# --- the law in counts and the pressures, in doubles of every kind ------------------------------------------
+
+#: The longest has 6 roundings, and no argument is rounded on the way in: below 8 half ulps of the sum of its terms.
+#: That sum is n_full/n_adc (beta (kappa + 1) + 1) for the slope, whose own value may cancel to less.
+BOUND = 8 * sympy.Rational(1, 2**53)
+
+
+@pytest.mark.parametrize("seed", range(41, 47))
+@pytest.mark.parametrize("name", LAW_NAMES)
+def test_the_law_in_counts_in_doubles(name, seed):
+    draw = random.Random(seed)
+    b, kappa, share = ([draw.uniform(low, high) for _ in range(20)] for low, high in ((0.5, 1.2), (0.01, 1), (0, 1)))
+    symbols = [casadi.SX.sym(letter) for letter in "bks"]
+    arrays = [np.array(column) for column in (b, kappa, share)]
+
+    def line(b, kappa, share):
+        return scaling.evaluate_line(
+            law(name), beta=b, kappa=kappa, u_min0_over_u_max=share, n_adc=4095.0, n_full=60000.0
+        )
+
+    in_casadi = casadi.Function("line", symbols, list(line(*symbols)))
+    in_numpy = line(*arrays)
+    assert all(isinstance(part, np.ndarray) for part in in_numpy)
+    for index, values in enumerate(zip(b, kappa, share, strict=True)):
+        true = scaling.law_in_counts(law(name))
+        names = dict(zip((beta, scaling.kappa, scaling.mu), map(rational, values), strict=True))
+        precise = Line(*(sympy.N(part.subs({**names, n_adc: 4095, n_full: 60000}), DIGITS) for part in true))
+        terms = Line(
+            slope=sympy.Rational(60000, 4095) * (names[beta] * (names[scaling.kappa] + 1) + 1), start=precise.start
+        )
+        for found in (line(*values), Line(*(part[index] for part in in_numpy)), Line(*map(float, in_casadi(*values)))):
+            for part, reference, scale in zip(found, precise, terms, strict=True):
+                assert abs(rational(float(part)) - reference) <= BOUND * scale
+
+
+@pytest.mark.parametrize("seed", range(51, 57))
+def test_pressures_in_doubles(seed):
+    draw = random.Random(seed)
+    codes = np.array([float(draw.randint(-4095, 4095)) for _ in range(20)])
+    found = scaling.pressure_drop(codes, span=20.0, code_max=4095)
+    symbol = casadi.SX.sym("code")
+    in_casadi = casadi.Function("dp", [symbol], [scaling.pressure_drop(symbol, span=20.0, code_max=4095)])
+    for code, dp in zip(codes, found, strict=True):
+        true = sympy.N(rational(code) * 20 / 4095, DIGITS)
+        for value in (float(dp), float(in_casadi(code))):
+            # One product that is exact here and one division: half an ulp, and half for the way CasADi may take.
+            assert abs(rational(value) - true) <= 2 * sympy.Rational(1, 2**53) * abs(true)

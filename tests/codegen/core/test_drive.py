@@ -1,0 +1,304 @@
+"""The drive around the law: the generated C on the host against `drive_model`, and what an engineer asks of it."""
+
+import ctypes
+from dataclasses import replace
+from fractions import Fraction
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from dzdesign.codegen.project import generate
+from dzdesign.core.errors import InputError
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.designing import design
+from dzdesign.design.options import DesignOptions
+from dzdesign.design.signal_text import Converter, command_signal, parse_signal
+from dzdesign.identify.valve.valve_file import valve_from_document
+from dzdesign.verify.exhaustive.drive_check import drive_samples as sequence
+from dzdesign.verify.exhaustive.exact_drive import STEP_UNIT, DriveModel
+from dzdesign.verify.toolchain.host_compiler import load_library
+from tests.support.golden_firmware import FULL, GOLDENS, full_options, golden_compensator
+from tests.support.synthetic import needs_compiler
+
+pytestmark = needs_compiler
+
+
+class Drive(ctypes.Structure):
+    """`struct dz_drive`."""
+
+    _fields_ = [
+        *((name, ctypes.c_uint16) for name in ("compare_a", "compare_b", "status", "law")),
+        ("side", ctypes.c_int16),
+        ("ticks", ctypes.c_uint16),
+        ("ramped", ctypes.c_int32),
+    ]
+
+
+class Firmware:
+    """The generated drive, compiled for the host, at rest."""
+
+    def __init__(self, compensator: Compensator, edit=lambda text: text) -> None:
+        files = generate(compensator, "f28335").files
+        sources = {path.removeprefix("core/"): text for path, text in files.items() if path.startswith("core/")}
+        sources["dz_drive.c"] = edit(sources["dz_drive.c"])
+        self._library = load_library(sources, "the drive")
+        self.state = Drive()
+        self._library.dz_drive_init(ctypes.byref(self.state))
+
+    def sample(self, *codes: int) -> None:
+        self._library.dz_drive_sample(ctypes.byref(self.state), *map(ctypes.c_uint16, codes))
+
+    def tick(self) -> None:
+        self._library.dz_drive_tick(ctypes.byref(self.state))
+
+    @property
+    def outputs(self) -> tuple[int, int, int]:
+        return self.state.compare_a, self.state.compare_b, self.state.status
+
+
+def turned(text: str):
+    return command_signal(parse_signal(text, "--command-signal"), Converter(), inverted=True)
+
+
+def options_named(name: str) -> DesignOptions:
+    """Sets of options, each with something that the others lack."""
+    full = full_options()
+    plain = DesignOptions(signals=replace(full.signals, command=DesignOptions().signals.command, swapped=False))
+    return {
+        "everything": full,
+        "two solenoids alone": DesignOptions(signals=full.signals),
+        "turned, same pressures": replace(
+            full, signals=replace(full.signals, command=turned("-10..10 V x 0.15 + 1.5 V"), swapped=False)
+        ),
+        "one solenoid, ramps": replace(plain, ramp_up_s=(0.3, 0.0), ramp_down_s=(0.9, 0.0)),
+        "one solenoid, turned, live zero, dither": replace(
+            plain,
+            signals=replace(plain.signals, command=turned("4..20 mA on 140 ohm")),
+            ramp_down_s=(0.2, 0.0),
+            dither_Hz=250.0,
+            dither_peak=Fraction(3, 100),
+            output_max=Fraction(3, 4),
+        ),
+        "quick ramps, no window": full_options(window=Fraction(0), ramp_up_s=(0.001, 0.02), ramp_down_s=(0.0, 0.003)),
+    }[name]
+
+
+SETS = (
+    "everything", "two solenoids alone", "turned, same pressures", "one solenoid, ramps",
+    "one solenoid, turned, live zero, dither", "quick ramps, no window",
+)  # fmt: skip
+
+
+@cache
+def compensator_named(name: str) -> Compensator:
+    content = (FULL / "valve.json").read_bytes()
+    return design(valve_from_document(content, "valve.json"), options_named(name), content)
+
+
+def first_difference(firmware, model: DriveModel, samples: list[tuple[int, int, int]]) -> str:
+    """Run both, two ticks a sample; the first tick where they differ in words, or nothing."""
+    for number, codes in enumerate(samples):
+        firmware.sample(*codes)
+        model.sample(*codes)
+        for tick in range(2):
+            firmware.tick()
+            model.tick()
+            if firmware.outputs[0] and firmware.outputs[1]:
+                return "both solenoids at once"
+            if firmware.outputs != model.outputs:
+                return f"sample {number} {codes}, tick {tick}: {firmware.outputs} and not {model.outputs}"
+    return ""
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_the_firmware_does_what_the_model_does(name):
+    compensator = compensator_named(name)
+    samples = sequence(compensator, seed=11, count=6000)
+    assert first_difference(Firmware(compensator), DriveModel(compensator), samples) == ""
+
+
+ONE_SIDE = "one solenoid, turned, live zero, dither"
+FAULTS = [
+    ("command > WINDOW_CODES", "command >= WINDOW_CODES", "everything"),
+    ("drive->ticks < DITHER_TICKS", "drive->ticks <= DITHER_TICKS", "everything"),
+    ("(drive->side < 0) ? (uint16_t)compare : 0u", "(uint16_t)compare", "everything"),
+    ("RAMP_UP_NEGATIVE, RAMP_DOWN_NEGATIVE)", "RAMP_UP_POSITIVE, RAMP_DOWN_NEGATIVE)", "everything"),
+    ("        drive->ramped = 0;\n    } else", "    } else", "everything"),
+    ("        drive->side = 0;\n        drive->ramped = 0;", "        drive->ramped = 0;", "everything"),
+    ("if (compare > DZ_COMPARE_LIMIT)", "if (compare > 65535u)", "everything"),
+    ("if (compare == 0u)", "if (compare == 1u)", ONE_SIDE),
+    ("compare -= DITHER_COUNTS;", ";", ONE_SIDE),
+    ("(to > 0) ? to : 0", "to", "everything"),
+    ("dz_comp_negative(u_law", "dz_comp_negative(u_adc", "everything"),
+    ("dz_status_negative(", "dz_status(", "everything"),
+    ("COMMAND_ZERO - command;", "COMMAND_ZERO + command;", ONE_SIDE),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "name"), FAULTS)
+def test_a_seeded_fault_of_the_drive_is_found(old, new, name):
+    def edit(text: str) -> str:
+        assert text.count(old) == 1, old
+        return text.replace(old, new)
+
+    compensator = compensator_named(name)
+    samples = sequence(compensator, seed=11, count=6000)
+    assert first_difference(Firmware(compensator, edit), DriveModel(compensator), samples) != ""
+
+
+PRESSURES = (2400, 1500)  # sound on both sensors
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_noise_inside_the_window_never_changes_the_side(side):
+    """A zero command with noise of one per cent, after each of the sides has been driven."""
+    compensator = compensator_named("two solenoids alone")
+    window, zero = compensator.amplifier.window_codes, compensator.signals.command.zero_code
+    assert window >= 0.0097 * compensator.signals.command.span(1)
+    firmware, rng = Firmware(compensator), np.random.default_rng(2)
+    firmware.sample(zero + side * 500, *PRESSURES)
+    for noise in (*rng.integers(-window, window + 1, 5000), window, -window):
+        firmware.sample(zero + int(noise), *PRESSURES)
+        firmware.tick()
+        assert firmware.state.side == side and (firmware.outputs[0] > 0) == (side > 0)
+    firmware.sample(zero - side * (window + 1), *PRESSURES)
+    assert firmware.state.side == -side, "one code more is a command"
+
+
+def test_from_rest_noise_drives_neither():
+    compensator = compensator_named("two solenoids alone")
+    firmware, window = Firmware(compensator), compensator.amplifier.window_codes
+    for noise in range(-window, window + 1):
+        firmware.sample(compensator.signals.command.zero_code + noise, *PRESSURES)
+        firmware.tick()
+        assert firmware.outputs[:2] == (0, 0)
+
+
+@pytest.mark.parametrize(("sign", "seconds"), [(1, (0.5, 0.4)), (-1, (0.8, 0.0))], ids=["positive", "negative"])
+def test_a_ramp_takes_its_time_to_a_sample(sign, seconds):
+    """Zero to full and back: to a sample more, by the rounding of the step (at most a 1/2 of 2^-16 codes a sample)."""
+    compensator = compensator_named("everything")
+    signals = compensator.signals
+    span, full = signals.command.span(sign), signals.command.zero_code + sign * signals.command.span(sign)
+    firmware = Firmware(compensator)
+    for goal, time_s in ((full, seconds[0]), (signals.command.zero_code, seconds[1])):
+        taken, end = 0, STEP_UNIT * (goal - signals.command.zero_code)
+        while firmware.state.ramped != end:
+            before = firmware.state.ramped
+            firmware.sample(goal, *PRESSURES)
+            taken += 1
+            if time_s:
+                assert abs(firmware.state.ramped - before) <= STEP_UNIT * span / (time_s * signals.sample_Hz) + 1
+        assert abs(taken - max(time_s * signals.sample_Hz, 1)) <= 1
+
+
+def test_reversing_the_command_stops_at_zero_on_the_way():
+    compensator = compensator_named("everything")
+    firmware, zero = Firmware(compensator), compensator.signals.command.zero_code
+    for _ in range(100):
+        firmware.sample(4095, *PRESSURES)
+    positions = []
+    for _ in range(400):
+        firmware.sample(0, *PRESSURES)
+        positions.append(firmware.state.ramped)
+    assert 0 in positions and positions == sorted(positions, reverse=True) and positions[-1] < 0
+    assert zero == 2048
+
+
+@pytest.mark.parametrize("name", ["everything", ONE_SIDE])
+def test_the_dither_has_its_frequency_and_its_peak(name):
+    compensator = compensator_named(name)
+    amplifier, signals = compensator.amplifier, compensator.signals
+    firmware = Firmware(compensator)
+    command = signals.command.zero_code + signals.command.direction(1) * 900
+    for _ in range(2000):  # the ramps are over
+        firmware.sample(command, *PRESSURES)
+    seen = []
+    for _ in range(signals.tick_Hz):
+        firmware.tick()
+        seen.append(firmware.outputs[0])
+    law = firmware.state.law
+    assert set(seen) == {law + amplifier.dither_counts, law - amplifier.dither_counts}
+    rises = sum(later > earlier for earlier, later in pairwise(seen))
+    asked = options_named(name)
+    exact = signals.tick_Hz / (2 * amplifier.dither_ticks)
+    assert abs(rises - exact) <= 1
+    assert abs(1 / exact - 1 / asked.dither_Hz) <= 1 / signals.tick_Hz, "to a PWM period"
+    assert amplifier.dither_counts == round(asked.dither_peak * signals.compare_max)
+    assert sum(seen[: 2 * amplifier.dither_ticks]) == 2 * amplifier.dither_ticks * law, "its mean is the law's"
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_zero_command_stays_under_the_certified_bound_at_the_waves_top(side):
+    """The bound, in closed form: of all thresholds' lower bounds of the side's tests at these pressures the lowest."""
+    compensator = compensator_named("everything")
+    signals = compensator.signals
+    valve = valve_from_document(compensator.valve_document.encode(), "valve.json")
+    tests = valve.sides["positive" if side > 0 else "negative"].tests
+    rising = valve.sides["positive" if side > 0 else "negative"].trend == "increasing"
+    counts_in_V = signals.compare_max / float(compensator.u_max_V)
+    firmware, tried = Firmware(compensator), 0
+    for _ in range(2000):
+        firmware.sample(signals.command.zero_code + 500 * side, *PRESSURES)
+    for _ in range(2000):
+        firmware.sample(signals.command.zero_code, *PRESSURES)
+    for a in range(850, 3900, 37):
+        b = 1900
+        firmware.sample(signals.command.zero_code, a, b)
+        dp = float(signals.dp_MPa(signals.difference(a, b, side)))
+        if not tests[0].dp_MPa + 0.05 <= dp <= tests[-1].dp_MPa - 0.05:
+            continue
+        top = 0
+        for _ in range(2 * compensator.amplifier.dither_ticks):
+            firmware.tick()
+            top = max(top, *firmware.outputs[:2])
+        near = [t.u_guard_lower_V for t in tests if (t.dp_MPa <= dp if rising else t.dp_MPa >= dp)]
+        assert 0 < top == firmware.state.law + compensator.amplifier.dither_counts
+        assert top <= max(near) * counts_in_V
+        tried += 1
+    assert tried >= 8
+
+
+def test_an_unsound_command_lets_go_at_once_and_starts_from_rest():
+    compensator = compensator_named("everything")
+    firmware = Firmware(compensator)
+    for _ in range(700):
+        firmware.sample(4095, *PRESSURES)
+    firmware.tick()
+    assert firmware.outputs[0] == compensator.amplifier.compare_limit
+    firmware.sample(65535, *PRESSURES)
+    firmware.tick()
+    assert firmware.outputs == (0, 0, 1) and firmware.state.ramped == firmware.state.side == 0
+
+
+def test_beta_for_the_telemetry_is_that_of_the_side():
+    compensator = compensator_named("everything")
+    files = generate(compensator, "f28335").files
+    core = load_library({path.removeprefix("core/"): files[path] for path in files if path.startswith("core/")}, "core")
+    signals, rng = compensator.signals, np.random.default_rng(8)
+    for name, sign in (("dz_beta", 1), ("dz_beta_negative", -1)):
+        for a, b in rng.integers(800, 3900, (2000, 2)).tolist():
+            beta = compensator.law_beta(signals.difference(a, b, sign), sign)
+            assert getattr(core, name)(ctypes.c_uint16(a), ctypes.c_uint16(b)) == int(beta * 2**15)
+
+
+def test_the_plain_drive_is_the_law_alone():
+    compensator = golden_compensator("f28335", GOLDENS)
+    firmware = Firmware(compensator)
+    for command in range(0, 4096, 13):
+        firmware.sample(command, 1500, 1000)
+        firmware.tick()
+        assert firmware.outputs == (compensator.compare(command, 500), 0, 0)
+
+
+def test_what_the_firmwares_integers_cannot_hold_is_refused():
+    plain = golden_compensator("f28335", GOLDENS)
+    with pytest.raises(InputError, match="whole number of PWM periods"):
+        replace(plain.signals, sample_Hz=1200)
+    signals = replace(plain.signals, code_max=65535, command=replace(plain.signals.command, valid_codes=(0, 65535)))
+    amplifier = replace(plain.amplifier, ramp_up=(1, 0))
+    nodes = (32768,) * (signals.largest_difference(1) // plain.beta_step_codes + 2)
+    with pytest.raises(InputError, match="32767 codes"):
+        replace(plain, signals=signals, amplifier=amplifier, positive=replace(plain.positive, beta_numerators=nodes))

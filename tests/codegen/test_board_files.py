@@ -1,0 +1,350 @@
+"""The files of a firmware that are its user's to fill in: kept by `codegen`, named and not checked by `verify`."""
+
+import json
+import re
+import shutil
+import subprocess
+
+import pytest
+
+from dzdesign import api
+from dzdesign.codegen.project import generate, targets, write_firmware
+from dzdesign.command_line.cli import main
+from dzdesign.core.artefact_files import MANIFEST_NAME, to_json, write_folder
+from dzdesign.core.errors import InputError
+from dzdesign.design.compensator_file import compensator_document
+from dzdesign.design.designing import design
+from dzdesign.report.valve_report import REPORT_NAME, report_of_folder, with_report
+from dzdesign.verify.checks import files_unchanged
+from dzdesign.verify.closed_loop.loop import RampSequence
+from dzdesign.verify.firmware import board_files
+from dzdesign.verify.firmware.board_files import BoardCompiled, board_compiles
+from dzdesign.verify.firmware.folder import read_firmware_manifest
+from dzdesign.verify.requirements import untried_of
+from dzdesign.verify.verification import SCHEMA, evidence_files, verify
+from tests.conftest import default_options
+from tests.support.synthetic import needs_compiler
+
+pytestmark = needs_compiler
+BOARD = ["dz_board.c", "dz_tick.h", "main.c", "mps2_an386.ld", "startup.c"]
+PROJECT = "f28335/dzdesign.projectspec"
+needs_arm = pytest.mark.skipif(shutil.which("arm-none-eabi-gcc") is None, reason="apt install gcc-arm-none-eabi")
+
+
+@pytest.fixture(scope="module")
+def compensator(example_valve):
+    return design(example_valve, default_options())
+
+
+@pytest.fixture
+def cortex(compensator, tmp_path):
+    write_firmware(generate(compensator, "cortex-m4"), tmp_path / "firmware")
+    return tmp_path / "firmware"
+
+
+def fill_in(folder, name="cortex_m4/dz_board.c", old="return dz_board_u_adc;", new="return 7u;"):
+    text = (folder / name).read_text()
+    assert old in text
+    (folder / name).write_text(text.replace(old, new))
+
+
+def unchanged(folder):
+    return files_unchanged(folder, json.loads((folder / MANIFEST_NAME).read_text()))
+
+
+def test_they_are_marked_in_their_first_lines_and_in_the_manifest(compensator):
+    found = {}
+    for target in targets():
+        try:
+            firmware = generate(compensator, target.name)
+        except InputError:  # another converter
+            continue
+        found[target.name] = firmware.manifest["board"]
+        for name, text in firmware.files.items():
+            head = " ".join(text.splitlines()[:4])
+            assert ("Yours to edit" in head) is (name in target.board) and target.board <= firmware.files.keys()
+            assert name == "compensator.json" or ("Do not edit" in head) is (name not in target.board)
+    assert found["cortex-m4"] == [f"cortex_m4/{name}" for name in BOARD]
+    assert found["f28335"] == [PROJECT] and found["host"] == []
+
+
+def test_the_readme_marks_the_same_files(cortex):
+    readme = (cortex / "cortex_m4/README.md").read_text()
+    starred = re.findall(r"`([\w.]+)` \*", readme)
+    assert sorted(starred) == BOARD
+    assert set(re.findall(r"`([\w.]+)`", readme[readme.index("## Your chip") :])) & set(BOARD) <= set(starred)
+
+
+def test_nothing_of_a_compensator_stands_in_them(compensator):
+    """A file that was kept would say it of the next one."""
+    one, other = generate(compensator, "cortex-m4"), generate(compensator, "cortex-m4", b"another spacing")
+    for name in one.manifest["board"]:
+        assert one.files[name] == other.files[name] and one.files[name].isascii()
+
+
+# ---- generated again ----
+
+
+def test_what_was_filled_in_is_kept_and_said(compensator, cortex, tmp_path, capsys):
+    fill_in(cortex)
+    (cortex / "cortex_m4/main.c").unlink()  # wanted anew
+    mine = (cortex / "cortex_m4/dz_board.c").read_bytes()
+    path = tmp_path / "compensator.json"
+    path.write_text(to_json(compensator_document(compensator)))
+    assert main(["codegen", str(path), "--target", "cortex-m4", "-o", str(cortex)]) == 0
+    assert "kept as you changed it: cortex_m4/dz_board.c; for what is generated now" in capsys.readouterr().err
+    assert (cortex / "cortex_m4/dz_board.c").read_bytes() == mine and (cortex / "cortex_m4/main.c").is_file()
+    assert unchanged(cortex).holds and "cortex_m4/dz_board.c" in unchanged(cortex).text  # known as changed again
+    (cortex / "cortex_m4/dz_board.c").unlink()
+    firmware = api.generate(path, target="cortex-m4", output=cortex)
+    assert firmware.note.count("kept") == 0
+    assert (cortex / "cortex_m4/dz_board.c").read_text() == firmware.files["cortex_m4/dz_board.c"]
+
+
+def test_it_is_said_where_another_text_would_be_generated_now(compensator, cortex):
+    fill_in(cortex)
+    firmware = generate(compensator, "cortex-m4")
+    newer = {**firmware.files, "cortex_m4/dz_board.c": firmware.files["cortex_m4/dz_board.c"] + "/* more */\n"}
+    kept = write_folder(cortex, newer, firmware.manifest)
+    assert kept == {"cortex_m4/dz_board.c": True}
+
+
+def test_a_notebook_shows_what_was_kept(compensator, cortex):
+    fill_in(cortex)
+    shown = str(write_firmware(generate(compensator, "cortex-m4"), cortex))
+    assert "kept as you changed it: cortex_m4/dz_board.c" in shown
+
+
+@pytest.mark.parametrize("name", ["cortex_m4/dz_tick.c", "core/dz_drive.c", "cortex_m4/Makefile", "compensator.json"])
+def test_any_other_file_that_was_changed_is_not_overwritten(compensator, cortex, name):
+    (cortex / name).write_text((cortex / name).read_text() + "\n")
+    before = {path: path.read_bytes() for path in cortex.rglob("*") if path.is_file()}
+    with pytest.raises(InputError, match=f"{name}' was changed since dzdesign wrote it and would be lost"):
+        write_firmware(generate(compensator, "cortex-m4"), cortex)
+    assert before == {path: path.read_bytes() for path in cortex.rglob("*") if path.is_file()}
+
+
+def test_what_was_filled_in_is_not_lost_to_another_target(compensator, cortex):
+    fill_in(cortex)
+    with pytest.raises(InputError, match=r"dz_board\.c' was changed since dzdesign wrote it and would be lost"):
+        write_firmware(generate(compensator, "host"), cortex)
+    assert "return 7u;" in (cortex / "cortex_m4/dz_board.c").read_text()
+
+
+def test_so_does_one_whose_drive_is_not_mounted_and_one_that_nobody_edited_yet(compensator, cortex, tmp_path):
+    """A stub in its place would compile, and read no converter."""
+    board, mine = cortex / "cortex_m4/dz_board.c", tmp_path / "my_board.c"
+    board.rename(mine)
+    board.symlink_to(mine)
+    kept = write_folder(cortex, *_parts(generate(compensator, "cortex-m4")))
+    assert kept == {"cortex_m4/dz_board.c": False} and board.is_symlink()
+    mine.rename(tmp_path / "elsewhere.c")
+    kept = write_folder(cortex, *_parts(generate(compensator, "cortex-m4")))
+    assert kept == {"cortex_m4/dz_board.c": False} and board.is_symlink() and not board.exists()
+    core = cortex / "core/dz_comp.c"
+    core.rename(tmp_path / "dz_comp.c")
+    core.symlink_to(tmp_path / "gone.c")
+    with pytest.raises(InputError, match=r"dz_comp\.c' was changed since dzdesign wrote it and would be lost"):
+        write_folder(cortex, *_parts(generate(compensator, "cortex-m4")))
+
+
+def _parts(firmware):
+    return firmware.files, firmware.manifest
+
+
+def test_a_link_in_its_place_stays_a_link(compensator, cortex, tmp_path):
+    mine = tmp_path / "my_board.c"
+    mine.write_text("/* mine */\n")
+    (cortex / "cortex_m4/dz_board.c").unlink()
+    (cortex / "cortex_m4/dz_board.c").symlink_to(mine)
+    write_firmware(generate(compensator, "cortex-m4"), cortex)
+    assert (cortex / "cortex_m4/dz_board.c").is_symlink() and mine.read_text() == "/* mine */\n"
+
+
+# ---- verified ----
+
+
+@pytest.mark.parametrize("name", ["cortex_m4/dz_tick.c", "cortex_m4/dz_board.h", "core/dz_comp.c", "compensator.json"])
+def test_an_edited_file_that_is_not_the_users_still_fails(cortex, name):
+    fill_in(cortex)
+    (cortex / name).write_text((cortex / name).read_text() + "\n")
+    assert unchanged(cortex).holds is False and f"changed or missing: {name}" in unchanged(cortex).text
+
+
+@pytest.mark.parametrize(
+    "name", ["core/dz_comp.c", "core/dz_drive.h", "compensator.json", "cortex_m4/missing.c", "../other.c", ""]
+)
+def test_a_manifest_can_not_hand_over_the_core(cortex, name):
+    manifest = json.loads((cortex / MANIFEST_NAME).read_text())
+    manifest["board"].append(name)
+    (cortex / MANIFEST_NAME).write_text(to_json(manifest))
+    check = files_unchanged(cortex, read_firmware_manifest(cortex)[1])
+    assert check.holds is False and f"calls {name} the user's to fill in" in check.text
+
+
+def test_a_manifest_whose_board_is_no_list_is_bad_input(cortex):
+    manifest = json.loads((cortex / MANIFEST_NAME).read_text())
+    (cortex / MANIFEST_NAME).write_text(to_json({**manifest, "board": 3}))
+    with pytest.raises(InputError, match="'board' is 3, expected a list"):
+        read_firmware_manifest(cortex)
+
+
+@needs_arm
+@pytest.mark.parametrize(
+    ("new", "holds"), [("return 7u;", True), ("return seven;", False), ("return 7u;\n}\n#include <my_chip.h>\n{", None)]
+)
+def test_it_is_compiled_if_that_can_be_done(cortex, new, holds):
+    _, manifest = read_firmware_manifest(cortex)
+    assert board_compiles(cortex, manifest) == BoardCompiled()
+    fill_in(cortex, new=new)
+    found = board_compiles(cortex, manifest)
+    checks = found.checks
+    assert bool(found.untried) is (holds is None)
+    assert [check.holds for check in checks] == ([] if holds is None else [holds])
+    assert holds is not False or ("cortex_m4/dz_board.c" in checks[0].text and "seven" in checks[0].text)
+
+
+def test_without_the_compiler_it_is_said_why(cortex, monkeypatch):
+    monkeypatch.setitem(board_files.COMPILERS, "cortex-m4", ("no-such-gcc",))
+    fill_in(cortex, new="return seven;")
+    found = board_compiles(cortex, read_firmware_manifest(cortex)[1])
+    assert found == BoardCompiled(untried="no-such-gcc is not on the path; install it, then `verify`")
+
+
+@needs_arm
+def test_a_vendors_header_is_named_and_found_by_an_option(cortex, tmp_path, capsys):
+    fill_in(cortex, old="#include", new='#include "stm32_chip.h"\n#include')
+    evidence = tmp_path / "evidence"
+    assert main(["verify", str(cortex), "-o", str(evidence)]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    why = "stm32_chip.h, which cortex_m4/dz_board.c includes, was not found in the firmware; verify --include DIR"
+    assert f"NOT TRIED your board files compile: {why}" in said
+    assert "stm32_chip.h, which" in (evidence / REPORT_NAME).read_text(encoding="utf-8")
+    headers = [tmp_path / "device", tmp_path / "cmsis"]
+    for folder, text in zip(headers, ['#include "core_cm4.h"\n', "int narrow(long x);\n"], strict=True):
+        folder.mkdir()
+        (folder / ("stm32_chip.h" if "core" in text else "core_cm4.h")).write_text(text)
+    one = ["--include", str(headers[0])]
+    assert main(["verify", str(cortex), "-o", str(evidence), *one]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert f"core_cm4.h, which cortex_m4/dz_board.c includes, was not found in the firmware nor in {headers[0]}" in said
+    assert main(["verify", str(cortex), "-o", str(evidence), *one, "--include", str(headers[1])]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "holds your board files compile: one by one, with cortex_m4/dz_board.c" in said
+    (cortex / "board").mkdir()
+    (cortex / "board/adc.c").write_text("int adc(void);\nint adc(void) { return 1; }\n")
+    manifest = json.loads((cortex / MANIFEST_NAME).read_text())
+    (check,) = board_compiles(cortex, manifest, headers).checks
+    assert check.holds and "as you changed them and board/adc.c" in check.text
+    (cortex / "board/adc.c").write_text("#error broken\n")
+    (check,) = board_compiles(cortex, manifest, headers).checks
+    assert check.holds is False and "broken" in check.text
+
+
+def test_include_of_what_is_no_folder_or_not_compiled_here_is_refused(compensator, cortex, tmp_path):
+    with pytest.raises(InputError, match=r"nowhere' is no folder, expected one with headers after --include"):
+        api.verify(cortex, include=[tmp_path / "nowhere"])
+    write_firmware(generate(compensator, "f28335"), tmp_path / "other")
+    with pytest.raises(InputError, match="is for the board files of cortex-m4, and this firmware is for f28335"):
+        api.verify(tmp_path / "other", include=[tmp_path])
+
+
+# ---- files of the user's own beside them ----
+
+
+def test_files_in_the_folder_for_them_are_named_kept_and_not_checked(compensator, cortex):
+    (cortex / "board").mkdir()
+    (cortex / "board/adc.c").write_text("this is no C")
+    (cortex / "board/my_chip.ld").write_text("/* mine */")
+    check = unchanged(cortex)
+    assert check.holds and check.text.endswith("yours, in board/, and not checked: board/adc.c, board/my_chip.ld")
+    write_firmware(generate(compensator, "cortex-m4"), cortex)
+    assert (cortex / "board/adc.c").read_text() == "this is no C"
+    evidence = {"checks": [], "closed_loop": {}, "monte_carlo": None, "own": ["board/adc.c"]}
+    assert "board/adc.c, which is yours: review it, and try it on the machine" in untried_of(evidence)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("board/dz_comp.h", "board/dz_comp.h: not generated, but named as a generated file"),
+        ("cortex_m4/my.ld", "does not name cortex_m4/my.ld; keep source and project files of your own in board/"),
+        ("core/board/adc.c", "does not name core/board/adc.c"),
+        ("core/dz_comp.h.gch", "core/dz_comp.h.gch: not generated, but named as a generated file"),
+        ("core/dz_comp.h.gch/any", "core/dz_comp.h.gch: not generated, but named as a generated file"),
+        ("core/adc.c", "core/ is the compensator alone, keep files of your own in board/"),
+    ],
+)
+def test_elsewhere_or_by_a_name_of_ours_they_fail(cortex, name, said):
+    (cortex / name).parent.mkdir(exist_ok=True)
+    (cortex / name).write_text("int x;\n")
+    assert unchanged(cortex).holds is False and said in unchanged(cortex).text
+
+
+def test_a_manifest_can_not_hide_a_core_file_in_that_folder(cortex):
+    """What it lists is compared with its hash, wherever it lies."""
+    manifest = json.loads((cortex / MANIFEST_NAME).read_text())
+    manifest["files"]["board/adc.c"] = "0" * 64
+    (cortex / MANIFEST_NAME).write_text(to_json(manifest))
+    (cortex / "board").mkdir()
+    (cortex / "board/adc.c").write_text("int x;\n")
+    assert unchanged(cortex).holds is False and "changed or missing: board/adc.c" in unchanged(cortex).text
+
+
+@needs_arm
+def test_make_takes_renamed_copies_of_board_files_and_finds_what_lies_in_board(cortex):
+    place, own = cortex / "cortex_m4", cortex / "board"
+    own.mkdir()
+    script, board = (place / "mps2_an386.ld").read_text(), (place / "dz_board.c").read_text()
+    (own / "my_chip.ld").write_text(script.replace("LENGTH = 4M", "LENGTH = 2M"))
+    (own / "my_board.c").write_text('#include "my_adc.h"\n' + board)
+    (own / "my_adc.h").write_text("uint16_t my_adc(void);\n".replace("uint16_t", "unsigned short"))
+    (own / "my_adc.c").write_text('#include "my_adc.h"\nunsigned short my_adc(void)\n{\n    return 7u;\n}\n')
+    own_files = ["LDSCRIPT=../board/my_chip.ld", "DZ_BOARD=../board/my_board.c"]
+    done = subprocess.run(["make", "-C", place, *own_files], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "-T ../board/my_chip.ld" in done.stdout and done.stdout.count("my_board.c") == 1
+    assert "../board/my_adc.c" in done.stdout and " dz_board.c" not in done.stdout
+    named = subprocess.run(
+        ["make", "-B", "-C", place, *own_files, "BOARD=../board/my_adc.c"], capture_output=True, text=True, check=False
+    )
+    assert named.returncode == 0, named.stderr
+    assert unchanged(cortex).holds
+
+
+def test_an_earlier_target_that_is_replaced_is_said_so(compensator, cortex, tmp_path, capsys):
+    path = tmp_path / "compensator.json"
+    path.write_text(to_json(compensator_document(compensator)))
+    assert main(["codegen", str(path), "--target", "cortex-m4", "-o", str(cortex)]) == 0
+    assert "replaced" not in capsys.readouterr().err
+    assert main(["codegen", str(path), "--target", "host", "-o", str(cortex)]) == 0
+    said = capsys.readouterr().err
+    assert "the firmware for cortex-m4 in '" in said and "was replaced by this one for host" in said
+    assert not (cortex / "cortex_m4").exists()
+
+
+def test_verify_holds_and_says_that_it_was_not_checked(cortex, tmp_path):
+    fill_in(cortex)
+    result = verify(cortex, sequence=RampSequence(rest=0.5, ramp=4.0, top=0.5))
+    assert result.holds and result.document["yours"] == ["cortex_m4/dz_board.c"]
+    said = "cortex_m4/dz_board.c, which is yours and was changed: review it, and try it on the machine"
+    assert said in untried_of(result.document)
+    assert "NOT TRIED: cortex_m4/dz_board.c, which is yours" in str(result)
+    manifest = {"schema": SCHEMA, "made_from": result.document["made_from"]}
+    write_folder(tmp_path / "evidence", with_report(evidence_files(result), cortex, tmp_path / "evidence"), manifest)
+    html = (tmp_path / "evidence" / REPORT_NAME).read_text(encoding="utf-8")
+    assert 'class="verdict good"' in html and "which is yours and was changed" in html
+    assert report_of_folder(tmp_path / "evidence").kind == "good"
+    fill_in(cortex, "cortex_m4/startup.c", "#include <stdint.h>", "#include <stdint.h> ")  # after the evidence
+    report = report_of_folder(tmp_path / "evidence")
+    said = "cortex_m4/startup.c: yours, and no longer as generated"
+    assert report.kind == "good" and any(said in line for line in report.missing)
+    fill_in(cortex, "cortex_m4/dz_tick.c", "drive", "drive ")
+    assert report_of_folder(tmp_path / "evidence").kind == "bad"
+
+
+def test_a_project_file_of_code_composer_studio_is_the_users(compensator, tmp_path):
+    write_firmware(generate(compensator, "f28335"), tmp_path)
+    fill_in(tmp_path, PROJECT, "C:/ti/c2000", "D:/ti/c2000")
+    check = unchanged(tmp_path)
+    assert check.holds and check.text.endswith(f"yours, changed, and not checked: {PROJECT}")

@@ -1,0 +1,263 @@
+"""What every target folder must be: found by itself, packaged, chosen on the command line, safe from users' names."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+import zipfile
+from dataclasses import replace
+from pathlib import PurePosixPath
+from xml.etree import ElementTree
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dzdesign.codegen import project
+from dzdesign.codegen.avr import target as avr
+from dzdesign.codegen.comment_text import LONGEST, printable_list, printable_name
+from dzdesign.codegen.cortex_m4 import target as cortex_m4
+from dzdesign.codegen.project import TARGET_NAMES, generate, target_named
+from dzdesign.codegen.target import folder_of
+from dzdesign.command_line.cli import main
+from dzdesign.core.artefact_files import to_json, write_folder
+from dzdesign.core.errors import DzdesignError, InputError
+from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
+from tests.support.golden_firmware import GOLDENS, golden_compensator
+from tests.support.paths import ROOT
+from tests.support.synthetic import needs_compiler
+
+VALVE = GOLDENS / "valve.json"
+HOSTILE = [
+    '*/ #error "c" /*',
+    'new\nline\n#error "n"',
+    "carriage\r\n$(error r)",
+    "../../../etc/passwd",
+    "%s%n$(shell touch owned)",
+    "$(x)`touch owned`",
+    "trigraph ??/",
+    "back\\",
+    "--> <owned/> <!--",
+    "'\"; touch owned #",
+    "{{ banner }} {% endfor %}",
+    "\u202e\u2028\x00\x1b[2J",
+    "- [owned](javascript:x)",
+]
+
+
+# --- found and packaged -------------------------------------------------------------------------------------
+
+
+def test_targets_are_the_folders_with_a_target_py(tmp_path, monkeypatch):
+    folders = sorted(path.parent.name for path in (ROOT / "codegen").glob("*/target.py"))
+    assert [folder_of(name) for name in TARGET_NAMES] == folders and {"avr", "cortex-m4", "host"} <= set(TARGET_NAMES)
+    for name, has_target in (("zeta", True), ("new_one", True), ("templates", False)):
+        (tmp_path / name).mkdir()
+        if has_target:
+            (tmp_path / name / "target.py").touch()
+    monkeypatch.setattr(project, "files_of", lambda _: tmp_path)
+    assert project._found_targets() == ("new-one", "zeta")
+
+
+@pytest.mark.parametrize("name", TARGET_NAMES)
+def test_a_target_says_its_own_name_and_uses_every_template(name):
+    target = target_named(name)
+    assert target.name == name and target.description and "\n" not in target.description
+    folder = ROOT / "codegen" / target.folder / "templates"
+    own = {path.name for path in folder.iterdir()}
+    shared = {path.name for path in (ROOT / "codegen" / "templates").iterdir()}
+    assert own <= set(target.templates.values()) <= own | shared
+    for path in target.templates:
+        assert PurePosixPath(path).parts[0] == target.folder and ".." not in path
+
+
+def test_every_target_has_its_rows_in_pyproject():
+    tables = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
+    for name in TARGET_NAMES:
+        package = f"dzdesign.codegen.{folder_of(name)}"
+        assert package in tables["packages"]
+        assert tables["package-dir"].get(package) == f"codegen/{folder_of(name)}"
+        assert tables["package-data"].get(package) == ["templates/*.jinja"]
+
+
+def test_the_wheel_generates_for_every_target(tmp_path):
+    source = tmp_path / "source"
+    left_out = shutil.ignore_patterns(".*", "*.egg-info", "build", "__pycache__", "tests", "benchmarks")
+    shutil.copytree(ROOT, source, ignore=left_out)
+    command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "--no-index"]
+    command += ["--disable-pip-version-check", "-w", str(tmp_path / "wheel"), str(source)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    with zipfile.ZipFile(next((tmp_path / "wheel").glob("*.whl"))) as wheel:
+        wheel.extractall(tmp_path / "installed")
+    code = (
+        "import sys, json, dzdesign; from dzdesign.codegen.project import generate, targets;"
+        "from dzdesign.design.compensator_file import compensator_from_document as read;"
+        "from dataclasses import replace;"
+        "c = read(open(sys.argv[1], 'rb').read(), 'c');"
+        "fit = lambda m: replace(c, signals=replace(c.signals, compare_max=m),"
+        " amplifier=replace(c.amplifier, compare_limit=m));"
+        "print(json.dumps([dzdesign.__path__[0]] + [sorted(generate(fit(t.compare_max), t.name).files)"
+        " for t in targets()]))"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path / "installed")}
+    command = [sys.executable, "-c", code, str(GOLDENS / "compensator.json")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path, env=environment)
+    assert done.returncode == 0, done.stderr
+    where, *listings = json.loads(done.stdout)
+    assert where.startswith(str(tmp_path / "installed"))
+    expected = [sorted(generate(golden_compensator(name), name).files) for name in TARGET_NAMES]
+    assert listings == expected
+
+
+# --- on the command line ------------------------------------------------------------------------------------
+
+
+def test_list_targets_is_a_line_each(capsys):
+    assert main(["codegen", "--list-targets"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == list(TARGET_NAMES)
+    assert all(target_named(name).description in line for name, line in zip(TARGET_NAMES, lines, strict=True))
+    assert main(["codegen", "--list-targets", "--json"]) == 0
+    listed = json.loads(capsys.readouterr().out)["targets"]
+    assert [entry["name"] for entry in listed] == list(TARGET_NAMES)
+
+
+@pytest.mark.parametrize("command", [["design", str(VALVE)], ["codegen", str(VALVE)]])
+def test_a_wrong_target_names_the_nearest_and_writes_nothing(command, tmp_path, capsys):
+    assert main([*command, "--target", "cortex-m3", "-o", str(tmp_path / "out")]) == 2
+    assert "did you mean 'cortex-m4'?" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_codegen_without_a_source_says_so(capsys):
+    assert main(["codegen"]) == 2
+    assert "COMPENSATOR.json" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", TARGET_NAMES)
+def test_design_and_codegen_fit_the_target(name, tmp_path, capsys):
+    """From a valve codegen designs by itself, and that is what design and codegen do one after the other."""
+    target = target_named(name)
+    compensator, one, two = (tmp_path / part for part in ("compensator.json", "one", "two"))
+    assert main(["design", str(VALVE), "--target", name, "-o", str(compensator)]) == 0
+    signals = json.loads(compensator.read_text())["signals"]
+    assert signals["compare_max"] == target.compare_max
+    assert signals["code_max"] == signals["command"]["full_code"] == target.adc_code_max
+    assert main(["codegen", str(compensator), "--target", name, "-o", str(one)]) == 0
+    assert main(["codegen", str(VALVE), "--target", name, "-o", str(two)]) == 0
+    files = {path.relative_to(one): path.read_bytes() for path in one.rglob("*") if path.is_file()}
+    assert files == {path.relative_to(two): path.read_bytes() for path in two.rglob("*") if path.is_file()}
+    assert json.loads((one / "manifest.json").read_text())["target"] == name
+
+
+def test_a_compensator_of_another_target_is_refused_with_the_way_out():
+    with pytest.raises(InputError, match=r"60000.*40000.*dzdesign design --target f280049c"):
+        generate(golden_compensator("f28335"), "f280049c")
+    for name in ("host", "avr", "cortex-m4"):  # these have no converter and timer of their own
+        assert "DZ_COMPARE_MAX 40000u" in generate(golden_compensator("f280049c"), name).files["core/dz_comp.h"]
+
+
+@needs_compiler
+def test_the_core_is_exact_on_every_input_for_another_pwm(tmp_path):
+    firmware = generate(golden_compensator("f280049c"), "f280049c")
+    write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
+    result = check_all_inputs(tmp_path / "fw")
+    assert result.holds and result.wrong == 0 and result.inputs == 33_550_336
+
+
+@pytest.mark.parametrize(
+    "change", [{"name": "cortex_m4"}, {"name": "Cortex-M4"}, {"name": "-m4"}, {"arithmetic": "float"}]
+)
+def test_a_target_with_a_wrong_name_or_arithmetic_is_refused(change):
+    with pytest.raises(DzdesignError):
+        replace(target_named("cortex-m4"), **change)
+
+
+@pytest.mark.parametrize(
+    ("module", "name", "value", "derived", "said"),
+    [
+        (avr, "BAUD", 115_200, "baud_divider", "off at 16000000 Hz"),
+        (cortex_m4, "CLOCK_HZ", 25_000_001, "systick_counts", "SysTick"),
+        (cortex_m4, "CLOCK_HZ", 2_500 * (2**24 + 1), "systick_counts", "SysTick"),
+    ],
+)
+def test_a_clock_that_does_not_divide_is_refused(monkeypatch, module, name, value, derived, said):
+    monkeypatch.setattr(module, name, value)
+    with pytest.raises(DzdesignError, match=said):
+        getattr(module, derived)()
+
+
+def test_the_avr_asks_for_narrow_arithmetic_and_the_others_do_not():
+    assert [name for name in TARGET_NAMES if target_named(name).arithmetic == "narrow"] == ["avr"]
+
+
+# --- names from users ---------------------------------------------------------------------------------------
+
+
+@given(st.text())
+def test_a_printable_name_acts_nowhere(name):
+    safe = printable_name(name)
+    assert re.fullmatch(r"[A-Za-z0-9._-]*", safe) and "--" not in safe and ".." not in safe and len(safe) <= LONGEST
+    assert printable_name(safe) == safe
+
+
+def test_an_honest_name_stays_and_many_are_counted():
+    assert printable_name("ramp_1.0-MPa.csv") == "ramp_1.0-MPa.csv"
+    assert printable_list(["a", "b", "c", "d", "e", "f"]) == "a, b, c, d and 2 more"
+
+
+def hostile_compensator(target: str, names: list[str]):
+    """The golden compensator of a valve whose recordings have these names."""
+    compensator = golden_compensator(target)
+    valve = json.loads(compensator.valve_document)
+    valve["made_from"] = [{"source": name, "sha256": "0" * 64} for name in names]
+    for test in valve["sides"]["positive"]["tests"]:
+        test["source"] = names[0]
+        test["ramps"]["sources"] = names
+    return replace(compensator, valve_document=to_json(valve))
+
+
+def without_banner(text: str) -> list[str]:
+    """Leave out what is meant to differ: the hash of the compensator, whole and its first 16 bits, and the names."""
+    meant = r"Compensator SHA-256: |Valve identified from: |^#define DZ_FIRMWARE_ORIGIN 0x[0-9A-F]{4}u$"
+    return [line for line in text.splitlines() if not re.search(meant, line)]
+
+
+@pytest.mark.parametrize("target", TARGET_NAMES)
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_hostile_name_changes_nothing_but_a_harmless_comment(target, name):
+    honest = generate(golden_compensator(target), target).files
+    firmware = generate(hostile_compensator(target, [name]), target)
+    files = firmware.files
+    assert files.keys() == honest.keys()
+    for path, text in files.items():
+        if path != "compensator.json":
+            assert without_banner(text) == without_banner(honest[path]), path
+            named = any(printable_name(name) in line for line in text.splitlines())
+            assert text.isascii() and (named or path in firmware.manifest["board"])
+            if path.endswith(".projectspec"):
+                ElementTree.fromstring(text)
+
+
+def test_hostile_names_build_in_a_hostile_folder(tmp_path):
+    make = shutil.which("make") or pytest.skip("no make on the path; apt install make")
+    folder = tmp_path / "it's a $(x) `touch owned`; #% folder"
+    firmware = generate(hostile_compensator("host", HOSTILE[:4]), "host")
+    write_folder(folder, firmware.files, firmware.manifest)
+    done = subprocess.run([make, "all", "check"], cwd=folder / "host", capture_output=True, text=True, check=False)
+    assert done.returncode == 0 and "FNV-1a-32" in done.stdout, done.stderr
+    assert not list(tmp_path.rglob("owned*"))
+    for path in folder.rglob("*"):
+        if path.is_file() and path.suffix in (".c", ".h", ".txt", ".md", ".map", ".def", ".exp", ""):
+            assert str(tmp_path) not in path.read_text(errors="replace") or path.name == "selftest"
+
+
+def test_the_check_of_hostile_names_sees_one_that_gets_through(monkeypatch):
+    monkeypatch.setattr(project, "printable_list", ", ".join)
+    files = generate(hostile_compensator("host", [HOSTILE[1]]), "host").files
+    honest = generate(golden_compensator("host"), "host").files
+    assert without_banner(files["core/dz_comp.c"]) != without_banner(honest["core/dz_comp.c"])

@@ -1,0 +1,374 @@
+"""Artefact files: written whole or not at all, nothing of anybody's lost, and documents checked key by key."""
+
+import json
+import os
+import re
+import stat
+import sys
+from pathlib import Path
+
+import pytest
+
+from dzdesign.core import folder_swap as exchange
+from dzdesign.core.artefact_files import (
+    MANIFEST_NAME,
+    check_file_may_be_written,
+    check_folder_may_be_written,
+    parse_document,
+    read_bytes,
+    to_json,
+    write_file,
+    write_folder,
+)
+from dzdesign.core.errors import InputError, one_line
+from dzdesign.core.shape import Exactly, Number, check_shape
+from dzdesign.core.units import parse_quantity, si_factor
+
+NoneType = type(None)
+FIRMWARE, EVIDENCE = {"schema": "dzdesign.firmware/1"}, {"schema": "dzdesign.evidence/1"}
+FILES = {"core/a.c": "int a;\n", "README.md": "read me\n"}
+
+
+def tree(folder: Path) -> dict[str, bytes]:
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()
+    }
+
+
+def failing(error, calls_that_work=0):
+    """Return a stand-in for a function of `os` that works some times and then raises."""
+    real, count = os.replace, iter(range(10))
+
+    def stand_in(*arguments):
+        if next(count) < calls_that_work:
+            return real(*arguments)
+        raise error
+
+    return stand_in
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A firmware folder as dzdesign leaves it."""
+    folder = tmp_path / "firmware"
+    write_folder(folder, FILES, FIRMWARE)
+    return folder
+
+
+@pytest.mark.parametrize("step", ["fsync", "replace", "chmod"])
+@pytest.mark.parametrize(
+    ("error", "becomes"),
+    [(OSError(28, "No space left on device"), InputError), (KeyboardInterrupt(), KeyboardInterrupt)],
+)
+def test_a_file_that_fails_half_way_leaves_the_old_one_and_nothing_else(tmp_path, monkeypatch, step, error, becomes):
+    path = tmp_path / "valve.json"
+    write_file(path, "old")
+    monkeypatch.setattr(os, step, failing(error))
+    with pytest.raises(becomes):
+        write_file(path, "new" * 100_000)
+    assert tree(tmp_path) == {"valve.json": b"old"}
+
+
+def test_a_file_is_written_in_utf_8_and_may_be_read_by_others(tmp_path):
+    path = tmp_path / "valve.json"
+    write_file(path, "Δp\n")
+    assert path.read_bytes() == "Δp\n".encode()
+    if sys.platform != "win32":
+        assert stat.S_IMODE(path.stat().st_mode) == 0o644
+
+
+@pytest.mark.parametrize("name", ["", "missing/valve.json", "file/valve.json", "x" * 300, "a\0b"])
+def test_a_place_where_no_file_can_go(tmp_path, name):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="-o"):
+        write_file(tmp_path / name, "text")
+    assert tree(tmp_path) == {"file": b""}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no device files")
+def test_a_device_is_not_replaced_by_a_file():
+    with pytest.raises(InputError, match="device"):
+        write_file(Path(os.devnull), "text")
+    assert not Path(os.devnull).is_file()
+
+
+def test_an_artefact_takes_the_place_of_its_own_kind_only(tmp_path):
+    path = tmp_path / "out.json"
+    for content in ("time_s,u_V\n", "[1]", '{"schema": "dzdesign.compensator/1"}', '{"schema": "valve"}', "[" * 5000):
+        path.write_text(content)
+        with pytest.raises(InputError, match="left alone"):
+            write_file(path, "{}", "dzdesign.valve/1")
+        assert path.read_text() == content
+    for content in ("", '{"schema": "dzdesign.valve/1"}', '{"schema": "dzdesign.valve/2"}'):
+        path.write_text(content)
+        check_file_may_be_written(path, "dzdesign.valve/1")
+
+
+def test_a_folder_is_written_with_the_hash_of_every_file(folder):
+    manifest = json.loads((folder / MANIFEST_NAME).read_text())
+    assert set(manifest["files"]) == set(FILES) and manifest["schema"] == FIRMWARE["schema"]
+    assert {name: text.encode() for name, text in FILES.items()}.items() <= tree(folder).items()
+
+
+def test_a_folder_written_again_drops_what_it_no_longer_has(folder):
+    write_folder(folder, {"README.md": "new\n"}, FIRMWARE)
+    assert set(tree(folder)) == {"README.md", MANIFEST_NAME}
+    assert [path.name for path in folder.parent.iterdir()] == ["firmware"]
+
+
+def test_what_a_person_added_stays(folder):
+    (folder / "core" / "notes.txt").write_text("mine")
+    (folder / "build" / "empty").mkdir(parents=True)
+    (folder / ".git" / "refs" / "heads").mkdir(parents=True)
+    linked = hasattr(os, "symlink") and sys.platform != "win32"
+    if linked:
+        (folder / "link").symlink_to("core")
+        (folder / "dangling").symlink_to("nowhere")
+    write_folder(folder, {**FILES, "README.md": "new\n"}, FIRMWARE)
+    assert (folder / "core" / "notes.txt").read_text() == "mine"
+    assert (folder / "README.md").read_text() == "new\n"
+    assert (folder / "build" / "empty").is_dir() and (folder / ".git" / "refs" / "heads").is_dir()
+    assert not linked or ((folder / "link").is_symlink() and os.readlink(folder / "dangling") == "nowhere")
+
+
+def test_what_a_person_changed_is_not_overwritten(folder):
+    (folder / "core" / "a.c").write_text("int a = 1;\n")
+    before = tree(folder)
+    with pytest.raises(InputError, match=r"a\.c' was changed since dzdesign wrote it"):
+        write_folder(folder, FILES, FIRMWARE)
+    assert tree(folder) == before
+
+
+def test_an_added_file_in_the_place_of_a_new_one_is_not_overwritten(folder):
+    (folder / "new.c").write_text("mine")
+    before = tree(folder)
+    with pytest.raises(InputError, match="stands where a new file goes"):
+        write_folder(folder, {**FILES, "new.c": "theirs"}, FIRMWARE)
+    assert tree(folder) == before
+    assert [path.name for path in folder.parent.iterdir()] == ["firmware"]
+
+
+def test_a_folder_of_another_kind_is_not_replaced(folder):
+    before = tree(folder)
+    with pytest.raises(InputError, match=r"which dzdesign\.evidence/1 would replace"):
+        write_folder(folder, {"verification.json": "{}"}, EVIDENCE)
+    assert tree(folder) == before
+
+
+@pytest.mark.parametrize(
+    "manifest", [None, "no JSON", "[]", '{"schema": "other/1", "files": {}}', '{"schema": "dzdesign.x/1"}', "[" * 5000]
+)
+def test_a_folder_that_is_not_ours_is_left_alone(tmp_path, manifest):
+    (tmp_path / "thesis.tex").write_text("years of work")
+    if manifest is not None:
+        (tmp_path / MANIFEST_NAME).write_text(manifest)
+    before = tree(tmp_path)
+    with pytest.raises(InputError, match="was not made by dzdesign"):
+        write_folder(tmp_path, FILES, FIRMWARE)
+    assert tree(tmp_path) == before
+
+
+@pytest.mark.parametrize("name", ["file", "file/below", "file/below/deep", "x" * 300, "a\0b"])
+def test_a_place_where_no_folder_can_go(tmp_path, name):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="-o"):
+        write_folder(tmp_path / name, FILES, FIRMWARE)
+    if "\0" not in name:  # the others are known before anything is computed
+        with pytest.raises(InputError, match="-o"):
+            check_folder_may_be_written(tmp_path / name)
+    assert tree(tmp_path) == {"file": b""}
+
+
+def test_an_empty_folder_may_be_written_and_parents_are_made(tmp_path):
+    (tmp_path / "empty").mkdir()
+    for name in ("empty", "a/b/c"):
+        write_folder(tmp_path / name, FILES, FIRMWARE)
+        assert (tmp_path / name / "core" / "a.c").is_file()
+
+
+@pytest.mark.parametrize("calls_that_work", [0, 1])
+@pytest.mark.parametrize(
+    ("error", "becomes"),
+    [(OSError(28, "No space left on device"), InputError), (KeyboardInterrupt(), KeyboardInterrupt)],
+)
+def test_a_folder_that_fails_half_way_leaves_the_old_one(folder, monkeypatch, calls_that_work, error, becomes):
+    before = tree(folder)
+    monkeypatch.setattr(exchange, "exchanged", lambda *_: False)  # a system without the one step for both
+    broken, real = failing(error, calls_that_work), os.replace
+    calls = iter(range(10))
+    # The call after the failing one brings the old folder back.
+    monkeypatch.setattr(os, "replace", lambda *pair: (broken if next(calls) <= calls_that_work else real)(*pair))
+    with pytest.raises(becomes):
+        write_folder(folder, {"README.md": "new\n"}, FIRMWARE)
+    assert tree(folder) == before
+    assert [path.name for path in folder.parent.iterdir()] == ["firmware"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links need a privilege on Windows")
+def test_a_link_to_a_folder_stays_a_link(folder):
+    link = folder.parent / "link"
+    link.symlink_to(folder, target_is_directory=True)
+    write_folder(link, {"README.md": "new\n"}, FIRMWARE)
+    assert link.is_symlink() and (folder / "README.md").read_text() == "new\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("nowhere", "does not exist"), ("file/below", "does not exist"), (".", "is a folder"), ("a\0b", "file's name")],
+)
+def test_a_file_that_cannot_be_read(tmp_path, name, words):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match=words):
+        read_bytes(tmp_path / name, "ramp file")
+
+
+DOCUMENT = {"schema": "dzdesign.valve/1", "value": 1.5}
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"time_s,u_V",
+        b"\xff\xfe{\0}\0",
+        json.dumps(DOCUMENT).encode("utf-16"),
+        b"\xef\xbb\xbf" + json.dumps(DOCUMENT).encode(),
+        b'{"schema": "dzdesign.valve/1", "value": NaN}',
+        b'{"schema": "dzdesign.valve/1", "value": -Infinity}',
+        b'{"schema": "dzdesign.valve/1", "value": 1e999}',
+        b'{"schema": "dzdesign.valve/1", "value": "\\ud800"}',
+        b'{"schema": "dzdesign.valve/1", "value": ' + b"9" * 5000 + b"}",
+        b'{"schema": "dzdesign.valve/1", "value": ' + b"[" * 5000 + b"]" * 5000 + b"}",
+        b"[" * 100_000,
+    ],
+)
+def test_what_is_not_json_is_refused_and_says_so(content):
+    with pytest.raises(InputError, match=r"'valve\.json' is not JSON"):
+        parse_document(content, "valve.json", ("dzdesign.valve/1",))
+
+
+@pytest.mark.parametrize(
+    "document", [{}, [], 1, "text", None, {"schema": "dzdesign.valve/2"}, {"schema": ["x" * 9999]}]
+)
+def test_another_schema_is_refused(document):
+    with pytest.raises(InputError, match=r"has the schema .{1,60}, expected dzdesign\.valve/1"):
+        parse_document(json.dumps(document).encode(), "valve.json", ("dzdesign.valve/1",))
+
+
+def test_a_document_written_is_the_document_read():
+    assert parse_document(to_json(DOCUMENT).encode(), "valve.json", ("dzdesign.valve/1",)) == DOCUMENT
+
+
+SHAPE = {
+    "u_max_V": Number(0, 1e4),
+    "nodes": [{"dp_MPa": float, "name": str}],
+    "pair": Exactly(2, int),
+    "trend": (str, NoneType),
+    "codes": Number(1, 65535, whole=True),
+    "valve": dict,
+    "holds": bool,
+}
+GOOD = {
+    "u_max_V": 10, "nodes": [{"dp_MPa": 1, "name": "a"}], "pair": [1, 2], "trend": None, "codes": 4095, "valve": {},
+    "holds": True, "more": "is welcome",
+}  # fmt: skip
+
+
+def test_a_document_of_the_shape_is_accepted():
+    check_shape(GOOD, SHAPE, "x.json", "make it again")
+    check_shape({**GOOD, "trend": "flat", "nodes": []}, SHAPE, "x.json", "make it again")
+
+
+@pytest.mark.parametrize("key", list(SHAPE))
+def test_a_key_that_is_missing_is_named(key):
+    with pytest.raises(InputError, match=rf"'x.json' lacks the key '{key}'; make it again"):
+        check_shape({name: value for name, value in GOOD.items() if name != key}, SHAPE, "x.json", "make it again")
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"u_max_V": "10"}, "'u_max_V' is '10', expected a number from 0 to 10000"),
+        ({"u_max_V": True}, "'u_max_V' is True, expected a number"),
+        ({"u_max_V": -1}, "'u_max_V' is -1, expected a number from 0"),
+        ({"u_max_V": 10**4000}, r"'u_max_V' is 1000.*\.\.\., expected a number"),
+        ({"u_max_V": float("nan")}, "'u_max_V' is nan, expected a number"),
+        ({"nodes": [{"dp_MPa": 1, "name": "a"}, {"dp_MPa": "1", "name": "a"}]}, r"'nodes\[1\]\.dp_MPa' is '1'"),
+        ({"nodes": [{"dp_MPa": float("inf"), "name": "a"}]}, r"'nodes\[0\]\.dp_MPa' is inf, expected a number"),
+        ({"nodes": [{"name": "a"}]}, r"lacks the key 'nodes\[0\]\.dp_MPa'"),
+        ({"nodes": [1]}, r"'nodes\[0\]' is 1, expected an object with dp_MPa, name"),
+        ({"nodes": {}}, "'nodes' is {}, expected a list"),
+        ({"pair": [1]}, "'pair' has 1 items, expected 2"),
+        ({"pair": [1, 2.0]}, r"'pair\[1\]' is 2.0, expected a whole number"),
+        ({"pair": 1}, "'pair' is 1, expected a list"),
+        ({"trend": 1}, "'trend' is 1, expected text"),
+        ({"codes": 1.0}, "'codes' is 1.0, expected a whole number from 1 to 65535"),
+        ({"codes": 0}, "'codes' is 0, expected a whole number"),
+        ({"valve": []}, r"'valve' is \[\], expected an object"),
+        ({"holds": 1}, "'holds' is 1, expected true or false"),
+    ],
+)
+def test_a_value_that_does_not_fit_is_named(change, words):
+    with pytest.raises(InputError, match=words):
+        check_shape({**GOOD, **change}, SHAPE, "x.json", "make it again")
+
+
+@pytest.mark.parametrize(
+    ("text", "quantity", "si"),
+    [
+        ("1 MPa", "pressure", 1e6),
+        ("1MPa", "pressure", 1e6),
+        ("1,5 bar", "pressure", 1.5e5),
+        ("2.000 bar", "pressure", 2e5),
+        ("0,125 bar", "pressure", 0.125e5),
+        ("1,2500 bar", "pressure", 1.25e5),
+        ("1e-5 m3/s", "flow", 1e-5),
+        ("1 m³/h", "flow", 1 / 3600),
+        ("3600 LPH", "flow", 1e-3),
+        ("2 Bar", "pressure", 2e5),
+        ("1 psig", "pressure", 6894.757293168361),
+        ("1 psid", "pressure", 6894.757293168361),
+        ("1 bar(g)", "pressure", 1e5),
+        ("6 ltr/min", "flow", 1e-4),
+        ("1 PSI", "pressure", 6894.757293168361),
+        ("6e1 l/min", "flow", 1e-3),
+        (".1 s", "time", 0.1),
+        ("100 ms", "time", 0.1),
+        ("1.8 mm", "length", 1.8e-3),
+        ("50 %", "ratio", 0.5),
+        ("-1 V", "voltage", -1.0),
+    ],
+)
+def test_quantities(text, quantity, si):
+    assert parse_quantity(text, quantity, "--option") == pytest.approx(si, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "text", ["", "V", "ten V", "1", "1e", "1.2.3 V", "inf V", "nan V", "1e999 V", "1 A", "1 V V", "²"]
+)
+def test_quantities_that_are_none(text):
+    with pytest.raises(InputError, match="--option is '"):
+        parse_quantity(text, "voltage", "--option")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("2,000 V", "--option is '2,000 V': '2,000' may be 2000 or 2.0; write 2000 or 2.0"),
+        ("-12,345V", "'12,345' may be 12345 or 12.345; write 12345 or 12.345"),
+    ],
+)
+def test_a_comma_before_three_digits_may_stand_between_thousands(text, words):
+    with pytest.raises(InputError, match=re.escape(words)):
+        parse_quantity(text, "voltage", "--option")
+
+
+@pytest.mark.parametrize("unit", ["9**9**9**9", "V**9**9**9**9", "V" * 10_000, "(V)", "V; import os", "", "1 V"])
+def test_a_unit_is_a_name_and_not_a_computation(unit):
+    with pytest.raises(InputError, match="is not a unit of voltage") as caught:
+        si_factor(unit, "voltage")
+    assert len(str(caught.value)) < 200
+
+
+def test_a_message_stays_on_its_line():
+    assert one_line("a\nb\rc\x1b[2Jd\u2028e\ud800f°Δ") == "a b c [2Jd e f°Δ"

@@ -1,0 +1,197 @@
+"""The JSON Schemas against the artefacts that the product writes: every key described, every fault seen."""
+
+import json
+import re
+from dataclasses import replace
+
+import pytest
+from jsonschema import Draft202012Validator
+
+from dzdesign.command_line.cli import main
+from dzdesign.commands.schema import SCHEMAS, schema_document
+from dzdesign.core.artefact_files import to_json, write_folder
+from dzdesign.identify.options import IdentifyOptions
+from tests.support.paths import GOLDENS_FULL
+from tests.support.schema_checks import overlooked, problems, resolved, wrong_documents
+from tests.support.synthetic import Truth, needs_compiler, synthetic_ramp
+
+GOLDENS = GOLDENS_FULL
+#: End of a key's name -> unit of its value.
+UNITS = {"_V": "V", "_MPa": "MPa", "_L_min": "L/min", "_L_min_V": "L/min/V", "_V_mm": "V/mm", "_Hz": "Hz", "_s": "s"}
+
+
+def identified(tests, **options):
+    from dzdesign.identify.identification import identify
+
+    return json.loads(to_json(identify(tests, IdentifyOptions(**options)).to_document()))
+
+
+def one_valve(case):
+    """Return the valve.json of a case that is not the example's."""
+    truth = Truth(noise=0.05)
+    if case == "both sides":
+        return json.loads((GOLDENS / "valve.json").read_text())
+    if case == "older version":  # before there were several guards
+        return json.loads((GOLDENS.parent / "goldens" / "valve.json").read_text())
+    if case == "flat":
+        found = identified([synthetic_ramp(dp, truth) for dp in (1.0, 3.0, 5.0)], x_max=1.8e-3, meter_lag=0.1)
+        assert found["sides"]["positive"]["trend"] == "flat" and found["meter"]["lag_is"] == "declared"
+        return found
+    ramp = synthetic_ramp(1.0, truth, falling=case != "no falling branch")
+    if case == "no pressure":
+        ramp = replace(ramp, dp=None)
+    found = identified([ramp])
+    assert found["sides"]["positive"]["trend"] is None
+    return found
+
+
+@pytest.fixture(scope="module")
+def written_firmware(example_firmware, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("schemas") / "firmware"
+    write_folder(folder, example_firmware.files, example_firmware.manifest)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def example_artefacts(example_valve, example_compensator, written_firmware):
+    from dzdesign.design.compensator_file import compensator_document
+
+    return {
+        "valve": json.loads(to_json(example_valve.to_document())),
+        "compensator": json.loads(to_json(compensator_document(example_compensator))),
+        "firmware": json.loads((written_firmware / "manifest.json").read_text()),
+    }
+
+
+@pytest.fixture(scope="module")
+def evidence(written_firmware, example_folder):
+    """Return verification.json with all that can be asked for."""
+    from dzdesign.verify.analysis.mutation import KILLED, SURVIVED, Outcome, mutation_document
+    from dzdesign.verify.closed_loop.plant import read_plant
+    from dzdesign.verify.closed_loop.tolerances import read_tolerances
+    from dzdesign.verify.verification import verify
+
+    tolerances = replace(read_tolerances(example_folder / "tolerances.toml"), plants=3)
+    plant = read_plant(example_folder / "plant.toml")
+    document = json.loads(to_json(verify(written_firmware, plant, "plant.toml", tolerances=tolerances).document))
+    found = [Outcome(file="core/dz_comp.c", line=9, change="+ to -", verdict=one) for one in (KILLED, SURVIVED)]
+    document["mutants"] = json.loads(to_json(mutation_document([replace(found[0], killer="a check"), found[1]])))
+    return document
+
+
+@pytest.fixture(scope="module")
+def assessment():
+    from dzdesign.assess.assessment import AssessOptions, assess
+    from dzdesign.assess.assessment_file import assessment_document
+
+    before = [synthetic_ramp(dp, Truth(), source=f"before_{dp:g}.csv") for dp in (1.0, 5.0)]
+    after = [synthetic_ramp(1.0, Truth(knee_rising=0.5), seed=1, source="after.csv")]
+    options = AssessOptions(reading=IdentifyOptions(), limits={"dead_zone_opening": 0.01, "symmetry": 0.01})
+    document = json.loads(to_json(assessment_document(assess(before, after, options))))
+    assert {limit["holds"] for limit in document["limits"]} == {False, None}  # one missed, one that can't be checked
+    assert any(item["after"] is None for item in document["pressures"])
+    return document
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_a_schema_is_of_the_draft_and_describes_every_key_with_its_unit(name):
+    schema = schema_document(name)
+    Draft202012Validator.check_schema(schema)
+    assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
+    lacking = []
+
+    def look(item, place):
+        for key, value in item.get("properties", {}).items():
+            described = value if "description" in value else resolved(value, schema)
+            if not described.get("description", "").endswith("."):
+                lacking.append(f"{place}.{key}: no sentence")
+            ends = [end for end in UNITS if key.endswith(end)]
+            types = value.get("type", "object")
+            if ends and ("number" in types or "array" in types) and value.get("unit") != UNITS[max(ends, key=len)]:
+                lacking.append(f"{place}.{key}: unit {value.get('unit')}")
+            look(value, f"{place}.{key}")
+        for key in ("items", "additionalProperties"):
+            if isinstance(item.get(key), dict):
+                look(item[key], f"{place}.{key}")
+
+    for part, item in {"": schema, **schema.get("$defs", {})}.items():
+        look(item, part)
+    assert lacking == []
+
+
+@pytest.mark.parametrize("name", ["valve", "compensator", "firmware"])
+def test_the_example_fits_and_every_fault_in_it_is_seen(example_artefacts, name):
+    document = example_artefacts[name]
+    assert problems(name, document) == []
+    assert overlooked(name, document) == []
+    assert len(list(wrong_documents(name, document))) > 40
+
+
+@pytest.mark.parametrize(
+    "case", ["both sides", "older version", "flat", "one pressure", "no pressure", "no falling branch"]
+)
+def test_other_valves_fit(case):
+    assert problems("valve", one_valve(case)) == []
+
+
+def test_a_compensator_with_every_option_fits():
+    document = json.loads((GOLDENS / "compensator.json").read_text())
+    assert document["sides"]["negative"] and document["edge_codes"]
+    assert problems("compensator", document) == [] and problems("valve", document["valve"]) == []
+
+
+@needs_compiler
+def test_evidence_fits_and_every_fault_in_it_is_seen(evidence):
+    assert problems("evidence", evidence) == []
+    assert overlooked("evidence", evidence) == []
+    assert len(list(wrong_documents("evidence", evidence))) > 150
+
+
+@needs_compiler
+def test_evidence_of_a_core_that_does_not_compile_fits(firmware_folder):
+    from dzdesign.verify.verification import verify
+
+    source = firmware_folder / "core" / "dz_comp.c"
+    source.write_text(source.read_text() + "\nint unused = 1.5;;\n")
+    found = verify(firmware_folder)
+    assert not found.holds and found.inputs == ()
+    assert problems("evidence", json.loads(to_json(found.document))) == []
+
+
+def test_an_assessment_fits_and_every_fault_in_it_is_seen(assessment):
+    assert problems("assessment", assessment) == []
+    assert overlooked("assessment", assessment) == []
+    assert len(list(wrong_documents("assessment", assessment))) > 60
+
+
+def test_a_key_that_no_schema_describes_is_seen(example_artefacts):
+    document = {**example_artefacts["valve"], "colour": "red"}
+    assert any("colour" in text for text in problems("valve", document))
+    assert problems("valve", document, every_key_described=False) == [], "more keys are welcome"
+
+
+def test_the_readers_ask_for_no_key_that_the_schema_lets_go():
+    """What `identify` writes is what `design` reads: the reader's shape within the schema's required keys."""
+    from dzdesign.design import compensator_file
+    from dzdesign.identify.valve import valve_file
+
+    valve, compensator = schema_document("valve"), schema_document("compensator")
+    assert set(valve_file.SHAPE) <= set(valve["required"])
+    assert set(valve_file.SIDE_SHAPE) <= set(valve["$defs"]["side"]["required"])
+    assert set(valve_file.TEST_SHAPE) <= set(valve["$defs"]["test"]["required"])
+    assert set(compensator_file.SHAPE) == set(compensator["required"]) - {"schema", "tool"}
+    assert set(compensator_file.SIDE) == set(compensator["$defs"]["side"]["required"])
+    assert set(compensator_file.SENSOR) == set(compensator["$defs"]["sensor"]["required"])
+
+
+def test_the_command_prints_them(capsys):
+    assert main(["schema"]) == 0
+    listed = capsys.readouterr().out
+    assert re.findall(r"^(\w+)  ", listed, re.MULTILINE) == list(SCHEMAS)
+    assert main(["schema", "--json"]) == 0
+    assert [each["name"] for each in json.loads(capsys.readouterr().out)["schemas"]] == list(SCHEMAS)
+    for name in SCHEMAS:
+        assert main(["schema", name]) == 0
+        assert json.loads(capsys.readouterr().out) == schema_document(name)
+    assert main(["schema", "../valve"]) == 2 and main(["schema", "vavle"]) == 2
+    assert "did you mean 'valve'?" in capsys.readouterr().err

@@ -1,0 +1,111 @@
+"""One setting for many valves: certified for each, the valve's own where all are alike, refused where there is none."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from dzdesign.core.errors import InputError
+from dzdesign.design.beta_table import offset_ceiling
+from dzdesign.design.certificate import guarded_curve
+from dzdesign.design.designing import design
+from dzdesign.design.lot_setting import Designed, _limit, common_setting
+from dzdesign.design.options import DesignOptions
+from dzdesign.design.signal_text import command_signal, parse_signal
+from dzdesign.design.signals import Signals
+from dzdesign.identify.identification import identify
+from dzdesign.identify.valve.valve_file import valve_from_document
+from tests.support.paths import GOLDENS_FULL
+from tests.support.synthetic import Truth, synthetic_ramp
+
+BOTH_SIDES = GOLDENS_FULL / "valve.json"
+
+
+def valve(knee, pressures=(1.0, 2.5, 5.0), *, seed=0):
+    tests = [synthetic_ramp(dp, Truth(knee_rising=knee(dp)), seed=seed, rate_Hz=10.0, ramp_s=60.0) for dp in pressures]
+    return identify(tests)
+
+
+def designed(valve, options=None):
+    return Designed.of(design(valve, options))
+
+
+@pytest.fixture(scope="module")
+def falling():
+    return designed(valve(lambda dp: 5.5 - 0.06 * dp))
+
+
+@pytest.fixture(scope="module")
+def rising():
+    return designed(valve(lambda dp: 5.1 + 0.05 * dp, seed=1))
+
+
+def highest_over(common, each, label="positive", sign=1):
+    """Return by how much the common offset exceeds a valve's own exact ceiling, at worst, over u_max."""
+    own = each.own
+    curve = guarded_curve(each.valve.sides[label], own.side(sign).certificate.guard, own.below_reference)
+    limit = offset_ceiling(curve, own.signals, own.u_max_V, sign=sign).limit
+    u_min0 = common.side(sign).u_min0_over_u_max
+    return max(common.beta(code, sign) * u_min0 - top for code, top in enumerate(limit))
+
+
+def test_valves_of_opposite_trends_have_one_setting_under_both(falling, rising):
+    common = common_setting({"falling": falling, "rising": rising})
+    assert set(common.binding) == {"falling", "rising"}
+    assert all(highest_over(common.compensator, each) <= 0 for each in (falling, rising))
+    assert highest_over(falling.own, rising) > 0 and highest_over(rising.own, falling) > 0  # neither own one would do
+
+
+def test_of_valves_that_are_alike_it_is_their_own(falling):
+    common = common_setting({"a": falling, "b": falling}).compensator
+    assert common.positive == falling.own.positive
+
+
+def test_both_signs():
+    content = BOTH_SIDES.read_bytes()
+    signals = Signals()
+    command = command_signal(
+        parse_signal("-10..10 V x 0.15 + 1.5 V", "command"), _converter(signals), inverted=False
+    )
+    options = DesignOptions(signals=_with_command(signals, command))
+    each = designed(valve_from_document(content, "valve.json"), options)
+    common = common_setting({"a": each, "b": each}).compensator
+    assert (common.positive, common.negative) == (each.own.positive, each.own.negative)
+    assert highest_over(common, each, "negative", -1) <= 0
+
+
+def _converter(signals):
+    from dzdesign.codegen.project import target_named
+
+    return target_named("f28335").inputs().converter
+
+
+def _with_command(signals, command):
+    from dataclasses import replace
+
+    return replace(signals, command=command)
+
+
+def test_the_doubles_find_the_exact_limit(falling, rising):
+    """What decides which valves are proved exactly agrees with the exact curve, on either side of every node too."""
+    for each in (falling, rising):
+        curve = guarded_curve(each.valve.positive, "closing", "hold")
+        places = [Fraction(number, 64) for number in range(1, 400)]
+        places += [node + tiny for node in curve.dp_MPa for tiny in (-Fraction(1, 10**6), 0, Fraction(1, 10**6))]
+        exact = [min(value for value in (curve.at(dp), curve.bound(dp)) if value is not None) for dp in places]
+        found = _limit(curve, np.array([float(dp) for dp in places]))
+        np.testing.assert_allclose(found, [float(value) for value in exact], atol=1e-9)
+
+
+def test_what_has_no_common_setting_is_told_why(falling, rising):
+    low, high = (designed(valve(lambda dp: 5.4 - 0.05 * dp, pressures)) for pressures in ((0.5, 1.0), (2.0, 4.0)))
+    with pytest.raises(InputError, match="no tested pressure drop in common"):
+        common_setting({"low": low, "high": high})
+    with pytest.raises(InputError, match="two valves or more"):
+        common_setting({"low": low})
+    other = designed(rising.valve, DesignOptions(law_name="target"))
+    with pytest.raises(InputError, match="another law_name"):
+        common_setting({"a": falling, "b": other})
+    edged = designed(falling.valve, DesignOptions(edge=Fraction(1, 50)))
+    with pytest.raises(InputError, match="with --edge"):
+        common_setting({"a": edged, "b": edged})

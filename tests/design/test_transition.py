@@ -1,0 +1,112 @@
+"""The edge and the other choices of design: what they promise, on the exact law and in the closed loop."""
+
+import dataclasses
+import json
+from fractions import Fraction
+from itertools import pairwise
+
+import pytest
+
+from dzdesign.codegen.project import target_named
+from dzdesign.command_line.cli import main
+from dzdesign.core.artefact_files import write_folder
+from dzdesign.core.errors import InputError
+from dzdesign.design.designing import design
+from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import DesignOptions
+from dzdesign.verify.closed_loop.loop import RampSequence
+from tests.support.synthetic import SHARED, needs_compiler
+
+EDGE = options_of({"edge": "1 %"}, target_named("f28335").inputs())
+
+
+@pytest.fixture(scope="module")
+def edged(example_valve):
+    return design(example_valve, EDGE)
+
+
+def test_the_edge_runs_from_the_certified_offset_to_the_opening_law_without_a_step(edged, example_valve):
+    plain = design(example_valve)
+    codes = edged.edge_codes
+    u_max = float(edged.u_max_V)
+    for dp_code in range(0, 1100, 50):
+        drives = [edged.drive(command, dp_code) for command in range(codes + 3)]
+        # Zero command: the same certified curve as without an edge, to within the nodes' rounding.
+        assert float(abs(drives[0] - plain.drive(0, dp_code))) * u_max < 1e-3
+        rises = [right - left for left, right in pairwise(drives)]
+        assert all(rise > 0 for rise in rises)
+        assert len(set(rises[:codes])) == 1 and len(set(rises[codes:])) == 1  # two straight parts that meet
+        # Beyond the edge the law goes on as a law of the opening threshold's beta, Eq. (18).
+        side, beta, share = edged.positive, edged.law_beta(dp_code), Fraction(codes + 2, 4095)
+        law = (beta * side.k_x_max_over_u_max - beta + 1) * share + beta * side.u_min0_over_u_max
+        assert drives[codes + 2] == law
+
+
+def test_the_edge_ends_at_or_above_the_opening_threshold_at_every_test(edged, example_valve):
+    signals = edged.signals
+    for test in example_valve.positive.tests:
+        code = round(signals.dp_code(Fraction(repr(test.dp_MPa))))
+        assert float(edged.drive(edged.edge_codes, code)) * 10 > test.u_knee_rising_V
+
+
+@needs_compiler
+def test_no_leak_and_one_per_cent_of_dead_zone_on_the_example(edged, example_folder, tmp_path):
+    """The issue's goal in the closed loop with hysteresis, PWM resolved: the plant is the one of the recordings."""
+    from dzdesign.codegen.project import generate
+    from dzdesign.verify.closed_loop.plant import read_plant
+    from dzdesign.verify.verification import verify
+
+    firmware = generate(edged, "f28335")
+    write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
+    plant = read_plant(example_folder / "plant.toml")
+    result = verify(tmp_path / "fw", plant, sequence=RampSequence(rest=1.0, ramp=40.0, top=1.0))
+    assert result.holds, [check for check in result.checks if not check.holds]
+    for loop in result.loops:
+        assert loop.result.q_zero_L_min <= 1e-9
+        assert loop.result.residual_opening <= 0.01
+
+
+@needs_compiler
+@pytest.mark.skipif(not SHARED.is_dir(), reason=f"the shared measurements are not at {SHARED}")
+def test_no_leak_and_one_per_cent_of_dead_zone_on_valve_a(tmp_path, capsys):
+    files = sorted(map(str, (SHARED / "valve_a").glob("*.csv.gz")))
+    valve, firmware, evidence = (str(tmp_path / name) for name in ("valve.json", "firmware", "evidence"))
+    assert main(["identify", *files, "--meter-lag", "0.1 s", "-o", valve]) == 0
+    assert main(["codegen", valve, "--edge", "1 %", "-o", firmware]) == 0
+    assert main(["verify", firmware, "-o", evidence, "--json"]) == 0
+    out = capsys.readouterr().out
+    document = json.loads(out[out.index("{\n") :])
+    loops = document["closed_loop"]["pressures"]
+    assert len(loops) == 6
+    assert all(loop["residual_opening"] <= 0.01 and loop["q_zero_L_min"] <= 1e-9 for loop in loops)
+
+
+def test_an_edge_needs_the_opening_branch(example_valve):
+    side = dataclasses.replace(example_valve.positive, opening_curve=None)
+    with pytest.raises(InputError, match="leave out --edge"):
+        design(dataclasses.replace(example_valve, sides={"positive": side}), EDGE)
+
+
+def test_below_the_reference_beta_is_held_or_extended(example_valve):
+    held, extended = design(example_valve), design(example_valve, DesignOptions(below_reference="extend"))
+    below, above = (round(held.signals.dp_code(Fraction(dp))) for dp in (Fraction(6, 10), Fraction(3)))
+    assert held.beta(below) <= 1 < extended.beta(below)
+    assert held.compare(0, above) == pytest.approx(extended.compare(0, above), abs=2)
+
+
+def test_a_dither_stands_under_the_certified_bound_at_its_top(example_valve):
+    plain = design(example_valve)
+    dithered = design(example_valve, DesignOptions(dither_Hz=150.0, dither_peak=Fraction(1, 100)))
+    peak = dithered.amplifier.dither_counts
+    assert peak == 600
+    for dp_code in range(150, 1000, 10):
+        assert dithered.compare(0, dp_code) + peak <= plain.compare(0, dp_code) + 2
+
+
+def test_both_signs_need_both_sides(example_valve):
+    from dzdesign.design.signal_text import Converter, command_signal, parse_signal
+    from dzdesign.design.signals import Signals
+
+    both = command_signal(parse_signal("-10..10 V x 0.15 + 1.5 V", "--command-signal"), Converter())
+    with pytest.raises(InputError, match="negative side was not tested"):
+        design(example_valve, DesignOptions(signals=Signals(command=both)))

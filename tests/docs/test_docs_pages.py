@@ -1,0 +1,124 @@
+"""The pages of the documentation, tried as a reader would: every command that they show, and what it prints."""
+
+import re
+import shutil
+
+import pytest
+
+from dzdesign.command_line.command_spec import language
+from dzdesign.command_line.parsing import build_parser
+from tests.support.page_runner import agrees, commands_of, leaves_out, run, with_outputs
+from tests.support.paths import ROOT
+from tests.support.synthetic import needs_compiler
+
+DOCS = ROOT / "docs"
+TUTORIAL = DOCS / "tutorial.md"
+#: Pages that go on where the tutorial ended, each with a copy of its folder.
+HOW_TO = [
+    DOCS / "before-after.md",
+    *sorted(page for page in (DOCS / "howto").glob("*.md") if commands_of(page.read_text(encoding="utf-8"))),
+]
+
+pytestmark = [needs_compiler, pytest.mark.skipif(shutil.which("bash") is None, reason="the pages' commands need bash")]
+
+
+def try_page(page, folder, update):
+    """Run a page's commands in a folder; return what differs. With `update` the page is written anew instead."""
+    text = page.read_text(encoding="utf-8")
+    wrong, outputs = [], {}
+    for command in commands_of(text):
+        status, printed = run(command, folder)
+        outputs[command.shown] = printed
+        if status != command.status:
+            wrong.append(f"{command.shown}\nexit status {status}, the page says {command.status}\n{printed}")
+        elif not agrees(command.output, printed) and not (update and not leaves_out(command.output)):
+            wrong.append(f"{command.shown}\nthe page shows\n{command.output}\nprinted was\n{printed}")
+    if update:
+        page.write_text(with_outputs(text, outputs), encoding="utf-8")
+    return wrong
+
+
+@pytest.fixture(scope="module")
+def after_tutorial(tmp_path_factory, request):
+    """The folder in which the tutorial was run, and what was wrong with the page."""
+    folder = tmp_path_factory.mktemp("docs") / "tutorial"
+    folder.mkdir()
+    (folder / "examples").symlink_to(ROOT / "examples")
+    return folder, try_page(TUTORIAL, folder, request.config.getoption("--update-docs"))
+
+
+def test_the_tutorial_prints_what_it_shows(after_tutorial):
+    folder, wrong = after_tutorial
+    assert wrong == []
+    assert (folder / "evidence" / "verification.json").is_file() and (folder / "assessment.json").is_file()
+
+
+@pytest.mark.parametrize("page", HOW_TO, ids=lambda page: page.stem)
+def test_a_how_to_page_prints_what_it_shows(after_tutorial, page, tmp_path, request):
+    folder = tmp_path / "page"
+    shutil.copytree(after_tutorial[0], folder, symlinks=True)
+    assert try_page(page, folder, request.config.getoption("--update-docs")) == []
+
+
+def test_every_command_of_every_page_and_of_the_readme_is_one_that_dzdesign_knows():
+    """Those that are not run, too: in code blocks of any kind, options and all."""
+    tried, parser = 0, build_parser(language())[0]
+    for page in (ROOT / "README.md", *DOCS.rglob("*.md")):
+        text = page.read_text(encoding="utf-8").replace("\\\n", " ")
+        for line in re.findall(r"^ *(?:\$ |\.venv\\Scripts\\|uv run )?(dzdesign [a-z].*)$", text, re.MULTILINE):
+            words = without_shell(line)
+            if words[0] == "dzdesign" and not {"--help", "--version"} & set(words):
+                parser.parse_args(words[1:])
+                tried += 1
+    assert tried > 30
+
+
+def without_shell(line):
+    """Return the words of the one dzdesign command in a line of shell."""
+    import shlex
+
+    words = shlex.split(line.split(" | ")[0].split(" > ")[0].split(" && ")[0], comments=True)
+    return ["OUT" if word.startswith("$") else word for word in words if not re.match(r"\d?>", word)]
+
+
+def test_the_runner_sees_a_wrong_page(tmp_path):
+    page = tmp_path / "page.md"
+    good = "```console\n$ printf 'a\\nb\\nc\\n'\na\n...\nc\n$ false  # exit status 1\n```\n"
+    page.write_text(good)
+    assert try_page(page, tmp_path, update=False) == []
+    for right, wrong in (
+        ("\nc\n", "\nd\n"),
+        ("exit status 1", "exit status 0"),
+        ("a\n...\nc", "a\nc"),
+        ("\na\n", "\nb\n"),
+    ):
+        page.write_text(good.replace(right, wrong, 1))
+        assert len(try_page(page, tmp_path, update=False)) == 1, wrong
+
+
+def test_the_runner_updates_what_a_page_shows(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("text\n```console\n$ echo new\nold\n$ true\n```\nmore\n")
+    assert try_page(page, tmp_path, update=True) == []
+    assert page.read_text() == "text\n```console\n$ echo new\nnew\n$ true\n```\nmore\n"
+
+
+@pytest.mark.parametrize(
+    ("shown", "printed", "same"),
+    [
+        ("a\nb", "a\nb", True),
+        ("a", "a\nb", False),
+        ("", "a", False),
+        ("", "", True),
+        ("...", "a\nb", True),
+        ("a\n...", "a\nb\nc", True),
+        ("...\nc", "a\nb\nc", True),
+        ("...\nb", "a\nb\nc", False),
+        ("a\n...\nb\n...\nd", "a\nx\nb\ny\nd", True),
+        ("a\n...\nb\n...\nd", "a\nx\ny\nd", False),
+        ("hash …, 3", "hash 5f, 3", True),
+        ("hash …, 3", "hash 5f,\n3", False),
+    ],
+)
+def test_three_points_stand_for_any_lines(shown, printed, same):
+    assert agrees(shown, printed) is same

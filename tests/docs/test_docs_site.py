@@ -1,0 +1,226 @@
+"""The documentation's site: it builds without a warning, loads nothing from elsewhere, and leaves nothing out."""
+
+import ast
+import html
+import os
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from urllib.parse import unquote
+
+import pytest
+
+from dzdesign.command_line.command_spec import COMMANDS
+from dzdesign.commands.schema import SCHEMAS, schema_document, schema_text
+from tests.support.paths import ROOT
+from tests.support.synthetic import needs_compiler
+
+pytest.importorskip("sphinx", reason="the site needs the packages of the extra `docs`")
+pytest.importorskip("myst_parser", reason="the site needs the packages of the extra `docs`")
+
+DOCS = ROOT / "docs"
+#: Tag -> attribute by which a page loads something; a link that a reader may follow is not among them.
+LOADS = {"link": "href", "script": "src", "img": "src", "source": "src", "iframe": "src", "object": "data"}
+
+pytestmark = needs_compiler
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The site, built as `make docs` does, of a copy of the pages without the derivation's account."""
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html"]
+    command += ["-d", str(folder / "doctrees"), str(DOCS), str(folder / "html")]
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    assert (done.returncode, done.stderr) == (0, ""), done.stderr
+    (folder / "said.txt").write_text(done.stdout, encoding="utf-8")
+    return folder / "html"
+
+
+def test_the_build_says_what_it_does(site):
+    """It takes two minutes, most of them for the figures."""
+    listed = (DOCS / "figures" / "draw.py").read_text(encoding="utf-8").partition("FIGURES = {")[2].partition("}")[0]
+    names = re.findall(r'"(\w+)":', listed)
+    said = (site.parent / "said.txt").read_text(encoding="utf-8").splitlines()
+    figures = [f"docs: figure {n} of {len(names)}: {name.replace('_', ' ')}" for n, name in enumerate(names, 1)]
+    pages = sum(1 for path in DOCS.rglob("*.md") if "_build" not in path.parts)
+    assert len(names) > 5 and said[:-2] == ["docs: identifying the bundled example", *figures]
+    assert said[-2:] == [
+        f"docs: reading {pages} pages, with the reference of commands, files and Python", "docs: writing the pages",
+    ]  # fmt: skip
+
+
+class Page(HTMLParser):
+    """What a page loads, where its links lead, and the places that a link may lead to."""
+
+    def __init__(self, path):
+        super().__init__()
+        self.loads, self.links, self.places = [], [], set()
+        self.feed(path.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag, attrs):
+        given = dict(attrs)
+        if given.get("id"):
+            self.places.add(given["id"])
+        if tag == "a" and given.get("href"):
+            self.links.append(given["href"])
+        if tag in LOADS and given.get(LOADS[tag]):
+            self.loads.append(given[LOADS[tag]])
+
+
+@pytest.fixture(scope="module")
+def pages(site):
+    return {path.resolve(): Page(path) for path in site.rglob("*.html") if "derivation" not in path.parts}
+
+
+def test_nothing_is_loaded_from_elsewhere(site, pages):
+    assert len(pages) > 20
+    loaded = {(path.name, what) for path, page in pages.items() for what in page.loads}
+    assert [each for each in loaded if re.match(r"([a-z]+:)?//", each[1])] == []
+    styles = "".join(path.read_text(encoding="utf-8") for path in site.rglob("*.css"))
+    assert re.findall(r"@import|url\(\s*['\"]?(?:https?:)?//[^)]*", styles) == []
+    assert list(site.rglob("*.woff*")) == [], "no web fonts"
+
+
+def test_every_link_leads_somewhere(site, pages):
+    broken = []
+    account = {"index.html", "derivation.tex", "derivation.json"}
+    for path, page in pages.items():
+        for link in page.links:
+            target, _, place = unquote(link).partition("#")
+            if re.match(r"[a-z]+:", target):
+                continue
+            where = (path.parent / target).resolve() if target else path
+            if where.parent.name == "derivation" and where.name in account:
+                continue
+            if not where.is_file() or (place and where in pages and place not in pages[where].places):
+                broken.append(f"{path.name}: {link}")
+    assert broken == []
+
+
+def test_make_docs_builds_the_account_that_the_pages_link_to():
+    recipe = (ROOT / "Makefile").read_text().partition("\ndocs:")[2].partition("\n\n")[0]
+    text = (DOCS / "derivation.md").read_text()
+    linked = re.findall(r'href="derivation/([^"]+)"', text)
+    assert len(linked) == 3 and [name for name in linked if f"$(DOCS)/{name}" not in recipe] == []
+    assert "sphinx-build -q -E -W" in recipe
+    ignored = (ROOT / ".gitignore").read_text().splitlines()
+    assert {"/docs/_build/", "/docs/_made/", "/docs/derivation/"} <= set(ignored)
+
+
+def test_the_reference_has_every_command_with_every_option(site):
+    page = (site / "reference" / "commands.html").read_text(encoding="utf-8")
+    for name, (_, _, options) in COMMANDS.items():
+        section = page.partition(f'<section id="{name}">')[2].partition("</section>")[0]
+        assert section, name
+        for names, keywords in options:
+            shown = names[-1] if names[0].startswith("-") else keywords["metavar"]
+            assert shown in section, f"{name} {shown}"
+
+
+def test_the_schemas_are_published_and_every_key_is_in_the_reference(site):
+    page = (site / "reference" / "files.html").read_text(encoding="utf-8")
+    text = html.unescape(re.sub(r"<[^>]+>", "", page))
+    for name in SCHEMAS:
+        assert (site / "schemas" / f"{name}.schema.json").read_text(encoding="utf-8") == schema_text(name)
+        described = list(described_keys(schema_document(name)))
+        assert len(described) > 15
+        missing = [key for key, words in described if key not in text or words.replace("`", "") not in text]
+        assert missing == [], name
+
+
+def described_keys(schema):
+    """Yield every key of a schema with its description."""
+    for key, value in schema.items():
+        if key == "properties":
+            yield from ((name, given["description"]) for name, given in value.items() if "description" in given)
+        if isinstance(value, dict):
+            yield from described_keys(value)
+
+
+def codes_in(*sources):
+    """Return the codes of all warnings that these files make."""
+    found = set()
+    for source in sources:
+        for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Warning_":
+                found |= {
+                    word.value.value for word in node.keywords if word.arg == "code" and hasattr(word.value, "value")
+                }
+    return found
+
+
+def test_every_warning_code_is_documented_and_none_is_invented():
+    text = (DOCS / "reference" / "warnings.md").read_text(encoding="utf-8")
+    own, _, of_assess = text.partition("## Notes of `assess`")
+    made = codes_in(*(ROOT / "identify").glob("*.py"))
+    assert len(made) > 20 and "one-branch" in made
+    assert set(re.findall(r"^### (\S+)$", own, re.MULTILINE)) == made
+    for section in own.split("\n### ")[1:]:
+        assert "**Meaning:**" in section and "**What to do:**" in section, section.splitlines()[0]
+    assert set(re.findall(r"^\| `(\S+)` \|", of_assess, re.MULTILINE)) == codes_in(*(ROOT / "verify").glob("*.py"))
+
+
+def test_every_figure_is_shown_with_words_for_those_who_cannot_see_it(site):
+    sys.path.insert(0, str(DOCS))
+    from figures.draw import FIGURES
+
+    shown = "".join(path.read_text(encoding="utf-8") for path in DOCS.rglob("*.md"))
+    for name in FIGURES:
+        block = shown.partition(f"_made/figures/{name}.svg\n")[2].partition("```")[0]
+        assert len(block.partition(":alt: ")[2].splitlines()[0]) > 40, name
+        assert (site / "_images" / f"{name}.svg").stat().st_size < 400_000
+
+
+def test_a_figure_is_drawn_again_with_the_same_bytes(site, tmp_path):
+    sys.path.insert(0, str(DOCS))
+    from figures.draw import FIGURES
+    from figures.example import read_example
+    from figures.frame import save, style
+
+    example = read_example()
+    for name in ("staircase", "residual"):
+        with style():
+            save(FIGURES[name](example), tmp_path / f"{name}.svg")
+        assert (tmp_path / f"{name}.svg").read_bytes() == (site / "_images" / f"{name}.svg").read_bytes()
+
+
+def test_the_picture_of_the_readme_is_the_one_of_the_pages(site, request):
+    """It is kept, for a README is read before anything is built; `--update-docs` keeps the new one."""
+    kept, drawn = DOCS / "dead_zone.svg", site / "_images" / "dead_zone.svg"
+    if request.config.getoption("--update-docs"):
+        kept.write_bytes(drawn.read_bytes())
+    number = re.compile(r"-?\d+\.\d+")
+    old, new = (path.read_text(encoding="utf-8") for path in (kept, drawn))
+    assert number.sub("", old) == number.sub("", new)
+    # Points of the page; another processor's last digits are none of them.
+    before, after = ([float(each) for each in number.findall(text)] for text in (old, new))
+    assert after == pytest.approx(before, abs=0.1)
+
+
+def test_the_pages_name_no_file_that_is_not_there():
+    """Paths of the repository in the pages, in CONTRIBUTING and in CHANGELOG."""
+    for page in (*DOCS.rglob("*.md"), *ROOT.glob("C*.md")):
+        text = page.read_text(encoding="utf-8")
+        for path in re.findall(
+            r"`((?:core|derivation|identify|design|codegen|verify|tests|examples|docs)/[\w./-]+)`", text
+        ):
+            made = path.startswith(("docs/_", "docs/derivation")) or "mychip" in path
+            assert made or (ROOT / path).exists(), f"{page.name}: {path}"
+
+
+def test_the_citation_is_of_the_format_and_of_this_version():
+    """The keys that Citation File Format 1.2.0 requires, and the paper by its DOI."""
+    import tomllib
+
+    yaml = pytest.importorskip("yaml", reason="PyYAML comes with the extra `docs`")
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert citation["cff-version"] == "1.2.0" and {"message", "title", "authors"} <= set(citation)
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert (citation["version"], citation["license"]) == (project["version"], project["license"])
+    (paper,) = citation["references"]
+    assert paper["doi"] == "10.11916/j.issn.1005-9113.20063" and (paper["start"], paper["end"]) == (45, 56)
+    assert [author["family-names"] for author in paper["authors"]] == ["Wu", "Ji", "Wang", "Hao", "Huang"]
+    assert "Apache License" in (ROOT / "LICENSE").read_text(encoding="utf-8")

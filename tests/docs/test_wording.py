@@ -1,0 +1,95 @@
+"""What the outputs say, in words that an engineer has, each of them in the glossary."""
+
+import re
+from types import SimpleNamespace
+
+import pytest
+
+from dzdesign.terminal.notebook import valve_html
+from dzdesign.terminal.tables import print_compensator, print_scenarios, print_valve
+from tests.support.paths import ROOT
+
+GLOSSARY = (ROOT / "docs/concepts/glossary.md").read_text("utf-8")
+FIGURES = {
+    "compensated_flow_L_min": 12.9, "compensated_rise_ms": 4.0, "compensated_settling_ms": 9.6,
+    "compensated_overshoot_percent": 6.31, "direct_flow_L_min": 0.0,
+}  # fmt: skip
+
+
+def scenario(name, **figures):
+    return SimpleNamespace(
+        name=name, dp_MPa=5.0, q_zero_L_min=0.0, q_peak_at_zero_L_min=0.0, must_shut=True, figures=figures
+    )
+
+
+@pytest.mark.parametrize("width", [80, 100, 140])
+def test_scenarios_are_a_table_of_short_rows_and_lines(monkeypatch, capsys, width):
+    monkeypatch.setenv("COLUMNS", str(width))
+    names = ("step to half command and back", "sensor ahead shows full, or the one behind breaks")
+    print_scenarios([scenario(names[0], **FIGURES), scenario(names[1])])
+    table, _, lines = capsys.readouterr().out.partition(f"{names[0]}: ")
+    rows = re.split("─{40,}", table)[1].splitlines()
+    assert len([row for row in rows if row.strip()]) <= 3, "a row fills at most two lines"
+    assert max(map(len, table.splitlines())) <= width and "further columns" not in table
+    assert lines == (
+        "with the compensator flow 12.9 L/min, rise 4 ms, settling 9.6 ms, overshoot 6.31 %; without it flow 0 L/min\n"
+    )
+
+
+def test_numbers_of_the_law_are_put_into_words(example_valve, example_compensator, capsys):
+    print_valve(example_valve)
+    valve = capsys.readouterr().out
+    assert re.search(r"drive range of the valve k x_max/u_max = 0\.\d{4}: command from the knee to full stroke", valve)
+    print_compensator(example_compensator)
+    design = capsys.readouterr().out
+    # What the signals hide is no cost among others: it comes first.
+    first = design.index("warning: of sensor A a broken wire")
+    assert first < design.index("law paper") < design.index("cost: ") and "cost: of sensor" not in design
+    assert re.search(r"drive range of the law k x_max/u_max = \d+/\d+ = 0\.\d{5} \(from its offset", design)
+    nodes = len(example_compensator.positive.beta_numerators)
+    assert f"beta(dP): straight between {nodes} nodes, each a whole number of 1/32768" in design
+    assert "both as shares of full command" in design
+    assert re.search(r"drive range of the valve k x_max/u_max = 0\.\d{4}: command", valve_html(example_valve))
+
+
+def test_no_output_calls_a_code_sound():
+    """The word stays in the code, where its meaning stands beside it; a reader of an output has no such place."""
+    printed = ("codegen/**/*.jinja", "*/dzdesign/**/schemas/*.json", "tests/goldens*/*/core/*")
+    for path in (path for pattern in printed for path in ROOT.glob(pattern)):
+        assert not re.search(r"\b(un)?sound", path.read_text("utf-8")), path
+    outputs = sorted(path for room in ("verify", "design", "codegen") for path in (ROOT / room).rglob("*.py"))
+    assert len(outputs) > 60
+    for path in outputs:
+        strings = re.findall(r'f?"[^"\n]*"', re.sub(r'"""(?s:.*?)"""', "", (ROOT / path).read_text("utf-8")))
+        assert [text for text in strings if "sound" in text] == [], path
+
+
+def test_every_word_of_the_outputs_is_in_the_glossary():
+    terms = {
+        re.sub(r"\[(.*)\]\(.*\)", r"\1", line)
+        for line, after in zip(GLOSSARY.splitlines(), GLOSSARY.splitlines()[1:], strict=False)
+        if after.startswith(": ")
+    }
+    known = {word for term in terms for word in term.split(", ")}
+    said = {
+        "knee", "onset", "level", "s.e.", "bound", "beta", "dP0", "u_min0", "drive range", "k x_max/u_max", "trend",
+        "cost", "certificate", "guard", "edge", "over-compensation", "residual dead zone", "staircase", "offset",
+        "drive", "code", "valid range", "compare value", "exactly rounded law", "monotone", "closed loop", "plant",
+        "scenario", "mutant", "holds", "DOES NOT HOLD", "NOT CHECKED", "NOT TRIED", "SHA-256", "record", "calibrated",
+        "common setting", "saturates", "FAILS", "NOT VERIFIED", "THE FILES DO NOT BELONG TOGETHER", "SIMULATED",
+        "ACCEPTED", "THE EVIDENCE CONTRADICTS ITSELF", "EXCEEDED", "OVER-COMPENSATED", "board file", "MISSED",
+    }  # fmt: skip
+    assert said <= known, said - known
+    assert len(known) == sum(len(term.split(", ")) for term in terms), "a word stands there twice"
+
+
+def test_the_headline_of_a_batch_counts_calibrated_valves(capsys):
+    from dzdesign.batch.summary import print_batch
+
+    document = {"valves": 4, "calibrated": 3, "failed": [], "quantiles": {}, "common_setting": {"why_not": "none"}}
+    document["oddities"] = ["two share a recording"]
+    document["warnings"] = {"onset-hidden": ["V1", "V2", "V3", "V4"], "pressure-stuck": ["V3"]}
+    print_batch(document, "out")
+    said = capsys.readouterr().out
+    assert "3 calibrated valves of 4" in said and "odd: two share a recording" in said
+    assert "warnings: pressure-stuck 1 (V3), onset-hidden 4" in said

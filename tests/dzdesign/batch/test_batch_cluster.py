@@ -1,0 +1,183 @@
+"""`batch --dask`: a real scheduler and real workers as processes on 127.0.0.1, any of them killed in mid-run."""
+
+import csv
+import json
+import logging
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from concurrent.futures import CancelledError
+from pathlib import Path
+
+import pytest
+from distributed.client import ClosedClientError
+from many_valves import write_lot
+
+from dzdesign.batch.calibration import Task
+from dzdesign.batch.runners import _scheduler_lost, run_on_cluster
+from dzdesign.command_line.cli import main
+from dzdesign.core.artefact_files import sha256_of
+from dzdesign.core.errors import InputError
+from tests.support.dying_work import die_over_bad
+from tests.support.paths import ROOT
+
+COUNT, SEED = 7, 7
+OPTIONS = ["--meter-lag", "0.1 s", "--target", "host"]
+NOTHING = dict(recordings=(), identify={}, design={}, target="host")
+
+
+def start(*arguments: str, folder: Path, deaths: int = 3) -> subprocess.Popen:
+    """Start a process of Dask in a folder of its own, its tests' helpers importable."""
+    folder.mkdir(parents=True)
+    environment = os.environ | {
+        "PYTHONPATH": str(ROOT),
+        "OPENBLAS_NUM_THREADS": "1",
+        "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": str(deaths),
+    }
+    return subprocess.Popen(
+        [sys.executable, "-m", "dask", *arguments], cwd=folder, env=environment,
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+
+
+@pytest.fixture
+def cluster(tmp_path, request):
+    """Address of a scheduler, a way to start workers, and its process; all end with the test.
+
+    Its parameter: deaths that a task may survive.
+    """
+    contact = tmp_path / "scheduler.json"
+    processes = [
+        start(
+            "scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(contact),
+            folder=tmp_path / "scheduler", deaths=getattr(request, "param", 3),
+        )
+    ]  # fmt: skip
+    deadline = time.monotonic() + 60
+    while not contact.exists() or not contact.read_text():
+        assert time.monotonic() < deadline and processes[0].poll() is None, "the scheduler did not start"
+        time.sleep(0.05)
+    address = json.loads(contact.read_text())["address"]
+
+    def worker(name: str) -> subprocess.Popen:
+        options = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--name", name, "--host", "127.0.0.1")
+        processes.append(start("worker", address, *options, folder=tmp_path / name))
+        return processes[-1]
+
+    yield address, worker, processes[0]
+    for process in reversed(processes):
+        process.kill()
+        process.wait(20)
+
+
+def whole_folders(output: Path) -> list[str]:
+    return [path.parent.name for path in output.glob("valves/*/manifest.json") if not path.parent.name.startswith(".")]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="SIGKILL is of POSIX")
+def test_a_worker_is_killed_in_mid_run_and_nothing_is_lost(cluster, tmp_path, monkeypatch):
+    address, worker, _ = cluster
+    monkeypatch.chdir(tmp_path)
+    broken = write_lot(Path("lot"), COUNT, 2, SEED)
+    victim, _ = worker("victim"), worker("survivor")
+    at_the_kill = []
+
+    def kill() -> None:
+        while len(whole_folders(tmp_path / "out")) < 2:
+            time.sleep(0.01)
+        victim.send_signal(signal.SIGKILL)
+        victim.wait(20)
+        at_the_kill.extend(whole_folders(tmp_path / "out"))
+
+    killer = threading.Thread(target=kill, daemon=True)
+    killer.start()
+    assert main(["batch", "lot", "-o", "out", "--dask", address, *OPTIONS]) == 1
+    killer.join(30)
+    assert 2 <= len(at_the_kill) < COUNT, "the worker was not killed in mid-run"
+    with open(tmp_path / "out" / "valves.csv", encoding="utf-8", newline="") as table:
+        rows = list(csv.DictReader(table))
+    assert [row["name"] for row in rows] == [f"V{number:04d}" for number in range(COUNT)]
+    assert {row["name"] for row in rows if row["status"] != "ok"} == set(broken)
+    assert main(["batch", "lot", "-o", "here", "--jobs", "1", *OPTIONS]) == 1
+    for path in sorted(Path("here").rglob("*.*")):
+        if path.is_file():  # what came over the network is what this machine makes
+            assert sha256_of(path.read_bytes()) == sha256_of(("out" / path.relative_to("here")).read_bytes()), path
+
+
+@pytest.mark.skipif(os.name == "nt", reason="SIGKILL is of POSIX")
+@pytest.mark.parametrize("kind", [signal.SIGTERM, getattr(signal, "SIGKILL", None)])
+def test_a_scheduler_that_dies_in_mid_run_is_one_sentence_and_what_is_done_is_kept(
+    cluster, kind, tmp_path, monkeypatch, capsys
+):
+    address, worker, scheduler = cluster
+    monkeypatch.chdir(tmp_path)
+    write_lot(Path("lot"), COUNT, 2, SEED)
+    worker("one")
+
+    def kill() -> None:
+        while len(whole_folders(tmp_path / "out")) < 2:
+            time.sleep(0.01)
+        scheduler.send_signal(kind)
+
+    killer = threading.Thread(target=kill, daemon=True)
+    killer.start()
+    # In a process of its own: what Dask logs goes where stderr was when it was imported.
+    code = "import sys; from dzdesign.command_line.cli import main; sys.exit(main(sys.argv[1:]))"
+    command = [sys.executable, "-c", code, "batch", "lot", "-o", "out", "--dask", address, *OPTIONS]
+    said = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+    killer.join(30)
+    done = whole_folders(tmp_path / "out")
+    assert 2 <= len(done) < COUNT, "the scheduler was not killed in mid-run"
+    assert (said.returncode, said.stdout) == (2, "") and said.stderr.splitlines() == [
+        f"dzdesign: {COUNT} valves, 0 of them done before",
+        f"dzdesign: the Dask scheduler at '{address}' is gone; what is done is kept: start one, and give the same "
+        "command again with its address",
+    ]
+    assert main(["batch", "lot", "-o", "out", "--jobs", "1", *OPTIONS]) == 1
+    assert f"{COUNT} valves, {len(done)} of them done before" in capsys.readouterr().err
+
+
+def test_a_lot_that_waits_for_a_worker_says_so_once_and_goes_on(cluster, monkeypatch, capsys):
+    monkeypatch.setattr("dzdesign.batch.runners.LOOK_S", 0.1)
+    address, worker, _ = cluster
+    starter = threading.Timer(2, worker, ["late"])
+    starter.start()
+    (outcome,) = run_on_cluster(iter([Task(name="a", **NOTHING)]), address, die_over_bad)
+    assert outcome.status == "ok"
+    said = capsys.readouterr().err
+    assert said.count("no worker is connected") == 1 and f"such as `dask worker {address} --nthreads 1`" in said
+
+
+@pytest.mark.parametrize("fault", [CancelledError(), OSError("a comm is closed"), ClosedClientError("closed")])
+def test_whatever_dask_says_of_a_lost_scheduler_is_that_sentence(fault):
+    level = logging.getLogger("distributed.client").level
+    with pytest.raises(InputError, match="the Dask scheduler at 'tcp://x' is gone"), _scheduler_lost("tcp://x"):
+        raise fault
+    with pytest.raises(ZeroDivisionError), _scheduler_lost("tcp://x"):
+        raise ZeroDivisionError
+    assert logging.getLogger("distributed.client").level == level
+
+
+@pytest.mark.skipif(os.name == "nt", reason="SIGKILL is of POSIX")
+@pytest.mark.parametrize("cluster", [0], indirect=True)
+def test_a_valve_that_kills_every_worker_is_named(cluster):
+    address, worker, _ = cluster
+    for number in range(3):
+        worker(f"w{number}")
+    names = ["a", "bad", "b", "c"]
+    tasks = (Task(name=name, **NOTHING) for name in names)
+    outcomes = {each.name: each for each in run_on_cluster(tasks, address, die_over_bad)}
+    assert set(outcomes) == set(names)
+    assert {name for name, each in outcomes.items() if each.status != "ok"} == {"bad"}
+    assert "ended without a word" in outcomes["bad"].reason and outcomes["bad"].digest == ""
+
+
+def test_no_scheduler_is_one_sentence(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("dzdesign.batch.runners.CONNECT_S", 0.5)
+    write_lot(tmp_path / "lot", 2, 1, SEED)
+    options = ["-o", str(tmp_path / "out"), "--dask", "tcp://127.0.0.1:1"]
+    assert main(["batch", str(tmp_path / "lot"), *options]) == 2
+    assert "no Dask scheduler answers at 'tcp://127.0.0.1:1'" in capsys.readouterr().err

@@ -1,0 +1,115 @@
+"""The table of a batch: valves in the order that people count in, and their records, of whatever text."""
+
+import csv
+import io
+import json
+import shutil
+from pathlib import Path
+
+import polars
+import pytest
+from many_valves import write_lot
+
+from dzdesign.batch.table import rows_from, safe_cell, table_files
+from dzdesign.batch.valves import by_name, valves_of
+from dzdesign.command_line.cli import main
+from dzdesign.report.lot.folder import lot_of
+from dzdesign.report.lot.report import report_of_lot
+from tests.support.page_reader import Page
+from tests.support.synthetic_lots import lot_rows, write_lot_folder
+
+OPTIONS = ["--meter-lag", "0.1 s", "--target", "host"]
+COUNTED = ["V1", "V2", "V9", "V10", "V11"]
+#: What a spreadsheet, CSV or a page could take for something else.
+HOSTILE = ["=cmd|'/c calc'!A0", "'=1", "''", "-1", "@SUM(A1)", "+49 89 1", 'a,"b"; c', "<b>x</b>", "0815", "ü"]
+
+
+def read_table(folder: Path) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO((folder / "valves.csv").read_text(encoding="utf-8"))))
+
+
+def test_numbers_in_names_sort_as_numbers():
+    names = ["V10", "V2", "1", "V1b", "V1", "V01", "V", "10 a", "9 b", "V1.5", "V1.10", "٣", "V" + "9" * 99]
+    counted = ["1", "9 b", "10 a", "V", "V01", "V1", "V1.5", "V1.10", "V1b", "V2", "V10", "V" + "9" * 99, "٣"]
+    assert sorted(names, key=by_name) == sorted(reversed(names), key=by_name) == counted
+    assert by_name("V" + "1" * 9999) < by_name("V" + "2" * 9999)  # of a table that somebody changed
+
+
+def test_a_folder_and_a_list_are_in_that_order(tmp_path):
+    for name in COUNTED:
+        (tmp_path / "lot" / name).mkdir(parents=True)
+    assert [valve.name for valve in valves_of(tmp_path / "lot", None, ())] == COUNTED
+    (tmp_path / "list.csv").write_text("name,files\n" + "".join(f"{name},x\n" for name in reversed(COUNTED)))
+    assert [valve.name for valve in valves_of(tmp_path / "list.csv", None, ())] == COUNTED
+
+
+@pytest.fixture(scope="module")
+def counted(tmp_path_factory):
+    """A lot whose valves are V9, V10 and so on, two of five broken; and what batch makes of it."""
+    folder = tmp_path_factory.mktemp("counted")
+    write_lot(folder / "made", 5, 2, 7)
+    (folder / "lot").mkdir()
+    for path, name in zip(sorted((folder / "made").iterdir()), COUNTED, strict=True):
+        shutil.copytree(path, folder / "lot" / name)
+    records = ["--record", "serial = 0815", "--record", 'oil = =HLP 46, "40"']
+    assert main(["batch", str(folder / "lot"), "-o", str(folder / "out"), "--jobs", "1", *OPTIONS, *records]) == 1
+    return folder
+
+
+def test_all_that_batch_writes_is_in_that_order_and_has_the_records(counted):
+    table = read_table(counted / "out")
+    assert [row["name"] for row in table] == COUNTED and {row["status"] for row in table} == {"ok", "failed"}
+    assert {(row["record.serial"], row["record.oil"]) for row in table} == {("0815", '\'=HLP 46, "40"')}
+    frame = polars.read_parquet(counted / "out" / "valves.parquet")
+    assert frame["name"].to_list() == COUNTED and set(frame["record.oil"]) == {'=HLP 46, "40"'}
+    document = json.loads((counted / "out" / "batch.json").read_text(encoding="utf-8"))
+    assert [each["source"] for each in document["made_from"]] == COUNTED
+    assert document["warnings"]["simulated"] == [row["name"] for row in table if row["status"] == "ok"]
+    lot = json.loads((counted / "out" / "common_compensator.json").read_text(encoding="utf-8"))["lot"]
+    assert [each["name"] for each in lot] == document["warnings"]["simulated"]
+    text = Page((counted / "out" / "report.html").read_text(encoding="utf-8")).text
+    assert "0815" in text and "serial" in text
+
+
+def test_an_output_in_the_old_order_is_taken_up_and_shown_in_the_new_one(counted, tmp_path, capsys):
+    out = shutil.copytree(counted / "out", tmp_path / "out")
+    rows = sorted(rows_from((out / "valves.csv").read_bytes(), "valves.csv"), key=lambda row: row["name"])
+    old = write_lot_folder(tmp_path / "old", [{k: v for k, v in row.items() if "record" not in k} for row in rows])
+    assert [row["name"] for row in rows] == ["V1", "V10", "V11", "V2", "V9"]
+    assert [row["name"] for row in lot_of(old).rows] == COUNTED and not report_of_lot(old).faults
+    for name in ("batch.json", "valves.csv", "valves.parquet"):
+        shutil.copy(old / name, out / name)
+    records = ["--record", "serial = 0815", "--record", 'oil = =HLP 46, "40"']
+    assert main(["batch", str(counted / "lot"), "-o", str(out), "--jobs", "1", *OPTIONS, *records]) == 1
+    assert "5 valves, 5 of them done before" in capsys.readouterr().err
+    for name in ("batch.json", "valves.csv", "valves.parquet", "common_compensator.json", "report.html"):
+        assert (out / name).read_bytes() == (counted / "out" / name).read_bytes(), name
+
+
+def test_no_cell_is_a_formula_and_every_text_comes_back(tmp_path):
+    rows = lot_rows(4, failed=[2])
+    for row in rows:
+        row |= {f"record.{text}": text for text in HOSTILE} | {"record.serial": HOSTILE[0] if row["reason"] else None}
+    rows[2]["reason"] = "--meter-lag is '0.3 V'"
+    content = table_files(rows)["valves.csv"]
+    for line in csv.reader(io.StringIO(content.decode())):
+        assert not any(cell.startswith(("=", "+", "-", "@")) for cell in line)
+    words = [{name: cell for name, cell in row.items() if not isinstance(cell, float)} for row in rows]
+    back = rows_from(content, "valves.csv")
+    for row, found in zip(words, back, strict=True):
+        assert {name: found[name] or None for name in row} == {name: cell or None for name, cell in row.items()}
+    assert safe_cell("-1") == "'-1" and safe_cell("'-1") == "''-1" and safe_cell("'a") == "'a"
+    html = report_of_lot(write_lot_folder(tmp_path / "out", rows)).html
+    assert "=cmd|" in html and "<b>x</b>" not in html
+
+
+def test_a_record_that_can_be_none_is_not_in_the_table(counted, tmp_path):
+    """The valve fails, and says why; the other has its own serial number."""
+    listing = tmp_path / "list.csv"
+    good = next(row["name"] for row in read_table(counted / "out") if row["status"] == "ok")
+    files = f"{counted}/lot/{good}/*.csv"
+    listing.write_text(f'name,files,record.serial\nbad,{files},"{"x" * 300}"\ngood,{files},4711\nnone,{files},\n')
+    assert main(["batch", str(listing), "-o", str(tmp_path / "out"), "--jobs", "1", *OPTIONS]) == 1
+    table = {row["name"]: row for row in read_table(tmp_path / "out")}
+    assert {name: row["record.serial"] for name, row in table.items()} == {"bad": "", "good": "4711", "none": ""}
+    assert "300 characters" in table["bad"]["reason"]

@@ -1,0 +1,620 @@
+"""Bad input through the command line: one line that says what and where, status 2, and no file touched."""
+
+import gzip
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dzdesign.command_line.cli import main
+from dzdesign.core import folder_swap as exchange
+from tests.support.synthetic import needs_compiler
+
+HEADER = "time_s,u_V,dP_MPa,Q_Lmin"
+#: What is told on stderr of the work under way, before it is found that it can't be done.
+PROGRESS = ("dzdesign: fitting", "dzdesign: compiling", "dzdesign: comparing", "dzdesign: running")
+
+
+def ramp(dp_MPa=1.0, knee=5.0, ramp_s=20, rate_Hz=25):
+    """Return rows of time, command, pressure drop and flow: up and down over a dead zone of half the range."""
+    up = np.linspace(0, 10, ramp_s * rate_Hz)
+    u = np.concatenate([up, up[::-1]])
+    edge = np.where(np.arange(u.size) < up.size, knee, knee - 0.1)
+    noise = np.random.default_rng(round(1000 * dp_MPa)).standard_normal(u.size)
+    q = np.clip(4 * np.sqrt(dp_MPa) * (u - edge), 0, None) + 0.02 * noise
+    return np.column_stack([np.arange(u.size) / rate_Hz, u, np.full(u.size, dp_MPa), q])
+
+
+def csv(rows, header=HEADER):
+    return "\n".join([header, *(",".join(f"{value:.4f}" for value in row) for row in rows)]) + "\n"
+
+
+def tree(folder):
+    return {path: path.read_bytes() for path in sorted(Path(folder).rglob("*")) if path.is_file()}
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory):
+    """A folder with two ramp tests and everything that is made of them."""
+    folder = tmp_path_factory.mktemp("good")
+    (folder / "a.csv").write_text(csv(ramp(1.0)))
+    (folder / "b.csv").write_text(csv(ramp(4.0, knee=4.8)))
+    names = {name: str(folder / name) for name in ("a.csv", "b.csv", "valve.json", "compensator.json", "firmware")}
+    assert main(["identify", names["a.csv"], names["b.csv"], "-o", names["valve.json"]]) == 0
+    assert main(["design", names["valve.json"], "-o", names["compensator.json"]]) == 0
+    assert main(["codegen", names["compensator.json"], "-o", names["firmware"]]) == 0
+    return folder
+
+
+@pytest.fixture
+def bench(good, tmp_path, monkeypatch, capsys):
+    """A copy of the good folder, as the working folder."""
+    folder = tmp_path / "bench"
+    shutil.copytree(good, folder)
+    monkeypatch.chdir(folder)
+    capsys.readouterr()
+    return folder
+
+
+@pytest.fixture
+def refusal(bench, capsys):
+    """Run a command that must refuse, and return its one line; nothing may have been written or lost."""
+
+    def refusal(*argv):
+        before = tree(bench)
+        assert main([str(word) for word in argv]) == 2
+        out, err = capsys.readouterr()
+        assert out == ""
+        *progress, line = err.splitlines()
+        assert all(told.startswith(PROGRESS) for told in progress)
+        assert line.startswith("dzdesign: ") and err.endswith("\n")
+        assert tree(bench) == before
+        return line
+
+    return refusal
+
+
+# ramp tests
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"", "is empty; expected a header row"),
+        (csv(ramp()).partition("\n")[2].encode(), "has no header row"),
+        (csv(ramp(), "time,u,dP,Q").encode(), "column 'time' has no unit"),
+        (csv(ramp(), "time_s,u_V,dP_xyz,Q_Lmin").encode(), "column 'dP_xyz': 'xyz' is not a unit of pressure"),
+        (csv(ramp(), "time_s,u_V,dP_V,Q_Lmin").encode(), "column 'dP_V': 'V' is not a unit of pressure"),
+        (csv(ramp(), "time_s,comand_V,dP_MPa,Q_Lmin").encode(), "no column of u"),
+        (csv(ramp(), "time_s,comand_V,dP_MPa,Q_Lmin").encode(), "did you mean 'comand_V'"),
+        (csv(ramp(), "time_s,u_V,u [V],Q_Lmin").encode(), "two columns of u: 'u_V' and 'u [V]'"),
+        (csv(ramp(), "time_s,u_V,pA_MPa,Q_Lmin").encode(), "a column of pA but none of pB"),
+        (("# bench 3\n\n" + csv(ramp()) + "1,x,3,4\n").encode(), "row 1004, column 'u_V': 'x' is not a number"),
+        (("# bench 3\n\n" + csv(ramp()) + "1,2,inf,4\n").encode(), "row 1004, column 'dP_MPa': 'inf'"),
+        (("# bench 3\n\n" + csv(ramp()) + "1,2,3,4\n").encode(), "row 1004: the time goes back"),
+        ((csv(ramp()) + "1,2,3\n").encode(), "row 1002 has 3 cells, expected 4"),
+        ((csv(ramp()) + "1,2,3,4,5\n").encode(), "row 1002 has 5 cells, expected 4"),
+        (gzip.compress(csv(ramp()).encode(), mtime=0)[:-9], "is not a whole gzip file"),
+        (gzip.compress(csv(ramp()).encode(), mtime=0)[:99] + b"\0" * 9, "is not a whole gzip file"),
+        (csv(ramp()).encode("utf-16-le"), "is UTF-16 without a byte order mark"),
+        (b"# 40 \x90C\n" + csv(ramp()).encode(), "is not a text file, neither in UTF-8 nor in Windows-1252"),
+        (csv(ramp() * [1, 1, 1, 0]).encode(), "the valve never opens"),
+        (csv(ramp() * [1, 0, 1, 1]).encode(), "holds no ramp of the command"),
+        (csv(ramp() * [1, 1, -1, 1]).encode(), "swap pA and pB"),
+        (csv(ramp() * [1, 1.2, 1, 1]).encode(), "give --u-max"),
+        (csv(ramp(), "time_s,u_V,dP_mPa,Q_Lmin").encode(), "correct the unit in the header"),
+        (csv(ramp(1.0) * [1, 1, 500, 1]).encode(), "the pressure drop is 500 MPa"),
+        (
+            csv(np.column_stack([ramp()[:, 0], 2 * np.round(ramp()[:, 1] / 2), ramp(2.0)[:, 2:]])).encode(),
+            "at 1 levels of",
+        ),
+        (csv(ramp()[:19]).encode(), "has 19 complete rows, expected at least 20"),
+    ],
+)
+def test_a_bad_ramp_file(refusal, bench, content, words):
+    (bench / "bad.csv").write_bytes(content)
+    line = refusal("identify", "a.csv", "bad.csv")
+    assert words in line and "bad.csv" in line
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("nowhere.csv", "does not exist"),
+        ("firmware", "is a folder"),
+        ("*.mat", "no file matches"),
+        ("a.csv/b", "does not"),
+    ],
+)
+def test_a_ramp_file_that_is_none(refusal, name, words):
+    line = refusal("identify", "a.csv", name)
+    assert words in line and name in line
+
+
+def test_a_copy_is_no_repetition(refusal, bench):
+    shutil.copy("a.csv", "again.csv")
+    line = refusal("identify", "a.csv", "again.csv")
+    assert "'again.csv' is byte for byte the same recording as 'a.csv'; give it once" in line
+
+
+def test_several_tests_without_pressure(refusal, bench):
+    (bench / "c.csv").write_text(csv(ramp()[:, [0, 1, 3]], "time_s,u_V,Q_Lmin"))
+    assert "'c.csv' has no column of dP" in refusal("identify", "a.csv", "c.csv")
+
+
+def test_a_valve_without_pressure_is_not_designed_for(refusal, bench, capsys):
+    (bench / "c.csv").write_text(csv(ramp()[:, [0, 1, 3]], "time_s,u_V,Q_Lmin"))
+    assert main(["identify", "c.csv", "-o", "c.json"]) == 0
+    capsys.readouterr()
+    assert "record the ramp test again with a column of dP" in refusal("design", "c.json")
+
+
+def test_a_file_name_that_steers_the_terminal(refusal):
+    assert "ramp file 'two lines 2J.csv' does not exist" in refusal("identify", "two\nlines\x1b2J.csv")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows keeps its file names in Unicode")
+def test_a_file_name_in_another_encoding(bench, capsys):
+    name = b"Ventil_\xfc.csv".decode("utf-8", "surrogateescape")
+    shutil.copy("a.csv", name)
+    assert main(["identify", name, "-o", "umlaut.json"]) == 0
+    assert json.loads(Path("umlaut.json").read_text())["made_from"][0]["source"] == "Ventil_?.csv"
+
+
+# the command line and its file of options
+
+
+@pytest.mark.parametrize(
+    ("argv", "words"),
+    [
+        ("", "required: COMMAND; see `dzdesign --help`"),
+        ("identfy a.csv", "did you mean 'identify'?"),
+        ("identify", "required: RAMP; see `dzdesign identify --help`"),
+        ("identify a.csv --meter-flor 1", "did you mean '--meter-floor'?"),
+        ("identify a.csv --dp0", "--dp0: expected one argument"),
+        ("identify a.csv --dp0 1", "--dp0 is '1' without a unit; write for example '1 MPa'"),
+        ("identify a.csv --dp0 1V", "--dp0 is '1V': 'V' is not a unit of pressure"),
+        ("identify a.csv --dp0 1mpa", "did you mean 'MPa'?"),
+        ("identify a.csv --dp0 one_MPa", "expected a number and a unit such as '1 MPa'"),
+        ("identify a.csv --dp0 0MPa", "dp0 is 0.0, expected a positive number"),
+        ("identify a.csv b.csv --dp0 2MPa", "dP0 = 2 MPa is not among the tested pressure drops (1, 4 MPa)"),
+        ("identify a.csv --u-max 5V", "the command reaches 10.00 V, above u_max = 5 V"),
+        ("identify a.csv --u-max 0V", "u_max is 0.0 V"),
+        ("identify a.csv --u-max 1e999V", "more than a number can hold"),
+        ("identify a.csv --x-max 1.8", "--x-max is '1.8' without a unit"),
+        ("identify a.csv --meter-lag=-1s", "meter_lag is negative"),
+        ("identify a.csv --meter-floor 1%", "'%' is not a unit of flow"),
+        ("identify a.csv --meter-floor 1000L/min", "0 samples at 0 levels of the command"),
+        ("identify a.csv --confidence 1", "the confidence is 1.0, expected 0.5 to below 1"),
+        ("identify a.csv --confidence 0.4", "the confidence is 0.4, expected 0.5 to below 1"),
+        ("identify a.csv --confidence nan", "the confidence is nan"),
+        ("identify a.csv --confidence high", "--confidence is 'high', expected a number such as 0.99"),
+        ("identify a.csv --knee-window 50-12", "expected two rising shares"),
+        ("identify a.csv --knee-window 12", "--knee-window is '12', expected two per cents"),
+        ("identify a.csv --knee-window a-b", "--knee-window is 'a-b', expected two per cents"),
+        ("identify a.csv --knee-window 12-500", "expected two rising shares"),
+        ("identify a.csv --knee-window 99-100", "samples lie between 99% and 100%"),
+        ("design valve.json --law papr", "unknown law 'papr' (did you mean 'paper'?)"),
+        ("design valve.json --pressure-span 2MPa", "ends below the tested pressure drop of 4 MPa"),
+        ("design valve.json --pressure-span 0MPa", "expected more than zero"),
+        ("design nowhere.json", "valve file 'nowhere.json' does not exist"),
+        ("codegen nowhere.json", "compensator file 'nowhere.json' does not exist"),
+        ("codegen compensator.json --target f28334", "no target 'f28334' (did you mean 'f28335'?)"),
+        ("codegen valve.json -o new --law aim", "unknown law 'aim'"),
+        ("derive --format htm", "unknown format 'htm' (did you mean 'html'?)"),
+        ("simulate --seed nan", "--seed is 'nan', expected a whole number"),
+        ("simulate --seed=-1", "--seed is '-1', expected a whole number"),
+        ("simulate --ramp-time 0s", "the ramp time is 0 s, expected 1 to 1000 s"),
+        ("simulate --dp 1MPa --dp 10bar", "--dp repeats a pressure drop"),
+        ("verify nowhere", "firmware manifest 'nowhere/manifest.json' does not exist"),
+        ("verify a.csv", "'a.csv' is a file, expected the firmware folder that `dzdesign codegen` writes"),
+        ("identify a.csv --config nowhere.toml", "config file 'nowhere.toml' does not exist"),
+    ],
+)
+def test_a_bad_command_line(refusal, argv, words):
+    assert words in refusal(*argv.split()).replace("\\", "/")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("meter-flor = '1 L/min'", "there is no option 'meter-flor' (did you mean 'meter-floor'?)"),
+        ("meter_flor = '1 L/min'", "did you mean 'meter-floor'?"),
+        ("u-max: 10 V", "'options.toml' is not TOML"),
+        ("u-max = ", "'options.toml' is not TOML"),
+        ("a = " + "[" * 5000, "'options.toml' is not TOML"),
+        ("seed = " + "9" * 5000, "'options.toml' is not TOML"),
+        ("u-max = 10", "'options.toml': u-max is '10' without a unit; write for example u-max = \"10 V\""),
+        ("meter_lag = 0.1", "meter-lag is '0.1' without a unit; write for example meter-lag = \"0.1 s\""),
+        ("dp0 = 'one'", "dp0 is 'one', expected a number and a unit such as dp0 = \"1 MPa\""),
+        ("u-max = '10 bar'", "u-max is '10 bar': 'bar' is not a unit of voltage"),
+        ("u-max = '10 bar'", "expected for example V, mV; write for example u-max = \"10 V\""),
+        ("knee-window = '12'", "expected two per cents of the largest flow such as knee-window = \"12-50\""),
+        ("confidence = 'high'", "'options.toml': confidence is 'high', expected a number such as 0.99"),
+        ("u-max = ['10 V']", "option 'u-max' is ['10 V'], expected text"),
+        ("u-max = true", "option 'u-max' is True, expected text"),
+        ("u-max = {V = 10}", "option 'u-max' is"),
+        ("u-max = 1979-05-27", "option 'u-max' is"),
+        ("dp = []", "option 'dp' is [], expected text"),
+        ("dp = [['1 MPa']]", "option 'dp' is"),
+        ("u-max = '10 V'\nu_max = '9 V'", "option 'u_max' is given twice"),
+        ("confidence = nan", "the confidence is nan"),
+        ("valve = 'valve.json'", "there is no option 'valve'"),
+        ("run = 'other'", "there is no option 'run'"),
+        ("output = ''", "is a folder, expected the name of a file"),
+        ('output = "a\\u0000b"', "can't be written"),
+    ],
+)
+def test_a_bad_file_of_options(refusal, bench, text, words):
+    (bench / "options.toml").write_text(text)
+    assert words in refusal("identify", "a.csv", "b.csv", "--config", "options.toml")
+
+
+def test_what_the_command_line_says_is_not_blamed_on_the_file(refusal, bench):
+    (bench / "options.toml").write_text("u-max = '10 V'\nmeter-lag = '0.1 s'\n")
+    said = refusal("identify", "a.csv", "--config", "options.toml", "--u-max", "9")
+    assert said.endswith("--u-max is '9' without a unit; write for example '9 V'") and "options.toml" not in said
+
+
+def test_an_example_for_a_part_of_a_value_is_none_for_the_whole():
+    from dzdesign.command_line.toml_options import in_words_of_the_file
+
+    values = {"ramp_up": "0.5 s / 0.8", "ramp": "1"}
+    said = in_words_of_the_file("--ramp-up is '0.8' without a unit; write for example '0.8 s'", "dz.toml", values)
+    assert said == "'dz.toml': ramp-up is '0.8' without a unit; write for example '0.8 s'"
+    assert in_words_of_the_file("'a.csv' has no column of u", "dz.toml", values) == "'a.csv' has no column of u"
+
+
+def test_a_file_of_options_that_is_no_text(refusal, bench):
+    (bench / "options.toml").write_bytes("u-max = '10 V'".encode("utf-16"))
+    assert "'options.toml' is not TOML" in refusal("identify", "a.csv", "--config", "options.toml")
+
+
+def test_options_from_a_file_stand_in_for_the_defaults(bench, capsys):
+    (bench / "options.toml").write_text(
+        "\ufeffu-max = '20 V'\nconfidence = 0.9\ndp = ['2 MPa']\ntarget = 'f28335'\n", "utf-8"
+    )
+    assert main(["identify", "a.csv", "-o", "new.json", "--config", "options.toml", "--confidence", "0.8"]) == 0
+    valve = json.loads(Path("new.json").read_text())
+    assert valve["u_max_V"] == 20 and valve["sides"]["positive"]["certificate"]["confidence"] == 0.8
+
+
+@pytest.mark.parametrize(
+    ("text", "argv", "expected"),
+    [
+        ("dp = '2 MPa'", [], ["2 MPa"]),
+        ("dp = ['2 MPa', '3 MPa']", [], ["2 MPa", "3 MPa"]),
+        ("dp = ['2 MPa', '3 MPa']", ["--dp", "1 MPa"], ["1 MPa"]),
+        ("seed = 3", [], None),
+    ],
+)
+def test_an_option_given_several_times_replaces_the_file(bench, text, argv, expected):
+    from dzdesign.command_line.cli import parse
+
+    (bench / "options.toml").write_text(text)
+    assert parse(["simulate", *argv, "--config", "options.toml"]).dp == expected
+
+
+# artefacts
+
+
+def altered(document, path, change):
+    """Return a copy in which the value at `path` is replaced by `change`, or gone if that is None."""
+    document = json.loads(json.dumps(document))
+    *way, last = path
+    place = document
+    for key in way:
+        place = place[key]
+    if change is None:
+        del place[last]
+    else:
+        place[last] = change
+    return document
+
+
+SIDE = ("sides", "positive")
+VALVES = [
+    (("u_max_V",), None, "lacks the key 'u_max_V'"),
+    (("u_max_V",), "10", "'u_max_V' is '10', expected a number"),
+    (("u_max_V",), True, "'u_max_V' is True, expected a number"),
+    (("u_max_V",), 0, "'u_max_V' is 0, expected a number"),
+    (("sides",), [], "'sides' is []"),
+    ((*SIDE, "tests"), [], "0 tests stand beside 2 nodes of beta"),
+    ((*SIDE, "tests", 0), None, "1 tests stand beside 2 nodes of beta"),
+    ((*SIDE, "tests", 1, "dp_MPa"), "4", "'sides.positive.tests[1].dp_MPa' is '4', expected a number"),
+    ((*SIDE, "tests", 1, "u_guard_lower_V"), None, "lacks the key 'sides.positive.tests[1].u_guard_lower_V'"),
+    ((*SIDE, "tests", 1, "u_knee_rising_V"), "x", "'sides.positive.tests[1].u_knee_rising_V' is 'x'"),
+    ((*SIDE, "reference", "u_min_V"), "5", "'sides.positive.reference.u_min_V' is '5'"),
+    ((*SIDE, "reference", "u_min_V"), -5, "u_min0 is -5 V, expected a positive threshold"),
+    ((*SIDE, "k_x_max_over_u_max"), 10**40, "'sides.positive.k_x_max_over_u_max' is 1000"),
+    ((*SIDE, "trend"), "downhill", "trend is 'downhill', expected one of decreasing, flat, increasing"),
+    ((*SIDE, "beta", "beta", 0), 1e308, "'sides.positive.beta.beta[0]' is 1e+308"),
+    ((*SIDE, "beta", "dp_MPa"), [4, 1], "which must rise"),
+    ((*SIDE, "certificate", "steps_V"), [], "0 steps bound 2 tests"),
+    ((*SIDE, "certificate", "confidence"), "high", "'sides.positive.certificate.confidence' is 'high'"),
+    ((*SIDE, "guards"), [], "'sides.positive.guards' is [], expected an object"),
+    ((*SIDE, "guards", "mean"), 5, "'sides.positive.guards.mean' is 5, expected an object with u_min0_V"),
+    ((*SIDE, "guards", "mean", "beta"), None, "lacks the key 'sides.positive.guards.mean.beta'"),
+    ((*SIDE, "guards", "mean", "u_lower_V", 1), "5", "'sides.positive.guards.mean.u_lower_V[1]' is '5'"),
+    ((*SIDE, "guards", "opening", "u_min0_V"), 0, "'guards.opening': u_min0 is 0 V, expected a positive threshold"),
+    ((*SIDE, "guards", "opening", "beta_dp_MPa"), [4, 1], "'guards.opening': the nodes of beta must be as many"),
+    ((*SIDE, "guards", "opening", "beta_dp_MPa"), [1, 3], "the nodes of beta must stand at the tests' pressure drops"),
+    ((*SIDE, "guards", "opening", "u_threshold_V"), [5], "'guards.opening': 2 lower bounds stand beside 1 thresholds"),
+    ((*SIDE, "guards", "opening", "certified_steps_V"), [1], "the certified steps do not follow"),
+    ((*SIDE, "guards", "opening", "u_lower_V", 0), 9, "'guards.opening': a lower bound lies above the threshold"),
+    ((*SIDE, "guards", "closing", "u_min0_V"), 4, "'guards.closing' is not the curve of 'reference', 'beta'"),
+    ((*SIDE, "certificate", "guard"), "shut", "expected the guard among them, and no others than closing, mean, open"),
+    ((*SIDE, "tests", 1, "ramps", "sources"), None, "lacks the key 'sides.positive.tests[1].ramps.sources'"),
+    ((*SIDE, "tests", 1, "ramps"), [], "'sides.positive.tests[1].ramps' is [], expected an object with sources"),
+    ((*SIDE, "tests", 1, "ramps", "sources"), "a.csv", "'sides.positive.tests[1].ramps.sources' is 'a.csv'"),
+    ((*SIDE, "opening_curve"), [], "'sides.positive.opening_curve' is [], expected an object"),
+    ((*SIDE, "opening_curve", "u_V"), None, "lacks the key 'sides.positive.opening_curve.u_V'"),
+    ((*SIDE, "opening_curve", "u_V", 0), None, "the opening curve has 1 thresholds and 2 errors at 2 pressure drops"),
+    ((*SIDE, "opening_curve", "u_V"), [1, 1], "the opening curve lies below the offset of a guard's curve"),
+    ((*SIDE, "opening_curve", "u_V"), [8, 9], "the opening curve does not run one way"),
+    ((*SIDE, "opening_curve", "dp_MPa"), [1, 3], "the nodes of beta must stand at the tests' pressure drops"),
+    (("warnings",), ["none"], "'warnings[0]' is 'none', expected an object"),
+    (("made_from",), {}, "'made_from' is {}, expected a list"),
+]
+POSITIVE = ("sides", "positive")
+POSITIVE = ("sides", "positive")
+COMPENSATORS = [
+    (("signals",), None, "lacks the key 'signals'"),
+    (("valve",), None, "lacks the key 'valve'"),
+    (("valve", "u_max_V"), None, "lacks the key 'u_max_V'"),
+    (("made_from",), [], "'made_from' is empty"),
+    (("law",), "papr", "unknown law 'papr' (did you mean 'paper'?)"),
+    (("u_max_V",), [10, 0], "'u_max_V' is [10, 0], expected a positive denominator"),
+    (("u_max_V",), [10], "'u_max_V' has 1 items, expected 2"),
+    (("u_max_V",), 10.0, "'u_max_V' is 10.0, expected a list"),
+    (("u_max_V",), [-10, 1], "is not that of its valve"),
+    ((*POSITIVE, "k_x_max_over_u_max", 0), 10**70, "'sides.positive.k_x_max_over_u_max[0]' is 1000"),
+    ((*POSITIVE, "k_x_max_over_u_max", 0), -1, "k x_max/u_max must be positive"),
+    ((*POSITIVE, "k_x_max_over_u_max", 1), -(2**16), "expected a positive denominator"),
+    ((*POSITIVE, "u_min0_over_u_max"), [3, 2], "u_min0 is 1.500 of u_max, expected between 0 and 1"),
+    ((*POSITIVE, "beta"), [1, 2], "beta has 2 nodes, expected 65"),
+    ((*POSITIVE, "beta", 3), 0, "'sides.positive.beta[3]' is 0"),
+    ((*POSITIVE, "beta", 3), 1.5, "'sides.positive.beta[3]' is 1.5, expected a whole number"),
+    ((*POSITIVE, "edge_beta"), [1, 2], "the edge's beta must have as many nodes"),
+    (("edge_codes",), 32, "an edge needs the opening threshold's beta"),
+    (("beta_denominator",), 3, "beta_denominator is 3, expected a power of two"),
+    (("beta_step_codes",), 0, "'beta_step_codes' is 0"),
+    (("below_dp0",), "held", "below_dp0 is 'held', expected hold or extend"),
+    (("reverse_codes",), -1, "'reverse_codes' is -1"),
+    (("reverse_codes",), "40", "'reverse_codes' is '40'"),
+    (("signals", "compare_max"), 10**9, "'signals.compare_max' is 1000000000, expected a whole number from 1 to 65535"),
+    (("signals", "compare_max"), 1000, "the compare limit is 60000, above full drive, 1000"),
+    (("signals", "pressure_a", "span_MPa"), [0, 1], "the sensor's span is 0 MPa"),
+    (("signals", "pressure_b", "zero_code"), 4095, "a pressure sensor has codes 4095 to 4095"),
+    (("signals", "command", "full_code"), 0, "zero and full command have the same code, 0"),
+    (("signals", "command", "negative_full_code"), 9, "expected the other side of zero"),
+    (("signals", "command", "valid_codes"), [0, 9], "full_code is 4095, outside the valid codes 0 to 9"),
+    (("amplifier", "dither_ticks"), 0, "'amplifier.dither_ticks' is 0"),
+    ((*POSITIVE, "certificate", "dp_MPa"), [[1, 1]], "'sides.positive.certificate.dp_MPa' has 1 items, expected 2"),
+]
+
+
+@pytest.mark.parametrize(("path", "change", "words"), VALVES)
+def test_a_valve_whose_value_does_not_fit(refusal, bench, path, change, words):
+    document = json.loads((bench / "valve.json").read_text())
+    (bench / "bad.json").write_text(json.dumps(altered(document, path, change)))
+    line = refusal("design", "bad.json", "-o", "new.json")
+    assert words in line and "bad.json" in line
+
+
+@pytest.mark.parametrize(("path", "change", "words"), COMPENSATORS)
+def test_a_compensator_whose_value_does_not_fit(refusal, bench, path, change, words):
+    document = json.loads((bench / "compensator.json").read_text())
+    (bench / "bad.json").write_text(json.dumps(altered(document, path, change)))
+    assert words in refusal("codegen", "bad.json", "-o", "new")
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"", "is not JSON"),
+        (HEADER.encode(), "is not JSON"),
+        (b'{"schema": "dzdesign.valve/1", "u_max_V": NaN}', "is not JSON (NaN is not a number of JSON)"),
+        (b'{"schema": "dzdesign.valve/1", "u_max_V": 1e999}', "is not JSON"),
+        (b'{"schema": "dzdesign.valve/1", "u_max_V": ' + b"[" * 9999, "is not JSON"),
+        ('{"schema": "dzdesign.valve/1"}'.encode("utf-16"), "is not JSON"),
+        (b"[]", "has the schema 'None', expected dzdesign.valve/1"),
+        (b'{"schema": "dzdesign.valve/9"}', "has the schema 'dzdesign.valve/9', expected dzdesign.valve/1"),
+    ],
+)
+def test_what_is_no_valve_at_all(refusal, bench, content, words):
+    (bench / "bad.json").write_bytes(content)
+    for command in ("design", "codegen"):
+        line = refusal(command, "bad.json", "-o", "new")
+        assert "'bad.json'" in line
+        assert words.partition(", expected")[0] in line
+
+
+def test_every_artefact_in_the_place_of_another(refusal):
+    assert "has the schema 'dzdesign.compensator/1', expected dzdesign.valve/1" in refusal("design", "compensator.json")
+    assert "has the schema 'dzdesign.firmware/1'" in refusal("codegen", "firmware/manifest.json", "-o", "new")
+    assert "is not JSON" in refusal("codegen", "firmware/core/dz_comp.c", "-o", "new")
+
+
+# where the output goes
+
+
+@pytest.mark.parametrize(
+    ("argv", "words"),
+    [
+        ("identify a.csv -o firmware", "is a folder, expected the name of a file"),
+        ("identify a.csv -o a.csv/valve.json", "its folder does not exist"),
+        ("identify a.csv -o nowhere/valve.json", "its folder does not exist"),
+        ("identify a.csv -o a.csv", "'a.csv' exists and is no dzdesign.valve/1"),
+        ("identify -o b.csv a.csv", "'b.csv' exists and is no dzdesign.valve/1"),
+        ("design valve.json -o valve.json", "'valve.json' exists and is no dzdesign.compensator/1"),
+        ("derive -o nowhere/equations.txt", "its folder does not exist"),
+        ("codegen compensator.json -o a.csv", "a.csv' is a file, expected a folder"),
+        ("codegen compensator.json -o a.csv/firmware", "a.csv' is a file, expected a folder"),
+        ("codegen compensator.json -o .", "is not empty and was not made by dzdesign"),
+        ("verify firmware -o .", "is not empty and was not made by dzdesign"),
+        ("verify firmware -o firmware", "which dzdesign.evidence/1 would replace"),
+        ("simulate -o a.csv/ramps", "a.csv' is a file, expected a folder"),
+        ("simulate -o .", "is not empty and was not made by dzdesign"),
+        ("demo a.csv", "a.csv"),
+        ("demo a.csv/demo", "a.csv"),
+    ],
+)
+def test_an_output_that_cannot_be_written(refusal, argv, words):
+    assert words in refusal(*argv.split())
+
+
+def test_a_changed_firmware_is_not_overwritten_and_an_added_file_stays(refusal, bench, capsys):
+    (bench / "firmware" / "core" / "notes.txt").write_text("mine")
+    assert main(["codegen", "compensator.json", "-o", "firmware", "--target", "f28335"]) == 0
+    assert (bench / "firmware" / "core" / "notes.txt").read_text() == "mine"
+    capsys.readouterr()
+    core = bench / "firmware" / "core" / "dz_comp.c"
+    core.write_text(core.read_text() + "/* tuned on the bench */\n")
+    line = refusal("codegen", "compensator.json", "-o", "firmware")
+    assert "dz_comp.c' was changed since dzdesign wrote it and would be lost" in line
+
+
+def test_a_full_disk_leaves_the_old_output(refusal, monkeypatch):
+    import os
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    for name in ("fsync", "replace"):
+        with monkeypatch.context() as patched:
+            patched.setattr(os, name, full)
+            assert "No space left on device" in refusal("identify", "a.csv", "-o", "valve.json")
+    monkeypatch.setattr(exchange, "exchanged", full)
+    assert "No space left on device" in refusal("codegen", "compensator.json", "-o", "firmware")
+
+
+# verify
+
+
+def test_no_compiler_says_what_to_do(refusal, monkeypatch):
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)  # no ziglang either
+    said = refusal("verify", "firmware")
+    assert "no C compiler was found (tried $CC, cc, gcc, clang, zig); install one" in said
+    assert "pip install dzdesign[zig]" in said
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("K_q = 60.0", "there is no plant parameter 'K_q' (did you mean 'K_a'?)"),
+        ("K_a = -1", "plant parameter K_a is -1"),
+        ("K_a = nan", "plant parameter K_a is nan"),
+        ("K_a = 0", "plant parameter K_a is 0"),
+        ("K_a = 'big'", "plant parameter K_a is 'big'"),
+        ("preload_N = '27.6 N'", "that its name ends in, without quotes; write for example preload_N = 27.6"),
+        ("K_a = true", "plant parameter K_a is True"),
+        ("K_a = " + "9" * 400, "plant parameter K_a is 999"),
+        ("K_a = " + "9" * 5000, "'plant.toml' is not TOML"),
+        ("K_a = " + "[" * 5000, "'plant.toml' is not TOML"),
+        ("K_a: 4", "'plant.toml' is not TOML"),
+        ("stroke_mm = 0.1", "ends inside the overlap"),
+        ("m_e_kg = 1e-9", "the plant's spool moves at 4.5e+10 rad/s, expected at most 1e+06"),
+    ],
+)
+def test_a_bad_plant(refusal, bench, text, words):
+    (bench / "plant.toml").write_text(text)
+    assert words in refusal("verify", "firmware", "--plant", "plant.toml")
+
+
+def test_a_plant_that_is_not_there(refusal):
+    assert "plant file 'nowhere.toml' does not exist" in refusal("verify", "firmware", "--plant", "nowhere.toml")
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("manifest.json", "{}", "has the schema 'None', expected dzdesign.firmware/1"),
+        ("manifest.json", "no JSON", "is not JSON"),
+        ("manifest.json", '{"schema": "dzdesign.firmware/1"}', "lacks the key 'files'"),
+        ("manifest.json", '{"schema": "dzdesign.firmware/1", "files": []}', "'files' is [], expected an object"),
+        ("compensator.json", '{"schema": "dzdesign.compensator/1"}', "lacks the key"),
+        ("compensator.json", None, "compensator.json' does not exist"),
+    ],
+)
+def test_a_folder_that_is_no_firmware(refusal, bench, name, content, words):
+    path = bench / "firmware" / name
+    path.unlink()
+    if content is not None:
+        path.write_text(content)
+    assert words in refusal("verify", "firmware")
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"int (\n", "FAILS  compiles without a warning"),
+        (b"", "FAILS"),
+        (b"typedef int nothing;\n", "FAILS"),
+        (b"/* \xe9 */\n", "FAILS"),
+        (None, "FAILS  compiles without a warning"),
+    ],
+)
+def test_a_core_that_is_none_does_not_hold(bench, capsys, content, words):
+    core = bench / "firmware" / "core" / "dz_comp.c"
+    core.unlink()
+    if content is not None:
+        core.write_bytes(content)
+    assert main(["verify", "firmware"]) == 1
+    out = capsys.readouterr().out
+    assert "FAILS  files as generated: changed or missing: core/dz_comp.c" in out and words in out
+
+
+@needs_compiler
+def test_a_core_that_somebody_edited_does_not_hold(bench, capsys):
+    core = bench / "firmware" / "core" / "dz_comp.c"
+    core.write_text(core.read_text() + "/* tuned on the bench */\n")
+    assert main(["verify", "firmware"]) == 1
+    out = capsys.readouterr().out
+    assert "FAILS  files as generated: changed or missing: core/dz_comp.c" in out
+    assert "holds  equals the exactly rounded law" in out
+
+
+@needs_compiler
+def test_a_plant_that_stays_shut_is_no_evidence(bench, capsys):
+    """The spring holds it shut: no flow at zero command means nothing."""
+    (bench / "plant.toml").write_text("preload_N = 1e6")
+    assert main(["verify", "firmware", "--plant", "plant.toml"]) == 1
+    assert "FAILS  the plant of the closed loop opens" in capsys.readouterr().out
+
+
+# the installed program
+
+
+def program(*argv, cwd):
+    """Run the installed script, or the module where there is none."""
+    script = Path(sys.executable).with_name("dzdesign")
+    module = [sys.executable, "-c", "import dzdesign.command_line.cli as c; exit(c.main())"]
+    command = [str(script)] if script.exists() else module
+    return subprocess.run([*command, *argv], cwd=cwd, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize(
+    ("argv", "line"),
+    [
+        (
+            ("identify", "nowhere.csv"),
+            "dzdesign: ramp file 'nowhere.csv' does not exist; check the name and the folder\n",
+        ),
+        (("codegen", "compensator.json", "-o", "a.csv"), "' is a file, expected a folder to write into; "),
+    ],
+)
+def test_the_installed_program(bench, argv, line):
+    before = tree(bench)
+    done = program(*argv, cwd=bench)
+    assert done.returncode == 2 and done.stdout == ""
+    assert line in done.stderr and done.stderr.count("\n") == 1
+    assert tree(bench) == before

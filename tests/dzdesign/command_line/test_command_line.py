@@ -1,0 +1,448 @@
+"""The command line as people expect it: help, completion, how much is said, near misses, tables that fit, the start."""
+
+import contextlib
+import io
+import json
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rich.console import Console
+
+from dzdesign.command_line.cli import main, parse
+from dzdesign.command_line.command_spec import COMMAND_GROUPS, COMMANDS, EXAMPLES, OPTION_GROUPS
+from dzdesign.core.errors import InputError, nearest, neighbour
+from dzdesign.core.units import si_factor
+from dzdesign.recordings import told_apart
+from dzdesign.terminal import progress
+from dzdesign.terminal.page import FILE_WIDTH, new_console, new_table, put_line
+from tests.support.synthetic import L_MIN, MPA, Truth, synthetic_ramp
+
+
+def run(*words, **environment):
+    code = "import sys; from dzdesign.command_line.cli import main; sys.exit(main(sys.argv[1:]))"
+    return subprocess.run(
+        [sys.executable, "-c", code, *words], capture_output=True, text=True, check=False,
+        env={**os.environ, **environment},
+    )  # fmt: skip
+
+
+def help_of(*words, columns=80):
+    """Return what --help prints, in this process."""
+    out = io.StringIO()
+    with pytest.MonkeyPatch.context() as patched, contextlib.redirect_stdout(out):
+        patched.setenv("COLUMNS", str(columns))
+        try:
+            status = main([*words, "--help"])
+        except SystemExit as ended:  # argparse's way
+            status = ended.code
+    assert status == 0
+    return out.getvalue()
+
+
+@pytest.fixture(scope="module")
+def ramp_file(tmp_path_factory):
+    """A short recording, as a file."""
+    test = synthetic_ramp(1.0, Truth(noise=0.02), ramp_s=20)
+    rows = zip(test.time, test.u, test.dp / MPA, test.q / L_MIN, strict=True)
+    path = tmp_path_factory.mktemp("ramp") / "ramp.csv"
+    path.write_text("time_s,u_V,dP_MPa,Q_Lmin\n" + "".join(",".join(f"{x:.4f}" for x in row) + "\n" for row in rows))
+    return path
+
+
+# help
+
+
+@pytest.mark.parametrize("columns", [64, 80, 140])
+def test_the_front_page_fits(columns):
+    assert max(map(len, help_of(columns=columns).partition("examples:")[0].splitlines())) <= min(columns, 100)
+    assert help_of(columns=columns) == help_of("--quiet", columns=columns)
+
+
+def test_help_groups_every_command_once():
+    page = help_of()
+    for heading in COMMAND_GROUPS:
+        assert f"\n{heading}:\n" in page
+    for name in COMMANDS:
+        assert len(re.findall(rf"^  {name} ", page, re.MULTILINE)) == 1, name
+    before = page.index("from ramps to firmware")
+    assert before < page.index("  identify") < page.index("  verify") < page.index("evidence:") < page.index("  assess")
+    assert "exit status:" in page and "130  interrupted" in page and "examples:" in page
+
+
+def test_a_command_that_no_group_names_stands_under_the_last(monkeypatch):
+    monkeypatch.setitem(COMMANDS, "weigh", ("weigh a valve", "dzdesign.weigh:run_weigh", ()))
+    page = help_of()
+    assert page.index("\nmore:") < page.index("  weigh ")
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize("columns", [64, 80, 140])
+def test_help_of_a_command_fits_and_names_every_option(name, columns):
+    page = help_of(name, columns=columns)
+    options = page[: page.index("\nexample")]
+    assert max(map(len, options.splitlines())) <= min(columns, 100)
+    for names, _ in COMMANDS[name][2]:
+        if names[0].startswith("-"):
+            assert re.search(rf"^  (-\w, )?{names[-1]}\b", page, re.MULTILINE), names
+    assert "of every command:" in page and "--quiet" in page and "--verbose" in page
+
+
+def test_every_group_of_options_is_of_some_command():
+    own = {names[-1] for _, _, options in COMMANDS.values() for names, _ in options}
+    named = {name for heading, names in OPTION_GROUPS.items() if heading != "of every command" for name in names}
+    assert named <= own, named - own
+
+
+def test_every_command_has_examples_and_they_can_be_said(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("dzdesign.toml").write_text("")
+    assert set(COMMANDS) <= set(EXAMPLES)
+    for lines in EXAMPLES.values():
+        for line in lines:
+            said = re.sub(r'^eval "\$\((.*)\)".*', r"\1", line)
+            words = shlex.split(re.split(r" > | \| |   ", said)[0])
+            assert words[0] == "dzdesign", line
+            assert parse(words[1:]).command == words[1]
+
+
+# completion
+
+
+COMPLETE = """
+source "$1"; shift
+function_of=$(complete -p dzdesign | sed 's/.*-F \\([^ ]*\\).*/\\1/')
+COMP_WORDS=("$@"); COMP_CWORD=$(( $# - 1 )); COMP_LINE="$*"; COMP_POINT=${#COMP_LINE}; COMPREPLY=()
+"$function_of" dzdesign "${@: -1}" "${@: -2:1}"
+printf '%s\\n' "${COMPREPLY[@]}"
+"""
+
+
+@pytest.fixture(scope="module")
+def bash_script(tmp_path_factory):
+    path = tmp_path_factory.mktemp("completion") / "dzdesign.bash"
+    out = io.StringIO()
+    with contextlib.redirect_stdout(out):
+        assert main(["completion", "bash"]) == 0
+    path.write_text(out.getvalue())
+    return path
+
+
+@pytest.mark.skipif(not shutil.which("bash"), reason="no bash on the path")
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ("ident", {"identify"}),
+        ("-q ident", {"identify"}),
+        ("identify --meter-", {"--meter-floor", "--meter-lag", "--meter-zero"}),
+        ("codegen --target ", {"avr", "cortex-m4", "f280049c", "f28335", "host"}),
+        ("design valve.json --guard ", {"closing", "mean", "opening"}),
+        ("derive --format h", {"html"}),
+        ("completion po", {"powershell"}),
+        ("schema val", {"valve"}),
+        ("schema as", {"assessment"}),
+        ("design valve.json --accept ", {"branch-order"}),
+        ("identify ramp", {"ramp.csv"}),
+        ("identify ramp.csv --config dz", {"dz.toml"}),
+        ("verify fi", {"firmware"}),
+    ],
+)
+def test_bash_completes(bash_script, tmp_path, words, expected):
+    (tmp_path / "ramp.csv").touch()
+    (tmp_path / "dz.toml").touch()
+    (tmp_path / "firmware").mkdir()
+    done = subprocess.run(
+        ["bash", "-c", COMPLETE, "bash", str(bash_script), "dzdesign", *words.split(" ")],
+        cwd=tmp_path, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert set(done.stdout.split()) == expected
+
+
+@pytest.mark.parametrize("shell", ["zsh", "fish", "powershell"])
+def test_other_shells_have_a_script_with_commands_and_targets(shell, capsys):
+    assert main(["completion", shell]) == 0
+    script = capsys.readouterr().out
+    for word in (*COMMANDS, "cortex-m4", "meter-lag"):
+        assert word in script
+
+
+# how much is said
+
+
+@pytest.mark.parametrize("words", [("-q", "identify"), ("identify", "--quiet")])
+def test_quiet_says_results_and_errors_only(ramp_file, tmp_path, capsys, words):
+    output = str(tmp_path / "valve.json")
+    assert main([*words, str(ramp_file), "-o", output]) == 0
+    said = capsys.readouterr()
+    assert said.err == "" and "Written:" in said.out
+    assert main([*words, "nowhere.csv", "-o", output]) == 2
+    assert "does not exist" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("words", [("--verbose", "identify"), ("identify", "-v")])
+def test_verbose_says_what_is_done_with_times_files_and_the_solver(ramp_file, tmp_path, capsys, words):
+    output = str(tmp_path / "valve.json")
+    assert main([*words, str(ramp_file), "-o", output]) == 0
+    said = capsys.readouterr()
+    assert re.search(r"^dzdesign: +\d+\.\d{3} s +reading ramp file '.*ramp\.csv'$", said.err, re.MULTILINE)
+    assert re.search(r"knees: Solve_Succeeded after \d+ iterations", said.err)
+    assert f"wrote '{output}'" in said.err and re.search(r"s  end$", said.err, re.MULTILINE)
+    assert main(["identify", str(ramp_file), "-o", output]) == 0
+    after = capsys.readouterr()
+    assert after.err == "dzdesign: fitting 1 recording\n" and after.out == said.out
+
+
+def test_quiet_and_verbose_together_are_refused(capsys):
+    assert main(["-q", "derive", "-v"]) == 2
+    assert "contradict each other" in capsys.readouterr().err
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+@pytest.mark.parametrize(
+    ("stream", "quiet", "term", "shown"),
+    [
+        (Terminal, False, "xterm", True),
+        (Terminal, True, "xterm", False),
+        (Terminal, False, "dumb", False),
+        (io.StringIO, False, "xterm", False),
+    ],
+)
+def test_a_long_stage_moves_a_bar_for_a_person(monkeypatch, stream, quiet, term, shown):
+    page = stream()
+    monkeypatch.setattr(sys, "stderr", page)
+    monkeypatch.setattr(progress, "PATIENCE", 0.01)
+    monkeypatch.setenv("TERM", term)
+    with progress.talking(quiet=quiet, verbose=False), progress.stages() as stage:
+        stage("fitting")
+        stage("drawing")
+        until = time.monotonic() + 5
+        while shown and "━" not in page.getvalue() and time.monotonic() < until:
+            time.sleep(0.01)
+    assert ("━" in page.getvalue()) == shown
+    assert not shown or page.getvalue().endswith("\x1b[1A\x1b[2K")  # the line of the bar is gone
+    assert ("dzdesign: fitting\n" in page.getvalue()) == (not quiet)
+
+
+def test_a_stage_of_known_pieces_shows_how_far_it_is(monkeypatch):
+    page = Terminal()
+    monkeypatch.setattr(sys, "stderr", page)
+    monkeypatch.setattr(progress, "PATIENCE", 0.0)
+    monkeypatch.setattr(progress, "REFRESH", 0.001)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.delenv("NO_COLOR", raising=False)
+
+    def half_is_done():
+        """A bar of known end is two stretches of one colour each; one of unknown end changes it at every step."""
+        until = time.monotonic() + 5
+        while "━" * 20 not in page.getvalue() and time.monotonic() < until:
+            time.sleep(0.01)
+        return "━" * 20 in page.getvalue()
+
+    with progress.talking(quiet=False, verbose=False), progress.stages() as stage:
+        stage("running the closed loop")
+        for piece in stage.each(iter(range(4)), 4):
+            if piece == 2:
+                assert half_is_done()
+    assert list(stage.each("abc", 3)) == ["a", "b", "c"]
+
+
+def test_colour_is_for_terminals_and_for_who_asks(monkeypatch):
+    def printed(**environment):
+        page = io.StringIO()
+        with pytest.MonkeyPatch.context() as patched:
+            patched.setattr(sys, "stdout", page)
+            for name in ("NO_COLOR", "FORCE_COLOR"):
+                patched.delenv(name, raising=False)
+            for name, value in environment.items():
+                patched.setenv(name, value)
+            table = new_table("title", "a", "b")
+            table.add_row("1", "2")
+            new_console().print(table)
+        return page.getvalue()
+
+    assert "\x1b[" not in printed()
+    assert "\x1b[1" in printed(FORCE_COLOR="1", TERM="xterm")
+
+
+# near misses
+
+
+@pytest.mark.parametrize(
+    ("line", "hint"),
+    [
+        ("idntify a.csv", "there is no command 'idntify' (did you mean 'identify'?)"),
+        ("identify a.csv --meterlag '0.1 s'", "has no option --meterlag (did you mean '--meter-lag'?)"),
+        ("identify a.csv --guard mean", "has no option --guard (it is one of `dzdesign design`)"),
+        ("verify firmware more", "'more' is one word too many"),
+        ("codegen --target f28334 x", "(did you mean 'f28335'?)"),
+        ("derive --equation 16b", "no statement '16b' (did you mean"),
+        ("derive --format HTML", "(did you mean 'html'?)"),
+        ("identify ramp.csw", "ramp file 'ramp.csw' does not exist (did you mean 'ramp.csv'?)"),
+        ("verify frmware", "'frmware/manifest.json' does not exist (did you mean 'firmware/manifest.json'?)"),
+        ("identify rmps/*.csv", "no file matches 'rmps/*.csv' (did you mean 'ramps'?)"),
+        ("identify ramp.csv --columns 'u=U_V'", "has no column 'U_V', which --columns names for u"),
+        ("identify ramp.csv --columns 'u=U_V'", "(did you mean 'u_V'?)"),
+        ("identify ramp.csv --meter-lag '0.1 sekond'", "(did you mean 'second'?)"),
+        ("completion bsh", "there is no completion for 'bsh' (did you mean 'bash'?)"),
+    ],
+)
+def test_a_near_miss_is_named(line, hint, ramp_file, tmp_path, monkeypatch, capsys):
+    shutil.copy(ramp_file, tmp_path)
+    (tmp_path / "firmware").mkdir()
+    (tmp_path / "ramps").mkdir()
+    monkeypatch.chdir(tmp_path)
+    assert main(shlex.split(line)) == 2
+    said = capsys.readouterr().err
+    assert hint in said and said.count("\n") == 1
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["firmware", "ramp.csv", "ramps"]
+
+
+@pytest.mark.parametrize(
+    ("unit", "quantity", "meant"),
+    [("megapascl", "pressure", "megapascal"), ("L/mim", "flow", "L/min"), ("litre/minutte", "flow", "litre/minute"),
+     ("BARR", "pressure", "bar"), ("mVV", "voltage", "mV")],
+)  # fmt: skip
+def test_a_mistyped_unit_names_one_of_its_quantity(unit, quantity, meant):
+    with pytest.raises(InputError, match=re.escape(f"(did you mean '{meant}'?)")):
+        si_factor(unit, quantity)
+    assert si_factor(meant, quantity) > 0
+
+
+def test_nothing_near_gives_no_hint(tmp_path):
+    assert nearest("zz", ["identify"]) == ""
+    (tmp_path / "ramp.csv").touch()
+    assert neighbour(tmp_path / "something-else.tdms") == ""
+    assert neighbour(tmp_path / "ramp.csv") == ""
+    assert neighbour(f"{tmp_path}/ramp.cvs") == f" (did you mean '{tmp_path}/ramp.csv'?)"
+
+
+# tables
+
+
+WORDS = st.text(st.characters(min_codepoint=33, max_codepoint=126), min_size=1, max_size=9)
+CELLS = st.lists(WORDS, min_size=1, max_size=4).map(" ".join)
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(st.integers(2, 9), st.integers(0, 4), st.integers(26, 160), st.data())
+def test_a_table_fits_the_page_with_every_word_whole(columns, rows, width, data):
+    headers = data.draw(st.lists(CELLS, min_size=columns, max_size=columns))
+    table = new_table("a title", *headers)
+    for _ in range(rows):
+        table.add_row(data.draw(CELLS), *data.draw(st.lists(WORDS, min_size=columns - 1, max_size=columns - 1)))
+    page = Console(width=width, file=io.StringIO(), highlight=False)
+    page.print(table)
+    text = page.file.getvalue()
+    assert max(map(len, text.splitlines())) <= width
+    shown = text.split()
+    for cell in (*headers, *(cell for row in table.rows for cell in row)):
+        assert all(word in shown for word in cell.split())
+
+
+def test_a_table_too_wide_is_parted_and_repeats_its_first_column():
+    table = new_table("t", "ramp test", *(f"number{k}" for k in range(12)))
+    table.add_row("ramp_dP0.5.csv.gz", *(f"{k}.12345" for k in range(12)))
+    page = Console(width=80, file=io.StringIO(), highlight=False)
+    page.print(table)
+    text = page.file.getvalue()
+    assert text.count("ramp_dP0.5.csv.gz") == text.count("ramp test") == 2
+    assert "(the same rows, further columns)" in text
+    assert [text.count(f" {k}.12345") for k in range(12)] == [1] * 12
+
+
+def test_markup_in_a_cell_is_text():
+    table = new_table("of [bold]x[/bold]", "[red]a", "b")
+    table.add_row("[/nothing]", "1")
+    page = Console(width=80, file=io.StringIO())
+    page.print(table)
+    assert all(word in page.file.getvalue() for word in ("[bold]x[/bold]", "[red]a", "[/nothing]"))
+
+
+@pytest.mark.parametrize(("told", "width"), [(None, FILE_WIDTH), ("80", 80), ("0", FILE_WIDTH), ("wide", FILE_WIDTH)])
+def test_a_pipe_is_as_wide_as_columns_says(monkeypatch, told, width):
+    monkeypatch.setattr(sys, "stdout", io.StringIO())
+    monkeypatch.delenv("COLUMNS", raising=False)
+    if told:
+        monkeypatch.setenv("COLUMNS", told)
+    assert new_console().width == width
+
+
+def test_sentences_are_wrapped_for_a_person_and_whole_in_a_pipe(monkeypatch):
+    sentence = "holds  equals the exactly rounded law: " + "inputs checked and none of them wrong " * 5
+    for stream, lines in ((Terminal(), 4), (io.StringIO(), 1)):
+        monkeypatch.setattr(sys, "stdout", stream)
+        monkeypatch.setenv("TERM", "xterm")  # of a dumb one rich takes 80 columns
+        monkeypatch.setenv("COLUMNS", "60")
+        put_line(new_console(), sentence)
+        written = stream.getvalue()
+        assert written.split() == sentence.split() and written.count("\n") == lines
+        assert lines == 1 or max(map(len, written.splitlines())) <= 60
+
+
+# recordings of one name
+
+
+def test_recordings_of_one_name_are_told_apart():
+    paths = [Path("x/a/ramp.csv"), Path("y/a/ramp.csv"), Path("y/b/ramp.csv"), Path("y/b/other.csv")]
+    assert told_apart(paths) == ["x/a/ramp.csv", "y/a/ramp.csv", "b/ramp.csv", "other.csv"]
+    assert told_apart([Path("ramp.csv"), Path("b/ramp.csv")]) == ["ramp.csv", "b/ramp.csv"]
+
+
+def test_their_folders_stand_in_the_valve_file_and_may_stand_in_dp(ramp_file, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    _, *rows = ramp_file.read_text().splitlines()
+    for number, folder in enumerate(("one", "two")):
+        Path(folder).mkdir()
+        bare = [",".join((row.split(",")[0], row.split(",")[1], row.split(",")[3])) for row in rows[number:]]
+        Path(folder, "ramp.csv").write_text("\n".join(["time_s,u_V,Q_Lmin", *bare]))
+    Path("dz.toml").write_text('[dp]\n"one/ramp.csv" = "1 MPa"\n"two/*" = "40 bar"\n')
+    assert main(["-q", "identify", "one/ramp.csv", "two/ramp.csv", "--config", "dz.toml", "--json"]) == 0
+    tests = json.loads(Path("valve.json").read_text())["sides"]["positive"]["tests"]
+    assert [(test["source"], test["dp_MPa"]) for test in tests] == [("one/ramp.csv", 1.0), ("two/ramp.csv", 4.0)]
+
+
+# the start
+
+
+def test_help_imports_next_to_nothing():
+    """The cause of a fast start, for a time is no test: these cost more than all of --help."""
+    heavy = (
+        "numpy", "casadi", "sympy", "cvxpy", "matplotlib", "pint", "polars", "rich", "scipy", "shtab",
+        "dataclasses", "inspect", "logging", "difflib", "json", "tempfile", "subprocess", "typing", "shutil", "pathlib",
+        "argparse", "gettext", "textwrap", "re", "enum", "collections", "functools", "contextlib",
+    )  # fmt: skip
+    code = (
+        "import sys; before = set(sys.modules)\n"
+        "import dzdesign.command_line.cli\n"
+        "try: dzdesign.command_line.cli.main(['--help'])\n"
+        "except SystemExit: pass\n"
+        f"print('LOADED', sorted((set(sys.modules) - before) & set({heavy!r})))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "LOADED []", done.stdout.splitlines()[-1]
+
+
+def test_options_of_other_commands_are_not_built():
+    from dzdesign.command_line.command_spec import language
+    from dzdesign.command_line.parsing import build_parser
+
+    _, commands = build_parser(language(), only="verify")
+    assert len(commands["verify"]._actions) > 5 and not commands["design"]._actions
+
+
+def test_a_ramp_test_keeps_its_samples_under_another_name():
+    test = synthetic_ramp(1.0, Truth(), ramp_s=2)
+    assert replace(test, source="b/x.csv").u is test.u

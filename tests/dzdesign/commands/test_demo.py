@@ -1,0 +1,87 @@
+"""The main job as a user runs it, and that the same input gives the same bytes."""
+
+import json
+import re
+
+import pytest
+
+from dzdesign.command_line.cli import main
+from tests.support.paths import ROOT
+from tests.support.synthetic import needs_compiler
+
+RECORD = ("--record", "valve = simulated by dzdesign, no measurement")
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("demo") / "out"
+    assert main(["demo", str(folder)]) == 0
+    return folder
+
+
+@needs_compiler
+def test_demo_leaves_every_artefact_with_its_origin(demo):
+    valve, compensator = (json.loads((demo / name).read_text()) for name in ("valve.json", "compensator.json"))
+    evidence = json.loads((demo / "evidence" / "verification.json").read_text())
+    assert valve["schema"] == "dzdesign.valve/1" and len(valve["made_from"]) == 6
+    assert compensator["made_from"][0]["source"] == "valve.json"
+    assert evidence["holds"] is True
+    assert [(each["inputs"], each["wrong"]) for each in evidence["inputs"]] == [(33550336, 0)]
+    assert (demo / "evidence" / "closed_loop.svg").read_text().startswith("<?xml")
+
+
+@needs_compiler
+def test_demo_prints_the_table_and_where_things_are(demo, capsys):
+    assert main(["demo", str(demo)]) == 0  # a second time, into the same folder
+    out = capsys.readouterr().out
+    for words in (
+        "threshold open/close",
+        "dead zone without",
+        "Q at zero without beta",
+        "Inputs checked: 33550336, wrong: 0",
+    ):
+        assert words in out
+    assert str(demo) in out
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    rows = [line.strip() for line in readme.splitlines() if re.match(r"\s+\d\.\d\d +\d\.\d{3} / ", line)]
+    assert len(rows) == 6
+    printed = [line.strip() for line in out.splitlines()]
+    assert [row for row in rows if row not in printed] == []
+
+
+@needs_compiler
+def test_the_chain_of_commands_gives_the_same_bytes_as_the_demo(demo, example_folder, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    ramps = sorted(str(path) for path in (example_folder / "ramps").glob("*.csv.gz"))
+    assert main(["identify", *ramps, "--meter-lag", "0.1 s", "--meter-floor", "0.6 L/min", *RECORD]) == 0
+    assert main(["design", "valve.json"]) == 0
+    assert main(["codegen", "compensator.json", "--target", "f28335"]) == 0
+    assert (tmp_path / "valve.json").read_bytes() == (demo / "valve.json").read_bytes()
+    assert (tmp_path / "firmware/manifest.json").read_bytes() == (demo / "firmware/manifest.json").read_bytes()
+    assert main(["codegen", "valve.json", "-o", "direct"]) == 0
+    assert (tmp_path / "direct/manifest.json").read_bytes() == (demo / "firmware/manifest.json").read_bytes()
+    assert "No such" not in capsys.readouterr().err
+
+
+def test_example_is_marked_as_simulated_and_can_be_made_again(example_folder):
+    import gzip
+
+    from dzdesign.verify.closed_loop.plant import plant_document, read_plant
+
+    manifest = json.loads((example_folder / "ramps" / "manifest.json").read_text())
+    assert manifest["simulated"] is True
+    assert manifest["plant"] == plant_document(read_plant(example_folder / "plant.toml"))
+    for path in (example_folder / "ramps").glob("*.csv.gz"):
+        assert gzip.decompress(path.read_bytes()).startswith(b"# SIMULATED")
+
+
+@needs_compiler
+def test_simulate_same_seed_same_bytes(tmp_path, example_folder):
+    from dzdesign.identify.reading.ramp_files import read_ramp_file
+
+    arguments = ["--dp", "1 MPa", "--ramp-time", "100 s", "--plant", str(example_folder / "plant.toml")]
+    assert main(["simulate", "-o", str(tmp_path / "again"), *arguments]) == 0
+    again = read_ramp_file(tmp_path / "again" / "ramp_dP1.csv.gz")
+    bundled = read_ramp_file(example_folder / "ramps" / "ramp_dP1.csv.gz")
+    # Another compiler may round the last bit of the plant differently; the file has four decimals.
+    assert abs(again.q - bundled.q).max() < 2e-4 / 60000

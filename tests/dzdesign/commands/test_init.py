@@ -1,0 +1,373 @@
+"""`dzdesign init`: the file that it writes is accepted, and identify runs with it on these recordings as they are."""
+
+import json
+import shutil
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dzdesign.command_line.cli import main
+from dzdesign.identify.first_look import guess_columns
+from dzdesign.identify.reading.named_pressure import pressure_in_name
+from tests.support.synthetic import L_MIN, MPA, Truth, synthetic_ramp
+
+LABELS = "Zeit (s),AO0 [V],Durchfluss [L/min],Temp [degC]"
+
+
+def columns_of(dp_MPa, *, sign=1, ramp_s=20, knee=5.4, rate_Hz=25):
+    test = synthetic_ramp(dp_MPa, Truth(noise=0.02, knee_rising=knee), ramp_s=ramp_s, rate_Hz=rate_Hz)
+    return test.time, sign * test.u, test.dp / MPA, sign * test.q / L_MIN
+
+
+def write(path, labels, *columns):
+    rows = "\n".join(",".join(f"{value:.4f}" for value in row) for row in np.column_stack(columns))
+    Path(path).parent.mkdir(exist_ok=True)
+    Path(path).write_text(f"{labels}\n{rows}\n")
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def init_then_identify(*ramps, more=()):
+    """Run init, then identify with its file; return init's report and the valve."""
+    assert main(["-q", "init", *ramps, *more]) == 0
+    text = Path("dzdesign.toml").read_text("utf-8")
+    assert main(["-q", "identify", *ramps, "--config", "dzdesign.toml"]) == 0
+    return text, json.loads(Path("valve.json").read_text())
+
+
+def test_the_bundled_recordings(here, example_folder, capsys):
+    for path in (example_folder / "ramps").glob("*.csv.gz"):
+        if any(dp in path.name for dp in ("dP1.", "dP4.")):
+            shutil.copy(path, here)
+    text, valve = init_then_identify("*.csv.gz")
+    said = capsys.readouterr().out
+    assert tomllib.loads(text) == {"u-max": "10 V"}  # what identify finds by itself stays a comment
+    assert "positive commands: 4 ramps at 0.999, 4 MPa, at most 0.1" in text and "negative" not in text
+    assert f"identify finds {valve['meter']['floor_L_min']:.2f} L/min" in text
+    assert "the recordings can't tell it (it takes ramps of two rates)" in text
+    assert '# u = "u_V"  (in V; understood by its label)' in text
+    assert "Written: dzdesign.toml" in said and "dzdesign identify *.csv.gz --config dzdesign.toml" in said
+
+
+def test_labels_of_another_program_and_pressures_in_the_names(here):
+    for dp_MPa, knee in ((1.0, 5.4), (4.0, 5.2)):
+        time, u, _, q = columns_of(dp_MPa, knee=knee)
+        write(f"ramp_{10 * dp_MPa:.0f}bar.csv", LABELS, time, u, q, 0 * q + 40)
+    text, valve = init_then_identify("ramp_*.csv")
+    assert tomllib.loads(text) == {
+        "u-max": "10 V",
+        "columns": {"time": "Zeit (s)", "u": "AO0 [V]", "Q": "Durchfluss [L/min]"},
+        "dp": {"ramp_10bar.csv": "10 bar", "ramp_40bar.csv": "40 bar"},
+    }
+    assert [test["dp_MPa"] for test in valve["sides"]["positive"]["tests"]] == [1.0, 4.0]
+
+
+def test_both_signs_and_a_smaller_command(here):
+    for sign, name in ((1, "up.csv"), (-1, "down.csv")):
+        time, u, dp, q = columns_of(1.0, sign=sign, knee=5.0)
+        write(name, "t_s,u_V,dP_MPa,Q_Lmin", time, u / 2, dp, q)
+    text, valve = init_then_identify("up.csv", "down.csv")
+    assert tomllib.loads(text) == {"u-max": "5 V"}
+    assert "# Full command: the ramps end at 5.00 V." in text
+    assert "positive commands: 1 ramp at 1 MPa" in text and "negative commands: 1 ramp at 1 MPa" in text
+    assert set(valve["sides"]) == {"positive", "negative"}
+
+
+def test_a_command_in_per_cent_says_that_full_command_was_not_seen(here, capsys):
+    time, u, dp, q = columns_of(1.0)
+    write("ramp.csv", "t_s,u_%,dP_MPa,Q_Lmin", time, 10 * u, dp, q)
+    text, _ = init_then_identify("ramp.csv")
+    assert "# Full command, what 100 % means: recordings in per cent don't say it. A guess: correct it." in text
+    assert 'full command: in per cent, so not recorded; u-max = "10 V" is a guess' in capsys.readouterr().out
+
+
+def test_ramps_that_stop_short_make_full_command_a_guess(here):
+    time, u, dp, q = columns_of(1.0)
+    write("ramp.csv", "t_s,u_V,dP_MPa,Q_Lmin", *(column[u <= 8] for column in (time, u, dp, q)))
+    text, _ = init_then_identify("ramp.csv")
+    assert tomllib.loads(text) == {"u-max": "10 V"}
+    assert "# Full command: a guess, for the ramps end at 8.00 V." in text
+
+
+def test_two_rates_tell_the_lag(here):
+    for ramp_s in (20, 60):
+        time, u, dp, q = columns_of(1.0, ramp_s=ramp_s)
+        write(f"ramp_{ramp_s}.csv", "t_s,u_V,dP_MPa,Q_Lmin", time, u, dp, q)
+    text, valve = init_then_identify("ramp_20.csv", "ramp_60.csv")
+    assert valve["meter"]["lag_is"] == "identified"
+    assert "from ramps of two rates. Declared, it is taken as exact." in text
+    assert "2 ramps at 1 MPa, at most 0.501 V/s" in text
+
+
+@pytest.mark.parametrize(
+    ("labels", "reason"),
+    [
+        ("t_s,u_V,Q1 [L/min],Q2 [L/min]", "Q: 'Q1 [L/min]' and 'Q2 [L/min]' could each be it"),
+        ("t_s,AO0,p [bar],Q_Lmin", "u: no column has a unit of voltage"),
+        ("t_s,I_valve [mA],dP [bar],Q_Lmin", "u: no column has a unit of voltage; if 'I_valve [mA]' is it, say"),
+        ("t_s,u,dP [bar],Q_Lmin", "u: 'u' has no unit; give it after a colon, such as V"),
+    ],
+)
+def test_what_can_not_be_told_is_left_open_with_the_reason(here, capsys, labels, reason):
+    time, u, dp, q = columns_of(1.0)
+    write("ramp.csv", labels, time, u, dp, q)
+    assert main(["init", "ramp.csv"]) == 1
+    assert f"open: column of {reason}" in capsys.readouterr().out
+    text = Path("dzdesign.toml").read_text()
+    assert f"# OPEN: column of {reason}" in text and f'# {reason[0]} = "LABEL:UNIT"' in text
+    assert reason[0] not in tomllib.loads(text).get("columns", {})
+
+
+@pytest.mark.parametrize(
+    ("labels", "declared", "status"),
+    [
+        ("t_s,u_V,pA,pB,Q_Lmin", "pA=pA:bar, pB=pB:bar", 1),  # identify would refuse these
+        ("t_s,u_V,pA (bar),pB,Q_Lmin", "pB=pB:bar", 1),
+        ("t_s,u_V,p_1,p_2,Q_Lmin", "pA=p_1:bar, pB=p_2:bar", 0),
+        ("t_s,u_V,Druck vor,Druck nach,Q_Lmin", "pA=Druck vor:bar, pB=Druck nach:bar", 0),
+        ("t_s,u_V,pos,PWM,Q_Lmin", "", 0),
+        ("t_s,u_V,power (W),x,Q_Lmin", "", 0),
+    ],
+)
+def test_pressures_without_a_unit_are_seen_and_can_be_declared_as_said(here, capsys, labels, declared, status):
+    time, u, dp, q = columns_of(1.0)
+    write("ramp.csv", labels, time, u, 10 * dp + 3, 0 * dp + 3, q)
+    assert main(["-q", "init", "ramp.csv"]) == status
+    said, text = capsys.readouterr().out, Path("dzdesign.toml").read_text("utf-8")
+    assert ("without a unit" in said) == ("without a unit" in text) == bool(declared)
+    assert "unknown MPa" not in said and ("at an unknown pressure drop" in said) == (status == 0)
+    if declared:
+        assert f'declare by --columns "{declared}"' in said
+        Path("dzdesign.toml").unlink()
+        init_then_identify("ramp.csv", more=("--columns", declared))
+        assert "at 1 MPa" in capsys.readouterr().out
+
+
+FOREIGN = ("Druckdifferenz [bar]", "Delta P (bar)", "p_diff/bar", "p1 [bar]", "Druck in bar", "Diff. pressure (bar)")
+
+
+@pytest.mark.parametrize("label", FOREIGN)
+@pytest.mark.parametrize("others", ["t_s,u_V", "Zeit/s,Sollwert [V]"])
+def test_a_pressure_with_a_foreign_name_is_used_and_not_that_of_the_files_name(here, capsys, label, others):
+    for dp_MPa, knee in ((1.0, 5.4), (4.0, 5.2)):
+        time, u, dp, q = columns_of(dp_MPa, knee=knee)
+        write(f"ramp_{10.5 * dp_MPa:.0f}bar.csv", f"{others},{label},Q_Lmin", time, u, 10 * dp, q)
+    text, valve = init_then_identify("ramp_*.csv")
+    table = tomllib.loads(text)
+    assert [test["dp_MPa"] for test in valve["sides"]["positive"]["tests"]] == pytest.approx([1.0, 4.0], rel=1e-3)
+    if label != "Delta P (bar)":  # that one is understood
+        assert table["columns"]["dP"] == label and "dp" not in table
+        assert "check that it is the drop over the valve" in text
+        assert f"pressure drop: '{label}', the only column in a unit of pressure" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("labels", "reason"),
+    [
+        ("t_s,u_V,p1 [bar],p2 [bar],Q_Lmin", "'p1 [bar]' and 'p2 [bar]': a pressure, but is it the drop, pA or pB?"),
+        ("Zeit [s],u_V,p1 [bar],p2 [bar],Q_Lmin", "'p1 [bar]' and 'p2 [bar]': a pressure, but is it the drop"),
+        ("t_s,u_V,pA [bar],x,Q_Lmin", "'pA [bar]' is the pressure of one port; which column is that of the other"),
+        ("t_s,u_V,Druck [mA],x,Q_Lmin", "'Druck [mA]' is a current; say what it means, for example --columns"),
+        ("t_s,u_V,Tank [bar],x,Q_Lmin", "'ramp_40bar.csv' says 40 bar in its name, and 1 MPa in 'Tank [bar]'"),
+    ],
+)
+def test_a_pressure_that_may_be_another_is_open(here, capsys, labels, reason):
+    time, u, dp, q = columns_of(1.0)
+    write("ramp_40bar.csv", labels, time, u, 10 * dp, 0 * dp + 3, q)
+    assert main(["init", "ramp_40bar.csv"]) == 1
+    assert f"open: column of dP: {reason}" in capsys.readouterr().out
+    assert "dp" not in tomllib.loads(Path("dzdesign.toml").read_text("utf-8"))
+    Path("dzdesign.toml").unlink()
+    if "pA" not in labels:
+        assert main(["init", "ramp_40bar.csv", "--dp", "40 bar"]) == 0  # the engineer's word
+        assert tomllib.loads(Path("dzdesign.toml").read_text("utf-8"))["dp"] == {"ramp_40bar.csv": "40 bar"}
+
+
+def test_a_declared_pressure_goes_before_a_column_with_a_foreign_name(here, capsys):
+    time, u, dp, q = columns_of(1.0)
+    write("ramp.csv", "t_s,u_V,Tank [bar],Q_Lmin", time, u, dp, q)
+    _, valve = init_then_identify("ramp.csv", more=("--dp", "40 bar"))
+    assert "not used: 'Tank [bar]', as --dp says the pressure drop" in capsys.readouterr().out
+    assert valve["sides"]["positive"]["tests"][0]["dp_MPa"] == 4.0
+
+
+def test_a_command_in_per_cent_under_another_name(here):
+    time, u, dp, q = columns_of(1.0)
+    write("ramp.csv", "t_s,Sollwert [%],dP_MPa,Q_Lmin", time, 10 * u, dp, q)
+    text, _ = init_then_identify("ramp.csv")
+    assert tomllib.loads(text)["columns"] == {"u": "Sollwert [%]"} and "recordings in per cent don't say it" in text
+
+
+def test_a_pressure_drop_without_a_unit_is_open(here, capsys):
+    time, u, dp, q = columns_of(1.0)
+    write("ramp.csv", "t_s,u_V,dP,Q_Lmin", time, u, dp, q)
+    assert main(["init", "ramp.csv"]) == 1
+    assert "open: pressure: 'dP' looks like a pressure, without a unit; declare by --columns \"dP=dP:bar\"" in (
+        capsys.readouterr().out
+    )
+
+
+def test_a_pressure_from_a_name_is_said_and_units_as_people_write_them(here, capsys):
+    time, u, _, q = columns_of(4.0)
+    write("ramp_4MPa.csv", "t_s,u_V,Q_Lmin", time, u, q)
+    text, valve = init_then_identify("ramp_4MPa.csv")
+    said = capsys.readouterr().out
+    assert "pressure drop by the files' names: 4 MPa" in said and "1 ramp at 4 MPa" in said
+    assert tomllib.loads(text)["dp"] == {"ramp_4MPa.csv": "4 MPa"}
+    assert valve["sides"]["positive"]["tests"][0]["dp_MPa"] == 4.0
+    assert '# Q = "Q_Lmin"  (in L/min; understood by its label)' in text
+
+
+@pytest.mark.parametrize(
+    ("labels", "ports"),
+    [
+        ("t_s,u_V,p1 [bar],p2 [bar],Q_Lmin", ["p1 [bar]", "p2 [bar]"]),
+        ("t_s,u_V,p1,p2,Q_Lmin", ["p1:bar", "p2:bar"]),
+        ("t_s,u_V,x,y,Q_Lmin", ["LABEL:UNIT", "LABEL:UNIT"]),
+    ],
+)
+def test_sensors_on_both_sides_have_their_lines_in_the_template(here, capsys, labels, ports):
+    time, u, dp, q = columns_of(1.0)
+    write("ramp.csv", labels, time, u, 10 * dp + 20, 0 * dp + 20, q)
+    assert main(["init", "ramp.csv"]) == (1 if "[bar]" in labels else 0)
+    lines = Path("dzdesign.toml").read_text("utf-8").splitlines()
+    at = lines.index("# or, of a sensor on either side, pA of the higher pressure, in place of dP:")
+    assert lines[at - 2 : at] == ["# [columns]", '# dP = "LABEL:UNIT"']
+    assert lines[at + 1 : at + 3] == [f'# pA = "{ports[0]}"', f'# pB = "{ports[1]}"']
+    told = [line.removeprefix("# ") for line in (lines[at - 2], *lines[at + 1 : at + 3])]
+    if "LABEL" not in ports[0]:
+        Path("told.toml").write_text("\n".join(told))
+        assert main(["-q", "identify", "ramp.csv", "--config", "told.toml"]) == 0
+        assert json.loads(Path("valve.json").read_text())["sides"]["positive"]["tests"][0]["dp_MPa"] == pytest.approx(1)
+
+
+@pytest.mark.parametrize(
+    ("labels", "reason"),
+    [
+        ("t_s,u_V,dP_bar,Q [Hz]", "Q: 'Q [Hz]': 'Hz' is not a unit of flow that dzdesign knows; expected for ex"),
+        ("t_s,u [v],dP_bar,Q_Lmin", "u: 'u [v]': 'v' is not a unit of voltage that dzdesign knows (did you mean 'V'?)"),
+        ("t_s,u_V,dP_bar,Q_mA", "Q: 'Q_mA' is in mA, which is no unit of flow; say what the signal means, for example"),
+    ],
+)
+def test_a_unit_that_is_none_of_its_quantity_is_open(here, capsys, labels, reason):
+    time, u, dp, q = columns_of(1.0)
+    write("ramp.csv", labels, time, u, 10 * dp, q)
+    assert main(["init", "ramp.csv"]) == 1
+    assert f"open: column of {reason}" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("dither", [0.0, 0.006])
+def test_names_that_contradict_the_column_are_said(here, capsys, dither):
+    """A sensor that is stuck at 1 MPa: by one recording the name tells it, by several the flows as well."""
+    for number in (1, 2, 5):
+        time, u, _, q = columns_of(float(number))
+        stuck = 1.0 + dither * np.random.default_rng(number).integers(-1, 2, u.size)
+        write(f"ramp_{number}MPa.csv", "t_s,u_V,dP_MPa,Q_Lmin", time, u, stuck, q * number**0.5)
+    assert main(["init", "ramp_5MPa.csv", "-o", "one.toml"]) == 0
+    said = capsys.readouterr().out
+    assert "CHECK: a name says another pressure drop than the column: 'ramp_5MPa.csv' holds 1 MPa; the sensor" in said
+    assert "# CHECK: a name says another" in Path("one.toml").read_text()
+    assert main(["init", "ramp_5MPa.csv", "ramp_1MPa.csv", "ramp_2MPa.csv", "-o", "three.toml"]) == 0
+    said = capsys.readouterr().out
+    assert "and the files' names say different ones: the sensor is stuck" in said and said.count("CHECK") == 1
+    assert main(["init", "ramp_1MPa.csv", "-o", "right.toml"]) == 0
+    assert "CHECK" not in capsys.readouterr().out
+
+
+def test_a_p_stands_for_a_point(here):
+    name = "Rampe_0p5MPa.txt"
+    for dp_MPa, path in ((0.5, name), (1.0, "Rampe_1MPa.txt")):
+        time, u, dp, q = columns_of(dp_MPa)
+        write(path, "t_s,u_V,Q_Lmin", time, u, q * dp_MPa**0.5)
+        write(f"with_{path}", "t_s,u_V,dP_MPa,Q_Lmin", time, u, 0.99 * dp, q * dp_MPa**0.5)
+    text, valve = init_then_identify("Rampe_*.txt")
+    assert tomllib.loads(text)["dp"] == {name: "0.5 MPa", "Rampe_1MPa.txt": "1 MPa"}
+    assert [test["dp_MPa"] for test in valve["sides"]["positive"]["tests"]] == [0.5, 1.0]
+    assert main(["init", "with_*", "-o", "with.toml"]) == 0 and "CHECK" not in Path("with.toml").read_text()
+
+
+def test_a_valve_nought_is_no_decimal_number(here, capsys):
+    """V0_1MPa: a tenth of the pressure would go into the certificate."""
+    for number in (1, 3, 5):
+        time, u, _, q = columns_of(float(number))
+        write(f"V0_{number}MPa.csv", "t_s,u_V,Q_Lmin", time, u, q * number**0.5)
+    assert main(["init", *(f"V0_{number}MPa.csv" for number in (1, 3, 5))]) == 1
+    assert "its name may say 0.1 MPa or 1 MPa" in capsys.readouterr().out
+    assert "dp" not in tomllib.loads(Path("dzdesign.toml").read_text())
+
+
+@pytest.mark.parametrize("others", [(), ("Rampe_1MPa.txt",)])
+def test_a_name_that_can_be_read_in_two_ways_is_asked(here, capsys, others):
+    time, u, _, q = columns_of(1.0)
+    for path in ("Rampe_2_5MPa.txt", *others):
+        write(path, "t_s,u_V,Q_Lmin", time, u, q)
+    assert main(["init", "Rampe_2_5MPa.txt", *others]) == 1
+    said = capsys.readouterr().out
+    assert "open: pressure drop of 'Rampe_2_5MPa.txt': its name may say 2.5 MPa or 5 MPa; declare the right one" in said
+    text = Path("dzdesign.toml").read_text()
+    assert '# "Rampe_2_5MPa.txt" = "2.5 MPa"\n# "Rampe_2_5MPa.txt" = "5 MPa"\n' in text
+    assert tomllib.loads(text).get("dp", {}) == {path: "1 MPa" for path in others}
+
+
+def test_one_stuck_sensor_and_flows_that_differ_are_said(here, capsys):
+    for name, dp_MPa in (("a.csv", 1.0), ("b.csv", 2.0), ("c.csv", 2.0)):
+        time, u, dp, q = columns_of(dp_MPa)
+        noise = 0 if name == "a.csv" else np.random.default_rng(1).integers(-9, 9, u.size)
+        write(name, "t_s,u_V,dP_MPa,Q_Lmin", time, u, dp + 0.001 * noise, q * (2 if name == "b.csv" else 1))
+    assert main(["init", "a.csv", "b.csv", "c.csv"]) == 0
+    said = capsys.readouterr().out
+    assert "CHECK: 'a.csv': the pressure drop is 1 MPa to the last digit" in said
+    assert "CHECK: recordings that are taken as one test, at" in said and said.count("CHECK") == 2
+
+
+def test_several_recordings_without_a_pressure_are_open(here, capsys):
+    for number in (1, 2):
+        time, u, _, q = columns_of(float(number))
+        write(f"r{number}.csv", "t_s,u_V,Q_Lmin", time, u, q)
+    assert main(["init", "r1.csv", "r2.csv"]) == 1
+    assert "open: pressure drop of 'r1.csv': no column, and none in its name" in capsys.readouterr().out
+    text = Path("dzdesign.toml").read_text()
+    assert '# "r2.csv" = "1 MPa"' in text and tomllib.loads(text) == {"u-max": "10 V"}
+
+
+def test_a_file_that_exists_stays(here, capsys):
+    Path("dzdesign.toml").write_text("mine")
+    time, u, dp, q = columns_of(1.0)
+    write("ramp.csv", "t_s,u_V,dP_MPa,Q_Lmin", time, u, dp, q)
+    assert main(["init", "ramp.csv"]) == 2
+    assert "'dzdesign.toml' exists, and init never writes over a file" in capsys.readouterr().err
+    assert Path("dzdesign.toml").read_text() == "mine"
+    assert main(["-q", "init", "ramp.csv", "-o", "other.toml"]) == 0
+
+
+def test_without_names_it_looks_in_ramps_then_here(here, capsys):
+    assert main(["init"]) == 2
+    assert "there are no recordings in ./ramps or in this folder" in capsys.readouterr().err
+    time, u, dp, q = columns_of(1.0)
+    write("ramps/ramp.csv", "t_s,u_V,dP_MPa,Q_Lmin", time, u, dp, q)
+    write("other.csv", "nothing", time)
+    assert main(["init", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["recordings"] == ["ramps/ramp.csv"] and said["open"] == [] and said["sides"]["positive"]["ramps"] == 1
+
+
+def test_hostile_labels_stay_strings_of_toml(here):
+    time, u, dp, q = columns_of(1.0)
+    write("ramp.csv", 't_s,"A ""0\\x\x7f [V]",dP_MPa,Q_Lmin,"] = 1\x1b[2J #"', time, u, dp, q, q)
+    text, _ = init_then_identify("ramp.csv")
+    assert set(tomllib.loads(text)) == {"u-max", "columns"} and "\x1b" not in text
+
+
+def test_the_look_is_of_labels_and_units(here):
+    time, u, dp, q = columns_of(1.0)
+    write("ramp.csv", "Time (s),Vin (V),p1 (bar),p2 (bar),Flow (L/min)", time, u, dp, dp, q)
+    found = guess_columns(Path("ramp.csv"))
+    assert found.chosen == {"u": "Vin (V)"} and set(found.understood) == {"time", "Q"}
+    assert "is it the drop, pA or pB?" in found.unclear["dP"]
+    assert pressure_in_name("a_1.5MPa_40bar.csv") is None and pressure_in_name("ramp 12,5 Bar up.csv") == "12.5 bar"

@@ -1,0 +1,274 @@
+"""`dzdesign monitor` over a pseudo-terminal, against the firmware's own frame code, compiled on the host."""
+
+import json
+import os
+import random
+import signal
+import struct
+import subprocess
+import sys
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dzdesign.codegen.telemetry.frame import FRAME_OCTETS, STATUS_RELEASED, Frame
+from dzdesign.codegen.telemetry.recording import COLUMNS, scalings_of
+from dzdesign.core.errors import InputError
+from dzdesign.identify.reading.ramp_files import read_ramp_file
+from tests.support.f28335_device import COMPILER, HERE, needs_compiler
+
+pytestmark = [
+    needs_compiler,
+    pytest.mark.skipif(not hasattr(os, "openpty"), reason="this system has no pseudo-terminals"),
+]
+PROGRAM = Path(sys.executable).with_name("dzdesign")
+WAIT_S = 30.0
+#: Looks in a row, 20 ms apart, at which nothing waits to be read.
+QUIET = 20
+TICKS = 25
+
+
+@dataclass
+class Bench:
+    """A firmware, a line to it, and the monitor that listens."""
+
+    folder: Path
+    firmware: Path
+    device: Path
+    origin: int
+    master: int
+    slave: int
+    monitor: subprocess.Popen | None = None
+
+    @property
+    def output(self) -> Path:
+        return self.folder / "ramp.csv"
+
+    def listen(self, *options: str, firmware: Path | None = None) -> None:
+        """Start the monitor, and wait until it has the port."""
+        command = [PROGRAM, "monitor", os.ttyname(self.slave), "--firmware", firmware or self.firmware, "--json"]
+        self.monitor = subprocess.Popen(
+            [*map(str, command), "-o", str(self.output), *options],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        first = self.monitor.stderr.readline()
+        assert "listening" in first, first + self.monitor.stderr.read()
+
+    def send(self, lines: list[str]) -> None:
+        """Have the firmware's frame code write to the line; return when the monitor has read it all."""
+        text = "\n".join(lines) + "\n"
+        subprocess.run([self.device], input=text, stdout=self.master, text=True, check=True, timeout=WAIT_S)
+        self._until_read()
+
+    def _until_read(self) -> None:
+        import fcntl
+        import termios
+
+        end = time.monotonic() + WAIT_S
+        quiet = 0
+        while quiet < QUIET:  # the kernel hands over in pieces: on a busy machine nothing may wait between two of them
+            quiet = 0 if struct.unpack("i", fcntl.ioctl(self.slave, termios.FIONREAD, b"\0" * 4))[0] else quiet + 1
+            assert time.monotonic() < end, "the monitor does not read"
+            time.sleep(0.02)
+
+    def stop(self) -> tuple[int, dict, str]:
+        """Press Ctrl-C; return exit status, result, and what was said."""
+        self.monitor.send_signal(signal.SIGINT)
+        return self.end()
+
+    def end(self) -> tuple[int, dict, str]:
+        out, said = self.monitor.communicate(timeout=WAIT_S)
+        return self.monitor.returncode, json.loads(out or "{}"), said
+
+    def frame(self, index: int, **changes: int) -> str:
+        values = Frame(
+            ticks=TICKS * (index + 1), origin=self.origin, u_adc=index % 4096, p_a_adc=1000, p_b_adc=795, beta=1 << 15,
+            compare_a=2 * index, compare_b=0, status=STATUS_RELEASED,
+        )  # fmt: skip
+        return "frame " + " ".join(str(getattr(replace(values, **changes), name)) for name in Frame.__slots__)
+
+
+@pytest.fixture
+def bench(firmware_folder, tmp_path):
+    device = tmp_path / "device"
+    sources = [str(firmware_folder / "f28335" / "dz_frame.c"), str(HERE / "frames.c")]
+    subprocess.run([COMPILER, "-std=c99", f"-I{firmware_folder / 'f28335'}", *sources, "-o", device], check=True)
+    place = tmp_path / "recordings"
+    place.mkdir()
+    master, slave = os.openpty()
+    bench = Bench(place, firmware_folder, device, scalings_of(firmware_folder).origin, master, slave)
+    yield bench
+    if bench.monitor and bench.monitor.poll() is None:
+        bench.monitor.kill()
+        bench.monitor.communicate()
+    for end in (bench.master, bench.slave):
+        if end >= 0:
+            os.close(end)
+
+
+def table(path: Path) -> np.ndarray:
+    lines = [line for line in path.read_text().splitlines() if not line.startswith("#")]
+    assert lines[0] == ",".join(COLUMNS)
+    return np.array([line.split(",") for line in lines[1:]], dtype=float)
+
+
+def test_good_frames_become_rows_in_units(bench):
+    bench.listen()
+    bench.send([bench.frame(index) for index in range(300)])
+    status, result, _ = bench.stop()
+    assert status == 0 and result["frames"] == 300 and result["lost"] == result["bad_crc"] == 0
+    assert result["octets_skipped"] == result["restarts"] == 0 and result["faults"] == []
+    rows, index = table(bench.output), np.arange(300)
+    assert np.allclose(rows[:, 0], index / 100, atol=1e-9), "100 frames a second, from the first on"
+    assert np.allclose(rows[:, 1], 10 * index / 4095, atol=1e-5)
+    assert np.allclose(rows[:, 2], 20 * 1000 / 4095, atol=1e-5) and np.allclose(rows[:, 3], 20 * 795 / 4095, atol=1e-5)
+    assert np.allclose(rows[:, 4], 10 * 2 * index / 60000, atol=1e-5)
+    assert np.all(rows[:, 5:] == np.column_stack([np.ones(300), 2 * index, 0 * index, np.full(300, STATUS_RELEASED)]))
+    assert [path.name for path in bench.folder.iterdir()] == ["ramp.csv"]
+
+
+def test_what_solenoid_b_gets_is_written_as_its_own_and_negative(bench):
+    bench.listen()
+    bench.send([bench.frame(index, compare_a=0, compare_b=6 * index) for index in range(20)])
+    assert bench.stop()[0] == 0
+    rows, index = table(bench.output), np.arange(20)
+    assert np.allclose(rows[:, 4], -10 * 6 * index / 60000, atol=1e-5)
+    assert np.all(rows[:, 6] == 0) and np.all(rows[:, 7] == 6 * index)
+
+
+def test_garbage_cut_frames_and_bad_crcs_are_passed_over_and_counted(bench):
+    lines = [bench.frame(index) for index in range(50)]
+    lines[10] = lines[10].replace("frame", "cut 11")
+    lines[20] = lines[20].replace("frame", "flip 13")
+    lines[21] = lines[21].replace("frame", "flip 23")
+    lines[30] = "raw " + "a55a0214" + "5a" * 9
+    lines[40] = "raw " + random.Random(1).randbytes(100).replace(b"\xa5", b"\0").hex()
+    bench.listen()
+    bench.send(lines)
+    status, result, _ = bench.stop()
+    assert status == 0 and result["frames"] == 45 and result["lost"] == 5
+    assert result["bad_crc"] == 4, "the cut one, the two with a wrong bit and the false beginning"
+    assert result["octets_skipped"] == 11 + 2 * FRAME_OCTETS + 13 + 100
+    kept = [index for index in range(50) if index not in (10, 20, 21, 30, 40)]
+    assert np.allclose(table(bench.output)[:, 0], np.array(kept) / 100)
+    assert "45 frames, 5 lost, 4 with a wrong CRC" in bench.output.read_text()
+
+
+def test_the_count_of_periods_wraps_and_a_reset_is_told(bench):
+    ticks = [(2**32 - 3 * TICKS + TICKS * step) % 2**32 for step in range(6)]
+    lines = [bench.frame(0, ticks=count) for count in (*ticks, TICKS, 2 * TICKS)]
+    bench.listen()
+    bench.send(lines)
+    _, result, _ = bench.stop()
+    assert result["restarts"] == 1 and result["lost"] == 0
+    assert np.allclose(table(bench.output)[:, 0], np.arange(8) / 100)
+
+
+def test_an_output_that_is_held_low_is_zero_and_faults_are_named(bench):
+    bench.listen()
+    bench.send([bench.frame(500), bench.frame(501, status=0), bench.frame(502, status=0x0103)])
+    _, result, _ = bench.stop()
+    assert list(table(bench.output)[:, 4] > 0) == [True, False, False]
+    assert result["faults"] == ["no usable sample in time", "trip input went low", "command outside its valid range"]
+
+
+def test_identify_reads_the_recording_with_the_flow_meters_column(bench):
+    up = np.arange(0, 4096, 3)
+    codes = np.concatenate([up, up[::-1]])
+    frames = [bench.frame(i, u_adc=int(c), compare_a=int(c) * 14) for i, c in enumerate(codes)]
+    bench.listen()
+    bench.send(frames)
+    assert bench.stop()[0] == 0
+    lines = bench.output.read_text().splitlines()
+    flow = np.clip(4.0 * (10 * codes / 4095 - 5.4), 0, None)
+    rows = iter(flow)
+    joined = [
+        line if line.startswith("#") else line + (",Q_Lmin" if line.startswith("time_s") else f",{next(rows):.4f}")
+        for line in lines
+    ]
+    bench.output.write_text("\n".join(joined) + "\n")
+    test = read_ramp_file(bench.output)
+    assert test.time.size == codes.size and np.allclose(np.diff(test.time), 0.01)
+    assert np.allclose(test.u, 10 * codes / 4095, atol=1e-5)
+    assert np.allclose(test.dp, 20e6 * 205 / 4095, atol=20.0)
+    output = read_ramp_file(bench.output, columns={"u": "uO_V"})
+    assert np.allclose(output.u, 10 * 14 * codes / 60000, atol=1e-5)
+    done = subprocess.run(
+        [PROGRAM, "identify", bench.output, "-o", bench.folder / "valve.json", "--json"],
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    (found,) = json.loads(done.stdout)["sides"]["positive"]["tests"]
+    assert found["u_knee_rising_V"] == pytest.approx(5.4, abs=0.01)
+
+
+def test_seconds_end_the_recording(bench):
+    bench.listen("--seconds", "1.5")
+    bench.send([bench.frame(index) for index in range(20)])
+    status, result, _ = bench.end()
+    assert status == 0 and result["frames"] == 20
+
+
+def test_a_line_that_breaks_leaves_what_came_and_status_1(bench):
+    bench.listen()
+    bench.send([bench.frame(index) for index in range(20)])
+    for name in ("slave", "master"):
+        os.close(getattr(bench, name))
+        setattr(bench, name, -1)
+    status, result, said = bench.end()
+    assert status == 1 and result["frames"] == 20 and "the port broke" in said
+    assert len(table(bench.output)) == 20
+
+
+def test_another_firmware_is_refused(bench):
+    bench.listen()
+    bench.send([bench.frame(0, origin=bench.origin ^ 1)])
+    status, _, said = bench.end()
+    assert status == 2 and "not " + f"{bench.origin:04x}" in said and not bench.output.exists()
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"), [([], "nothing"), (["raw " + "00ff" * 40], "check --baud"), (["raw a55a0207"], "one version")]
+)
+def test_a_line_without_frames_is_status_2_and_leaves_no_file(bench, lines, said):
+    bench.listen("--seconds", "0.1")
+    if lines:
+        bench.send(lines)
+    status, _, words = bench.end()
+    assert status == 2 and said in words and list(bench.folder.iterdir()) == []
+
+
+def refused(*words: str | Path) -> str:
+    done = subprocess.run([PROGRAM, "monitor", *words], capture_output=True, text=True, check=False)
+    assert done.returncode == 2 and done.stderr.count("\n") == 1 and done.stdout == "", done.stderr
+    return done.stderr
+
+
+def test_a_bad_port_option_or_place_is_one_sentence(bench):
+    port, output = os.ttyname(bench.slave), ["-o", bench.output]
+    firmware = ["--firmware", bench.firmware]
+    assert "can't be opened" in refused("/dev/no-such-port", *firmware, *output)
+    assert "can't be opened" in refused(bench.firmware / "compensator.json", *firmware, *output)
+    assert "--baud is 'fast'" in refused(port, *firmware, *output, "--baud", "fast")
+    assert "--seconds is '-1'" in refused(port, *firmware, *output, "--seconds=-1")
+    assert "does not exist" in refused(port, "--firmware", bench.folder, *output)
+    bench.output.write_text("time_s\n1\n")
+    assert "not to be had again" in refused(port, *firmware, *output)
+    assert bench.output.read_text() == "time_s\n1\n"
+
+
+def test_a_port_in_use_is_refused(bench):
+    bench.listen()
+    other = bench.folder / "other.csv"
+    assert "can't be opened" in refused(os.ttyname(bench.slave), "--firmware", bench.firmware, "-o", other)
+
+
+def test_a_firmware_without_telemetry_is_refused(bench, monkeypatch):
+    from dzdesign.codegen.f28335.target import TARGET
+    from dzdesign.codegen.telemetry.frame import recording as telemetry_record
+
+    monkeypatch.setattr(telemetry_record, "target_named", lambda name: replace(TARGET, link=None))
+    with pytest.raises(InputError, match="no telemetry"):
+        scalings_of(bench.firmware)

@@ -1,0 +1,335 @@
+"""The API gives what the commands give, is light to import, is typed, and shows its results safely in a notebook."""
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import nbformat
+import pytest
+from nbclient import NotebookClient
+
+from dzdesign import api
+from dzdesign.batch.command import IDENTIFY
+from dzdesign.command_line.cli import main
+from dzdesign.command_line.command_spec import COMMANDS
+from dzdesign.design.request import DEFAULTS
+from dzdesign.identify.valve.model import ValveModel
+from tests.support.paths import ROOT
+from tests.support.synthetic import needs_compiler
+
+NOTEBOOK = ROOT / "examples" / "notebook" / "ramps_to_firmware.ipynb"
+HOSTILE = '<script>alert("1")</script>&'
+
+
+class Tags(HTMLParser):
+    """The tags and the text of a page."""
+
+    def __init__(self, html):
+        super().__init__()
+        self.tags, self.text = set(), ""
+        self.feed(html)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.add(tag)
+
+    def handle_data(self, data):
+        self.text += data
+
+
+@pytest.fixture(scope="module")
+def ramps(example_folder):
+    return sorted((example_folder / "ramps").glob("*.csv.gz"))[:2]
+
+
+def test_the_api_writes_the_bytes_of_the_commands(ramps, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    options = ["--meter-lag", "0.1 s", "--x-max", "1.8 mm", "--confidence", "0.95"]
+    assert main(["identify", *map(str, ramps), *options]) == 0
+    assert main(["design", "valve.json", "--guard", "mean", "--target", "host"]) == 0
+    assert main(["codegen", "compensator.json", "--target", "host"]) == 0
+    valve = api.identify(ramps, meter_lag="0.1 s", x_max="1.8 mm", confidence=0.95, output="api_valve.json")
+    compensator = api.design(valve, guard="mean", target="host", output="api_compensator.json")
+    api.generate(compensator, target="host", output="api_firmware")
+    pairs = ("valve.json", "compensator.json", "firmware/manifest.json")
+    assert all(Path(name).read_bytes() == Path(f"api_{name}").read_bytes() for name in pairs)
+    assert capsys.readouterr().out.count("Written") == 2  # by the commands; the API prints nothing
+    by_path = api.generate(Path("compensator.json"), target="host")
+    assert by_path == api.generate(api.design("valve.json", guard="mean", target="host"), target="host")
+
+
+def test_the_options_are_those_of_the_commands():
+    """An option that a command gains is missing here until the API has it."""
+    import inspect
+
+    only_on_paper = {"identify": {"plots"}, "assess": {"plots"}, "design": set(), "init": set(), "report": set()}
+    only_on_paper |= {"simulate": set(), "batch": {*DEFAULTS, *IDENTIFY, "record"}}  # those are in its two mappings
+    for name, left_out in only_on_paper.items():
+        words = {option[0][-1] for option in COMMANDS[name][2]}
+        options = {word.removeprefix("--").replace("-", "_") for word in words if word.startswith("--")}
+        assert set(inspect.signature(getattr(api, name)).parameters) >= options - left_out
+    assert set(DEFAULTS) <= set(inspect.signature(api.design).parameters)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda ramps: api.identify(ramps, u_max="10 bar"), "--u-max"),
+        (lambda ramps: api.identify("nothing_*.csv"), "no file matches 'nothing_*.csv'"),
+        (lambda ramps: api.identify([ramps[0], ramps[0]]), "byte for byte the same recording"),
+        (lambda ramps: api.identify(ramps, output=ramps[0]), "left alone; choose another name with output"),
+        (lambda ramps: api.design("nothing.json"), "'nothing.json' does not exist"),
+        (lambda ramps: api.design("nothing.json", target="f28334"), "did you mean 'f28335'?"),
+        (lambda ramps: api.verify("nothing"), "does not exist"),
+        (lambda ramps: api.init("nothing_*.csv"), "no file matches 'nothing_*.csv'"),
+        (lambda ramps: api.simulate(dp=["1 MPa", "1 MPa"]), "--dp repeats a pressure drop"),
+        (lambda ramps: api.simulate(dp="1 MPa", seed=-1), "--seed is '-1'"),
+        (lambda ramps: api.assess(ramps, ramps), "byte for byte the same recording"),
+        (lambda ramps: api.assess(ramps, ramps, limits={"linearty": "5 %"}), "did you mean 'linearity'?"),
+        (lambda ramps: api.report("nothing"), "nothing"),
+        (lambda ramps: api.batch("nothing", output="lot"), "'nothing'"),
+        (lambda ramps: api.batch(".", output="lot", identify={"meter_lagg": "0 s"}), "did you mean 'meter_lag'?"),
+        (lambda ramps: api.batch(".", output="lot", design={"meter_lag": "0 s"}), "design has no option 'meter_lag'"),
+    ],
+)
+def test_bad_input_is_one_sentence(call, words, ramps):
+    with pytest.raises(api.InputError) as error:
+        call(ramps)
+    assert words in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: api.simulate(dp=1), "dp: expected text with a unit such as '1 MPa', got 1"),
+        (lambda: api.simulate(dp=[1]), "dp[0]: expected text with a unit such as '1 MPa', got 1"),
+        (lambda: api.simulate(ramp_time=5), "ramp_time: expected text with a unit such as '100 s', got 5"),
+        (lambda: api.simulate(plant=5), "plant: expected a path, got 5"),
+        (lambda: api.identify("x", meter_lag=0.1), "meter_lag: expected text with a unit such as '0.1 s', got 0.1"),
+        (lambda: api.identify("x", dp={"x": 5}), "dp['x']: expected text with a unit such as '1 MPa', got 5"),
+        (lambda: api.identify("x", record=5), "record: expected a mapping of names to values, got 5"),
+        (lambda: api.identify(["x", 5]), "ramps[1]: expected a path, got 5"),
+        (lambda: api.design("x", edge=1), "edge: expected text with a unit such as '1 %', got 1"),
+        (lambda: api.design("x", accept=["x"]), "accept: expected text, got ['x']"),
+        (lambda: api.design("x", target=28335), "target: expected text, got 28335"),
+        (lambda: api.design(5), "valve: expected a path, got 5"),
+        (lambda: api.generate(None), "compensator: expected a path, got None"),
+        (lambda: api.verify(5), "firmware: expected a path, got 5"),
+        (lambda: api.assess("x", "y", level=0.6), "level: expected text with a unit such as '0.6 L/min', got 0.6"),
+        (lambda: api.assess("x", "y", limits={"z": 5}), "limits['z']: expected text with a unit such as '5 %', got 5"),
+        (lambda: api.init(5), "ramps: expected a path, got 5"),
+        (lambda: api.init(b"x"), "ramps: expected a path, got b'x'"),
+        (lambda: api.report(None), "folder: expected a path, got None"),
+        (lambda: api.batch(".", output="lot", design={"edge": 1}), "design['edge']: expected text, got 1"),
+        (
+            lambda: api.identify("x", kneewindow="20-60"),
+            "identify has no option 'kneewindow' (did you mean 'knee_window'?); see help(identify)",
+        ),
+        (lambda: api.verify("x", Plant="p"), "verify has no option 'Plant' (did you mean 'plant'?); see help(verify)"),
+        (lambda: api.report("x", zzz=1), "report has no option 'zzz'; see help(report)"),
+        (lambda: api.batch(".", output="lot", identify=5), "identify: expected a mapping of names to values, got 5"),
+    ],
+)
+def test_what_is_no_text_is_one_sentence(call, words):
+    with pytest.raises(api.InputError) as error:
+        call()
+    assert str(error.value) == words
+
+
+def test_a_number_for_an_option_of_a_lot_is_one_sentence(ramps, tmp_path):
+    with pytest.raises(api.InputError, match=r"--meter-lag: expected text with a unit such as '1 s', got 0\.1"):
+        api.batch(ramps[0].parent, output=tmp_path / "lot", identify={"meter_lag": 0.1})
+
+
+def test_paths_may_come_from_anything_that_gives_them(ramps):
+    assert len(api.identify((path for path in ramps), meter_lag="0.1 s").to_document()["made_from"]) == len(ramps)
+
+
+def test_what_stands_around_the_stages_writes_the_bytes_of_the_commands(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    two = ["--dp", "1 MPa", "--dp", "2 MPa", "--ramp-time", "20 s"]
+    assert main(["simulate", *two, "-o", "lot/V1"]) == 0 and main(["simulate", *two, "--seed", "2", "-o", "after"]) == 0
+    files = api.simulate(dp=["1 MPa", "2 MPa"], ramp_time="20 s", output="again")
+    assert {path.name: path.read_bytes() for path in Path("lot/V1").glob("*.gz")} == files
+    assert Path("again/manifest.json").read_bytes() == Path("lot/V1/manifest.json").read_bytes()
+    pairs = []
+    assert main(["init", "lot/V1/*.gz", "-o", "init.toml"]) == 0
+    proposal = api.init("lot/V1/*.gz", output="api_init.toml")
+    assert not proposal.opens and "largest command: 10.00 V" in proposal.seen
+    pairs.append(("init.toml", "api_init.toml"))
+    limits = ["--limits", "dead_zone_opening = 60 %", "--meter-lag", "0.1 s"]
+    assert main(["assess", "lot/V1/*.gz", "--after", "after/*.gz", *limits]) == 0
+    compared = {"limits": {"dead_zone_opening": "60 %"}, "meter_lag": "0.1 s", "output": "api_assessment.json"}
+    assert api.assess("lot/V1/*.gz", "after/*.gz", **compared).holds
+    pairs.append(("assessment.json", "api_assessment.json"))
+    assert main(["batch", "lot", "--meter-lag", "0.1 s", "--guard", "mean", "--jobs", "1", "-o", "done"]) == 0
+    capsys.readouterr()
+    said = {"identify": {"meter_lag": "0.1 s"}, "design": {"guard": "mean"}, "jobs": 1}
+    document = api.batch(Path("lot"), output=Path("api_done"), **said)
+    assert document["calibrated"] == document["valves"] == 1
+    pairs += [(f"done/{name}", f"api_done/{name}") for name in ("batch.json", "valves.csv", "report.html")]
+    made = api.report("done", output="api_report.html")
+    assert made.holds is None and "NOT VERIFIED" in made.verdict
+    pairs.append(("done/report.html", "api_report.html"))
+    for name, other in pairs:
+        assert Path(name).read_bytes() == Path(other).read_bytes(), name
+    assert capsys.readouterr() == ("", "")  # the API prints nothing
+
+
+def test_a_valve_of_a_lot_that_fails_is_no_error_of_the_api(ramps, tmp_path):
+    for name, content in (("V1", ramps[0].read_bytes()), ("V2", b"no table")):
+        (tmp_path / "lot" / name).mkdir(parents=True)
+        (tmp_path / "lot" / name / "a.csv").write_bytes(content)
+    document = api.batch(tmp_path / "lot", output=tmp_path / "out", jobs=1)
+    assert [each["name"] for each in document["failed"]] == ["V2"] and document["calibrated"] == 1
+
+
+def test_print_sums_a_result_up(example_valve, example_compensator, example_firmware):
+    side, text = example_valve.positive, str(example_valve)
+    assert text.startswith("Valve of 10 V, positive side, from 6 recordings\n")
+    for test in side.tests:
+        assert f"{test.dp_MPa:.3f} MPa: knee opening {test.u_knee_rising_V:.3f} ± {test.rising.knee_se_V:.3f}" in text
+    assert "trend with dP: decreasing" in text and "warnings: simulated, " in text
+    assert "cost: outside 0.50 to 5.00 MPa" in str(example_compensator)
+    assert str(example_compensator).startswith("Compensator for f28335, law paper, of a valve of 10 V\n")
+    assert "core/dz_comp.c" in str(example_firmware)
+    for result in (example_valve, example_compensator, example_firmware):
+        assert repr([result]) == f"[<{str(result).splitlines()[0]}>]"
+        assert len(str(result)) < 4000
+    steered = replace(example_valve, warnings=(replace(example_valve.warnings[0], code="\x1b[31m\nred"),))
+    assert "\x1b" not in str(steered) and str(steered).splitlines()[-1].endswith("red; their texts are in .warnings")
+
+
+def test_a_compensator_whose_certificate_does_not_follow_is_not_generated(example_compensator):
+    side = example_compensator.positive
+    higher = replace(side, u_min0_over_u_max=side.u_min0_over_u_max * 17 / 16)
+    with pytest.raises(api.InputError, match="certificate does not hold"):
+        api.generate(replace(example_compensator, positive=higher))
+
+
+def test_what_a_notebook_shows_is_escaped(example_valve, example_compensator, example_firmware):
+    side = example_valve.positive
+    tests = (replace(side.tests[0], source=HOSTILE), *side.tests[1:])
+    valve = replace(
+        example_valve,
+        sides={"positive": replace(side, tests=tests)},
+        warnings=(replace(example_valve.warnings[0], text=HOSTILE, source=HOSTILE),),
+    )
+    firmware = replace(example_firmware, files={HOSTILE: "int x;"}, manifest={"target": HOSTILE, "law": HOSTILE})
+    for result, count in ((valve, 3), (replace(example_compensator, costs=(HOSTILE,)), 1), (firmware, 3)):
+        page = Tags(result._repr_html_())
+        assert page.tags <= {"table", "caption", "b", "thead", "tbody", "tr", "th", "td", "ul", "li"}
+        assert page.text.count(HOSTILE) == count  # shown, as text
+
+
+def test_a_valve_shows_its_numbers(example_valve):
+    text = Tags(example_valve._repr_html_()).text
+    test = example_valve.positive.tests[0]
+    for number in (f"{test.u_knee_rising_V:.3f} ± ", f"{test.u_guard_lower_V:.3f}", "trend with dP: decreasing"):
+        assert number in text
+    assert isinstance(example_valve, ValveModel)
+
+
+def test_importing_the_api_is_light():
+    heavy = ("numpy", "scipy", "casadi", "sympy", "cvxpy", "matplotlib", "pint", "polars", "jinja2", "rich")
+    code = f"import sys, dzdesign.api; print([name for name in {heavy} if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+#: What hangs on the machine's compilers: the object's hash, and which of them were tried.
+OF_THE_MACHINE = ((r"object [0-9a-f]{64}", "object …"), (r"(-Werror): [\w, .+-]*", r"\1: …"))
+
+
+def stored_outputs(cell):
+    """Return the outputs of an executed cell as the notebook keeps them: the table where there is one, a row a line."""
+    kept = []
+    for output in cell.outputs:
+        assert output.output_type == "execute_result", output
+        shown = output.data.get("text/html")
+        text = shown or output.data["text/plain"]
+        for pattern, instead in OF_THE_MACHINE:
+            text = re.sub(pattern, instead, text)
+        lines = re.findall(r".*?</tr>|.+", text) if shown else text.splitlines(keepends=True)
+        data = {"text/html" if shown else "text/plain": lines}
+        kept.append(
+            {"data": data, "execution_count": cell.execution_count, "metadata": {}, "output_type": "execute_result"}
+        )
+    return kept
+
+
+@needs_compiler
+def test_the_notebook_gives_what_it_shows(tmp_path, request):
+    """Its outputs are stored; `pytest tests/dzdesign/test_api.py -k notebook --update-docs` stores them anew."""
+    document = json.loads(NOTEBOOK.read_text(encoding="utf-8"))
+    notebook = nbformat.read(NOTEBOOK, as_version=4)
+    nbformat.validate(notebook)
+    client = NotebookClient(
+        notebook, timeout=300, record_timing=False, resources={"metadata": {"path": str(tmp_path)}}
+    )
+    client.execute()
+    found = [stored_outputs(cell) for cell in notebook.cells if cell.cell_type == "code"]
+    cells = [cell for cell in document["cells"] if cell["cell_type"] == "code"]
+    if request.config.getoption("--update-docs"):
+        for number, (cell, outputs) in enumerate(zip(cells, found, strict=True), start=1):
+            cell.update(execution_count=number, outputs=outputs)
+        NOTEBOOK.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    assert [cell["outputs"] for cell in cells] == found
+    assert [cell["execution_count"] for cell in cells] == list(range(1, len(cells) + 1))
+    shown = [Tags("".join(each[-1]["data"]["text/html"])).text for each in found if "text/html" in each[-1]["data"]]
+    assert len(shown) == 4 and found[-1][-1]["data"] == {"text/plain": ["True"]}
+    assert "33550336 inputs checked, 0 wrong" in shown[3] and "core/dz_comp.c" in shown[2]
+
+
+@pytest.fixture(scope="module")
+def typed_house(tmp_path_factory):
+    """The packages as a wheel lays them out: a type checker does not follow an editable install's mapping."""
+    house = tmp_path_factory.mktemp("house")
+    for room in ("core", "derivation", "identify", "design", "codegen", "verify"):
+        (house / "dzdesign" / room).mkdir(parents=True)
+        for source in (ROOT / room).glob("*.py"):
+            shutil.copy(source, house / "dzdesign" / room)
+    shutil.copytree(ROOT / "dzdesign" / "batch", house / "dzdesign" / "batch")
+    for source in (*(ROOT / "dzdesign").glob("*.py"), ROOT / "dzdesign" / "py.typed"):
+        shutil.copy(source, house / "dzdesign")
+    shutil.copy(ROOT / "pyproject.toml", house)
+    (house / "right.py").write_text(
+        "from dzdesign import api\n"
+        'firmware = api.generate(api.design(api.identify("ramps/*.csv", dp0="1 MPa")), target="host")\n'
+        "holds: bool = api.verify(firmware).holds\n"
+        'holds = api.assess("a.csv", ["b.csv"], limits={"hysteresis": "5 %"}).holds\n'
+        'names: list[str] = list(api.simulate(dp="1 MPa"))\n'
+        "text: str = api.init().text\n"
+        'page: str = api.report("evidence").html\n'
+        'failed: object = api.batch("lot", output="out", identify={"meter_lag": "0.1 s"})["failed"]\n'
+    )
+    (house / "wrong.py").write_text(
+        "from dzdesign import api\n"
+        'holds: str = api.verify(api.design("valve.json")).holds\n'
+        "api.identify(meter_lag=0.1)\n"
+    )
+    return house
+
+
+def test_the_api_and_its_use_are_typed_strictly(typed_house):
+    ours = ("api", "api_around", "notebook", "summaries", "identify_options", "core.shown")
+    modules = (*(f"dzdesign.{name}" for name in ours), "right", "wrong")
+    command = [sys.executable, "-m", "mypy", *(f"-m{module}" for module in modules)]
+    done = subprocess.run(command, cwd=typed_house, capture_output=True, text=True, check=False)
+    errors = [line for line in done.stdout.splitlines() if ": error:" in line]
+    assert all(line.startswith("wrong.py") for line in errors), done.stdout
+    # A bool is no str, a verification takes no compensator, the recordings are missing, a lag is text with its unit.
+    kinds = sorted(line.rsplit("[", 1)[1] for line in errors)
+    assert kinds == ["arg-type]", "arg-type]", "assignment]", "call-arg]"], done.stdout
+
+
+def test_the_notebook_is_small_and_has_no_path_of_a_machine():
+    document = json.loads(NOTEBOOK.read_text(encoding="utf-8"))
+    assert len(json.dumps(document)) < 40_000
+    text = json.dumps(document)
+    assert not re.search(r"/home|/tmp|/root|/usr|C:\\\\|\d{4}-\d\d-\d\d", text), "a path, or a date"
+    assert "iopub" not in text and "version" not in document["metadata"]["language_info"]

@@ -1,0 +1,165 @@
+"""The walls of the house: imports run one way and in no circle, public names are documented, the start is light."""
+
+import ast
+import importlib
+import inspect
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+from tests.support.paths import ROOT
+
+#: In the order of DESIGN: a room imports only rooms before it.
+ROOMS = ("core", "derivation", "identify", "design", "codegen", "verify", "assess", "report", "dzdesign")
+#: Beyond the order: what a room may not import though it stands before it.
+FORBIDDEN = {
+    "verify": {"codegen"},  # the checker shares no code with what it checks
+    "assess": {"derivation", "design", "codegen", "verify"},
+}
+MOST_MODULES = 25
+
+
+def modules(root: Path = ROOT) -> dict[str, Path]:
+    """Return every module of the product by its name."""
+    found = {}
+    for room in ROOMS:
+        for path in sorted((root / room / "dzdesign").rglob("*.py")):
+            name = ".".join(path.relative_to(root / room).with_suffix("").parts)
+            found[name.removesuffix(".__init__")] = path
+    return found
+
+
+def room_of(name: str) -> str:
+    """Return the room of a module: modules that stand in no room's package are the front door's."""
+    part = name.split(".")[1]
+    return part if part in ROOMS else "dzdesign"
+
+
+def imports(source: str, known: Mapping[str, object]) -> Iterator[str]:
+    """Yield the product's modules that a source imports anywhere, also in a function or under TYPE_CHECKING."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name in known)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            for alias in node.names:
+                name = f"{node.module}.{alias.name}"
+                if name in known:
+                    yield name
+                elif node.module in known:
+                    yield node.module
+
+
+def import_graph(root: Path = ROOT) -> dict[str, set[str]]:
+    """Return which module imports which."""
+    known = modules(root)
+    return {name: set(imports(path.read_text("utf-8"), known)) for name, path in known.items()}
+
+
+def against_the_order(graph: Mapping[str, set[str]]) -> list[str]:
+    """Return the imports that run against the order of the rooms."""
+    wrong = []
+    for name, needed in graph.items():
+        room = room_of(name)
+        allowed = set(ROOMS[: ROOMS.index(room) + 1]) - FORBIDDEN.get(room, set())
+        wrong += [f"{name} imports {other}" for other in sorted(needed) if room_of(other) not in allowed]
+    return wrong
+
+
+def circle(graph: Mapping[str, set[str]]) -> list[str]:
+    """Return the modules of an import circle, or nothing."""
+    try:
+        TopologicalSorter({name: needed - {name} for name, needed in graph.items()}).prepare()
+    except CycleError as error:
+        return error.args[1]
+    return []
+
+
+def test_the_whole_tree_is_seen():
+    graph = import_graph()
+    assert len(graph) > 200
+    assert sum(map(len, graph.values())) > 500
+    assert {room_of(name) for name in graph} == set(ROOMS)
+
+
+def test_a_room_imports_only_the_rooms_before_it():
+    assert against_the_order(import_graph()) == []
+
+
+def test_there_is_no_import_circle():
+    assert circle(import_graph()) == []
+
+
+@pytest.mark.parametrize(
+    ("module", "line"),
+    [
+        ("dzdesign.identify.seeded", "from dzdesign.design.signals import Signals"),
+        ("dzdesign.verify.seeded", "from dzdesign.codegen import project"),
+        ("dzdesign.core.seeded", "def f():\n    from dzdesign.derivation.law import law"),
+        ("dzdesign.assess.seeded", "import dzdesign.design.signals"),
+    ],
+)
+def test_a_seeded_import_against_the_order_is_found(module, line):
+    graph = import_graph()
+    graph[module] = set(imports(line, graph))
+    assert any(module in found for found in against_the_order(graph))
+
+
+def test_a_seeded_circle_is_found():
+    source = "if TYPE_CHECKING:\n    from dzdesign.identify.identification import identify"
+    graph = import_graph()
+    graph["dzdesign.core.errors"] |= set(imports(source, graph))
+    assert "dzdesign.core.errors" in circle(graph)
+
+
+def test_no_folder_holds_more_modules_than_one_can_look_over():
+    folders: dict[Path, int] = {}
+    for path in modules().values():
+        folders[path.parent] = folders.get(path.parent, 0) + (path.name != "__init__.py")
+    assert {str(folder.relative_to(ROOT)): count for folder, count in folders.items() if count > MOST_MODULES} == {}
+
+
+def public_objects() -> Iterator[tuple[str, object]]:
+    for name in modules():
+        module = importlib.import_module(name)
+        yield name, module
+        for key, value in vars(module).items():
+            if (
+                not key.startswith("_")
+                and (inspect.isfunction(value) or inspect.isclass(value))
+                and value.__module__ == name
+            ):
+                yield f"{name}.{key}", value
+
+
+def test_public_names_are_documented_and_so_are_their_arguments():
+    missing = []
+    for name, value in public_objects():
+        text = inspect.getdoc(value)
+        if not text:
+            missing.append(name)
+        elif inspect.isfunction(value) and "Parameters\n---" in text:
+            for argument in inspect.signature(value).parameters:
+                if argument not in ("self", "args") and argument not in text:
+                    missing.append(f"{name}({argument})")
+    assert missing == []
+
+
+def test_the_front_door_is_light():
+    """--help costs no heavy import."""
+    heavy = ("numpy", "casadi", "sympy", "cvxpy", "matplotlib", "pint", "polars")
+    code = f"import sys, dzdesign.command_line.cli; print([name for name in {heavy} if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_no_assert_and_no_bare_except_in_shipped_code():
+    found = []
+    for source in modules().values():
+        for node in ast.walk(ast.parse(source.read_text("utf-8"))):
+            if isinstance(node, ast.Assert) or (isinstance(node, ast.ExceptHandler) and node.type is None):
+                found.append(f"{source.relative_to(ROOT)}:{node.lineno}")
+    assert found == []

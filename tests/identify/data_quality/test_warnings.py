@@ -1,0 +1,400 @@
+"""What the quality gate says of whole recordings, and what follows from it down to the C and the report."""
+
+import gzip
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dzdesign.codegen.project import generate, target_named
+from dzdesign.command_line.cli import main
+from dzdesign.core.artefact_files import to_json
+from dzdesign.core.errors import InputError
+from dzdesign.design.compensator_file import compensator_document
+from dzdesign.design.designing import design
+from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import DesignOptions
+from dzdesign.identify.data_quality import knee_errors, quality
+from dzdesign.identify.data_quality.quality import MOST_SERIOUS_FIRST, most_serious_first
+from dzdesign.identify.identification import identify
+from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.reading.ramp_files import ramp_file_bytes, read_ramp_file
+from dzdesign.identify.valve.model import Warning_
+from dzdesign.report.artefact_chain import chain_of
+from dzdesign.report.summary import headline
+from dzdesign.report.valve_report import make_report
+from tests.support.synthetic import L_MIN, MPA, Truth, synthetic_ramp
+
+PRESSURES = (1.0, 2.0, 4.0)
+MARK = "SIMULATED by somebody"
+
+
+def warned(valve, code):
+    return [warning for warning in valve.warnings if warning.code == code]
+
+
+def valve_at(dp_MPa, **changes):
+    """A ramp of a valve whose flow grows with the root of the pressure drop."""
+    root = dp_MPa**0.5
+    truth = Truth(knee_rising=5.5 - 0.05 * dp_MPa, slope=4 * root, saturation=100 * root)
+    return synthetic_ramp(dp_MPa, replace(truth, **changes), source=f"ramp_dP{dp_MPa:g}.csv")
+
+
+def written(path, test, *comments):
+    """Write a recording into a file and read it back."""
+    columns = {"time_s": test.time, "u_V": test.u, "dP_MPa": test.dp / MPA, "Q_Lmin": test.q / L_MIN}
+    path.write_bytes(ramp_file_bytes(columns, comments, compress=path.suffix == ".gz"))
+    return read_ramp_file(path)
+
+
+class TestSimulated:
+    @pytest.mark.parametrize("name", ["ramp.csv", "ramp.csv.gz"])
+    @pytest.mark.parametrize(("comments", "marked"), [((MARK, "more"), True), (("more", MARK), True), ((), False)])
+    def test_the_mark_is_seen_wherever_it_stands_above_the_labels(self, tmp_path, name, comments, marked):
+        assert written(tmp_path / name, valve_at(1.0), *comments).simulated is marked
+
+    @pytest.mark.parametrize(("line", "marked"), [('"# SIMULATED, no data",,,', True), ("# simulated leak: no", False)])
+    def test_a_spreadsheet_may_quote_it_and_a_word_in_a_sentence_is_none(self, tmp_path, line, marked):
+        path = tmp_path / "ramp.csv"
+        written(path, valve_at(1.0))
+        path.write_text(f"{line}\n{path.read_text()}")
+        assert read_ramp_file(path).simulated is marked
+
+    def test_every_bundled_recording_is_marked_and_so_is_the_valve(self, example_tests, example_valve, example_folder):
+        assert all(test.simulated for test in example_tests)
+        assert example_valve.warnings[0].code == "simulated"
+        assert f"all {len(example_tests)} recordings are simulated" in example_valve.warnings[0].text
+        first = sorted((example_folder / "ramps").glob("*.csv.gz"))[0]
+        assert gzip.decompress(first.read_bytes()).startswith(b"# SIMULATED")
+
+    def test_some_of_several_are_named(self):
+        tests = [valve_at(dp) for dp in PRESSURES]
+        tests[1] = replace(tests[1], simulated=True)
+        (warning,) = warned(identify(tests), "simulated")
+        assert "1 of 3 recordings (ramp_dP2.csv) is simulated" in warning.text
+
+    def test_the_firmware_and_the_report_say_so_and_those_of_a_measured_valve_do_not(self):
+        for simulated in (True, False):
+            valve = identify([replace(valve_at(dp), simulated=simulated) for dp in PRESSURES])
+            compensator = design(valve)
+            firmware = generate(compensator, "host")
+            for name, text in firmware.files.items():
+                assert ("SIMULATED" in text) is simulated or name == "compensator.json", name
+            shelf = {
+                "valve.json": to_json(valve.to_document()).encode(),
+                "compensator.json": to_json(compensator_document(compensator)).encode(),
+            }
+            cautions = headline(chain_of(shelf)).cautions
+            assert [text.startswith("SIMULATED") for text in cautions] == [True] * simulated
+            html = make_report(chain_of(shelf)).html
+            assert ("SIMULATED recordings" in html[: html.index('<section id="data">')]) is simulated
+
+
+@pytest.fixture(scope="module")
+def crossed():
+    """As a lag that was declared ten times too large leaves it: the knees change places."""
+    return identify([valve_at(dp, hysteresis=-0.05) for dp in PRESSURES], IdentifyOptions(meter_lag=0.0))
+
+
+class TestBranchOrder:
+    def test_design_refuses_in_one_sentence(self, crossed):
+        assert len(warned(crossed, "branch-order")) == 3
+        words = r"'ramp_dP1.csv': the valve closes .* --meter-lag .* --accept branch-order"
+        with pytest.raises(InputError, match=words):
+            design(crossed)
+
+    def test_a_simulation_without_noise_and_hysteresis_is_in_order(self):
+        side = identify([valve_at(1.0, hysteresis=-1e-4, noise=0.0)]).positive
+        assert not side.tests[0].closes_above_opening and side.tests[0].u_knee_se_V < 1e-5
+
+    def test_accepted_it_goes_on_and_the_cost_is_said(self, crossed):
+        compensator = design(crossed, DesignOptions(accept=("branch-order",)))
+        assert any(line.startswith("accepted, branch-order: at 1.00, 2.00, 4.00 MPa") for line in compensator.costs)
+
+    def test_the_report_says_so_beside_the_verdict_and_beside_the_warning(self, crossed):
+        """The warning was written before anybody accepted it."""
+        options = options_of({"accept": "branch-order"}, target_named("f28335").inputs())
+        for valve, accepted in ((crossed, True), (identify([valve_at(dp) for dp in PRESSURES]), False)):
+            shelf = {
+                "valve.json": to_json(valve.to_document()).encode(),
+                "compensator.json": to_json(compensator_document(design(valve, options))).encode(),
+            }
+            said = [line for line in headline(chain_of(shelf)).cautions if line.startswith("ACCEPTED warning, branch-")]
+            html = make_report(chain_of(shelf)).html
+            words = re.sub("<[^>]*>|`", "", html)
+            assert bool(said) is accepted
+            assert ("ACCEPTED warning, branch-order" in html[: html.index('<section id="data">')]) is accepted
+            assert ("refuses it unless it is accepted, which it was (--accept)" in words) is accepted
+
+    def test_a_valve_in_order_costs_nothing_of_it(self):
+        valve = identify([valve_at(dp) for dp in PRESSURES])
+        assert not any("accepted" in line for line in design(valve, DesignOptions(accept=("branch-order",))).costs)
+
+    def test_the_command_line_and_a_file_of_options_accept_it(self, crossed, tmp_path, monkeypatch, capsys):
+        monkeypatch.chdir(tmp_path)
+        (tmp_path / "valve.json").write_text(to_json(crossed.to_document()))
+        (tmp_path / "options.toml").write_text('accept = "branch-order"\n')
+        assert main(["design", "valve.json"]) == 2 and not (tmp_path / "compensator.json").exists()
+        assert "--accept branch-order" in capsys.readouterr().err
+        assert main(["codegen", "valve.json", "--target", "host"]) == 2 and not (tmp_path / "firmware").exists()
+        assert main(["design", "valve.json", "--accept", "branch-ordr"]) == 2
+        assert main(["design", "valve.json", "--accept", "branch-order"]) == 0
+        assert "cost: accepted, branch-order" in capsys.readouterr().out
+        assert main(["codegen", "valve.json", "--target", "host", "--config", "options.toml"]) == 0
+
+    def test_only_what_stops_a_design_can_be_accepted(self):
+        with pytest.raises(InputError, match=r"'branch-ordr' \(did you mean 'branch-order'\?\)"):
+            DesignOptions(accept=("branch-ordr",))
+
+
+def test_a_side_that_the_firmware_leaves_out_is_said_from_identify_to_the_report():
+    tests = []
+    for dp in PRESSURES:
+        up, down = valve_at(dp), valve_at(dp)
+        tests.append(
+            replace(
+                up,
+                time=np.concatenate([up.time, up.time[-1] + 0.02 + down.time]),
+                u=np.concatenate([up.u, -down.u]),
+                q=np.concatenate([up.q, -down.q]),
+                dp=np.concatenate([up.dp, down.dp]),
+            )
+        )
+    both, one = identify(tests), identify([valve_at(dp) for dp in PRESSURES])
+    (warning,) = warned(both, "two-sides")
+    assert "--command-signal" in warning.text and not warned(one, "two-sides")
+    for valve, said in ((both, True), (one, False)):
+        shelf = {
+            "valve.json": to_json(valve.to_document()).encode(),
+            "compensator.json": to_json(compensator_document(design(valve))).encode(),
+        }
+        assert any("negative side" in text for text in headline(chain_of(shelf)).cautions) is said
+
+
+class TestKneeErrors:
+    @staticmethod
+    def curved(power, *, noise=0.08, correlation=0.0, pressures=PRESSURES):
+        """Ramps whose flow is a power of the travel; the noise may be slow."""
+        from scipy.signal import lfilter
+
+        tests = []
+        for dp in pressures:
+            test = synthetic_ramp(dp, Truth(noise=0.0))
+            rising = np.arange(test.u.size) < test.u.size / 2
+            travel = np.clip(test.u - np.where(rising, 5.4, 5.3), 0, None) / 4.6
+            white = np.random.default_rng([1, int(dp)]).standard_normal(test.u.size)
+            slow = lfilter([np.sqrt(1 - correlation**2)], [1, -correlation], white)
+            tests.append(replace(test, q=(18 * dp**0.5 * travel**power + noise * slow) * L_MIN))
+        return tests
+
+    @pytest.mark.parametrize("pressures", [PRESSURES, (1.0,)])
+    @pytest.mark.parametrize("power", [0.5, 0.6, 2.0])
+    @pytest.mark.parametrize("noise", [0.005, 0.08])
+    def test_a_curve_is_not_put_down_to_the_meter(self, power, noise, pressures):
+        valve = identify(self.curved(power, noise=noise, pressures=pressures))
+        assert warned(valve, "bend") and not warned(valve, "noise")
+
+    @pytest.mark.parametrize(("noise", "correlation"), [(1.5, 0.0), (0.3, 0.99)])
+    def test_noise_fast_or_slow_is_not_put_down_to_the_valve(self, noise, correlation):
+        valve = identify(self.curved(1.0, noise=noise, correlation=correlation))
+        assert warned(valve, "noise") and not warned(valve, "bend")
+
+    def test_one_branch_alone_says_that_it_cannot_tell(self):
+        (test,) = self.curved(2.0, pressures=(1.0,))
+        half = test.u.size // 2
+        up = replace(test, **{name: getattr(test, name)[:half] for name in ("time", "u", "q", "dp")})
+        (warning,) = warned(identify([up]), "noise")
+        assert "one branch alone can't tell" in warning.text
+
+    def test_a_sharp_straight_valve_hears_nothing(self):
+        valve = identify(self.curved(1.0))
+        assert not {"noise", "bend", "coarse-levels"} & {warning.code for warning in valve.warnings}
+
+
+    @pytest.mark.parametrize("window", [(0.12, 0.5), (0.6, 0.8)])
+    def test_the_window_of_the_line_is_named(self, window):
+        (warning, *_) = warned(identify(self.curved(0.5), IdentifyOptions(knee_window=window)), "bend")
+        low, high = (round(100 * share) for share in window)
+        assert f"the flow bends between {low} and {high} % of its largest, where" in warning.text
+
+    def test_a_window_that_was_widened_is_named_beside_the_one_that_was_asked_for(self):
+        valve = identify(self.curved(0.5))
+        row = valve.positive.tests[0]
+        row = replace(row, rising=replace(row.rising, straight=(0.12, 0.9), knee_se_V=1.0))
+        warning = knee_errors._bent(row, 0.1, (0.12, 0.5))
+        assert "between 12 and 90 % of its largest (--knee-window 12-50, widened as far" in warning.text
+
+
+class TestStuckPressure:
+    @staticmethod
+    def stuck(pressures, names=("a.csv", "b.csv", "c.csv")):
+        return [
+            replace(valve_at(dp), source=name, dp=np.full(valve_at(dp).u.size, 1.0 * MPA))
+            for dp, name in zip(pressures, names, strict=True)
+        ]
+
+    def test_flows_that_differ_tell_it(self):
+        (warning,) = warned(identify(self.stuck(PRESSURES)), "pressure-stuck")
+        assert "1 MPa in every row of all 3 recordings" in warning.text and "differ by 10" in warning.text
+
+    @pytest.mark.parametrize("step", [0.0061, 0.0244])
+    @pytest.mark.parametrize("ports", [1, 2])
+    def test_the_noise_of_a_converter_hides_nothing(self, step, ports):
+        tests = self.stuck((1.0, 1.4, 2.0))
+        for index, test in enumerate(tests):
+            rng = np.random.default_rng(index)
+            noise = sum(rng.integers(-2, 3, test.u.size) for _ in range(ports))
+            tests[index] = replace(test, dp=(1.0 + step * noise) * MPA)
+        valve = identify(tests)
+        (warning,) = warned(valve, "pressure-stuck")
+        assert "MPa in all 3 recordings, but the flows at 10 V differ by 4" in warning.text
+        assert not warned(valve, "noise") and not warned(valve, "bend")
+
+    def test_an_analog_sensor_that_is_stuck_has_no_steps(self):
+        tests = self.stuck(PRESSURES)
+        for index, test in enumerate(tests):
+            noise = np.random.default_rng(index).standard_normal(test.u.size)
+            tests[index] = replace(test, dp=(1.0 + 0.008 * noise) * MPA)
+        assert warned(identify(tests), "pressure-stuck")
+
+    def test_a_coarse_sensor_that_follows_is_not_blamed(self):
+        """Steps of 0.5 MPa: 1.0 and 1.5 MPa are neighbours, and the flows differ by what that means."""
+        tests = [replace(valve_at(dp), source=f"{dp}.csv") for dp in (1.0, 1.5)]
+        for index, test in enumerate(tests):
+            noise = 0.5 * (np.random.default_rng(index).random(test.u.size) < 0.02)
+            tests[index] = replace(test, dp=test.dp + noise * MPA)
+        assert not warned(identify(tests), "pressure-stuck")
+        close = [valve_at(dp) for dp in (1.0, 1.15)]
+        assert not warned(identify(close), "pressure-stuck")
+
+    def test_names_in_other_units_say_the_same(self):
+        tests = self.stuck((1.0, 1.0, 1.0), ("1MPa.csv", "10bar.csv", "1000 kPa.csv"))
+        tests = [replace(test, q=test.q + seed * 1e-9) for seed, test in enumerate(tests)]
+        assert not warned(identify(tests), "pressure-stuck")
+
+    def test_names_that_differ_tell_it(self):
+        tests = self.stuck((1.0, 1.0, 1.0), ("V7_dP1.csv", "V7_dP2.csv", "V7_4bar.csv"))
+        tests = [replace(test, q=test.q + seed * 1e-9) for seed, test in enumerate(tests)]
+        (warning,) = warned(identify(tests), "pressure-stuck")
+        assert "names say different ones" in warning.text
+
+    def test_a_repeated_test_is_welcome(self):
+        assert not warned(identify(self.stuck((1.0, 1.0, 1.0))), "pressure-stuck")
+        repeated = self.stuck((1.0, 1.0, 1.0), ("dP1.csv", "dP1_again.csv", "dP1_third.csv"))
+        assert not warned(identify(repeated), "pressure-stuck")
+
+    def test_a_sensor_that_works_is_not_blamed(self):
+        assert not warned(identify([valve_at(dp) for dp in PRESSURES]), "pressure-stuck")
+
+    def test_where_the_mixture_is_refused_the_sensor_is_named(self, monkeypatch):
+        def refuse(*_):
+            raise InputError("the flow jumps")
+
+        monkeypatch.setattr("dzdesign.identify.identification.identify_side", refuse)
+        with pytest.raises(InputError, match=r"^the flow jumps; it may be that .* the sensor is stuck"):
+            identify(self.stuck(PRESSURES))
+        with pytest.raises(InputError, match=r"^the flow jumps$"):
+            identify([valve_at(dp) for dp in PRESSURES])
+
+
+class TestCoarseFlow:
+    @staticmethod
+    def cut_off(step):
+        tests = [valve_at(dp) for dp in PRESSURES]
+        return [replace(test, q=np.floor(np.maximum(test.q / L_MIN, 0) / step) * step * L_MIN) for test in tests]
+
+    def test_a_flow_that_was_cut_off_to_steps_is_said_and_can_be_allowed_for(self):
+        true = [5.4 - 0.05 * dp for dp in PRESSURES]
+        coarse = identify(self.cut_off(0.5))
+        assert any(test.u_guard_lower_V > closes for test, closes in zip(coarse.positive.tests, true, strict=True))
+        assert "steps of 0.5 L/min" in warned(coarse, "coarse-flow")[0].text
+        allowed = identify(self.cut_off(0.5), IdentifyOptions(meter_zero=0.25 * L_MIN))
+        assert not warned(allowed, "coarse-flow")
+        assert all(test.u_guard_lower_V < closes for test, closes in zip(allowed.positive.tests, true, strict=True))
+
+    def test_steps_that_move_a_threshold_past_its_bound_are_said_however_fine(self):
+        quiet = [valve_at(dp, noise=0.01) for dp in PRESSURES]
+        cut = [replace(test, q=np.floor(test.q / L_MIN / 0.02) * 0.02 * L_MIN) for test in quiet]
+        found = identify(cut)
+        assert "steps of 0.02 L/min" in warned(found, "coarse-flow")[0].text
+        assert any(test.u_guard_lower_V > 5.4 - 0.05 * test.dp_MPa for test in found.positive.tests)
+
+    def test_fine_steps_are_not_worth_a_word(self):
+        assert not warned(identify(self.cut_off(0.01)), "coarse-flow")
+
+
+class TestClippedMeter:
+    @staticmethod
+    def recordings(tmp_path, cut, **truth):
+        tests = []
+        for dp in PRESSURES:
+            test = valve_at(dp, **truth)
+            tests.append(written(tmp_path / test.source, replace(test, q=cut(test.q / L_MIN) * L_MIN)))
+        return tests
+
+    @pytest.mark.parametrize(
+        "cut",
+        [
+            pytest.param(lambda q: np.where(q < 0, -0.0, q), id="at zero, written -0.0"),
+            pytest.param(lambda q: np.where(q < 0.6, -0.0, q), id="zero below its floor, written -0.0"),
+            pytest.param(lambda q: np.maximum(q, 0.6), id="at its floor"),
+            pytest.param(lambda q: np.round(np.maximum(q, 0.6) / 0.1) * 0.1, id="in steps of its noise"),
+            pytest.param(lambda q: np.where(np.arange(q.size) % 997 == 0, 0.0, np.maximum(q, 0.6)), id="drop-outs"),
+            pytest.param(lambda q: np.where(np.arange(q.size) == 0, 5.0, np.maximum(q, 0.6)), id="a glitch first"),
+            pytest.param(lambda q: np.maximum(q, 0.6) * (1 + 1e-9 * np.sin(q)), id="not to the last digit"),
+        ],
+    )
+    def test_knees_are_true_and_bounds_below_them(self, tmp_path, cut):
+        tests = self.recordings(tmp_path, cut)
+        for test, dp in zip(identify(tests).positive.tests, PRESSURES, strict=True):
+            opens = 5.5 - 0.05 * dp
+            assert test.u_knee_rising_V == pytest.approx(opens, abs=5e-3)
+            assert test.u_knee_falling_V == pytest.approx(opens - 0.1, abs=5e-3)
+            assert opens - 0.12 < test.u_guard_lower_V < opens - 0.1
+
+    def test_a_floor_that_is_written_as_such_is_no_zero_error(self, tmp_path):
+        valve = identify(self.recordings(tmp_path, lambda q: np.maximum(q, 0.6)))
+        assert len(warned(valve, "meter-clipped")) == 3 and not warned(valve, "meter-zero")
+        assert valve.meter_floor_L_min == pytest.approx(0.6)
+
+    def test_a_zero_error_stays_one(self, tmp_path):
+        valve = identify(self.recordings(tmp_path, lambda q: q + 0.6))
+        assert warned(valve, "meter-zero") and not warned(valve, "meter-clipped")
+
+    @pytest.mark.parametrize("cut", [lambda q: np.maximum(q, 0.6), lambda q: q + 0.6], ids=["floor", "zero error"])
+    def test_of_a_meter_that_does_not_scatter_the_safe_one_is_taken(self, tmp_path, cut):
+        quiet = identify(self.recordings(tmp_path, cut, noise=0.0))
+        assert warned(quiet, "meter-clipped") and not warned(quiet, "meter-zero")
+        assert "the recordings can't tell which. It is taken as cut off, which is safe" in quiet.warnings[0].text
+        assert quiet.positive.tests[0].u_guard_lower_V < 5.375  # where the first of them closes
+
+
+class TestOrder:
+    def test_what_stops_a_design_comes_first(self, crossed):
+        marked = [replace(valve_at(dp, hysteresis=-0.05), simulated=True) for dp in PRESSURES]
+        for valve in (crossed, identify(marked, IdentifyOptions(meter_lag=0.0))):
+            assert [warning.code for warning in valve.warnings[:3]] == ["branch-order"] * 3
+        codes = [warning.code for warning in valve.warnings]
+        assert codes[3] == "simulated"
+        assert [MOST_SERIOUS_FIRST.index(code) for code in codes] == sorted(map(MOST_SERIOUS_FIRST.index, codes))
+
+    def test_every_code_has_its_place(self):
+        written = {
+            code
+            for path in Path(quality.__file__).parent.glob("*.py")
+            for code in re.findall(r'code="([a-z-]+)"', path.read_text("utf-8"))
+        }
+        assert written == set(MOST_SERIOUS_FIRST) and len(MOST_SERIOUS_FIRST) == len(written)
+
+    def test_an_unknown_one_comes_last(self):
+        two = [Warning_(code=code, text="", source=None) for code in ("unheard-of", "thinned")]
+        assert most_serious_first(two) == tuple(reversed(two))
+
+
+def test_warnings_reach_the_file(tmp_path):
+    document = identify([replace(valve_at(1.0), simulated=True)]).to_document()
+    assert document["warnings"][0]["code"] == "simulated"
+    assert json.loads(to_json(document))["warnings"][0]["source"] == "ramp_dP1.csv"

@@ -1,0 +1,109 @@
+"""How far the straight part reaches, asked of all branches together; and what a table of few levels tells."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.synthetic import L_MIN, Truth, synthetic_ramp
+
+from dzdesign.identify.identification import identify
+from dzdesign.identify.knees import linear_region as straight_part
+from dzdesign.identify.knees.prepared_tests import describe_tests
+from dzdesign.identify.knees.profile import crossing, flow_at_top
+from dzdesign.identify.options import IdentifyOptions
+
+PRESSURES = (0.5, 1.0, 2.0, 3.0, 4.0, 5.0)
+DECLARED = IdentifyOptions(meter_lag=0.0)
+
+
+def ramps(bend=0.0, odd=None, noise=0.15):
+    """Ramp tests of a valve whose flow bends down by a share of itself at full command; `odd` bends alone."""
+    tests = []
+    for dp in PRESSURES:
+        test = synthetic_ramp(dp, Truth(slope=3 * dp**0.5, noise=noise), seed=3)
+        share = np.clip(test.u - 5.4, 0, None) / 4.6
+        mine = bend if odd is None or odd == dp else 0.0
+        tests.append(replace(test, q=test.q * (1 - mine * share)))
+    return tests
+
+
+def windows(tests):
+    return [shape.window for item in describe_tests(tests, DECLARED).tests for shape in item.shapes]
+
+
+def test_a_straight_valve_is_straight_to_the_top_and_down_to_the_first_flow():
+    found = windows(ramps())
+    assert [high for _, high in found].count(0.98) >= 11
+    assert [low < 0.12 for low, _ in found].count(True) >= 11
+
+
+def test_a_bend_too_slight_for_one_branch_stops_all():
+    tests = ramps(bend=0.006)
+    alone = [windows([test])[0][1] for test in tests]
+    together = [high for _, high in windows(tests)]
+    assert max(together) < 0.98 <= max(alone)
+    for test in identify(tests, DECLARED).positive.tests:
+        assert test.u_knee_rising_V == pytest.approx(5.4, abs=0.01)
+
+
+def test_an_odd_branch_stops_alone():
+    found = windows(ramps(bend=0.4, odd=2.0))
+    odd = 2 * PRESSURES.index(2.0)
+    assert max(high for _, high in found[odd : odd + 2]) < 0.98
+    assert [high for _, high in found].count(0.98) >= 9
+
+
+def test_without_the_question_a_bent_valve_loses_its_knee(monkeypatch):
+    monkeypatch.setattr(straight_part, "STRAIGHT", 1e9)
+    monkeypatch.setattr(straight_part, "ALONE", 1e9)
+    monkeypatch.setattr(straight_part, "LARGEST_SHIFT", 1.0)
+    monkeypatch.setattr("dzdesign.identify.knees.linear_fits.LARGEST_SHIFT", 1.0)
+    found = identify(ramps(bend=0.2), DECLARED).positive.tests
+    assert min(test.u_knee_rising_V for test in found) < 5.4 - 0.05
+
+
+def test_drop_outs_do_not_move_a_crossing():
+    u = np.linspace(0, 10, 1001)
+    y = np.clip(u - 5, 0, None)
+    spoiled = y.copy()
+    spoiled[900:904] = 0.0  # four bins in a row without flow, far above
+    spoiled[100] = 3.0
+    assert crossing(u, spoiled, 1.0) == pytest.approx(crossing(u, y, 1.0)) == pytest.approx(6.0, abs=0.01)
+
+
+def test_drop_outs_do_not_lower_the_flow_at_full_command():
+    """Two runs of zeros, each as long as two bins, near the end; and one that the ramp's last bins are."""
+    u = np.linspace(0.0, 10.0, 1000)
+    flow = np.maximum(u - 5.0, 0.0) + 0.01 * np.random.default_rng(4).standard_normal(u.size)
+    for lost in ((970, 974, 985, 989), (996, 1000)):
+        y = flow.copy()
+        for start, stop in zip(lost[::2], lost[1::2], strict=True):
+            y[start:stop] = 0.0
+        assert flow_at_top(u, y) == pytest.approx(5.0, abs=0.02)
+
+
+class TestTables:
+    @staticmethod
+    def table(step=0.4, knee=5.5, noise=0.0, hold=1):
+        u = np.repeat(np.arange(0, 10 + step / 2, step), hold)
+        u = np.concatenate([u, u[::-1]])
+        q = np.minimum(np.clip(u - knee, 0, None) * 12, 10.0) + noise * np.random.default_rng(1).standard_normal(u.size)
+        test = synthetic_ramp(1.0, Truth())
+        return replace(
+            test, time=np.arange(u.size, dtype=float), u=u, q=q * L_MIN, dp=np.full(u.size, 1e6), source="table.csv"
+        )
+
+    def test_a_threshold_between_two_levels_is_known_to_one_level(self):
+        (test,) = identify([self.table()], DECLARED).positive.tests
+        assert test.u_knee_rising_V == pytest.approx(5.5, abs=0.4)
+        assert 0.2 <= test.u_knee_se_V <= 1.0
+        assert test.u_guard_lower_V < 5.2
+
+    def test_and_the_gate_says_that_it_is_known_no_better(self):
+        codes = {warning.code for warning in identify([self.table()], DECLARED).warnings}
+        assert "coarse-levels" in codes
+
+    def test_finer_levels_need_no_chord(self):
+        (test,) = identify([self.table(step=0.05)], DECLARED).positive.tests
+        assert test.u_knee_rising_V == pytest.approx(5.5, abs=0.01)
+        assert test.u_knee_se_V < 0.05

@@ -1,0 +1,152 @@
+"""Recordings that show no threshold are refused with the reason; weak sweeps are said to be weak."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from dzdesign.core.errors import InputError
+from dzdesign.identify.identification import identify
+from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.reading.ramp_files import read_ramp_file
+from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
+
+
+def with_share(test, column, share, value, seed=1):
+    """Return a recording in which a share of one column's samples, at random, is one value."""
+    cells = getattr(test, column).copy()
+    cells[np.random.default_rng(seed).random(cells.size) < share] = value
+    return dataclasses.replace(test, **{column: cells})
+
+
+def codes(*tests, **options):
+    return {warning.code for warning in identify(tests, IdentifyOptions(**options)).warnings}
+
+
+@pytest.mark.parametrize("floor", [0.51, 0.6, 0.8, 0.95])
+@pytest.mark.parametrize("noise", [0.0, 0.02, 0.4])
+def test_a_meter_that_starts_above_the_straight_part_is_refused(floor, noise):
+    """The line through the jump would put the closing threshold volts above the true one, and certify it."""
+    truth = Truth(slope=4.0, floor=floor * 4.0 * 4.6, noise=noise)
+    with pytest.raises(InputError, match=r"the flow jumps at .* V: .*meter starts above that"):
+        identify([synthetic_ramp(1.0, truth)])
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.1])
+@pytest.mark.parametrize("levels", [41, 81, 161])
+def test_a_table_that_jumps_certifies_nothing_above_the_truth(levels, noise):
+    """Between its levels a table hides what happens; a line from its last shut level ended up to 2.4 V too high."""
+    refused = 0
+    for floor in np.arange(0.0, 0.7, 0.1):
+        test = synthetic_ramp(1.0, Truth(slope=4.0, floor=floor * 18.4, noise=noise), rate_Hz=levels / 100)
+        try:
+            side = identify([test]).positive
+        except InputError as refusal:
+            assert "the flow jumps between" in str(refusal)
+            refused += 1
+        else:
+            assert side.tests[0].u_guard_lower_V < 5.3 + 1e-6
+    assert 2 <= refused <= 5
+
+
+@pytest.mark.parametrize("floor", [0.1, 0.3, 0.4])
+def test_a_floor_inside_the_straight_part_is_no_jump(floor):
+    side = identify([synthetic_ramp(1.0, Truth(floor=floor * 4.0 * 4.6))]).positive
+    assert side.tests[0].u_guard_lower_V < 5.3
+
+
+def test_a_steep_valve_is_no_jump():
+    side = identify([synthetic_ramp(1.0, Truth(slope=60.0, saturation=20.0))]).positive
+    assert side.tests[0].u_knee_rising_V == pytest.approx(5.4, abs=0.01)
+
+
+def test_a_flow_of_the_wrong_sign_is_not_called_a_shut_valve():
+    test = synthetic_ramp(1.0, Truth())
+    with pytest.raises(InputError, match=r"the flow falls with the command.*reverse the sign of Q"):
+        identify([dataclasses.replace(test, q=-test.q)])
+
+
+def test_a_refused_rise_is_said_beside_what_was_expected():
+    with pytest.raises(InputError, match=r"is (-?[\d.]+) L/min above that at zero, expected more than") as refusal:
+        identify([synthetic_ramp(1.0, Truth(noise=6.0))])
+    rise, least = (float(str(refusal.value).split(before)[1].split()[0]) for before in (" V is ", "more than "))
+    assert rise < least
+
+
+def test_spikes_of_the_flow_that_leave_no_rise_are_refused():
+    with pytest.raises(InputError, match="does not rise with the command; look for spikes"):
+        identify([with_share(synthetic_ramp(1.0, Truth()), "q", 0.15, 30 * L_MIN)])
+
+
+@pytest.mark.parametrize("share", [0.02, 0.05, 0.1])
+def test_fewer_spikes_move_neither_the_knee_nor_the_flow_at_full_command(share):
+    plain = synthetic_ramp(1.0, Truth())
+    clean, spoilt = (identify([test]).positive.tests[0] for test in (plain, with_share(plain, "q", share, 999 * L_MIN)))
+    assert spoilt.u_knee_falling_V == pytest.approx(clean.u_knee_falling_V, abs=1e-3)
+    assert spoilt.q_max_L_min == pytest.approx(clean.q_max_L_min, rel=0.01)
+
+
+def test_drop_outs_of_the_command_that_leave_no_ramp_are_refused():
+    with pytest.raises(InputError, match=r"the command jumps back and forth .*leave their cells blank"):
+        identify([with_share(synthetic_ramp(1.0, Truth()), "u", 0.05, 0.0)])
+
+
+def test_a_clock_that_stands_still_is_said_and_a_lag_on_it_refused():
+    test = synthetic_ramp(1.0, Truth())
+    still = dataclasses.replace(test, time=np.zeros(test.time.size))
+    assert "clock" in codes(still)
+    assert "clock" not in codes(test)
+    with pytest.raises(InputError, match="the time stands still"):
+        identify([still], IdentifyOptions(meter_lag=0.1))
+
+
+def test_a_ramp_from_above_the_threshold_is_said():
+    test = synthetic_ramp(1.0, Truth(knee_rising=3.0))
+    above, below = (dataclasses.replace(test, u=start + test.u * (10 - start) / 10) for start in (3.5, 1.0))
+    assert "edge-not-swept" not in codes(below)
+    flow = 4.0 * np.clip(above.u - np.where(np.arange(above.u.size) < above.u.size // 2, 3.0, 2.9), 0, None) * L_MIN
+    assert "edge-not-swept" in codes(dataclasses.replace(above, q=flow))
+
+
+def test_a_flow_that_falls_at_the_top_is_said():
+    test = synthetic_ramp(1.0, Truth())
+    assert "flow-falls" not in codes(test)
+    assert "flow-falls" in codes(dataclasses.replace(test, q=test.q - 6 * L_MIN * np.clip(test.u - 8, 0, None)))
+
+
+def test_a_curve_that_bends_away_from_its_straight_part_is_said():
+    """Full drive of the law is where the line would reach the largest flow; a curved valve passes less there."""
+    test = synthetic_ramp(1.0, Truth())
+    assert "curved" not in codes(test)
+    bent = test.q.max() * (1 - np.exp(-1.8 * test.q / test.q.max())) / (1 - np.exp(-1.8))
+    assert "curved" in codes(dataclasses.replace(test, q=bent))
+
+
+def test_many_outliers_are_said():
+    test = synthetic_ramp(1.0, Truth())
+    assert not {"outliers", "flow-falls"} & codes(with_share(test, "q", 0.01, 999 * L_MIN))
+    assert "outliers" in codes(with_share(test, "q", 0.05, 999 * L_MIN))
+
+
+@pytest.mark.parametrize(("hysteresis", "said"), [(-0.1, True), (0.0, False), (0.1, False)])
+def test_thresholds_in_the_wrong_order_are_said_beyond_their_noise(hysteresis, said):
+    tests = [synthetic_ramp(dp, Truth(hysteresis=hysteresis), seed=seed) for seed, dp in enumerate((0.5, 1, 2, 3, 5))]
+    assert ("branch-order" in codes(*tests)) is said
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("Logger 3, made by hand\ntime_s,u_V,dP_MPa,Q_Lmin\n0,0,1,0\n", r"row 1 \('Logger 3, made by hand'\).*with #"),
+        ("time_s,u_V,dP_MPa,Q_Lmin\n12:00,0,1,0\n", "'12:00' may be hours and minutes, minutes and seconds"),
+        ("time_s,u_V,dP_MPa,Q_Lmin\n0,0,1,0\n2024-05-01 12:00:00,0,1,0\n", "row 3.*is not a number .a column of the"),
+        ("time_s,u_mA,dP_MPa,Q_Lmin\n0,4,1,0\n", "u=u_mA:4..20 mA = 0..10 V"),
+        ("time_s,u_V,dP_MPa,Q_Lmin\n0,4,1,0\n1,4,1,0\n2,4,1,0\n0,4,1,0\n", "make a file of each"),
+        ("PK\x03\x04workbook", "Excel workbook"),
+    ],
+)
+def test_what_loggers_write_is_refused_with_what_to_do(tmp_path, text, message):
+    path = tmp_path / "ramp.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=message):
+        read_ramp_file(path)

@@ -1,0 +1,208 @@
+"""Both sides of a bipolar valve, the meter's lag from two ramp rates, and what the quality gate says."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.synthetic import L_MIN, MPA, Truth, synthetic_ramp
+
+from dzdesign.command_line.cli import main
+from dzdesign.core.artefact_files import to_json
+from dzdesign.core.errors import InputError
+from dzdesign.design.designing import design
+from dzdesign.identify.identification import identify
+from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.reading.ramp_files import ramp_file_bytes
+from dzdesign.identify.valve.valve_file import valve_from_document
+
+PRESSURES = (1.0, 2.0, 4.0)
+
+
+def bipolar(dp, positive, negative, *, signed_flow=True, signed_dp=False):
+    """One recording: up and down on the positive side, then on the negative one."""
+    up, down = synthetic_ramp(dp, positive), synthetic_ramp(dp, negative, seed=7)
+    step = up.time[1] - up.time[0]
+    return replace(
+        up,
+        source=f"bipolar_{dp:g}.csv",
+        time=np.concatenate([up.time, up.time[-1] + step + down.time]),
+        u=np.concatenate([up.u, -down.u]),
+        q=np.concatenate([up.q, -down.q if signed_flow else down.q]),
+        dp=np.concatenate([up.dp, -down.dp if signed_dp else down.dp]),
+    )
+
+
+@pytest.fixture(scope="module")
+def recordings():
+    return [
+        bipolar(dp, Truth(knee_rising=5.5 - 0.05 * dp), Truth(knee_rising=3.0 + 0.04 * dp, slope=2.5))
+        for dp in PRESSURES
+    ]
+
+
+@pytest.fixture(scope="module")
+def valve(recordings):
+    return identify(recordings, IdentifyOptions(meter_lag=0.0))
+
+
+class TestSides:
+    def test_each_side_has_its_own_thresholds_and_trend(self, valve):
+        assert list(valve.sides) == ["positive", "negative"]
+        for side, sign, start in ((valve.sides["positive"], -0.05, 5.5), (valve.sides["negative"], 0.04, 3.0)):
+            assert side.trend == ("decreasing" if sign < 0 else "increasing")
+            for test, dp in zip(side.tests, PRESSURES, strict=True):
+                assert test.u_knee_rising_V == pytest.approx(start + sign * dp, abs=6e-3)
+                assert test.u_knee_falling_V == pytest.approx(start + sign * dp - 0.1, abs=6e-3)
+                assert test.u_guard_lower_V < start + sign * dp - 0.1
+        assert valve.sides["negative"].tests[0].slope_L_min_V == pytest.approx(2.5, rel=0.01)
+
+    def test_one_side_does_not_move_the_other(self, valve):
+        alone = identify(
+            [synthetic_ramp(dp, Truth(knee_rising=5.5 - 0.05 * dp)) for dp in PRESSURES], IdentifyOptions(meter_lag=0.0)
+        )
+        for one, other in zip(alone.positive.tests, valve.positive.tests, strict=True):
+            assert one.u_knee_rising_V == pytest.approx(other.u_knee_rising_V, abs=1e-4)
+
+    @pytest.mark.parametrize("signed_flow", [True, False])
+    @pytest.mark.parametrize("signed_dp", [True, False])
+    def test_flow_and_pressure_may_change_sign_with_the_side(self, valve, signed_flow, signed_dp):
+        truths = Truth(knee_rising=5.45), Truth(knee_rising=3.04, slope=2.5)
+        test = bipolar(1.0, *truths, signed_flow=signed_flow, signed_dp=signed_dp)
+        found = identify([test], IdentifyOptions(meter_lag=0.0)).sides["negative"].tests[0]
+        assert found.dp_MPa == pytest.approx(1.0)
+        assert found.u_knee_rising_V == pytest.approx(3.04, abs=6e-3)
+
+    def test_sides_in_files_of_their_own(self):
+        tests = [synthetic_ramp(1.0, Truth(knee_rising=5.4)), synthetic_ramp(2.0, Truth(knee_rising=5.3))]
+        mirrored = [replace(test, source=f"minus_{test.source}", u=-test.u, q=-test.q) for test in tests]
+        both = identify([*mirrored, *tests])
+        assert [test.source for test in both.sides["negative"].tests] == [test.source for test in mirrored]
+        assert both.sides["negative"].u_min0_V == pytest.approx(both.positive.u_min0_V, abs=1e-6)
+
+    def test_a_side_without_data_is_said_to_be_missing(self, valve):
+        assert valve.to_document()["untested_sides"] == []
+        test = synthetic_ramp(1.0, Truth())
+        assert identify([test]).to_document()["untested_sides"] == ["negative"]
+        only_negative = identify([replace(test, u=-test.u, q=-test.q)])
+        assert only_negative.to_document()["untested_sides"] == ["positive"]
+        with pytest.raises(InputError, match="negative commands only; record ramp tests with positive ones"):
+            design(only_negative)
+
+    def test_a_side_that_never_opens_is_missing_with_the_reason(self):
+        test = bipolar(1.0, Truth(), Truth(knee_rising=20.0))
+        found = identify([test])
+        assert list(found.sides) == ["positive"]
+        (warning,) = [warning for warning in found.warnings if warning.code == "side-refused"]
+        assert "the negative side is missing" in warning.text and "never opens" in warning.text
+
+    def test_the_file_holds_both_sides(self, valve):
+        read = valve_from_document(to_json(valve.to_document()).encode(), "valve.json")
+        assert read.to_document() == valve.to_document()
+
+    def test_the_command_prints_both(self, recordings, tmp_path, monkeypatch, capsys):
+        monkeypatch.chdir(tmp_path)
+        for test in recordings:
+            columns = {"time_s": test.time, "u_V": test.u, "dP_MPa": test.dp / MPA, "Q_Lmin": test.q / L_MIN}
+            Path(test.source).write_bytes(ramp_file_bytes(columns, (), compress=False))
+        assert main(["identify", *(test.source for test in recordings)]) == 0
+        out = capsys.readouterr().out
+        assert "Thresholds (V), positive side" in out and "Thresholds (V), negative side" in out
+        assert set(json.loads(Path("valve.json").read_text())["sides"]) == {"positive", "negative"}
+        assert main(["design", "valve.json"]) == 0
+
+
+def delayed(test, lag):
+    """What a meter with a first-order lag shows of a recording."""
+    from scipy.signal import lfilter
+
+    pole = np.exp(-(test.time[1] - test.time[0]) / lag)
+    return replace(test, q=lfilter([1 - pole], [1, -pole], test.q - test.q[0]) + test.q[0])
+
+
+def two_rates(lag, noise=0.08, seconds=(100.0, 20.0)):
+    return [
+        delayed(
+            synthetic_ramp(dp, Truth(noise=noise), ramp_s=ramp_s, seed=int(ramp_s), source=f"{dp:g}_{ramp_s:g}"), lag
+        )
+        for dp in PRESSURES
+        for ramp_s in seconds
+    ]
+
+
+class TestLag:
+    @pytest.mark.parametrize("lag", [0.05, 0.1, 0.5])
+    def test_two_rates_tell_the_lag_from_hysteresis(self, lag):
+        valve = identify(two_rates(lag))
+        assert (valve.meter_lag_is, valve.meter_lag_s) == ("identified", pytest.approx(lag, abs=0.012, rel=0.05))
+        for test in valve.positive.tests:
+            assert test.u_knee_rising_V == pytest.approx(5.4, abs=5e-3)
+            assert test.u_knee_falling_V == pytest.approx(5.3, abs=5e-3)
+            assert test.u_guard_lower_V < 5.3
+
+    def test_no_lag_is_found_where_there_is_none(self):
+        valve = identify(two_rates(1e-6))
+        assert valve.meter_lag_s == pytest.approx(0.0, abs=0.01)
+
+    def test_one_rate_does_not_tell(self):
+        tests = two_rates(0.1, seconds=(100.0,))
+        valve = identify(tests)
+        assert (valve.meter_lag_is, valve.meter_lag_s) == ("unknown", 0.0)
+        (warning,) = [warning for warning in valve.warnings if warning.code == "lag-unknown"]
+        assert "10 mV at 0.1 V/s" in warning.text and "--meter-lag" in warning.text
+        hysteresis = [test.u_knee_rising_V - test.u_knee_falling_V for test in valve.positive.tests]
+        assert np.mean(hysteresis) == pytest.approx(0.1 + 2 * 0.1 * 0.1, abs=5e-3)
+
+    def test_a_declared_lag_is_taken_as_it_is(self):
+        valve = identify(two_rates(0.1), IdentifyOptions(meter_lag=0.02))
+        assert (valve.meter_lag_is, valve.meter_lag_s) == ("declared", 0.02)
+        assert "lag-unknown" not in {warning.code for warning in valve.warnings}
+
+
+def codes(valve):
+    return {warning.code for warning in valve.warnings}
+
+
+class TestQualityGate:
+    def test_a_lag_too_large_for_the_ramp_is_said(self):
+        tests = [delayed(synthetic_ramp(dp, Truth(), ramp_s=10.0), 0.5) for dp in PRESSURES]
+        valve = identify(tests, IdentifyOptions(meter_lag=0.5))
+        (warning,) = [warning for warning in valve.warnings if warning.code == "lag-large"]
+        assert "501 mV" in warning.text and "slower" in warning.text
+        assert "lag-large" not in codes(identify(tests, IdentifyOptions(meter_lag=0.01)))
+
+    def test_noise_that_hides_the_knee_is_said(self):
+        quiet, loud = (identify([synthetic_ramp(1.0, Truth(noise=noise), ramp_s=20.0)]) for noise in (0.05, 2.0))
+        assert "noise" in codes(loud) and "noise" not in codes(quiet)
+
+    def test_a_leak_inside_the_overlap_is_said(self):
+        tight = synthetic_ramp(1.0, Truth())
+        share = np.clip((tight.u - 2.0) / 3.4, 0, 1)
+        leaky = replace(tight, q=tight.q + 0.2 * L_MIN * share)
+        assert "leak" in codes(identify([leaky])) and "leak" not in codes(identify([tight]))
+
+    def test_a_pressure_that_sags_by_more_than_a_third_is_said(self):
+        assert "pressure-sag" in codes(identify([synthetic_ramp(1.0, Truth(sag=0.4))]))
+        assert "pressure-sag" not in codes(identify([synthetic_ramp(1.0, Truth(sag=0.2))]))
+
+    def test_what_the_meter_hides_is_said_beside_the_threshold(self):
+        test = synthetic_ramp(1.0, Truth(floor=0.6), falling=False)
+        row = identify([test], IdentifyOptions(meter_floor=0.6 * L_MIN)).to_document()["sides"]["positive"]["tests"][0]
+        assert "nothing below 0.60 L/min" in row["not_observable"]["u_onset_rising_V"]
+        assert row["not_observable"]["u_knee_falling_V"] == "there is no falling branch"
+        assert row["u_level_rising_V"] == pytest.approx(5.4 + 0.6 / 4, abs=0.02)
+        assert 0 < row["u_level_rising_se_V"] < 0.02 and 0 < row["u_onset_rising_se_V"] < 0.05
+        assert row["u_knee_falling_V"] is None and row["u_onset_falling_se_V"] is None
+
+    def test_flat_is_what_the_engineer_says(self):
+        tests = [synthetic_ramp(dp, Truth(knee_rising=5.4 - 0.01 * dp, noise=0.02)) for dp in PRESSURES]
+        assert identify(tests).positive.trend == "decreasing"
+        flat = identify(tests, IdentifyOptions(flat_change=5e-3)).positive
+        assert flat.trend == "flat" and set(flat.beta) == {1.0} and flat.trend_p < 0.01
+        assert max(flat.certified_steps_V) <= min(test.u_guard_lower_V for test in flat.tests)
+
+
+def test_the_pressure_of_a_side_is_read_where_it_is_shut(recordings):
+    for test in identify(recordings).sides["negative"].tests:
+        assert test.dp_MPa * MPA == pytest.approx(MPA * round(test.dp_MPa))

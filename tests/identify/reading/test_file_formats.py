@@ -1,0 +1,164 @@
+"""The same recording in every format that a bench may write: read alike, refused in one sentence."""
+
+import io
+
+import h5py
+import numpy as np
+import polars as pl
+import pytest
+import scipy.io
+from nptdms import ChannelObject, RootObject, TdmsWriter
+
+from dzdesign.core.errors import InputError
+from dzdesign.identify.reading.ramp_files import read_ramp_file
+from tests.identify.reading.test_ramp_files import DP, HEADER, ROWS, TIME, Q, U, assert_is_the_ramp
+
+COLUMNS = dict(zip(HEADER.split(","), (TIME, U, DP, Q), strict=True))
+PLAIN = {"time": (TIME, "s"), "u": (U, "V"), "dP": (DP, "MPa"), "Q": (Q, "L/min")}
+
+
+def tdms(channels=PLAIN, waveform=False):
+    """Return a TDMS file whose channels carry their unit as a property."""
+    out = io.BytesIO()
+    with TdmsWriter(out) as writer:
+        objects = []
+        for name, (data, unit) in channels.items():
+            properties = {"unit_string": unit} if unit else {}
+            if waveform:
+                properties |= {"wf_increment": 0.04, "wf_start_offset": 0.0, "wf_samples": 1}
+            objects.append(ChannelObject("bench", name, data, properties=properties))
+        writer.write_segment([RootObject(), *objects])
+    return out.getvalue()
+
+
+def mat(variables=COLUMNS, **keywords):
+    out = io.BytesIO()
+    scipy.io.savemat(out, variables, **keywords)
+    return out.getvalue()
+
+
+def hdf5(columns=COLUMNS, user_block=b"", units=None, compound=False):
+    """Return an HDF5 file; with a user block it is what MATLAB calls version 7.3."""
+    out = io.BytesIO()
+    with h5py.File(out, "w", userblock_size=512 if user_block else 0) as file:
+        if compound:
+            file["run/table"] = np.rec.fromarrays(list(columns.values()), names=list(columns))
+        else:
+            for name, data in columns.items():
+                file[f"run/{name}"] = np.atleast_2d(data) if user_block else data
+                if units:
+                    file[f"run/{name}"].attrs["units"] = units[name]
+    content = bytearray(out.getvalue())
+    content[: len(user_block)] = user_block
+    return bytes(content)
+
+
+def frame(write, columns=COLUMNS):
+    out = io.BytesIO()
+    getattr(pl.DataFrame(columns), write)(out)
+    return out.getvalue()
+
+
+GOOD = {
+    "tdms": tdms(),
+    "tdms units in labels": tdms({label: (data, "") for label, data in COLUMNS.items()}),
+    "tdms waveform": tdms({name: PLAIN[name] for name in ("u", "dP", "Q")}, waveform=True),
+    "mat 5": mat(),
+    "mat 5 compressed": mat(do_compression=True),
+    "mat 5 columns": mat(oned_as="column"),
+    "mat 5 struct": mat({"run": COLUMNS}),
+    "mat 4": mat(format="4"),
+    "mat 7.3": hdf5(user_block=b"MATLAB 7.3 MAT-file, Platform: GLNXA64"),
+    "hdf5": hdf5(),
+    "hdf5 units": hdf5(
+        {name: data for name, (data, _) in PLAIN.items()}, units={name: unit for name, (_, unit) in PLAIN.items()}
+    ),
+    "hdf5 compound": hdf5(compound=True),
+    "parquet": frame("write_parquet"),
+    "feather": frame("write_ipc"),
+}
+
+
+@pytest.fixture
+def read(tmp_path):
+    def read(content, name="ramp.mat", **keywords):
+        (tmp_path / name).write_bytes(content)
+        return read_ramp_file(tmp_path / name, **keywords)
+
+    return read
+
+
+@pytest.mark.parametrize("name", GOOD)
+def test_the_same_recording_in_every_format(read, name):
+    assert_is_the_ramp(read(GOOD[name]))
+    if name != "mat 4":  # it alone has no mark, and is known by its name
+        assert_is_the_ramp(read(GOOD[name], "renamed.csv"))
+
+
+def test_a_matrix_is_addressed_by_its_columns(read):
+    test = read(
+        mat({"data": np.column_stack([TIME, U, DP, Q])}),
+        columns={"time": "data(:,1):s", "u": "data(:,2):V", "dP": "data(:,3):MPa", "Q": "data(:,4):L/min"},
+    )
+    assert_is_the_ramp(test)
+
+
+def test_a_missing_sample_is_left_out(read):
+    gap = {**COLUMNS, "Q_Lmin": np.where(np.arange(ROWS) == 7, np.nan, Q)}
+    kept = np.arange(ROWS) != 7
+    assert_is_the_ramp(read(frame("write_parquet", gap)), kept)
+    null = {**COLUMNS, "Q_Lmin": [None if row == 7 else float(Q[row]) for row in range(ROWS)]}
+    assert_is_the_ramp(read(frame("write_parquet", null)), kept)
+    assert_is_the_ramp(read(mat(gap)), kept)
+
+
+def test_dates_are_seconds_since_the_first(read):
+    start = np.datetime64("2026-03-01T08:00:00", "us")
+    dates = {**COLUMNS, "time_s": start + np.round(TIME * 1e6).astype("timedelta64[us]")}
+    test = read(frame("write_parquet", {"time" if k == "time_s" else k: v for k, v in dates.items()}))
+    np.testing.assert_allclose(test.time, TIME, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", [name for name in GOOD if name not in ("mat 4",)])
+def test_a_file_that_is_cut_off_is_refused_in_one_sentence(read, name):
+    for share in (0.1, 0.5, 0.9):
+        content = GOOD[name][: int(share * len(GOOD[name]))]
+        try:
+            test = read(content)
+        except InputError as error:
+            assert "ramp.mat'" in str(error) and "\n" not in str(error)
+        else:  # TDMS keeps whole what was written before the cut
+            assert name.startswith("tdms") and test.u.size >= 20
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (mat({"note": "none"}), "holds no columns of numbers; expected one vector per quantity, such as u_V"),
+        (mat({**COLUMNS, "Q_Lmin": Q[:-1]}), "column 'Q_Lmin' has 29 samples, but 'time_s' has 30; expected one clock"),
+        (frame("write_parquet", {**COLUMNS, "Q_Lmin": Q * 1e9}), "sample 16, column 'Q_Lmin'"),
+        (frame("write_parquet", {**COLUMNS, "dP_MPa": DP * np.inf}), "sample 1, column 'dP_MPa': 'inf' is no measure"),
+        (frame("write_parquet", {"t": TIME, "u_V": U, "Q_Lmin": Q}), "column 't' has no unit"),
+        (tdms({**PLAIN, "u": (U, "bar")}), "column 'u': 'bar' is not a unit of voltage"),
+        (mat({"a": {"u_V": U, "time_s": TIME, "Q_Lmin": Q}, "b": {"u_V": U}}), "no column of u (columns found: a/u_V"),
+        (hdf5({**COLUMNS, "u [V]": U}), "has two columns of u: 'u [V]' and 'u_V'"),
+        (b"PAR1 this is none", "is not a Parquet file that can be read"),
+        (b"ARROW1 this is none", "is not a Feather file that can be read"),
+        (b"TDSm this is none", "(TDMS) holds no columns of numbers"),
+        (b"MATLAB 5.0 MAT-file, this is none", "is not a MATLAB file that can be read"),
+        (b"MATLAB 7.3 MAT-file, this is none", "is not a MATLAB 7.3 file that can be read"),
+        (b"\x89HDF\r\n\x1a\n this is none", "is not a HDF5 file that can be read"),
+        (b"time_s,u_V\n", "is not a MATLAB file that can be read"),
+    ],
+)
+def test_refused_with_the_reason(read, content, words):
+    with pytest.raises(InputError) as caught:
+        read(content)
+    assert words in str(caught.value) and "ramp.mat'" in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_text_in_a_chosen_column_is_refused(read):
+    content = frame("write_parquet", {**COLUMNS, "note": ["ok"] * ROWS})
+    with pytest.raises(InputError, match="has no column 'note'"):
+        read(content, columns={"u": "note:V"})
+    assert_is_the_ramp(read(content))

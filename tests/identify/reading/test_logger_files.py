@@ -1,0 +1,423 @@
+"""Recordings as loggers write them: init says what is what, identify finds the valve, block by block as at once."""
+
+import gzip
+import json
+import logging
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dzdesign.command_line.cli import main
+from dzdesign.core.errors import InputError
+from dzdesign.identify.first_look import guess_columns
+from dzdesign.identify.reading.ramp_files import read_ramp_file
+from dzdesign.identify.reading.text import blocks as text_blocks
+from tests.dzdesign.command_line.test_bad_input import csv
+from tests.support.logger_files import (
+    DP,
+    FILES,
+    ROWS,
+    START,
+    TIME,
+    Q,
+    U,
+    excel_english,
+    milliseconds,
+    rows,
+    stamps,
+    text,
+)
+
+L_MIN = 1e-3 / 60
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def read(content, **keywords):
+    Path("ramp.csv").write_bytes(content)
+    return read_ramp_file(Path("ramp.csv"), **keywords)
+
+
+def refusal(content, **keywords):
+    with pytest.raises(InputError) as caught:
+        read(content, **keywords)
+    assert "\n" not in str(caught.value) and "ramp.csv" in str(caught.value)
+    return str(caught.value)
+
+
+def assert_is_the_ramp(test, rows=slice(None)):
+    np.testing.assert_allclose(test.time - test.time[0], TIME[rows], atol=6e-4)
+    np.testing.assert_allclose(test.u, U[rows], atol=6e-5)
+    np.testing.assert_allclose(test.dp, 1e6 * DP[rows], rtol=1e-4)
+    np.testing.assert_allclose(test.q, L_MIN * Q[rows], atol=L_MIN * 1e-4)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_init_then_identify(here, name):
+    make, options = FILES[name]
+    Path("ramp.csv").write_bytes(make())
+    assert main(["-q", "init", "ramp.csv", *options]) == 0
+    assert main(["-q", "identify", "ramp.csv", "--config", "dzdesign.toml"]) == 0
+    (test,) = json.loads(Path("valve.json").read_text())["sides"]["positive"]["tests"]
+    assert (test["u_knee_rising_V"], test["u_knee_falling_V"]) == pytest.approx((5.0, 4.9), abs=0.01)
+    assert test["dp_MPa"] == pytest.approx(2.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_read_as_it_is_and_in_blocks(here, monkeypatch, name):
+    make, options = FILES[name]
+    Path("ramp.csv").write_bytes(make())
+    columns = guess_columns(Path("ramp.csv")).chosen
+    if options:
+        from dzdesign.identify.reading.column_labels import parse_columns
+
+        columns = parse_columns(options[1])
+    test = read(make(), columns=columns)
+    assert_is_the_ramp(test)
+    for content, size in ((make(), 4096), (make(), 4097), (gzip.compress(make()), 5000)):
+        monkeypatch.setattr(text_blocks, "BLOCK_BYTES", size)
+        again = read(content, columns=columns)
+        for one in ("time", "u", "q", "dp"):
+            np.testing.assert_array_equal(getattr(again, one), getattr(test, one))
+
+
+# encodings
+
+
+@pytest.mark.parametrize("encoding", ["cp1252", "latin-1", "utf-16", "utf-8-sig"])
+def test_an_encoding_is_told_and_logged(here, caplog, encoding):
+    with caplog.at_level(logging.DEBUG, "dzdesign"):
+        test = read(text("Öl: 40 °C, µm²", "t_s;u_V;dP_bar;Q [dm³/min]", *rows(TIME, U, 10 * DP, Q), encoding=encoding))
+    assert_is_the_ramp(test)
+    said = {"cp1252": "Windows-1252", "latin-1": "Windows-1252", "utf-16": "UTF-16"}.get(encoding)
+    assert (f"is text in {said}" in caplog.text) == (said is not None)
+    assert "the header was found in row 2" in caplog.text
+
+
+def test_an_encoding_that_shows_in_a_later_block(here, monkeypatch):
+    monkeypatch.setattr(text_blocks, "BLOCK_BYTES", 4096)
+    plain = csv(ROWS).encode()
+    assert_is_the_ramp(read(plain + "# Öl\n".encode("cp1252")))
+    assert_is_the_ramp(read(plain + "# Öl\n".encode()))
+    assert "is not a text file in UTF-8 throughout" in refusal("# Öl\n".encode() + plain + "# Öl\n".encode("cp1252"))
+
+
+# what stands above, between and below
+
+
+def test_the_number_of_rows_above_the_header_may_be_told(here):
+    lines = ["A1;A2;A3;A4", "e;f;g;h", "i;j;k;l", *rows(TIME, U, DP, Q)]
+    message = refusal(text(*lines))
+    assert "rows 1 ('A1;A2;A3;A4') and 3 ('i;j;k;l') could each be the header" in message and "--skip-rows 2" in message
+    columns = {"time": "e:s", "u": "f:V", "dP": "g:MPa", "Q": "h:L/min"}
+    with_labels = text(lines[0], lines[1], *lines[3:])
+    assert_is_the_ramp(read(with_labels, columns=columns, skip_rows=1))
+    Path("dzdesign.toml").write_text('skip-rows = 1\ncolumns = "time=e:s, u=f:V, dP=g:MPa, Q=h:L/min"')
+    assert main(["-q", "identify", "ramp.csv", "--config", "dzdesign.toml"]) == 0
+    assert main(["identify", "ramp.csv", "--skip-rows", "two"]) == 2
+    assert "is empty below its first 5000 rows (--skip-rows)" in refusal(with_labels, skip_rows=5000)
+    assert "has no header row (row 3 is '0,00" in refusal(with_labels, skip_rows=2)
+
+
+def test_told_that_nothing_stands_above_the_first_line_is_the_header(here):
+    content = text("note;to;all;x", "t_s;u_V;dP_MPa;Q_Lmin", *rows(TIME, U, DP, Q))
+    assert_is_the_ramp(read(content))
+    assert "no column of time (columns found: note, to, all, x)" in refusal(content, skip_rows=0)
+    assert_is_the_ramp(read(content, skip_rows=1))
+
+
+@pytest.mark.parametrize(
+    ("where", "line", "words"),
+    [
+        (400, "Pause;;;", "row 401, column 't_s': 'Pause' is not a number"),
+        (400, "Pause", "row 401 has 1 cell, 'Pause', expected 4 as in the header"),
+        (1001, "40,0", "row 1002 has 1 cell, '40,0', expected 4 as in the header, row 1 ('t_s, u_V, dP_MPa, Q_Lmin'); "
+         "complete the row, or delete it"),
+        (1, "0,0;1,0", "row 2 has 2 cells, expected 4 as in the header, row 1 ('t_s, u_V, dP_MPa, Q_Lmin'); corr"),
+        (1001, "40,0;1,0", "row 1002 has 2 cells, expected 4"),
+        (900, "x;1,0;2,0;3,0", "row 901, column 't_s': 'x' is not a number"),
+    ],
+)
+def test_a_wrong_row_among_samples_is_found(here, where, line, words):
+    lines = ["t_s;u_V;dP_MPa;Q_Lmin", *rows(TIME, U, DP, Q)]
+    assert words in refusal(text(*lines[:where], line, *lines[where:]))
+
+
+@pytest.mark.parametrize(
+    ("labels", "words"),
+    [
+        ("X_Value;u (V);dP (bar);Q (l/min)", 'is it, say its unit, for example --columns "time=X_Value:s"'),
+        ("Sample;u (V);dP (bar);Q (l/min)", "'Sample' counts the rows: export the time beside it"),
+        ("VarName;TimeString;VarValue;Time_ms", "row for each variable (VarName, VarValue): export a column for each"),
+    ],
+)
+def test_init_says_how_to_go_on_with_a_bare_time_or_a_row_a_variable(here, capsys, labels, words):
+    first = np.arange(TIME.size) if labels.startswith("Sample") else TIME
+    Path("ramp.csv").write_bytes(text(labels, *rows(first, U, 10 * DP, Q)))
+    assert main(["-q", "init", "ramp.csv"]) == 1
+    assert words in capsys.readouterr().out
+
+
+def test_statistics_below_the_samples_are_said_and_those_amid_them_are_refused(here, caplog):
+    lines = ["t_s;u_V;dP_MPa;Q_Lmin", *rows(TIME, U, DP, Q)]
+    with caplog.at_level(logging.DEBUG, "dzdesign"):
+        assert_is_the_ramp(read(text(*lines, "Mittelwert;5,0;2,0;9,9", "Max;10,0;2,1;21")))
+    assert "row 1002 is passed over: Mittelwert 5,0 2,0 9,9" in caplog.text and "row 1003" in caplog.text
+    message = refusal(text(*lines, "Mittelwert;5,0;2,0;9,9", *lines[-3:], "Ende"))
+    assert "row 1002 has a statistic, 'Mittelwert', and samples below it" in message
+    assert "row 1002, column 't_s': 'Mitte' is not a number" in refusal(text(*lines, "Mitte;5,0;2,0;9,9"))
+
+
+@pytest.mark.parametrize("cell", ["#N/A", "#NV", "#DIV/0!", "#WERT!", '"#N/A"', " #NAME?"])
+@pytest.mark.parametrize("separator", [";", ","])
+def test_what_a_spreadsheet_writes_for_no_value_is_a_blank_cell_and_no_comment(here, cell, separator):
+    lines = rows(np.zeros(TIME.size), TIME, U, DP, Q, separator=separator, comma=False)
+    spoiled = [cell + line[line.index(separator) :] if index % 3 == 0 else line for index, line in enumerate(lines)]
+    labels = separator.join(["note", "t_s", "u_V", "dP_MPa", "Q_Lmin"])
+    assert_is_the_ramp(read(text(labels, *spoiled)))
+    spoiled = [line.rpartition(separator)[0] + separator + cell if n == 9 else line for n, line in enumerate(lines)]
+    assert_is_the_ramp(read(text(labels, "# a comment", *spoiled)), np.arange(TIME.size) != 9)
+
+
+def test_a_row_of_units_is_no_first_sample_and_may_say_what_labels_say(here):
+    assert_is_the_ramp(read(text("t_s;u;dP_MPa;Q_Lmin", "sec;V;MPa;l/min", *rows(TIME, U, DP, Q))))
+
+
+@pytest.mark.parametrize(
+    ("labels", "units", "words"),
+    [
+        ("t_s;u;dP_MPa;Q_Lmin", "s;V;MPa;l/h", "'Q_Lmin' says 'Lmin' in its label, and 'l/h' is stated as its unit"),
+        ("t_s;u;dP_bar;Q_Lmin", "s;V;MPa;l/min", "'dP_bar' says 'bar' in its label, and 'MPa' is stated as its unit"),
+        ("t_s;u_V;dP_MPa;Q_Lmin", "ms;%;MPa;mA", "'t_s' says 's' in its label, and 'ms' is stated as its unit"),
+        ("t_s;u_V;dP_MPa;Q_Lmin", "s;%;MPa;l/min", "'u_V' says 'V' in its label, and '%' is stated as its unit"),
+        ("t_s;u_V;dP_MPa;Q_Lmin", "s;V;MPa;mA", "'Q_Lmin' says 'Lmin' in its label, and 'mA' is stated as its unit"),
+    ],
+)
+def test_units_that_contradict_each_other(here, labels, units, words):
+    content = text(labels, units, *rows(TIME, U, DP, Q))
+    assert words in refusal(content)
+    label, own = words.split("'")[1:4:2]
+    quantity = {"t_s": "time"}.get(label, label.partition("_")[0])
+    assert words in refusal(content, columns={quantity: label})
+    if quantity in ("dP", "Q"):  # no other label is contradicted
+        assert read(content, columns={quantity: f"{label}:{own}"}).dp.max() > 0
+
+
+@pytest.mark.parametrize(
+    ("cells", "words"),
+    [
+        (["1.000,5", "2000.5"], "stands in one column with '1.000,5'"),
+        (["1.000", "999,5"], "'1.000' stands in one column with '999,5'"),
+        (["1.00,5", "2,5"], "'1.00,5' stands in one column with '1.00,5'"),
+    ],
+)
+def test_marks_of_thousands_that_contradict_each_other(here, cells, words):
+    column = [cells[index] if index < 2 else f"{value:.1f}".replace(".", ",") for index, value in enumerate(1000 * DP)]
+    message = refusal(text("t_s;u_V;dP_kPa;Q_Lmin", *rows(TIME, U, column, Q)))
+    assert words in message and "which mark is the decimal one can't be told" in message
+
+
+def test_thousands_are_read_as_they_are_meant(here):
+    assert read(excel_english()).dp[0] == pytest.approx(2e6)
+
+
+def kilopascals(separator=";", comma=True, cell="{:,.0f}", quotes=""):
+    """A recording whose pressure drops in kPa have a mark between thousands: 2.000, or 2,000 where it has points."""
+    swap = str.maketrans(",.", ".,") if comma else {}
+    pressures = [quotes + cell.format(2000 + index % 7).translate(swap) + quotes for index in range(TIME.size)]
+    labels = separator.join(["t_s", "u_V", "dP_kPa", "Q_Lmin"])
+    return text(labels, *rows(TIME, U, pressures, Q, separator=separator, comma=comma))
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (kilopascals(), "row 2, column 'dP_kPa': '2.000' may be 2000 or a decimal, as column 't_s' has decimal commas"),
+        (kilopascals("\t", comma=False), "'2,000' may be 2000 or a decimal, as column 't_s' has decimal points ('0.04"),
+        (kilopascals(",", comma=False, quotes='"'), "'2,000' may be 2000 or a decimal, as column 't_s' has decimal po"),
+    ],
+)
+def test_thousands_that_look_like_decimals_are_refused(here, content, words):
+    assert words in refusal(content)
+
+
+def test_thousands_that_look_like_decimals_in_another_block(here, monkeypatch):
+    lines = kilopascals(cell="{:,.1f}").decode().split("\n")
+    first = [line.replace(",0;", ";") if index > 500 else line for index, line in enumerate(lines)]
+    last = [line.replace(",0;", ";") if index < 500 else line for index, line in enumerate(lines)]
+    monkeypatch.setattr(text_blocks, "BLOCK_BYTES", 4096)
+    assert read(text(*first[:-1])).dp[[0, -1]] == pytest.approx([2e6, 2.005e6])
+    assert "'2.000' may be 2000 or a decimal, as column" in refusal(text(*last[:-1]))
+    whole = [f"{n};5;2.001;3" for n in range(2000)]
+    halves = [f"{n};5;2.000,5;3" for n in range(2000, 4000)]
+    labels = "t_s;u_V;dP_kPa;Q_Lmin"
+    assert "'2.001' may be 2001 or a decimal, as column 'dP_kPa' has decimal commas ('2.000,5')" in refusal(
+        text(labels, *whole, *halves)
+    )
+    later = [line.replace(";2.000,5;", ";2.001;") for line in halves[1000:]]
+    assert read(text(labels, *halves[:1000], *later)).dp[[0, -1]] == pytest.approx([2000.5e3, 2001e3])
+
+
+def test_thousands_beside_whole_numbers_below_them_are_refused(here):
+    """998 and 1.001 kPa: no column shows a comma, and read as decimals the pressure would fall to a thousandth."""
+    pressures = [f"{996 + index % 9:,}".replace(",", ".") for index in range(TIME.size)]
+    lines = rows(TIME, U, pressures, Q, comma=False)
+    message = refusal(text("t_s;u_V;dP_kPa;Q_Lmin", *lines))
+    assert "row 7, column 'dP_kPa': '1.001' stands in one column with '999', so it may be 1001 or a decimal" in message
+
+
+@pytest.mark.parametrize("cells", [("1.999", "2", "2.001"), ("150", "150.125", "149.875"), ("2.001", "2.000", "2.002")])
+def test_whole_numbers_beside_decimals_of_their_size_stay(here, cells):
+    pressures = [cells[index % 3] for index in range(TIME.size)]
+    test = read(text("t_s;u_V;dP_bar;Q_Lmin", *rows(TIME, U, pressures, Q, comma=False)))
+    np.testing.assert_allclose(test.dp[:3], [1e5 * float(cell) for cell in cells])
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_three_digits_behind_a_point_stay_decimals(here, monkeypatch, separator):
+    labels = separator.join(["t_s", "u_V", "dP_MPa", "Q_Lmin"])
+    lines = rows(TIME, U, [f"{2.001:.3f}"] * TIME.size, Q, separator=separator, comma=False)
+    np.testing.assert_allclose(read(text(labels, *lines)).dp, 2.001e6)
+    monkeypatch.setattr(text_blocks, "BLOCK_BYTES", 4096)
+    np.testing.assert_allclose(read(text(labels, *lines)).dp, 2.001e6)
+
+
+# clocks
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "seconds"),
+    [
+        ("2026-11-22 03:04:05.5", "2026-11-22 03:04:06.25", 0.75),
+        ("2026-11-22T03:04:05Z", "2026-11-22T03:04:06Z", 1),
+        ("2026-10-25T02:59:59.5+02:00", "2026-10-25T02:00:00+01:00", 0.5),
+        ("31.12.2026 23:59:59,5", "01.01.2027 00:00:00", 0.5),
+        ("11/12/2026 11:59:59 PM", "11/13/2026 12:00:00 AM", 1),
+        ("12/11/2026 23:59:59", "13/11/2026 00:00:00", 1),
+        ("11:59:59.5 a.m.", "12:00:00 p.m.", 0.5),
+        ("23:59:59", "00:00:01", 2),
+        ("26.11.22 23:59:59", "26.11.23 00:00:01", 2),
+        ("22.11.26 23:59:59", "23.11.26 00:00:01", 2),
+        ("30.11.26 23:59:59", "01.12.26 00:00:01", 2),
+        ("99:59:59", "100:00:00", 1),
+        ("03:04:05:250", "03:04:05:500", 0.25),
+    ],
+)
+def test_stamps(here, first, second, seconds):
+    lines = [f"{clock};{u:.4f};{q:.4f}" for clock, u, q in zip([first] * 30 + [second] * 30, U, Q, strict=False)]
+    test = read(text("time;u [V];Q [l/min]", *lines))
+    np.testing.assert_allclose(test.time, np.repeat([0.0, seconds], 30), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("cells", "words"),
+    [
+        (["03:04"], "'03:04' may be hours and minutes, minutes and seconds or a date"),
+        (["04:05,5"], "may be hours and minutes, minutes and seconds"),
+        (["2026-11-22"], "or a date, expected seconds as a number, or a time such as"),
+        (["01/02/2026 23:59:59", "02/02/2026 00:00:00"], "it is 1 or 31 days, as it can't be told which number is"),
+        (["03:04:05", "soon"], "row 3, column 'time': 'soon' is no time, expected one such as"),
+        (["99/99/2026 03:04:05"], "'99/99/2026' is no date"),
+        (["03:04:05", "03:03:05"], "the time goes back"),
+    ],
+)
+def test_stamps_that_can_not_be_told(here, cells, words):
+    clock = [cells[min(index, len(cells) - 1)] for index in range(TIME.size)]
+    assert words in refusal(text("time;u [V];Q [l/min]", *rows(clock, U, Q)))
+
+
+def test_milliseconds_beside_a_time_of_day_are_not_passed_over(here):
+    clock = [stamp.partition(".")[0] for stamp in stamps("%H:%M:%S.")]
+    parts = [stamp.partition(".")[2] for stamp in stamps("%H:%M:%S.")]
+    content = text("Time;ms;u [V];dP [MPa];Q [l/min]", *rows(clock, parts, U, DP, Q))
+    assert_is_the_ramp(read(content))
+    assert_is_the_ramp(read(content, columns={"time": "Time"}))
+    wrong = text("Time;ms;u [V];dP [MPa];Q [l/min]", *rows(clock, [*parts[:-1], "1000"], U, DP, Q))
+    assert "row 1001, column 'ms': 1000 is no part of a second, expected 0 to 999" in refusal(wrong)
+    whole = text("Time;ms;u [V];dP [MPa];Q [l/min]", *rows(stamps("%H:%M:%S."), parts, U, DP, Q))
+    assert_is_the_ramp(read(whole))
+
+
+def test_stamps_over_blocks_count_from_the_first_row_of_the_file(here, monkeypatch):
+    content = text("time;u [V];dP [MPa];Q [l/min]", *rows(stamps("%d.%m.%Y %H:%M:%S,"), U, DP, Q))
+    monkeypatch.setattr(text_blocks, "BLOCK_BYTES", 4096)
+    assert_is_the_ramp(read(content))
+    blank = content.replace(START.strftime("\n%d.%m.%Y %H:%M:%S,163").encode(), b"\n", 1)
+    assert_is_the_ramp(read(blank), np.arange(TIME.size) != 1)
+
+
+def test_whole_numbers_without_a_unit_that_can_only_be_milliseconds(here, capsys):
+    assert_is_the_ramp(read(milliseconds()))
+    assert main(["identify", "ramp.csv"]) == 0
+    assert "warning [time-unit] ramp.csv: the column of time counts like milliseconds" in capsys.readouterr().out
+    # As seconds these are ramps of 25 minutes: nothing is plain.
+    few = milliseconds().split(b"\n")
+    slow = b"\n".join([few[0], *(b"%d,%s" % (3 * n, line.split(b",", 1)[1]) for n, line in enumerate(few[1:-1]))])
+    assert "column 'time' has no unit; write for example time_s" in refusal(slow)
+    assert read(milliseconds().replace(b"time", b"time_ms", 1)).clock_doubt == ""
+    stated = read(milliseconds().replace(b"time", b"time_s", 1))
+    assert stated.clock_doubt and stated.time[-1] == pytest.approx(1000 * TIME[-1])
+    assert read(csv(ROWS).encode()).clock_doubt == ""
+
+
+# transmitters
+
+
+@pytest.mark.parametrize(
+    ("unit", "words"),
+    [
+        ("mA", "'mA' is not a unit of flow that dzdesign knows; expected for example L/min, Lmin, m3/s, gpm; say what"),
+        ("mA", 'for example --columns "Q=F (mA):4..20 mA = 0..50 L/min"'),
+        ("4..20 mA", "'4..20 mA' is no range, expected one such as '4..20 mA = 0..50 L/min'"),
+        ("4..20 mA = 0..50 bar", "'bar' is not a unit of flow"),
+        ("4..20 s = 0..50 L/min", "'s' is no unit of a transmitter's signal"),
+        ("4..4 mA = 0..50 L/min", "has no width"),
+        ("4..20 mA = 0..25.000 mL/min", "'25.000' may be 25000 or 25.0; write 25000 or 25.0"),
+        ("4..20 mA = 0..25,000 mL/min", "'25,000' may be 25000 or 25.0; write 25000 or 25.0"),
+        ("4..20 mA = 0..50,000 mL/min", "'50,000' may be 50000 or 50.0; write 50000 or 50.0"),
+    ],
+)
+def test_a_current_is_no_flow_until_its_range_is_told(here, unit, words):
+    content = text("t_s,u_V,dP_MPa,F (mA)", *rows(TIME, U, DP, 4 + 0.32 * Q, separator=",", comma=False))
+    assert words in refusal(content, columns={"Q": f"F (mA):{unit}" if unit != "mA" else "F (mA)"})
+
+
+def test_a_range_in_another_unit_than_the_labels(here):
+    content = text("t_s,u_V,dP_MPa,Q_mV", *rows(TIME, U, DP, 200 * Q, separator=",", comma=False))
+    words = "the range '0..10 V = 0..50 L/min' is of a column in V, but the file says 'mV'"
+    assert words in refusal(content, columns={"Q": "Q_mV:0..10 V = 0..50 L/min"})
+    assert_is_the_ramp(read(content, columns={"Q": "Q_mV:0..10000 mV = 0..50 L/min"}))
+
+
+def test_a_range_may_fall_and_hold_other_signals(here):
+    table = rows(TIME, 20 - 1.6 * U, DP, 0.2 * Q, separator=",", comma=False, form="{:.6f}")
+    columns = {"u": "I:20..4 mA = 0..100 %", "Q": "F:0..10 V = 0..50 L/min"}
+    assert_is_the_ramp(read(text("t_s,I,dP_MPa,F", *table), columns=columns))
+
+
+# what is no recording
+
+
+@pytest.mark.parametrize(("content", "words"), [(b'{"a": 1}', "is JSON, expected"), (b"<html>", "is HTML or XML")])
+def test_documents_are_no_recordings(here, content, words):
+    assert words in refusal(content)
+
+
+def test_artefacts_beside_recordings(here, capsys):
+    Path("a.csv").write_text(csv(ROWS))
+    assert main(["identify", "a.csv"]) == 0
+    Path("manifest.json").write_text(json.dumps({"schema": "dzdesign.simulation/1"}))
+    capsys.readouterr()
+    assert main(["identify", "*.csv", "manifest.json", "-o", "b.json"]) == 0
+    assert "'manifest.json' is left out: a manifest that dzdesign writes" in capsys.readouterr().err
+    for name, schema in (("manifest.json", "simulation"), ("valve.json", "valve")):
+        assert main(["identify", name, "-o", "c.json"]) == 2
+        assert f"'{name}' is no recording but a file that dzdesign wrote (dzdesign.{schema}/1); leave it out" in (
+            capsys.readouterr().err
+        )
+    assert main(["identify", "a.csv", "valve.json", "-o", "c.json"]) == 2

@@ -1,0 +1,236 @@
+"""Recordings of many rows: read in blocks as they are at once, thinned without moving a knee, in bounded memory."""
+
+import dataclasses
+import gzip
+import os
+import threading
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from dzdesign.core.errors import InputError
+from dzdesign.identify.identification import identify
+from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.reading import thinning
+from dzdesign.identify.reading.binary import tables as binary_tables
+from dzdesign.identify.reading.ramp_files import RampTest, ramp_file_bytes, read_ramp_file
+from dzdesign.identify.reading.text import blocks as text_blocks
+from dzdesign.identify.reading.thinning import Thinner
+from tests.identify.reading.test_dirty_recordings import changed, jittered, spiked, staircase
+from tests.identify.reading.test_file_formats import GOOD
+from tests.identify.reading.test_ramp_files import assert_is_the_ramp, table
+from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
+
+LIMIT, BLOCK = 21_000, 7_001
+
+
+def long_ramp(**keywords) -> RampTest:
+    return synthetic_ramp(1.0, Truth(**keywords), rate_Hz=1000.0, ramp_s=80)
+
+
+def thinned(test: RampTest) -> RampTest:
+    """Return what is left of a recording that comes in blocks, none of them whole windows."""
+    thinner = Thinner(10.0)
+    rows = np.stack([test.time, test.u, test.q, test.dp])
+    for start in range(0, rows.shape[1], BLOCK):
+        thinner.add(rows[:, start : start + BLOCK])
+    assert thinner.read == test.u.size and thinner.kept <= LIMIT and thinner.run == 8
+    time, u, q, dp = (column.copy() for column in thinner.rows())
+    return changed(test, time=time, u=u, q=q, dp=dp, run=thinner.run, rows_read=thinner.read)
+
+
+def some(test: RampTest, name: str, share: float, values) -> RampTest:
+    column = getattr(test, name).copy()
+    hit = np.random.default_rng(4).choice(column.size, int(share * column.size), replace=False)
+    column[hit] = np.random.default_rng(5).choice(values, hit.size)
+    return changed(test, **{name: column})
+
+
+def with_true_floor(test: RampTest) -> RampTest:
+    """Read zero where the flow with its noise is below 1.2 L/min: near there, zeros and readings alternate."""
+    return changed(test, q=np.where(test.q < 1.2 * L_MIN, 0.0, test.q))
+
+
+def stamped(test: RampTest) -> RampTest:
+    return changed(test, time=np.floor(test.time * 10) / 10, q=np.interp(test.time - 0.5, test.time, test.q))
+
+
+CASES = {
+    "plain": long_ramp,
+    "spikes of flow": lambda: some(long_ramp(), "q", 0.01, [0.0, 80 * L_MIN]),
+    "spikes of pressure": lambda: some(long_ramp(), "dp", 0.01, [1e4, 2e7]),
+    "spikes of command": lambda: spiked("u", -3.0, 13.0)(long_ramp()),
+    "floor before the noise": lambda: long_ramp(floor=1.2),
+    "floor behind the noise": lambda: with_true_floor(long_ramp()),
+    "floor and spikes": lambda: some(with_true_floor(long_ramp()), "q", 0.01, [0.0, 80 * L_MIN]),
+    "jittered clock": lambda: jittered(long_ramp()),
+    "stamps of 0.1 s and a lag": lambda: stamped(long_ramp()),
+    "sag": lambda: long_ramp(sag=0.2),
+    "coarse flow": lambda: (lambda test: changed(test, q=np.round(test.q / L_MIN / 0.1) * 0.1 * L_MIN))(long_ramp()),
+}
+
+
+WITHOUT_SPIKES = {name: long_ramp for name in CASES if name.startswith("spikes")}
+WITHOUT_SPIKES["floor and spikes"] = CASES["floor behind the noise"]
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_thinning_moves_no_knee(name, monkeypatch):
+    monkeypatch.setattr(thinning, "MOST_ROWS", LIMIT)
+    test = CASES[name]()
+    options = IdentifyOptions(meter_lag=0.5 if "lag" in name else 0.0)
+    # Spikes leave no trace, so what is to be found is what the same recording gives without them.
+    (full,) = identify([WITHOUT_SPIKES.get(name, CASES[name])()], options).positive.tests
+    few = identify([thinned(test)], options)
+    (found,) = few.positive.tests
+    for branch in ("u_knee_rising_V", "u_knee_falling_V"):
+        assert abs(getattr(found, branch) - getattr(full, branch)) < max(full.u_knee_se_V, 1e-4), branch
+    assert 0.5 * full.u_knee_se_V < found.u_knee_se_V < 2 * full.u_knee_se_V
+    assert found.q_max_L_min == pytest.approx(full.q_max_L_min, rel=2e-3)
+    (warning,) = [warning for warning in few.warnings if warning.code == "thinned"]
+    assert "of 160000 rows every 8 in a row" in warning.text and warning.source == test.source
+
+
+def test_a_staircase_keeps_its_levels(monkeypatch):
+    monkeypatch.setattr(thinning, "MOST_ROWS", 2_000)
+    test = staircase(long_ramp())  # 60 rows a level
+    thinner = Thinner(10.0)
+    thinner.add(np.stack([test.time, test.u, test.q, test.dp]))
+    u = thinner.rows()[1]
+    assert thinner.run == 8 and np.abs(u - np.round(u, 1)).max() < 1e-12
+    assert np.unique(np.round(u, 1)).size == 101
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_no_flow_between_zero_and_the_floor_is_made_up(noise, monkeypatch):
+    monkeypatch.setattr(thinning, "MOST_ROWS", LIMIT)
+    test = thinned(with_true_floor(long_ramp(noise=noise)))
+    between = (test.q > 1e-3 * L_MIN) & (test.q < (1.2 - 1e-9) * L_MIN)
+    assert not between.any() and (test.q == 0).any()
+
+
+def test_means_of_all_rows_would_make_one_up(monkeypatch):
+    """The check above, checked."""
+    monkeypatch.setattr(thinning, "MOST_ROWS", LIMIT)
+    monkeypatch.setattr(thinning, "_typical", lambda windows, *_: np.ones(windows.shape, dtype=bool))
+    test = thinned(with_true_floor(long_ramp(noise=0.02)))
+    assert np.any((test.q > 1e-3 * L_MIN) & (test.q < (1.2 - 1e-9) * L_MIN))
+
+
+def test_a_sweep_faster_than_its_runs_is_not_smeared(monkeypatch):
+    monkeypatch.setattr(thinning, "MOST_ROWS", 500)
+    up = np.linspace(0, 10, 1000)
+    u = np.tile(np.concatenate([up, up[::-1]]), 8)
+    thinner = Thinner(10.0)
+    thinner.add(np.stack([np.arange(u.size) / 100, u, u**3, np.full(u.size, 1e6)]))
+    rows = thinner.rows()
+    assert rows.shape[1] <= 500 and thinner.run >= 32
+    np.testing.assert_allclose(rows[2], rows[1] ** 3, rtol=1e-4, atol=1e-5)  # on the curve, not on a chord of it
+
+
+def test_below_the_limit_nothing_is_touched(monkeypatch):
+    test = long_ramp()
+    rows = np.stack([test.time, test.u, test.q, test.dp])
+    thinner = Thinner(10.0)
+    for start in range(0, rows.shape[1], BLOCK):
+        thinner.add(rows[:, start : start + BLOCK])
+    np.testing.assert_array_equal(thinner.rows(), rows)
+    assert thinner.run == 1
+
+
+def assert_same(one: RampTest, other: RampTest) -> None:
+    for field in dataclasses.fields(RampTest):
+        np.testing.assert_array_equal(getattr(one, field.name), getattr(other, field.name))
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda text: text,
+        lambda text: "# oil at 40 °C\n\n" + text + "# the end",
+        lambda text: text.replace("\n", ",\n").replace("\n0.12,", "\n,", 1).replace(",1,", ",nan,", 1),
+        lambda text: text.replace(",", ";").replace(".", ","),
+        lambda text: text.replace(",", "  "),
+        lambda text: "\ufeff" + text,
+    ],
+)
+def test_text_read_in_blocks_is_text_read_at_once(tmp_path, monkeypatch, spoil, end):
+    content = spoil(table()).replace("\n", end).encode()
+    for name, data in (("a.csv", content), ("a.csv.gz", gzip.compress(content))):
+        (tmp_path / name).write_bytes(data)
+        at_once = read_ramp_file(tmp_path / name)
+        for size in (64, 65, 66, 67, 301):
+            with monkeypatch.context() as context:
+                context.setattr(text_blocks, "BLOCK_BYTES", size)
+                assert_same(read_ramp_file(tmp_path / name), at_once)
+
+
+@pytest.mark.parametrize("name", GOOD)
+def test_binary_files_read_in_blocks_are_read_at_once(name, tmp_path, monkeypatch):
+    path = tmp_path / "ramp.mat"
+    path.write_bytes(GOOD[name])
+    at_once = read_ramp_file(path)
+    monkeypatch.setattr(binary_tables, "BLOCK_ROWS", 7)
+    assert_same(read_ramp_file(path), at_once)
+    assert_is_the_ramp(at_once)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (lambda lines: [*lines[:25], "1,x,3,4", *lines[25:]], "row 26, column 'u_V': 'x' is not a number"),
+        (lambda lines: [*lines[:25], "1,2,3", *lines[25:]], "row 26 has 3 cells, expected 4"),
+        (lambda lines: [*lines[:25], "1,2,3", "# two", "1,2,3,4,5", *lines[25:]], "row 26 has 3 cells, expected 4"),
+        (lambda lines: [*lines[:25], "0,1,2,3", *lines[25:]], "row 26: the time goes back"),
+        (lambda lines: [*lines[:25], "1,1e9,2,3", *lines[25:]], "row 26, column 'u_V': '1e9' is no measurement"),
+        (lambda lines: [*lines[:25], "9" * 500, *lines[25:]], "has a line of more than"),
+    ],
+)
+@pytest.mark.parametrize("before", ["", "# one\r\n\r\n"])
+def test_a_fault_in_a_later_block_is_found_in_its_row(tmp_path, monkeypatch, spoil, words, before):
+    monkeypatch.setattr(text_blocks, "BLOCK_BYTES", 128)
+    (tmp_path / "a.csv").write_bytes(before.encode() + "\n".join(spoil(table().splitlines())).encode())
+    with pytest.raises(InputError) as caught:
+        read_ramp_file(tmp_path / "a.csv")
+    assert words.replace("row 26", "row 28" if before else "row 26") in str(caught.value)
+
+
+def test_a_short_row_is_not_made_up_for_by_a_long_one(tmp_path):
+    rows = ["0,1,2,", "1,2"]  # as many separators as two rows should have
+    (tmp_path / "a.csv").write_text("\n".join(["time_s,u_V,Q_Lmin", *(["0,1,2"] * 30), *rows]))
+    with pytest.raises(InputError, match=r"row 32 has 4 cells, expected 3"):
+        read_ramp_file(tmp_path / "a.csv")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes")
+def test_a_pipe_is_read_once(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    writer = threading.Thread(target=(tmp_path / "pipe").write_bytes, args=(table().encode(),))
+    writer.start()
+    assert_is_the_ramp(read_ramp_file(tmp_path / "pipe"))
+    writer.join()
+
+
+def peak_of_reading(path) -> int:
+    tracemalloc.start()
+    read_ramp_file(path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    return peak
+
+
+def test_memory_does_not_grow_with_the_file(tmp_path, monkeypatch):
+    """Of what Python and NumPy take; `benchmarks/identify/reading.py` measures the whole process."""
+    monkeypatch.setattr(thinning, "MOST_ROWS", 5_000)
+    monkeypatch.setattr(text_blocks, "BLOCK_BYTES", 1 << 16)
+    test = long_ramp()
+    peaks = []
+    for rows in (20_000, 160_000):
+        part = slice(None, None, test.u.size // rows)
+        columns = {"time_s": test.time[part], "u_V": test.u[part], "Q_Lmin": test.q[part] / L_MIN}
+        (tmp_path / "a.csv").write_bytes(ramp_file_bytes(columns, (), compress=False))
+        read_ramp_file(tmp_path / "a.csv")  # what is imported stays
+        peaks.append(peak_of_reading(tmp_path / "a.csv"))
+    assert peaks[1] < 1.2 * peaks[0]

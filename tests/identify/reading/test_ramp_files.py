@@ -1,0 +1,304 @@
+"""Ramp files: every reading that must work, every one that must not and says where, and the round trip."""
+
+import gzip
+import re
+
+import numpy as np
+import pytest
+
+from dzdesign.core.errors import InputError
+from dzdesign.identify.reading.ramp_files import ramp_file_bytes, read_ramp_file
+
+ROWS = 30
+TIME = np.arange(ROWS) / 25
+U = np.linspace(0, 10, ROWS)
+DP = np.linspace(1.0, 0.9, ROWS)
+Q = np.clip(4 * (U - 5), 0, None)
+HEADER = "time_s,u_V,dP_MPa,Q_Lmin"
+L_MIN = 1e-3 / 60
+
+
+def table(header=HEADER, columns=(TIME, U, DP, Q), separator=",", comma=False, end="\n"):
+    """Return the text of a ramp file; `comma` writes decimal commas."""
+    rows = [[f"{value:.6g}" for value in row] for row in zip(*columns, strict=True)]
+    lines = [header, *(separator.join(cells).replace(".", "," if comma else ".") for cells in rows)]
+    return end.join(lines) + end
+
+
+@pytest.fixture
+def read(tmp_path):
+    def read(content, **keywords):
+        path = tmp_path / "ramp.csv"
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return read_ramp_file(path, **keywords)
+
+    return read
+
+
+@pytest.fixture
+def refusal(read):
+    """Return the message with which a file is refused."""
+
+    def refusal(content, **keywords):
+        with pytest.raises(InputError) as caught:
+            read(content, **keywords)
+        return str(caught.value)
+
+    return refusal
+
+
+def assert_is_the_ramp(test, rows=slice(None)):
+    np.testing.assert_allclose(test.time, TIME[rows], rtol=1e-5, atol=1e-12)
+    np.testing.assert_allclose(test.u, U[rows], rtol=1e-5, atol=1e-12)
+    np.testing.assert_allclose(test.dp, 1e6 * DP[rows], rtol=1e-5)
+    np.testing.assert_allclose(test.q, L_MIN * Q[rows], rtol=1e-5, atol=1e-15)
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_separators(read, separator):
+    assert_is_the_ramp(read(table(HEADER.replace(",", separator), separator=separator)))
+
+
+@pytest.mark.parametrize("separator", [";", "\t"])
+def test_decimal_comma(read, separator):
+    assert_is_the_ramp(read(table(HEADER.replace(",", separator), separator=separator, comma=True)))
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "time [s],u [V],dP [MPa],Q [L/min]",
+        "t (s),u (V),dP (MPa),Q (l/min)",
+        "t_s,U_V,dp_MPa,q_Lmin",
+        "Time[s],Command[V],Delta p[MPa],Flow[lpm]",
+        "time_s,u_V,Δp_MPa,Q_l_min",
+        "time_s , u_V , dP_MPa , Q_LPM",
+    ],
+)
+def test_spellings_of_labels(read, header):
+    assert_is_the_ramp(read(table(header)))
+
+
+@pytest.mark.parametrize(
+    ("label", "column"),
+    [
+        ("dP_bar", 10 * DP),
+        ("dP [kPa]", 1000 * DP),
+        ("dP (psi)", DP * 145.03773773),
+        ("dP [N/mm2]", DP),
+        ("dP [Pa]", DP * 1e6),
+    ],
+)
+def test_units_of_pressure(read, label, column):
+    assert_is_the_ramp(read(table(f"time_s,u_V,{label},Q_Lmin", (TIME, U, column, Q))))
+
+
+@pytest.mark.parametrize(
+    ("label", "factor"),
+    [
+        ("Q [m3/s]", L_MIN),
+        ("Q [m³/h]", 0.06),
+        ("Q [cm3/s]", 1000 / 60),
+        ("Q [gpm]", 1 / 3.785411784),
+        ("Q_mL/min", 1e3),
+    ],
+)
+def test_units_of_flow(read, label, factor):
+    assert_is_the_ramp(read(table(f"time_s,u_V,dP_MPa,{label}", (TIME, U, DP, factor * Q))))
+
+
+def test_units_of_time_and_command(read):
+    assert_is_the_ramp(read(table("time_ms,u_mV,dP_MPa,Q_Lmin", (1000 * TIME, 1000 * U, DP, Q))))
+
+
+@pytest.mark.parametrize("unit", ["%", "pct", "percent"])
+def test_command_in_per_cent_of_full_command(read, unit):
+    assert_is_the_ramp(read(table(f"time_s,u [{unit}],dP_MPa,Q_Lmin", (TIME, 10 * U, DP, Q))))
+    halved = read(table(f"time_s,u [{unit}],dP_MPa,Q_Lmin", (TIME, 10 * U, DP, Q)), u_max=5.0)
+    np.testing.assert_allclose(halved.u, U / 2, rtol=1e-5)
+
+
+def test_pressures_of_both_ports_stand_for_their_difference(read):
+    assert_is_the_ramp(read(table("time_s,u_V,pA_bar,pB_MPa,Q_Lmin", (TIME, U, 10 * (DP + 1), DP * 0 + 1, Q))))
+
+
+def test_a_file_without_pressure_has_none(read):
+    assert read(table("time_s,u_V,Q_Lmin", (TIME, U, Q))).dp is None
+
+
+def test_comments_and_blank_lines_anywhere(read):
+    lines = table().splitlines()
+    lines.insert(10, "# valve 12; bench 3, oil at 40 °C")
+    lines.insert(5, "   ")
+    lines.insert(5, ",,,")  # what a spreadsheet makes of a blank line
+    text = '# first\n\n  # second\n"# third; saved again by a spreadsheet",,,\n' + "\n".join(lines) + "\n\n# last"
+    assert_is_the_ramp(read(text))
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_ends_of_lines(read, end):
+    assert_is_the_ramp(read(table(end=end)))
+
+
+@pytest.mark.parametrize("before", ["", "# bench 3\n\n"])
+@pytest.mark.parametrize(
+    "spoil", [lambda text: text, lambda text: text.replace(",1,", ",,", 1), lambda text: text[:-1]]
+)
+def test_plain_rows_are_read_as_rows_with_a_comment_are(read, spoil, before):
+    text = before + spoil(table())
+    plain, commented = read(text), read(text + "\n# the end\n")
+    for name in ("time", "u", "q", "dp"):
+        np.testing.assert_array_equal(getattr(plain, name), getattr(commented, name))
+
+
+def test_byte_order_mark(read):
+    assert_is_the_ramp(read(b"\xef\xbb\xbf" + table().encode()))
+
+
+def test_quoted_cells(read):
+    quoted = re.sub(r"[^,\n]+", lambda cell: f'"{cell[0]}"', table())
+    assert_is_the_ramp(read(quoted))
+    assert_is_the_ramp(read(quoted.replace(",", ", ")))
+
+
+def test_quoted_decimal_commas_between_commas(read):
+    rows = [",".join(f'"{value:.6g}"'.replace(".", ",") for value in row) for row in zip(TIME, U, DP, Q, strict=True)]
+    assert_is_the_ramp(read("\n".join([HEADER, *rows])))
+
+
+@pytest.mark.parametrize("blank", ["", "  ", "nan", "NaN", '""'])
+def test_blank_cells_are_missing_samples(read, blank):
+    lines = table().splitlines()
+    for row, column in ((3, 0), (7, 1), (8, 3)):
+        cells = lines[row].split(",")
+        cells[column] = blank
+        lines[row] = ",".join(cells)
+    kept = [row for row in range(ROWS) if row + 1 not in (3, 7, 8)]
+    assert_is_the_ramp(read("\n".join(lines)), kept)
+
+
+def test_gzip_is_read_by_its_content(read):
+    assert_is_the_ramp(read(gzip.compress(table().encode(), mtime=0)))
+
+
+def test_columns_of_no_ramp_test_are_left_aside(read):
+    header = "sample,time_s,oil temperature,u_V,dP_MPa,note,Q_Lmin,,"
+    rows = [f"{n},{TIME[n]},40.1,{U[n]},{DP[n]},ok,{Q[n]},," for n in range(ROWS)]
+    assert_is_the_ramp(read("\n".join([header, *rows])))
+
+
+@pytest.mark.parametrize("compress", [False, True])
+def test_what_is_written_reads_back(read, compress):
+    columns = {"time_s": TIME, "u_V": U, "dP_MPa": DP, "Q_Lmin": Q}
+    content = ramp_file_bytes(columns, ("SIMULATED", "not a measurement"), compress=compress)
+    assert content == ramp_file_bytes(columns, ("SIMULATED", "not a measurement"), compress=compress)
+    test = read(content)
+    half_a_digit = 0.5001e-4
+    np.testing.assert_allclose(test.u, U, atol=half_a_digit)
+    np.testing.assert_allclose(test.dp, 1e6 * DP, atol=1e6 * half_a_digit)
+    np.testing.assert_allclose(test.q, L_MIN * Q, atol=L_MIN * half_a_digit)
+
+
+def test_arrays_are_read_only_and_the_file_is_known_by_its_hash(read):
+    test = read(table())
+    assert test.source == "ramp.csv" and len(test.sha256) == 64
+    with pytest.raises(ValueError, match="read-only"):
+        test.u[0] = 1
+
+
+def spoiled(row, column, cell, before=""):
+    """Return a ramp file with one cell replaced; `row` counts from the header, 0."""
+    lines = table().splitlines()
+    cells = lines[row].split(",")
+    cells[column] = cell
+    lines[row] = ",".join(cells)
+    return before + "\n".join(lines)
+
+
+@pytest.mark.parametrize("cell", ["n/a", "1.2.3", "1e", "--", "0x10", "1_0", "OVERFLOW"])
+def test_text_in_a_number_is_found_in_its_row_of_the_file(refusal, cell):
+    message = refusal(spoiled(4, 1, cell, before="# one\n\n# two\n"))
+    # Three lines before the header, which is line 4; four rows on.
+    assert f"row 8, column 'u_V': '{cell}' is not a number" in message
+
+
+@pytest.mark.parametrize("separator", ["\x0b", "\x0c", "\x1c", "\x85", "\u2028"])
+def test_rows_are_counted_as_an_editor_does(refusal, separator):
+    assert "row 6," in refusal(spoiled(4, 1, "x", before=f"# a{separator}b\n"))
+
+
+@pytest.mark.parametrize("cell", ["inf", "-inf", "1e400", "1e38", "-1e10"])
+def test_numbers_that_no_valve_gives(refusal, cell):
+    message = refusal(spoiled(4, 2, cell))
+    assert f"row 5, column 'dP_MPa': '{cell}' is no measurement" in message
+
+
+def test_long_cells_and_many_columns_are_cut(refusal):
+    assert len(refusal(spoiled(4, 1, "x" * 10000))) < 400
+    assert len(refusal(",".join(f"channel {n}" for n in range(1000)) + "\n")) < 500
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"", "is empty; expected a header row"),
+        (b"\n# only this\n\n", "is empty; expected a header row"),
+        (table().partition("\n")[2], "has no header row (row 1 is '0,0,1,0')"),
+        (HEADER + "\n", "has 0 complete rows, expected at least 20"),
+        (table("time,u,dP,Q"), "column 'time' has no unit; write for example time_s"),
+        (table("time_s,u_V,dP,Q_Lmin"), "column 'dP' has no unit; write for example dP_MPa"),
+        (table("time_s,u_V,dP_MPa,Q"), "column 'Q' has no unit; write for example Q_Lmin"),
+        (table("time_s,u_V,dP_MPA,Q_Lmin"), "column 'dP_MPA': 'MPA' is not a unit of pressure"),
+        (table("time_s,u_V,dP [barr],Q_Lmin"), "(did you mean 'bar'?)"),
+        (table("time_s,u_V,dP [Lmin],Q_Lmin"), "column 'dP [Lmin]': 'Lmin' is not a unit of pressure"),
+        (table("time_s,u [mA],dP_MPa,Q_Lmin"), "column 'u [mA]': 'mA' is not a unit of voltage"),
+        (table("time_s,u [9**9**9**9],dP_MPa,Q_Lmin"), "'9**9**9**9' is not a unit of voltage"),
+        (table("time_s,comand_V,dP_MPa,Q_Lmin"), "no column of u (columns found: time_s, comand_V,"),
+        (table("time_s,comand_V,dP_MPa,Q_Lmin"), "(did you mean 'comand_V'? name it u_V)"),
+        (table("time_s,voltage_V,dP_MPa,Q_Lmin"), "(did you mean 'voltage_V'? name it u_V)"),
+        (table("tme_s,u_V,dP_MPa,Q_Lmin"), "no column of time"),
+        (table("time_s,u_V,dP_MPa,through_Lmin"), "(did you mean 'through_Lmin'? name it Q_Lmin)"),
+        (table("time_s,u_V,u [V],Q_Lmin"), "row 1 has two columns of u: 'u_V' and 'u [V]'"),
+        (table("time_s,u_V,pA_MPa,Q_Lmin"), "row 1 has a column of pA but none of pB; expected both, or dP"),
+        (table("time_s,u_V,pB_MPa,Q_Lmin"), "row 1 has a column of pB but none of pA; expected both, or dP"),
+        (table() + "1,2,3\n", f"row {ROWS + 2} has 3 cells, expected 4 as in the header"),
+        ("#\n" + table() + "1,2,3,4,5\n", f"row {ROWS + 3} has 5 cells, expected 4 as in the header"),
+        (HEADER + "\n0,1,2,3,4,5,6,7\n", "decimal commas need ';' or a tab"),
+        (spoiled(7, 0, "0.1"), "row 8: the time goes back"),
+        (gzip.compress(table().encode(), mtime=0)[:-20], "is not a whole gzip file"),
+        (gzip.compress(table().encode(), mtime=0)[:15] + b"\0" * 40, "is not a whole gzip file"),
+        (b"\x1f\x8b", "is not a whole gzip file"),
+        (table().encode("utf-16")[:-1], "begins as UTF-16 and is not (truncated data)"),
+        (table().encode("utf-16-le"), "is UTF-16 without a byte order mark, or no text at all"),
+        (b"# \x81l\n" + table().encode(), "neither in UTF-8 nor in Windows-1252 (byte 3)"),
+        (b"\xef\xbb\xbf# \xd6l\n" + table().encode(), "is not a text file in UTF-8 throughout (byte 6)"),
+        (b"PK\x03\x04\x14\x00\x06\x00\x08\x00\x00\x00!\x00\xff", "is an Excel workbook (xlsx) or a zip archive; in "),
+        (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "is an Excel workbook (xls); in the spreadsheet program"),
+    ],
+)  # fmt: skip
+def test_refused_with_the_reason_and_the_place(refusal, content, words):
+    message = refusal(content)
+    assert words in message
+    assert "ramp.csv'" in message and "\n" not in message
+
+
+def test_gzip_with_a_changed_byte_is_refused(refusal):
+    content = bytearray(gzip.compress(table().encode(), mtime=0))
+    for place in range(10, len(content), 7):
+        changed = content.copy()
+        changed[place] ^= 0x10
+        assert "gzip" in refusal(bytes(changed))
+
+
+@pytest.mark.parametrize("header", ["t_s,u_V,dP_MPa,Q_Lmin,T_degC,Q_set", "T_degC,t_s,u_V,dP_MPa,Q_Lmin,Q_set"])
+def test_a_column_of_another_kind_with_the_same_letter_is_left_alone(header, tmp_path):
+    names = header.split(",")
+    rows = []
+    for index in range(60):
+        value = {"t_s": index, "u_V": index / 6, "dP_MPa": 1, "Q_Lmin": index, "T_degC": 40, "Q_set": 7}
+        rows.append(",".join(str(value[name]) for name in names))
+    path = tmp_path / "ramp.csv"
+    path.write_text("\n".join([header, *rows]) + "\n")
+    test = read_ramp_file(path)
+    assert test.time[-1] == 59
+    assert test.q[-1] * 60000 == pytest.approx(59)

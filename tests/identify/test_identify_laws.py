@@ -1,0 +1,101 @@
+"""Laws of `identify` beside those of splitting and pooling: what must not matter does not, what must scale scales."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from dzdesign.identify.identification import identify
+from dzdesign.identify.options import IdentifyOptions
+from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
+
+RATE_HZ = 20
+laws = settings(max_examples=6, deadline=None, derandomize=True)
+seeds = st.integers(0, 10**6)
+
+
+def ramp(dp=1.0, seed=0, **keywords):
+    truth = {"knee_rising": 5.5 - 0.06 * dp, "slope": 4 * dp**0.5, **keywords}
+    return synthetic_ramp(dp, Truth(**truth), seed=seed, rate_Hz=RATE_HZ, ramp_s=60)
+
+
+def valve(seed, **keywords):
+    return [ramp(dp, seed, **keywords) for dp in (1.0, 3.0)]
+
+
+def thresholds(tests, options=None):
+    """Return knees and their standard errors, both (T, 2), V."""
+    rows = identify(tests, options).positive.tests
+    branches = [(test.rising, test.falling) for test in rows]
+    return tuple(
+        np.array([[getattr(branch, name) for branch in pair] for pair in branches]) for name in ("knee_V", "knee_se_V")
+    )
+
+
+@laws
+@given(seed=seeds, factor=st.floats(0.1, 2.4))
+def test_thresholds_scale_with_the_command(seed, factor):
+    tests = valve(seed)
+    scaled = [dataclasses.replace(test, u=factor * test.u) for test in tests]
+    knee, se = thresholds(tests)
+    knee_scaled, se_scaled = thresholds(scaled, IdentifyOptions(u_max=10 * factor))
+    np.testing.assert_allclose(knee_scaled, factor * knee, rtol=1e-9)
+    np.testing.assert_allclose(se_scaled, factor * se, rtol=1e-6)
+
+
+@laws
+@given(seed=seeds, factor=st.floats(0.1, 100))
+def test_the_size_of_the_valve_does_not_matter(seed, factor):
+    tests = valve(seed)
+    larger = [dataclasses.replace(test, q=factor * test.q) for test in tests]
+    np.testing.assert_allclose(thresholds(larger), thresholds(tests), rtol=1e-9)
+
+
+@laws
+@given(seed=seeds, longest=st.integers(2, 8))
+def test_lingering_in_the_dead_zone_does_not_move_a_quiet_meters_knees(seed, longest):
+    """Of a meter whose noise is below the flow that counts; a louder one is known better for it, see the other law."""
+    test, rng = ramp(1.0, seed, noise=0.02), np.random.default_rng(seed)
+    held = np.where(test.u < 4, rng.integers(1, longest + 1, test.u.size), 1)
+    index = np.repeat(np.arange(test.u.size), held)
+    again = np.concatenate([[False], np.diff(index) == 0])
+    longer = dataclasses.replace(
+        test,
+        time=np.arange(index.size) / RATE_HZ,
+        u=test.u[index],
+        q=np.where(again, rng.normal(0, 0.02 * L_MIN, index.size), test.q[index]),
+        dp=test.dp[index],
+    )
+    assert longer.u.size > 1.1 * test.u.size
+    np.testing.assert_allclose(thresholds([longer])[0], thresholds([test])[0], rtol=0, atol=1e-9)
+
+
+@laws
+@given(seed=seeds)
+def test_which_branch_comes_first_does_not_matter(seed):
+    """But for one sample: that at the turning point is counted to the sweep that it starts."""
+
+    def falling_first(test):
+        half = test.u.size // 2
+        order = np.concatenate([np.arange(half, test.u.size), np.arange(half)])
+        return dataclasses.replace(test, u=test.u[order], q=test.q[order], dp=test.dp[order])
+
+    knee, se = thresholds(valve(seed))
+    swapped, _ = thresholds([falling_first(test) for test in valve(seed)])
+    assert np.all(np.abs(swapped - knee) < se)
+
+
+def test_a_repeated_test_shrinks_the_error_by_the_root_of_two():
+    ratios, moves = [], []
+    for seed in range(8):
+        again = [dataclasses.replace(test, source="again " + test.source) for test in valve(seed + 100)]
+        knee, se = thresholds(valve(seed))
+        pooled, pooled_se = thresholds(valve(seed) + again)
+        ratios.append(pooled_se / se)
+        moves.append((pooled - knee) / se)
+    # How far the straight part reaches may change with the data, and the error with it: the law is of the average.
+    assert np.exp(np.mean(np.log(ratios))) == pytest.approx(2**-0.5, rel=0.1)
+    # The mean of two differs from the first by half of their difference: 0.7 standard errors.
+    assert np.sqrt(np.mean(np.square(moves))) == pytest.approx(2**-0.5, rel=0.35)

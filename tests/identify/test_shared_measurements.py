@@ -1,0 +1,76 @@
+"""The whole pipeline on ramp tests that the project did not make; skipped where they are not at hand."""
+
+import json
+
+import numpy as np
+import pytest
+
+from dzdesign.command_line.cli import main
+from tests.support.synthetic import SHARED, needs_compiler
+
+pytestmark = pytest.mark.skipif(
+    not SHARED.is_dir(), reason=f"the shared measurements are not at {SHARED} (set DZDESIGN_SHARED_DATA)"
+)
+#: 0.3 % of 10 V.
+KNEE_TOLERANCE_V = 0.03
+
+
+@pytest.fixture(scope="module", params=["a", "e"])
+def artefacts(request, tmp_path_factory):
+    folder = tmp_path_factory.mktemp(f"valve_{request.param}")
+    ramps = sorted(str(path) for path in (SHARED / f"valve_{request.param}").glob("*.csv.gz"))
+    assert len(ramps) == 6
+    assert main(["identify", *ramps, "-o", str(folder / "valve.json")]) == 0
+    return folder
+
+
+def test_knees_of_both_branches_at_every_pressure(artefacts):
+    truth = json.loads((SHARED / "truth.json").read_text())
+    valve = json.loads((artefacts / "valve.json").read_text())
+    tests = valve["sides"]["positive"]["tests"]
+    assert len(tests) == 6
+    for test in tests:
+        known = truth[test["source"].removesuffix(".csv.gz")]["pos"]
+        for branch in ("rising", "falling"):
+            error = test[f"u_knee_{branch}_V"] - known[f"u_knee_{branch}_15_50pct"]
+            assert abs(error) <= KNEE_TOLERANCE_V, (test["source"], branch, error)
+        assert test["q_max_L_min"] == pytest.approx(known["Qmax_true"], rel=0.02)
+    assert valve["sides"]["positive"]["trend"] == "decreasing"
+    assert valve["sides"]["positive"]["reference"]["dp_MPa"] == pytest.approx(1, abs=0.02)
+
+
+@needs_compiler
+def test_firmware_from_them_is_verified(artefacts, capsys):
+    assert main(["codegen", str(artefacts / "valve.json"), "-o", str(artefacts / "fw")]) == 0
+    assert main(["verify", str(artefacts / "fw"), "-o", str(artefacts / "evidence")]) == 0
+    evidence = json.loads((artefacts / "evidence" / "verification.json").read_text())
+    assert [(each["inputs"], each["wrong"]) for each in evidence["inputs"]] == [(33550336, 0)]
+    assert "33550336 inputs checked, 0 wrong" in capsys.readouterr().out
+
+
+def test_offset_passes_no_flow_that_the_meter_could_see(artefacts):
+    """At the certified offset, on the closing branch, the true flow is below the meter's floor at every pressure."""
+    truth = json.loads((SHARED / "truth.json").read_text())
+    side = json.loads((artefacts / "valve.json").read_text())["sides"]["positive"]
+    for test, beta in zip(side["tests"], side["beta"]["beta"], strict=True):
+        known = truth[test["source"].removesuffix(".csv.gz")]["pos"]
+        assert beta * side["reference"]["u_min_V"] < known["u_falling_Q0.6"]
+
+
+def test_measured_valve_without_pressure_is_one_pressure_and_says_so(tmp_path, capsys):
+    path = tmp_path / "valve.json"
+    assert main(["identify", str(SHARED / "real" / "pvp_psol.csv"), "-o", str(path)]) == 0
+    bracket = json.loads((SHARED / "real" / "brackets.json").read_text())["pvp_psol.csv"]
+    valve = json.loads(path.read_text())
+    (test,) = valve["sides"]["positive"]["tests"]
+    for branch in ("rising", "falling"):
+        assert abs(test[f"u_knee_{branch}_V"] - bracket[f"linear_knee_10_50pct_{branch}"]) <= 0.1
+    assert test["dp_MPa"] is None and valve["sides"]["positive"]["trend"] is None
+    assert "can't be said" in capsys.readouterr().out
+    # At its bound of the closing threshold the meter saw less than half a per cent of the largest flow.
+    u, q = np.loadtxt(SHARED / "real" / "pvp_psol.csv", delimiter=",", skiprows=1, usecols=(1, 2)).T
+    falling = np.arange(u.size) > np.argmax(u)
+    assert q[falling & (u <= test["u_guard_lower_V"])].max() < 0.005 * bracket["Qmax"]
+    assert main(["codegen", str(path), "-o", str(tmp_path / "fw")]) == 2
+    assert "without a pressure drop" in capsys.readouterr().err
+    assert not (tmp_path / "fw").exists()

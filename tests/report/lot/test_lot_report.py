@@ -1,0 +1,476 @@
+"""The report of a lot: what it leads with, that hashes decide what it shows, and that it names what stands out."""
+
+import csv
+import io
+import json
+import re
+import shutil
+from urllib.parse import unquote
+
+import numpy as np
+import pytest
+from many_valves import recordings, write_lot
+
+from dzdesign.batch.reasons import reason_groups
+from dzdesign.batch.results import Results
+from dzdesign.batch.table import SIDE_COLUMNS
+from dzdesign.command_line.cli import main
+from dzdesign.core.artefact_files import sha256_of, to_json
+from dzdesign.core.errors import InputError
+from dzdesign.report.lot.folder import lot_of
+from dzdesign.report.lot.report import report_of_lot
+from dzdesign.report.lot.sections import HEADINGS
+from dzdesign.report.lot.spread import FAR, quantiles, spread_of
+from tests.support.page_reader import HOSTILE, Page
+from tests.support.schema_checks import overlooked, problems
+from tests.support.synthetic_lots import lot_rows, write_lot_folder
+
+OPTIONS = ["--meter-lag", "0.1 s", "--target", "host", "--jobs", "1"]
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """Six valves through the command, two of them broken."""
+    folder = tmp_path_factory.mktemp("lot report")
+    write_lot(folder / "lot", 6, 2, 7)
+    assert main(["batch", str(folder / "lot"), "-o", str(folder / "out"), *OPTIONS]) == 1
+    return folder / "out"
+
+
+@pytest.fixture
+def copied(made, tmp_path):
+    return shutil.copytree(made, tmp_path / "out")
+
+
+@pytest.fixture
+def on_paper(tmp_path):
+    def write(rows, **options):
+        return write_lot_folder(tmp_path / "paper", rows, **options)
+
+    return write
+
+
+def downloads(html: str) -> dict[str, str]:
+    links = {each["download"]: each["href"] for each in Page(html).of("a") if "download" in each}
+    return {name: unquote(link.removeprefix("data:text/csv;charset=utf-8,")) for name, link in links.items()}
+
+
+def head(html: str) -> str:
+    return html[: html.index('<section id="failed">')]
+
+
+# --- what the command leaves -----------------------------------------------------------------------------------------
+
+
+def test_the_batch_writes_the_report_and_it_leads_with_the_verdict(made):
+    html = (made / "report.html").read_text(encoding="utf-8")
+    document = json.loads((made / "batch.json").read_bytes())
+    top = head(html)
+    assert "4 of 6 valves calibrated, 2 NOT" in top and "2 failed: V0001, V0004" in top
+    assert "SIMULATED recordings, not of measured valves: V0000" in top
+    assert document["warnings"]["simulated"] == [f"V000{at}" for at in (0, 2, 3, 5)]
+    for column in ("dead_zone_opening_percent", "dead_zone_closing_percent", "common_extra_dead_zone_percent"):
+        at = document["quantiles"][column]
+        assert f"{at['0.5']:.2f} %" in top and f"all from {at['0']:.2f} to {at['1']:.2f} %" in top
+    ids = [attributes["id"] for _, attributes in Page(html).tags if "id" in attributes]
+    assert [name for name, _ in HEADINGS] == [name for name in ids if name in dict(HEADINGS)]
+    assert len(ids) == len(set(ids))
+    assert {link["href"][1:] for link in Page(html).of("a") if link["href"].startswith("#")} <= set(ids)
+    hashes = [document["files"]["valves.csv"], document["common_setting"]["sha256"]]
+    assert all(digest in html for digest in (*hashes, sha256_of((made / "batch.json").read_bytes())))
+
+
+def test_report_makes_the_same_bytes_again(copied, capsys):
+    before = (copied / "report.html").read_bytes()
+    assert main(["report", str(copied)]) == 1
+    assert (copied / "report.html").read_bytes() == before
+    assert main(["report", str(copied), "-o", str(copied / "r.html"), "--json"]) == 1
+    out = capsys.readouterr().out
+    document = json.loads(out[out.index("{") :])
+    assert document["holds"] is False and document["faults"] == [] and document["report"].endswith("r.html")
+    assert (copied / "r.html").read_bytes() == before
+
+
+def test_the_json_of_the_command_names_the_report(made, capsys):
+    lot = made.parent / "lot"
+    assert main(["batch", str(lot), "-o", str(made), *OPTIONS, "--json"]) == 1
+    document = json.loads(capsys.readouterr().out)
+    assert document["report"] == str(made / "report.html")
+    assert "report" not in json.loads((made / "batch.json").read_bytes())  # where it lies is no content
+
+
+def test_a_lot_without_a_report_has_its_table(made, tmp_path, monkeypatch, capsys):
+    def too_large(_folder):
+        raise InputError("valves.csv is larger than 16 MiB")
+
+    monkeypatch.setattr("dzdesign.report.lot.report.report_of_lot", too_large)
+    out = shutil.copytree(made, tmp_path / "out")
+    assert main(["batch", str(made.parent / "lot"), "-o", str(out), *OPTIONS, "--json"]) == 1
+    said = capsys.readouterr()
+    assert json.loads(said.out)["report"] is None and "no report.html: valves.csv is larger" in said.err
+
+
+def test_a_table_too_large_for_a_page_is_one_sentence_and_leaves_no_page_of_an_earlier_run(
+    made, tmp_path, monkeypatch, capsys
+):
+    out = shutil.copytree(made, tmp_path / "out")
+    size = (out / "valves.csv").stat().st_size
+    monkeypatch.setattr("dzdesign.report.lot.folder.MOST_TABLE", size - 1)
+    assert main(["batch", str(made.parent / "lot"), "-o", str(out), *OPTIONS]) == 1  # of the valves, not of the page
+    said = capsys.readouterr()
+    (line,) = [line for line in said.err.splitlines() if "no report.html" in line]
+    assert "too large for one page; read the table itself, or calibrate the lot in parts" in line
+    assert not (out / "report.html").exists() and "to be read" not in said.out
+    assert main(["report", str(out)]) == 2 and "too large for one page" in capsys.readouterr().err
+    monkeypatch.setattr("dzdesign.report.lot.folder.MOST_TABLE", size)
+    assert main(["report", str(out)]) == 1 and (out / "report.html").exists()
+
+
+def test_what_is_odd_is_in_the_verdict_and_all_of_it_below(copied, tmp_path):
+    document = json.loads((copied / "batch.json").read_bytes())
+    assert document["oddities"] == [] and "odd:" not in head(report_of_lot(copied).html)
+    document["oddities"] = [f"V{at}, <b>V{at + 1}</b> share a recording" for at in range(5)]
+    (copied / "batch.json").write_text(json.dumps(document))
+    html = report_of_lot(copied).html
+    assert head(html).count("share a recording") == 3 and "odd: 2 more" in head(html)
+    assert html.count("share a recording.") == 5 and "<b>V1</b>" not in html
+    document["oddities"] = "two"
+    (copied / "batch.json").write_text(json.dumps(document))
+    with pytest.raises(InputError, match="'oddities'"):
+        report_of_lot(copied)
+    del document["oddities"]  # of an older version
+    (copied / "batch.json").write_text(json.dumps(document))
+    assert not report_of_lot(copied).faults
+
+
+def test_batch_json_fits_its_schema_and_every_fault_in_it_is_seen(made):
+    document = json.loads((made / "batch.json").read_bytes())
+    assert problems("batch", document) == []
+    assert overlooked("batch", document) == []
+    for key in set(document) - {"schema", "tool", "complete"}:
+        assert problems("batch", {name: value for name, value in document.items() if name != key}), key
+    setting = document["common_setting"]
+    assert setting["without_binding"]["left_out"]
+    for key in setting:
+        lacking = {name: value for name, value in setting.items() if name != key}
+        assert problems("batch", {**document, "common_setting": lacking}), key
+    for other in ({"why_not": "one valve only"}, {**setting, "without_binding": None}):
+        assert problems("batch", {**document, "common_setting": other}) == []
+    assert problems("batch", {**document, "common_setting": {**setting, "why_not": "both"}})
+    stopped = {key: document[key] for key in ("schema", "tool")} | {"complete": False}
+    assert problems("batch", {**stopped, "names": ["V1"]}) == [] and problems("batch", stopped)
+
+
+def test_every_valve_not_calibrated_has_its_reason_and_what_to_do(made):
+    text = " ".join(Page((made / "report.html").read_text(encoding="utf-8")).text.split())
+    assert "valve 'V0001' has no recording" in text and "expected files such as ramp_1MPa.csv" in text
+    assert "'ramp_dP1.csv' has no column of Q" in text and "expected names with units such as" in text
+
+
+def test_what_the_setting_would_cost_without_those_that_hold_it_down(made):
+    common = json.loads((made / "batch.json").read_bytes())["common_setting"]
+    without = common["without_binding"]
+    assert without["left_out"] == common["binding"] == ["V0003"]
+    with_all = json.loads((made / "batch.json").read_bytes())["quantiles"]["common_extra_dead_zone_percent"]
+    (at,) = without["quantiles"].values()
+    assert at["1"] < with_all["1"] and at["0.5"] < with_all["0.5"]
+    html = (made / "report.html").read_text(encoding="utf-8")
+    assert f"would cost {at['0.5']:.2f} % of command at the median valve" in html
+
+
+def test_one_valve_of_the_lot_has_its_own_report_and_one_without_calibration_its_reason(made, tmp_path, capsys):
+    assert "dzdesign report valves/NAME" in (made / "report.html").read_text(encoding="utf-8")
+    page = tmp_path / "one.html"
+    assert main(["report", str(made / "valves" / "V0002"), "-o", str(page)]) == 1  # not verified
+    html = page.read_text(encoding="utf-8")
+    for name in ("valve.json", "compensator.json", "firmware/manifest.json"):
+        assert sha256_of((made / "valves" / "V0002" / name).read_bytes()) in html
+    assert main(["report", str(made / "valves" / "V0001"), "-o", str(page)]) == 2
+    assert "was not calibrated: valve 'V0001' has no recording" in capsys.readouterr().err
+
+
+def test_the_tables_in_the_page_are_the_files(made):
+    tables = downloads((made / "report.html").read_text(encoding="utf-8"))
+    assert tables["valves.csv"] == (made / "valves.csv").read_text(encoding="utf-8")
+    rows = list(csv.DictReader(io.StringIO(tables["valves.csv"])))
+    shown = list(csv.DictReader(io.StringIO(tables["thresholds.csv"])))
+    opening = {row["valve"]: row["value"] for row in shown if row["quantity"] == "knee_opening_V"}
+    assert opening == {row["name"]: row["knee_opening_V"] for row in rows if row["status"] == "ok"}
+    assert {"law.csv", "order.csv", "left.csv", "common.csv", "spread.csv", "not-calibrated.csv"} <= set(tables)
+
+
+# --- files that do not fit -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("valves.csv", "valves.csv was changed since `dzdesign batch` wrote it"),
+        ("valves.parquet", "valves.parquet was changed since"),
+        ("common_compensator.json", "common_compensator.json was changed since"),
+        ("valves/V0002/valve.json", "not those that the table was made from (1): V0002/valve.json"),
+        ("valves/V0003/firmware/manifest.json", "V0003/firmware/manifest.json"),
+    ],
+)
+def test_a_file_that_was_changed_is_said_and_no_verdict_stands(copied, name, said):
+    (copied / name).write_bytes((copied / name).read_bytes() + b"\n")
+    report = report_of_lot(copied)
+    assert any(said in fault for fault in report.faults), report.faults
+    assert report.holds is False and "No verdict stands" in report.verdict
+    assert report.faults[0].partition("`")[0] in Page(head(report.html)).text
+
+
+def test_a_table_that_was_changed_is_not_shown(copied):
+    text = (copied / "valves.csv").read_text(encoding="utf-8")
+    (copied / "valves.csv").write_text(text.replace("V0002", "V9999"), encoding="utf-8")
+    html = report_of_lot(copied).html
+    assert "V9999" not in html and "<figure" not in html
+
+
+def test_counts_that_the_table_does_not_have(copied):
+    document = json.loads((copied / "batch.json").read_bytes())
+    (copied / "batch.json").write_text(to_json({**document, "calibrated": 6}))
+    assert any("the table has 4" in fault for fault in report_of_lot(copied).faults)
+
+
+def test_files_that_are_gone_are_missing(copied):
+    shutil.rmtree(copied / "valves")
+    (copied / "common_compensator.json").unlink()
+    report = report_of_lot(copied)
+    assert not report.faults and "4 of 6 valves" in report.verdict
+    assert [line.partition(":")[0] for line in report.missing] == [
+        "common_compensator.json", "the folders of the valves", "the evidence of each valve"
+    ]  # fmt: skip
+    (copied / "valves.csv").unlink()
+    assert "the table is not here" in report_of_lot(copied).verdict
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda text: text.replace("5.", "wide", 1), "is 'wide"),
+        (lambda text: text.replace("1.0,", "nan,", 1), "is 'nan', expected a number"),
+        (lambda text: text.replace("1.0,", "1e300,", 1), "is '1e300', expected a number"),
+        (lambda text: text.replace("offset_V", "ofset_V", 1), "lacks the column 'offset_V'"),
+        (lambda text: text + "V9,ok\n", "has 2 cells, expected"),
+        (lambda text: text.partition("\n")[0] + "\n", "has no valve"),
+        (lambda text: "", "lacks the column 'name'"),
+        (lambda text: text.replace("ok", "\ud800"), "no table in UTF-8"),
+    ],
+)
+def test_a_table_that_is_none_is_named(change, said, copied, capsys):
+    text = change((copied / "valves.csv").read_text(encoding="utf-8"))
+    content = text.encode(errors="surrogatepass")
+    (copied / "valves.csv").write_bytes(content)
+    document = json.loads((copied / "batch.json").read_bytes())
+    document["files"]["valves.csv"] = sha256_of(content)
+    (copied / "batch.json").write_text(to_json(document))
+    with pytest.raises(InputError, match=said):
+        report_of_lot(copied)
+    assert main(["report", str(copied)]) == 2 and "Traceback" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("key", ["files", "valves", "verified", "common_setting"])
+def test_a_batch_json_without_a_key_is_refused(key, copied):
+    document = json.loads((copied / "batch.json").read_bytes())
+    del document[key]
+    (copied / "batch.json").write_text(to_json(document))
+    with pytest.raises(InputError, match=f"lacks the key '{key}"):
+        report_of_lot(copied)
+
+
+# --- lots of every kind ----------------------------------------------------------------------------------------------
+
+
+def test_a_batch_that_was_stopped_says_what_is_there(copied):
+    Results(copied).begin([f"V{number:04d}" for number in range(9)])
+    shutil.rmtree(copied / "valves" / "V0005")
+    report = report_of_lot(copied)
+    assert report.verdict == "NOT FINISHED: 5 of 9 valves tried, 3 calibrated" and report.holds is False
+    assert any(line.startswith("4 of 9 valves, the table and the common setting") for line in report.missing)
+    assert report.html.count("<figure") == 4 and "made at the end of a batch" in report.html
+    assert "no-saturation" in report.html and "is a lower bound of the stroke" in report.html
+    shutil.rmtree(copied / "valves")
+    report = report_of_lot(copied)
+    assert "0 of 9 valves tried" in report.verdict and report.holds is None
+
+
+def test_good_is_only_a_lot_that_is_calibrated_and_verified(on_paper):
+    report = report_of_lot(on_paper(lot_rows(8), verified=True))
+    assert (report.kind, report.holds) == ("good", True)
+    report = report_of_lot(on_paper(lot_rows(8)))
+    assert (report.kind, report.holds) == ("open", None) and "NOT VERIFIED" in report.verdict
+    rows = lot_rows(8)
+    rows[3] |= {"status": "does not hold", "reason": "no flow at zero command: 0.2 L/min at 1 MPa"}
+    report = report_of_lot(on_paper(rows, verified=True))
+    assert (report.kind, report.holds) == ("bad", False) and "1 does not hold: V0003" in head(report.html)
+
+
+def test_a_lot_of_nothing_but_failures(on_paper):
+    report = report_of_lot(on_paper(lot_rows(5, failed=range(5))))
+    assert report.verdict == "NONE of 5 valves calibrated" and report.kind == "bad"
+    assert "<figure" not in report.html and "There is no common setting" in report.html
+
+
+def test_a_lot_of_one_valve(on_paper):
+    report = report_of_lot(on_paper(lot_rows(1)))
+    assert report.verdict.startswith("1 of 1 valves calibrated") and report.html.count("<figure") == 4
+    assert "lots of 8 calibrated valves or more" in report.html
+
+
+def test_a_bipolar_lot_shows_both_sides(on_paper):
+    rows = lot_rows(12, bipolar=True)
+    for column in SIDE_COLUMNS:
+        rows[4][f"negative_{column}"] = None  # a side that was refused
+    html = report_of_lot(on_paper(rows)).html
+    names = ("thresholds", "law", "order", "left")
+    assert all(f'id="figure-{name}-{side}"' in html for name in names for side in ("positive", "negative"))
+    assert "Negative commands: dP0 is 1 MPa" in html
+    table = csv.DictReader(io.StringIO(downloads(html)["spread.csv"]))
+    assert {row["quantity"]: row["valves"] for row in table}["negative_offset_V"] == "11"
+
+
+def mirrored(content: bytes) -> bytes:
+    """Return a ramp file of the other sign: command and flow are negative."""
+    table = [line.split(b",") for line in content.splitlines()]
+    turned = [
+        line if line[0][:1] in b"#t" else [line[0], b"-" + line[1], line[2], b"-" + line[3].lstrip(b"-")]
+        for line in table
+    ]
+    return b"\n".join(b",".join(line) for line in turned) + b"\n"
+
+
+def test_bipolar_valves_through_the_command(tmp_path, capsys):
+    for number in range(2):
+        folder = tmp_path / "lot" / f"V{number}"
+        folder.mkdir(parents=True)
+        for name, content in recordings(number, 7).items():
+            (folder / name).write_bytes(content)
+            (folder / f"negative_{name}").write_bytes(mirrored(content))
+    signal = ["--command-signal", "-10..10 V x 0.15 + 1.5 V", "--zero-window", "1 %"]
+    assert main(["batch", str(tmp_path / "lot"), "-o", str(tmp_path / "out"), *OPTIONS, *signal]) == 0
+    html = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "2 of 2 valves calibrated" in head(html) and "Negative side: it leaves" in html
+    assert 'id="figure-common"' in html and 'id="figure-left-negative"' in html
+    assert "positive: all from " in head(html) and "negative: all from " in head(html)
+
+
+def test_a_thousand_valves_fit_a_page(on_paper):
+    report = report_of_lot(on_paper(lot_rows(1000, failed=range(50, 1000, 97))))
+    assert "990 of 1\u202f000 valves calibrated, 10 NOT" in head(report.html)
+    assert len(report.html.encode()) < 3e6
+    assert report.html.count("<tr>") < 200 and ">V0051</td>" not in report.html
+    assert downloads(report.html)["valves.csv"].count("\n") == 1001
+
+
+# --- what stands out -------------------------------------------------------------------------------------------------
+
+
+def test_a_valve_far_from_the_rest_is_named_and_no_other(on_paper):
+    rows = lot_rows(60, seed=5)
+    rows[7]["offset_V"] = 4.2
+    html = report_of_lot(on_paper(rows)).html
+    (found,) = csv.DictReader(io.StringIO(downloads(html)["far-from-the-rest.csv"]))
+    assert (found["valve"], found["quantity"]) == ("V0007", "offset_V") and float(found["robust_sd_from_median"]) < -FAR
+    assert ">V0007</text>" in html  # in the figure too
+    assert "1 beyond 3.5 robust s.d." in head(html)
+    html = report_of_lot(on_paper(lot_rows(60, seed=5))).html
+    assert "far-from-the-rest.csv" not in html and "No valve lies there." in html
+
+
+def test_the_rule_is_blind_to_what_a_few_valves_do(on_paper):
+    """Of 40 valves nine may be anywhere: mean and standard deviation would hide them, median and MAD do not."""
+    rows = lot_rows(40)
+    for row in rows[:9]:
+        row["knee_opening_V"] = 9.0
+    spread = spread_of(rows, "knee_opening_V", "")
+    assert {name for name, _ in spread.far()} == {row["name"] for row in rows[:9]}
+    assert 0.06 < spread.deviation < 0.3  # of the others: 0.12
+
+
+def test_a_quantity_without_spread_makes_no_valve_far():
+    rows = [{**row, "beta_at_highest_dp": 1.0} for row in lot_rows(20)]
+    rows[3]["beta_at_highest_dp"] = 0.9
+    spread = spread_of(rows, "beta_at_highest_dp", "")
+    assert spread.limits is None and spread.far() == ()
+
+
+def test_reasons_of_one_kind_stand_together():
+    rows = lot_rows(20, failed=range(2, 20, 2))
+    rows[3] |= {"status": "failed", "reason": "unexpected ZeroDivisionError: of ours"}
+    rows[5] |= {"status": "does not hold", "reason": "every input: 7 wrong; see there"}
+    groups = reason_groups([row for row in rows if row["status"] != "ok"])
+    rows[7] |= {"status": "failed", "reason": "'a.csv' has 13 complete rows, expected at least 20 of a ramp test"}
+    (short,) = reason_groups([rows[7]])
+    assert (short.what, short.advice) == ("'a.csv' has 13 complete rows", "expected at least 20 of a ramp test")
+    assert [len(group.valves) for group in groups] == [9, 1, 1]
+    assert groups[0].what == "'ramp_dP1.csv' row …, column 'u_V': 'overload' is not a number"
+    assert groups[0].advice == "correct it, or leave the cell blank" and groups[0].valves[1] == ("V0004", "4")
+    assert groups[1].advice.startswith("a fault of dzdesign") and groups[2].what == "every input: 7 wrong; see there"
+
+
+# --- hostile text ----------------------------------------------------------------------------------------------------
+
+
+def test_nobodys_text_becomes_markup(on_paper):
+    """A table and a batch.json of somebody's making: their hashes fit."""
+    rows = lot_rows(20, failed=(3, 4))
+    clean = Page(report_of_lot(on_paper(rows)).html)
+    for place, name in enumerate(HOSTILE):
+        rows[10 + place]["name"] = name + "x" * 300 * (place == 2)
+        rows[10 + place]["offset_V"] = 1.0 + place / 10
+        rows[10 + place]["warnings"] = "<b>x</b> no-saturation"
+    rows[3] |= {"name": HOSTILE[0] + "y", "reason": " ".join(HOSTILE)}
+    html = report_of_lot(on_paper(rows)).html
+    page = Page(html)
+    kinds = {tag for tag, _ in page.tags}
+    drawn = {"g", "defs", "use", "text", "path", "rect", "clippath", "td", "span", "wbr"}
+    assert kinds <= {tag for tag, _ in clean.tags} | drawn
+    assert not [key for _, attributes in page.tags for key in attributes if key.startswith("on")]
+    assert "<script" not in html and "<img" not in html
+    outside = [
+        value
+        for _, attributes in page.tags
+        for key, value in attributes.items()
+        if key in ("src", "href", "xlink:href", "action") and not value.startswith(("#", "data:"))
+    ]
+    assert outside == []
+    assert HOSTILE[0] in page.text
+
+
+def test_names_reach_no_file_outside_of_the_valves(on_paper, tmp_path):
+    """A row whose name is a way out is said and not followed."""
+    rows = lot_rows(9)
+    (tmp_path / "secret").mkdir()
+    (tmp_path / "secret" / "valve.json").write_text("{}")
+    rows[0] |= {"name": "../../secret", "valve_json_sha256": sha256_of(b"{}")}
+    folder = on_paper(rows)
+    (folder / "valves").mkdir()
+    assert any("../../secret" in fault for fault in lot_of(folder).faults)
+
+
+@pytest.mark.parametrize(("count", "strip"), [(2, True), (10, True), (11, False), (60, False)])
+def test_of_few_valves_each_is_a_dot_with_its_name_and_of_many_there_are_bars(count, strip, tmp_path):
+    html = report_of_lot(write_lot_folder(tmp_path / "lot", lot_rows(count))).html
+    figure = re.search('id="figure-thresholds".*?</figure>', html, re.DOTALL)[0]
+    assert (">valves</text>" not in figure) is strip  # the axis that counts them
+    assert (">V0001</text>" in figure) is strip
+    assert ("5 and 95 %" in figure) is (count >= 20)
+    assert ("at one in twenty" in html or "5 to 95 % of the valves" in html) is (count >= 20)
+
+
+def test_valves_without_spread_have_a_figure(tmp_path):
+    row, *_ = lot_rows(1)
+    html = report_of_lot(write_lot_folder(tmp_path / "lot", [{**row, "name": name} for name in ("a", "b", "c")])).html
+    figure = re.search('id="figure-law".*?</figure>', html, re.DOTALL)[0]
+    assert ">all 3</text>" in figure and ">valves</text>" not in figure
+
+
+def test_the_median_of_an_even_lot_is_the_mean_of_the_two_middle_ones():
+    assert quantiles([4.0, 1.0, 2.0, 9.0])["0.5"] == 3.0 and quantiles([4.0, 1.0, 2.0])["0.5"] == 2.0
+    values = list(np.random.default_rng(5).normal(5, 1, 61).round(7))
+    for count in range(1, len(values)):
+        at = quantiles(values[:count])
+        assert (at["0"], at["1"]) == (min(values[:count]), max(values[:count]))  # of valves, that can be named
+        wanted = np.quantile(values[:count], [float(q) for q in at])
+        np.testing.assert_allclose(list(at.values()), wanted, atol=1e-7)

@@ -1,0 +1,240 @@
+"""report.html in a real browser: headless Chromium at two widths, light and dark, and printed."""
+
+import contextlib
+import json
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+
+from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of, to_json
+from dzdesign.report.lot.report import report_of_lot
+from dzdesign.report.valve_report import REPORT_NAME, report_of_folder
+from tests.support.synthetic import needs_compiler
+from tests.support.synthetic_lots import lot_rows, write_lot_folder
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+VIEWS = [(width, scheme) for width in (1280, 400) for scheme in ("light", "dark")]
+#: Of WCAG 2 AA; large or bold text may have less, but has as much here.
+CONTRAST = 4.5
+
+pytestmark = [needs_compiler, pytest.mark.skipif(CHROMIUM is None, reason="no Chromium (chromium) on the path")]
+
+#: Of every text that is seen: its colour on the first opaque background behind it, as a ratio.
+CONTRASTS = """() => {
+  const channel = v => (v /= 255) <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4;
+  const light = c => 0.2126 * channel(c[0]) + 0.7152 * channel(c[1]) + 0.0722 * channel(c[2]);
+  const parse = s => { const n = s.match(/[\\d.]+/g).map(Number); return n.length > 3 && n[3] < 1 ? null : n; };
+  const behind = e => { for (; e; e = e.parentElement) {
+    const c = parse(getComputedStyle(e).backgroundColor); if (c) return c; } return [255, 255, 255]; };
+  const found = [];
+  const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  while (walker.nextNode()) {
+    const e = walker.currentNode.parentElement;
+    if (!walker.currentNode.data.trim() || e.closest('style, .skip')) continue;
+    const style = getComputedStyle(e), colour = parse(e.closest('svg') ? style.fill : style.color);
+    if (!colour) continue;
+    const [a, b] = [light(colour), light(behind(e))].sort((x, y) => y - x);
+    found.push([(a + 0.05) / (b + 0.05), walker.currentNode.data.trim().slice(0, 40), style.color]);
+  }
+  return found.sort((x, y) => x[0] - y[0]);
+}"""
+SIZES = """() => [...document.querySelectorAll('svg, img')].map(e => {
+  const box = e.getBoundingClientRect(); return [box.width, box.height]; })"""
+IMAGES = """async () => Promise.all([...document.querySelectorAll('svg image')].map(async e => {
+  const image = new Image(); image.src = e.getAttribute('xlink:href') || e.getAttribute('href');
+  await image.decode(); return image.naturalWidth; }))"""
+LOST_LINKS = """() => [...document.querySelectorAll('a[href^="#"]')].map(a => a.getAttribute('href'))
+  .filter(href => !document.getElementById(decodeURIComponent(href.slice(1))))"""
+DOWNLOADS = """async () => Promise.all([...document.querySelectorAll('a[download]')].map(async a =>
+  [a.download, await (await fetch(a.href)).text()]))"""
+#: What reaches beyond the page's right edge without a box that scrolls around it.
+BEYOND = """() => [...document.querySelectorAll('main *, nav *')].filter(e =>
+    e.getBoundingClientRect().right > document.documentElement.clientWidth + 1 &&
+    !e.closest('.scroll, .formula, .long')).map(e => e.tagName + ' ' + e.textContent.slice(0, 40))"""
+
+
+#: Words of a table or of a number that matters which stand on two lines, unless they may be broken: names, hashes.
+SPLIT = """() => {
+  const found = [], range = document.createRange();
+  for (const e of document.querySelectorAll('td, th, .numbers')) {
+    const walker = document.createTreeWalker(e, NodeFilter.SHOW_TEXT);
+    while (walker.nextNode()) {
+      const text = walker.currentNode;
+      if (text.parentElement.closest('math, .breaks, .hash')) continue;
+      for (const word of text.data.matchAll(/[\\p{L}\\p{N}]{2,}/gu)) {
+        range.setStart(text, word.index);
+        range.setEnd(text, word.index + word[0].length);
+        const tops = [...range.getClientRects()].filter(box => box.width).map(box => Math.round(box.top));
+        if (new Set(tops).size > 1) found.push(word[0]);
+      }
+    }
+  }
+  return found;
+}"""
+#: CSS pixels between the margins of the page that the style sheet prints on: 210 mm less 2 x 14 mm.
+PAPER = 688
+
+
+@pytest.fixture(scope="module")
+def browser():
+    # Imported where a browser is: the driver starts a process of its own.
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as driver:
+        flags = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []  # Chromium's rule for root
+        with contextlib.closing(driver.chromium.launch(executable_path=CHROMIUM, args=flags)) as started:
+            yield started
+
+
+@pytest.fixture(scope="module")
+def pages(reported_demo, tmp_path_factory):
+    """The report of the demo; of one that fails with long names; of a valve alone; of a lot with hostile names."""
+    folder = tmp_path_factory.mktemp("pages")
+    failing = folder / "failing"
+    shutil.copytree(reported_demo, failing)
+    evidence = json.loads((failing / "evidence" / "verification.json").read_bytes())
+    evidence["holds"] = False
+    evidence["checks"][1].update(holds=False, text="unbroken" * 60)
+    evidence["checks"][2].update(holds=None, text="<b>was not</b> tried")
+    content = to_json(evidence).encode()
+    (failing / "evidence" / "verification.json").write_bytes(content)
+    manifest = json.loads((failing / "evidence" / MANIFEST_NAME).read_bytes())
+    manifest["files"]["verification.json"] = sha256_of(content)
+    (failing / "evidence" / MANIFEST_NAME).write_text(to_json(manifest))
+    alone = folder / "alone"
+    alone.mkdir()
+    valve = json.loads((reported_demo / "valve.json").read_bytes())
+    valve["record"] = {"serial": "4711", "n" * 60: "unbroken" * 25, "oil": "HLP 46, 40 °C"}
+    (alone / "valve.json").write_text(to_json(valve))
+    for place in (failing, alone):
+        (place / REPORT_NAME).write_text(report_of_folder(place).html, encoding="utf-8")
+    rows = lot_rows(80, failed=(3, 4, 50))
+    rows[7] |= {"name": "unbroken" * 12, "offset_V": 4.2, "knee_opening_V": 4.4}
+    rows[8] |= {"name": "\u5f01 <b>7</b>", "offset_V": 4.25}
+    rows[3] |= {"name": "no-blank-in-it-" * 6, "reason": "unbroken" * 60}
+    write_lot_folder(folder / "lot", rows)
+    (folder / "lot" / REPORT_NAME).write_text(report_of_lot(folder / "lot").html, encoding="utf-8")
+    return {
+        "lot": folder / "lot" / REPORT_NAME,
+        "demo": reported_demo / "evidence" / REPORT_NAME,
+        "failing": failing / REPORT_NAME,
+        "valve alone": alone / REPORT_NAME,
+    }
+
+
+@contextlib.contextmanager
+def opened(browser, path: Path, width: int = 1280, scheme: str = "light"):
+    """A page, and what its console said and which requests it made beyond the file."""
+    context = browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme)
+    page, heard = context.new_page(), []
+    page.on("console", lambda message: heard.append(f"console: {message.text}"))
+    page.on("pageerror", lambda error: heard.append(f"error: {error}"))
+    page.on("requestfailed", lambda request: heard.append(f"failed: {request.url[:80]}"))
+    page.on("request", lambda request: request.url.startswith(("file:", "data:")) or heard.append(request.url))
+    page.goto(path.as_uri())
+    try:
+        yield page, heard
+    finally:
+        context.close()
+
+
+@pytest.mark.parametrize("name", ["demo", "failing", "valve alone", "lot"])
+@pytest.mark.parametrize(("width", "scheme"), VIEWS)
+def test_a_page_is_quiet_whole_and_readable(browser, pages, name, width, scheme):
+    with opened(browser, pages[name], width, scheme) as (page, heard):
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        assert page.evaluate(BEYOND) == [] and page.evaluate(SPLIT) == []
+        sizes = page.evaluate(SIZES)
+        assert len(sizes) == {"demo": 8, "failing": 8, "valve alone": 3, "lot": 4}[name]
+        assert all(wide > 300 and high > 100 for wide, high in sizes)
+        poor = [found for found in page.evaluate(CONTRASTS) if found[0] < CONTRAST]
+        assert poor == []
+        assert page.evaluate(LOST_LINKS) == []
+        dark = page.evaluate("getComputedStyle(document.body).backgroundColor") != "rgb(255, 255, 255)"
+        assert dark == (scheme == "dark")
+        assert heard == []
+
+
+#: By how much each box's content is wider than the box.
+SCROLLS = """selector => [...document.querySelectorAll(selector)].map(e => e.scrollWidth - e.clientWidth)"""
+
+
+@pytest.mark.parametrize("name", ["demo", "valve alone"])
+def test_nothing_scrolls_sideways_on_a_wide_page_and_no_figure_on_a_narrow_one(browser, pages, name):
+    with opened(browser, pages[name]) as (page, _):
+        assert max(page.evaluate(SCROLLS, ".scroll")) == 0
+        assert not page.locator(".large").first.is_visible()
+    with opened(browser, pages[name], width=400) as (page, _):
+        assert max(page.evaluate(SCROLLS, "figure .scroll")) == 0
+        page.locator(".large input").first.check()
+        wider = page.evaluate(SCROLLS, "figure .scroll")
+        assert wider[0] > 250 and max(wider[1:]) == 0
+
+
+def test_the_raster_decodes_and_the_numbers_can_be_fetched(browser, pages):
+    with opened(browser, pages["demo"]) as (page, heard):
+        widths = page.evaluate(IMAGES)
+        assert widths and all(widths)
+        tables = dict(page.evaluate(DOWNLOADS))
+        assert len(tables) == 9
+        evidence = pages["demo"].parent
+        assert tables["zero-positive.csv"] == (evidence / "zero_command_positive.csv").read_text()
+        with page.expect_download() as waiting:
+            page.click('a[download="beta-positive.csv"]')
+        assert Path(waiting.value.path()).read_text(encoding="utf-8") == tables["beta-positive.csv"]
+        assert heard == []
+
+
+def test_a_failing_verdict_is_larger_than_a_good_one(browser, pages):
+    shown = {}
+    for name in ("demo", "failing"):
+        with opened(browser, pages[name]) as (page, _):
+            script = "e => [parseFloat(getComputedStyle(e).fontSize), e.getBoundingClientRect().bottom]"
+            shown[name] = page.eval_on_selector(".verdict .words", script)
+    assert shown["failing"][0] > 1.3 * shown["demo"][0]
+    assert max(bottom for _, bottom in shown.values()) < 900  # seen without scrolling
+
+
+def test_it_prints_on_light_paper_without_what_only_a_screen_needs(browser, pages, tmp_path):
+    with opened(browser, pages["demo"], scheme="dark") as (page, heard):
+        shown = "getComputedStyle(document.querySelector('.signatures')).display"
+        assert page.evaluate(shown) == "none"
+        page.emulate_media(media="print")
+        assert page.evaluate(shown) == "grid"
+        assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
+        assert page.evaluate("getComputedStyle(document.querySelector('nav')).display") == "none"
+        assert [found for found in page.evaluate(CONTRASTS) if found[0] < CONTRAST] == []
+        paper = page.pdf(path=tmp_path / "report.pdf", prefer_css_page_size=True)
+        assert paper.startswith(b"%PDF") and 6 <= paper.count(b"/Type /Page\n") <= 13, "a page is left half empty"
+        assert heard == []
+
+
+@pytest.mark.parametrize("name", ["demo", "failing", "valve alone"])
+def test_nothing_runs_off_the_paper(browser, pages, name):
+    with opened(browser, pages[name], width=PAPER) as (page, _):
+        page.emulate_media(media="print")
+        assert page.evaluate(BEYOND.replace("!e.closest('.scroll, .formula, .long')", "true")) == []
+        assert page.evaluate(SPLIT) == []
+
+
+def test_the_checks_see_what_they_must(browser, pages, tmp_path):
+    """Each fault is seeded, and each check is seen to find it."""
+    text = pages["valve alone"].read_text(encoding="utf-8")
+    broken = text.replace(
+        "</main>",
+        '<p style="width:3000px;color:#ddd">wide and pale</p><a href="#nowhere">x</a>'
+        '<table style="width:1px"><td style="overflow-wrap:anywhere;min-width:0">headroom</td></table>'
+        '<img src="missing.png"><script>console.log(1)</script></main>',
+    )
+    path = tmp_path / "broken.html"
+    path.write_text(broken, encoding="utf-8")
+    with opened(browser, path) as (page, heard):
+        assert page.evaluate("document.documentElement.scrollWidth") > 1280
+        assert page.evaluate(BEYOND)
+        assert page.evaluate(SPLIT) == ["headroom"]
+        assert [found for found in page.evaluate(CONTRASTS) if found[0] < CONTRAST]
+        assert page.evaluate(LOST_LINKS) == ["#nowhere"]
+        assert min(wide for wide, _ in page.evaluate(SIZES)) < 300
+        assert {words.partition(":")[0] for words in heard} == {"console", "failed"}

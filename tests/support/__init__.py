@@ -1,0 +1,1 @@
+"""What tests share: recordings with a known truth, models of devices, readers of pages, folders."""

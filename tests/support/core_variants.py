@@ -1,0 +1,95 @@
+"""The core in every form that its options give it, from the goldens' valve: what a check of the C's text runs over."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from fractions import Fraction
+from functools import cache
+from itertools import product
+
+from dzdesign.codegen.project import Firmware, generate, target_named
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.designing import design
+from dzdesign.design.options import DesignOptions
+from dzdesign.design.signal_text import Converter, command_signal, parse_signal, pressure_signal
+from dzdesign.design.signals import Signals
+from dzdesign.identify.fitting.guard_curve import OpeningCurve
+from dzdesign.identify.valve.model import SideModel
+from dzdesign.identify.valve.valve_file import valve_from_document
+from tests.support.golden_firmware import GOLDENS
+
+#: One target of each arithmetic, products of 32x32->64 bits and none longer than 32 bits.
+TARGETS = {"wide": "f28335", "narrow": "avr"}
+ADC = Converter()
+
+
+def _command(text: str, **options):
+    return command_signal(parse_signal(text, "--command-signal"), ADC, **options)
+
+
+def _sensor(text: str):
+    return pressure_signal(parse_signal(text, "--pressure-a"), ADC, Fraction(20))
+
+
+BOTH = _command("-10..10 V x 0.15 + 1.5 V")
+UNLIKE = {
+    "pressure_a": _sensor("4..20 mA on 149 ohm = 25 MPa"),
+    "pressure_b": _sensor("0.5..4.5 V x 0.6 = 160 bar"),
+}
+AMPLIFIER = {
+    "ramp_up_s": (0.5, 0.8),
+    "ramp_down_s": (0.3, 0.0),
+    "dither_Hz": 150.0,
+    "dither_peak": Fraction(1, 100),
+    "output_max": Fraction(9, 10),
+}
+#: Name to the options of `design`; "signals" are those that differ from the target's own.
+VARIANTS = {
+    "plain": {},
+    "target law": {"law_name": "target"},
+    "edge": {"edge": Fraction(1, 100)},
+    "target law, edge": {"law_name": "target", "edge": Fraction(1, 100)},
+    "live zero": {"signals": UNLIKE | {"command": _command("4..20 mA on 149 ohm")}},
+    "inverted": {"signals": {"command": _command("0..10 V x 0.3", inverted=True)}, **AMPLIFIER},
+    "bipolar": {"signals": {"command": BOTH}},
+    "bipolar, all options": {"signals": UNLIKE | {"command": BOTH, "swapped": True}, "edge": Fraction(1, 100)}
+    | AMPLIFIER,
+}  # fmt: skip
+NAMES = tuple(product(VARIANTS, TARGETS))
+
+
+@cache
+def variant(name: str, arithmetic: str) -> Compensator:
+    """Design a variant for the target of that arithmetic."""
+    target = target_named(TARGETS[arithmetic])
+    content = (GOLDENS / "valve.json").read_bytes()
+    valve = valve_from_document(content, "valve.json")
+    options = dict(VARIANTS[name])
+    given = options.pop("signals", {})
+    signals = Signals(compare_max=target.compare_max, sample_Hz=target.sample_Hz, tick_Hz=target.tick_Hz, **given)
+    sides = {side: _with_opening_curve(valve.sides["positive"]) for side in ("positive", "negative")}
+    if len(signals.signs) == 1:
+        del sides["negative"]
+    valve = replace(valve, sides=sides)
+    return design(valve, DesignOptions(signals=signals, **options))
+
+
+def _with_opening_curve(side: SideModel) -> SideModel:
+    """Add where the rising branch's knees are: the goldens' valve was identified before that curve was kept."""
+    curve = OpeningCurve(
+        dp_MPa=tuple(test.dp_MPa for test in side.tests),
+        u_V=tuple(test.u_knee_rising_V for test in side.tests),
+        u_se_V=tuple(0.001 for _ in side.tests),
+    )
+    return replace(side, opening_curve=curve)
+
+
+def firmware(name: str, arithmetic: str) -> Firmware:
+    """Generate a variant's firmware."""
+    return generate(variant(name, arithmetic), TARGETS[arithmetic])
+
+
+def core_files(name: str, arithmetic: str) -> Iterator[tuple[str, str]]:
+    """Give name and text of each file of a variant's core."""
+    for path, text in firmware(name, arithmetic).files.items():
+        if path.startswith("core/"):
+            yield path.removeprefix("core/"), text

@@ -1,0 +1,110 @@
+"""The goldens: what every target's files were from one small compensator.json, and how they are made anew.
+
+The second set, `FULL`, has everything switched on: a valve of two unlike sides, an edge, ramps, dither, a largest
+output, 4-20 mA sensors of unlike spans.
+"""
+
+import difflib
+import shutil
+from collections.abc import Mapping
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+from dzdesign.codegen.project import generate, target_named, targets
+from dzdesign.core.artefact_files import to_json
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.compensator_file import compensator_document, compensator_from_document
+from dzdesign.design.designing import design
+from dzdesign.design.options import DesignOptions
+from dzdesign.design.signal_text import Converter, command_signal, parse_signal, pressure_signal
+from dzdesign.design.signals import Signals
+from dzdesign.identify.valve.valve_file import valve_from_document
+from tests.support.paths import TESTS
+
+GOLDENS = TESTS / "goldens"
+FULL = TESTS / "goldens_full"
+FULL_TARGETS = ("avr", "cortex-m4", "f28335")
+#: Not compared: it is what goes in.
+INPUT = "compensator.json"
+LINES_SHOWN = 60
+
+
+def full_options(**changes) -> DesignOptions:
+    """Every option switched on."""
+    adc = Converter()
+
+    def sensor(text: str) -> object:
+        return pressure_signal(parse_signal(text, "--pressure-a"), adc, Fraction(20))
+
+    signals = Signals(
+        command=command_signal(parse_signal("-10..10 V x 0.15 + 1.5 V", "--command-signal"), adc),
+        pressure_a=sensor("4..20 mA on 149 ohm = 25 MPa"),
+        pressure_b=sensor("4..20 mA on 140 ohm = 16 MPa"),
+        swapped=True,
+    )
+    chosen = {
+        "signals": signals,
+        "edge": Fraction(1, 100),
+        "ramp_up_s": (0.5, 0.8),
+        "ramp_down_s": (0.4, 0.0),
+        "dither_Hz": 150.0,
+        "dither_peak": Fraction(1, 100),
+        "output_max": Fraction(95, 100),
+    }
+    return DesignOptions(**(chosen | changes))
+
+
+def golden_compensator(target_name: str, root: Path = GOLDENS) -> Compensator:
+    """The fixed compensator, with the scalings of a target that has its own."""
+    target = target_named(target_name)
+    compensator = compensator_from_document((root / INPUT).read_bytes(), INPUT)
+    if target.takes_any_signals or root == FULL:
+        return compensator
+    return replace(
+        compensator,
+        signals=replace(compensator.signals, compare_max=target.compare_max),
+        amplifier=replace(compensator.amplifier, compare_limit=target.compare_max),
+    )
+
+
+def golden_files(target_name: str, root: Path = GOLDENS) -> dict[str, str]:
+    """Generate a target's files from the fixed compensator."""
+    compensator = golden_compensator(target_name, root)
+    files = dict(generate(compensator, target_name, to_json(compensator_document(compensator)).encode()).files)
+    del files[INPUT]
+    return files
+
+
+def differences(folder: Path, files: Mapping[str, str]) -> str:
+    """Return what a person wants to know about files that are not those of the folder; empty if they are."""
+    kept = {path.relative_to(folder).as_posix(): path for path in sorted(folder.rglob("*")) if path.is_file()}
+    said = [f"{folder.name}/{name}: no golden\n" for name in sorted(files.keys() - kept.keys())]
+    said += [f"{folder.name}/{name}: a golden that is not generated\n" for name in sorted(kept.keys() - files.keys())]
+    for name in sorted(files.keys() & kept.keys()):
+        golden = kept[name].read_text(encoding="utf-8")
+        label = f"{folder.name}/{name}"
+        diff = difflib.unified_diff(
+            golden.splitlines(True), files[name].splitlines(True), f"golden {label}", f"generated {label}"
+        )
+        said += list(diff)
+    if len(said) > LINES_SHOWN:
+        said = [*said[:LINES_SHOWN], f"... and {len(said) - LINES_SHOWN} lines more\n"]
+    return "".join(said)
+
+
+def update() -> None:
+    """Design the compensators anew from their valve.json, and write every target's files."""
+    every = tuple(target.name for target in targets())
+    for root, names, options in ((GOLDENS, every, None), (FULL, FULL_TARGETS, full_options())):
+        content = (root / "valve.json").read_bytes()
+        document = compensator_document(design(valve_from_document(content, "valve.json"), options, content))
+        (root / INPUT).write_text(to_json(document), encoding="utf-8", newline="\n")
+        for folder in root.iterdir():
+            if folder.is_dir():
+                shutil.rmtree(folder)
+        for target in names:
+            for name, text in golden_files(target, root).items():
+                path = root / target / name
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_text(text, encoding="utf-8", newline="\n")

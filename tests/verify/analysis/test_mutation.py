@@ -1,0 +1,186 @@
+"""Faults seeded in the C by verify itself: what is made, and that each verdict is given where it is due."""
+
+import json
+import random
+import shutil
+
+import pytest
+
+from dzdesign.codegen.project import generate
+from dzdesign.command_line.cli import main
+from dzdesign.core.artefact_files import write_folder
+from dzdesign.core.errors import RequirementError
+from dzdesign.design.designing import design
+from dzdesign.design.options import DesignOptions
+from dzdesign.verify.analysis import mutation
+from dzdesign.verify.analysis.c_mutants import Mutant, mutants_of
+from dzdesign.verify.analysis.mutation import (
+    KILLED,
+    REFUSED,
+    SAME_OBJECT,
+    SAME_OUTPUTS,
+    SURVIVED,
+    MutationBench,
+    all_mutants,
+    judge_all,
+    mutation_check,
+    mutation_document,
+)
+from dzdesign.verify.exhaustive.drive_check import FIELDS, CompiledDrive, PreparedDrive
+from tests.support.golden_firmware import FULL, GOLDENS, INPUT
+from tests.support.synthetic import needs_compiler
+
+pytestmark = needs_compiler
+#: Of the hundreds of a firmware, those that every run of the tests tries; `make bench-verify` tries all.
+TRIED, SEED = 12, 5
+
+
+def bench_of(root, target: str, folder) -> MutationBench:
+    shutil.copytree(root / target, folder)
+    shutil.copy(root / INPUT, folder / INPUT)
+    return MutationBench(folder)
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory):
+    return bench_of(GOLDENS, "f28335", tmp_path_factory.mktemp("plain") / "fw")
+
+
+@pytest.fixture(scope="module")
+def full(tmp_path_factory):
+    return bench_of(FULL, "f28335", tmp_path_factory.mktemp("full") / "fw")
+
+
+def edited(bench: MutationBench, file: str, old: str, new: str) -> Mutant:
+    text = bench.sources[file]
+    assert text.count(old) >= 1, old
+    return Mutant(file=file, line=0, change=f"{old} -> {new}", text=text.replace(old, new, 1))
+
+
+def changes(text: str) -> list[str]:
+    return [mutant.text for mutant in mutants_of("a.c", text)]
+
+
+def test_every_constant_comparison_and_operator_is_changed():
+    assert changes("x = 7u;") == ["x = 8u;", "x = 6u;"]
+    assert changes("UINT32_C(0x10)") == ["UINT32_C(17)", "UINT32_C(15)"]
+    assert changes("x = 0;") == ["x = 1;"]
+    assert changes("a < b") == ["a <= b"] and changes("a >= b") == ["a > b"] and changes("a == b") == ["a != b"]
+    assert (
+        changes("a + b") == ["a - b"] and changes("f(x) - b") == ["f(x) + b"] and changes("a[i] >> b") == ["a[i] << b"]
+    )
+    assert changes("x = -y;") == ["x = y;"] and changes("return -y;") == ["return y;"] and changes("~y & z") == [
+        "y & z", "~y | z"]  # fmt: skip
+    assert changes("d->n++;") == ["d->n--;"] and changes("n += m;") == ["n -= m;"]
+
+
+def test_names_comments_and_includes_are_left_alone():
+    assert changes('/* 1 + 1 */ #include "dz_comp.h"\n#ifndef DZ_1\n#define DZ_1\n#endif\nuint16_t a1; // 2\n') == []
+    assert changes("#define STEP 64u\n") == ["#define STEP 65u\n", "#define STEP 63u\n"]
+    assert changes("struct a *f(const int *b, uint16_t c);") == []
+
+
+def test_a_mutant_says_where_it_is():
+    (one, _) = mutants_of("a.c", "int a;\nint b = 5;\n")
+    assert (one.file, one.line, one.change) == ("a.c", 2, "int b = 5;: 5 -> 6")
+
+
+def test_the_original_passes_and_a_wrong_one_is_no_bench(plain, tmp_path):
+    plain.check_original()
+    bench = bench_of(GOLDENS, "f28335", tmp_path / "fw")
+    source = tmp_path / "fw" / "core" / "dz_comp.c"
+    source.write_text(source.read_text().replace("#define STEP_CODES 64u", "#define STEP_CODES 63u"))
+    with pytest.raises(RequirementError, match="the firmware itself fails"):
+        MutationBench(tmp_path / "fw").check_original()
+    assert bench.judge(edited(bench, "dz_comp.c", "STEP_CODES 64u", "STEP_CODES 63u")).verdict == KILLED
+
+
+#: By hand, one a verdict.
+JUDGED = [
+    ("dz_comp.c", "#define REVERSE 40u", "#define REVERSE 41u", KILLED),
+    ("dz_comp.c", "return (uint16_t)((invalid_command", "return (uint16_t)(((invalid_command", REFUSED),
+    ("dz_comp.c", "/* The law, Eq. (18):", "/* The law:", SAME_OBJECT),
+    ("dz_comp.h", "DZ_ADC_CODE_MAX 4095u", "DZ_ADC_CODE_MAX 4096u", SAME_OBJECT),
+    ("dz_comp.c", "#define HALF UINT64_C(586263035904)", "#define HALF UINT64_C(586263035905)", SAME_OUTPUTS),
+    ("dz_drive.c", "drive->status = 0u;", "drive->status = 1u;", KILLED),
+    ("dz_drive.c", "drive->law = dz_comp(u_adc", "drive->law = dz_comp(p_a_adc", KILLED),
+]
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "verdict"), JUDGED, ids=[f"{each[3]} {i}" for i, each in enumerate(JUDGED)]
+)
+def test_a_verdict_is_given_where_it_is_due(plain, file, old, new, verdict):
+    outcome = plain.judge(edited(plain, file, old, new))
+    assert outcome.verdict == verdict, outcome
+    document = mutation_document([outcome, plain.judge(edited(plain, *JUDGED[0][:3]))])
+    assert mutation_check(document).holds
+    assert [row["verdict"] for row in document["not_killed"]] == ([] if verdict == KILLED else [verdict])
+
+
+def test_a_fault_that_no_converter_shows_survives(plain):
+    """At codes that the check of codes that are not sound does not try: the random triples tell."""
+    head = "uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)\n{"
+    text = plain.sources["dz_comp.c"].replace(head, "static " + head.replace("dz_comp", "right"))
+    text += f"{head}\n    const uint16_t beyond = p_a_adc > 5000u && p_a_adc < 60000u;\n"
+    text += "    return (uint16_t)(right(u_adc, p_a_adc, p_b_adc) ^ beyond);\n}\n"
+    outcome = plain.judge(Mutant(file="dz_comp.c", line=0, change="beyond", text=text))
+    assert outcome.verdict == SURVIVED
+    check = mutation_check(mutation_document([outcome, plain.judge(edited(plain, *JUDGED[0][:3]))]))
+    assert not check.holds and check.text.endswith("1 survived")
+
+
+@pytest.mark.parametrize("name", ["plain", "full"])
+def test_a_part_of_all_mutants_is_killed_or_equivalent(name, request):
+    bench = request.getfixturevalue(name)
+    every = all_mutants(bench)
+    assert {mutant.file for mutant in every} >= {"dz_comp.c", "dz_comp.h", "dz_drive.c"} and len(every) > 300
+    document = mutation_document(judge_all(bench, random.Random(SEED).sample(every, TRIED)))
+    assert document["survived"] == 0 and document["refused"] == 0
+    assert document["killed"] >= 0.7 * TRIED
+    assert sum(document["killers"].values()) == document["killed"]
+
+
+def test_the_command_line_adds_the_row_and_the_list(firmware_folder, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(mutation, "all_mutants", lambda bench: [edited(bench, *JUDGED[k][:3]) for k in (0, 3)])
+    assert main(["verify", str(firmware_folder), "--mutate", "-o", str(tmp_path / "evidence")]) == 0
+    out = capsys.readouterr().out
+    assert "holds  wrong C is caught: 1 of 2 mutants killed, 1 equivalent (1 of the same object code" in out
+    assert "same object code, dz_comp.h line 0: DZ_ADC_CODE_MAX 4095u -> DZ_ADC_CODE_MAX 4096u" in out
+    document = json.loads((tmp_path / "evidence" / "verification.json").read_text())
+    assert document["mutants"]["killed"] == 1 and document["holds"]
+    assert [check["holds"] for check in document["checks"] if check["name"] == "the drive follows its model"] == [True]
+
+
+def test_a_negative_side_and_the_drive_of_both_have_their_killers(full):
+    for file, old, new, killer in (
+        ("dz_comp_negative.c", "#define REVERSE ", "#define REVERSE 1", "inputs"),
+        ("dz_drive.c", "command > WINDOW_CODES", "command >= WINDOW_CODES", "drive"),
+        ("dz_drive.c", "drive->ticks >= DITHER_PERIOD", "drive->ticks > DITHER_PERIOD", "drive"),
+    ):
+        outcome = full.judge(edited(full, file, old, new))
+        assert outcome.verdict == KILLED and killer in outcome.killer, outcome
+
+
+def test_a_fault_high_up_a_slow_ramp_is_seen(example_valve, tmp_path):
+    """Twenty seconds from end to end: samples alone would not get there."""
+    compensator = design(example_valve, DesignOptions(ramp_up_s=(20.0, 20.0), ramp_down_s=(20.0, 20.0)))
+    made = generate(compensator, "f28335")
+    write_folder(tmp_path / "fw", made.files, made.manifest)
+    drive, prepared = CompiledDrive(tmp_path / "fw"), PreparedDrive(compensator)
+    assert drive.check(prepared).wrong == 0
+    text = drive.sources["dz_drive.c"].decode()
+    right, wrong = "command = ramped / RAMP_UNIT;", "command = (ramped > 3800 * RAMP_UNIT) ? 0 : (ramped / RAMP_UNIT);"
+    assert text.count(right) == 1
+    assert drive.edited("dz_drive.c", text.replace(right, wrong).encode()).check(prepared).wrong > 0
+
+
+def test_a_wrong_drive_is_named_by_field_and_sample(full):
+    text = full.sources["dz_drive.c"].replace("command > WINDOW_CODES", "command >= WINDOW_CODES")
+    found = full._drive.edited("dz_drive.c", text.encode()).check(full._drive_samples)
+    assert found.wrong > 0 and found.first_wrong.split()[0] in FIELDS and "with codes" in found.first_wrong
+    assert isinstance(full._drive, CompiledDrive)
+    init = full.sources["dz_drive.c"].replace("drive->status = 0u;", "drive->status = 2u;")
+    assert full._drive.edited("dz_drive.c", init.encode()).check(full._drive_samples).first_wrong == (
+        "status after 0 PWM periods, before any sample"
+    )

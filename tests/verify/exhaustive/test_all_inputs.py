@@ -1,0 +1,312 @@
+"""The check of every input is checked: each count fires on a core that has just that fault, on every machine."""
+
+import json
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dzdesign.command_line.cli import main
+from dzdesign.core.errors import RequirementError
+from dzdesign.verify.analysis import machine_code
+from dzdesign.verify.analysis.machine_code import check_on_machine, machine_code_checks
+from dzdesign.verify.exhaustive.all_inputs import check_all_inputs, first_wrong, input_check
+from dzdesign.verify.exhaustive.exact_law import ExactLaw
+from dzdesign.verify.exhaustive.test_vectors import (
+    DIRECTION,
+    OUTSIDE,
+    PAIR,
+    PART,
+    PLAN,
+    ROW,
+    SAMPLED_ROWS,
+    PreparedInputs,
+    differences,
+)
+from dzdesign.verify.exhaustive.zero_command import pressure_drops
+from dzdesign.verify.toolchain import machines
+from dzdesign.verify.toolchain.compiled_core import CompiledCore, Findings
+from dzdesign.verify.toolchain.host_compiler import host_compiler
+from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4
+from tests.support.golden_firmware import FULL, GOLDENS, INPUT
+from tests.support.synthetic import needs_compiler
+
+pytestmark = needs_compiler
+
+SIGNATURE = "(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)"
+
+
+def needs(machine):
+    return pytest.mark.skipif(bool(machine.missing()), reason=f"{machine.name}: {machine.missing()}")
+
+
+def copy_of(root, target: str, folder):
+    shutil.copytree(root / target, folder)
+    shutil.copy(root / INPUT, folder / INPUT)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory):
+    return copy_of(GOLDENS, "f28335", tmp_path_factory.mktemp("plain") / "fw")
+
+
+@pytest.fixture(scope="module")
+def full(tmp_path_factory):
+    """Both signs, unlike sensors with live zeros, swapped pressures, an edge."""
+    return copy_of(FULL, "f28335", tmp_path_factory.mktemp("full") / "fw")
+
+
+def exact_law(folder, sign: int = 1) -> ExactLaw:
+    return ExactLaw(json.loads((folder / INPUT).read_bytes()), sign)
+
+
+def wrapped(core: CompiledCore, statement: str, function: str = "dz_comp") -> CompiledCore:
+    """The core with a statement that may change `compare`, the right value, before it is returned."""
+    name = "dz_comp_negative.c" if function == "dz_comp_negative" else "dz_comp.c"
+    text = core.sources[name].decode()
+    head = f"uint16_t {function}{SIGNATURE}\n{{"
+    assert text.count(head) == 1
+    text = text.replace(head, f"static uint16_t right{SIGNATURE}\n{{")
+    text += (
+        f"{head}\n    uint16_t compare = right(u_adc, p_a_adc, p_b_adc);\n\n    {statement}\n    return compare;\n}}\n"
+    )
+    return core.edited(name, text.encode())
+
+
+#: One count each, and how often it must fire: at a command and a difference, or at a pair of pressures.
+FAULTS = {
+    "wrong": ("if (u_adc == 3000u && p_a_adc == p_b_adc + 77u) compare++;", {"wrong": 1}),
+    "out of range": ("if (u_adc == 4095u && p_a_adc == p_b_adc) compare = 60001u;", {"out_of_range": 1, "wrong": 1}),
+    # The row after it goes against the law too, where that rises with dP.
+    "falls": (
+        "if (u_adc == 2000u && p_a_adc == p_b_adc + 9u) compare = (uint16_t)(compare - 20u);",
+        {"falls": 1, "wrong": 1},
+    ),
+    "against": ("if (u_adc <= 5u && p_a_adc == p_b_adc + 500u) compare = 33000u;", {"against": 6, "wrong": 6}),
+    "fallback": ("if (u_adc == 65535u) compare = 1u;", {"bad_fallbacks": 25}),
+    "fallback of a pressure": ("if (p_b_adc == 65535u && u_adc == 17u) compare++;", {"bad_fallbacks": 5}),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_each_count_fires(plain, fault):
+    statement, expected = FAULTS[fault]
+    prepared = PreparedInputs(exact_law(plain))
+    found = wrapped(CompiledCore(plain), statement).check(prepared.everything())
+    assert {name: getattr(found, name) for name in expected} == expected
+    assert found.faults
+
+
+def test_a_pair_of_pressures_that_is_not_its_difference_is_odd_and_not_wrong(plain):
+    prepared = PreparedInputs(exact_law(plain))
+    odd = wrapped(CompiledCore(plain), "if (p_a_adc == 2500u && p_b_adc == 2001u) compare++;")
+    found = odd.check(prepared.everything())
+    assert found.wrong == 0 and found.odd >= 2, "at the commands that take it in turn, and at zero command"
+    at_zero = wrapped(CompiledCore(plain), "if (u_adc == 0u && p_a_adc == 2500u && p_b_adc == 2001u) compare++;")
+    assert at_zero.check(prepared.everything()).odd >= 1
+    assert at_zero.check(prepared.everything(cube=False)).odd == 0
+    low = wrapped(CompiledCore(plain), "if (p_a_adc == 100u && p_b_adc == 4000u) compare++;")
+    assert low.check(prepared.everything()).odd >= 1, "where the law does not follow, the commands still take it"
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_what_is_shown_is_checked_on_both_sides(full, sign):
+    prepared, core = PreparedInputs(exact_law(full, sign)), CompiledCore(full, sign)
+    name = ("dz_comp.c", "dz_comp_negative.c")[sign < 0]
+    text = core.sources[name].decode()
+    for old, new, count in (
+        ("u_adc) & DZ_STATUS_COMMAND", "u_adc) & 16u", "bad_status"),
+        ("(scaled.high >> (BETA_SHIFT - 32u))", "(scaled.high >> (BETA_SHIFT - 32u)) + 1u", "bad_betas"),
+        ("* BETA_FACTOR) >> BETA_SHIFT", "* BETA_FACTOR) >> 34u", "bad_betas"),
+    ):
+        if old in text:
+            found = core.edited(name, text.replace(old, new).encode()).check(prepared.sample(), sample=True)
+            assert getattr(found, count) > 0 and found.faults == getattr(found, count)
+
+
+def test_both_sides_of_everything_see_a_fault_at_one_place(full):
+    for sign, function in ((1, "dz_comp"), (-1, "dz_comp_negative")):
+        prepared = PreparedInputs(exact_law(full, sign))
+        core = CompiledCore(full, sign)
+        code = 2048 + sign * 1000
+        found = wrapped(core, f"if (u_adc == {code}u && p_a_adc == 2000u) compare++;", function).check(
+            prepared.everything()
+        )
+        assert found.wrong + found.odd >= 1
+        words = first_wrong(prepared, found)
+        assert words is None or f"command code {code}," in words
+        honest = core.check(prepared.everything())
+        assert honest.faults == 0 and honest.inputs == prepared.differences.made.sum() * 4096
+        assert core.check(prepared.sample(), sample=True).faults == 0
+
+
+def test_the_hash_is_of_all_compare_values(plain):
+    prepared = PreparedInputs(exact_law(plain)).everything()
+    core = CompiledCore(plain)
+    hashes = {core.check(prepared).outputs_hash}
+    for code in (0, 1, 4095):
+        hashes.add(wrapped(core, f"if (u_adc == {code}u && p_a_adc == 4095u && p_b_adc == 0u) compare++;")
+                   .check(prepared).outputs_hash)  # fmt: skip
+    assert len(hashes) == 4
+    assert core.check(prepared).object_sha256 != wrapped(core, ";").check(prepared).object_sha256
+
+
+def test_a_core_that_crashes_or_hangs_does_not_pass(plain, monkeypatch):
+    prepared = PreparedInputs(exact_law(plain)).everything()
+    crash = wrapped(CompiledCore(plain), "if (u_adc == 9u) *(volatile char *)0 = 1;")
+    with pytest.raises(RequirementError, match="ended with signal"):
+        crash.check(prepared)
+    hang = wrapped(CompiledCore(plain), "while (u_adc == 9u) { *(volatile uint16_t *)&compare = 1u; }")
+    with pytest.raises(RequirementError, match="did not end"):
+        hang.check(prepared, replace(machines.HOST, run_timeout_s=2.0))
+
+
+# --- what is prepared ---------------------------------------------------------------------------------------
+
+
+def test_the_layouts_are_those_of_the_header(tmp_path):
+    structs = {"dz_plan": PLAN, "dz_part": PART, "dz_row": ROW, "dz_direction": DIRECTION, "dz_pair": PAIR}
+    asked = [f"sizeof(struct {name})" for name in structs]
+    asked += [f"offsetof(struct {name}, {field})" for name, dtype in structs.items() for field in dtype.names]
+    prints = "".join(f'printf("%d\\n", (int)({each}));' for each in asked)
+    (tmp_path / "sizes.c").write_text(
+        f'#include <stddef.h>\n#include <stdio.h>\n#include "every_input.h"\nint main(void) {{ {prints} return 0; }}\n'
+    )
+    command = [host_compiler(), f"-I{machines.programs_folder()}", "sizes.c", "-o", "sizes"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    said = subprocess.run([str(tmp_path / "sizes")], capture_output=True, text=True, check=True).stdout.split()
+    expected = [dtype.itemsize for dtype in structs.values()]
+    expected += [dtype.fields[field][1] for dtype in structs.values() for field in dtype.names]
+    assert list(map(int, said)) == expected
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_pairs_of_a_difference_are_those_that_make_it(full, sign):
+    exact = exact_law(full, sign)
+    codes = np.arange(exact.code_max + 1)
+    made, sound = (
+        exact.difference(codes[:, None], codes[None, :]),
+        exact.sound_pressures(codes[:, None], codes[None, :]),
+    )
+    found = differences(exact)
+    counts = np.bincount(made[sound] - found.values[0], minlength=found.values.size)
+    assert (counts == np.maximum(found.b_last - found.b_first + 1, 0)).all() and found.pairs == sound.sum()
+    for place in np.flatnonzero(found.made)[::97]:
+        b = np.arange(found.b_first[place], found.b_last[place] + 1)
+        a = exact.turn * found.values[place] + found.slant[b]
+        assert (made[a, b] == found.values[place]).all() and sound[a, b].all()
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_pressure_drops_of_a_difference_are_the_extremes_over_its_pairs(full, sign):
+    exact = exact_law(full, sign)
+    found = differences(exact)
+    scale, least, most = pressure_drops(exact, found, [7])
+    a_MPa, b_MPa = (s["span_MPa"][0] / s["span_MPa"][1] / (s["full_code"] - s["zero_code"]) for s in (exact.a, exact.b))
+    errors = [[error[0] / error[1] for error in s["error_MPa"]] for s in (exact.a, exact.b)]
+    ends = sorted(exact.turn * error for error in (errors[0][0] - errors[1][1], errors[0][1] - errors[1][0]))
+    for place in np.flatnonzero(found.made)[::61]:
+        b = np.arange(found.b_first[place], found.b_last[place] + 1)
+        a = exact.turn * found.values[place] + found.slant[b]
+        drops = exact.turn * ((a - exact.a["zero_code"]) * a_MPa - (b - exact.b["zero_code"]) * b_MPa)
+        assert least[place] / scale == pytest.approx(drops.min() + ends[0], abs=1e-9)
+        assert most[place] / scale == pytest.approx(drops.max() + ends[1], abs=1e-9)
+
+
+def test_the_steps_of_the_c_are_the_rows_of_the_reference(full):
+    """The C's quotients and remainders against `ExactLaw.rows`, which steps NumPy arrays."""
+    for sign in (1, -1):
+        exact = exact_law(full, sign)
+        prepared = PreparedInputs(exact)
+        betas = [exact.betas(int(code)) for code in prepared.differences.values[::501]]
+        rows = np.array(list(exact.rows(betas))).T
+        laws, rows_of = prepared._laws(), prepared._rows()["law"][::501]
+        for row, law in zip(rows, rows_of, strict=True):
+            values, begin = [], 0
+            for part, straight in enumerate(prepared._parts):
+                piece = laws[law, part]
+                for k in range(straight.end - begin):
+                    total = int(piece["remainder"]) + k * int(piece["carry"])
+                    count = int(piece["quotient"]) + k * int(piece["step"]) + total // straight.denominator
+                    values.append(min(max(count, 0), exact.compare_limit))
+                begin = straight.end
+            for code in range(exact.code_max + 1):
+                place = code if sign > 0 else exact.code_max - code
+                assert values[place] == (row[exact.from_zero(code)] if code in exact.sound_commands else 0)
+
+
+def test_a_sample_has_the_corners(plain):
+    prepared = PreparedInputs(exact_law(plain))
+    chosen = prepared.differences.values[prepared.sampled_rows()].tolist()
+    assert {-4095, -41, -40, -1, 0, 1, 4095} <= set(chosen) and len(chosen) >= SAMPLED_ROWS - 7
+    assert {0, 1, 4094, 4095} <= set(prepared.sampled_places().tolist())
+    assert OUTSIDE % 257 == 0
+
+
+# --- other processors ---------------------------------------------------------------------------------------
+
+
+@needs(CORTEX_M4)
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_machine_code_of_the_cortex_m4_gives_what_the_host_gives_at_every_input(sign, tmp_path):
+    folder = copy_of(FULL, "cortex-m4", tmp_path / "fw")
+    host = check_all_inputs(folder, sign)
+    done = check_on_machine(folder, CORTEX_M4, host)
+    assert done.holds and done.found.inputs == host.inputs and done.found.outputs_hash == host.outputs_hash
+
+
+@needs(AVR)
+def test_the_machine_code_of_the_avr_gives_what_the_host_gives_at_the_sample(tmp_path):
+    folder = copy_of(GOLDENS, "avr", tmp_path / "fw")
+    done = check_on_machine(folder, AVR, check_all_inputs(folder))
+    assert done.holds and done.found.inputs > 5000
+
+
+@needs(AVR)
+def test_an_int_of_16_bits_is_seen_on_the_avr_alone(tmp_path):
+    """A product that needs a longer int, which no PC shows."""
+    folder = copy_of(GOLDENS, "avr", tmp_path / "fw")
+    core = folder / "core" / "dz_comp.c"
+    text, count = re.subn(r"const uint16_t p_a = p_a_adc;", "const uint16_t p_a = (uint16_t)((p_a_adc * 17) / 17);",
+                          core.read_text())  # fmt: skip
+    assert count >= 1
+    core.write_text(text)
+    host = check_all_inputs(folder)
+    assert host.holds
+    done = check_on_machine(folder, AVR, host)
+    assert not done.holds and done.found.wrong > 100
+
+
+def test_a_machine_that_is_not_here_is_not_passed(plain, monkeypatch):
+    monkeypatch.setattr(machines.shutil, "which", lambda _: None)
+    host = input_check_of(plain)
+    checks = machine_code_checks(plain, (host,))
+    assert [check.holds for check in checks] == [None, None]
+    assert checks[0].text == (
+        "not run: arm-none-eabi-gcc and qemu-system-arm not found; apt install gcc-arm-none-eabi qemu-system-arm"
+    )
+    assert [check.holds for check in machine_code_checks(plain, ())] == [None, None]
+
+
+def input_check_of(folder):
+    """An InputCheck without running anything."""
+    document = json.loads((folder / INPUT).read_bytes())
+    prepared = PreparedInputs(ExactLaw(document, 1))
+    counts = [name for name, kind in Findings.__annotations__.items() if kind is int]
+    at_zero = np.zeros(prepared.differences.values.size, dtype=int)
+    found = Findings(outputs_hash="", object_sha256="", at_zero=at_zero, **dict.fromkeys(counts, 0))
+    return input_check(document, prepared, CompiledCore(folder), found)
+
+
+def test_the_command_line_reports_a_machine_that_is_not_here_and_does_not_hold(
+    firmware_folder, tmp_path, capsys, monkeypatch
+):
+    monkeypatch.setattr(machine_code, "MACHINES", (replace(CORTEX_M4, needs={"no-such-compiler": "its-package"}),))
+    assert main(["verify", str(firmware_folder), "--machine-code", "-o", str(tmp_path / "evidence")]) == 1
+    words = "NOT CHECKED  machine code of the Cortex-M4: not run: no-such-compiler not found; apt install its-package"
+    assert words in capsys.readouterr().out
+    assert json.loads((tmp_path / "evidence" / "verification.json").read_text())["holds"] is False

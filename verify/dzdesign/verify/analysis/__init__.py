@@ -1,0 +1,1 @@
+"""Analysis: Frama-C, mutants, other machine code, state kept between calls."""

@@ -1,0 +1,224 @@
+"""No undefined behaviour where `int` has 16 bits, for every input: shown by Frama-C's Eva, where that is installed.
+
+Running the core at every input, on the host and in simulators, can't show that: a signed overflow or an index beyond a
+table may do by chance what was meant. Eva reads the C as the standard does, with the 16-bit `int` of TI's C28x.
+"""
+
+import csv
+import json
+import os
+import re
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from dzdesign.core.errors import RequirementError
+from dzdesign.verify.checks import Check
+from dzdesign.verify.exhaustive.exact_law import ExactLaw
+from dzdesign.verify.toolchain.compiled_core import SOURCES
+from dzdesign.verify.toolchain.machines import programs_folder
+
+NAME = "no undefined behaviour with an int of 16 bits"
+PROGRAM = "frama-c"
+#: A shift of a negative number to the right is each compiler's own; overflow of unsigned words is the core's tool.
+OPTIONS = (
+    "-machdep", "x86_16", "-eva", "-eva-slevel", "100", "-eva-no-show-progress", "-eva-no-results",
+    "-warn-right-shift-negative",
+)  # fmt: skip
+TIMEOUT_S = 1800
+CODES = 65536
+
+
+class Alarm(NamedTuple):
+    """What Eva could not exclude: where in the core's C, and the property that it could not show."""
+
+    file: str
+    line: int
+    function: str
+    what: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Proof:
+    """What is left of Eva's alarms when each place counts as shown by the analysis that shows it.
+
+    Attributes
+    ----------
+    version : str
+        Of Frama-C.
+    functions : tuple of str
+        That were analysed for all inputs.
+    alarms : tuple of Alarm
+        Not excluded by any of the analyses; none: there is no undefined behaviour.
+    """
+
+    version: str
+    functions: tuple[str, ...]
+    alarms: tuple[Alarm, ...]
+
+
+def proof_check(folder: Path) -> Check:
+    """Return the requirement that no input makes the core's C overflow, index beyond a table or shift too far.
+
+    Parameters
+    ----------
+    folder : Path
+        Firmware folder.
+
+    Returns
+    -------
+    Check
+        Not checked, with the reason, where Frama-C is not installed or does not end.
+    """
+    if not shutil.which(PROGRAM):
+        return Check(name=NAME, holds=None, text=f"not run: {PROGRAM} not found; apt install frama-c-base")
+    try:
+        proof = prove(folder)
+    except RequirementError as error:
+        return Check(name=NAME, holds=None, text=f"not run: {error}")
+    if proof.alarms:
+        first = proof.alarms[0]
+        where = f"{first.function}, {first.file}:{first.line}"
+        text = f"{len(proof.alarms)} not excluded, the first in {where}: {first.what}"
+    else:
+        text = f"{', '.join(proof.functions)}: none, for all 2^48 triples of codes"
+        text += ", and one step of the drive from any state in its range"
+    return Check(name=NAME, holds=not proof.alarms, text=f"{text}; Frama-C {proof.version}, -machdep x86_16")
+
+
+def prove(folder: Path, rows: int | None = None) -> Proof:
+    """Analyse each side's core, and the drive.
+
+    Each analysis gives the core every input, cut to pieces in another way. A place that one of them shows to be sound
+    is sound: the first undefined behaviour of a run, were there one, would be an alarm of each.
+
+    Parameters
+    ----------
+    folder : Path
+        Firmware folder.
+    rows : int, optional
+        So many codes of sensor B, from its first sound one on, in place of all: no proof, but a quick look.
+
+    Raises
+    ------
+    RequirementError
+        If Frama-C fails or takes longer than `TIMEOUT_S`.
+    """
+    document = json.loads((folder / "compensator.json").read_bytes())
+    sources = sorted(path.name for path in (folder / "core").glob("*.[ch]"))
+    alarms: set[Alarm] = set()
+    functions: list[str] = []
+    with tempfile.TemporaryDirectory(prefix="dzdesign-proof-") as name:
+        for sign, (source, ending) in SOURCES.items():
+            if source not in sources:
+                continue
+            law = ExactLaw(document, sign)
+            work = Path(name) / source
+            work.mkdir()
+            for each in sources:
+                shutil.copyfile(folder / "core" / each, work / each)
+            shutil.copyfile(programs_folder() / "proof.c", work / "proof.c")
+            tried = _sound(law.b["valid_codes"])[:rows]
+            (work / "pieces.h").write_text(_pieces(law, ending, tried))
+            alarms |= _of_side(work, [each for each in sources if each.endswith(".c")], len(tried))
+            functions += [f"dz_{function}{ending}" for function in ("comp", "beta", "status")]
+    return Proof(version=_version(), functions=tuple(functions), alarms=tuple(sorted(alarms)))
+
+
+def _of_side(work: Path, sources: list[str], rows: int) -> set[Alarm]:
+    """Return the alarms that are left of one side, and of the drive."""
+    parts = np.linspace(0, rows, max(1, min(os.cpu_count() or 1, 8)) + 1).astype(int)
+    runs = [("pressures", first, end) for first, end in pairwise(parts)]
+    runs += [("no_pressures", 0, rows), ("commands", 0, rows), ("drive", 0, rows)]
+    with ThreadPoolExecutor(len(parts)) as pool:
+        found = list(pool.map(lambda run: _alarms(work, sources, *run), runs))
+    *by_pressure, by_command, of_drive = found
+    core = set().union(*by_pressure) & by_command
+    return core | {alarm for alarm in of_drive if alarm.file.startswith("dz_drive")}
+
+
+def _pieces(law: ExactLaw, ending: str, tried: range) -> str:
+    """Return pieces.h: the functions of a side, and the codes where the pieces of each input end; of B those tried."""
+    a, b = _sound(law.a["valid_codes"]), _sound(law.b["valid_codes"])
+    commands = law.sound_commands
+    corners = {law.zero, law.full, law.zero + law.edge_codes, max(law.zero - law.edge_codes, 0)}
+    ends = sorted({0, CODES, *_ends_of(commands), *corners, *(code + 1 for code in corners)})
+    furthest = max(abs(code - law.zero) for code in (commands.start, commands.stop - 1))
+    lines = [f"#define {function.upper()} dz_{function}{ending}" for function in ("comp", "beta", "status")]
+    lines += [
+        f"#define COMMAND_ENDS {_braces(ends)}",
+        f"#define SOUND_B {b.start}u",
+        f"#define NOT_OF_A {_unsound(a)}",
+        f"#define NOT_OF_B {_unsound(b)}",
+        f"#define RAMPED {furthest * CODES}L",
+        f"#define PRESSURE_ENDS {{{', '.join(_braces(_kinds(law, a, code)) for code in tried)}}}",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _ends_of(sound: range) -> tuple[int, int, int]:
+    """Return where codes become sound, where they end to be, and where words of 16 bits take them for negative."""
+    return sound.start, sound.stop, sound.start + CODES // 2
+
+
+def _unsound(sound: range) -> str:
+    """Return the pieces of the codes that a sensor can't give."""
+    ends = sorted({0, CODES, *_ends_of(sound)})
+    pieces = [(first, end) for first, end in pairwise(ends) if first not in sound]
+    return f"{{{', '.join(map(_braces, pieces))}}}"
+
+
+def _kinds(law: ExactLaw, a: range, code_b: int) -> tuple[int, ...]:
+    """Return the ends of sensor A's pieces: its zero, and where its difference from a code of B turns sign or good."""
+    difference = law.difference(np.arange(a.start, a.stop), np.array(code_b))
+    kind = np.where(difference < -law.reverse, 0, np.where(difference < 0, 1, 2))
+    changes = (np.flatnonzero(np.diff(kind)) + 1 + a.start).tolist()
+    ends = sorted({a.start, a.stop, *changes, *({law.a["zero_code"]} & {*a})})
+    return (*ends, *[a.stop] * (5 - len(ends)))
+
+
+def _sound(ends: list[int]) -> range:
+    return range(ends[0], ends[1] + 1)
+
+
+def _braces(numbers: Iterable[int]) -> str:
+    return "{" + ", ".join(f"UINT32_C({number})" for number in numbers) + "}"
+
+
+def _alarms(work: Path, sources: list[str], main: str, first: int, end: int) -> set[Alarm]:
+    """Run one analysis and return what it could not exclude in the core's C."""
+    report = work / f"{main}_{first}.csv"
+    command = [
+        PROGRAM, *OPTIONS, f"-cpp-extra-args=-DPART_FIRST={first}u -DPART_END={end}u", "-main", main, "proof.c",
+        *sources, "-then", "-report-csv", report.name,
+    ]  # fmt: skip
+    try:
+        done = subprocess.run(
+            command, cwd=work, capture_output=True, text=True, errors="replace", stdin=subprocess.DEVNULL,
+            timeout=TIMEOUT_S, check=False, env={**os.environ, "PWD": str(work)},  # which it trusts, not the folder
+        )  # fmt: skip
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise RequirementError(f"{PROGRAM} did not end: {error}") from error
+    if done.returncode or not report.exists():
+        said = [line for line in (done.stdout + done.stderr).splitlines() if "rror" in line or "aborted" in line]
+        raise RequirementError(f"{PROGRAM} {_version()} failed on {main}: {' '.join(said)[:300]}")
+    with report.open(newline="") as lines:
+        rows = list(csv.DictReader(lines, dialect="excel-tab"))
+    return {
+        Alarm(file=row["file"], line=int(row["line"]), function=row["function"], what=row["property"])
+        for row in rows
+        if row["status"] not in ("Valid", "Considered valid", "Partially proven")
+    }
+
+
+def _version() -> str:
+    done = subprocess.run([PROGRAM, "-version"], capture_output=True, text=True, errors="replace", check=False)
+    return re.sub(r"\s+", " ", done.stdout).strip() or "of an unknown version"

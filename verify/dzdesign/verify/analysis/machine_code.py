@@ -1,0 +1,97 @@
+"""The same check on other processors' machine code: all inputs on a Cortex-M4 in QEMU, a sample on an AVR."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from dzdesign.core.errors import RequirementError
+from dzdesign.verify.checks import Check
+from dzdesign.verify.exhaustive.all_inputs import InputCheck
+from dzdesign.verify.exhaustive.exact_law import ExactLaw
+from dzdesign.verify.exhaustive.test_vectors import SAMPLED_STRIDE, PreparedInputs
+from dzdesign.verify.toolchain.compiled_core import CompiledCore, Findings
+from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4, Machine
+
+MACHINES = (CORTEX_M4, AVR)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MachineCheck:
+    """What a machine found of one side, and the hash of the same inputs' compare values on the host."""
+
+    machine: Machine
+    sign: int
+    found: Findings
+    host_hash: str
+
+    @property
+    def holds(self) -> bool:
+        """True if nothing was wrong and all compare values are those of the host."""
+        return not self.found.faults and self.found.outputs_hash == self.host_hash
+
+
+def check_on_machine(folder: Path, machine: Machine, host: InputCheck) -> MachineCheck:
+    """Check one side's machine code for another processor.
+
+    Parameters
+    ----------
+    folder : Path
+        Firmware folder.
+    machine : Machine
+        For which; on a small one a sample is tried, there and on the host. Elsewhere all inputs are, but without the
+        host's second look at the pairs of pressures.
+    host : InputCheck
+        The host's check of that side.
+
+    Raises
+    ------
+    RequirementError
+        If the core does not compile or the program does not end there.
+    """
+    core = CompiledCore(folder, host.sign)
+    prepared = PreparedInputs(ExactLaw(json.loads((folder / "compensator.json").read_bytes()), host.sign))
+    if machine.small:
+        sample = prepared.sample()
+        found, host_hash = core.check(sample, machine), core.check(sample, sample=True).outputs_hash
+    else:
+        found, host_hash = core.check(prepared.everything(cube=False), machine), host.outputs_hash
+    return MachineCheck(machine=machine, sign=host.sign, found=found, host_hash=host_hash)
+
+
+def machine_code_checks(folder: Path, inputs: tuple[InputCheck, ...]) -> list[Check]:
+    """Return one requirement a machine: its machine code is right at every input, or at a sample of them.
+
+    Parameters
+    ----------
+    folder : Path
+        Firmware folder.
+    inputs : tuple of InputCheck
+        The host's checks, one a sign of command.
+    """
+    checks = []
+    for machine in MACHINES:
+        name = f"machine code of the {machine.name}"
+        missing = "the core was not checked on the host" if not inputs else machine.missing()
+        if missing:
+            checks.append(Check(name=name, holds=None, text=f"not run: {missing}"))
+            continue
+        try:
+            done = [check_on_machine(folder, machine, host) for host in inputs]
+        except RequirementError as error:
+            checks.append(Check(name=name, holds=False, text=str(error)))
+            continue
+        checks.append(Check(name=name, holds=all(each.holds for each in done), text="; ".join(map(_words, done))))
+    return checks
+
+
+def _words(done: MachineCheck) -> str:
+    found, machine = done.found, done.machine
+    which = f"a sample of {found.inputs} inputs with the corners" if machine.small else f"{found.inputs} inputs, all"
+    beyond = f" (every {SAMPLED_STRIDE}th)" if machine.small else ""
+    elsewhere = found.bad_fallbacks + found.bad_status + found.bad_betas
+    same = "as on the host" if found.outputs_hash == done.host_hash else f"on the host {done.host_hash}"
+    return (
+        f"{which}: {found.wrong} wrong, {found.odd} odd pairs, {elsewhere} wrong at codes outside their signal's valid "
+        f"range{beyond}; hash of all compare values {found.outputs_hash}, {same}; {machine.runner[0]}, "
+        f"{machine.compiler} {' '.join(machine.core_flags)}, object {found.object_sha256}"
+    )

@@ -1,0 +1,215 @@
+"""Whether verify would see a wrong firmware: every constant, comparison and operator of its core changed by itself.
+
+A mutant is killed if the check of all inputs (values, fallbacks, status, beta) or that of the drive finds a fault, or
+if the program crashes or hangs. One that a compiler refuses is no evidence, and counted apart. What is left is
+equivalent if its object is the same byte for byte, or if nothing tells the two apart: all inputs pass, so that its
+compare value is the law's at every pair of command and pressure difference; the drive goes with its model; and at
+`RANDOM_TRIPLES` random triples of 16-bit codes, most of which no converter can give, all functions of the law return
+what the original's return. Otherwise it survives.
+"""
+
+import os
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from dzdesign.core.artefact_files import parse_document, read_bytes
+from dzdesign.core.errors import RequirementError
+from dzdesign.design.compensator_file import compensator_from_document
+from dzdesign.verify.analysis.c_mutants import Mutant, mutants_of
+from dzdesign.verify.checks import Check
+from dzdesign.verify.exhaustive.drive_check import CompiledDrive, PreparedDrive
+from dzdesign.verify.exhaustive.exact_law import ExactLaw
+from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
+from dzdesign.verify.toolchain.compiled_core import CompiledCore
+from dzdesign.verify.toolchain.machines import HOST, compile_object, link_program, programs_folder, run_program
+
+KILLED, REFUSED, SAME_OBJECT, SAME_OUTPUTS, SURVIVED = (
+    "killed", "refused by the compiler", "same object code", "same outputs", "survived",
+)  # fmt: skip
+RANDOM_TRIPLES = 2**24
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """What became of one mutant: its file, line and change, one of the five verdicts, and what killed it."""
+
+    file: str
+    line: int
+    change: str
+    verdict: str
+    killer: str = ""
+
+
+class MutationBench:
+    """The checks that a mutant has to pass, prepared once.
+
+    Parameters
+    ----------
+    folder : Path
+        Firmware folder.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        content = read_bytes(folder / "compensator.json", "compensator")
+        document = parse_document(content, str(folder / "compensator.json"), ("dzdesign.compensator/1",))
+        self._compensator = compensator_from_document(content, str(folder / "compensator.json"))
+        self._signs = (1, -1) if document["sides"]["negative"] else (1,)
+        self._cores = {sign: CompiledCore(folder, sign) for sign in self._signs}
+        prepared = {sign: PreparedInputs(ExactLaw(document, sign)) for sign in self._signs}
+        self._samples = {sign: each.sample() for sign, each in prepared.items()}
+        self._everything = {sign: each.everything(impatient=True) for sign, each in prepared.items()}
+        self._drive = CompiledDrive(folder)
+
+    @cached_property
+    def _drive_samples(self) -> PreparedDrive:
+        return PreparedDrive(self._compensator)
+
+    @property
+    def sources(self) -> dict[str, str]:
+        """The core's files, name to text."""
+        return {name: text.decode(errors="surrogateescape") for name, text in self._drive.sources.items()}
+
+    def check_original(self) -> None:
+        """Run every check on the firmware as it is.
+
+        Raises
+        ------
+        RequirementError
+            If it fails one: then no mutant's failing says anything.
+        """
+        _ = self._drive_samples
+        for verdict in self._tried(self._cores, self._drive):
+            if verdict:
+                raise RequirementError(f"the firmware itself fails ({verdict}), so its mutants can't be judged")
+
+    def judge(self, mutant: Mutant) -> Outcome:
+        """Compile a mutant and try everything on it.
+
+        Parameters
+        ----------
+        mutant : Mutant
+            Of one of `sources`.
+        """
+        text = mutant.text.encode(errors="surrogateescape")
+        drive = self._drive.edited(mutant.file, text)
+        cores = {
+            sign: core.edited(mutant.file, text) for sign, core in self._cores.items() if mutant.file in core.sources
+        }
+
+        def outcome(verdict: str, killer: str = "") -> Outcome:
+            return Outcome(file=mutant.file, line=mutant.line, change=mutant.change, verdict=verdict, killer=killer)
+
+        try:
+            objects = drive.objects()
+        except RequirementError:
+            return outcome(REFUSED)
+        if _contents(objects) == _contents(self._drive.objects()):
+            return outcome(SAME_OBJECT)
+        for killer in self._tried(cores, drive):
+            if killer:
+                return outcome(KILLED, killer)
+        return outcome(SAME_OUTPUTS if self._agree(objects) else SURVIVED)
+
+    def _tried(self, cores: dict[int, CompiledCore], drive: CompiledDrive) -> Iterable[str]:
+        """Yield, check by check, what found a fault, or an empty text: first what is quick."""
+        runs: list[tuple[str, Callable[[], int]]] = []
+        for sign, core in cores.items():
+            runs.append(("sample of inputs", lambda c=core, s=sign: c.check(self._samples[s], sample=True).faults))
+        runs.append(("drive", lambda: drive.check(self._drive_samples).wrong))
+        for sign, core in cores.items():
+            runs.append(("all inputs", lambda c=core, s=sign: c.check(self._everything[s]).faults))
+        for name, run in runs:
+            try:
+                yield name if run() else ""
+            except RequirementError as error:
+                yield f"{name}: {str(error).partition(':')[0]}"
+
+    def _agree(self, objects: Sequence[Path]) -> bool:
+        """Compare every function of the core with the original's at random triples of 16 bits."""
+        results = []
+        flags = (*HOST.check_flags, *(["-DDZ_BOTH"] if len(self._signs) > 1 else []))
+        source = {"random_triples.c": (programs_folder() / "random_triples.c").read_bytes()}
+        main = compile_object(HOST, "random_triples.c", source, flags, "the random triples")
+        for each in (objects, self._drive.objects()):
+            program = link_program(HOST, [*each, main], "the random triples")
+            results.append(run_program(HOST, program, [str(RANDOM_TRIPLES)], "the core"))
+        return results[0] == results[1]
+
+
+def _contents(objects: Sequence[Path]) -> list[bytes]:
+    return [each.read_bytes() for each in objects]
+
+
+def all_mutants(bench: MutationBench) -> list[Mutant]:
+    """Return every mutant of the core's files, in their order."""
+    return [mutant for name, text in bench.sources.items() for mutant in mutants_of(name, text)]
+
+
+def judge_all(
+    bench: MutationBench, mutants: Sequence[Mutant], bar: Callable[[Sequence[Any]], Iterable[Any]] = iter
+) -> list[Outcome]:
+    """Judge mutants on all processors.
+
+    Parameters
+    ----------
+    bench : MutationBench
+        The checks; the original passes them.
+    mutants : sequence of Mutant
+        Which.
+    bar : callable
+        Shows progress over a sequence, and hands its items on.
+    """
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        futures = [pool.submit(bench.judge, mutant) for mutant in mutants]
+        try:
+            return [future.result() for future in bar(futures)]
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+
+
+def mutation_document(outcomes: Sequence[Outcome]) -> dict[str, Any]:
+    """Return the counts, and by name what was not killed and why.
+
+    Parameters
+    ----------
+    outcomes : sequence of Outcome
+        Of `judge_all`.
+    """
+    kinds = {"killed": KILLED, "refused": REFUSED, "same_object": SAME_OBJECT, "same_outputs": SAME_OUTPUTS}
+    kinds |= {"survived": SURVIVED}
+    count = {key: sum(each.verdict == verdict for each in outcomes) for key, verdict in kinds.items()}
+    killers: dict[str, int] = {}
+    for each in outcomes:
+        if each.killer:
+            killers[each.killer] = killers.get(each.killer, 0) + 1
+    return {
+        "mutants": len(outcomes),
+        **count,
+        "killers": killers,
+        "equivalent_means": f"the object is the same; or the compare values at all inputs, the status words and betas "
+        f"are the law's, the drive follows its model, and {RANDOM_TRIPLES} random triples of codes give the same",
+        "not_killed": [asdict(each) for each in outcomes if each.verdict != KILLED],
+    }
+
+
+def mutation_check(document: dict[str, Any]) -> Check:
+    """Return the requirement that no mutant survives that is not equivalent.
+
+    Parameters
+    ----------
+    document : dict
+        Of `mutation_document`.
+    """
+    equivalent = document["same_object"] + document["same_outputs"]
+    return Check(
+        name="wrong C is caught",
+        holds=document["survived"] == 0 and document["killed"] > 0,
+        text=f"{document['killed']} of {document['mutants']} mutants killed, {equivalent} equivalent "
+        f"({document['same_object']} of the same object code, {document['same_outputs']} of the same outputs), "
+        f"{document['refused']} refused by the compiler, {document['survived']} survived",
+    )

@@ -1,0 +1,1 @@
+"""Closed loop: the compiled core with the CasADi plant; ramps, scenarios, tolerances."""

@@ -1,0 +1,293 @@
+"""The compiled core in closed loop with the plant: ramps up and down, the pulse resolved, pressures through the ADC."""
+
+import copy
+import ctypes
+from dataclasses import dataclass, replace
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dzdesign.core.errors import InputError
+from dzdesign.design.drive import RAMP_UNIT
+from dzdesign.verify.closed_loop.motion import motion_header, numbers_of
+from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
+from dzdesign.verify.toolchain.host_compiler import load_library
+
+#: Periods of the PWM between two records: 100 a second, as in the paper's tests.
+PERIODS_PER_RECORD = 25
+RECORD_S = PERIODS_PER_RECORD * PWM_PERIOD_S
+#: Numbers in a record; loop.c has the same.
+RECORDED = 6
+#: Pressure behind the edge: what both sensors see beside the drop.
+BACK_PRESSURE_MPA = 1.0
+#: Flow counts as flow from this share of the largest flow on: no meter stands between.
+FLOW_SHARE = 1e-3
+#: Flow at zero command below this is none: the edge is shut, only the last bits of a number remain.
+NO_FLOW_L_MIN = 1e-9
+#: The command's ramps are longer than the amplifier's own by this factor.
+RAMP_RESERVE = 1.1
+#: No contraction to fused products: every processor gives the same digits.
+FLOATING = ("-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
+MODES = ("direct", "compensated", "without beta")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RampSequence:
+    """Command over time: hold at zero, ramp up, hold at full command, ramp down, hold at zero; all in s."""
+
+    rest: float = 3.0
+    ramp: float = 100.0
+    top: float = 2.0
+
+    def no_faster_than(self, ramp: float) -> "RampSequence":
+        """Return the sequence with ramps of so many s at least."""
+        return replace(self, ramp=max(self.ramp, ramp))
+
+    def command(self) -> np.ndarray:
+        """Return the command as a share of u_max, one value a record."""
+        corners = np.cumsum([0, self.rest, self.ramp, self.top, self.ramp, self.rest])
+        time = np.arange(0, corners[-1], RECORD_S)
+        return np.interp(time, corners, [0, 0, 1, 1, 0, 0])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoopRun:
+    """Records of one run, 100 a second unless others were asked for: time in s, command share, compare value, dP in
+    MPa, flow in L/min, position of the spool in mm, all (N,).
+
+    Of the flow three: at the record's end; its mean over the record, and its largest there. A dither of 100 Hz or more
+    has a whole wave in a record: its mean is what a meter sees, its largest is at the wave's top.
+    """
+
+    time: np.ndarray
+    command: np.ndarray
+    compare: np.ndarray
+    dp_MPa: np.ndarray
+    q_L_min: np.ndarray
+    q_mean_L_min: np.ndarray
+    q_largest_L_min: np.ndarray
+    position_mm: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PressureResult:
+    """The closed loop at one pressure drop, as shares of u_max and L/min.
+
+    Dead zones are the commands at which the plant's own flow passes `FLOW_SHARE` of the largest (no meter between),
+    on the opening and on the closing branch, without compensator and with it; with a dither the mean over its wave.
+    Flow at zero command is taken at the end, after closing, with a dither at the wave's top; `without_beta` with the
+    pressures frozen at dP0.
+    """
+
+    side: str
+    dp_MPa: float
+    dead_zone_opening: float
+    dead_zone_closing: float
+    residual_opening: float
+    residual_closing: float
+    q_zero_L_min: float
+    q_zero_without_beta_L_min: float
+    q_max_direct_L_min: float
+    q_max_L_min: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoopComparison:
+    """Result at one pressure drop, and the two runs it was read from."""
+
+    result: PressureResult
+    direct: LoopRun
+    compensated: LoopRun
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scalings:
+    """Converter codes of command, pressure A and B at zero and at their spans (1, MPa, MPa); all (3,)."""
+
+    zeros: np.ndarray
+    fulls: np.ndarray
+    spans: np.ndarray
+    code_max: int
+    compare_max: int
+    negative: bool = False
+    swapped: bool = False
+
+
+#: Of the direct drive: without a compensator no code is read.
+DIRECT = Scalings(
+    zeros=np.zeros(3, dtype=np.int32),
+    fulls=np.full(3, 4095, dtype=np.int32),
+    spans=np.array([1.0, 20.0, 20.0]),
+    code_max=4095,
+    compare_max=60000,
+)
+
+
+def _scalings(document: dict[str, Any], sign: int) -> Scalings:
+    signals = document["signals"]
+    command, sensors = signals["command"], (signals["pressure_a"], signals["pressure_b"])
+    full = command["full_code" if sign > 0 else "negative_full_code"]
+    return Scalings(
+        zeros=np.array([command["zero_code"], *(sensor["zero_code"] for sensor in sensors)], dtype=np.int32),
+        fulls=np.array([full, *(sensor["full_code"] for sensor in sensors)], dtype=np.int32),
+        spans=np.array([1.0, *(sensor["span_MPa"][0] / sensor["span_MPa"][1] for sensor in sensors)]),
+        code_max=signals["code_max"],
+        compare_max=signals["compare_max"],
+        negative=sign < 0,
+        swapped=sign < 0 and signals["swapped"],
+    )
+
+
+def _slowest_ramp_s(document: dict[str, Any], sign: int) -> float:
+    amplifier, command = document["amplifier"], document["signals"]["command"]
+    full = command["full_code" if sign > 0 else "negative_full_code"]
+    units = abs(full - command["zero_code"]) * RAMP_UNIT
+    side = 0 if sign > 0 else 1
+    steps = [amplifier[name][side] for name in ("ramp_up", "ramp_down") if amplifier[name][side]]
+    return max((units / step / document["signals"]["sample_Hz"] * RAMP_RESERVE for step in steps), default=0.0)
+
+
+class ClosedLoop:
+    """One plant and, where given, one generated core, compiled into one native loop.
+
+    Parameters
+    ----------
+    plant : Plant
+        Parameters.
+    firmware : Path or None
+        Firmware folder; None leaves only the direct drive.
+    document : dict
+        compensator.json of the firmware: scalings of its inputs and output.
+    sign : {1, -1}
+        Side of the valve: the sign of the command that opens it.
+    """
+
+    def __init__(
+        self, plant: Plant, firmware: Path | None = None, document: dict[str, Any] | None = None, sign: int = 1
+    ) -> None:
+        driver = files("dzdesign.verify.closed_loop")
+        sources = {"plant_motion.h": motion_header()}
+        for name in ("loop.c", "plant_period.h", "plant_stops.h"):
+            sources[name] = driver.joinpath(name).read_text(encoding="utf-8")
+        if firmware is None:
+            sources["dz_drive.h"] = driver.joinpath("no_drive.h").read_text(encoding="utf-8")
+        elif not (firmware / "core" / "dz_drive.h").is_file():
+            raise InputError(f"'{firmware}' has no core/dz_drive.h; give the folder that `dzdesign codegen` made")
+        else:
+            for path in sorted((firmware / "core").glob("*.[ch]")):
+                sources[path.name] = path.read_text(encoding="utf-8")
+        self._library = load_library(sources, "the closed loop", FLOATING)
+        self._scalings = _scalings(document, sign) if document else DIRECT
+        #: Of the amplifier's own ramps on this side, from zero to full command or back, s; 0: none.
+        self.slowest_ramp_s = _slowest_ramp_s(document, sign) if document else 0.0
+        self._has_core = firmware is not None
+        self._plant = numbers_of(plant, self._scalings.compare_max)
+
+    def with_plant(self, plant: Plant) -> "ClosedLoop":
+        """Return the same loop with another plant; nothing is compiled again."""
+        other = copy.copy(self)
+        other._plant = numbers_of(plant, self._scalings.compare_max)
+        return other
+
+    def run(
+        self,
+        command: np.ndarray,
+        supply_MPa: float | np.ndarray,
+        mode: str = "direct",
+        dp_frozen_MPa: float = 0.0,
+        *,
+        seen_MPa: np.ndarray | None = None,
+        periods_per_record: int = PERIODS_PER_RECORD,
+    ) -> LoopRun:
+        """Run the loop from rest.
+
+        Parameters
+        ----------
+        command : (N,) array
+            Share of u_max, one value a record.
+        supply_MPa : float or (N,) array
+            Pressure drop at no flow.
+        mode : {"direct", "compensated", "without beta"}
+            What drives the PWM.
+        dp_frozen_MPa : float
+            The pressure drop that mode "without beta" shows to the core.
+        seen_MPa : (N,) array, optional
+            Pressure drop that the sensors show, of sensors that fail; not a number: the plant's own.
+        periods_per_record : int
+            Periods of the PWM that a value of the command is held for, and a record is of.
+        """
+        if mode not in MODES:
+            raise ValueError(f"mode is '{mode}', expected one of {', '.join(MODES)}")
+        if mode != "direct" and not self._has_core:
+            raise InputError("this loop was built without a compensator; give the firmware folder")
+        command = np.ascontiguousarray(command, dtype=float)
+        supply = np.ascontiguousarray(np.broadcast_to(supply_MPa, command.shape), dtype=float)
+        if mode == "without beta":
+            seen_MPa = np.full(command.shape, dp_frozen_MPa)
+        seen = np.full(command.shape, np.nan) if seen_MPa is None else np.ascontiguousarray(seen_MPa, dtype=float)
+        record = np.empty((command.size, RECORDED))
+        scalings, plant = self._scalings, self._plant
+        span, highest = float(scalings.spans[1:].min()), float(supply.max())
+        back_MPa = min(BACK_PRESSURE_MPA, span - highest)
+        if back_MPa < 0:
+            raise InputError(f"a pressure drop of {highest:g} MPa exceeds the sensors' span of {span:g} MPa")
+        choices = (
+            command.size, periods_per_record, mode != "direct", scalings.negative, scalings.swapped,
+            scalings.code_max, scalings.compare_max,
+        )  # fmt: skip
+        series = (np.array(choices, dtype=np.int32), command, supply, seen)
+        given = (scalings.zeros, scalings.fulls, scalings.spans, plant.flat, plant.coarse, plant.fine, record)
+        pointers = [[array.ctypes.data_as(ctypes.c_void_p) for array in arrays] for arrays in (series, given)]
+        self._library.dz_loop(*pointers[0], ctypes.c_double(back_MPa), *pointers[1])
+        return LoopRun(
+            time=np.arange(command.size) * periods_per_record * PWM_PERIOD_S,
+            command=command,
+            compare=record[:, 0],
+            dp_MPa=record[:, 1],
+            q_L_min=record[:, 2],
+            q_mean_L_min=record[:, 3],
+            q_largest_L_min=record[:, 4],
+            position_mm=1e3 * record[:, 5],
+        )
+
+
+def compare_at_pressure(
+    loop: ClosedLoop, dp_MPa: float, dp0_MPa: float, sequence: RampSequence, side: str = "positive"
+) -> LoopComparison:
+    """Run the ramp without and with the compensator at one pressure drop, and read dead zones and flows.
+
+    Where the firmware has ramps of its own, the command goes no faster than they: then they hold nothing back, and
+    what is read over the command is of the valve and the law, not of the ramps' lag.
+    """
+    command = sequence.no_faster_than(loop.slowest_ramp_s).command()
+    direct = loop.run(command, dp_MPa)
+    with_core = loop.run(command, dp_MPa, "compensated")
+    # Only the flow at zero command is asked of this one, so it may open and close the valve quickly.
+    quick = RampSequence(rest=sequence.rest, ramp=5.0, top=0.5).no_faster_than(loop.slowest_ramp_s).command()
+    without_beta = loop.run(quick, dp_MPa, "without beta", dp_frozen_MPa=dp0_MPa)
+    level = FLOW_SHARE * direct.q_L_min.max()
+    result = PressureResult(
+        side=side,
+        dp_MPa=dp_MPa,
+        dead_zone_opening=dead_zone(direct, level, rising=True),
+        dead_zone_closing=dead_zone(direct, level, rising=False),
+        residual_opening=dead_zone(with_core, level, rising=True),
+        residual_closing=dead_zone(with_core, level, rising=False),
+        q_zero_L_min=float(with_core.q_largest_L_min[-1]),
+        q_zero_without_beta_L_min=float(without_beta.q_largest_L_min[-1]),
+        q_max_direct_L_min=float(direct.q_L_min.max()),
+        q_max_L_min=float(with_core.q_mean_L_min.max()),
+    )
+    return LoopComparison(result=result, direct=direct, compensated=with_core)
+
+
+def dead_zone(run: LoopRun, level: float, *, rising: bool) -> float:
+    """Return the command share at which flow first reaches `level` going up, or last holds it going down."""
+    top = int(np.argmax(run.command))
+    flows = np.flatnonzero(run.q_mean_L_min > level)
+    part = flows[flows <= top] if rising else flows[flows > top]
+    if part.size == 0:
+        return 1.0
+    return float(run.command[part[0] if rising else part[-1]])

@@ -1,0 +1,285 @@
+"""The plant's motion over a period of the PWM: CasADi functions for any plant, and the numbers of one plant for them.
+
+Eqs. (19)-(23) are linear but for one acceleration that depends on the spool's position: pressure and flow force. The
+linear part is solved exactly, by matrix exponentials that are tabulated over the duty; the acceleration is interpolated
+through its values at the start, the middle and the end of the period, which makes an exponential Runge-Kutta step.
+Where a stop or the edge is passed within the period, plant_period.h takes it apart and follows `plant_path`.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields
+from functools import cache
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant, derivatives, opening_of, orifice
+
+if TYPE_CHECKING:
+    import casadi
+
+#: Radians of the fastest motion in a step: what the Taylor series leaves out is below 1e-12 of it.
+STEP_RAD = 0.6
+ORDER = 12
+#: Half counts of the compare value in a step of the coarse table of responses.
+FINE = 512
+#: Change of the acceleration that its interpolation does not explain, as a share of the spring's at full stroke, beyond
+#: which the period is taken apart.
+JUMP_SHARE = 1e-4
+#: Numbers of a plant that plant_period.h reads by name, in SI units where none stands.
+NAMED = (
+    "STROKE_M", "HALF_PLAY_V", "VOLTS_PER_CHARGE", "U_MAX_V", "PERIOD_S", "DECAY", "DRIVE", "PER_SETTLED",
+    "PULL", "SPRING", "DAMPING", "PUSH", "OVERLAP_M", "REACH_M", "STEPS", "LINEAR", "JUMP",
+)  # fmt: skip
+#: Entries of the exact maps over a period, row by column of (current, position, speed, charge); of the position in its
+#: middle; what the acceleration adds: to the middle and, foreseen, to the end from its value at the start, and to
+#: position and speed from its values at start, middle and end.
+MAP = (
+    "i_i", "q_i", "x_i", "x_x", "x_v", "v_i", "v_x", "v_v", "mid_i", "mid_x", "mid_v",
+    "mid_start", "ahead_start", "x_start", "x_mid", "x_end", "v_start", "v_mid", "v_end",
+)  # fmt: skip
+
+
+class Equations(NamedTuple):
+    """The plant's equations with every parameter a symbol.
+
+    Attributes
+    ----------
+    linear : casadi.Function
+        plant -> d rates / d state (3, 3), d rates / d inputs (3, 3), where no pressure acts.
+    extracted : casadi.Function
+        plant -> what of the next two depends on the parameters only.
+    nonlinear : casadi.Function
+        (x, supply, plant, extracted) -> acceleration beyond the linear part, m/s²; dP, MPa; Q, L/min.
+    """
+
+    linear: "casadi.Function"
+    extracted: "casadi.Function"
+    nonlinear: "casadi.Function"
+
+
+@cache
+def equations() -> Equations:
+    """Return Eqs. (19)-(24) parted into what is linear and what is not."""
+    import casadi as ca
+
+    names = [field.name for field in fields(Plant)]
+    symbols = ca.SX.sym("plant", len(names))
+    plant = SimpleNamespace(**dict(zip(names, ca.vertsplit(symbols), strict=True)))
+    state, inputs, rates = derivatives(plant)
+    nothing = [ca.SX.zeros(3), ca.SX.zeros(3)]
+    jacobians = [ca.jacobian(rates, state), ca.jacobian(rates, inputs)]
+    by_state, by_input = ca.substitute(jacobians, [state, inputs], nothing)
+    x, supply = ca.SX.sym("x"), ca.SX.sym("supply")
+    # Without the spring, which is in the linear part; of a mass of 1 kg it is the force, which saves a division.
+    beside = [ca.vertcat(0, x, 0), ca.vertcat(0, 0, supply), ca.SX(0), ca.SX(1)]
+    force = ca.substitute([rates[2]], [state, inputs, plant.K_et_N_m, plant.m_e_kg], beside)[0]
+    acceleration = force * (1 / plant.m_e_kg)
+    acting = ca.vertcat(acceleration, *orifice(plant, opening_of(plant, x), supply))
+    remaining, found, extracted = ca.extract_parametric(acting, symbols)
+    return Equations(
+        ca.Function("linear", [symbols], [by_state, by_input]),
+        ca.Function("extracted", [symbols], [ca.vertcat(*extracted)]),
+        ca.Function("nonlinear", [x, supply, symbols, ca.vertcat(*found)], ca.vertsplit(remaining)),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Numbers:
+    """One plant as plant_period.h takes it.
+
+    Attributes
+    ----------
+    flat : (P,) array
+        `NAMED`, `MAP`, the parameters, and what `Equations.extracted` makes of them.
+    coarse : (G, 4) array
+        Current, position, speed and charge that full voltage makes, from rest, in 0, 1, ... times `FINE` half counts of
+        the compare value.
+    fine : (FINE, 12) array
+        The same in 0, 1, ... half counts, after the first eight entries of `MAP` for that time: what it does to a
+        state that is there already.
+    """
+
+    flat: np.ndarray
+    coarse: np.ndarray
+    fine: np.ndarray
+
+
+def numbers_of(plant: Plant, compare_max: int) -> Numbers:
+    """Return the numbers of one plant, for a PWM of so many counts."""
+    parameters = np.array([getattr(plant, field.name) for field in fields(Plant)], dtype=float)
+    by_state, by_input = (np.array(part) for part in equations().linear(parameters))
+    rates, drive = np.zeros((4, 4)), np.zeros(4)
+    rates[:3, :3], rates[3, 0], drive[:3] = by_state, 1.0, plant.u_max_V * by_input[:, 0]
+    fastest = max(plant.fastest_rad_s, float(np.abs(np.linalg.eigvals(by_state)).max()))
+    steps = max(math.ceil(fastest * PWM_PERIOD_S / STEP_RAD), 1)
+    linear = plant.flow_force_N_mm_MPa == 0 and plant.droop_MPa_L_min2 == 0
+    stroke = plant.stroke_mm * 1e-3
+    named = (
+        stroke, plant.hysteresis_V / 2, plant.K_i_N_A / plant.force_per_volt / PWM_PERIOD_S, plant.u_max_V,
+        PWM_PERIOD_S, -by_state[0, 0], by_input[0, 0], -by_state[0, 0] / drive[0],
+        by_state[2, 0], -by_state[2, 1], -by_state[2, 2], by_input[2, 1] * plant.force_per_volt,
+        plant.overlap_mm * 1e-3, by_state[2, 0] * drive[0] / -by_state[0, 0] * PWM_PERIOD_S**2, steps, linear,
+        JUMP_SHARE * -by_state[2, 1] * stroke,
+    )  # fmt: skip
+    extracted = np.array(equations().extracted(parameters)).ravel()
+    return Numbers(np.concatenate([named, _map(rates), parameters, extracted]), *_times(rates, drive, 2 * compare_max))
+
+
+def _map(rates: np.ndarray) -> list[float]:
+    """Return the entries of `MAP`: exponentials of the linear part, and integrals of them against polynomials."""
+    from scipy.linalg import expm
+
+    def over(seconds: float) -> tuple[np.ndarray, np.ndarray]:
+        # Powers of time s^j/j! drive the speed: an exponential of a larger matrix holds their responses, j = 0, 1, 2.
+        larger = np.zeros((7, 7))
+        larger[:4, :4], larger[2, 4], larger[4, 5], larger[5, 6] = rates, 1.0, 1.0, 1.0
+        found = expm(larger * seconds)
+        return found[:4, :4], found[:4, 4:]
+
+    end, by_power = over(PWM_PERIOD_S)
+    middle, by_power_middle = over(PWM_PERIOD_S / 2)
+    share = 1 / PWM_PERIOD_S
+    # Values at 0, T/2, T -> coefficients of s^j/j!.
+    quadratic = np.array([[1, 0, 0], [-3 * share, 4 * share, -share], [4 * share**2, -8 * share**2, 4 * share**2]])
+    return [
+        end[0, 0], end[3, 0], *end[1, :3], *end[2, :3], *middle[1, :3],
+        by_power_middle[1, 0], by_power[1, 0], *(by_power[1] @ quadratic), *(by_power[2] @ quadratic),
+    ]  # fmt: skip
+
+
+def _times(rates: np.ndarray, drive: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return `Numbers.coarse` and `Numbers.fine` for `count` parts of a period."""
+    from scipy.linalg import expm
+
+    driven = np.zeros((5, 5))
+    driven[:4, :4], driven[:4, 4] = rates, drive
+    part = driven * (PWM_PERIOD_S / count)
+    fine, coarse = _powers(expm(part), FINE), _powers(expm(part * FINE), count // FINE + 1)
+    (i, x, v, charge), push = range(4), slice(0, 4)
+    entries = [(i, i), (charge, i), (x, i), (x, x), (x, v), (v, i), (v, x), (v, v)]
+    free = np.stack([fine[:, row, column] for row, column in entries], axis=1)
+    return np.ascontiguousarray(coarse[:, push, 4]), np.hstack([free, fine[:, push, 4]])
+
+
+def _powers(matrix: np.ndarray, count: int) -> np.ndarray:
+    """Return the powers 0 to count - 1 of a matrix, (count, n, n)."""
+    powers = np.eye(len(matrix))[None]
+    while len(powers) < count:
+        powers = np.concatenate([powers, powers @ (powers[-1] @ matrix)])
+    return powers[:count]
+
+
+@cache
+def motion_header() -> str:
+    """Return the C of the functions that plant_period.h calls; the same for every plant.
+
+    ``plant_step(i, x, v, response[5], acts, push, supply_MPa, p) -> (i, x, v, charge, middle, acts, excess)``
+        moves over a period that touches neither a stop nor the edge. `response`: what the voltage adds to current,
+        position, speed, charge and the middle's position; `push`: the play's acceleration; `acts`: what else depends on
+        nothing but the position, at the start and at the end; `excess`: how far it departs from a straight line.
+    ``plant_step_linear(i, x, v, response[5], acts, push, p) -> (i, x, v, charge, middle)``
+        does where `acts` is constant.
+    ``plant_path(state[3], voltage, h, push, supply_MPa, p) -> (i, x, v, charge)[ORDER + 1]``
+        gives the path over any short time h as powers of the share of it that has passed.
+    ``plant_path_linear(state[3], voltage, h, acts, push, p) -> (i, x, v, charge)[ORDER + 1]``
+        does where `acts` is constant.
+    ``plant_acting(x, supply_MPa, p) -> (acts in m/s², dp_MPa, Q_L_min)``
+
+    p: `Numbers.flat`.
+    """
+    import casadi as ca
+
+    parameters = len(fields(Plant))
+    extracted = equations().extracted.size1_out(0)
+    p = ca.SX.sym("p", len(NAMED) + len(MAP) + parameters + extracted)
+    parts = ca.vertsplit(p, list(np.cumsum([0, len(NAMED), len(MAP), parameters, extracted])))
+    named = SimpleNamespace(**dict(zip(NAMED, ca.vertsplit(parts[0]), strict=True)))
+    through = SimpleNamespace(**dict(zip(MAP, ca.vertsplit(parts[1]), strict=True)))
+    i, x, v, voltage, h, push, supply, acts = (
+        ca.SX.sym(name) for name in ("i", "x", "v", "voltage", "h", "push", "supply", "acts")
+    )
+    response, state = ca.SX.sym("response", 5), ca.SX.sym("state", 3)
+
+    def acting(position):
+        return equations().nonlinear(position, supply, *parts[2:])
+
+    def acceleration(position):
+        return acting(position)[0] + push
+
+    whole, fixed = [i, x, v, response, acts, push], acts + push
+    generator = ca.CodeGenerator("plant_motion.c")
+    for name, inputs, outputs in (
+        ("plant_step", [*whole, supply, p], _step(through, (i, x, v), response, fixed, acceleration)),
+        ("plant_step_linear", [*whole, p], _step(through, (i, x, v), response, fixed, lambda _: fixed)[:5]),
+        ("plant_path", [state, voltage, h, push, supply, p], _path(named, state, voltage, h, acceleration)),
+        ("plant_path_linear", [state, voltage, h, acts, push, p], _straight_path(named, state, voltage, h, fixed)),
+        ("plant_acting", [x, supply, p], acting(x)),
+    ):
+        generator.add(ca.Function(name, inputs, outputs))
+    names = ", ".join(f"PLANT_{name.upper()}" for name in (*NAMED, *MAP))
+    sizes = f"#define PLANT_TERMS {ORDER + 1}\n#define PLANT_FINE {FINE}\n"
+    return f"enum {{ {names} }};\n{sizes}{generator.dump()}"
+
+
+def _step(through, state, response, start, acceleration: Callable) -> list:
+    """Return what `plant_step` does, accelerations with the play's."""
+    i, x, v = state
+    middle = through.mid_i * i + through.mid_x * x + through.mid_v * v + response[4]
+    middle += through.mid_start * start
+    at_middle = acceleration(middle)
+    free_x = through.x_i * i + through.x_x * x + through.x_v * v + response[1]
+    free_v = through.v_i * i + through.v_x * x + through.v_v * v + response[2]
+    # Not from `at_middle`, which would have to be waited for; the difference is of the fourth order.
+    at_end = acceleration(free_x + through.ahead_start * start)
+    return [
+        through.i_i * i + response[0],
+        free_x + through.x_start * start + through.x_mid * at_middle + through.x_end * at_end,
+        free_v + through.v_start * start + through.v_mid * at_middle + through.v_end * at_end,
+        through.q_i * i + response[3],
+        middle,
+        at_end,
+        at_middle - (start + at_end) / 2,
+    ]
+
+
+def _straight_path(named, state, voltage, h, acceleration) -> list:
+    """Return the path at a constant voltage and acceleration as powers of the share of h: Taylor's series."""
+    import casadi as ca
+
+    terms = _taylor(named, ca.vertsplit(state), voltage, h, (acceleration,))
+    return [ca.vertcat(*part) for part in zip(*terms, strict=True)]
+
+
+def _path(named, state, voltage, h, acceleration: Callable) -> list:
+    """Return the path at a constant voltage as powers of the share of h: the same step, its linear part by Taylor."""
+    import casadi as ca
+
+    start = acceleration(state[1])
+    free = list(_taylor(named, ca.vertsplit(state), voltage, h, (start,)))
+    # What an acceleration of s/h and one of (s/h)^2 add.
+    slope, curve = (list(_taylor(named, (0, 0, 0), 0, h, unit)) for unit in ((0, 1), (0, 0, 1)))
+    at_middle = acceleration(sum(term[1] / 2**order for order, term in enumerate(free)))
+    ahead = sum(term[1] + 2 * (at_middle - start) * more[1] for term, more in zip(free, slope, strict=True))
+    at_end = acceleration(ahead)
+    first, second = -3 * start + 4 * at_middle - at_end, 2 * start - 4 * at_middle + 2 * at_end
+    terms = [
+        [base + first * one + second * two for base, one, two in zip(*parts, strict=True)]
+        for parts in zip(free, slope, curve, strict=True)
+    ]
+    return [ca.vertcat(*part) for part in zip(*terms, strict=True)]
+
+
+def _taylor(named, state, voltage, h, acceleration: tuple) -> Iterator[list]:
+    """Yield the terms of current, position, speed and charge after h, under an acceleration sum a_j (s/h)^j."""
+    term = [*state, 0]
+    yield term
+    for order in range(ORDER):
+        i, x, v, _ = term
+        driven = (named.DRIVE * voltage if order == 0 else 0) - named.DECAY * i
+        pulled = named.PULL * i - named.SPRING * x - named.DAMPING * v
+        pulled += acceleration[order] if order < len(acceleration) else 0
+        term = [h / (order + 1) * rate for rate in (driven, v, pulled, i)]
+        yield term

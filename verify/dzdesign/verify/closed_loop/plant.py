@@ -1,0 +1,242 @@
+"""The plant of Eqs. (19)-(24), with what a real valve's measurements need.
+
+Added to the paper's equations, each of them off where its parameter is zero: preload, overlap, stops, a pressure force
+that moves the threshold, flow force, a play in the magnetic force (hysteresis), droop of the supply.
+"""
+
+import json
+import math
+import tomllib
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from dzdesign.core.artefact_files import read_bytes
+from dzdesign.core.errors import InputError, nearest, quoted
+from dzdesign.identify.valve.model import SideModel
+
+if TYPE_CHECKING:
+    import casadi
+
+PWM_PERIOD_S = 400e-6
+MPA, L_MIN = 1e6, 1e-3 / 60
+#: Beyond any plant in the units of the names; an integer of TOML has no end.
+LARGEST_PARAMETER = 1e12
+#: Characters of a key to which the nearest known one is looked for.
+LONGEST_KEY = 80
+#: Faster than this is no valve's spool, and would take the integrator a thousand steps a phase.
+FASTEST_RAD_S = 1e6
+#: Of a hydraulic system, for the flow force.
+LARGEST_DP_MPA = 40.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plant:
+    """Parameters of the plant; the names are those of Eqs. (19)-(24), the units stand in them.
+
+    Attributes
+    ----------
+    u_max_V : float
+        Command at which the PWM is fully on; the amplifier of Eq. (19) sees u_max or 0.
+    K_a, K_fi_V_A, R_c_ohm, r_p_ohm, L_c_H : float
+        Amplifier gain (K_e of Eq. 19), current feedback, coil.
+    K_i_N_A, m_e_kg, B_e_N_s_m, K_et_N_m : float
+        Force per current, mass, damping, spring.
+    preload_N, pressure_force_N_MPa, flow_force_N_mm_MPa : float
+        Parts of the load force f_eL: at rest; falling with dP; growing with dP and opening.
+    overlap_mm, stroke_mm : float
+        Travel before the edge opens; travel to the stop.
+    hysteresis_V : float
+        Width of the play between current and force, in volts of command.
+    C_d_W_mm, rho_kg_m3 : float
+        Discharge coefficient times area gradient, and density, of Eq. (24).
+    droop_MPa_L_min2 : float
+        Loss of pressure drop per flow squared.
+    """
+
+    u_max_V: float = 10.0
+    K_a: float = 4.0
+    K_fi_V_A: float = 9.0
+    R_c_ohm: float = 3.5
+    r_p_ohm: float = 0.5
+    L_c_H: float = 0.04
+    K_i_N_A: float = 60.0
+    m_e_kg: float = 0.06
+    B_e_N_s_m: float = 45.0
+    K_et_N_m: float = 15000.0
+    preload_N: float = 27.6
+    pressure_force_N_MPa: float = 0.32
+    flow_force_N_mm_MPa: float = 1.5
+    overlap_mm: float = 0.3
+    stroke_mm: float = 2.2
+    hysteresis_V: float = 0.15
+    C_d_W_mm: float = 3.2
+    rho_kg_m3: float = 860.0
+    droop_MPa_L_min2: float = 4e-4
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if type(value) not in (int, float) or not 0 <= value <= LARGEST_PARAMETER:
+                raise InputError(
+                    f"plant parameter {field.name} is {quoted(value)}, expected a number of zero or more, in "
+                    f"the unit that its name ends in, without quotes; write for example {field.name} = {field.default}"
+                )
+        for name in ("u_max_V", "K_a", "R_c_ohm", "L_c_H", "K_i_N_A", "m_e_kg", "K_et_N_m", "rho_kg_m3", "C_d_W_mm"):
+            if getattr(self, name) <= 0:
+                raise InputError(f"plant parameter {name} is {getattr(self, name)}, expected a positive number")
+        if self.stroke_mm <= self.overlap_mm:
+            raise InputError(f"the stroke of {self.stroke_mm} mm ends inside the overlap of {self.overlap_mm} mm")
+        if self.fastest_rad_s > FASTEST_RAD_S:
+            raise InputError(
+                f"the plant's spool moves at {self.fastest_rad_s:.3g} rad/s, expected at most {FASTEST_RAD_S:.3g}; "
+                "correct m_e_kg, K_et_N_m or B_e_N_s_m"
+            )
+        if self.coil_rad_s > FASTEST_RAD_S:
+            raise InputError(
+                f"the plant's coil follows at {self.coil_rad_s:.3g} rad/s, expected at most {FASTEST_RAD_S:.3g}; "
+                "correct L_c_H, K_a or K_fi_V_A"
+            )
+
+    @property
+    def fastest_rad_s(self) -> float:
+        """Rate of the spool's fastest free motion: against spring and flow force, or against its damping."""
+        stiffest = self.K_et_N_m + self.flow_force_N_mm_MPa * 1e3 * LARGEST_DP_MPA
+        return max(math.sqrt(stiffest / self.m_e_kg), self.B_e_N_s_m / self.m_e_kg)
+
+    @property
+    def coil_rad_s(self) -> float:
+        """Rate at which the current settles, from Eqs. (19)-(21)."""
+        return (self.K_a * self.K_fi_V_A + self.R_c_ohm + self.r_p_ohm) / self.L_c_H
+
+    @property
+    def force_per_volt(self) -> float:
+        """Force in N per volt of command at rest, from Eqs. (19)-(22)."""
+        return self.K_i_N_A * self.K_a / (self.R_c_ohm + self.r_p_ohm + self.K_a * self.K_fi_V_A)
+
+
+def read_plant(path: Path, say: Callable[[str], None] = lambda _: None) -> Plant:
+    """Read a plant from TOML; a key that is none of `Plant`'s is refused, with the nearest that is.
+
+    Parameters
+    ----------
+    path : Path
+    say : callable
+        Told which parameters the file leaves as the default plant has them.
+
+    Raises
+    ------
+    InputError
+        If the file can't be read or a value does not fit.
+    """
+    content = read_bytes(path, "plant file")
+    try:
+        values = tomllib.loads(content.decode("utf-8-sig"))
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"'{path}' is not TOML: {error}") from error
+    known = [field.name for field in fields(Plant)]
+    for key in values:
+        if key not in known:
+            raise InputError(f"'{path}': there is no plant parameter {quoted(key)}{nearest(key[:LONGEST_KEY], known)}")
+    try:
+        plant = Plant(**values)
+    except InputError as error:
+        raise InputError(f"'{path}': {error}") from error
+    missing = [name for name in known if name not in values]
+    if missing:
+        say(f"'{path}' leaves {', '.join(missing)} as the default plant has them")
+    return plant
+
+
+def plants_from_tests(side: SideModel, u_max_V: float) -> dict[float, Plant]:
+    """Return, per tested pressure drop in MPa, the default plant with the identified thresholds, slope and stroke.
+
+    The dynamics stay those of the default plant; what was identified at rest is taken over, at a constant pressure
+    drop: it opens at the rising knee and closes at the guarded threshold (the onset, where the edge is soft). It stands
+    in for the valve where no better plant is given; the closed loop then checks the design and the C, not the
+    identification.
+    """
+    plants = {}
+    for test in side.tests:
+        base = Plant(u_max_V=u_max_V, pressure_force_N_MPa=0, flow_force_N_mm_MPa=0, droop_MPa_L_min2=0, overlap_mm=0.3)
+        opens = test.u_knee_rising_V if test.u_knee_rising_V is not None else test.u_guard_V
+        closes = test.u_guard_V if side.guard == "closing" else opens
+        middle, hysteresis = (opens + closes) / 2, max(opens - closes, 0.0)
+        # A threshold below the spring force of the overlap is met with less overlap.
+        overlap = min(base.overlap_mm, 0.5 * middle * base.force_per_volt / base.K_et_N_m * 1e3)
+        travel_mm_V = base.force_per_volt / base.K_et_N_m * 1e3
+        speed = math.sqrt(2 * test.dp_MPa * MPA / base.rho_kg_m3)
+        plants[test.dp_MPa] = replace(
+            base,
+            overlap_mm=overlap,
+            preload_N=middle * base.force_per_volt - base.K_et_N_m * overlap * 1e-3,
+            hysteresis_V=hysteresis,
+            stroke_mm=overlap + side.k_x_max_over_u_max * u_max_V * travel_mm_V,
+            C_d_W_mm=test.slope_L_min_V * L_MIN / (travel_mm_V * 1e-3) / speed * 1e3,
+        )
+    return plants
+
+
+def plant_document(plant: Plant) -> dict[str, Any]:
+    """Return the parameters as they stand in a file."""
+    return json.loads(json.dumps(asdict(plant)))
+
+
+def derivatives(plant: Plant) -> tuple["casadi.SX", "casadi.SX", "casadi.SX"]:
+    """Return state, inputs and their derivatives of Eqs. (19)-(24), lowered from SymPy to CasADi.
+
+    Returns
+    -------
+    tuple
+        state (i in A, x_e in m, v in m/s); inputs (amplifier voltage in V, force offset of the play in N, supply
+        pressure drop in MPa); d state/dt, free of the stops.
+    """
+    import casadi as ca
+
+    from dzdesign.derivation import plant as equations
+    from dzdesign.derivation.lowering import lower
+
+    state, inputs = ca.SX.sym("state", 3), ca.SX.sym("inputs", 3)
+    current, position, speed = (state[index] for index in range(3))
+    voltage, play_force, supply = (inputs[index] for index in range(3))
+    opening = opening_of(plant, position)
+    dp_MPa, _ = orifice(plant, opening, supply)
+    load = (
+        plant.preload_N
+        - plant.pressure_force_N_MPa * dp_MPa
+        + plant.flow_force_N_mm_MPa * 1e3 * dp_MPa * opening
+        - play_force
+    )
+    parameters = (
+        plant.K_a, plant.K_fi_V_A, plant.K_i_N_A, plant.R_c_ohm, plant.r_p_ohm, plant.L_c_H, plant.m_e_kg,
+        plant.B_e_N_s_m, plant.K_et_N_m,
+    )  # fmt: skip
+    names = (*equations.STATE, *equations.INPUTS, *equations.PARAMETERS)
+    lowered = lower(list(equations.state_derivatives()), names)
+    return state, inputs, ca.vertcat(*lowered(current, position, speed, voltage, load, *parameters))
+
+
+def opening_of(plant: Plant, position: Any) -> Any:
+    """Return how far the edge is open, m."""
+    import casadi as ca
+
+    past = position - plant.overlap_mm * 1e-3
+    return ca.if_else(past > 0, past, 0)  # fmax would be a call of the C library
+
+
+def orifice(plant: Plant, opening_m: Any, supply_MPa: Any) -> tuple[Any, Any]:
+    """Return pressure drop (MPa) and flow (L/min) across the edge, the supply's droop solved for in closed form.
+
+    Eq. (24) is Q = G sqrt(dP); with dP = supply - droop Q^2 that gives dP = supply / (1 + droop G^2).
+    """
+    import casadi as ca
+
+    from dzdesign.derivation import plant as equations
+    from dzdesign.derivation.lowering import lower
+
+    flow = lower(equations.flow(), (equations.STATE[1], *equations.FLOW_PARAMETERS), {"sqrt": ca.sqrt})
+    # L/min at 1 MPa; Eq. (24) is linear in the opening, and of one metre it is a number.
+    conductance = opening_m * (flow(1.0, 1.0, plant.C_d_W_mm * 1e-3, plant.rho_kg_m3, MPA) / L_MIN)
+    dp_MPa = supply_MPa / (1 + plant.droop_MPa_L_min2 * conductance**2)
+    return dp_MPa, conductance * ca.sqrt(dp_MPa)

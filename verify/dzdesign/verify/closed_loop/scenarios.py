@@ -1,0 +1,238 @@
+"""What a machine does to a valve beside ramps: steps, load steps, failing sensors, noise, cold and hot oil."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dzdesign.verify.closed_loop.loop import ClosedLoop, LoopRun
+from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
+
+#: Two periods a record: as often as the core samples, 1.25 kHz.
+PERIODS = 2
+STEP_S = PERIODS * PWM_PERIOD_S
+#: Time in which a spool has come to rest; and of a command's ramp, quick but far slower than the spool.
+SETTLE_S, RAMP_S = 0.4, 2.0
+#: Of the final flow: where a rise begins and ends, and how near it is settled.
+RISE, SETTLED = (0.1, 0.9), 0.05
+#: Standard deviation of the noise on the command, share of full.
+NOISE = 0.002
+SEED = 1
+#: Viscosity (damping goes with it) and density of a mineral oil of class VG 46 against 40 °C: about 0 °C and 80 °C.
+OILS = {"cold oil, 8 times the viscosity": (8.0, 1.03), "hot oil, a quarter of the viscosity": (0.25, 0.97)}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScenarioResult:
+    """One scenario at one pressure drop.
+
+    Attributes
+    ----------
+    name, side : str
+        What happens, and on which side of the valve.
+    dp_MPa : float
+        Pressure drop before anything happens, at no flow.
+    q_zero_L_min : float
+        Flow at zero command at the end, after everything has settled.
+    q_peak_at_zero_L_min : float
+        Largest flow while the command was zero and the valve had closed before.
+    must_shut : bool
+        Whether flow at the end is a failure: not where no compensator could know better.
+    figures : dict of str to float
+        What else was measured, the unit in the name.
+    """
+
+    name: str
+    side: str
+    dp_MPa: float
+    q_zero_L_min: float
+    q_peak_at_zero_L_min: float
+    must_shut: bool
+    figures: dict[str, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scene:
+    """The loop of one side at one pressure drop.
+
+    Attributes
+    ----------
+    loop : ClosedLoop
+        With the compensator, and the plant of this pressure drop.
+    plant : Plant
+    side : str
+    dp_MPa, reference_MPa : float
+        Pressure drop at no flow, and the law's dP0.
+    tested_MPa : (float, float) or None
+        Lowest and highest tested pressure drop; None where the plant holds at `dp_MPa` only.
+    """
+
+    loop: ClosedLoop
+    plant: Plant
+    side: str
+    dp_MPa: float
+    reference_MPa: float
+    tested_MPa: tuple[float, float] | None
+
+    @property
+    def settle_s(self) -> float:
+        """Time in which the valve has come to rest, the firmware's own ramps included."""
+        return SETTLE_S + self.loop.slowest_ramp_s
+
+    def held(self, level: float, times: float = 1) -> np.ndarray:
+        """Return a command held for so many times the time to come to rest."""
+        return np.full(round(times * self.settle_s / STEP_S), level)
+
+    def opened_and_closed(self) -> np.ndarray:
+        """Return the command that leaves the spool as its hysteresis leaves it after use."""
+        return np.concatenate([_ramp(0, 1), self.held(1), _ramp(1, 0), self.held(0, 2)])
+
+    def run(self, command: np.ndarray, **keywords) -> LoopRun:
+        """Run the compensated loop at this pressure drop unless told otherwise."""
+        supply = keywords.pop("supply_MPa", self.dp_MPa)
+        mode = keywords.pop("mode", "compensated")
+        return self.loop.run(command, supply, mode, periods_per_record=PERIODS, **keywords)
+
+    def result(self, name: str, run: LoopRun, *, must_shut: bool = True, **figures: float) -> ScenarioResult:
+        """Return the result; zero command counts once the valve has had the time to come to rest."""
+        shut = np.flatnonzero(_held_for(run.command <= 0, round(self.settle_s / STEP_S)))
+        return ScenarioResult(
+            name=name,
+            side=self.side,
+            dp_MPa=self.dp_MPa,
+            q_zero_L_min=float(run.q_largest_L_min[-1]),
+            q_peak_at_zero_L_min=float(run.q_largest_L_min[shut].max(initial=0.0)),
+            must_shut=must_shut,
+            figures={key: float(value) for key, value in figures.items()},
+        )
+
+
+def run_scenarios(scene: Scene) -> Iterator[ScenarioResult]:
+    """Run every scenario of one side at one pressure drop."""
+    yield _steps(scene)
+    if scene.tested_MPa:
+        yield _load_step_at_zero(scene)
+        yield _load_step_in_motion(scene)
+        yield _frozen_sensors(scene)
+    yield from _failing_sensors(scene)
+    yield _noise_at_zero(scene)
+    yield from _oils(scene)
+
+
+def _ramp(start: float, end: float) -> np.ndarray:
+    return np.linspace(start, end, round(RAMP_S / STEP_S))
+
+
+def _held_for(condition: np.ndarray, count: int) -> np.ndarray:
+    """Return where a condition has held for so many records, this one included."""
+    since = np.arange(condition.size) - np.maximum.accumulate(np.where(condition, -1, np.arange(condition.size)))
+    return condition & (since > count)
+
+
+def _steps(scene: Scene) -> ScenarioResult:
+    """Steps of the command, zero to half and back, with and without compensator (the paper's Fig. 8)."""
+    half = scene.held(0.5, 2)
+    command = np.concatenate([scene.opened_and_closed(), half, scene.held(0, 2)])
+    start, stop = command.size - 2 * half.size, command.size - half.size
+    runs = {mode: scene.run(command, mode=mode) for mode in ("compensated", "direct")}
+    figures = {}
+    for name, run in runs.items():
+        step = run.q_L_min[start:stop]
+        final = float(step[-1])
+        figures[f"{name}_flow_L_min"] = final
+        if final > 0:
+            figures[f"{name}_rise_ms"] = 1e3 * STEP_S * _rise(step / final)
+            figures[f"{name}_settling_ms"] = 1e3 * STEP_S * _last(np.abs(step / final - 1) > SETTLED)
+            figures[f"{name}_overshoot_percent"] = max(100 * float(step.max() / final - 1), 0.0)
+    return scene.result("step to half command and back", runs["compensated"], **figures)
+
+
+def _rise(response: np.ndarray) -> int:
+    begin, end = (int(np.argmax(response >= level)) for level in RISE)
+    return end - begin
+
+
+def _last(condition: np.ndarray) -> int:
+    return int(np.flatnonzero(condition)[-1]) + 1 if condition.any() else 0
+
+
+def _other_pressures(scene: Scene, length: int) -> np.ndarray:
+    """Return the supply: as before, then at both ends of the tested interval, then as before."""
+    quarter = length // 4
+    parts = [scene.dp_MPa, *scene.tested_MPa[::-1], scene.dp_MPa]
+    return np.repeat(parts, [quarter, quarter, quarter, length - 3 * quarter])
+
+
+def _load_step_at_zero(scene: Scene) -> ScenarioResult:
+    """The pressure drop jumps to both ends of what was tested while the command is zero."""
+    before, quiet = scene.opened_and_closed(), scene.held(0, 8)
+    supply = np.concatenate([np.full(before.size, scene.dp_MPa), _other_pressures(scene, quiet.size)])
+    run = scene.run(np.concatenate([before, quiet]), supply_MPa=supply)
+    volume = run.q_mean_L_min[before.size :].sum() * STEP_S / 60 * 1e3
+    return scene.result("load steps at zero command", run, volume_mL=volume)
+
+
+def _load_step_in_motion(scene: Scene) -> ScenarioResult:
+    """The pressure drop jumps in the middle of a ramp of the command."""
+    command = np.concatenate([scene.opened_and_closed(), _ramp(0, 0.6), _ramp(0.6, 0), scene.held(0, 2)])
+    jump = scene.opened_and_closed().size + _ramp(0, 1).size // 2
+    supply = np.full(command.size, scene.dp_MPa)
+    supply[jump:] = scene.tested_MPa[1] if scene.dp_MPa < sum(scene.tested_MPa) / 2 else scene.tested_MPa[0]
+    run = scene.run(command, supply_MPa=supply)
+    change = run.q_L_min[jump + round(SETTLE_S / STEP_S)] - run.q_L_min[jump - 1]
+    return scene.result(
+        "load step in the middle of a ramp", run, pressure_drop_then_MPa=supply[-1], flow_change_L_min=change
+    )
+
+
+def _failing_sensors(scene: Scene) -> Iterator[ScenarioResult]:
+    """A sensor fails in mid-ramp: its wire breaks, or it shows full pressure."""
+    beyond = 1e3  # MPa: the converter's end
+    for name, shown_MPa in (
+        ("sensor ahead breaks, or the one behind shows full", -beyond),
+        ("sensor ahead shows full, or the one behind breaks", beyond),
+    ):
+        yield scene.result(name, _fail(scene, shown_MPa, scene.dp_MPa))
+
+
+def _frozen_sensors(scene: Scene) -> ScenarioResult:
+    """The sensors freeze, then the pressure drop rises. The codes are sound: what it costs is stated, not required."""
+    low, high = scene.tested_MPa
+    name = f"sensors frozen at {low:.2f} MPa, then {high:.2f} MPa"
+    return scene.result(name, _fail(scene, low, high), must_shut=False)
+
+
+def _fail(scene: Scene, shown_MPa: float, supply_MPa: float) -> LoopRun:
+    """Run a ramp up and down; in mid-ramp the sensors begin to show something, and the supply becomes another."""
+    before = scene.opened_and_closed()
+    command = np.concatenate([before, _ramp(0, 0.6), _ramp(0.6, 0), scene.held(0, 2)])
+    failure = before.size + _ramp(0, 1).size // 2
+    seen, supply = np.full(command.size, np.nan), np.full(command.size, scene.dp_MPa)
+    seen[failure:], supply[failure:] = shown_MPa, supply_MPa
+    return scene.run(command, supply_MPa=supply, seen_MPa=seen)
+
+
+def _noise_at_zero(scene: Scene) -> ScenarioResult:
+    """White noise on a zero command, as long as the spool needs to feel its mean."""
+    before = scene.opened_and_closed()
+    noise = NOISE * np.random.default_rng(SEED).standard_normal(round(2.0 / STEP_S))
+    command = np.concatenate([before, np.maximum(noise, 0.0), scene.held(0)])
+    run = scene.run(command)
+    noisy = slice(before.size, before.size + noise.size)
+    return scene.result(
+        f"noise of {100 * NOISE:g} % on a zero command",
+        run,
+        mean_flow_L_min=run.q_mean_L_min[noisy].mean(),
+        peak_flow_L_min=run.q_largest_L_min[noisy].max(),
+    )
+
+
+def _oils(scene: Scene) -> Iterator[ScenarioResult]:
+    """The same ramp with oil far from the temperature of the bench."""
+    for name, (viscosity, density) in OILS.items():
+        plant = replace(
+            scene.plant, B_e_N_s_m=scene.plant.B_e_N_s_m * viscosity, rho_kg_m3=scene.plant.rho_kg_m3 * density
+        )
+        warm = replace(scene, loop=scene.loop.with_plant(plant), plant=plant)
+        run = warm.run(warm.opened_and_closed())
+        yield warm.result(name, run, largest_flow_L_min=run.q_mean_L_min.max())

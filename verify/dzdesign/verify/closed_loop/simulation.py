@@ -1,0 +1,131 @@
+"""`simulate`: ramp tests as a bench would record them, from the plant; always marked as simulated."""
+
+import json
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dzdesign.core.artefact_files import TOOL, read_bytes, sha256_of
+from dzdesign.core.errors import InputError
+from dzdesign.design.compensator_file import compensator_from_document
+from dzdesign.identify.reading.ramp_files import SIMULATED_MARK, ramp_file_bytes
+from dzdesign.verify.closed_loop.loop import RECORD_S, ClosedLoop, RampSequence
+from dzdesign.verify.closed_loop.plant import Plant, plant_document
+from dzdesign.verify.firmware.folder import check_firmware_inside
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bench:
+    """The sensors and the recorder of a bench.
+
+    Attributes
+    ----------
+    rate_Hz : float
+        Rows per second.
+    meter_lag_s, meter_floor_L_min, meter_noise_L_min : float
+        Flow meter: first-order lag, flow below which it reads zero, standard deviation of its noise.
+    command_noise_V, pressure_noise_MPa : float
+        Standard deviations of the other two channels.
+    seed : int
+        Of the noise; the same seed gives the same bytes.
+    """
+
+    rate_Hz: float = 25.0
+    meter_lag_s: float = 0.1
+    meter_floor_L_min: float = 0.6
+    meter_noise_L_min: float = 0.08
+    command_noise_V: float = 0.002
+    pressure_noise_MPa: float = 0.01
+    seed: int = 1
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.rate_Hz <= 1 / RECORD_S:
+            raise InputError(f"the rate is {self.rate_Hz:g} Hz, expected 1 to {1 / RECORD_S:g} Hz")
+
+
+def simulate_ramp(
+    loop: ClosedLoop, plant: Plant, dp_MPa: float, bench: Bench, sequence: RampSequence, mode: str = "direct"
+) -> dict[str, np.ndarray]:
+    """Record one ramp test of the plant, without compensator ("direct") or with it ("compensated").
+
+    Returns
+    -------
+    dict
+        Columns of a ramp file: time_s, u_V, dP_MPa, Q_Lmin.
+    """
+    from scipy.signal import lfilter
+
+    run = loop.run(sequence.no_faster_than(loop.slowest_ramp_s).command(), dp_MPa, mode)
+    share = 1 - np.exp(-RECORD_S / bench.meter_lag_s) if bench.meter_lag_s > 0 else 1.0
+    with_core = mode != "direct"
+    # Of a dither a meter sees the mean.
+    metered = lfilter([share], [1, share - 1], run.q_mean_L_min if with_core else run.q_L_min)
+    rows = np.round(np.arange(0, run.time[-1], 1 / bench.rate_Hz) / RECORD_S).astype(int)
+    # One stream of numbers per pressure drop, so that adding a test changes none of the others.
+    stream = [bench.seed, round(dp_MPa * 1e6), *([1] if with_core else [])]
+    noise = np.random.default_rng(stream).standard_normal((3, rows.size))
+    seen = np.where(metered[rows] < bench.meter_floor_L_min, 0.0, metered[rows])
+    return {
+        "time_s": run.time[rows],
+        "u_V": run.command[rows] * plant.u_max_V + bench.command_noise_V * noise[0],
+        "dP_MPa": run.dp_MPa[rows] + bench.pressure_noise_MPa * noise[1],
+        "Q_Lmin": seen + bench.meter_noise_L_min * noise[2],
+    }
+
+
+def simulated_files(
+    plant: Plant,
+    pressures_MPa: list[float],
+    ramp_s: float,
+    bench: Bench,
+    say: Callable[[str], None],
+    firmware: Path | None = None,
+) -> tuple[dict[str, bytes], dict[str, Any]]:
+    """Simulate one ramp test per pressure drop, up and down; with a firmware folder, of the compensated valve.
+
+    Returns
+    -------
+    tuple
+        File name -> gzipped CSV, each marked as simulated in its first lines; manifest of the folder.
+    """
+    if not 1 <= ramp_s <= 1000:
+        raise InputError(f"the ramp time is {ramp_s:g} s, expected 1 to 1000 s")
+    loop, origin = (ClosedLoop(plant), {}) if firmware is None else _loop_of(plant, firmware)
+    name, mode = ("ramp", "direct") if firmware is None else ("compensated", "compensated")
+    sequence = RampSequence(ramp=ramp_s)
+    contents = {}
+    for dp_MPa in pressures_MPa:
+        if not 0.01 <= dp_MPa <= 18:
+            raise InputError(f"a pressure drop of {dp_MPa:g} MPa can't be simulated, expected 0.01 to 18 MPa")
+        say(f"simulating {dp_MPa:g} MPa")
+        comments = (
+            f"{SIMULATED_MARK} by dzdesign simulate; not a measurement.",
+            f"pressure drop {dp_MPa:g} MPa at no flow; 0-{plant.u_max_V:g} V in {ramp_s:g} s and back",
+            f"meter: floor {bench.meter_floor_L_min:g} L/min, lag {bench.meter_lag_s:g} s, "
+            f"noise {bench.meter_noise_L_min:g} L/min; seed {bench.seed}",
+            *(["with the compensator; u is its command"] if firmware else []),
+        )
+        columns = simulate_ramp(loop, plant, dp_MPa, bench, sequence, mode)
+        contents[f"{name}_dP{dp_MPa:g}.csv.gz"] = ramp_file_bytes(columns, comments, compress=True)
+    manifest = {
+        "schema": "dzdesign.simulation/1",
+        "tool": TOOL,
+        "simulated": True,
+        "plant": plant_document(plant),
+        "bench": asdict(bench),
+        **origin,
+    }
+    return contents, manifest
+
+
+def _loop_of(plant: Plant, firmware: Path) -> tuple[ClosedLoop, dict[str, Any]]:
+    """Return the loop of a plant with a firmware's core, and what the manifest says of it."""
+    check_firmware_inside(firmware)
+    path = firmware / "compensator.json"
+    content = read_bytes(path, "compensator of the firmware")
+    compensator_from_document(content, str(path))  # every key that the loop reads is there
+    origin = {"compensator": {"source": path.name, "sha256": sha256_of(content)}}
+    return ClosedLoop(plant, firmware, json.loads(content)), origin

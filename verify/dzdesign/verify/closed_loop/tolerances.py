@@ -1,0 +1,189 @@
+"""Monte Carlo over the tolerances of a plant: how the compensated valve scatters where no two valves are alike."""
+
+import re
+import tomllib
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dzdesign.core.artefact_files import read_bytes
+from dzdesign.core.errors import InputError, nearest, quoted
+from dzdesign.verify.closed_loop.loop import FLOW_SHARE, NO_FLOW_L_MIN, ClosedLoop, RampSequence, dead_zone
+from dzdesign.verify.closed_loop.plant import LONGEST_KEY, Plant
+
+PARAMETERS = tuple(field.name for field in fields(Plant))
+#: Ramps quick enough for hundreds of plants; the lag of a spool is a thousandth of them.
+SEQUENCE = RampSequence(rest=1.0, ramp=10.0, top=0.5)
+QUANTILES = (0.01, 0.05, 0.5, 0.95, 0.99)
+WORKERS = 2
+MOST_PLANTS = 100_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tolerances:
+    """How the plants of a series scatter.
+
+    Attributes
+    ----------
+    spreads : dict of str to (float, str)
+        Parameter of `Plant` to its relative spread and the distribution: "uniform" (plus and minus that much) or
+        "normal" (its standard deviation).
+    plants, seed : int
+        How many plants, and of which random numbers.
+    """
+
+    spreads: dict[str, tuple[float, str]]
+    plants: int = 200
+    seed: int = 1
+
+    def draw(self, nominal: Plant) -> list[Plant]:
+        """Return the plants; the first n of a larger number are the same.
+
+        Raises
+        ------
+        InputError
+            If one of them is no plant: its parameters contradict each other.
+        """
+        drawn = []
+        for index in range(self.plants):
+            random = np.random.default_rng([self.seed, index])
+            factors = {
+                name: 1 + spread * (random.uniform(-1, 1) if shape == "uniform" else random.standard_normal())
+                for name, (spread, shape) in self.spreads.items()
+            }
+            drawn.append(replace(nominal, **{name: getattr(nominal, name) * by for name, by in factors.items()}))
+        return drawn
+
+
+def read_tolerances(path: Path) -> Tolerances:
+    """Read tolerances from TOML: parameters as "3 %" (uniform) or "1 % sd" (normal), ``plants`` and ``seed``.
+
+    Raises
+    ------
+    InputError
+        If the file can't be read, or a key or value does not fit.
+    """
+    content = read_bytes(path, "file of tolerances")
+    try:
+        values = tomllib.loads(content.decode("utf-8-sig"))
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"'{path}' is not TOML: {error}") from error
+    counts = {name: _count(path, name, values.pop(name)) for name in ("plants", "seed") if name in values}
+    for name in values:
+        if name not in PARAMETERS:
+            near = nearest(name[:LONGEST_KEY], PARAMETERS)
+            raise InputError(f"'{path}': there is no plant parameter {quoted(name)}{near}")
+    if not values:
+        raise InputError(f"'{path}' names no plant parameter; write one such as preload_N = \"3 %\"")
+    return Tolerances(spreads={name: _spread(path, name, value) for name, value in values.items()}, **counts)
+
+
+def _count(path: Path, name: str, value: Any) -> int:
+    least = 1 if name == "plants" else 0
+    if type(value) is not int or not least <= value <= MOST_PLANTS:
+        raise InputError(f"'{path}': {name} is {quoted(value)}, expected a whole number from {least} to {MOST_PLANTS}")
+    return value
+
+
+def _spread(path: Path, name: str, value: Any) -> tuple[float, str]:
+    text = value if isinstance(value, str) else ""
+    found = re.fullmatch(r"\s*(\d{1,3}(?:\.\d{1,6})?)\s*%\s*(sd)?\s*", text, re.ASCII)
+    if found is None or not 0 < float(found[1]) < 100:
+        raise InputError(
+            f"'{path}': {name} is {quoted(value)}, expected plus and minus some per cent, or a standard deviation; "
+            f'write for example {name} = "3 %", or {name} = "1 % sd"'
+        )
+    return float(found[1]) / 100, "normal" if found[2] else "uniform"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scatter:
+    """What a series of plants does at one pressure drop.
+
+    Attributes
+    ----------
+    side : str
+    dp_MPa : float
+    plants, leaking : int
+        How many there are; how many pass flow at zero command after closing.
+    quantiles : dict of str to dict of str to float
+        Quantity to quantile ("0.05") to value: dead zones with the compensator as shares of full command, flows in
+        L/min.
+    worst : dict of str to dict
+        Quantity to the parameters of the plant at its bad end that differ from the nominal one, and its value.
+    """
+
+    side: str
+    dp_MPa: float
+    plants: int
+    leaking: int
+    quantiles: dict[str, dict[str, float]]
+    worst: dict[str, dict[str, Any]]
+
+
+def scatter(
+    loop: ClosedLoop, nominal: Plant, tolerances: Tolerances, dp_MPa: float, side: str = "positive"
+) -> Scatter:
+    """Run every plant through a ramp at one pressure drop.
+
+    Parameters
+    ----------
+    loop : ClosedLoop
+        With the compensator of the side.
+    nominal : Plant
+        What the tolerances are about.
+    tolerances : Tolerances
+    dp_MPa : float
+        Pressure drop at no flow.
+    side : str
+        For the result.
+    """
+    plants = tolerances.draw(nominal)
+    command = SEQUENCE.no_faster_than(loop.slowest_ramp_s).command()
+
+    def one(plant: Plant) -> tuple[float, ...]:
+        run = loop.with_plant(plant).run(command, dp_MPa, "compensated")
+        level = FLOW_SHARE * max(float(run.q_mean_L_min.max()), NO_FLOW_L_MIN)
+        return (
+            dead_zone(run, level, rising=True),
+            dead_zone(run, level, rising=False),
+            float(run.q_largest_L_min[-1]),
+            float(run.q_mean_L_min.max()),
+        )
+
+    with ThreadPoolExecutor(WORKERS) as pool:
+        found = np.array(list(pool.map(one, plants)))
+    names = ("residual_opening", "residual_closing", "q_zero_L_min", "q_max_L_min")
+    bad_end = (np.argmax, np.argmax, np.argmax, np.argmin)
+    worst = {
+        name: {
+            "value": float(column[(at := int(end(column)))]),
+            "plant": {key: getattr(plants[at], key) for key in tolerances.spreads},
+        }
+        for name, column, end in zip(names, found.T, bad_end, strict=True)
+    }
+    return Scatter(
+        side=side,
+        dp_MPa=dp_MPa,
+        plants=len(plants),
+        leaking=int((found[:, 2] > NO_FLOW_L_MIN).sum()),
+        quantiles={
+            name: {f"{q:g}": float(value) for q, value in zip(QUANTILES, np.quantile(column, QUANTILES), strict=True)}
+            for name, column in zip(names, found.T, strict=True)
+        },
+        worst=worst,
+    )
+
+
+def scatter_document(tolerances: Tolerances, found: Sequence[Scatter]) -> dict[str, Any]:
+    """Return what verification.json says of the series."""
+    return {
+        "plants": tolerances.plants,
+        "seed": tolerances.seed,
+        "spreads": {name: f"{100 * spread:g} % {shape}" for name, (spread, shape) in tolerances.spreads.items()},
+        "pressures": [asdict(each) for each in found],
+    }

@@ -1,0 +1,1 @@
+"""Exhaustive: the compiled core on every input against the exactly rounded law."""

@@ -1,0 +1,211 @@
+"""The compiled drive against its model, tick by tick: outputs and state, over corners and random samples."""
+
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+
+from dzdesign.core.errors import RequirementError
+from dzdesign.design.compensator import Compensator
+from dzdesign.verify.exhaustive.exact_drive import STEP_UNIT, DriveModel
+from dzdesign.verify.toolchain.machines import HOST, compile_object, link_program, programs_folder, run_program, stored
+
+SEED, SAMPLES = 11, 3000
+#: A ramp that is not put anywhere; share of the samples before which it is.
+STAYS, PUT_SHARE = -(2**31), 0.04
+FIELDS = ("compare_a", "compare_b", "status", "law", "side", "ticks", "ramped")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveCheck:
+    """What running the drive beside its model found.
+
+    Attributes
+    ----------
+    ticks, wrong : int
+        PWM periods, and those after which an output or the state is not the model's.
+    first_wrong : str or None
+        The first of them, in words.
+    """
+
+    ticks: int
+    wrong: int
+    first_wrong: str | None
+
+
+def drive_samples(compensator: Compensator, seed: int, count: int) -> list[tuple[int, int, int]]:
+    """Return random codes, corners, steps from end to end, and noise about zero, one after the other.
+
+    Parameters
+    ----------
+    compensator : Compensator
+        Its signals and its window.
+    seed : int
+        Of the random numbers.
+    count : int
+        Samples: codes of command, pressure A and pressure B.
+    """
+    rng = np.random.default_rng(seed)
+    signals = compensator.signals
+    zero, window = signals.command.zero_code, max(compensator.amplifier.window_codes, 4)
+    low, high = signals.command.valid_codes
+    corners = [0, low, high, signals.code_max, signals.code_max + 1, 65535, zero, signals.command.full_code]
+    corners += [max(zero + sign * (window + step), 0) for sign in (1, -1) for step in (-1, 0, 1)]
+    sound_pressures = (signals.pressure_a.valid_codes, signals.pressure_b.valid_codes)
+    made = []
+    while len(made) < count:
+        kind = int(rng.integers(7))
+        length = int(rng.integers(1, 900 if kind == 5 else 60))
+        held, corner = int(rng.integers(low, high + 1)), int(rng.choice(corners))
+        for _ in range(length):
+            near = min(max(held + int(rng.integers(-3, 4)), low), high)
+            about_zero = max(zero + int(rng.integers(-2 * window, 2 * window + 1)), 0)
+            anything = int(rng.integers(0, 65536)) if rng.random() < 0.02 else int(rng.integers(low, high + 1))
+            end = held if held % 2 else (low, high)[held // 2 % 2]
+            command = (anything, int(rng.choice(corners)), held, about_zero, near, end, corner)[kind]
+            sound = rng.random() < 0.9
+            pressures = [int(rng.integers(least, most + 1)) for least, most in sound_pressures]
+            pressures = pressures if sound else rng.choice([0, 700, 4014, 4095, 4096, 65535], 2)
+            made.append((command, *map(int, pressures)))
+    return made[:count]
+
+
+def ramp_places(compensator: Compensator, seed: int, count: int) -> list[int]:
+    """Return where the ramp is put before each sample, in codes over `STEP_UNIT`; `STAYS` where it goes on by itself.
+
+    A slow ramp would need minutes of samples from end to end. Its state is one number, so it is put anywhere.
+
+    Parameters
+    ----------
+    compensator : Compensator
+        With its ramps; without any there is nothing to put.
+    seed : int
+        Of the random numbers.
+    count : int
+        Samples.
+    """
+    rng = np.random.default_rng([seed, 1])
+    amplifier, signals = compensator.amplifier, compensator.signals
+    if not any(amplifier.ramp_up + amplifier.ramp_down):
+        return [STAYS] * count
+    high = signals.command.span(1)
+    low = -signals.command.span(-1) if len(signals.signs) == 2 else 0
+    ends = (low * STEP_UNIT, high * STEP_UNIT)
+
+    def place() -> int:
+        return int(rng.choice(ends) if rng.random() < 0.2 else rng.integers(*ends))
+
+    return [place() if rng.random() < PUT_SHARE else STAYS for _ in range(count)]
+
+
+def window_samples(compensator: Compensator) -> list[tuple[tuple[int, int, int], int]]:
+    """Return samples, each with the ramp's place: from either end to the window's edges, where the side changes.
+
+    Parameters
+    ----------
+    compensator : Compensator
+        Its signals, its window, and its ramps.
+    """
+    amplifier, command = compensator.amplifier, compensator.signals.command
+    sensors = (compensator.signals.pressure_a, compensator.signals.pressure_b)
+    pressures = [sum(sensor.valid_codes) // 2 for sensor in sensors]
+    ramps = any(amplifier.ramp_up + amplifier.ramp_down)
+    signs = compensator.signals.signs
+    made = []
+    for sign in signs:
+        far = -sign * command.span(-sign) if len(signs) == 2 else 0
+        for step in (-1, 0, 1):
+            for away in (far, sign * max(amplifier.window_codes + step, 0)):
+                code = command.zero_code + command.direction(1) * away
+                made.append(((code, *pressures), away * STEP_UNIT if ramps else STAYS))
+    return made
+
+
+class PreparedDrive:
+    """Samples, and what the model says after every tick.
+
+    Parameters
+    ----------
+    compensator : Compensator
+        What the firmware was made from.
+    seed, count : int
+        Of `drive_samples`.
+    """
+
+    def __init__(self, compensator: Compensator, seed: int = SEED, count: int = SAMPLES) -> None:
+        signals = compensator.signals
+        first, put = zip(*window_samples(compensator), strict=True)
+        self.samples = [*first, *drive_samples(compensator, seed, count)]
+        self.ticks_per_sample = signals.tick_Hz // signals.sample_Hz
+        model = DriveModel(compensator)
+        states = [model.state]
+        places = [*put, *ramp_places(compensator, seed, count)]
+        for index, codes in enumerate((None, *self.samples)):  # some PWM periods go by before the first sample
+            if codes:
+                if places[index - 1] != STAYS:
+                    model.position = Fraction(places[index - 1], STEP_UNIT)
+                model.sample(*codes)
+            for _ in range(self.ticks_per_sample):
+                model.tick()
+                states.append(model.state)
+        head = np.array([len(self.samples), self.ticks_per_sample], dtype="<i4")
+        codes = np.array(self.samples, dtype="<u2").tobytes()
+        words = np.array(places, dtype="<i4").tobytes() + np.array(states, dtype="<i4").tobytes()
+        self.content = head.tobytes() + codes + bytes(-len(codes) % 4) + words
+
+
+class CompiledDrive:
+    """The drive and the law's sides, compiled as they stand in the firmware.
+
+    Parameters
+    ----------
+    folder : Path
+        Firmware folder with ``core/dz_drive.c``.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.sources = {path.name: path.read_bytes() for path in sorted((folder / "core").glob("*.[ch]"))}
+
+    def edited(self, name: str, text: bytes) -> "CompiledDrive":
+        """Return the drive with another text in one of its files."""
+        other = object.__new__(CompiledDrive)
+        other.sources = {**self.sources, name: text}
+        return other
+
+    def objects(self) -> list[Path]:
+        """Return the objects, each compiled by itself."""
+        headers = {name: text for name, text in self.sources.items() if name.endswith(".h")}
+        return [
+            compile_object(HOST, name, {**headers, name: text}, HOST.core_flags, f"the firmware's {name}")
+            for name, text in self.sources.items()
+            if name.endswith(".c")
+        ]
+
+    def check(self, prepared: PreparedDrive) -> DriveCheck:
+        """Run the drive beside its model.
+
+        Parameters
+        ----------
+        prepared : PreparedDrive
+            Samples and the model's answers.
+
+        Raises
+        ------
+        RequirementError
+            If the drive does not compile, crashes, or hangs.
+        """
+        main = {name: text for name, text in self.sources.items() if name.endswith(".h")}
+        main["drive.c"] = (programs_folder() / "drive.c").read_bytes()
+        objects = [*self.objects(), compile_object(HOST, "drive.c", main, HOST.check_flags, "the check of the drive")]
+        file = stored(prepared.content)
+        said = run_program(HOST, link_program(HOST, objects, "the drive"), [str(file)], "the drive")
+        if not said or len(said[0]) != 4:
+            raise RequirementError(f"the drive's check reported {said[:1]}, expected four numbers")
+        ticks, wrong, tick, field = said[0]
+        words = None
+        if wrong:
+            sample = (tick - 1) // prepared.ticks_per_sample - 1
+            when = f"sample {sample} with codes {prepared.samples[sample]}" if sample >= 0 else "before any sample"
+            words = f"{FIELDS[field]} after {tick} PWM periods, {when}"
+        return DriveCheck(ticks=ticks, wrong=wrong, first_wrong=words)

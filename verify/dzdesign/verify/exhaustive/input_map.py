@@ -1,0 +1,151 @@
+"""What the compiled core gives over its range of inputs: a coarse grid to draw, and every code at zero command.
+
+The check of all inputs (`all_inputs`) counts; this shows. The grid is denser where the valve was tested.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dzdesign.verify.exhaustive.exact_law import ExactLaw
+from dzdesign.verify.exhaustive.test_vectors import Differences, differences
+from dzdesign.verify.exhaustive.zero_command import bounds_at
+from dzdesign.verify.toolchain.compiled_core import SOURCES
+from dzdesign.verify.toolchain.host_compiler import load_library
+
+#: Columns of the grid over the converter's codes; rows over all differences, and over the tested ones.
+COMMANDS, WIDE_ROWS, TESTED_ROWS = 46, 36, 54
+#: The denser rows reach so far beyond the tested interval, as a share of its width.
+BEYOND = 0.15
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InputMap:
+    """Compare values of one side on a grid of command codes and differences of pressure codes.
+
+    Attributes
+    ----------
+    side : str
+        ``positive`` or ``negative``.
+    command_codes : (U,) tuple of int
+    dp_codes : (D,) tuple of int
+        Differences of pressure codes, rising.
+    compare, exact, status : (D, U) array
+        What the core gives, the exactly rounded law, and the status word; of a command that is not sound the law
+        says nothing, and `exact` is what the core gives.
+    zero_command : tuple of (int, float, float, float)
+        At every difference of the tested interval: its code, pressure drop in MPa, drive at zero command in V (with
+        a dither its peak), and the lower bound of the threshold in V.
+    """
+
+    side: str
+    command_codes: tuple[int, ...]
+    dp_codes: tuple[int, ...]
+    compare: np.ndarray
+    exact: np.ndarray
+    status: np.ndarray
+    zero_command: tuple[tuple[int, float, float, float], ...]
+
+    def rows(self) -> Iterator[tuple[int, int, int, int, int]]:
+        """Return command code, difference, compare value, its error in counts and status word of every point."""
+        for i, dp_code in enumerate(self.dp_codes):
+            for j, code in enumerate(self.command_codes):
+                given = int(self.compare[i, j])
+                yield code, dp_code, given, given - int(self.exact[i, j]), int(self.status[i, j])
+
+
+def map_inputs(folder: Path, document: dict[str, Any], sign: int = 1) -> InputMap:
+    """Call one side of the compiled core over the grid.
+
+    Parameters
+    ----------
+    folder : Path
+        Firmware folder.
+    document : dict
+        Its compensator.json, checked.
+    sign : {1, -1}
+        Sign of the commands.
+
+    Raises
+    ------
+    RequirementError
+        If the core does not compile.
+    """
+    exact = ExactLaw(document, sign)
+    name, ending = SOURCES[sign]
+    texts = {
+        file: (folder / "core" / file).read_text(encoding="utf-8", errors="surrogateescape")
+        for file in (name, "dz_comp.h")
+    }
+    library = load_library(texts, f"the core {name}")
+    core, status = (getattr(library, f"dz_{what}{ending}") for what in ("comp", "status"))
+    found = differences(exact)
+    made = np.flatnonzero(found.made)
+    bounds = bounds_at(document, exact, found)
+    tested = np.array([row for row in made if bounds[row] is not None])
+    rows, commands = _grid_rows(found, made, tested), _commands(exact)
+    pairs = {row: _pair(exact, found, row) for row in {*rows.tolist(), *tested.tolist()}}
+    values = [[core(code, *pairs[row]) for code in commands] for row in rows.tolist()]
+    compare = np.array(values)
+    a_MPa = float(Fraction(*exact.a["span_MPa"])) / (exact.a["full_code"] - exact.a["zero_code"])
+    volt = float(Fraction(*document["u_max_V"])) / exact.compare_max
+    peak = document["amplifier"]["dither_counts"]
+    return InputMap(
+        side=exact.side,
+        command_codes=tuple(commands),
+        dp_codes=tuple(found.values[rows].tolist()),
+        compare=compare,
+        exact=_exact_values(exact, found.values[rows].tolist(), commands, compare),
+        status=np.array([[status(code, *pairs[row]) for code in commands] for row in rows.tolist()]),
+        zero_command=tuple(
+            (
+                int(found.values[row]),
+                float(found.values[row]) * a_MPa,
+                (core(exact.zero, *pairs[row]) + peak) * volt,
+                float(bounds[row]),
+            )
+            for row in tested.tolist()
+        ),
+    )
+
+
+def _commands(exact: ExactLaw) -> list[int]:
+    """Return codes over the converter's range, zero and full command among them."""
+    spread = np.linspace(0, exact.code_max, COMMANDS).round().astype(int).tolist()
+    return sorted({*spread, exact.zero, exact.full})
+
+
+def _grid_rows(found: Differences, made: np.ndarray, tested: np.ndarray) -> np.ndarray:
+    """Return places of differences that sound codes make: over all of them, and closer over the tested ones."""
+    wide = made[np.linspace(0, made.size - 1, WIDE_ROWS).round().astype(int)]
+    if tested.size == 0:
+        return np.unique(wide)
+    room = BEYOND * (tested[-1] - tested[0] + 1)
+    close = np.linspace(tested[0] - room, tested[-1] + room, TESTED_ROWS).round().astype(int)
+    near = found.values[np.clip(close, made[0], made[-1])] - found.values[0]
+    return np.unique([*wide, *(row for row in near if found.made[row])])
+
+
+def _pair(exact: ExactLaw, found: Differences, row: int) -> tuple[int, int]:
+    """Return a pair of sound pressure codes that makes a difference."""
+    b = int(found.b_first[row])
+    return int(exact.turn * found.values[row] + found.slant[b]), b
+
+
+def _exact_values(exact: ExactLaw, dp_codes: list[int], commands: list[int], given: np.ndarray) -> np.ndarray:
+    """Return the exactly rounded law on the grid."""
+    values = given.copy()
+    for row, dp_code in enumerate(dp_codes):
+        corners = exact.corners(exact.betas(dp_code))
+        for column, code in enumerate(commands):
+            if code in exact.sound_commands:
+                away = exact.from_zero(code)
+                part = next(i for i in range(len(corners) - 1) if away <= corners[i + 1][0])
+                (first, start), (last, end) = corners[part : part + 2]
+                count = start + (end - start) * Fraction(away - first, last - first)
+                values[row, column] = min(max((count + Fraction(1, 2)).__floor__(), 0), exact.compare_limit)
+    return values

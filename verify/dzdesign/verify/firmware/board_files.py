@@ -1,0 +1,127 @@
+"""The files of a firmware that its user fills in: which of them were changed, and whether they compile."""
+
+import re
+import shutil
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from dzdesign.core.artefact_files import sha256_of
+from dzdesign.core.errors import InputError
+from dzdesign.verify.checks import OWN, Check, own_files
+from dzdesign.verify.requirements import COMPILES
+from dzdesign.verify.toolchain.host_compiler import build_folder, run_compiler
+from dzdesign.verify.toolchain.machines import CORTEX_M4
+
+#: Compiler and options of a target whose board files can be compiled without a vendor's library.
+COMPILERS = {"cortex-m4": (CORTEX_M4.compiler, *CORTEX_M4.core_flags)}
+#: How a compiler says that a header lies elsewhere: where, only its user knows.
+ELSEWHERE = re.compile(r"error: (\S+): No such file or directory")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoardFile:
+    """A file that the user fills in: its name in the firmware folder, and whether it is no longer as generated."""
+
+    name: str
+    changed: bool
+
+
+def board_files(folder: Path, manifest: dict[str, Any]) -> tuple[BoardFile, ...]:
+    """Return the files that the manifest calls the user's.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the firmware.
+    manifest : dict
+        Of `read_firmware_manifest`.
+    """
+    return tuple(
+        BoardFile(
+            name=name,
+            changed=not (folder / name).is_file() or sha256_of((folder / name).read_bytes()) != manifest["files"][name],
+        )
+        for name in sorted(set(manifest.get("board", ())) & manifest["files"].keys())
+    )
+
+
+def check_include(include: Sequence[Path], manifest: dict[str, Any]) -> None:
+    """Refuse folders of headers that are none, or of a target whose board files are not compiled here.
+
+    Parameters
+    ----------
+    include : sequence of Path
+        As given.
+    manifest : dict
+        Of `read_firmware_manifest`.
+
+    Raises
+    ------
+    InputError
+        Naming the first that is none.
+    """
+    for place in include:
+        if not place.is_dir():
+            raise InputError(f"'{place}' is no folder, expected one with headers after --include; check the name")
+    if include and manifest.get("target") not in COMPILERS:
+        raise InputError(
+            f"--include is for the board files of {', '.join(COMPILERS)}, and this firmware is for "
+            f"{manifest.get('target')}, whose board files are not compiled here; leave it out"
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoardCompiled:
+    """Whether the user's board files compile: a check, or why it was not tried; neither where nothing was changed."""
+
+    checks: tuple[Check, ...] = ()
+    untried: str = ""
+
+
+def board_compiles(folder: Path, manifest: dict[str, Any], include: Sequence[Path] = ()) -> BoardCompiled:
+    """Compile the target's C together with the board files that were changed, and the user's own; nothing is linked.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the firmware.
+    manifest : dict
+        Of `read_firmware_manifest`.
+    include : sequence of Path
+        Where headers of the user's chip lie.
+    """
+    compiler, *options = COMPILERS.get(manifest.get("target", ""), ("",))
+    changed = [each.name for each in board_files(folder, manifest) if each.changed]
+    if not changed or not compiler:
+        return BoardCompiled()
+    if not shutil.which(compiler):
+        return BoardCompiled(untried=f"{compiler} is not on the path; install it, then `verify`")
+    place = (folder / changed[0]).parent
+    sources = sorted(name for name in manifest["files"] if (folder / name).parent == place and name.endswith(".c"))
+    own = [name for name in own_files(folder, manifest) if name.endswith(".c")]
+    sources += own
+    # Warnings in headers of a vendor are no concern here: -isystem.
+    folders = [f"-I{folder / 'core'}", f"-I{place}", "-iquote", str(folder / OWN)]
+    folders += [word for path in include for word in ("-isystem", str(path))]
+    for source in (name for name in sources if (folder / name).is_file()):
+        command = [compiler, *options, *folders, "-c", str(folder / source), "-o", str(build_folder() / "board.o")]
+        try:
+            done = run_compiler(command)
+        except (OSError, subprocess.TimeoutExpired) as error:
+            return BoardCompiled(untried=f"{compiler} did not run on {source} ({type(error).__name__}); then `verify`")
+        if done.returncode and (lost := ELSEWHERE.search(done.stderr)):
+            given = f" nor in {', '.join(map(str, include))}" if include else ""
+            return BoardCompiled(
+                untried=f"{lost[1]}, which {source} includes, was not found in the firmware{given}; `verify --include "
+                "DIR` with the folder in which it lies"
+            )
+        if done.returncode:
+            first = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr.strip()[:300])
+            return BoardCompiled(checks=(Check(name=COMPILES, holds=False, text=f"{first} ({Path(compiler).name})"),))
+    added = f" and {', '.join(own)}" if own else ""
+    text = f"one by one, with {', '.join(changed)} as you changed them{added} ({Path(compiler).name}); not linked, and "
+    text += "what they do is not checked"
+    return BoardCompiled(checks=(Check(name=COMPILES, holds=True, text=text),))

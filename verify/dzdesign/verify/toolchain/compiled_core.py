@@ -1,0 +1,151 @@
+"""The generated core as a black box: compiled by itself for a machine, and every input tried there."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from dzdesign.core.artefact_files import sha256_of
+from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.verify.toolchain.machines import (
+    HOST,
+    Machine,
+    compile_object,
+    link_program,
+    programs_folder,
+    run_program,
+    stored,
+)
+
+#: Source of each sign of command, and what its functions' names end with.
+SOURCES = {1: ("dz_comp.c", ""), -1: ("dz_comp_negative.c", "_negative")}
+
+#: The check in C, of programs/.
+CHECK = ("every_input.c", "other_codes.c", "every_input.h", "march.h")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Findings:
+    """What a machine found: the counts of programs/every_input.h, the hash of all compare values, and which object.
+
+    Attributes
+    ----------
+    outputs_hash : str
+        Of all compare values in their order, 64 bits.
+    inputs, wrong, largest_error, out_of_range, falls, against, odd, bad_fallbacks, bad_status, bad_betas, calls : int
+        As `InputCheck` names them; calls of the core in all.
+    first_row, first_place, first_found, first_expected : int
+        Of the first wrong value.
+    at_zero : (D,) array
+        Compare values at zero command, a difference each; empty of a sample, and where a simulator ran it.
+    object_sha256 : str
+        Of the core's object file.
+    """
+
+    outputs_hash: str
+    inputs: int
+    wrong: int
+    largest_error: int
+    out_of_range: int
+    falls: int
+    against: int
+    odd: int
+    bad_fallbacks: int
+    bad_status: int
+    bad_betas: int
+    calls: int
+    first_row: int
+    first_place: int
+    first_found: int
+    first_expected: int
+    at_zero: np.ndarray
+    object_sha256: str
+
+    @property
+    def faults(self) -> int:
+        """All that must be none, together."""
+        counts = (self.wrong, self.out_of_range, self.falls, self.against, self.odd)
+        return sum(counts) + self.bad_fallbacks + self.bad_status + self.bad_betas
+
+
+class CompiledCore:
+    """One side of the core.
+
+    Parameters
+    ----------
+    folder : Path
+        Firmware folder with ``core/dz_comp.c`` and ``core/dz_comp.h``.
+    sign : {1, -1}
+        Sign of the command.
+    """
+
+    def __init__(self, folder: Path, sign: int = 1) -> None:
+        self._name, self._ending = SOURCES[sign]
+        self.sources = {name: _read(folder / "core" / name) for name in (self._name, "dz_comp.h")}
+        self.sha256 = sha256_of(b"".join(self.sources.values()))
+
+    def edited(self, name: str, text: bytes) -> "CompiledCore":
+        """Return the core with another text in one of its files."""
+        other = object.__new__(CompiledCore)
+        other.__dict__.update(self.__dict__)
+        other.sources = {**self.sources, name: text}
+        return other
+
+    def compiled(self, machine: Machine = HOST) -> Path:
+        """Return the core's object for a machine: compiled alone, so that nothing of it is inlined into the check."""
+        return compile_object(machine, self._name, self.sources, machine.core_flags, f"the core {self._name}")
+
+    def check(self, prepared: bytes, machine: Machine = HOST, *, sample: bool = False) -> Findings:
+        """Try what was prepared on a machine.
+
+        Parameters
+        ----------
+        prepared : bytes
+            `PreparedInputs.everything` or `PreparedInputs.sample`.
+        machine : Machine
+            Where.
+        sample : bool
+            True if it is the sample.
+
+        Raises
+        ------
+        RequirementError
+            If the core does not compile, crashes, or hangs.
+        """
+        core = self.compiled(machine)
+        called = (f"-DDZ_{name.upper()}=dz_{name}{self._ending}" for name in ("status", "beta"))
+        flags = (*machine.check_flags, f"-DDZ_CORE=dz_comp{self._ending}", *called)
+        check = {name: _read(programs_folder() / name) for name in (*CHECK, machine.main)}
+        units = [name for name in check if name.endswith(".c")]
+        objects = [core, *(compile_object(machine, name, check, flags, "the check") for name in units)]
+        arguments = []
+        if machine.section:
+            text = f'{machine.section}\n.balign 8\n.global dz_prepared\ndz_prepared:\n.incbin "prepared.bin"\n'
+            tables = {"prepared.S": text.encode(), "prepared.bin": prepared}
+            objects.append(compile_object(machine, "prepared.S", tables, machine.check_flags, "the prepared inputs"))
+        else:
+            file = stored(prepared)
+            arguments = [str(file), *(["sample"] if sample else [])]
+        program = link_program(machine, objects, f"the core {self._name} ({machine.name})")
+        said = run_program(machine, program, arguments, f"the core {self._name}")
+        return _findings(said, sha256_of(core.read_bytes()), f"the core {self._name} on the {machine.name}")
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: can't be read: {error.strerror}; make it again with `dzdesign codegen`") from error
+
+
+def _findings(said: list[list[int]], object_sha256: str, what: str) -> Findings:
+    fields = 17
+    if not said or len(said[0]) != fields:
+        raise RequirementError(f"{what} reported {said[0][:3] if said else 'nothing'}, expected {fields} numbers")
+    high, low, *counts = said[0]
+    return Findings(
+        outputs_hash=f"{high:08x}{low:08x}",
+        **dict(zip(list(Findings.__dataclass_fields__)[1:16], counts, strict=True)),
+        at_zero=np.array(said[1] if len(said) > 1 else [], dtype=np.int64),
+        object_sha256=object_sha256,
+    )

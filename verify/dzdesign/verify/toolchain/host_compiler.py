@@ -1,0 +1,217 @@
+"""The host's C compiler: C in, a loaded shared library out, named by its content so that no stale code can run.
+
+Where a machine has no compiler, Zig's serves: a clang with its own headers and linker, in the wheel `ziglang`.
+"""
+
+import ctypes
+import importlib.util
+import logging
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Mapping, Sequence
+from functools import cache
+from pathlib import Path
+
+from dzdesign.core.artefact_files import sha256_of
+from dzdesign.core.errors import InputError, RequirementError
+
+#: What the generated core must bear without a word.
+STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wpedantic", "-Werror")
+TIMEOUT_S = 120
+#: What `zig cc` must be told to be a compiler as others are: not to write debug information (it holds the folder's
+#: name, so that equal sources gave unequal objects), to compile for every processor of the kind and not for this one,
+#: and to build no traps into what is undefined (it does so where it is not told to optimize).
+LIKE_OTHERS = ("-g0", "-mcpu=baseline", "-fno-sanitize=undefined")
+
+logger = logging.getLogger(__name__)
+
+
+@cache
+def _build_folder() -> tempfile.TemporaryDirectory:
+    return tempfile.TemporaryDirectory(prefix="dzdesign-", ignore_cleanup_errors=True)
+
+
+def build_folder() -> Path:
+    """Return the folder that everything is built in; it goes when the process ends."""
+    return Path(_build_folder().name)
+
+
+def find_compilers() -> tuple[str, ...]:
+    """Return the C compilers on this machine, the one to use first: $CC, then cc, gcc, clang; where none is, Zig.
+
+    Each as a person would write it: a path, or with $CC words such as ``ccache gcc``.
+    """
+    wanted = (_found(name) for name in (os.environ.get("CC"), "cc", "gcc", "clang") if name)
+    found = {compiler: None for compiler in wanted if compiler}
+    if not found and (zig := find_zig()):
+        found = {zig: None}
+    return tuple(found)
+
+
+def _found(name: str) -> str | None:
+    """Return the path of a program, or several words as they are if the first one is a program."""
+    path = shutil.which(name)
+    words = [] if path else shlex.split(name, posix=os.name != "nt")
+    return path or (name if len(words) > 1 and shutil.which(words[0]) else None)
+
+
+def find_zig() -> str | None:
+    """Return Zig's program, of the path or of the package `ziglang`, or None."""
+    path = shutil.which("zig")
+    spec = None if path else importlib.util.find_spec("ziglang")
+    for folder in (spec.submodule_search_locations or ()) if spec else ():
+        path = path or shutil.which("zig", path=folder)
+    return path
+
+
+def words_of(compiler: str) -> tuple[str, ...]:
+    """Return how a command with a compiler begins.
+
+    Parameters
+    ----------
+    compiler : str
+        One of `find_compilers`.
+
+    Examples
+    --------
+    >>> words_of("/opt/zig/zig")
+    ('/opt/zig/zig', 'cc', '-g0', '-mcpu=baseline', '-fno-sanitize=undefined')
+    """
+    words = (compiler,) if shutil.which(compiler) else tuple(shlex.split(compiler, posix=os.name != "nt"))
+    if Path(words[-1]).stem == "zig":
+        return (*words, "cc", *LIKE_OTHERS)
+    return (*words, *LIKE_OTHERS) if [Path(word).stem for word in words[-2:]] == ["zig", "cc"] else words
+
+
+def environment() -> dict[str, str]:
+    """Return the environment of a compiler: Zig keeps its C library in the user's cache, and what it builds with ours.
+
+    Without a home it would refuse to work; with ours for all it would build the C library at every start, for seconds.
+    """
+    caches = (
+        {
+            "win32": os.environ.get("LOCALAPPDATA"),
+            "darwin": str(Path("~/Library/Caches").expanduser()),
+        }.get(sys.platform)
+        or os.environ.get("XDG_CACHE_HOME")
+        or str(Path("~/.cache").expanduser())
+    )
+    kept = Path(caches) / "dzdesign" / "zig"
+    try:
+        kept.mkdir(parents=True, exist_ok=True)
+        may_write = os.access(kept, os.W_OK)
+    except OSError:
+        may_write = False
+    ours = {
+        "ZIG_GLOBAL_CACHE_DIR": str(kept if may_write else build_folder() / "zig"),
+        "ZIG_LOCAL_CACHE_DIR": str(build_folder() / "zig"),
+    }
+    return {**ours, **os.environ}
+
+
+def host_compiler() -> str:
+    """Return the C compiler to use.
+
+    Raises
+    ------
+    InputError
+        If there is none, with what to do.
+    """
+    compilers = find_compilers()
+    if not compilers:
+        raise InputError(
+            "no C compiler was found (tried $CC, cc, gcc, clang, zig); install one, for example "
+            "`pip install dzdesign[zig]` into this environment, `apt install gcc`, `xcode-select --install`, or on "
+            "Windows `winget install LLVM.LLVM`; `dzdesign doctor` says what is there"
+        )
+    return compilers[0]
+
+
+def run_compiler(command: Sequence[str], folder: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """Run a compiler, and log the command.
+
+    Parameters
+    ----------
+    command : sequence of str
+        As `words_of` begins it.
+    folder : Path, optional
+        To run in.
+
+    Raises
+    ------
+    OSError, subprocess.TimeoutExpired
+        If it can't be run, or does not end.
+    """
+    begin = time.perf_counter()
+    done = subprocess.run(
+        command, cwd=folder, capture_output=True, text=True, errors="replace", timeout=TIMEOUT_S, check=False,
+        env=environment(),
+    )  # fmt: skip
+    logger.debug("%s (%.3f s)", shlex.join(command), time.perf_counter() - begin)
+    return done
+
+
+def _run(command: list[str], what: str) -> None:
+    try:
+        done = run_compiler(command)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise RequirementError(f"{what} could not be compiled: {error}") from error
+    if done.returncode:
+        first = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr.strip()[:300])
+        raise RequirementError(f"{what} does not compile: {first}")
+
+
+def check_strictly(source: Path, compiler: str, options: Sequence[str] = ()) -> None:
+    """Compile one file with every warning an error, and with further options.
+
+    Raises
+    ------
+    RequirementError
+        With the compiler's first complaint.
+    """
+    target = Path(_build_folder().name) / "strict.o"
+    command = [*words_of(compiler), *STRICT, "-O2", *options, "-c", str(source), "-o", str(target)]
+    _run(command, f"{source.name} ({Path(compiler).name})")
+
+
+def load_library(sources: Mapping[str, str], what: str, options: Sequence[str] = ()) -> ctypes.CDLL:
+    """Compile C files together and load them.
+
+    Parameters
+    ----------
+    sources : mapping
+        File name to text; headers may be among them.
+    what : str
+        For messages.
+    options : sequence of str
+        Further options of the compiler.
+
+    Returns
+    -------
+    ctypes.CDLL
+    """
+    compiler = host_compiler()
+    key = sha256_of(
+        "\0".join([compiler, *options, *(f"{name}\0{text}" for name, text in sorted(sources.items()))]).encode(
+            errors="surrogateescape"
+        )
+    )
+    folder = Path(_build_folder().name) / key[:32]
+    library = folder / f"{key[:32]}{'.dll' if sys.platform == 'win32' else '.so'}"
+    if not library.exists():
+        folder.mkdir(exist_ok=True)
+        for name, text in sources.items():
+            (folder / name).write_text(text, encoding="utf-8", errors="surrogateescape")
+        units = [str(folder / name) for name in sources if name.endswith(".c")]
+        position = [] if sys.platform == "win32" else ["-fPIC"]
+        command = [*words_of(compiler), "-std=c99", "-O2", *options, *position, "-shared", *units]
+        _run([*command, "-o", str(library), "-lm"], what)
+    try:
+        return ctypes.CDLL(str(library))
+    except OSError as error:
+        raise RequirementError(f"{what} does not link: {str(error).rpartition(': ')[2]}") from error
