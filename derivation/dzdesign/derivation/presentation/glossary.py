@@ -1,7 +1,7 @@
 """What each symbol means, in a few words; its unit is in `units.py`."""
 
 from dzdesign.derivation import symbols
-from dzdesign.derivation.account.statement import Name
+from dzdesign.derivation.symbols import Name
 
 _MEANINGS = {
     # commands
