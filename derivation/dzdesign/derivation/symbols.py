@@ -100,7 +100,7 @@ B_e = _positive("B_e", "N*s/m", "damping of the armature")
 K_et = _positive("K_et", "N/m", "stiffness of the spring")
 G_0 = _positive("G_0", f"{_FLOW}/V", "static gain of the transfer function")
 
-# Flow per command beyond the threshold, command per opening, largest flows
+# Flow per command beyond the threshold, command per opening, flows, openings
 s_flow = _positive("S", f"{_FLOW}/V", "flow per command beyond the threshold")
 s_flow0 = _positive("S_0", f"{_FLOW}/V", "flow per command beyond the threshold, at dP0")
 s_flow1 = _positive("S_1", f"{_FLOW}/V", "flow per command beyond the threshold, at dP1")
@@ -109,16 +109,24 @@ Q_max = _positive("Q_max", _FLOW, "largest flow")
 Q_max0 = _positive("Q_max0", _FLOW, "largest flow at dP0")
 Q_max1 = _positive("Q_max1", _FLOW, "largest flow at dP1")
 Q_floor = _positive("Q_floor", _FLOW, "least flow that the meter shows")
+Q = _real("Q", _FLOW, "flow")
+Q_O = _real("Q_O", _FLOW, "wanted flow at the reference")
+Q_O_prime = _real("Q_O'", _FLOW, "wanted flow off the reference")
+Q_neg = _real("Q_neg", _FLOW, "flow at the opposite command", latex="Q_{-}")
+Q_scaled = _real("Q_scaled", _FLOW, "flow of the other valve")
+Q_1 = _real("Q_1", _FLOW, "flow of a first sample")
+Q_2 = _real("Q_2", _FLOW, "flow of a second sample")
 V_pin = _real("V_pin", "V", "voltage at the converter's pin")
 V_adc = _positive("V_adc", "V", "full scale of the converter")
+x = _nonnegative("x", "m", "opening of the edge")
 x_max = _positive("x_max", "m", "largest opening")
 x_ov = _nonnegative("x_ov", "m", "overlap of the spool")
 q_x = _positive("q_x", "V", "k x_max, the command that full opening takes")
 
 # Pressure drop: at no index, at the reference (0), off the reference (1)
-dP = _positive("dP", "Pa", "pressure drop across the edge", latex=r"\Delta P")
-dP0 = _positive("dP0", "Pa", "pressure drop at the reference", latex=r"\Delta P_{0}")
-dP1 = _positive("dP1", "Pa", "a pressure drop off the reference", latex=r"\Delta P_{1}")
+dP = _positive("dP", "Pa", "pressure drop across the edge", latex=r"\mathrm{\Delta} P")
+dP0 = _positive("dP0", "Pa", "pressure drop at the reference", latex=r"\mathrm{\Delta} P_{0}")
+dP1 = _positive("dP1", "Pa", "a pressure drop off the reference", latex=r"\mathrm{\Delta} P_{1}")
 f = sympy.Function("f", positive=True)
 _declare(f(dP), "V", "threshold as a function of the pressure drop (Eq. 4)")
 
@@ -181,22 +189,12 @@ I_s = _transform("I", "A*s", "transform of i")
 Q_s = _transform("Q", "m**3", "transform of Q")
 G = _transform("G", f"{_FLOW}/V", "transfer function from command to flow")
 
-# ... flows and openings, and what an identification differentiates and samples, ...
-Q = _varying("Q", _FLOW, "flow")
-Q_O = _varying("Q_O", _FLOW, "wanted flow at the reference")
-Q_O_prime = _varying("Q_O'", _FLOW, "wanted flow off the reference")
-Q_neg = _varying("Q_neg", _FLOW, "flow at the opposite command", latex="Q_{-}")
-Q_scaled = _varying("Q_scaled", _FLOW, "flow of the other valve")
-Q_1 = _varying("Q_1", _FLOW, "flow of a first sample")
-Q_2 = _varying("Q_2", _FLOW, "flow of a second sample")
-dQ_dC_d = _varying(
-    "dQ_dC_d", _FLOW, "sensitivity of the flow to C_d", latex=r"\frac{\partial Q}{\partial C_{d}}"
-)
+# ... what an identification differentiates, ...
+dQ_dC_d = _varying("dQ_dC_d", _FLOW, "sensitivity of the flow to C_d", latex=r"\frac{\partial Q}{\partial C_{d}}")
 dQ_dk = _varying("dQ_dk", f"{_FLOW}*m/V", "sensitivity of the flow to k", latex=r"\frac{\partial Q}{\partial k}")
 dQ_dx_max = _varying(
     "dQ_dx_max", "m**2/s", "sensitivity of the flow to x_max", latex=r"\frac{\partial Q}{\partial x_{\text{max}}}"
 )
-x = _nonnegative("x", "m", "opening of the edge", varies=True)
 
 # ... and commands, last in a product
 u_O = _varying("u_O", "V", "output of the compensator")

@@ -21,6 +21,7 @@ from dzdesign.derivation.symbols import QUANTITIES, dP, dP0, dP1, s
 _RANK = {name: rank for rank, name in enumerate(QUANTITIES)}
 _PRESSURES = {dP, dP0, dP1}
 _HALF = sympy.Rational(1, 2)
+_LOW_PARENTHESES = re.compile(r"\\left\(((?:(?!\\left|\\frac|\\sqrt|\\right).)*?) ?\\right\)")
 
 
 class Root(sympy.Function):
@@ -47,8 +48,9 @@ def arrange(expression: sympy.Basic) -> sympy.Basic:
         return _sum(expression)
     if isinstance(expression, sympy.Mul | sympy.Pow):
         return _product(_with_positive_sign(expression))
-    if isinstance(expression, Relational) and _rank(expression.lhs) < _rank(expression.rhs):
-        expression = expression.reversed
+    if isinstance(expression, sympy.GreaterThan | sympy.LessThan | sympy.StrictGreaterThan | sympy.StrictLessThan):
+        # What a condition is about stands on its left.
+        expression = expression if _rank(expression.lhs) >= _rank(expression.rhs) else expression.reversed
     if isinstance(expression, AppliedUndef) or not expression.args:
         return expression
     parts = [arrange(part) for part in expression.args]
@@ -226,7 +228,7 @@ def to_text(formula: sympy.Basic) -> str:
     >>> to_text((s.k * s.x_max / s.u_max - 1) * s.u_i + s.u_min0)
     '(k*x_max/u_max - 1)*u_i + u_min0'
     """
-    return _Text({"order": "none"}).doprint(arrange(formula))
+    return _Text({"order": "none", "full_prec": False}).doprint(arrange(formula))
 
 
 @cache
@@ -249,18 +251,19 @@ def to_latex(formula: sympy.Basic) -> str:
     """
     names = {name: known.latex for name, known in QUANTITIES.items() if known.latex}
     settings = {"order": "none", "ln_notation": True, "mul_symbol": r" \, ", "symbol_names": names}
-    return _Latex(settings).doprint(arrange(formula))
+    latex, low = "", _Latex(settings).doprint(arrange(formula))
+    while latex != low:  # parentheses grow around what is tall only
+        latex, low = low, _LOW_PARENTHESES.sub(r"(\1)", low)
+    return latex
 
 
 @cache
-def to_mathml(latex: str, display: bool = False) -> str:
-    """Return LaTeX of math mode as an element ``math`` for a browser.
+def to_mathml(latex: str) -> str:
+    """Return LaTeX of math mode as the inside of an element ``math``, for a browser.
 
     Parameters
     ----------
     latex : str
-    display : bool
-        Whether it stands on a line of its own.
 
     Returns
     -------
@@ -268,4 +271,4 @@ def to_mathml(latex: str, display: bool = False) -> str:
     """
     from latex2mathml.converter import convert
 
-    return convert(latex, xmlns="", display="block" if display else "inline").replace(' xmlns=""', "")
+    return convert(latex).partition(">")[2].removesuffix("</math>")
