@@ -28,6 +28,8 @@ FULL = TESTS / "goldens_full"
 FULL_TARGETS = ("avr", "cortex-m4", "f28335")
 #: Not compared: it is what goes in.
 INPUT = "compensator.json"
+#: Beside the targets.
+SCHEMAS = GOLDENS / "schemas"
 LINES_SHOWN = 60
 
 
@@ -101,8 +103,10 @@ def update() -> None:
         content = (root / "valve.json").read_bytes()
         document = compensator_document(design(read_artefact(content, ValveModel, "valve.json"), options, content))
         (root / INPUT).write_text(to_json(document), encoding="utf-8", newline="\n")
+        for folder in root.iterdir():
+            if folder.is_dir() and folder != SCHEMAS:
+                shutil.rmtree(folder)
         for target in names:
-            shutil.rmtree(root / target, ignore_errors=True)
             for name, text in golden_files(target, root).items():
                 path = root / target / name
                 path.parent.mkdir(parents=True, exist_ok=True)

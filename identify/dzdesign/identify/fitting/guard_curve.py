@@ -59,7 +59,7 @@ class GuardCurve:
         if any(low > high + ROUNDING_V for low, high in zip(self.u_lower_V, self.u_threshold_V, strict=True)):
             raise RuleError("a lower bound lies above the threshold that it bounds")
         if not self.u_min0_V > 0:
-            raise RuleError(f"u_min0 is {self.u_min0_V} V, expected a positive threshold")
+            raise RuleError(f"u_min0 is {self.u_min0_V:g} V, expected a positive threshold")
 
     @property
     def u_offset_V(self) -> tuple[float, ...]:

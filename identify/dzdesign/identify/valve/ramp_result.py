@@ -85,7 +85,7 @@ class TestResult:
         quantity("1", "Variance of a mean of the flow over that under white noise of the same size.", ge=0, le=1e6),
     ]
     outliers: Annotated[int, Meta(description="Samples of the straight part that were left out.", ge=0, le=10**12)]
-    ramps: Annotated[tuple[str, ...], Meta(description="The ramps that were pooled.")]
+    ramps: Annotated[tuple[str, ...], Meta(description="The ramps that were pooled.", min_length=1)]
 
     def __post_init__(self) -> None:
         for branch in BRANCHES:

@@ -134,7 +134,7 @@ class SideModel:
         """Check that reference and tests repeat the guard's curve."""
         guard, curve = self.certificate.guard, self.curve
         if abs(self.reference.u_min_V - curve.u_min0_V) > ROUNDING_V:
-            raise RuleError(f"the reference's u_min_V is {self.reference.u_min_V} V, not that of the {guard} curve")
+            raise RuleError(f"the reference's u_min_V is {self.reference.u_min_V:g} V, not that of the {guard} curve")
         for test, threshold, bound in zip(self.tests, curve.u_threshold_V, curve.u_lower_V, strict=True):
             if abs(test.u_guard_V - threshold) > ROUNDING_V or abs(test.u_guard_lower_V - bound) > ROUNDING_V:
                 raise RuleError(f"the tests' guarded thresholds and bounds are not those of the {guard} curve")
