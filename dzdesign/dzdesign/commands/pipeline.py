@@ -255,7 +255,7 @@ def simulate(args: argparse.Namespace) -> tuple[dict[str, bytes], dict[str, Any]
 
 def run_derive(args: argparse.Namespace) -> int:
     """Re-derive the paper's equations; 1 if one of those shown is not found as a correct account finds it."""
-    from dzdesign.derivation.account.account import account
+    from dzdesign.derivation.account import account
     from dzdesign.derivation.presentation.report import check_format, closure, render
 
     format = "json" if args.json else args.format

@@ -1,4 +1,4 @@
-"""`dzdesign schema`: the JSON Schemas of the artefacts, as their types state them."""
+"""`dzdesign schema`: the JSON Schemas of the artefacts, as their types say them."""
 
 import argparse
 import json
@@ -9,11 +9,11 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from dzdesign.core.documents import to_json
+from dzdesign.core.artefact_schema import json_schema
 from dzdesign.core.errors import InputError, nearest
 
-#: Name -> (module and type, or the package that keeps a file of it; the artefact; the command that writes it), in the
-#: order of the pipeline.
+#: Name -> (module and class of the artefact, or the package that keeps its schema as a file; the artefact; the command
+#: that writes it), in the order of the pipeline.
 SCHEMAS: Mapping[str, tuple[str, str, str]] = MappingProxyType(
     {
         "valve": ("dzdesign.identify", "valve.json", "identify"),
@@ -50,12 +50,10 @@ def schema_text(name: str) -> str:
         raise InputError(
             f"there is no schema '{name[:40]}'{nearest(name, SCHEMAS)}; expected one of {', '.join(SCHEMAS)}"
         )
-    module, _, kind = SCHEMAS[name][0].partition(":")
+    place, _, kind = SCHEMAS[name][0].partition(":")
     if kind:
-        from dzdesign.core.artefact_schema import json_schema
-
-        return to_json(json_schema(getattr(import_module(module), kind)))
-    return (Path(str(files(module))) / "schemas" / f"{name}.schema.json").read_text(encoding="utf-8")
+        return json.dumps(json_schema(getattr(import_module(place), kind)), indent=2, ensure_ascii=False) + "\n"
+    return (Path(str(files(place))) / "schemas" / f"{name}.schema.json").read_text(encoding="utf-8")
 
 
 def schema_document(name: str) -> dict[str, Any]:
@@ -66,7 +64,8 @@ def schema_document(name: str) -> dict[str, Any]:
     name : str
         One of `SCHEMAS`.
     """
-    return json.loads(schema_text(name))
+    document: dict[str, Any] = json.loads(schema_text(name))
+    return document
 
 
 def run_schema(args: argparse.Namespace) -> int:
