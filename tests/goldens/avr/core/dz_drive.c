@@ -2,7 +2,7 @@
 /* Compensator SHA-256: 3f050c31e2a66b4df463b1c735c53ac404ac38140dbec81724887029eeb87175 */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv */
 /*
- * The amplifier around the law: which solenoid is driven.
+ * The drive functions around the law: which solenoid is driven.
  *
  * MISRA C:2012: nothing found by cppcheck 2.10 (--platform=avr8 --std=c99 --addon=misra) in this file.
  */

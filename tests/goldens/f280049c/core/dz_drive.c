@@ -2,7 +2,7 @@
 /* Compensator SHA-256: eac85b670cfa5ec88bd1a711a39cbed127739afade4757dffedb8f1fa3ae0f6d */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv */
 /*
- * The amplifier around the law: which solenoid is driven.
+ * The drive functions around the law: which solenoid is driven.
  *
  * MISRA C:2012: nothing found by cppcheck 2.10 (--platform=avr8 --std=c99 --addon=misra) in this file.
  */

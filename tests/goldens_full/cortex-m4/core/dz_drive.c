@@ -2,7 +2,7 @@
 /* Compensator SHA-256: f7f9e7acf314b10cf4fa3252755723cf134d6830c37f3d7b80f816dba136a02d */
 /* Valve identified from: bipolar_1.csv, bipolar_3.csv, bipolar_5.csv */
 /*
- * The amplifier around the law: which solenoid is driven, ramps, dither.
+ * The drive functions around the law: which solenoid is driven, ramps, dither.
  *
  * MISRA C:2012: nothing found by cppcheck 2.10 (--platform=avr8 --std=c99 --addon=misra) in this file.
  */
