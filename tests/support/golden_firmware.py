@@ -104,7 +104,7 @@ def update() -> None:
         document = compensator_document(design(read_artefact(content, ValveModel, "valve.json"), options, content))
         (root / INPUT).write_text(to_json(document), encoding="utf-8", newline="\n")
         for folder in root.iterdir():
-            if folder.is_dir() and folder != SCHEMAS:
+            if folder.is_dir() and folder.name != "schemas":
                 shutil.rmtree(folder)
         for target in names:
             for name, text in golden_files(target, root).items():

@@ -2,8 +2,8 @@
 /* Compensator SHA-256: 91b4bbbfcb99069f6fb6df0b85ed4b8e4b7f70864d72ecaea7d7d40f7512f966 */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv */
 /*
- * The amplifier around the law: call dz_drive_sample() with new codes, dz_drive_tick() once a PWM period, and write
- * compare_a and compare_b to the PWM. Inputs are those of dz_comp(), see dz_comp.h.
+ * The drive functions around the law: call dz_drive_sample() with new codes, dz_drive_tick() once a PWM period, and
+ * write compare_a and compare_b to the PWM. Inputs are those of dz_comp(), see dz_comp.h.
  *
  * MISRA C:2012: nothing found by cppcheck 2.10 (--platform=avr8 --std=c99 --addon=misra) in this file but for
  *   deviation from rule 2.5 (advisory) in DZ_DRIVE_TICKS_PER_SAMPLE: it is for those who call the drive; who is told

@@ -2,7 +2,7 @@
 /* Compensator SHA-256: 91b4bbbfcb99069f6fb6df0b85ed4b8e4b7f70864d72ecaea7d7d40f7512f966 */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv */
 /*
- * The amplifier around the law: which solenoid is driven.
+ * The drive functions around the law: which solenoid is driven.
  *
  * MISRA C:2012: nothing found by cppcheck 2.10 (--platform=avr8 --std=c99 --addon=misra) in this file.
  */

@@ -2,7 +2,7 @@
 /* Compensator SHA-256: ca99b81ebc12673158e550fa02637ed53faf8d102b70af9e36408e6d24b5476e */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv */
 /*
- * The amplifier around the law: which solenoid is driven.
+ * The drive functions around the law: which solenoid is driven.
  *
  * MISRA C:2012: nothing found by cppcheck 2.10 (--platform=avr8 --std=c99 --addon=misra) in this file.
  */

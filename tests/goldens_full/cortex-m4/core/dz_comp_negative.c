@@ -17,8 +17,8 @@
  *     k x_max/u_max = 22801/32768 = 0.695831, rounded to nearest
  *     u_min0/u_max  = 4983/16384 = 0.304138, rounded down with half a count to spare
  *     beta(dP): straight over 36 segments of 64 codes of the pressure difference (0.4916 MPa) each
- * Edge: over the first 16 codes of command (0.78%) u_O is lowered by
- *     (beta - beta_zero) * u_min0 * (1 - u_i/u_edge),
+ * Transition: over the first 16 codes of command (0.78%) u_O is lowered by
+ *     (beta - beta_zero) * u_min0 * (1 - u_i/u_transition),
  * so that zero command gives the certified offset beta_zero * u_min0, below the closing threshold.
  *
  * In counts of the PWM this is sum / (1 * 2^40) with the 64-bit integer
@@ -68,15 +68,15 @@
 /* Place of the top bit of a word, which is set after a subtraction below zero: bit 31 of 32 (exact). */
 #define WORD_TOP 31u
 
-/* ---- the segments of beta, and the edge ---- */
+/* ---- the segments of beta, and the transition ---- */
 
 /* Width of a segment of beta, codes of sensor A: 0.4916 MPa (exact). */
 #define STEP_CODES 64u
 /* From codes to segments: 1/64 segment a code (the segment is rounded down). */
 #define STEP_SHIFT 6u
-/* Codes of command that the edge takes, u_edge: 0.78% of command, 0.07812 V (the power of two below what was asked
- * for). */
-#define EDGE_CODES 16u
+/* Codes of command that the transition takes, u_transition: 0.78% of command, 0.07812 V (the power of two below what
+ * was asked for). */
+#define TRANSITION_CODES 16u
 
 /* ---- the law's integers ---- */
 
@@ -86,9 +86,9 @@
 /* Eq. (18), coefficient of beta in u_O: u_min0 = 3.041382 V (exact from u_min0/u_max = 4983/16384, rounded down with
  * half a count to spare). */
 #define FACTOR_OFFSET INT32_C(1530777600)
-/* Edge, coefficient of (beta - beta_zero) in u_O, for each code of command missing to u_edge: u_min0/16 = 0.190086 V
- * (exact from u_min0/u_max = 4983/16384, rounded down with half a count to spare). */
-#define EDGE_FACTOR UINT32_C(95673600)
+/* Transition, coefficient of (beta - beta_zero) in u_O, for each code of command missing to its end: u_min0/16 =
+ * 0.190086 V (exact from u_min0/u_max = 4983/16384, rounded down with half a count to spare). */
+#define TRANSITION_FACTOR UINT32_C(95673600)
 /* Eq. (18), coefficient of u_i alone in u_O, over 2^32: 1.000000 (exact). */
 #define COMMAND_HIGH_WORD UINT32_C(7500)
 /* Eq. (32), half a count, so that shift and division round to the nearest, a half up: 8.33e-05 V (exact). */
@@ -233,9 +233,9 @@ uint16_t dz_comp_negative(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
     const uint32_t failed = failed_pressures_negative(p_a, p_b, difference);
     const uint32_t dp = pressure_drop_negative(difference, failed);
     const uint32_t row = row_of_negative(dp, failed);
-    /* Codes of command that are missing to the edge's end; 0 beyond it. */
-    const uint32_t missing = (uint32_t)(EDGE_CODES - command);
-    const uint32_t to_edge = (uint32_t)(missing & (uint32_t)~below_zero_negative(missing));
+    /* Codes of command that are missing to the end of the transition; 0 beyond it. */
+    const uint32_t missing = (uint32_t)(TRANSITION_CODES - command);
+    const uint32_t to_end = (uint32_t)(missing & (uint32_t)~below_zero_negative(missing));
     /* The law. Below 2^31 (proved when this was generated). */
     const uint32_t beta = law_beta_negative(row, dp);
     const int32_t factor = (FACTOR_SLOPE * (int32_t)command) + FACTOR_OFFSET;
@@ -243,7 +243,7 @@ uint16_t dz_comp_negative(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
     const uint32_t straight = COMMAND_HIGH_WORD * command;
     const uint64_t law = (uint64_t)scaled + ((uint64_t)straight << 32) + HALF;
     const uint32_t gap = beta - zero_beta_negative(row, dp);
-    const uint32_t lowering = EDGE_FACTOR * to_edge;
+    const uint32_t lowering = TRANSITION_FACTOR * to_end;
     const uint64_t sum = law - ((uint64_t)gap * lowering);
     /* Modulo 2^64, and the whole sum is never negative (proved over the tables' nodes). */
     const uint32_t unlimited = (uint32_t)(sum >> SUM_SHIFT);

@@ -2,7 +2,7 @@
 /* Compensator SHA-256: d3443c5526a0e7db257934352ca02d5b997013a8ea4683ef68c5884e696a1a7a */
 /* Valve identified from: bipolar_1.csv, bipolar_3.csv, bipolar_5.csv */
 /*
- * The amplifier around the law: which solenoid is driven, ramps, dither.
+ * The drive functions around the law: which solenoid is driven, ramps, dither.
  *
  * MISRA C:2012: nothing found by cppcheck 2.10 (--platform=avr8 --std=c99 --addon=misra) in this file.
  */

@@ -2,8 +2,8 @@
 /* Compensator SHA-256: d3443c5526a0e7db257934352ca02d5b997013a8ea4683ef68c5884e696a1a7a */
 /* Valve identified from: bipolar_1.csv, bipolar_3.csv, bipolar_5.csv */
 /*
- * The amplifier around the law: call dz_drive_sample() with new codes, dz_drive_tick() once a PWM period, and write
- * compare_a and compare_b to the PWM. Inputs are those of dz_comp(), see dz_comp.h.
+ * The drive functions around the law: call dz_drive_sample() with new codes, dz_drive_tick() once a PWM period, and
+ * write compare_a and compare_b to the PWM. Inputs are those of dz_comp(), see dz_comp.h.
  *
  * MISRA C:2012: nothing found by cppcheck 2.10 (--platform=avr8 --std=c99 --addon=misra) in this file but for
  *   deviation from rule 2.5 (advisory) in DZ_DRIVE_TICKS_PER_SAMPLE: it is for those who call the drive; who is told
