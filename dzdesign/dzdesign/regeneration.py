@@ -10,7 +10,7 @@ from dzdesign.core.artefact_files import TOOL, read_bytes, sha256_of
 from dzdesign.core.errors import InputError, quoted
 
 if TYPE_CHECKING:
-    from dzdesign.verify.checks import Check
+    from dzdesign.verify.evidence import Check
     from dzdesign.verify.verification import Verification
 
 
@@ -24,9 +24,7 @@ def with_regenerated(verification: "Verification", folder: Path) -> "Verificatio
     folder : Path
         Of the firmware.
     """
-    from dzdesign.verify.firmware.c2000ware import with_check
-
-    return with_check(verification, regenerated(folder))
+    return verification.with_checks(regenerated(folder))
 
 
 def regenerated(folder: Path) -> "Check":
@@ -45,29 +43,28 @@ def regenerated(folder: Path) -> "Check":
     """
     from dzdesign.codegen.project import generate
     from dzdesign.design.compensator_file import compensator_from_document
-    from dzdesign.verify.checks import Check
     from dzdesign.verify.firmware.folder import read_firmware_manifest
     from dzdesign.verify.requirements import REGENERATED
 
     _, manifest = read_firmware_manifest(folder)
     if reason := _not_generated_here(manifest):
-        return Check(name=REGENERATED, holds=None, text=reason)
+        return REGENERATED.check(holds=None, text=reason)
     source = folder / "compensator.json"
     content = read_bytes(source, "compensator")
     try:
         firmware = generate(compensator_from_document(content, str(source)), manifest["target"], content)
     except InputError as error:
-        return Check(name=REGENERATED, holds=False, text=str(error))
+        return REGENERATED.check(holds=False, text=str(error))
     made = {name: sha256_of(text.encode()) for name, text in firmware.files.items()}
     expected: dict[str, Any] = {**firmware.manifest, "files": made}
     others = [name for name in sorted(made) if name not in expected["board"] and _digest(folder / name) != made[name]]
     others += [f"{key} of manifest.json" for key in sorted(expected) if manifest.get(key) != expected[key]]
     if others:
         text = f"otherwise than generated now: {', '.join(others)}; make the firmware again with `dzdesign codegen`"
-        return Check(name=REGENERATED, holds=False, text=text)
+        return REGENERATED.check(holds=False, text=text)
     text = f"generated again for {manifest['target']}: {len(made) - len(expected['board'])} files and the manifest are "
     text += "the same, byte for byte"
-    return Check(name=REGENERATED, holds=True, text=text)
+    return REGENERATED.check(holds=True, text=text)
 
 
 def _not_generated_here(manifest: dict[str, Any]) -> str:

@@ -11,11 +11,12 @@ import pytest
 from dzdesign.core.artefact_files import to_json, write_folder
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator_file import compensator_document
-from dzdesign.verify.checks import certificate_follows, files_unchanged
 from dzdesign.verify.closed_loop.loop import PERIODS_PER_RECORD, ClosedLoop, RampSequence, dead_zone, motion
 from dzdesign.verify.closed_loop.plant import Plant, plants_from_tests
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
+from dzdesign.verify.firmware.compensator_checks import certificate_follows
+from dzdesign.verify.firmware.unchanged_files import files_unchanged
 from dzdesign.verify.verification import verify
 from tests.support import plant_oracle
 from tests.support.plant_oracle import Oracle
@@ -116,7 +117,7 @@ def test_a_changed_file_fails_the_verification(firmware_folder):
     readme = firmware_folder / "f28335" / "README.md"
     readme.write_text(readme.read_text() + "\n")
     result = verify(firmware_folder, sequence=QUICK)
-    assert [check.name for check in result.checks if not check.holds] == ["files as generated"]
+    assert [check.name for check in result.evidence.checks if not check.holds] == ["files as generated"]
 
 
 @pytest.mark.parametrize(
@@ -171,13 +172,13 @@ def test_a_manifest_that_names_no_file_is_no_evidence(firmware_folder):
     manifest = json.loads((firmware_folder / "manifest.json").read_text())
     (firmware_folder / "manifest.json").write_text(to_json(manifest | {"files": {}, "core": []}))
     result = verify(firmware_folder, sequence=QUICK)
-    assert "files as generated" in {check.name for check in result.checks if not check.holds}
+    assert "files as generated" in {check.name for check in result.evidence.checks if not check.holds}
 
 
 def test_a_core_that_does_not_compile_fails_the_verification(firmware_folder):
     mutate(firmware_folder, r"const uint32_t sum = law;|const uint64_t sum = law;", "const uint64_t sum = lav;")
     result = verify(firmware_folder, sequence=QUICK)
-    assert not result.holds and result.inputs == ()
+    assert not result.holds and result.evidence.inputs == ()
 
 
 def test_reference_agrees_with_the_compensator_at_random(example_compensator):
@@ -328,7 +329,7 @@ def test_a_law_without_its_guard_leaks_in_the_loop(example_compensator, example_
     firmware = generate(leaky, "f28335")
     write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
     result = verify(tmp_path / "fw", read_plant(example_folder / "plant.toml"), sequence=QUICK)
-    failed = {check.name for check in result.checks if not check.holds}
+    failed = {check.name for check in result.evidence.checks if not check.holds}
     assert "no flow at zero command in the closed loop" in failed
 
 
@@ -344,8 +345,8 @@ def test_what_could_not_be_checked_is_not_passed(tmp_path):
     firmware = generate(design(valve, DesignOptions(guard="opening")), "f28335")
     write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
     result = verify(tmp_path / "fw", sequence=QUICK)
-    assert [check.holds for check in result.checks if "zero command in" in check.name] == [None]
-    assert not result.holds and result.document["holds"] is False
+    assert [check.holds for check in result.evidence.checks if "zero command in" in check.name] == [None]
+    assert not result.holds and result.evidence.holds is False
 
 
 def test_a_span_that_ends_at_the_tested_pressure_can_be_verified(example_valve, tmp_path):

@@ -108,5 +108,5 @@ def test_verify_says_so(firmware_folder):
     change(manifest, ("constants", place_of(manifest, "SUM_SHIFT"), "value"), 31)
     (firmware_folder / "manifest.json").write_text(json.dumps(manifest))
     found = verify(firmware_folder)
-    missed = [check.name for check in found.checks if not check.holds]
+    missed = [check.name for check in found.evidence.checks if not check.holds]
     assert missed == ["the manifest says what is in the firmware"]

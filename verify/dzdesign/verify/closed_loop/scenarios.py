@@ -7,6 +7,7 @@ import numpy as np
 
 from dzdesign.verify.closed_loop.loop import ClosedLoop, LoopRun
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
+from dzdesign.verify.evidence import ScenarioResult, Side
 
 #: Two periods a record: as often as the core samples, 1.25 kHz.
 PERIODS = 2
@@ -23,35 +24,6 @@ OILS = {"cold oil, 8 times the viscosity": (8.0, 1.03), "hot oil, a quarter of t
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ScenarioResult:
-    """One scenario at one pressure drop.
-
-    Attributes
-    ----------
-    name, side : str
-        What happens, and on which side of the valve.
-    dp_MPa : float
-        Pressure drop before anything happens, at no flow.
-    q_zero_L_min : float
-        Flow at zero command at the end, after everything has settled.
-    q_peak_at_zero_L_min : float
-        Largest flow while the command was zero and the valve had closed before.
-    must_shut : bool
-        Whether flow at the end is a failure: not where no compensator could know better.
-    figures : dict of str to float
-        What else was measured, the unit in the name.
-    """
-
-    name: str
-    side: str
-    dp_MPa: float
-    q_zero_L_min: float
-    q_peak_at_zero_L_min: float
-    must_shut: bool
-    figures: dict[str, float]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
     """The loop of one side at one pressure drop.
 
@@ -60,7 +32,7 @@ class Scene:
     loop : ClosedLoop
         With the compensator, and the plant of this pressure drop.
     plant : Plant
-    side : str
+    side : {"positive", "negative"}
     dp_MPa, reference_MPa : float
         Pressure drop at no flow, and the law's dP0.
     tested_MPa : (float, float) or None
@@ -69,7 +41,7 @@ class Scene:
 
     loop: ClosedLoop
     plant: Plant
-    side: str
+    side: Side
     dp_MPa: float
     reference_MPa: float
     tested_MPa: tuple[float, float] | None

@@ -8,7 +8,9 @@ import numpy as np
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.design.compensator import Compensator
+from dzdesign.verify.evidence import Check
 from dzdesign.verify.exhaustive.exact_drive import STEP_UNIT, DriveModel
+from dzdesign.verify.requirements import DRIVE
 from dzdesign.verify.toolchain.machines import HOST, compile_object, link_program, programs_folder, run_program, stored
 
 SEED, SAMPLES = 11, 3000
@@ -209,3 +211,24 @@ class CompiledDrive:
             when = f"sample {sample} with codes {prepared.samples[sample]}" if sample >= 0 else "before any sample"
             words = f"{FIELDS[field]} after {tick} PWM periods, {when}"
         return DriveCheck(ticks=ticks, wrong=wrong, first_wrong=words)
+
+
+def drive_follows(folder: Path, compensator: Compensator) -> Check:
+    """Tell whether the drive around the law does what its model in rational numbers does.
+
+    Parameters
+    ----------
+    folder : Path
+        Firmware folder.
+    compensator : Compensator
+        What it was made from.
+    """
+    prepared = PreparedDrive(compensator)
+    try:
+        found = CompiledDrive(folder).check(prepared)
+    except RequirementError as error:
+        return DRIVE.check(holds=False, text=str(error))
+    text = f"outputs and state after each of {found.ticks} PWM periods, {len(prepared.samples)} samples of corners, "
+    text += f"steps, noise and random codes (seed {SEED}): {found.wrong} wrong"
+    text += f" ({found.first_wrong})" if found.wrong else ""
+    return DRIVE.check(holds=found.wrong == 0, text=text)

@@ -32,7 +32,7 @@ def read_firmware_manifest(folder: Path) -> tuple[bytes, dict[str, Any]]:
     check_shape(manifest, shape, str(path), "make it again with `dzdesign codegen`")
     check_inside(folder, [*manifest["files"], *manifest["core"]], f"'{path}'")
     check_firmware_inside(folder)
-    return content, manifest
+    return content, {"board": (), **manifest}
 
 
 def check_firmware_inside(folder: Path) -> None:

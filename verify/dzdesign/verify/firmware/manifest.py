@@ -8,8 +8,8 @@ from typing import Any
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
 from dzdesign.core.shape import check_shape
-from dzdesign.report.shapes import CONSTANTS
-from dzdesign.verify.checks import Check
+from dzdesign.verify.evidence import Check
+from dzdesign.verify.requirements import MANIFEST
 
 COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 #: A number as the core writes it: 64u, UINT32_C(64), (-INT32_C(64)).
@@ -38,7 +38,8 @@ def manifest_follows(folder: Path, manifest: dict[str, Any]) -> Check:
     """
     says = "constants" in manifest  # one of an older version does not
     if says:
-        check_shape(manifest, CONSTANTS, str(folder / MANIFEST_NAME), "make it again with `dzdesign codegen`")
+        shape = {"constants": [{"file": str, "symbol": str}]}
+        check_shape(manifest, shape, str(folder / MANIFEST_NAME), "make it again with `dzdesign codegen`")
     faults = [*_faults_of_origin(folder, manifest), *(_faults_of_constants(folder, manifest) if says else ())]
     if says:
         text = f"law, target, hashes and {len(manifest['constants'])} constants in {len(manifest['core'])} files"
@@ -50,7 +51,7 @@ def manifest_follows(folder: Path, manifest: dict[str, Any]) -> Check:
         more = f", and {len(faults) - 1} more" if len(faults) > 1 else ""
         text = f"{faults[0]}{more}; make the firmware again with `dzdesign codegen`"
     holds = False if faults else True if says else None
-    return Check(name="the manifest says what is in the firmware", holds=holds, text=text)
+    return MANIFEST.check(holds=holds, text=text)
 
 
 def _faults_of_origin(folder: Path, manifest: dict[str, Any]) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""The files of a firmware that its user fills in: which of them were changed, and whether they compile."""
+"""Whether the firmware's C compiles: the core strictly, and the files that its user filled in."""
 
 import re
 import shutil
@@ -8,11 +8,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dzdesign.core.artefact_files import sha256_of
-from dzdesign.core.errors import InputError
-from dzdesign.verify.checks import OWN, Check, own_files
-from dzdesign.verify.requirements import COMPILES
-from dzdesign.verify.toolchain.host_compiler import build_folder, run_compiler
+from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.verify import requirements
+from dzdesign.verify.evidence import Check
+from dzdesign.verify.firmware.unchanged_files import USER_FOLDER, changed_files, user_files
+from dzdesign.verify.toolchain.host_compiler import (
+    STRICT,
+    build_folder,
+    check_strictly,
+    find_compilers,
+    first_error,
+    run_compiler,
+)  # fmt: skip
 from dzdesign.verify.toolchain.machines import CORTEX_M4
 
 #: Compiler and options of a target whose board files can be compiled without a vendor's library.
@@ -21,16 +28,8 @@ COMPILERS = {"cortex-m4": (CORTEX_M4.compiler, *CORTEX_M4.core_flags)}
 ELSEWHERE = re.compile(r"error: (\S+): No such file or directory")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BoardFile:
-    """A file that the user fills in: its name in the firmware folder, and whether it is no longer as generated."""
-
-    name: str
-    changed: bool
-
-
-def board_files(folder: Path, manifest: dict[str, Any]) -> tuple[BoardFile, ...]:
-    """Return the files that the manifest calls the user's.
+def compiles_strictly(folder: Path, manifest: dict[str, Any]) -> Check:
+    """Tell whether every compiler on this machine takes the core with every warning an error.
 
     Parameters
     ----------
@@ -39,13 +38,29 @@ def board_files(folder: Path, manifest: dict[str, Any]) -> tuple[BoardFile, ...]
     manifest : dict
         Of `read_firmware_manifest`.
     """
-    return tuple(
-        BoardFile(
-            name=name,
-            changed=not (folder / name).is_file() or sha256_of((folder / name).read_bytes()) != manifest["files"][name],
-        )
-        for name in sorted(set(manifest.get("board", ())) & manifest["files"].keys())
-    )
+    compilers = find_compilers()
+    try:
+        for compiler in compilers:
+            for name in manifest["core"]:
+                if name.endswith(".c"):
+                    check_strictly(folder / name, compiler)
+    except RequirementError as error:
+        return requirements.COMPILES.check(holds=False, text=str(error))
+    names = ", ".join(sorted({Path(compiler).name for compiler in compilers}))
+    return requirements.COMPILES.check(holds=True, text=f"{' '.join(STRICT)}: {names}")
+
+
+def changed_board_files(folder: Path, manifest: dict[str, Any]) -> list[str]:
+    """Return the files of the target that the user fills in and that are no longer as generated.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the firmware.
+    manifest : dict
+        Of `read_firmware_manifest`.
+    """
+    return sorted(name for name in changed_files(folder, manifest) if name in manifest["board"])
 
 
 def check_include(include: Sequence[Path], manifest: dict[str, Any]) -> None:
@@ -78,7 +93,7 @@ class BoardCompiled:
     """Whether the user's board files compile: a check, or why it was not tried; neither where nothing was changed."""
 
     checks: tuple[Check, ...] = ()
-    untried: str = ""
+    not_compiled: str = ""
 
 
 def board_compiles(folder: Path, manifest: dict[str, Any], include: Sequence[Path] = ()) -> BoardCompiled:
@@ -94,34 +109,36 @@ def board_compiles(folder: Path, manifest: dict[str, Any], include: Sequence[Pat
         Where headers of the user's chip lie.
     """
     compiler, *options = COMPILERS.get(manifest.get("target", ""), ("",))
-    changed = [each.name for each in board_files(folder, manifest) if each.changed]
+    changed = changed_board_files(folder, manifest)
     if not changed or not compiler:
         return BoardCompiled()
     if not shutil.which(compiler):
-        return BoardCompiled(untried=f"{compiler} is not on the path; install it, then `verify`")
+        return BoardCompiled(not_compiled=f"{compiler} is not on the path; install it, then `verify`")
     place = (folder / changed[0]).parent
     sources = sorted(name for name in manifest["files"] if (folder / name).parent == place and name.endswith(".c"))
-    own = [name for name in own_files(folder, manifest) if name.endswith(".c")]
+    own = [name for name in user_files(folder, manifest) if name.endswith(".c")]
     sources += own
     # Warnings in headers of a vendor are no concern here: -isystem.
-    folders = [f"-I{folder / 'core'}", f"-I{place}", "-iquote", str(folder / OWN)]
+    folders = [f"-I{folder / 'core'}", f"-I{place}", "-iquote", str(folder / USER_FOLDER)]
     folders += [word for path in include for word in ("-isystem", str(path))]
     for source in (name for name in sources if (folder / name).is_file()):
         command = [compiler, *options, *folders, "-c", str(folder / source), "-o", str(build_folder() / "board.o")]
         try:
             done = run_compiler(command)
         except (OSError, subprocess.TimeoutExpired) as error:
-            return BoardCompiled(untried=f"{compiler} did not run on {source} ({type(error).__name__}); then `verify`")
+            return BoardCompiled(
+                not_compiled=f"{compiler} did not run on {source} ({type(error).__name__}); then `verify`"
+            )
         if done.returncode and (lost := ELSEWHERE.search(done.stderr)):
             given = f" nor in {', '.join(map(str, include))}" if include else ""
             return BoardCompiled(
-                untried=f"{lost[1]}, which {source} includes, was not found in the firmware{given}; `verify --include "
-                "DIR` with the folder in which it lies"
+                not_compiled=f"{lost[1]}, which {source} includes, was not found in the firmware{given}; "
+                "`verify --include DIR` with the folder in which it lies"
             )
         if done.returncode:
-            first = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr.strip()[:300])
-            return BoardCompiled(checks=(Check(name=COMPILES, holds=False, text=f"{first} ({Path(compiler).name})"),))
+            text = f"{first_error(done.stderr)} ({Path(compiler).name})"
+            return BoardCompiled(checks=(requirements.BOARD_FILES.check(holds=False, text=text),))
     added = f" and {', '.join(own)}" if own else ""
     text = f"one by one, with {', '.join(changed)} as you changed them{added} ({Path(compiler).name}); not linked, and "
     text += "what they do is not checked"
-    return BoardCompiled(checks=(Check(name=COMPILES, holds=True, text=text),))
+    return BoardCompiled(checks=(requirements.BOARD_FILES.check(holds=True, text=text),))
