@@ -481,7 +481,8 @@ def test_a_series_of_plants_is_shown(copied):
         "side": "positive", "dp_MPa": 1.0, "plants": 200, "leaking": 3,
         "residual_opening": spread, "residual_closing": spread, "q_zero_L_min": spread, "q_max_L_min": spread,
     }  # fmt: skip
-    change_evidence(copied, lambda evidence: evidence.update(monte_carlo={"plants": 200, "seed": 1, "spreads": {}, "pressures": [one]}))
+    series = {"plants": 200, "seed": 1, "spreads": {}, "pressures": [one]}
+    change_evidence(copied, lambda evidence: evidence.update(monte_carlo=series))
     html = report_of_folder(copied).html
     assert "2.10 (1.00 to 3.45)" in html and "3 of 200" in html
 

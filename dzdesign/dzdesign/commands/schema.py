@@ -18,12 +18,16 @@ SCHEMAS: Mapping[str, tuple[str, str, str]] = MappingProxyType(
     {
         "valve": ("dzdesign.identify", "valve.json", "identify"),
         "compensator": ("dzdesign.design", "compensator.json", "design"),
-        "firmware": ("dzdesign.codegen", "manifest.json of a firmware", "codegen"),
+        "firmware": ("dzdesign.design.firmware_manifest:FirmwareManifest", "manifest.json of a firmware", "codegen"),
         "evidence": ("dzdesign.verify.evidence:Evidence", "verification.json", "verify"),
         "assessment": ("dzdesign.assess", "assessment.json", "assess"),
         "batch": ("dzdesign.batch", "batch.json", "batch"),
         "reproduction": ("dzdesign.reproduce", "reproduction.json", "reproduce"),
-        "derivation": ("dzdesign.derivation", "derivation.json", "derive --format json"),
+        "derivation": (
+            "dzdesign.derivation.presentation.derivation_file:DerivationFile",
+            "derivation.json",
+            "derive --format json",
+        ),
     }
 )
 

@@ -115,7 +115,7 @@ def verify(
     if tolerances and plant is None:
         raise InputError("tolerances are about a plant; give it with --plant PLANT.toml")
     folder = Path(folder)
-    manifest_bytes, manifest = read_firmware_manifest(folder)
+    manifest = read_firmware_manifest(folder)
     check_include(include, manifest)
     content = read_bytes(folder / "compensator.json", "compensator")
     compensator = compensator_from_document(content, str(folder / "compensator.json"))  # every key that is read below
@@ -124,7 +124,7 @@ def verify(
     host_compiler()
     say("compiling the core with every warning an error")
     compiles = compiles_strictly(folder, manifest)
-    checks = [files_unchanged(folder, manifest), manifest_follows(folder, manifest), compiles]
+    checks = [files_unchanged(folder, manifest), manifest_follows(folder, manifest, compensator, valve), compiles]
     inputs: tuple[InputCheck, ...] = ()
     maps: tuple[InputMap, ...] = ()
     loop = FirmwareLoop()
@@ -149,10 +149,11 @@ def verify(
     board = board_compiles(folder, manifest, include)
     checks += [*loop.checks, certificate_follows(compensator), law_follows(compensator, document)]
     checks += [*valve_follows(folder, document), *board.checks]
+    digest = sha256_of((folder / MANIFEST_NAME).read_bytes())
     evidence = Evidence(
         tool=THIS_TOOL,
-        made_from=(SourceFile(source=f"{folder.name}/{MANIFEST_NAME}", sha256=sha256_of(manifest_bytes)),),
-        target=manifest.get("target", ""),
+        made_from=(SourceFile(source=f"{folder.name}/{MANIFEST_NAME}", sha256=digest),),
+        target=manifest.target,
         changed_board_files=tuple(changed_board_files(folder, manifest)),
         user_files=tuple(user_files(folder, manifest)),
         board_not_compiled=board.not_compiled,

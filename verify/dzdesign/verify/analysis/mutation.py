@@ -12,7 +12,7 @@ import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -108,12 +108,16 @@ class MutationBench:
 
     def _tried(self, cores: dict[int, CompiledCore], drive: CompiledDrive) -> Iterable[str]:
         """Yield, check by check, what found a fault, or an empty text: first what is quick."""
-        runs: list[tuple[str, Callable[[], int]]] = []
-        for sign, core in cores.items():
-            runs.append(("sample of inputs", lambda c=core, s=sign: c.check(self._samples[s], sample=True).faults))
+
+        def sampled(sign: int) -> int:
+            return cores[sign].check(self._samples[sign], sample=True).faults
+
+        def all_of(sign: int) -> int:
+            return cores[sign].check(self._everything[sign]).faults
+
+        runs: list[tuple[str, Callable[[], int]]] = [("sample of inputs", partial(sampled, sign)) for sign in cores]
         runs.append(("drive", lambda: drive.check(self._drive_samples).wrong))
-        for sign, core in cores.items():
-            runs.append(("all inputs", lambda c=core, s=sign: c.check(self._everything[s]).faults))
+        runs += [("all inputs", partial(all_of, sign)) for sign in cores]
         for name, run in runs:
             try:
                 yield name if run() else ""

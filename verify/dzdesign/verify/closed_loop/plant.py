@@ -146,6 +146,8 @@ def plants_from_tests(side: SideModel, u_max_V: float) -> dict[float, Plant]:
     """
     plants = {}
     for test in side.tests:
+        if test.dp_MPa is None:
+            raise InputError(f"{test.source} has no pressure drop, so no plant can be made from it; give --plant")
         base = Plant(u_max_V=u_max_V, pressure_force_N_MPa=0, flow_force_N_mm_MPa=0, droop_MPa_L_min2=0, overlap_mm=0.3)
         opens = test.u_knee_rising_V if test.u_knee_rising_V is not None else test.u_guard_V
         closes = test.u_guard_V if side.guard == "closing" else opens

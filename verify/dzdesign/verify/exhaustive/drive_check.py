@@ -15,6 +15,8 @@ from dzdesign.verify.toolchain.machines import HOST, compile_object, link_progra
 
 SEED, SAMPLES = 11, 3000
 #: A ramp that is not put anywhere; share of the samples before which it is.
+#: Codes of command, pressure A and pressure B.
+Codes = tuple[int, int, int]
 STAYS, PUT_SHARE = -(2**31), 0.04
 FIELDS = ("compare_a", "compare_b", "status", "law", "side", "ticks", "ramped")
 
@@ -36,7 +38,7 @@ class DriveCheck:
     first_wrong: str | None
 
 
-def drive_samples(compensator: Compensator, seed: int, count: int) -> list[tuple[int, int, int]]:
+def drive_samples(compensator: Compensator, seed: int, count: int) -> list[Codes]:
     """Return random codes, corners, steps from end to end, and noise about zero, one after the other.
 
     Parameters
@@ -55,7 +57,7 @@ def drive_samples(compensator: Compensator, seed: int, count: int) -> list[tuple
     corners = [0, low, high, signals.code_max, signals.code_max + 1, 65535, zero, signals.command.full_code]
     corners += [max(zero + sign * (window + step), 0) for sign in (1, -1) for step in (-1, 0, 1)]
     sound_pressures = (signals.pressure_a.valid_codes, signals.pressure_b.valid_codes)
-    made = []
+    made: list[Codes] = []
     while len(made) < count:
         kind = int(rng.integers(7))
         length = int(rng.integers(1, 900 if kind == 5 else 60))
@@ -67,9 +69,10 @@ def drive_samples(compensator: Compensator, seed: int, count: int) -> list[tuple
             end = held if held % 2 else (low, high)[held // 2 % 2]
             command = (anything, int(rng.choice(corners)), held, about_zero, near, end, corner)[kind]
             sound = rng.random() < 0.9
-            pressures = [int(rng.integers(least, most + 1)) for least, most in sound_pressures]
-            pressures = pressures if sound else rng.choice([0, 700, 4014, 4095, 4096, 65535], 2)
-            made.append((command, *map(int, pressures)))
+            p_a, p_b = (int(rng.integers(least, most + 1)) for least, most in sound_pressures)
+            if not sound:
+                p_a, p_b = map(int, rng.choice([0, 700, 4014, 4095, 4096, 65535], 2))
+            made.append((command, p_a, p_b))
     return made[:count]
 
 
@@ -101,7 +104,7 @@ def ramp_places(compensator: Compensator, seed: int, count: int) -> list[int]:
     return [place() if rng.random() < PUT_SHARE else STAYS for _ in range(count)]
 
 
-def window_samples(compensator: Compensator) -> list[tuple[tuple[int, int, int], int]]:
+def window_samples(compensator: Compensator) -> list[tuple[Codes, int]]:
     """Return samples, each with the ramp's place: from either end to the window's edges, where the side changes.
 
     Parameters
@@ -111,7 +114,7 @@ def window_samples(compensator: Compensator) -> list[tuple[tuple[int, int, int],
     """
     amplifier, command = compensator.amplifier, compensator.signals.command
     sensors = (compensator.signals.pressure_a, compensator.signals.pressure_b)
-    pressures = [sum(sensor.valid_codes) // 2 for sensor in sensors]
+    p_a, p_b = (sum(sensor.valid_codes) // 2 for sensor in sensors)
     ramps = any(amplifier.ramp_up + amplifier.ramp_down)
     signs = compensator.signals.signs
     made = []
@@ -120,7 +123,7 @@ def window_samples(compensator: Compensator) -> list[tuple[tuple[int, int, int],
         for step in (-1, 0, 1):
             for away in (far, sign * max(amplifier.window_codes + step, 0)):
                 code = command.zero_code + command.direction(1) * away
-                made.append(((code, *pressures), away * STEP_UNIT if ramps else STAYS))
+                made.append(((code, p_a, p_b), away * STEP_UNIT if ramps else STAYS))
     return made
 
 

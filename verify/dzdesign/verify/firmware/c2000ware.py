@@ -9,9 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
 
-from dzdesign.core.artefact_files import MANIFEST_NAME, read_bytes
+from dzdesign.core.artefact_files import read_bytes
 from dzdesign.core.errors import InputError, RequirementError
-from dzdesign.core.shape import check_shape
 from dzdesign.verify.evidence import Check
 from dzdesign.verify.firmware.folder import read_firmware_manifest
 from dzdesign.verify.requirements import C2000WARE
@@ -66,11 +65,9 @@ def check_against_c2000ware(folder: Path, ware: Path, say: Callable[[str], None]
     InputError
         If either folder is none of its kind, or there is no C compiler.
     """
-    _, manifest = read_firmware_manifest(folder)
-    remedy = "make it again with `dzdesign codegen`"
-    check_shape(manifest, {"target": str}, str(folder / MANIFEST_NAME), remedy)
-    if manifest["target"] != TARGET:
-        raise InputError(f"--c2000ware checks firmware for {TARGET}, and '{folder}' is for {manifest['target']}")
+    manifest = read_firmware_manifest(folder)
+    if manifest.target != TARGET:
+        raise InputError(f"--c2000ware checks firmware for {TARGET}, and '{folder}' is for {manifest.target}")
     for headers in HEADERS:
         if not (ware / headers).is_dir():
             raise InputError(
@@ -79,7 +76,7 @@ def check_against_c2000ware(folder: Path, ware: Path, say: Callable[[str], None]
             )
     compiler = host_compiler()
     say(f"compiling the firmware against {ware}")
-    sources = sorted(folder / name for name in manifest["files"] if name.endswith(".c"))
+    sources = sorted(folder / name for name in manifest.files if name.endswith(".c"))
     try:
         with tempfile.TemporaryDirectory(prefix="dzdesign-") as temporary:
             prelude = Path(temporary) / "prelude.h"

@@ -31,7 +31,8 @@ def certificate_follows(compensator: Compensator) -> Check:
     certificate = compensator.positive.certificate
     common = f"of {compensator.common_valves} valves the one in compensator.json: " if compensator.common_valves else ""
     text = f"{common}the {certificate.guard} threshold's {100 * certificate.confidence:.6g}% lower bound, "
-    text += f"{span_MPa(*map(float, certificate.dp_MPa))}, proved again at every difference of pressure codes"
+    low, high = map(float, certificate.dp_MPa)
+    text += f"{span_MPa(low, high)}, proved again at every difference of pressure codes"
     return CERTIFICATE.check(holds=True, text=text)
 
 

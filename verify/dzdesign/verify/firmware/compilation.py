@@ -6,9 +6,9 @@ import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.verify import requirements
 from dzdesign.verify.evidence import Check
 from dzdesign.verify.firmware.unchanged_files import USER_FOLDER, changed_files, user_files
@@ -28,20 +28,20 @@ COMPILERS = {"cortex-m4": (CORTEX_M4.compiler, *CORTEX_M4.core_flags)}
 ELSEWHERE = re.compile(r"error: (\S+): No such file or directory")
 
 
-def compiles_strictly(folder: Path, manifest: dict[str, Any]) -> Check:
+def compiles_strictly(folder: Path, manifest: FirmwareManifest) -> Check:
     """Tell whether every compiler on this machine takes the core with every warning an error.
 
     Parameters
     ----------
     folder : Path
         Of the firmware.
-    manifest : dict
+    manifest : FirmwareManifest
         Of `read_firmware_manifest`.
     """
     compilers = find_compilers()
     try:
         for compiler in compilers:
-            for name in manifest["core"]:
+            for name in manifest.core:
                 if name.endswith(".c"):
                     check_strictly(folder / name, compiler)
     except RequirementError as error:
@@ -50,27 +50,27 @@ def compiles_strictly(folder: Path, manifest: dict[str, Any]) -> Check:
     return requirements.COMPILES.check(holds=True, text=f"{' '.join(STRICT)}: {names}")
 
 
-def changed_board_files(folder: Path, manifest: dict[str, Any]) -> list[str]:
+def changed_board_files(folder: Path, manifest: FirmwareManifest) -> list[str]:
     """Return the files of the target that the user fills in and that are no longer as generated.
 
     Parameters
     ----------
     folder : Path
         Of the firmware.
-    manifest : dict
+    manifest : FirmwareManifest
         Of `read_firmware_manifest`.
     """
-    return sorted(name for name in changed_files(folder, manifest) if name in manifest["board"])
+    return sorted(name for name in changed_files(folder, manifest) if name in manifest.board)
 
 
-def check_include(include: Sequence[Path], manifest: dict[str, Any]) -> None:
+def check_include(include: Sequence[Path], manifest: FirmwareManifest) -> None:
     """Refuse folders of headers that are none, or of a target whose board files are not compiled here.
 
     Parameters
     ----------
     include : sequence of Path
         As given.
-    manifest : dict
+    manifest : FirmwareManifest
         Of `read_firmware_manifest`.
 
     Raises
@@ -81,10 +81,10 @@ def check_include(include: Sequence[Path], manifest: dict[str, Any]) -> None:
     for place in include:
         if not place.is_dir():
             raise InputError(f"'{place}' is no folder, expected one with headers after --include; check the name")
-    if include and manifest.get("target") not in COMPILERS:
+    if include and manifest.target not in COMPILERS:
         raise InputError(
             f"--include is for the board files of {', '.join(COMPILERS)}, and this firmware is for "
-            f"{manifest.get('target')}, whose board files are not compiled here; leave it out"
+            f"{manifest.target}, whose board files are not compiled here; leave it out"
         )
 
 
@@ -96,26 +96,26 @@ class BoardCompiled:
     not_compiled: str = ""
 
 
-def board_compiles(folder: Path, manifest: dict[str, Any], include: Sequence[Path] = ()) -> BoardCompiled:
+def board_compiles(folder: Path, manifest: FirmwareManifest, include: Sequence[Path] = ()) -> BoardCompiled:
     """Compile the target's C together with the board files that were changed, and the user's own; nothing is linked.
 
     Parameters
     ----------
     folder : Path
         Of the firmware.
-    manifest : dict
+    manifest : FirmwareManifest
         Of `read_firmware_manifest`.
     include : sequence of Path
         Where headers of the user's chip lie.
     """
-    compiler, *options = COMPILERS.get(manifest.get("target", ""), ("",))
+    compiler, *options = COMPILERS.get(manifest.target, ("",))
     changed = changed_board_files(folder, manifest)
     if not changed or not compiler:
         return BoardCompiled()
     if not shutil.which(compiler):
         return BoardCompiled(not_compiled=f"{compiler} is not on the path; install it, then `verify`")
     place = (folder / changed[0]).parent
-    sources = sorted(name for name in manifest["files"] if (folder / name).parent == place and name.endswith(".c"))
+    sources = sorted(name for name in manifest.files if (folder / name).parent == place and name.endswith(".c"))
     own = [name for name in user_files(folder, manifest) if name.endswith(".c")]
     sources += own
     # Warnings in headers of a vendor are no concern here: -isystem.

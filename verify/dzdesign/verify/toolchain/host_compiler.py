@@ -32,7 +32,7 @@ logger = logging.getLogger(__name__)
 
 
 @cache
-def _build_folder() -> tempfile.TemporaryDirectory:
+def _build_folder() -> tempfile.TemporaryDirectory[str]:
     return tempfile.TemporaryDirectory(prefix="dzdesign-", ignore_cleanup_errors=True)
 
 
