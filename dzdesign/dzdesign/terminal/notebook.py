@@ -5,6 +5,7 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 from dzdesign.core.units import chance
+from dzdesign.core.verdicts import verdict_words
 
 if TYPE_CHECKING:
     from dzdesign.codegen.project import Firmware
@@ -12,8 +13,6 @@ if TYPE_CHECKING:
     from dzdesign.identify.valve.model import ValveModel
     from dzdesign.identify.valve.side_model import SideModel
     from dzdesign.verify.verification import Verification
-
-VERDICTS = {True: "holds", False: "FAILS", None: "NOT CHECKED"}
 
 
 def _table(caption: str, headings: Sequence[str], rows: Iterable[Sequence[str]], words: Sequence[int] = (0,)) -> str:
@@ -117,7 +116,7 @@ def verification_html(verification: "Verification") -> str:
     checks = _table(
         verification.verdict,
         ("requirement", "verdict", "figures"),
-        ((check.name, VERDICTS[check.holds], check.text) for check in verification.checks),
+        ((check.name, verdict_words(check.holds), check.text) for check in verification.evidence.checks),
         words=(0, 1, 2),
     )
     rows = [
@@ -131,7 +130,7 @@ def verification_html(verification: "Verification") -> str:
         for loop in verification.loops
     ]
     headings = ("side, dP (MPa)", "dead zone without (%)", "with: opening (%)", "closing (%)", "Q at zero (L/min)")
-    caption = f"Closed loop (plant: {verification.plant_source})"
+    caption = f"Closed loop (plant: {verification.evidence.closed_loop.plant_source})"
     return checks + (_table(caption, headings, rows) if rows else "")
 
 

@@ -25,7 +25,8 @@ from dzdesign.report.artefact_folder import (
     is_of,
     listing,
 )
-from dzdesign.report.shapes import ASSESSMENT, FIRMWARE, LATER, REPRODUCTION, VERIFICATION
+from dzdesign.report.shapes import ASSESSMENT, FIRMWARE, LATER, REPRODUCTION
+from dzdesign.verify.evidence import Evidence
 
 ASSESSMENT_SCHEMA, REPRODUCTION_SCHEMA = "dzdesign.assessment/1", "dzdesign.reproduction/1"
 #: Kinds of artefact, from the evidence back to the recordings.
@@ -86,6 +87,11 @@ class Chain:
         """Return the content of an artefact, or None if it is missing."""
         found = self.artefacts.get(role)
         return None if found is None else found.document
+
+    def evidence(self) -> Evidence:
+        """Return the evidence; only where there is a document of it."""
+        one = self.artefacts["verification"]
+        return read_artefact(to_json(one.document).encode(), Evidence, one.name)
 
 
 def chain_of(shelf: Mapping[str, bytes], *, own: tuple[str, ...] = ("",), sealed: bool = True) -> Chain:
@@ -339,7 +345,7 @@ def _origin(artefact: Artefact) -> str:
 
 #: Schema and shape of each kind.
 SCHEMAS = {
-    "verification": (EVIDENCE_SCHEMA, VERIFICATION),
+    "verification": (EVIDENCE_SCHEMA, {}),
     "firmware": (FIRMWARE_SCHEMA, FIRMWARE),
     "compensator": (COMPENSATOR_SCHEMA, {}),
     "valve": (VALVE_SCHEMA, {}),
@@ -360,6 +366,8 @@ def _checked(role: str, content: bytes, name: str) -> dict[str, Any]:
         compensator = compensator_from_document(content, name)
         if document.get("tool") == TOOL:  # another version may have chosen other tables
             prove_derived(compensator)
+    if role == "verification":
+        read_artefact(content, Evidence, name)
     if role == "valve":
         read_artefact(content, ValveModel, name)
     return document
