@@ -2,14 +2,17 @@
 
 import hashlib
 import json
+import math
 from collections.abc import Iterable, Mapping
 from typing import Any, BinaryIO
 
-from dzdesign.core.errors import InputError
+from dzdesign.core.errors import QUOTED, InputError
 
 #: Lists and objects in one another; dzdesign's own artefacts have eight. Beyond some hundred, what reads or prints the
 #: value would end in the interpreter's own limit, at a depth that depends on who called.
 DEEPEST = 32
+#: Digits of a whole number; a part of a fraction has some sixty.
+MOST_DIGITS = 1000
 #: What writes the artefacts that are given to another command, by the schema's name without its version.
 WRITTEN_BY = {
     "dzdesign.valve": "dzdesign identify",
@@ -41,6 +44,19 @@ def _no_number(word: str) -> float:
     raise ValueError(f"{word} is not a number of JSON")
 
 
+def _number(text: str) -> float:
+    value = float(text)
+    if math.isinf(value):
+        raise ValueError(f"the number {text[:QUOTED]} is too large")
+    return value
+
+
+def _whole_number(text: str) -> int:
+    if len(text) > MOST_DIGITS:
+        raise ValueError(f"it holds a whole number of {len(text)} digits, of {MOST_DIGITS} at most")
+    return int(text)
+
+
 def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     found = dict(pairs)
     if len(found) < len(pairs):
@@ -62,15 +78,25 @@ def parse_document(content: bytes, source: str, schemas: tuple[str, ...]) -> dic
     expected = " or ".join(f"{schema}{_writer(schema)}" for schema in schemas)
     try:
         # JSON in UTF-16, or after a byte order mark, would be read here and stumbled over later.
-        document = json.loads(content.decode("utf-8"), parse_constant=_no_number, object_pairs_hook=_unique_keys)
+        document = json.loads(
+            content.decode("utf-8"),
+            parse_constant=_no_number,
+            parse_float=_number,
+            parse_int=_whole_number,
+            object_pairs_hook=_unique_keys,
+        )
         _refuse_deep(document)
-        to_json(document).encode()
+        if b"\\u" in content:  # half a character, which can't be written again
+            json.dumps(document, ensure_ascii=False).encode()
     except (ValueError, RecursionError) as error:
         raise InputError(f"'{source}' is not JSON ({error}); expected an artefact of schema {expected}") from error
     found = document.get("schema") if isinstance(document, dict) else None
-    if found not in schemas:
-        raise InputError(f"'{source}' has the schema {str(found)[:40]!r}, expected {expected}; give another file")
-    return document
+    if found in schemas:
+        return document
+    same_kind = next((schema for schema in schemas if str(found).partition("/")[0] == schema.partition("/")[0]), None)
+    command = written_by(same_kind) if same_kind else None
+    remedy = f"make it again with `{command}` of this version" if command else "give another file"
+    raise InputError(f"'{source}' has the schema {str(found)[:QUOTED]!r}, expected {expected}; {remedy}")
 
 
 def _writer(schema: str) -> str:

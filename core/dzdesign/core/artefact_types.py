@@ -1,0 +1,141 @@
+"""Artefacts as types: one frozen dataclass is read from JSON, written as JSON and described as JSON Schema by itself.
+
+An artefact is declared once. The annotation of a field says its type, unit, bounds and meaning; ``__post_init__`` holds
+the rules between fields. `dzdesign.core.artefact_reading` reads it, `dzdesign.core.artefact_schema` describes it.
+
+Examples
+--------
+>>> from dataclasses import dataclass
+>>> from typing import Annotated, ClassVar, Literal
+>>> @dataclass(frozen=True, slots=True, kw_only=True)
+... class Supply(Artefact):
+...     "A pump as its data sheet has it."
+...
+...     FILE_NAME: ClassVar[str] = "supply.json"
+...     schema: Literal["dzdesign.supply/1"] = "dzdesign.supply/1"
+...     p_MPa: Annotated[float, quantity("MPa", "Set pressure.", ge=0, le=50)]
+>>> to_json_bytes(Supply(tool=THIS_TOOL, made_from=(), p_MPa=21.0))[:32]
+b'{\\n "schema": "dzdesign.supply/1"'
+"""
+
+from collections.abc import Mapping
+from dataclasses import MISSING, dataclass, fields
+from fractions import Fraction
+from typing import Annotated, Any, ClassVar
+
+from msgspec import Meta, to_builtins
+
+from dzdesign.core.documents import to_json
+from dzdesign.core.errors import InputError, quoted
+from dzdesign.core.version import __version__
+
+
+class RuleError(InputError, ValueError):
+    """A rule between the fields of one object does not hold; raised in its ``__post_init__``.
+
+    The reader adds the file and the object's place in it; to an `InputError` that is no `RuleError`, the file alone.
+    """
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tool:
+    """The program that wrote a file."""
+
+    name: Annotated[str, Meta(description="Always dzdesign.")]
+    version: Annotated[str, Meta(description="Its version.")]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SourceFile:
+    """A file that something was made from."""
+
+    source: Annotated[str, Meta(description="File name.")]
+    sha256: Annotated[str, Meta(description="SHA-256 of its bytes.", pattern="^[0-9a-f]{64}$", max_length=64)]
+
+
+#: What this program writes into the header of its artefacts.
+THIS_TOOL = Tool(name="dzdesign", version=__version__)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Artefact:
+    """Header of every artefact; a subclass gives `FILE_NAME`, and `schema` as a ``Literal`` with its default."""
+
+    FILE_NAME: ClassVar[str]
+    schema: Annotated[str, Meta(description="Name and version of this schema.")]
+    tool: Annotated[Tool, Meta(description="The program that wrote the file.")]
+    made_from: Annotated[tuple[SourceFile, ...], Meta(description="The files that it was made from.")]
+
+
+def quantity(
+    unit: str,
+    description: str,
+    *,
+    ge: float | None = None,
+    gt: float | None = None,
+    le: float | None = None,
+    lt: float | None = None,
+) -> Meta:
+    """Return the metadata of a physical quantity, for an annotation.
+
+    Parameters
+    ----------
+    unit : str
+        As a person writes it, such as ``L/min``; ``1`` of a ratio.
+    description : str
+        One sentence.
+    ge, gt, le, lt : float, optional
+        Bounds: at least, above, at most, below. Only of an ``int`` or a ``float``; those of the items of a list stand
+        in the annotation of the item.
+
+    Examples
+    --------
+    >>> quantity("MPa", "Nominal pressure drop.", ge=0, le=200).le
+    200
+    """
+    bounds: dict[str, Any] = {"ge": ge, "gt": gt, "le": le, "lt": lt}
+    return Meta(description=description, extra_json_schema={"unit": unit}, **bounds)
+
+
+def schema_of(kind: type[Artefact]) -> str:
+    """Return the name and version of the schema of an artefact.
+
+    Examples
+    --------
+    >>> from dzdesign.core.artefact_types import Artefact
+    >>> schema_of(Artefact)
+    Traceback (most recent call last):
+    TypeError: Artefact has no default of 'schema', expected a Literal with its value
+    """
+    default = next(field.default for field in fields(kind) if field.name == "schema")
+    if default is MISSING:
+        raise TypeError(f"{kind.__name__} has no default of 'schema', expected a Literal with its value")
+    return str(default)
+
+
+def as_document(artefact: object) -> dict[str, Any]:
+    """Return a dataclass as it stands in JSON: objects and lists, keys in the order of declaration."""
+    document: dict[str, Any] = to_builtins(artefact, enc_hook=_encoded)
+    return document
+
+
+def to_json_bytes(artefact: Artefact) -> bytes:
+    """Return an artefact as the bytes of its file; the same artefact gives the same bytes.
+
+    Raises
+    ------
+    ValueError
+        If a number is NaN or infinite.
+    TypeError
+        If a value is of a type that no artefact has, such as a NumPy number.
+    """
+    return to_json(as_document(artefact)).encode()
+
+
+def _encoded(value: object) -> object:
+    """Write what JSON has no type for."""
+    if isinstance(value, Fraction):
+        return [value.numerator, value.denominator]
+    if isinstance(value, Mapping):  # one that is read-only
+        return dict(value)
+    raise TypeError(f"an artefact holds {quoted(value)} of type {type(value).__name__}, which can't be written")
