@@ -11,7 +11,6 @@ Command line, options file, keywords of `dzdesign.api`, help, shell completion a
 """
 
 import contextlib
-import math
 import os
 import re
 from collections.abc import Callable, Iterable, Mapping
@@ -211,20 +210,21 @@ def quantity(kind: str) -> Callable[[str, str], float]:
     return lambda text, option: parse_quantity(text, kind, option)
 
 
-def number(expected: str, least: float = -math.inf) -> Callable[[str | float, str], float]:
+def number(expected: str, between: tuple[float, float] | None = None) -> Callable[[str | float, str], float]:
     """Return what reads a number without a unit.
 
     Parameters
     ----------
     expected : str
         For the message, such as ``a number such as 0.99``.
-    least : float
-        Every number is above it.
+    between : tuple of float, optional
+        Every number lies between these.
     """
 
     def read(text: str | float, option: str) -> float:
         with contextlib.suppress(ValueError):
-            if not (value := float(text)) <= least:
+            value = float(text)
+            if between is None or between[0] < value < between[1]:
                 return value
         raise InputError(f"{option} is {quoted(text)}, expected {expected}")
 
@@ -268,3 +268,14 @@ def percent_range(of: str) -> Callable[[str, str], tuple[float, float]]:
         return float(ends[1]) / 100, float(ends[2]) / 100
 
     return read
+
+
+def paths_of(paths: Paths) -> list[AnyPath]:
+    """Return one path, or several, as a list.
+
+    Parameters
+    ----------
+    paths : path or iterable of paths
+        As a caller gave them.
+    """
+    return [paths] if isinstance(paths, str | os.PathLike) else list(paths)

@@ -115,8 +115,10 @@ def calibrate(task: Task) -> Outcome:
 
 def _run(task: Task, folder: Path) -> tuple[str, str]:
     """Run the stages into ``folder/out`` and return status and reason."""
-    from dzdesign import api
     from dzdesign.codegen.project import generate
+    from dzdesign.stages.design import DesignArguments, design
+    from dzdesign.stages.identify import IdentifyArguments, identify
+    from dzdesign.stages.verify import VerifyArguments, verify
 
     out = folder / "out"
     out.mkdir()
@@ -128,8 +130,8 @@ def _run(task: Task, folder: Path) -> tuple[str, str]:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content)
         paths.append(path)
-    valve = api.identify(paths, **task.identify, output=out / "valve.json")
-    compensator = api.design(valve, target=task.target, **task.design, output=out / "compensator.json")
+    valve = identify(IdentifyArguments(paths, **task.identify, output=out / "valve.json"))
+    compensator = design(DesignArguments(valve, target=task.target, **task.design, output=out / "compensator.json"))
     firmware = generate(compensator, task.target)  # proved by the design, a line above
     write_folder(out / FIRMWARE, firmware.files, firmware.manifest)
     if not task.verify:
@@ -138,7 +140,7 @@ def _run(task: Task, folder: Path) -> tuple[str, str]:
     if task.plant:
         plant = folder / task.plant[0]
         plant.write_bytes(task.plant[1])
-    verification = api.verify(out / FIRMWARE, plant=plant, output=out / "evidence")
+    verification = verify(VerifyArguments(out / FIRMWARE, plant=plant, output=out / "evidence"))
     if verification.holds:
         return OK, ""
     check = next(check for check in verification.checks if not check.holds)

@@ -11,7 +11,7 @@ from pathlib import Path
 from dzdesign.core.artefact_files import read_bytes
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.identify.valve.test_record import checked_record
-from dzdesign.recordings import expand
+from dzdesign.stages.recordings import expand
 
 #: What recordings are called in a valve's folder where no --pattern says so; notes and photographs may lie beside them.
 RECORDINGS = ("csv", "txt", "tsv", "dat", "gz", "tdms", "mat", "h5", "hdf5", "parquet", "feather", "arrow")
@@ -133,9 +133,7 @@ def _of_folder(folder: Path, pattern: str | None) -> list[Valve]:
     # A link to a folder that is gone was a valve: its reason is that the file can't be read.
     gone = {path: (str(path),) for path in visible if path.is_symlink() and not path.exists()}
     folders = [path for path in visible if path in gone or path.is_dir()]
-    return [
-        Valve(name=path.name, patterns=gone.get(path) or tuple(_recordings_in(path, pattern))) for path in folders
-    ]
+    return [Valve(name=path.name, patterns=gone.get(path) or tuple(_recordings_in(path, pattern))) for path in folders]
 
 
 def _recordings_in(folder: Path, pattern: str | None) -> list[str]:

@@ -38,7 +38,7 @@ COMMANDS = {
     "verify": Command(PIPELINE, f"{ROOT}.verify", "firmware in, evidence out: every input, and the closed loop"),
     "batch": Command(
         PIPELINE,
-        "dzdesign.batch.command",
+        f"{ROOT}.batch",
         "many valves: identify, design, codegen for each; one table, one report, the cost of one common setting",
     ),
     "assess": Command(EVIDENCE, f"{ROOT}.assess", "compare ramp tests without and with the compensator, with limits"),
@@ -52,7 +52,7 @@ COMMANDS = {
     ),
     "reproduce": Command(
         EVIDENCE,
-        "dzdesign.reproduce.reproduction",
+        f"{ROOT}.reproduce",
         "the paper's valves through the whole product; every number of the paper beside ours, its figures redrawn",
     ),
     "demo": Command(SETUP, f"{ROOT}.demo", "run the whole pipeline on the bundled example"),

@@ -1,14 +1,15 @@
 """`dzdesign schema`: the JSON Schemas of the artefacts, each kept in the room that writes the artefact."""
 
-import argparse
-import json
+import json as json_module
 from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Annotated, Any
 
 from dzdesign.core.errors import InputError, nearest
+from dzdesign.core.options import Option, Text
 
 #: Name -> (package that keeps it, the artefact, the command that writes it), in the order of the pipeline.
 SCHEMAS: Mapping[str, tuple[str, str, str]] = MappingProxyType(
@@ -58,16 +59,28 @@ def schema_document(name: str) -> dict[str, Any]:
     name : str
         One of `SCHEMAS`.
     """
-    return json.loads(schema_text(name))
+    return json_module.loads(schema_text(name))
 
 
-def run_schema(args: argparse.Namespace) -> int:
+EXAMPLES = ("dzdesign schema", "dzdesign schema valve > valve.schema.json")
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """Arguments of `schema`."""
+
+    name: Annotated[
+        Text, Option("valve, compensator, firmware, ... (default: list them).", "NAME", choices=tuple(SCHEMAS))
+    ] = None
+
+
+def run(arguments: Arguments, json: bool) -> int:
     """Print one schema, or which there are."""
-    if args.name is not None:
-        print(schema_text(args.name), end="")
-    elif args.json:
+    if arguments.name is not None:
+        print(schema_text(arguments.name), end="")
+    elif json:
         listing = [{"name": name, "artefact": artefact} for name, (_, artefact, _) in SCHEMAS.items()]
-        print(json.dumps({"schemas": listing}, indent=2))
+        print(json_module.dumps({"schemas": listing}, indent=2))
     else:
         width = max(map(len, SCHEMAS))
         for name, (_, artefact, command) in SCHEMAS.items():

@@ -225,7 +225,7 @@ def test_a_long_stage_moves_a_bar_for_a_person(monkeypatch, stream, quiet, term,
     monkeypatch.setattr(sys, "stderr", page)
     monkeypatch.setattr(progress, "PATIENCE", 0.01)
     monkeypatch.setenv("TERM", term)
-    with progress.talking(quiet=quiet, verbose=False), progress.stages() as stage:
+    with progress.talking(quiet=quiet, verbose=False), progress.stage_progress() as stage:
         stage("fitting")
         stage("drawing")
         until = time.monotonic() + 5
@@ -251,7 +251,7 @@ def test_a_stage_of_known_pieces_shows_how_far_it_is(monkeypatch):
             time.sleep(0.01)
         return "━" * 20 in page.getvalue()
 
-    with progress.talking(quiet=False, verbose=False), progress.stages() as stage:
+    with progress.talking(quiet=False, verbose=False), progress.stage_progress() as stage:
         stage("running the closed loop")
         for piece in stage.each(iter(range(4)), 4):
             if piece == 2:

@@ -1,21 +1,74 @@
-"""Reading recordings as the command line names them: patterns, columns, declared pressure drops, no copies."""
+"""How stages read recordings: patterns, columns, declared pressure drops, no copies."""
 
 import fnmatch
 import glob
 import os
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from dzdesign.core.artefact_files import MANIFEST_NAME
+from dzdesign.core.artefact_files import MANIFEST_NAME, check_place_of_files
 from dzdesign.core.errors import InputError, nearest, neighbour
-from dzdesign.core.options import Paths, Table
+from dzdesign.core.options import (
+    FIT,
+    METER,
+    RECORDINGS,
+    AnyPath,
+    Option,
+    Paths,
+    Table,
+    Text,
+    paths_of,
+    percent_range,
+    quantity,
+    whole_number,
+)
 from dzdesign.core.units import parse_quantity
 from dzdesign.terminal.progress import say, with_bar
 
 if TYPE_CHECKING:
     from dzdesign.identify.reading.ramp_files import RampTest
+
+
+#: Reads --skip-rows.
+read_skip_rows = whole_number("how many rows stand above the header, such as 12 (0: none)")
+
+# fmt: off
+
+@dataclass(frozen=True, kw_only=True)
+class ColumnArguments:
+    """How the columns of recordings are found."""
+
+    columns: Annotated[Table, Option(
+        'Columns, such as "u=AO0:V, Q=Flow (L/min)": a quantity (time, u, dP, pA, pB, Q), its label in the file and, '
+        "after a colon, the unit that the label lacks. In the options file a table [columns].",
+        "MAP", RECORDINGS)] = None
+    dp: Annotated[Table, Option(
+        'Pressure drop of files without a column of it, such as "1 MPa". In the options file also a table [dp] from '
+        "file name or pattern to pressure.",
+        "P", RECORDINGS, example="1 MPa")] = None
+    skip_rows: Annotated[int | str | None, Option(
+        "Rows above the header of a text file, such as a logger's preamble (default: found).", "N", RECORDINGS,
+        read=read_skip_rows)] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class RampArguments(ColumnArguments):
+    """How ramp tests are read."""
+
+    u_max: Annotated[str, Option(
+        "Full command.", "U", RECORDINGS, example="10 V", read=quantity("voltage"))] = "10 V"
+    meter_floor: Annotated[Text, Option(
+        "Flow below which the meter reads zero (default: found).",
+        "Q", METER, example="0.6 L/min", read=quantity("flow"))] = None
+    meter_lag: Annotated[Text, Option(
+        "Lag of the flow meter (default: found from ramps of two rates).",
+        "T", METER, example="0.1 s", read=quantity("time"))] = None
+    knee_window: Annotated[str, Option(
+        "Flow range of the straight-line fit, in percent of maximum flow.",
+        "A-B", FIT, read=percent_range("the largest flow such as '12-50'"))] = "12-50"
+# fmt: on
 
 
 def read_recordings(
@@ -24,7 +77,7 @@ def read_recordings(
     u_max: float,
     columns: Table,
     dp: Table,
-    skip_rows: int | None = None,
+    skip_rows: int | str | None = None,
     what: str = "reading recordings",
 ) -> "list[RampTest]":
     """Read the recordings that patterns name.
@@ -39,8 +92,8 @@ def read_recordings(
         Of --columns, or of the table in the options file.
     dp : str or mapping, optional
         Pressure drop that --dp declares for all files, or that [dp] declares for each.
-    skip_rows : int, optional
-        Rows above the header.
+    skip_rows : int or str, optional
+        Of --skip-rows.
     what : str
         For the progress bar.
 
@@ -52,13 +105,13 @@ def read_recordings(
     from dzdesign.identify.reading.column_labels import parse_columns
     from dzdesign.identify.reading.ramp_files import read_ramp_file
 
-    chosen = parse_columns(columns if isinstance(columns, str) else dict(columns)) if columns else {}
+    chosen, skipped = parse_columns(columns) if columns else {}, None
+    if skip_rows is not None:
+        skipped = read_skip_rows(skip_rows, "--skip-rows")
     paths = expand(patterns)
     names = distinct_names(paths)
     tests = [
-        replace(
-            read_ramp_file(path, u_max, columns=chosen, dp=_declared_dp(name, dp), skip_rows=skip_rows), source=name
-        )
+        replace(read_ramp_file(path, u_max, columns=chosen, dp=_declared_dp(name, dp), skip_rows=skipped), source=name)
         for path, name in with_bar(list(zip(paths, names, strict=True)), what)
     ]
     _refuse_unnamed(tests, dp)
@@ -68,7 +121,7 @@ def read_recordings(
 def expand(patterns: Paths) -> list[Path]:
     """Return the files that one or several patterns name; cmd.exe leaves ``*.csv`` to the program."""
     paths = []
-    for pattern in map(os.fspath, [patterns] if isinstance(patterns, str | os.PathLike) else patterns):
+    for pattern in map(os.fspath, paths_of(patterns)):
         magic = glob.has_magic(pattern) and "\0" not in pattern and not os.path.exists(pattern)
         matches = sorted(glob.glob(pattern)) if magic else [pattern]
         if not matches:
@@ -144,3 +197,23 @@ def refuse_copies(tests: list["RampTest"]) -> None:
                 "(a repeated ramp test is welcome, a copy is no repetition)"
             )
         known[test.sha256] = test.source
+
+
+def check_plots(folder: AnyPath | None, output: AnyPath | None) -> None:
+    """Refuse a folder for plots that can't be one, or in whose place the output goes.
+
+    Parameters
+    ----------
+    folder : path, optional
+        Of the plots.
+    output : path, optional
+        Of the result.
+    """
+    if folder is None:
+        return
+    if not os.fspath(folder):
+        raise InputError("--plots is empty, expected the name of a folder, such as plots")
+    place = Path(folder)
+    check_place_of_files(place, "--plots")
+    if output is not None and Path(output).absolute() in (place.absolute(), *place.absolute().parents):
+        raise InputError(f"--plots '{folder}' lies at '{output}', where -o puts a file; choose another --plots")

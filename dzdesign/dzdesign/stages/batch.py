@@ -1,0 +1,28 @@
+"""`batch`: recordings of many valves -> a calibration of each, in one table."""
+
+from typing import Any
+
+from dzdesign.batch.arguments import BatchArguments
+
+
+def batch(arguments: BatchArguments) -> dict[str, Any]:
+    """Calibrate many valves; an earlier run in the folder is continued.
+
+    Parameters
+    ----------
+    arguments : BatchArguments
+        Of the stage.
+
+    Returns
+    -------
+    dict
+        Content of batch.json: counts, reasons, quantiles, the common setting.
+
+    Raises
+    ------
+    InputError
+        If the list, the folder or an option is wrong. A valve that can't be calibrated is no error: see ``failed``.
+    """
+    from dzdesign.batch.command import calibrate_lot
+
+    return calibrate_lot(arguments)[0]
