@@ -88,7 +88,7 @@ def _kind(argument: Argument) -> str:
     if bool in argument.kinds:
         return "bool"
     words = [argument.result_class] if argument.result_class else []
-    words += ["path" if os.PathLike in argument.kinds else "str"] if str in argument.kinds else []
+    words += ["path" if argument.is_path else "str"] if str in argument.kinds else []
     words += [kind.__name__ for kind in (int, float) if kind in argument.kinds]
     words += ["mapping"] if Mapping in argument.kinds else []
     words += ["iterable of them"] if Iterable in argument.kinds else []
@@ -102,7 +102,7 @@ def _checked(argument: Argument, value: Any) -> Any:
         return value
     if argument.result_class in (one.__name__ for one in type(value).__mro__):
         return value
-    if isinstance(value, Mapping) and Mapping in kinds:
+    if isinstance(value, Mapping) and argument.is_table:
         for key, item in value.items():
             if not argument.option.by_entry and not isinstance(item, str):
                 raise _of_another_kind(f"{name}[{key!r}]", item, argument)
@@ -119,7 +119,7 @@ def _checked(argument: Argument, value: Any) -> Any:
 
 
 def _of_another_kind(place: str, value: object, argument: Argument) -> InputError:
-    if os.PathLike in argument.kinds:
+    if argument.is_path:
         words = "a path"
     elif argument.option.example:
         words = f"text with a unit such as '{argument.option.example}'"

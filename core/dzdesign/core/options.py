@@ -124,6 +124,11 @@ class Argument:
         return Iterable in self.kinds or self.option.by_entry
 
     @property
+    def is_path(self) -> bool:
+        """Whether it names files or folders."""
+        return os.PathLike in self.kinds
+
+    @property
     def is_table(self) -> bool:
         """Whether it may be a table of the options file."""
         return Mapping in self.kinds
