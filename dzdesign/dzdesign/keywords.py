@@ -46,7 +46,7 @@ def with_keywords(declaration: Callable[P, A], stage: Callable[[A], R]) -> Calla
     dzdesign.core.errors.InputError: ramp_time: expected text with a unit such as '100 s', got 5
     """
     signature, name = inspect.signature(declaration), stage.__name__
-    declared = {argument.name: argument for argument in arguments_of(declaration)}  # type: ignore[arg-type]
+    declared = {argument.name: argument for argument in arguments_of(declaration)}
 
     @wraps(stage)
     def call(*args: P.args, **kwargs: P.kwargs) -> R:

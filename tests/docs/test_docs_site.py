@@ -11,15 +11,18 @@ from urllib.parse import unquote
 
 import pytest
 
-from dzdesign.command_line.command_spec import COMMANDS
+from dzdesign.command_line.command_table import COMMANDS
+from dzdesign.command_line.parser import arguments_of_command
 from dzdesign.commands.schema import SCHEMAS, schema_document, schema_text
-from tests.support.paths import ROOT
+from dzdesign.core.version import __version__
+from tests.support.paths import ROOMS, ROOT
 from tests.support.synthetic import needs_compiler
 
 pytest.importorskip("sphinx", reason="the site needs the packages of the extra `docs`")
 pytest.importorskip("myst_parser", reason="the site needs the packages of the extra `docs`")
 
 DOCS = ROOT / "docs"
+FOLDERS = (*ROOMS, "tests", "examples", "docs")
 #: Tag -> attribute by which a page loads something; a link that a reader may follow is not among them.
 LOADS = {"link": "href", "script": "src", "img": "src", "source": "src", "iframe": "src", "object": "data"}
 
@@ -112,12 +115,12 @@ def test_make_docs_builds_the_account_that_the_pages_link_to():
 
 def test_the_reference_has_every_command_with_every_option(site):
     page = (site / "reference" / "commands.html").read_text(encoding="utf-8")
-    for name, (_, _, options) in COMMANDS.items():
+    for name in COMMANDS:
         section = page.partition(f'<section id="{name}">')[2].partition("</section>")[0]
         assert section, name
-        for names, keywords in options:
-            shown = names[-1] if names[0].startswith("-") else keywords["metavar"]
-            assert shown in section, f"{name} {shown}"
+        for argument in arguments_of_command(name):
+            word = argument.option.metavar if argument.is_positional else argument.flag
+            assert word in section, f"{name} {word}"
 
 
 def test_the_schemas_are_published_and_every_key_is_in_the_reference(site):
@@ -155,12 +158,14 @@ def codes_in(*sources):
 def test_every_warning_code_is_documented_and_none_is_invented():
     text = (DOCS / "reference" / "warnings.md").read_text(encoding="utf-8")
     own, _, of_assess = text.partition("## Notes of `assess`")
-    made = codes_in(*(ROOT / "identify").glob("*.py"))
+    made = codes_in(*(ROOT / "identify").rglob("*.py"))
     assert len(made) > 20 and "one-branch" in made
     assert set(re.findall(r"^### (\S+)$", own, re.MULTILINE)) == made
     for section in own.split("\n### ")[1:]:
         assert "**Meaning:**" in section and "**What to do:**" in section, section.splitlines()[0]
-    assert set(re.findall(r"^\| `(\S+)` \|", of_assess, re.MULTILINE)) == codes_in(*(ROOT / "verify").glob("*.py"))
+    notes = codes_in(*(ROOT / "assess").rglob("*.py"))
+    assert len(notes) > 5
+    assert set(re.findall(r"^\| `(\S+)` \|", of_assess, re.MULTILINE)) == notes
 
 
 def test_every_figure_is_shown_with_words_for_those_who_cannot_see_it(site):
@@ -204,9 +209,7 @@ def test_the_pages_name_no_file_that_is_not_there():
     """Paths of the repository in the pages, in CONTRIBUTING and in CHANGELOG."""
     for page in (*DOCS.rglob("*.md"), *ROOT.glob("C*.md")):
         text = page.read_text(encoding="utf-8")
-        for path in re.findall(
-            r"`((?:core|derivation|identify|design|codegen|verify|tests|examples|docs)/[\w./-]+)`", text
-        ):
+        for path in re.findall(rf"`((?:{'|'.join(FOLDERS)})/[\w./-]+)`", text):
             made = path.startswith(("docs/_", "docs/derivation")) or "mychip" in path
             assert made or (ROOT / path).exists(), f"{page.name}: {path}"
 
@@ -219,7 +222,7 @@ def test_the_citation_is_of_the_format_and_of_this_version():
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     assert citation["cff-version"] == "1.2.0" and {"message", "title", "authors"} <= set(citation)
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    assert (citation["version"], citation["license"]) == (project["version"], project["license"])
+    assert (citation["version"], citation["license"]) == (__version__, project["license"])
     (paper,) = citation["references"]
     assert paper["doi"] == "10.11916/j.issn.1005-9113.20063" and (paper["start"], paper["end"]) == (45, 56)
     assert [author["family-names"] for author in paper["authors"]] == ["Wu", "Ji", "Wang", "Hao", "Huang"]

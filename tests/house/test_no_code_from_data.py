@@ -6,9 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.paths import ROOT
+from tests.support.paths import ROOMS, ROOT
 
-ROOMS = ("core", "derivation", "identify", "design", "codegen", "verify", "assess", "report", "dzdesign")
 #: Modules that make objects or code of bytes, and functions that run text or a shell's words.
 MODULES = {"pickle", "cPickle", "dill", "cloudpickle", "joblib.numpy_pickle", "marshal", "shelve", "yaml", "jsonpickle"}
 CALLS = {"eval", "exec", "compile", "__import__", "os.system", "os.popen", "subprocess.getoutput",

@@ -15,7 +15,7 @@ import os
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import MISSING, dataclass, fields
-from functools import lru_cache
+from functools import cache
 from typing import Any, ForwardRef, get_args, get_origin
 
 from dzdesign.core.errors import InputError, quoted
@@ -151,7 +151,7 @@ def flag_of(name: str) -> str:
     return f"--{name.replace('_', '-')}"
 
 
-@lru_cache(maxsize=64)
+@cache
 def arguments_of(declaration: type) -> tuple[Argument, ...]:
     """Return what a dataclass of arguments declares, those by position first.
 
@@ -181,12 +181,12 @@ def arguments_of(declaration: type) -> tuple[Argument, ...]:
     return tuple(sorted(found, key=lambda argument: not argument.by_position))
 
 
-def read_options(arguments: object, names: Iterable[str]) -> dict[str, Any]:
+def read_options(arguments: Any, names: Iterable[str]) -> dict[str, Any]:
     """Return options by name, each read; None where one is not given and has no default.
 
     Parameters
     ----------
-    arguments : object
+    arguments : dataclass
         Of a class that `arguments_of` knows.
     names : iterable of str
         Fields of it.
@@ -196,7 +196,8 @@ def read_options(arguments: object, names: Iterable[str]) -> dict[str, Any]:
     InputError
         If one can't be read; it is named.
     """
-    known, values = {argument.name: argument for argument in arguments_of(type(arguments))}, {}
+    declaration: type = type(arguments)
+    known, values = {argument.name: argument for argument in arguments_of(declaration)}, {}
     for name in names:
         option, value = known[name].option, getattr(arguments, name)
         value = (option.default or None) if value is None else value
@@ -284,3 +285,14 @@ def paths_of(paths: Paths) -> list[AnyPath]:
         As a caller gave them.
     """
     return [paths] if isinstance(paths, str | os.PathLike) else list(paths)
+
+
+def texts_of(texts: Texts) -> list[str]:
+    """Return one text, or several, as a list.
+
+    Parameters
+    ----------
+    texts : str or iterable of str
+        As a caller gave them.
+    """
+    return [texts] if isinstance(texts, str) else list(texts)

@@ -33,7 +33,8 @@ def main(argv: list[str] | None = None) -> int:
 
         call = parse(argv)
         with talking(quiet=call.quiet, verbose=call.verbose):
-            return command_module(call.command).run(call.arguments, call.json)
+            status: int = command_module(call.command).run(call.arguments, call.json)
+            return status
     except RequirementError as error:
         print(f"dzdesign: does not hold: {clear_line(str(error))}", file=sys.stderr)
         return DOES_NOT_HOLD

@@ -6,7 +6,7 @@ from typing import Any
 from dzdesign.command_line.command_table import COMMANDS
 from dzdesign.command_line.options_file import Value, options_from_file
 from dzdesign.command_line.parser import arguments_of_command, build_parser, command_module, unknown_words
-from dzdesign.core.errors import InputError, nearest
+from dzdesign.core.errors import InputError, nearest, quoted
 from dzdesign.core.options import Argument
 
 
@@ -68,7 +68,7 @@ def parse(argv: list[str]) -> Invocation:
     for argument in declared:
         key = argument.name
         if argument.option.by_entry and (key in given or key in values):
-            given[key] = _merged_entries(argument, values.get(key), given.get(key, []))
+            given[key] = merged_entries(argument.flag, values.get(key), given.get(key, []))
         elif key in from_file:
             value = values[key]
             given[key] = [value] if argument.is_repeatable and isinstance(value, str) else value
@@ -112,18 +112,33 @@ def _is_meant(value: Value, argument: Argument) -> bool:
     return argument.is_repeatable or not isinstance(value, list)
 
 
-def _merged_entries(argument: Argument, value: Value | None, entries: list[str]) -> dict[str, str]:
-    """Return entries, ``name = text``, of the command line on top of those of the file."""
+def merged_entries(flag: str, value: Value | None, entries: list[str]) -> dict[str, str]:
+    """Return entries of the command line, ``name = text``, on top of those of the options file.
+
+    Parameters
+    ----------
+    flag : str
+        Option that they are of.
+    value : str, list of str or mapping, optional
+        Of the options file.
+    entries : list of str
+        Of the command line.
+
+    Raises
+    ------
+    InputError
+        If an entry is none, or a name is given twice.
+    """
     from dzdesign.identify.valve.test_record import checked_record
 
-    table = value if isinstance(value, dict) else {}
+    table = checked_record(value.items(), "the record") if isinstance(value, dict) else {}
     texts = [value] if isinstance(value, str) else value if isinstance(value, list) else []
-    tops = checked_record([_entry(argument.flag, text) for text in (*texts, *entries)], argument.flag)
-    return {**checked_record(table.items(), "the record"), **tops}
+    later = checked_record([_entry(flag, text) for text in (*texts, *entries)], flag)
+    return checked_record((table | later).items(), "the record")
 
 
 def _entry(flag: str, text: str) -> tuple[str, str]:
     name, equals, value = text.partition("=")
     if not equals:
-        raise InputError(f'{flag} is {text!r}, expected a name and a text such as "serial = 4711"')
+        raise InputError(f'{flag} is {quoted(text)}, expected a name and a text such as "serial = 4711"')
     return name.strip(), value.strip()

@@ -2,14 +2,16 @@
 
 import argparse
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterable
+from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from types import ModuleType
+from typing import Annotated, NoReturn
 
 from dzdesign.command_line.command_table import COMMANDS, EXAMPLES
 from dzdesign.core.errors import InputError, nearest
-from dzdesign.core.options import GROUPS, Argument, arguments_of
+from dzdesign.core.options import GROUPS, Argument, Option, arguments_of
 from dzdesign.core.version import __version__
 
 #: The widest that help is set, in columns: longer lines are hard to read.
@@ -20,13 +22,16 @@ EXIT_STATUS = """exit status:
   1    a requirement does not hold, or could not be checked; the message says which
   2    bad input or usage
   130  interrupted"""
-#: Options of every command, before it or after it: (spellings, keywords of add_argument).
-COMMON = (
-    (("--config",), {"metavar": "TOML", "help": "File with options of the same names; dzdesign init writes one."}),
-    (("--json",), {"action": "store_true", "help": "Print the result as JSON."}),
-    (("-q", "--quiet"), {"action": "store_true", "help": "Print results and errors only."}),
-    (("-v", "--verbose"), {"action": "store_true", "help": "Log the work with times, files and the solver's output."}),
-)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CommonArguments:
+    """Options of every command, before it or after it."""
+
+    config: Annotated[str, Option("File with options of the same names; dzdesign init writes one.", "TOML")] = ""
+    json: Annotated[bool, Option("Print the result as JSON.")] = False
+    quiet: Annotated[bool, Option("Print results and errors only.", short="-q")] = False
+    verbose: Annotated[bool, Option("Log the work with times, files and the solver's output.", short="-v")] = False
 
 
 class HelpFormatter(argparse.RawDescriptionHelpFormatter):
@@ -50,7 +55,7 @@ class HelpFormatter(argparse.RawDescriptionHelpFormatter):
 class Parser(argparse.ArgumentParser):
     """A parser whose errors are one line, as every other error."""
 
-    def error(self, message: str) -> None:
+    def error(self, message: str) -> NoReturn:
         """Raise instead of printing the usage."""
         raise InputError(f"{message}; see `{self.prog} --help`")
 
@@ -58,12 +63,14 @@ class Parser(argparse.ArgumentParser):
 class FrontParser(Parser):
     """The parser of `dzdesign` itself, whose help has the commands in groups."""
 
+    commands: "argparse._SubParsersAction[Parser]"
+
     def format_help(self) -> str:
         """Return the help."""
         page = self._get_formatter()
         page.add_text("usage: dzdesign COMMAND [OPTIONS]")
         page.add_text(self.description)
-        commands = {action.dest: action for action in self._subparsers._group_actions[0]._choices_actions}
+        commands = {action.dest: action for action in self.commands._choices_actions}
         for group in dict.fromkeys(command.group for command in COMMANDS.values()):
             page.start_section(group)
             page.add_arguments([commands[name] for name, command in COMMANDS.items() if command.group == group])
@@ -98,34 +105,45 @@ def build_parser(only: str | None = None) -> tuple[Parser, dict[str, Parser]]:
     parser = FrontParser(prog="dzdesign", description=ABOUT, formatter_class=HelpFormatter, add_help=False)
     parser.add_argument("-h", "--help", action="help", help="Show this page and exit.")
     parser.add_argument("--version", action="version", version=f"dzdesign {__version__}", help="Print the version.")
-    for names, keywords in COMMON:
-        parser.add_argument(*names, default=argparse.SUPPRESS, **keywords)
-    choices = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=Parser)
+    for argument in arguments_of(CommonArguments):
+        _add_option(parser, argument)
+    parser.commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=Parser)
     commands = {}
     for name, command in COMMANDS.items():
-        keywords = {"formatter_class": HelpFormatter, "add_help": False, "help": command.help}
-        if only in (None, name):
-            arguments = arguments_of_command(name)
-            commands[name] = choices.add_parser(
-                name,
-                description=f"{command.help[0].upper()}{command.help[1:]}.",
-                epilog=_lines("examples", command_module(name).EXAMPLES),
-                usage=" ".join([f"dzdesign {name}", *filter(None, map(_usage, arguments)), "[OPTIONS]"]),
-                **keywords,
-            )
+        wanted = only in (None, name)
+        arguments = arguments_of_command(name) if wanted else ()
+        commands[name] = parser.commands.add_parser(
+            name,
+            help=command.help,
+            description=f"{command.help[0].upper()}{command.help[1:]}.",
+            epilog=_lines("examples", command_module(name).EXAMPLES) if wanted else None,
+            usage=usage_of(name, arguments),
+            formatter_class=HelpFormatter,
+            add_help=False,
+        )
+        if wanted:
             _add_options(commands[name], arguments)
-        else:
-            commands[name] = choices.add_parser(name, **keywords)
     return parser, commands
 
 
-def _usage(argument: Argument) -> str:
-    """Return an argument in the usage line; options that may be left out are listed below it, in groups."""
-    if not argument.is_positional and not argument.required:
-        return ""
-    word = argument.option.metavar + (" ..." if argument.is_repeatable else "")
-    word = word if argument.is_positional else f"{argument.flag} {word}"
-    return word if argument.required else f"[{word}]"
+def usage_of(name: str, arguments: Iterable[Argument]) -> str:
+    """Return a command with the words that it must or may be given; options are listed below it, in groups.
+
+    Parameters
+    ----------
+    name : str
+        Of the command.
+    arguments : iterable of Argument
+        That it takes.
+    """
+    words = [f"dzdesign {name}"]
+    for argument in arguments:
+        word = argument.option.metavar + (" ..." if argument.is_repeatable else "")
+        if argument.is_positional:
+            words.append(word if argument.required else f"[{word}]")
+        elif argument.required:
+            words.append(f"{argument.flag} {word}")
+    return " ".join([*words, "[OPTIONS]"])
 
 
 def _lines(heading: str, lines: tuple[str, ...]) -> str:
@@ -136,32 +154,33 @@ def _add_options(command: Parser, arguments: tuple[Argument, ...]) -> None:
     """Add a command's options in their groups, the common ones last."""
     command._positionals.title = "arguments"
     used = [group for group in GROUPS if any(argument.option.group == group for argument in arguments)]
-    groups: Mapping[str, argparse._ActionsContainer] = {group: command.add_argument_group(group) for group in used}
+    groups = {group: command.add_argument_group(group) for group in used}
     for argument in arguments:
-        names = [argument.name] if argument.is_positional else [argument.option.short, argument.flag]
-        place = groups.get(argument.option.group, command)
-        place.add_argument(*filter(None, names), default=argparse.SUPPRESS, **_keywords(argument))
+        _add_option(groups.get(argument.option.group, command), argument)
     common = command.add_argument_group("options of every command")
-    for names, keywords in COMMON:
-        common.add_argument(*names, default=argparse.SUPPRESS, **keywords)  # what stands before the command stays
+    for argument in arguments_of(CommonArguments):
+        _add_option(common, argument)
     common.add_argument("-h", "--help", action="help", help="Show this help and exit.")
 
 
-def _keywords(argument: Argument) -> dict[str, object]:
-    """Return the keywords of `add_argument`."""
-    keywords: dict[str, object] = {"help": help_of(argument).replace("%", "%%")}
-    if bool in argument.kinds:
-        return {**keywords, "action": "store_true"}
-    keywords["metavar"] = argument.option.metavar
+def _add_option(place: argparse._ActionsContainer, argument: Argument) -> None:
+    """Add an option, without a default: what was given is told from what was not, and what stands before stays."""
+    option, text = argument.option, help_of(argument).replace("%", "%%")
+    names = [name for name in (option.short, argument.flag) if name]
+    nargs = None
     if argument.by_position and argument.is_repeatable:
-        keywords["nargs"] = "+" if argument.required else "*"
+        nargs = "+" if argument.required else "*"
+    if bool in argument.kinds:
+        place.add_argument(*names, action="store_true", default=argparse.SUPPRESS, help=text)
     elif argument.is_positional:
-        keywords["nargs"] = None if argument.required else "?"
-    elif argument.is_repeatable:
-        keywords["action"] = "append"
-    if not argument.is_positional and argument.required:
-        keywords["required"] = True
-    return keywords
+        nargs = nargs or (None if argument.required else "?")
+        place.add_argument(argument.name, nargs=nargs, default=argparse.SUPPRESS, metavar=option.metavar, help=text)
+    else:
+        action = "append" if argument.is_repeatable and nargs is None else "store"
+        place.add_argument(
+            *names, action=action, nargs=nargs, required=argument.required, default=argparse.SUPPRESS,
+            metavar=option.metavar, help=text,
+        )  # fmt: skip
 
 
 def help_of(argument: Argument) -> str:

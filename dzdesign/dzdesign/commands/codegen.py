@@ -24,7 +24,7 @@ class Arguments(GenerateArguments):
     compensator: Annotated[
         AnyPath | None,
         Option("compensator.json; or a valve.json, designed first with the options below.", "COMPENSATOR.json"),
-    ] = None
+    ] = None  # type: ignore[assignment]  # with --list-targets there is none
     _: KW_ONLY
     list_targets: Annotated[bool, Option("Print name and description of every target.")] = False
 
@@ -43,7 +43,7 @@ def run(arguments: Arguments, json: bool) -> int:
         return 0
     from dzdesign.terminal.tables import print_firmware
 
-    print_firmware(firmware, os.fspath(arguments.output))
+    print_firmware(firmware, os.fspath(arguments.output or ""))
     return 0
 
 

@@ -15,6 +15,8 @@ EXAMPLES = (
     "dzdesign completion fish > ~/.config/fish/completions/dzdesign.fish",
     "dzdesign completion powershell | Out-String | Invoke-Expression   # in $PROFILE",
 )
+#: Where shtab looks for what a value completes to.
+COMPLETE = "complete"
 
 
 @dataclass(frozen=True)
@@ -52,9 +54,9 @@ def parser_with_values() -> argparse.ArgumentParser:
             if argument is not None and argument.option.choices:
                 action.choices = tuple(_words(argument.option.choices))
             elif action.metavar == "DIR":
-                action.complete = shtab.DIRECTORY
+                setattr(action, COMPLETE, shtab.DIRECTORY)
             elif action.dest == "config" or (argument is not None and argument.is_path):
-                action.complete = shtab.FILE
+                setattr(action, COMPLETE, shtab.FILE)
     return parser
 
 

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from dzdesign.core.artefact_files import check_file_may_be_written, to_json, write_file
 from dzdesign.core.errors import InputError
-from dzdesign.core.options import AnyPath, Option, Texts
+from dzdesign.core.options import AnyPath, Option, Texts, texts_of
 from dzdesign.terminal.progress import stage_progress
 
 EXAMPLES = ("dzdesign derive --equation 18", "dzdesign derive --format html -o derivation.html")
@@ -40,7 +40,7 @@ def run(arguments: Arguments, json: bool) -> int:
         if arguments.equation:
             raise InputError("--mutate counts over all equations; leave out --equation")
         return _run_mutations(arguments, json)
-    chosen = closure(STATEMENTS, arguments.equation) if arguments.equation else None
+    chosen = closure(STATEMENTS, texts_of(arguments.equation)) if arguments.equation else None
     with stage_progress() as stage:
         stage("re-deriving the paper's equations")
         verdicts = verify_statements()

@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 from dataclasses import asdict, dataclass
+from typing import Any
 
 from dzdesign.core.artefact_files import to_json
 from dzdesign.core.errors import DzdesignError
@@ -148,7 +149,7 @@ def _lacking(programs: dict[str, dict[str, str] | None]) -> list[Tool]:
     ]
 
 
-def _print(document: dict, programs: dict[str, dict[str, str] | None], missing: list[str]) -> None:
+def _print(document: dict[str, Any], programs: dict[str, dict[str, str] | None], missing: list[str]) -> None:
     from dzdesign.terminal.page import new_console, new_table, put_line
 
     console = new_console()

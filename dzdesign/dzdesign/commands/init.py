@@ -26,7 +26,7 @@ def run(arguments: Arguments, json: bool) -> int:
         Whether the result is printed as JSON.
     """
     proposal = init(arguments)
-    output = os.fspath(arguments.output)
+    output = os.fspath(arguments.output or "")
     if json:
         print(to_json(_document(proposal, output)), end="")
         return 1 if proposal.opens else 0

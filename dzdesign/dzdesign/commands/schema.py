@@ -59,7 +59,8 @@ def schema_document(name: str) -> dict[str, Any]:
     name : str
         One of `SCHEMAS`.
     """
-    return json_module.loads(schema_text(name))
+    document: dict[str, Any] = json_module.loads(schema_text(name))
+    return document
 
 
 EXAMPLES = ("dzdesign schema", "dzdesign schema valve > valve.schema.json")

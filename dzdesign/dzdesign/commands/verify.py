@@ -26,6 +26,6 @@ def run(arguments: Arguments, json: bool) -> int:
     print_verification(verification)
     if mutants := verification.document.get("mutants"):
         print_firmware_mutants(mutants)
-    output = Path(arguments.output)
+    output = Path(arguments.output or "")
     print(one_line(f"Evidence: {output}, to be read: {output / REPORT_NAME}"))
     return 0 if verification.holds else 1

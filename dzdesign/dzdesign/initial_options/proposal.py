@@ -80,8 +80,8 @@ def _look(
     tests = read_recordings(names, u_max=10.0, columns=columns or None, dp=declared_dp, skip_rows=skip_rows)
     dp: dict[str, str] = {}
     if declared_dp:
-        one = isinstance(declared_dp, str)
-        dp = {test.source: declared_dp for test in tests} if one else dict(declared_dp)
+        every = {test.source: declared_dp for test in tests} if isinstance(declared_dp, str) else declared_dp
+        dp = dict(every)
     lacking = [test.source for test in tests if test.dp is None]
     if lacking:
         dp, missing, by_names = _pressures_by_names(lacking, alone=len(tests) == 1)
@@ -89,13 +89,14 @@ def _look(
         if len(dp) == len(lacking):
             tests = read_recordings(names, u_max=10.0, columns=columns or None, dp=dp, skip_rows=skip_rows)
     u_max, u_seen = proposed_u_max(tests)
+    sides: dict[str, SeenSide] = {}
+    refused: dict[str, str] = {}
     in_per_cent = _is_in_per_cent(guesses, columns)
     if in_per_cent:
-        u_max, u_seen = 10.0, None
+        u_max = 10.0
         notes.append('full command: in per cent, so not recorded; u-max = "10 V" is a guess, correct it')
     contradicted, doubts = _contradicted(tests, u_max, columns["dP"] if "dP" in columns and "dP" not in given else "")
     opens, notes = opens + contradicted, notes + doubts
-    sides, refused = {}, {}
     if not opens:
         with stage_progress() as stage:
             stage(f"looking at {len(tests)} recording{'s' if len(tests) > 1 else ''}")
@@ -104,7 +105,7 @@ def _look(
         opens = [f"identify would refuse these recordings: {next(iter(refused.values()))}"]
     return (
         Look(
-            paths=paths, guesses=guesses, columns=columns, dp=dp, u_max=u_max, u_seen=u_seen,
+            paths=paths, guesses=guesses, columns=columns, dp=dp, u_max=u_max, u_seen=None if in_per_cent else u_seen,
             in_per_cent=in_per_cent, sides=sides, refused=refused, notes=tuple(notes), skip_rows=skip_rows,
         ),
         opens,
@@ -206,7 +207,8 @@ def _with_source(warning: "Warning_") -> str:
 
 def _pressures(guesses: "list[GuessedColumns]", columns: dict[str, str]) -> tuple[list[str], list[str]]:
     """Return what is open of columns that look like a pressure and have no unit, and what is worth a note."""
-    opens, notes = [], []
+    opens: list[str] = []
+    notes: list[str] = []
     if "dP" in columns or {"pA", "pB"} <= columns.keys():
         return opens, notes
     for guess in guesses:

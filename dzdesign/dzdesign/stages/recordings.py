@@ -121,7 +121,8 @@ def read_recordings(
 def expand(patterns: Paths) -> list[Path]:
     """Return the files that one or several patterns name; cmd.exe leaves ``*.csv`` to the program."""
     paths = []
-    for pattern in map(os.fspath, paths_of(patterns)):
+    for path in paths_of(patterns):
+        pattern = os.fspath(path)
         magic = glob.has_magic(pattern) and "\0" not in pattern and not os.path.exists(pattern)
         matches = sorted(glob.glob(pattern)) if magic else [pattern]
         if not matches:

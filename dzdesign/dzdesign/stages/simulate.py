@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from dzdesign.core.artefact_files import check_folder_may_be_written, write_folder
 from dzdesign.core.errors import InputError
-from dzdesign.core.options import AnyPath, Option, Texts, quantity, read_options, whole_number
+from dzdesign.core.options import AnyPath, Option, Texts, quantity, read_options, texts_of, whole_number
 from dzdesign.core.units import parse_quantity
 from dzdesign.terminal.progress import say, stage_progress
 
@@ -63,7 +63,7 @@ def simulate(arguments: SimulateArguments) -> SimulatedRamps:
     if arguments.output is not None:
         check_folder_may_be_written(Path(arguments.output))
     plant = read_plant(Path(arguments.plant), say) if arguments.plant is not None else Plant()
-    texts = [arguments.dp] if isinstance(arguments.dp, str) else list(arguments.dp) or PRESSURE_DROPS
+    texts = texts_of(arguments.dp) or list(PRESSURE_DROPS)
     pressures = [parse_quantity(text, "pressure", "--dp") / 1e6 for text in texts]
     if len({f"{dp_MPa:g}" for dp_MPa in pressures}) < len(pressures):  # one file each, named by it
         raise InputError(f"--dp repeats a pressure drop ({', '.join(texts)}); give each of them once")
