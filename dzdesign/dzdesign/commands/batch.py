@@ -16,17 +16,18 @@ EXAMPLES = (
 def run(arguments: Arguments, json: bool) -> int:
     """Calibrate the valves of a folder or a list; raise at the end if any could not be."""
     from dzdesign.batch.command import calibrate_lot
-    from dzdesign.batch.summary import print_batch
+    from dzdesign.batch.printing import print_lot
+    from dzdesign.core.artefact_types import as_document
 
     output = Path(arguments.output)
-    document, report = calibrate_lot(arguments)
+    summary, report = calibrate_lot(arguments)
     if json:
-        print(to_json({**document, "report": report and str(report)}), end="")
+        print(to_json({**as_document(summary), "report": report and str(report)}), end="")
     else:
-        print_batch(document, str(output), report is not None)
-    if document["failed"]:
+        print_lot(summary, output, report)
+    if summary.failed:
         raise RequirementError(
-            f"{len(document['failed'])} of {document['valves']} valves are not calibrated; their reasons are in "
+            f"{len(summary.failed)} of {summary.valves} valves are not calibrated; their reasons are in "
             f"'{output / 'valves.csv'}'"
         )
     return 0

@@ -39,7 +39,9 @@ def run(arguments: Arguments, json: bool) -> int:
     if firmware.note:
         say(firmware.note)
     if json:
-        print(to_json(firmware.manifest), end="")
+        from dzdesign.core.artefact_types import as_document
+
+        print(to_json(as_document(firmware.manifest)), end="")
         return 0
     from dzdesign.terminal.tables import print_firmware
 

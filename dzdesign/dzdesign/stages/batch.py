@@ -1,11 +1,14 @@
 """`batch`: recordings of many valves -> a calibration of each, in one table."""
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 from dzdesign.batch.arguments import BatchArguments
 
+if TYPE_CHECKING:
+    from dzdesign.report.lot.summary import LotSummary
 
-def batch(arguments: BatchArguments) -> dict[str, Any]:
+
+def batch(arguments: BatchArguments) -> "LotSummary":
     """Calibrate many valves; an earlier run in the folder is continued.
 
     Parameters
@@ -15,7 +18,7 @@ def batch(arguments: BatchArguments) -> dict[str, Any]:
 
     Returns
     -------
-    dict
+    LotSummary
         Content of batch.json: counts, reasons, quantiles, the common setting.
 
     Raises

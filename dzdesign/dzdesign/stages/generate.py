@@ -46,18 +46,20 @@ def generate(arguments: GenerateArguments) -> "Firmware":
     InputError
         If the file can't be read, a number in it does not follow, or the target counts otherwise.
     """
-    from dzdesign.codegen.project import DEFAULT_TARGET, SCHEMA, target_named, write_firmware
+    from dzdesign.codegen.project import DEFAULT_TARGET, target_named, write_firmware
     from dzdesign.codegen.project import generate as generate_project
+    from dzdesign.core.artefact_types import schema_of
     from dzdesign.design.compensator import Compensator
     from dzdesign.design.compensator_file import SCHEMA as COMPENSATOR_SCHEMA
     from dzdesign.design.designing import design as design_valve
+    from dzdesign.design.firmware_manifest import FirmwareManifest
     from dzdesign.identify.valve.model import SCHEMA as VALVE_SCHEMA
     from dzdesign.identify.valve.valve_file import valve_from_document
 
     target = arguments.target or DEFAULT_TARGET
     target_named(target)
     if arguments.output is not None:
-        check_folder_may_be_written(Path(arguments.output), SCHEMA)
+        check_folder_may_be_written(Path(arguments.output), schema_of(FirmwareManifest))
     given = arguments.compensator
     if isinstance(given, Compensator):
         firmware = generate_project(_proven(given, "the compensator", arguments), arguments.target)
