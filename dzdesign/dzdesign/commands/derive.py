@@ -30,7 +30,7 @@ class Arguments:
 
 def run(arguments: Arguments, json: bool) -> int:
     """Re-derive the paper's equations; 1 if one of those printed is not found as a correct account finds it."""
-    from dzdesign.derivation.account import STATEMENTS, verify_statements
+    from dzdesign.derivation.account.account import STATEMENTS, verify_statements
     from dzdesign.derivation.presentation.report import check_format, closure, render
 
     check_format(arguments.format)
@@ -55,7 +55,7 @@ def run(arguments: Arguments, json: bool) -> int:
 
 def _run_mutations(arguments: Arguments, json: bool) -> int:
     """Count the wrong equations that the account catches; 1 if one of them is not caught."""
-    from dzdesign.derivation.account import verify_statements
+    from dzdesign.derivation.account.account import verify_statements
     from dzdesign.derivation.account.mutation import mutation_document, score_mutations
     from dzdesign.terminal.tables import print_mutations
 
