@@ -16,7 +16,8 @@ from sympy.core.function import AppliedUndef
 from dzdesign.command_line.cli import main
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.derivation import symbols
-from dzdesign.derivation.account.account import PAPER_NUMBERS, STATEMENTS, account, verify_statements
+from dzdesign.derivation.account import account
+from dzdesign.derivation.account.account import PAPER_NUMBERS, STATEMENTS, verify_statements
 from dzdesign.derivation.account.identity import agree
 from dzdesign.derivation.account.statement import Outcome
 from dzdesign.derivation.presentation import html as report_html
