@@ -10,7 +10,7 @@ from dzdesign.derivation.account.statement import Outcome
 from dzdesign.derivation.account.target_flow import TARGET, TIES
 from dzdesign.derivation.law import law
 from dzdesign.derivation.presentation.content import Entry, Term
-from dzdesign.derivation.presentation.html import Page
+from dzdesign.derivation.presentation.html import HtmlWriter
 from dzdesign.derivation.presentation.prose import Words, parse_prose
 from dzdesign.derivation.presentation.report import closure, compose
 
@@ -34,7 +34,7 @@ class LawAccount:
         What these rest on, in the account's order.
     glossary : tuple of Term
         The symbols.
-    page : Page
+    page : HtmlWriter
         Writes words and formulas.
     """
 
@@ -42,7 +42,7 @@ class LawAccount:
     main: tuple[Entry, ...]
     rest: tuple[Entry, ...]
     glossary: tuple[Term, ...]
-    page: Page
+    page: HtmlWriter
 
     @property
     def holds(self) -> bool:
@@ -81,7 +81,7 @@ def account_of(law_name: str) -> LawAccount:
         main=_in(entries, direct),
         rest=_in(entries, set(numbers) - direct),
         glossary=content.glossary,
-        page=Page(set(numbers)),
+        page=HtmlWriter(numbers),
     )
 
 
