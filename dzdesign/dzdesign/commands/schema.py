@@ -23,7 +23,11 @@ SCHEMAS: Mapping[str, tuple[str, str, str]] = MappingProxyType(
         "assessment": ("dzdesign.assess", "assessment.json", "assess"),
         "batch": ("dzdesign.report.lot.summary:LotSummary", "batch.json", "batch"),
         "reproduction": ("dzdesign.reproduce", "reproduction.json", "reproduce"),
-        "derivation": ("dzdesign.derivation", "derivation.json", "derive --format json"),
+        "derivation": (
+            "dzdesign.derivation.presentation.derivation_file:DerivationFile",
+            "derivation.json",
+            "derive --format json",
+        ),
     }
 )
 

@@ -16,7 +16,7 @@ from sympy.functions.elementary.piecewise import ExprCondPair
 from sympy.printing.latex import LatexPrinter
 from sympy.printing.str import StrPrinter
 
-from dzdesign.derivation.symbols import QUANTITIES, dP, dP0, dP1, s
+from dzdesign.derivation.symbols import QUANTITIES, dP, dP0, dP1, s, u_min
 
 _RANK = {name: rank for rank, name in enumerate(QUANTITIES)}
 _PRESSURES = {dP, dP0, dP1}
@@ -126,8 +126,12 @@ def _power(base: sympy.Expr, exponent: sympy.Expr) -> sympy.Expr:
 
 
 def _factor_key(power: tuple[sympy.Expr, sympy.Expr]) -> tuple[int, int, int, str]:
+    """Numbers, constants, a root, sums, commands, and last what varies."""
     base, _ = power
-    kind = 0 if base.is_number else 4 if _varies(base) else 2 if isinstance(base, Root) else 3 if base.args else 1
+    if isinstance(base, AppliedUndef) or not base.args:
+        kind = 0 if base.is_number else 5 if _varies(base) else 4 if _rank(base) >= _RANK[u_min] else 1
+    else:
+        kind = 2 if isinstance(base, Root) else 3
     return kind, _rank(base), base.count_ops(), str(base)
 
 

@@ -74,12 +74,11 @@ def account_of(law_name: str) -> LawAccount:
     numbers = closure(STATEMENTS, [number])
     statements = [statement for statement in STATEMENTS if statement.number in numbers]
     content = compose(prove(statements), numbers)
-    entries = [entry for _, section in content.sections for entry in section]
     direct = {ground.number for ground in statements[-1].grounds} | {number}
     return LawAccount(
         note=parse_prose(law(law_name).note),
-        main=_in(entries, direct),
-        rest=_in(entries, set(numbers) - direct),
+        main=_in(content.entries, direct),
+        rest=_in(content.entries, set(numbers) - direct),
         glossary=content.glossary,
         page=HtmlWriter(numbers),
     )
