@@ -23,7 +23,6 @@ from typing import TYPE_CHECKING
 from dzdesign.api_around import assess, batch, init, report, simulate
 from dzdesign.command_line.argument_types import takes_text
 from dzdesign.core.artefact_files import (
-    TOOL,
     check_file_may_be_written,
     check_folder_may_be_written,
     read_bytes,
@@ -301,7 +300,7 @@ def verify(
     from dzdesign.report.valve_report import with_report
     from dzdesign.verify.closed_loop.plant import read_plant
     from dzdesign.verify.closed_loop.tolerances import read_tolerances
-    from dzdesign.verify.verification import SCHEMA, evidence_files
+    from dzdesign.verify.verification import SCHEMA, evidence_files, evidence_manifest
     from dzdesign.verify.verification import verify as verify_folder
 
     if output is not None:
@@ -320,7 +319,7 @@ def verify(
         )
         verification = with_regenerated(verification, folder)
         if output is not None:
-            manifest = {"schema": SCHEMA, "tool": TOOL, "made_from": verification.document["made_from"]}
+            manifest = evidence_manifest(verification.evidence)
             files = with_report(evidence_files(verification), folder, Path(output))
             write_folder(Path(output), files, manifest)
     return verification

@@ -10,6 +10,7 @@ from jsonschema import Draft202012Validator
 from dzdesign.command_line.cli import main
 from dzdesign.commands.schema import SCHEMAS, schema_document, schema_text
 from dzdesign.core.artefact_files import to_json, write_folder
+from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.identify.options import IdentifyOptions
 from tests.support.paths import GOLDENS_FULL, TESTS
 from tests.support.schema_checks import overlooked, problems, resolved, wrong_documents
@@ -18,7 +19,8 @@ from tests.support.synthetic import Truth, needs_compiler, synthetic_ramp
 GOLDENS = GOLDENS_FULL
 SCHEMA_GOLDENS = TESTS / "goldens" / "schemas"
 #: End of a key's name -> unit of its value.
-UNITS = {"_V": "V", "_MPa": "MPa", "_L_min": "L/min", "_L_min_V": "L/min/V", "_V_mm": "V/mm", "_Hz": "Hz", "_s": "s"}
+UNITS = {"_V": "V", "_MPa": "MPa", "_L_min": "L/min", "_L_min_V": "L/min/V", "_V_mm": "V/mm", "_Hz": "Hz", "_s": "s",
+         "_N_MPa": "N/MPa", "_N_mm_MPa": "N/(mm MPa)"}  # fmt: skip
 
 
 def identified(tests, **options):
@@ -67,17 +69,18 @@ def example_artefacts(example_valve, example_compensator, written_firmware):
 @pytest.fixture(scope="module")
 def evidence(written_firmware, example_folder):
     """Return verification.json with all that can be asked for."""
-    from dzdesign.verify.analysis.mutation import KILLED, SURVIVED, Outcome, mutation_document
+    from dzdesign.verify.analysis.mutation import KILLED, SURVIVED, mutation_score
     from dzdesign.verify.closed_loop.plant import read_plant
     from dzdesign.verify.closed_loop.tolerances import read_tolerances
+    from dzdesign.verify.evidence import MutantOutcome
     from dzdesign.verify.verification import verify
 
     tolerances = replace(read_tolerances(example_folder / "tolerances.toml"), plants=3)
     plant = read_plant(example_folder / "plant.toml")
-    document = json.loads(to_json(verify(written_firmware, plant, "plant.toml", tolerances=tolerances).document))
-    found = [Outcome(file="core/dz_comp.c", line=9, change="+ to -", verdict=one) for one in (KILLED, SURVIVED)]
-    document["mutants"] = json.loads(to_json(mutation_document([replace(found[0], killer="a check"), found[1]])))
-    return document
+    evidence = verify(written_firmware, plant, "plant.toml", tolerances=tolerances).evidence
+    found = [MutantOutcome(file="core/dz_comp.c", line=9, change="+ to -", verdict=one) for one in (KILLED, SURVIVED)]
+    score = mutation_score([replace(found[0], killer="a check"), found[1]])
+    return json.loads(to_json_bytes(replace(evidence, mutants=score)))
 
 
 @pytest.fixture(scope="module")
@@ -164,8 +167,8 @@ def test_evidence_of_a_core_that_does_not_compile_fits(firmware_folder):
     source = firmware_folder / "core" / "dz_comp.c"
     source.write_text(source.read_text() + "\nint unused = 1.5;;\n")
     found = verify(firmware_folder)
-    assert not found.holds and found.inputs == ()
-    assert problems("evidence", json.loads(to_json(found.document))) == []
+    assert not found.holds and found.evidence.inputs == ()
+    assert problems("evidence", json.loads(to_json_bytes(found.evidence))) == []
 
 
 def test_an_assessment_fits_and_every_fault_in_it_is_seen(assessment):

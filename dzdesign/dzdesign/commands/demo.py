@@ -3,7 +3,8 @@
 import argparse
 from pathlib import Path
 
-from dzdesign.core.artefact_files import TOOL, check_folder_may_be_written, sha256_of, to_json, write_file, write_folder
+from dzdesign.core.artefact_files import check_folder_may_be_written, sha256_of, to_json, write_file, write_folder
+from dzdesign.core.artefact_types import as_document
 from dzdesign.core.errors import InputError
 from dzdesign.core.units import parse_quantity
 from dzdesign.example import example_folder
@@ -28,7 +29,7 @@ def run_demo(args: argparse.Namespace) -> int:
     from dzdesign.report.valve_report import with_report
     from dzdesign.terminal.tables import print_demo
     from dzdesign.verify.closed_loop.plant import read_plant
-    from dzdesign.verify.verification import SCHEMA, evidence_files, verify
+    from dzdesign.verify.verification import evidence_files, evidence_manifest, verify
 
     folder = Path(args.folder)
     for part in ("firmware", "evidence"):
@@ -64,11 +65,11 @@ def run_demo(args: argparse.Namespace) -> int:
         source = "plant.toml of the example"
         verification = verify(folder / "firmware", plant, source, digest, say=stage, watch=stage.each)
     verification = with_regenerated(verification, folder / "firmware")
-    manifest = {"schema": SCHEMA, "tool": TOOL, "made_from": verification.document["made_from"]}
+    manifest = evidence_manifest(verification.evidence)
     evidence = with_report(evidence_files(verification), folder / "firmware", folder / "evidence")
     write_folder(folder / "evidence", evidence, manifest)
     if args.json:
-        print(to_json(verification.document), end="")
+        print(to_json(as_document(verification.evidence)), end="")
     else:
         print_demo(valve, verification, str(folder))
     return 0 if verification.holds and expected == len(verdicts) else 1

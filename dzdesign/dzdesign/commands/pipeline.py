@@ -2,12 +2,12 @@
 
 import argparse
 import re
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dzdesign.command_line.identify_options import identify_options, record_of
 from dzdesign.core.artefact_files import (
-    TOOL,
     check_file_may_be_written,
     check_folder_may_be_written,
     parse_document,
@@ -24,6 +24,9 @@ from dzdesign.core.units import parse_quantity
 from dzdesign.recordings import check_plots, read_recordings, refuse_copies
 from dzdesign.regeneration import with_regenerated
 from dzdesign.terminal.progress import say, stages, with_bar
+
+if TYPE_CHECKING:
+    from dzdesign.verify.evidence import MutationScore
 
 
 def _seed(text: str) -> int:
@@ -158,8 +161,8 @@ def run_verify(args: argparse.Namespace) -> int:
     from dzdesign.terminal.tables import print_firmware_mutants, print_verification
     from dzdesign.verify.closed_loop.plant import read_plant
     from dzdesign.verify.closed_loop.tolerances import read_tolerances
-    from dzdesign.verify.firmware.c2000ware import check_against_c2000ware, with_check
-    from dzdesign.verify.verification import SCHEMA, evidence_files, verify
+    from dzdesign.verify.firmware.c2000ware import check_against_c2000ware
+    from dzdesign.verify.verification import SCHEMA, evidence_files, evidence_manifest, verify
 
     output = Path(args.output)
     check_folder_may_be_written(output, SCHEMA)
@@ -181,7 +184,7 @@ def run_verify(args: argparse.Namespace) -> int:
 
         with stages() as stage:
             stage("comparing the machine code of other processors with the exact law, in simulators")
-            added += machine_code_checks(firmware, verification.inputs)
+            added += machine_code_checks(firmware, verification.evidence.inputs)
     if args.proof:
         from dzdesign.verify.analysis.frama_c import proof_check
 
@@ -193,14 +196,13 @@ def run_verify(args: argparse.Namespace) -> int:
         from dzdesign.verify.analysis.mutation import mutation_check
 
         added.append(mutation_check(mutants))
-    for check in added:
-        verification = with_check(verification, check)
+    verification = verification.with_checks(*added)
     if mutants:
-        verification.document["mutants"] = mutants
-    manifest = {"schema": SCHEMA, "tool": TOOL, "made_from": verification.document["made_from"]}
+        verification = replace(verification, evidence=replace(verification.evidence, mutants=mutants))
+    manifest = evidence_manifest(verification.evidence)
     write_folder(output, with_report(evidence_files(verification), firmware, output), manifest)
     if args.json:
-        print(to_json(verification.document), end="")
+        print(to_json(as_document(verification.evidence)), end="")
     else:
         print_verification(verification)
         if mutants:
@@ -209,15 +211,15 @@ def run_verify(args: argparse.Namespace) -> int:
     return 0 if verification.holds else 1
 
 
-def _firmware_mutants(firmware: Path) -> dict[str, Any]:
+def _firmware_mutants(firmware: Path) -> "MutationScore":
     """Make the firmware's core wrong in every place, and return what verify says to each."""
-    from dzdesign.verify.analysis.mutation import MutationBench, all_mutants, judge_all, mutation_document
+    from dzdesign.verify.analysis.mutation import MutationBench, all_mutants, judge_all, mutation_score
 
     bench = MutationBench(firmware)
     mutants = all_mutants(bench)
     say(f"checking the core with {len(mutants)} faults, one at a time")
     bench.check_original()
-    return mutation_document(judge_all(bench, mutants, lambda work: with_bar(work, "mutants")))
+    return mutation_score(judge_all(bench, mutants, lambda work: with_bar(work, "mutants")))
 
 
 def run_simulate(args: argparse.Namespace) -> int:

@@ -5,14 +5,13 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 from dzdesign.core.units import chance
+from dzdesign.core.verdicts import verdict_words
 
 if TYPE_CHECKING:
     from dzdesign.codegen.project import Firmware
     from dzdesign.design.compensator import Compensator
     from dzdesign.identify.valve.model import BranchResult, SideModel, ValveModel
     from dzdesign.verify.verification import Verification
-
-VERDICTS = {True: "holds", False: "FAILS", None: "NOT CHECKED"}
 
 
 def _table(caption: str, headings: Sequence[str], rows: Iterable[Sequence[str]], words: Sequence[int] = (0,)) -> str:
@@ -116,7 +115,7 @@ def verification_html(verification: "Verification") -> str:
     checks = _table(
         verification.verdict,
         ("requirement", "verdict", "figures"),
-        ((check.name, VERDICTS[check.holds], check.text) for check in verification.checks),
+        ((check.name, verdict_words(check.holds), check.text) for check in verification.evidence.checks),
         words=(0, 1, 2),
     )
     rows = [
@@ -130,7 +129,7 @@ def verification_html(verification: "Verification") -> str:
         for loop in verification.loops
     ]
     headings = ("side, dP (MPa)", "dead zone without (%)", "with: opening (%)", "closing (%)", "Q at zero (L/min)")
-    caption = f"Closed loop (plant: {verification.plant_source})"
+    caption = f"Closed loop (plant: {verification.evidence.closed_loop.plant_source})"
     return checks + (_table(caption, headings, rows) if rows else "")
 
 

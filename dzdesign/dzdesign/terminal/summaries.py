@@ -4,7 +4,8 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from dzdesign.core.errors import one_line
-from dzdesign.terminal.notebook import VERDICTS, side_lines
+from dzdesign.core.verdicts import NOT_CHECKED, verdict_words
+from dzdesign.terminal.notebook import side_lines
 
 if TYPE_CHECKING:
     from dzdesign.codegen.project import Firmware
@@ -62,10 +63,10 @@ def firmware_summary(firmware: "Firmware") -> str:
 
 def verification_summary(verification: "Verification") -> str:
     """Return the verdict, every requirement with its figures, and what was not tried."""
-    from dzdesign.verify.requirements import untried_of
+    from dzdesign.verify.requirements import not_tried
 
-    checks = [f"  {VERDICTS[check.holds]}: {check.name}: {check.text}" for check in verification.checks]
-    untried = [f"  NOT TRIED: {name}".replace("`", "") for name in untried_of(verification.document)]
+    checks = [f"  {verdict_words(check.holds)}: {check.name}: {check.text}" for check in verification.evidence.checks]
+    untried = [f"  {NOT_CHECKED}: {name}".replace("`", "") for name in not_tried(verification.evidence)]
     return "\n".join(map(one_line, [f"Verification: {verification.verdict}", *checks, *untried]))
 
 

@@ -556,11 +556,11 @@ def test_a_folder_that_is_no_firmware(refusal, bench, name, content, words):
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (b"int (\n", "FAILS  compiles without a warning"),
-        (b"", "FAILS"),
-        (b"typedef int nothing;\n", "FAILS"),
-        (b"/* \xe9 */\n", "FAILS"),
-        (None, "FAILS  compiles without a warning"),
+        (b"int (\n", "DOES NOT HOLD  compiles without a warning"),
+        (b"", "DOES NOT HOLD"),
+        (b"typedef int nothing;\n", "DOES NOT HOLD"),
+        (b"/* \xe9 */\n", "DOES NOT HOLD"),
+        (None, "DOES NOT HOLD  compiles without a warning"),
     ],
 )
 def test_a_core_that_is_none_does_not_hold(bench, capsys, content, words):
@@ -570,7 +570,7 @@ def test_a_core_that_is_none_does_not_hold(bench, capsys, content, words):
         core.write_bytes(content)
     assert main(["verify", "firmware"]) == 1
     out = capsys.readouterr().out
-    assert "FAILS  files as generated: changed or missing: core/dz_comp.c" in out and words in out
+    assert "DOES NOT HOLD  files as generated: changed or missing: core/dz_comp.c" in out and words in out
 
 
 @needs_compiler
@@ -579,7 +579,7 @@ def test_a_core_that_somebody_edited_does_not_hold(bench, capsys):
     core.write_text(core.read_text() + "/* tuned on the bench */\n")
     assert main(["verify", "firmware"]) == 1
     out = capsys.readouterr().out
-    assert "FAILS  files as generated: changed or missing: core/dz_comp.c" in out
+    assert "DOES NOT HOLD  files as generated: changed or missing: core/dz_comp.c" in out
     assert "holds  equals the exactly rounded law" in out
 
 
@@ -588,7 +588,7 @@ def test_a_plant_that_stays_shut_is_no_evidence(bench, capsys):
     """The spring holds it shut: no flow at zero command means nothing."""
     (bench / "plant.toml").write_text("preload_N = 1e6")
     assert main(["verify", "firmware", "--plant", "plant.toml"]) == 1
-    assert "FAILS  the plant of the closed loop opens" in capsys.readouterr().out
+    assert "DOES NOT HOLD  the plant of the closed loop opens" in capsys.readouterr().out
 
 
 # the installed program

@@ -273,7 +273,7 @@ def test_verify_holds_the_core_against_the_bounds_of_its_own_guard(tmp_path, mon
     capsys.readouterr()
     assert main(["verify", "firmware"]) == 1  # what was not checked is no evidence
     out = capsys.readouterr().out
-    assert "FAILS" not in out and "holds  no over-compensation on the tested interval: 0 pressure codes" in out
+    assert "DOES NOT HOLD" not in out and "HOLDS  no over-compensation on the tested interval: 0 pressure codes" in out
     assert "NOT CHECKED  no flow at zero command in the closed loop: the mean threshold was chosen to be guarded" in out
     # A core whose offset is that of the opening threshold, under a certificate of the mean: seen.
     assert main(["design", "valve.json", "--guard", "opening"]) == 0
@@ -287,5 +287,5 @@ def test_verify_holds_the_core_against_the_bounds_of_its_own_guard(tmp_path, mon
     write_folder(Path("wrong"), firmware.files, firmware.manifest)
     assert main(["verify", "wrong"]) == 1
     out = capsys.readouterr().out
-    assert "FAILS  the certificate follows from the valve" in out
-    assert "FAILS  no over-compensation on the tested interval" in out
+    assert "DOES NOT HOLD  the certificate follows from the valve" in out
+    assert "DOES NOT HOLD  no over-compensation on the tested interval" in out
