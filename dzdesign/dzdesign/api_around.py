@@ -14,10 +14,10 @@ from dzdesign.command_line.argument_types import takes_text
 from dzdesign.core.artefact_files import (
     check_file_may_be_written,
     check_folder_may_be_written,
-    to_json,
     write_file,
     write_folder,
 )
+from dzdesign.core.artefact_types import schema_of, to_json_bytes
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.terminal.progress import talking
 
@@ -176,7 +176,8 @@ def assess(
     InputError
         If a file or an option can't be read. A limit that is missed is no error: see ``holds``.
     """
-    from dzdesign.assess.assessment_file import SCHEMA, assessment_document
+    from dzdesign.assess.assessing import assess_curves
+    from dzdesign.assess.assessment import Assessment
     from dzdesign.commands.assess import assess_options, compare
 
     said = Namespace(
@@ -187,11 +188,11 @@ def assess(
     )  # fmt: skip
     options = assess_options(said)
     if output is not None:
-        check_file_may_be_written(Path(output), SCHEMA, "output")
+        check_file_may_be_written(Path(output), schema_of(Assessment), "output")
     with talking(quiet=True, verbose=False):
-        found = compare(said, options)
+        found = assess_curves(compare(said, options))
     if output is not None:
-        write_file(Path(output), to_json(assessment_document(found)), SCHEMA, "output")
+        write_file(Path(output), to_json_bytes(found).decode(), schema_of(Assessment), "output")
     return found
 
 

@@ -4,7 +4,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dzdesign.core.artefact_files import check_file_may_be_written, to_json, write_file, write_files
+from dzdesign.core.artefact_files import check_file_may_be_written, write_file, write_files
+from dzdesign.core.artefact_types import schema_of, to_json_bytes
 from dzdesign.core.errors import InputError, one_line
 from dzdesign.core.units import parse_quantity
 from dzdesign.recordings import (
@@ -18,39 +19,43 @@ from dzdesign.recordings import (
 from dzdesign.terminal.progress import say, stages
 
 if TYPE_CHECKING:
-    from dzdesign.assess.assessment import Assessment, AssessOptions
+    from dzdesign.assess.curve_pairs import Comparison
+    from dzdesign.assess.options import AssessOptions, Set
     from dzdesign.identify.reading.ramp_files import RampTest
 
 
 def run_assess(args: argparse.Namespace) -> int:
     """Compare recordings; 1 if one with the compensator misses a limit, or a limit can't be checked."""
-    from dzdesign.assess.assessment_file import SCHEMA, assessment_document
+    from dzdesign.assess.assessing import assess_curves
+    from dzdesign.assess.assessment import Assessment
     from dzdesign.terminal.assessment_tables import print_assessment
 
     options = assess_options(args)
     output = Path(args.output)
-    check_file_may_be_written(output, SCHEMA)
+    schema = schema_of(Assessment)
+    check_file_may_be_written(output, schema)
     check_plots(args.plots, output)
-    found = compare(args, options)
-    document = assessment_document(found)
-    write_file(output, to_json(document), SCHEMA)
+    comparison = compare(args, options)
+    found = assess_curves(comparison)
+    content = to_json_bytes(found).decode()
+    write_file(output, content, schema)
     if args.plots:
         from dzdesign.assess.plots import plot_files
 
         with stages() as stage:
             stage("drawing")
-            drawn = plot_files(found)
+            drawn = plot_files(comparison, found)
         write_files(Path(args.plots), drawn, "--plots")
     if args.json:
-        print(to_json(document), end="")
+        print(content, end="")
     else:
         print_assessment(found)
         print(one_line(f"Written: {args.output}" + (f", plots in {args.plots}" if args.plots else "")))
     return 0 if found.holds else 1
 
 
-def compare(args: argparse.Namespace, options: "AssessOptions") -> "Assessment":
-    """Read the recordings of both sets and compare them.
+def compare(args: argparse.Namespace, options: "AssessOptions") -> "Comparison":
+    """Read the recordings of both sets and pair their curves.
 
     Parameters
     ----------
@@ -59,19 +64,20 @@ def compare(args: argparse.Namespace, options: "AssessOptions") -> "Assessment":
     options : AssessOptions
         Of `assess_options`.
     """
-    from dzdesign.assess.assessment import assess
+    from dzdesign.assess.curve_pairs import compare_curves
 
+    inputs: tuple[tuple[Set, list[str], str | dict[str, str] | None], ...] = (
+        ("before", args.before, args.columns),
+        ("after", args.after, args.after_columns or args.columns),
+    )
     sets = {
         name: _read_set(name, patterns, columns, args, options.of_set(name).u_max)
-        for name, patterns, columns in (
-            ("before", args.before, args.columns),
-            ("after", args.after, args.after_columns or args.columns),
-        )
+        for name, patterns, columns in inputs
     }
     refuse_copies([*sets["before"], *sets["after"]])
     with stages() as stage:
         stage(f"comparing {len(sets['before'])} recordings before with {len(sets['after'])} after")
-        return assess(sets["before"], sets["after"], options)
+        return compare_curves(sets["before"], sets["after"], options)
 
 
 def _read_set(
@@ -99,8 +105,8 @@ def _read_set(
 
 def assess_options(args: argparse.Namespace) -> "AssessOptions":
     """Return the engineer's choices, SI; `args` has them as the command's texts."""
-    from dzdesign.assess.assessment import AssessOptions
     from dzdesign.assess.limits import parse_limits
+    from dzdesign.assess.options import AssessOptions
     from dzdesign.identify.options import IdentifyOptions
 
     reading = IdentifyOptions(
