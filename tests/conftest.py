@@ -76,6 +76,7 @@ def firmware_folder(example_firmware, tmp_path):
 def reported_demo(example_valve, tmp_path_factory):
     """A folder as `dzdesign demo` leaves it, with quicker ramps: valve.json, compensator.json, firmware, evidence."""
     from dzdesign.codegen.project import generate
+    from dzdesign.core.artefact_types import to_json_bytes
     from dzdesign.design.compensator_file import compensator_document
     from dzdesign.design.designing import design
     from dzdesign.report.valve_report import with_report
@@ -83,10 +84,10 @@ def reported_demo(example_valve, tmp_path_factory):
     from dzdesign.verify.verification import evidence_files, evidence_manifest, verify
 
     folder = tmp_path_factory.mktemp("reported")
-    valve_json = to_json(example_valve.to_document())
-    compensator = design(example_valve, default_options(), valve_json.encode())
+    valve_json = to_json_bytes(example_valve)
+    compensator = design(example_valve, default_options(), valve_json)
     compensator_json = to_json(compensator_document(compensator))
-    (folder / "valve.json").write_text(valve_json, encoding="utf-8", newline="")
+    (folder / "valve.json").write_bytes(valve_json)
     (folder / "compensator.json").write_text(compensator_json, encoding="utf-8", newline="")
     firmware = generate(compensator, "f28335", compensator_json.encode())
     write_folder(folder / "firmware", firmware.files, firmware.manifest)

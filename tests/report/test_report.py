@@ -11,6 +11,7 @@ import pytest
 
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of, to_json
+from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.identify.identification import identify
 from dzdesign.report.artefact_chain import chain_of
@@ -499,7 +500,7 @@ def reports(tmp_path_factory):
     found = {}
     for name, ramps in (("one", [one]), ("both", [one, other, *mirrored])):
         folder = tmp_path_factory.mktemp(name)
-        (folder / "valve.json").write_text(to_json(identify(ramps).to_document()), encoding="utf-8")
+        (folder / "valve.json").write_bytes(to_json_bytes(identify(ramps)))
         found[name] = report_of_folder(folder).html
     return found
 

@@ -8,9 +8,10 @@ import pytest
 from dzdesign.codegen.project import generate
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import MANIFEST_NAME, TOOL, sha256_of, to_json, write_folder
+from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.design.compensator_file import compensator_document
 from dzdesign.design.designing import design
-from dzdesign.identify.valve.valve_file import valve_from_document
+from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.valve_report import REPORT_NAME, report_of_folder, with_report
 from dzdesign.verify.firmware.compensator_checks import valve_follows
 from dzdesign.verify.requirements import VALVE, not_tried
@@ -122,7 +123,7 @@ def test_a_firmware_among_many_folders_is_found(copied):
 def spaced(copied):
     """The firmware of a valve.json that somebody saved with another spacing; its compensator's document."""
     content = json.dumps(json.loads((copied / "valve.json").read_bytes())).encode()
-    compensator = design(valve_from_document(content, "valve.json"), default_options(), content)
+    compensator = design(read_artefact(content, ValveModel, "valve.json"), default_options(), content)
     write_folder(copied / "firmware", *_made(compensator))
     (copied / "valve.json").write_bytes(content)
     return json.loads(to_json(compensator_document(compensator)))

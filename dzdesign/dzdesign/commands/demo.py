@@ -19,6 +19,7 @@ RECORD = {"valve": "simulated by dzdesign, no measurement"}
 def run_demo(args: argparse.Namespace) -> int:
     """Run the pipeline on the bundled ramp tests and print the closing table."""
     from dzdesign.codegen.project import DEFAULT_TARGET, generate, target_named
+    from dzdesign.core.artefact_types import to_json_bytes
     from dzdesign.derivation.account.account import verify_statements
     from dzdesign.design.compensator_file import compensator_document
     from dzdesign.design.designing import design
@@ -53,11 +54,11 @@ def run_demo(args: argparse.Namespace) -> int:
         )
         stage(f"identifying the valve from {len(tests)} simulated ramp tests")
         valve = identify(tests, meter, RECORD)
-        valve_json = to_json(valve.to_document())
+        valve_json = to_json_bytes(valve)
         write_file(folder / "valve.json", valve_json)
         stage("designing the compensator")
         options = options_of({}, target_named(DEFAULT_TARGET).inputs())
-        compensator = design(valve, options, valve_json.encode())
+        compensator = design(valve, options, valve_json)
         compensator_json = to_json(compensator_document(compensator))
         write_file(folder / "compensator.json", compensator_json)
         firmware = generate(compensator, DEFAULT_TARGET, compensator_json.encode())

@@ -37,6 +37,7 @@ def _seed(text: str) -> int:
 
 def run_identify(args: argparse.Namespace) -> int:
     """Identify a valve from ramp tests."""
+    from dzdesign.core.artefact_types import to_json_bytes
     from dzdesign.identify.identification import identify_sides
     from dzdesign.identify.valve.model import SCHEMA
     from dzdesign.terminal.tables import print_valve
@@ -44,15 +45,13 @@ def run_identify(args: argparse.Namespace) -> int:
     options, record = identify_options(args), record_of(args.record)
     check_file_may_be_written(Path(args.output), SCHEMA)
     check_plots(args.plots, Path(args.output))
-    tests = read_recordings(
-        args.ramps, u_max=options.u_max, columns=args.columns, dp=args.dp, skip_rows=args.skip_rows
-    )
+    tests = read_recordings(args.ramps, u_max=options.u_max, columns=args.columns, dp=args.dp, skip_rows=args.skip_rows)
     refuse_copies(tests)
     with stages() as stage:
         stage(f"fitting {len(tests)} recording{'s' if len(tests) > 1 else ''}")
         found = identify_sides(tests, options, record)
-    document = found.model.to_document()
-    write_file(Path(args.output), to_json(document), SCHEMA)
+    content = to_json_bytes(found.model)
+    write_file(Path(args.output), content, SCHEMA)
     if args.plots:
         from dzdesign.identify.plots.valve_plots import plot_files
 
@@ -61,7 +60,7 @@ def run_identify(args: argparse.Namespace) -> int:
             drawn = plot_files(found)
         write_files(Path(args.plots), drawn, "--plots")
     if args.json:
-        print(to_json(document), end="")
+        print(content.decode(), end="")
     else:
         print_valve(found.model)
         print(one_line(f"Written: {args.output}" + (f", plots in {args.plots}" if args.plots else "")))
@@ -71,11 +70,12 @@ def run_identify(args: argparse.Namespace) -> int:
 def _design(valve_path: Path, content: bytes, args: argparse.Namespace) -> "Compensator":  # noqa: F821
     from dzdesign.codegen.project import target_named
     from dzdesign.command_line.design_options import design_options
+    from dzdesign.core.artefact_reading import read_artefact
     from dzdesign.design.designing import design
-    from dzdesign.identify.valve.valve_file import valve_from_document
+    from dzdesign.identify.valve.model import ValveModel
 
     options = design_options(args, target_named(args.target).inputs())
-    return design(valve_from_document(content, str(valve_path)), options, content)
+    return design(read_artefact(content, ValveModel, str(valve_path)), options, content)
 
 
 def run_design(args: argparse.Namespace) -> int:

@@ -16,7 +16,7 @@ from dzdesign.core.errors import InputError, nearest
 #: order of the pipeline.
 SCHEMAS: Mapping[str, tuple[str, str, str]] = MappingProxyType(
     {
-        "valve": ("dzdesign.identify", "valve.json", "identify"),
+        "valve": ("dzdesign.identify.valve.model:ValveModel", "valve.json", "identify"),
         "compensator": ("dzdesign.design", "compensator.json", "design"),
         "firmware": ("dzdesign.design.firmware_manifest:FirmwareManifest", "manifest.json of a firmware", "codegen"),
         "evidence": ("dzdesign.verify.evidence:Evidence", "verification.json", "verify"),

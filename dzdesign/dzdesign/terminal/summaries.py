@@ -10,12 +10,12 @@ from dzdesign.terminal.notebook import side_lines
 if TYPE_CHECKING:
     from dzdesign.codegen.project import Firmware
     from dzdesign.design.compensator import Compensator
-    from dzdesign.identify.valve.model import BranchResult, ValveModel
+    from dzdesign.identify.valve.model import ValveModel
     from dzdesign.verify.verification import Verification
 
 
-def _knee(branch: "BranchResult | None") -> str:
-    return "not recorded" if branch is None else f"{branch.knee_V:.3f} ± {branch.knee_se_V:.3f}"
+def _knee(u_V: float | None, se_V: float | None) -> str:
+    return "not recorded" if u_V is None else f"{u_V:.3f} ± {se_V:.3f}"
 
 
 def valve_summary(valve: "ValveModel") -> str:
@@ -29,9 +29,11 @@ def valve_summary(valve: "ValveModel") -> str:
         lines.append(f"  {name} side, thresholds in V:")
         for test in side.tests:
             at = "dP unknown" if test.dp_MPa is None else f"{test.dp_MPa:.3f} MPa"
+            opens = _knee(test.u_knee_rising_V, test.u_knee_rising_se_V)
+            closes = _knee(test.u_knee_falling_V, test.u_knee_falling_se_V)
             lines.append(
-                f"    {at}: knee opening {_knee(test.rising)}, closing {_knee(test.falling)}; lower bound of "
-                f"the {side.guard} threshold {test.u_guard_lower_V:.3f}; largest flow {test.q_max_L_min:.2f} L/min"
+                f"    {at}: knee opening {opens}, closing {closes}; lower bound of the {side.certificate.guard} "
+                f"threshold {test.u_guard_lower_V:.3f}; largest flow {test.q_max_L_min:.2f} L/min"
             )
         lines += [f"    {line}" for line in side_lines(side)]
     codes = list(dict.fromkeys(warning.code for warning in valve.warnings))

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
 
     from dzdesign.codegen.project import Firmware
     from dzdesign.design.compensator import Compensator
-    from dzdesign.identify.valve.model import SideModel, ValveModel
+    from dzdesign.identify.valve.model import ValveModel
+    from dzdesign.identify.valve.side_model import SideModel
     from dzdesign.terminal.page import Grid
     from dzdesign.verify.evidence import MonteCarlo, MutationScore, ScenarioResult, Spread
     from dzdesign.verify.verification import Verification
@@ -47,8 +48,8 @@ def print_valve(valve: "ValveModel") -> None:
     how = {"declared": "declared", "identified": "from ramps of two rates", "unknown": "none declared"}
     put_line(
         console,
-        f"meter floor: {valve.meter_floor_L_min:.2f} L/min; lag taken as {valve.meter_lag_s:.3g} s "
-        f"({how.get(valve.meter_lag_is, valve.meter_lag_is)})",
+        f"meter floor: {valve.meter.floor_L_min:.2f} L/min; lag taken as {valve.meter.lag_s:.3g} s "
+        f"({how.get(valve.meter.lag_is, valve.meter.lag_is)})",
     )
     for warning in valve.warnings:
         source = f"{warning.source}: " if warning.source else ""
@@ -60,7 +61,7 @@ def _thresholds(side: "SideModel", title: str) -> "Grid":
         title, "ramp test", "dP (MPa)", "knee opening", "knee closing", "s.e. of knee", "onset closing",
          "bound", "beta", "Q max (L/min)",
     )  # fmt: skip
-    betas = side.beta or ("-",)
+    betas = side.beta.beta or ("-",)
     for test, beta in zip(side.tests, betas, strict=True):
         table.add_row(
             test.source,
@@ -77,13 +78,14 @@ def _thresholds(side: "SideModel", title: str) -> "Grid":
 
 
 def _side_lines(side: "SideModel") -> tuple[str, ...]:
-    at = "" if side.reference_dp_MPa is None else f" at dP0 = {side.reference_dp_MPa:.3f} MPa"
+    at = "" if side.reference.dp_MPa is None else f" at dP0 = {side.reference.dp_MPa:.3f} MPa"
+    certificate = side.certificate
     return (
-        f"bound: {100 * side.confidence:.6g}% lower bound, for all tests together, of the {side.guard} threshold (the "
-        f"knee, or the tail's zero where the edge is soft); flow below {side.level_L_min:.2f} L/min (meter's floor, "
-        "its noise, or 0.5 % of the largest flow) counts as none",
-        f"u_min0 = {side.u_min0_V:.4f} V{at}: the largest certified offset. Between two tests only the lower of their "
-        "bounds is certain, so each offset stays under the neighbour's; more tests raise it",
+        f"bound: {100 * certificate.confidence:.6g}% lower bound, for all tests together, of the {certificate.guard} "
+        "threshold (the knee, or the tail's zero where the edge is soft); flow below "
+        f"{certificate.level_L_min:.2f} L/min (meter's floor, its noise, or 0.5 % of the largest flow) counts as none",
+        f"u_min0 = {side.reference.u_min_V:.4f} V{at}: the largest certified offset. Between two tests only the lower "
+        "of their bounds is certain, so each offset stays under the neighbour's; more tests raise it",
         f"drive range of the valve k x_max/u_max = {side.k_x_max_over_u_max:.4f}: command from the knee to full "
         "stroke, as a share of full command; the law's counts from its offset, which lies lower"
         + (f"; k = {side.k_V_mm:.4f} V/mm" if side.k_V_mm is not None else ""),
@@ -96,10 +98,11 @@ def _side_lines(side: "SideModel") -> tuple[str, ...]:
 
 def print_compensator(compensator: "Compensator") -> None:
     """Print the law, the certificate and what the choices cost."""
+    from dzdesign.core.artefact_reading import read_artefact
     from dzdesign.derivation.law import law
     from dzdesign.design.costs import hidden_failures
     from dzdesign.design.signal_descriptions import signals_in_words
-    from dzdesign.identify.valve.valve_file import valve_from_document
+    from dzdesign.identify.valve.model import ValveModel
 
     chosen = law(compensator.law_name)
     lines = [
@@ -125,7 +128,7 @@ def print_compensator(compensator: "Compensator") -> None:
         share = compensator.edge_codes / compensator.signals.command.span(1)
         guard = compensator.positive.certificate.guard
         lines.append(f"edge: from the {guard} to the opening threshold over the first {share:.2%} of command")
-    valve = valve_from_document(compensator.valve_document.encode(), "compensator.json: valve")
+    valve = read_artefact(compensator.valve_document.encode(), ValveModel, "compensator.json: valve")
     hidden = hidden_failures(compensator, valve)
     costs = [line for line in compensator.costs if line not in hidden]
     console = new_console()

@@ -317,16 +317,16 @@ def test_firmware_and_report_say_first_that_they_are_of_a_lot(common, batch, tmp
     made = generate(common.compensator, "f28335")
     write_firmware(made, folder)
     document = json.loads((folder / "compensator.json").read_bytes())
-    said = f"COMMON SETTING of 4 valves, lot SHA-256 {document['lot_sha256']}."
+    said = f"LOT SETTING of 4 valves, lot SHA-256 {document['lot_sha256']}."
     for name, text in made.files.items():
         assert name in (*made.manifest.board, "compensator.json") or said in "\n".join(text.splitlines()[:4]), name
     header, readme = made.files["core/dz_comp.h"], made.files["f28335/README.md"]
     assert f"/* Valve {common.carrier} identified from: " in header
     words = " ".join(header.replace(" * ", " ").split())
-    assert f"of one of the 4 valves of this common setting, valve {common.carrier}; of the others" in words
-    assert "**This is a common setting of 4 valves**" in readme and document["lot_sha256"] in readme
+    assert f"of one of the 4 valves of this lot setting, valve {common.carrier}; of the others" in words
+    assert "**This is a lot setting of 4 valves**" in readme and document["lot_sha256"] in readme
     own = generate(batch["a"].own, "host")
-    assert not any("common setting" in text.lower() for text in own.files.values())
+    assert not any("lot setting" in text.lower() for text in own.files.values())
     evidence = tmp_path / "evidence"
     main(["verify", str(folder), "-o", str(evidence), "--quiet"])  # its verdict is no matter here
     report = (evidence / "report.html").read_text(encoding="utf-8")
@@ -364,7 +364,7 @@ def test_an_old_common_file_without_its_lot_says_that_it_is_not_known(document):
     old = {name: value for name, value in document.items() if name not in ("lot", "lot_sha256")}
     compensator = read(old)
     said = generate(compensator, "host").files["core/dz_comp.h"]
-    assert "COMMON SETTING of 4 valves, the file does not say which." in said
+    assert "LOT SETTING of 4 valves, the file does not say which." in said
     artefacts = {
         "compensator": Artefact(role="compensator", name="compensator.json", sha256="0" * 64, document=old),
     }

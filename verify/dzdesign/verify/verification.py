@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, read_bytes, sha256_of
+from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, as_document, schema_of, to_json_bytes
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.design.compensator_file import compensator_from_document
-from dzdesign.identify.valve.valve_file import valve_from_document
+from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.closed_loop.evidence_curves import curve_files
 from dzdesign.verify.closed_loop.firmware_loop import FirmwareLoop, Watch, close_the_loop, scenes_of
 from dzdesign.verify.closed_loop.loop import LoopComparison, RampSequence
@@ -120,7 +121,7 @@ def verify(
     content = read_bytes(folder / "compensator.json", "compensator")
     compensator = compensator_from_document(content, str(folder / "compensator.json"))  # every key that is read below
     document = json.loads(content)
-    valve = valve_from_document(compensator.valve_document.encode(), "compensator.json")
+    valve = read_artefact(compensator.valve_document.encode(), ValveModel, "compensator.json")
     host_compiler()
     say("compiling the core with every warning an error")
     compiles = compiles_strictly(folder, manifest)

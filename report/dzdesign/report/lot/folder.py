@@ -14,7 +14,7 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import Tool, schema_of
 from dzdesign.core.errors import InputError, and_more
 from dzdesign.core.input_files import MOST_DOCUMENT
-from dzdesign.identify.valve.valve_file import valve_from_document
+from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.lot.summary import AGAIN, OK, SUMMARY_NAME, LotSummary, UnfinishedLot
 from dzdesign.report.lot.table import HASHED, TABLE, TableRow, read_table
 from dzdesign.report.lot.table_rows import table_rows
@@ -213,7 +213,7 @@ class _LotFiles:
                 if stated and sha256_of(content) != stated:
                     other.append(f"{row.name}/{file}")
                 elif content and file == "valve.json" and not texts.keys() >= set(row.warnings):
-                    valve = valve_from_document(content, str(path))
+                    valve = read_artefact(content, ValveModel, str(path))
                     texts = {**{each.code: each.text for each in reversed(valve.warnings)}, **texts}
         if other:
             self.faults.append(

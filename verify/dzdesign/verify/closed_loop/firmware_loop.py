@@ -79,13 +79,13 @@ def scenes_of(
             continue
         side = valve.sides[name]
         # One that stands in for the valve at one pressure drop says nothing of another.
-        plants = dict.fromkeys(side.beta_dp_MPa, plant) if plant else plants_from_tests(side, valve.u_max_V)
+        plants = dict.fromkeys(side.beta.dp_MPa, plant) if plant else plants_from_tests(side, valve.u_max_V)
         tested = (min(plants), max(plants)) if plant else None
         first = ClosedLoop(next(iter(plants.values())), folder, document, sign)
         scenes += [
             Scene(
                 loop=first.with_plant(one), plant=one, side=name, dp_MPa=dp_MPa,
-                reference_MPa=side.reference_dp_MPa, tested_MPa=tested,
+                reference_MPa=side.reference.dp_MPa, tested_MPa=tested,
             )
             for dp_MPa, one in plants.items()
         ]  # fmt: skip

@@ -58,7 +58,7 @@ def no_flow_at_zero(
     worst = max(ramps, key=lambda ramp: ramp.q_zero_L_min)
     guards = {sign: compensator.side(sign).certificate.guard for sign in compensator.signals.signs}
     identified = {1: valve.sides.get("positive"), -1: valve.sides.get("negative")}
-    chosen = [guard for sign, guard in guards.items() if (side := identified[sign]) and side.guard != guard]
+    chosen = [guard for sign, guard in guards.items() if (side := identified[sign]) and side.certificate.guard != guard]
     if chosen:
         return ZERO_FLOW.check(
             holds=None,

@@ -16,7 +16,7 @@ from msgspec import Meta
 from dzdesign.core.artefact_files import read_bytes
 from dzdesign.core.artefact_types import quantity
 from dzdesign.core.errors import InputError, nearest, quoted
-from dzdesign.identify.valve.model import SideModel
+from dzdesign.identify.valve.side_model import SideModel
 
 if TYPE_CHECKING:
     import casadi
@@ -150,7 +150,7 @@ def plants_from_tests(side: SideModel, u_max_V: float) -> dict[float, Plant]:
             raise InputError(f"{test.source} has no pressure drop, so no plant can be made from it; give --plant")
         base = Plant(u_max_V=u_max_V, pressure_force_N_MPa=0, flow_force_N_mm_MPa=0, droop_MPa_L_min2=0, overlap_mm=0.3)
         opens = test.u_knee_rising_V if test.u_knee_rising_V is not None else test.u_guard_V
-        closes = test.u_guard_V if side.guard == "closing" else opens
+        closes = test.u_guard_V if side.certificate.guard == "closing" else opens
         middle, hysteresis = (opens + closes) / 2, max(opens - closes, 0.0)
         # A threshold below the spring force of the overlap is met with less overlap.
         overlap = min(base.overlap_mm, 0.5 * middle * base.force_per_volt / base.K_et_N_m * 1e3)
