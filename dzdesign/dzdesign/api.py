@@ -23,7 +23,6 @@ from typing import TYPE_CHECKING
 from dzdesign.api_around import assess, batch, init, report, simulate
 from dzdesign.command_line.argument_types import takes_text
 from dzdesign.core.artefact_files import (
-    TOOL,
     check_file_may_be_written,
     check_folder_may_be_written,
     read_bytes,
@@ -112,6 +111,7 @@ def identify(
         If a file or an option can't be read, or no threshold can be given; the reason.
     """
     from dzdesign.command_line.identify_options import identify_options, record_of
+    from dzdesign.core.artefact_types import to_json_bytes
     from dzdesign.identify.identification import identify as identify_tests
     from dzdesign.identify.valve.model import SCHEMA
     from dzdesign.recordings import read_recordings, refuse_copies
@@ -136,7 +136,7 @@ def identify(
     refuse_copies(tests)
     valve = identify_tests(tests, options, said)
     if output is not None:
-        write_file(Path(output), to_json(valve.to_document()), SCHEMA, "output")
+        write_file(Path(output), to_json_bytes(valve), SCHEMA, "output")
     return valve
 
 
@@ -210,11 +210,11 @@ def design(
     given = dict(locals())  # first of all: the options by their names, once
     from dzdesign.codegen.project import target_named
     from dzdesign.command_line.design_options import design_options
+    from dzdesign.core.artefact_reading import read_artefact
     from dzdesign.design.compensator_file import SCHEMA, compensator_document
     from dzdesign.design.designing import design as design_valve
     from dzdesign.design.request import DEFAULTS
     from dzdesign.identify.valve.model import ValveModel
-    from dzdesign.identify.valve.valve_file import valve_from_document
 
     options = design_options(Namespace(**{name: given[name] for name in DEFAULTS}), target_named(target).inputs())
     if output is not None:
@@ -223,7 +223,7 @@ def design(
         compensator = design_valve(valve, options)
     else:
         content = read_bytes(Path(valve), "valve file")
-        compensator = design_valve(valve_from_document(content, os.fspath(valve)), options, content)
+        compensator = design_valve(read_artefact(content, ValveModel, os.fspath(valve)), options, content)
     if output is not None:
         write_file(Path(output), to_json(compensator_document(compensator)), SCHEMA, "output")
     return compensator
@@ -301,7 +301,7 @@ def verify(
     from dzdesign.report.valve_report import with_report
     from dzdesign.verify.closed_loop.plant import read_plant
     from dzdesign.verify.closed_loop.tolerances import read_tolerances
-    from dzdesign.verify.verification import SCHEMA, evidence_files
+    from dzdesign.verify.verification import SCHEMA, evidence_files, evidence_manifest
     from dzdesign.verify.verification import verify as verify_folder
 
     if output is not None:
@@ -320,7 +320,7 @@ def verify(
         )
         verification = with_regenerated(verification, folder)
         if output is not None:
-            manifest = {"schema": SCHEMA, "tool": TOOL, "made_from": verification.document["made_from"]}
+            manifest = evidence_manifest(verification.evidence)
             files = with_report(evidence_files(verification), folder, Path(output))
             write_folder(Path(output), files, manifest)
     return verification

@@ -145,7 +145,7 @@ def test_a_number_for_an_option_of_a_lot_is_one_sentence(ramps, tmp_path):
 
 
 def test_paths_may_come_from_anything_that_gives_them(ramps):
-    assert len(api.identify((path for path in ramps), meter_lag="0.1 s").to_document()["made_from"]) == len(ramps)
+    assert len(api.identify((path for path in ramps), meter_lag="0.1 s").made_from) == len(ramps)
 
 
 def test_what_stands_around_the_stages_writes_the_bytes_of_the_commands(tmp_path, monkeypatch, capsys):
@@ -267,9 +267,7 @@ def test_the_notebook_gives_what_it_shows(tmp_path, request):
     document = json.loads(NOTEBOOK.read_text(encoding="utf-8"))
     notebook = nbformat.read(NOTEBOOK, as_version=4)
     nbformat.validate(notebook)
-    client = NotebookClient(
-        notebook, timeout=300, record_timing=False, resources={"metadata": {"path": str(tmp_path)}}
-    )
+    client = NotebookClient(notebook, timeout=300, record_timing=False, resources={"metadata": {"path": str(tmp_path)}})
     client.execute()
     found = [stored_outputs(cell) for cell in notebook.cells if cell.cell_type == "code"]
     cells = [cell for cell in document["cells"] if cell["cell_type"] == "code"]

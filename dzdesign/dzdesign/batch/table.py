@@ -18,7 +18,7 @@ from dzdesign.identify.valve.test_record import checked_record
 
 if TYPE_CHECKING:
     from dzdesign.design.lot_setting import CommonSetting, Designed
-    from dzdesign.identify.valve.model import SideModel
+    from dzdesign.identify.valve.side_model import SideModel
 
 #: Columns of either side, after its name; a valve that was not calibrated has blanks.
 SIDE_COLUMNS = (
@@ -137,16 +137,16 @@ def _side_values(designed: "Designed", sign: int, common: "CommonSetting | None"
     test = _reference_test(side)
     left = _remaining(designed, sign, own)
     certificate = own.side(sign).certificate
-    code = round(own.signals.dp_code(Fraction(repr(side.reference_dp_MPa))))
+    code = round(own.signals.dp_code(Fraction(repr(side.reference.dp_MPa))))
     return {
-        "dp0_MPa": side.reference_dp_MPa,
+        "dp0_MPa": side.reference.dp_MPa,
         "knee_opening_V": test.u_knee_rising_V,
         "knee_closing_V": test.u_knee_falling_V,
         "knee_se_V": test.u_knee_se_V,
         "bound_V": side.guards[certificate.guard].u_lower_V[side.tests.index(test)],
         "offset_V": round(float(own.beta(code, sign) * own.side(sign).u_min0_over_u_max * own.u_max_V), 7),
         "trend": side.trend,
-        "highest_dp_MPa": side.beta_dp_MPa[-1],
+        "highest_dp_MPa": side.beta.dp_MPa[-1],
         "beta_at_highest_dp": side.guards[certificate.guard].beta[-1],
         "k_x_max_over_u_max": side.k_x_max_over_u_max,
         "dead_zone_opening_percent": left.get("opening"),
@@ -156,7 +156,7 @@ def _side_values(designed: "Designed", sign: int, common: "CommonSetting | None"
 
 
 def _reference_test(side: "SideModel") -> Any:
-    return min(side.tests, key=lambda test: abs(test.dp_MPa - side.reference_dp_MPa))
+    return min(side.tests, key=lambda test: abs(test.dp_MPa - side.reference.dp_MPa))
 
 
 def _remaining(designed: "Designed", sign: int, law: Any) -> dict[str, float]:
@@ -185,7 +185,7 @@ def extra_dead_zone(designed: "Designed", common: "CommonSetting", sign: int) ->
     from dzdesign.design.costs import remaining_dead_zone
 
     side = designed.valve.sides["positive" if sign > 0 else "negative"]
-    branch = "opening" if side.tests[0].rising is not None else "closing"
+    branch = "opening" if side.tests[0].u_knee_rising_V is not None else "closing"
     laws = common.compensator, designed.own
     left = ([remaining_dead_zone(law, test, sign)[branch] for law in laws] for test in side.tests)
     return round(100 * max(shared - own for shared, own in left), 5)

@@ -3,7 +3,8 @@
 import argparse
 from pathlib import Path
 
-from dzdesign.core.artefact_files import TOOL, check_folder_may_be_written, sha256_of, to_json, write_file, write_folder
+from dzdesign.core.artefact_files import check_folder_may_be_written, sha256_of, to_json, write_file, write_folder
+from dzdesign.core.artefact_types import as_document
 from dzdesign.core.errors import InputError
 from dzdesign.core.units import parse_quantity
 from dzdesign.example import example_folder
@@ -18,6 +19,7 @@ RECORD = {"valve": "simulated by dzdesign, no measurement"}
 def run_demo(args: argparse.Namespace) -> int:
     """Run the pipeline on the bundled ramp tests and print the closing table."""
     from dzdesign.codegen.project import DEFAULT_TARGET, generate, target_named
+    from dzdesign.core.artefact_types import to_json_bytes
     from dzdesign.derivation.account.account import verify_statements
     from dzdesign.design.compensator_file import compensator_document
     from dzdesign.design.designing import design
@@ -28,7 +30,7 @@ def run_demo(args: argparse.Namespace) -> int:
     from dzdesign.report.valve_report import with_report
     from dzdesign.terminal.tables import print_demo
     from dzdesign.verify.closed_loop.plant import read_plant
-    from dzdesign.verify.verification import SCHEMA, evidence_files, verify
+    from dzdesign.verify.verification import evidence_files, evidence_manifest, verify
 
     folder = Path(args.folder)
     for part in ("firmware", "evidence"):
@@ -52,11 +54,11 @@ def run_demo(args: argparse.Namespace) -> int:
         )
         stage(f"identifying the valve from {len(tests)} simulated ramp tests")
         valve = identify(tests, meter, RECORD)
-        valve_json = to_json(valve.to_document())
+        valve_json = to_json_bytes(valve)
         write_file(folder / "valve.json", valve_json)
         stage("designing the compensator")
         options = options_of({}, target_named(DEFAULT_TARGET).inputs())
-        compensator = design(valve, options, valve_json.encode())
+        compensator = design(valve, options, valve_json)
         compensator_json = to_json(compensator_document(compensator))
         write_file(folder / "compensator.json", compensator_json)
         firmware = generate(compensator, DEFAULT_TARGET, compensator_json.encode())
@@ -64,11 +66,11 @@ def run_demo(args: argparse.Namespace) -> int:
         source = "plant.toml of the example"
         verification = verify(folder / "firmware", plant, source, digest, say=stage, watch=stage.each)
     verification = with_regenerated(verification, folder / "firmware")
-    manifest = {"schema": SCHEMA, "tool": TOOL, "made_from": verification.document["made_from"]}
+    manifest = evidence_manifest(verification.evidence)
     evidence = with_report(evidence_files(verification), folder / "firmware", folder / "evidence")
     write_folder(folder / "evidence", evidence, manifest)
     if args.json:
-        print(to_json(verification.document), end="")
+        print(to_json(as_document(verification.evidence)), end="")
     else:
         print_demo(valve, verification, str(folder))
     return 0 if verification.holds and expected == len(verdicts) else 1

@@ -2,12 +2,12 @@
 
 import argparse
 import re
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dzdesign.command_line.identify_options import identify_options, record_of
 from dzdesign.core.artefact_files import (
-    TOOL,
     check_file_may_be_written,
     check_folder_may_be_written,
     parse_document,
@@ -25,6 +25,9 @@ from dzdesign.recordings import check_plots, read_recordings, refuse_copies
 from dzdesign.regeneration import with_regenerated
 from dzdesign.terminal.progress import say, stages, with_bar
 
+if TYPE_CHECKING:
+    from dzdesign.verify.evidence import MutationScore
+
 
 def _seed(text: str) -> int:
     if not re.fullmatch(r"\d{1,18}", text, re.ASCII):
@@ -34,6 +37,7 @@ def _seed(text: str) -> int:
 
 def run_identify(args: argparse.Namespace) -> int:
     """Identify a valve from ramp tests."""
+    from dzdesign.core.artefact_types import to_json_bytes
     from dzdesign.identify.identification import identify_sides
     from dzdesign.identify.valve.model import SCHEMA
     from dzdesign.terminal.tables import print_valve
@@ -41,15 +45,13 @@ def run_identify(args: argparse.Namespace) -> int:
     options, record = identify_options(args), record_of(args.record)
     check_file_may_be_written(Path(args.output), SCHEMA)
     check_plots(args.plots, Path(args.output))
-    tests = read_recordings(
-        args.ramps, u_max=options.u_max, columns=args.columns, dp=args.dp, skip_rows=args.skip_rows
-    )
+    tests = read_recordings(args.ramps, u_max=options.u_max, columns=args.columns, dp=args.dp, skip_rows=args.skip_rows)
     refuse_copies(tests)
     with stages() as stage:
         stage(f"fitting {len(tests)} recording{'s' if len(tests) > 1 else ''}")
         found = identify_sides(tests, options, record)
-    document = found.model.to_document()
-    write_file(Path(args.output), to_json(document), SCHEMA)
+    content = to_json_bytes(found.model)
+    write_file(Path(args.output), content, SCHEMA)
     if args.plots:
         from dzdesign.identify.plots.valve_plots import plot_files
 
@@ -58,7 +60,7 @@ def run_identify(args: argparse.Namespace) -> int:
             drawn = plot_files(found)
         write_files(Path(args.plots), drawn, "--plots")
     if args.json:
-        print(to_json(document), end="")
+        print(content.decode(), end="")
     else:
         print_valve(found.model)
         print(one_line(f"Written: {args.output}" + (f", plots in {args.plots}" if args.plots else "")))
@@ -68,11 +70,12 @@ def run_identify(args: argparse.Namespace) -> int:
 def _design(valve_path: Path, content: bytes, args: argparse.Namespace) -> "Compensator":  # noqa: F821
     from dzdesign.codegen.project import target_named
     from dzdesign.command_line.design_options import design_options
+    from dzdesign.core.artefact_reading import read_artefact
     from dzdesign.design.designing import design
-    from dzdesign.identify.valve.valve_file import valve_from_document
+    from dzdesign.identify.valve.model import ValveModel
 
     options = design_options(args, target_named(args.target).inputs())
-    return design(valve_from_document(content, str(valve_path)), options, content)
+    return design(read_artefact(content, ValveModel, str(valve_path)), options, content)
 
 
 def run_design(args: argparse.Namespace) -> int:
@@ -158,8 +161,8 @@ def run_verify(args: argparse.Namespace) -> int:
     from dzdesign.terminal.tables import print_firmware_mutants, print_verification
     from dzdesign.verify.closed_loop.plant import read_plant
     from dzdesign.verify.closed_loop.tolerances import read_tolerances
-    from dzdesign.verify.firmware.c2000ware import check_against_c2000ware, with_check
-    from dzdesign.verify.verification import SCHEMA, evidence_files, verify
+    from dzdesign.verify.firmware.c2000ware import check_against_c2000ware
+    from dzdesign.verify.verification import SCHEMA, evidence_files, evidence_manifest, verify
 
     output = Path(args.output)
     check_folder_may_be_written(output, SCHEMA)
@@ -181,7 +184,7 @@ def run_verify(args: argparse.Namespace) -> int:
 
         with stages() as stage:
             stage("comparing the machine code of other processors with the exact law, in simulators")
-            added += machine_code_checks(firmware, verification.inputs)
+            added += machine_code_checks(firmware, verification.evidence.inputs)
     if args.proof:
         from dzdesign.verify.analysis.frama_c import proof_check
 
@@ -193,14 +196,13 @@ def run_verify(args: argparse.Namespace) -> int:
         from dzdesign.verify.analysis.mutation import mutation_check
 
         added.append(mutation_check(mutants))
-    for check in added:
-        verification = with_check(verification, check)
+    verification = verification.with_checks(*added)
     if mutants:
-        verification.document["mutants"] = mutants
-    manifest = {"schema": SCHEMA, "tool": TOOL, "made_from": verification.document["made_from"]}
+        verification = replace(verification, evidence=replace(verification.evidence, mutants=mutants))
+    manifest = evidence_manifest(verification.evidence)
     write_folder(output, with_report(evidence_files(verification), firmware, output), manifest)
     if args.json:
-        print(to_json(verification.document), end="")
+        print(to_json(as_document(verification.evidence)), end="")
     else:
         print_verification(verification)
         if mutants:
@@ -209,15 +211,15 @@ def run_verify(args: argparse.Namespace) -> int:
     return 0 if verification.holds else 1
 
 
-def _firmware_mutants(firmware: Path) -> dict[str, Any]:
+def _firmware_mutants(firmware: Path) -> "MutationScore":
     """Make the firmware's core wrong in every place, and return what verify says to each."""
-    from dzdesign.verify.analysis.mutation import MutationBench, all_mutants, judge_all, mutation_document
+    from dzdesign.verify.analysis.mutation import MutationBench, all_mutants, judge_all, mutation_score
 
     bench = MutationBench(firmware)
     mutants = all_mutants(bench)
     say(f"checking the core with {len(mutants)} faults, one at a time")
     bench.check_original()
-    return mutation_document(judge_all(bench, mutants, lambda work: with_bar(work, "mutants")))
+    return mutation_score(judge_all(bench, mutants, lambda work: with_bar(work, "mutants")))
 
 
 def run_simulate(args: argparse.Namespace) -> int:

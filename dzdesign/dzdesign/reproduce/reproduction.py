@@ -84,6 +84,7 @@ def run_chain(valve: "RecoveredValve", say: Callable[[str], None] = lambda _: No
     """
     from dzdesign.codegen.project import generate
     from dzdesign.core.artefact_files import parse_document
+    from dzdesign.core.artefact_types import to_json_bytes
     from dzdesign.design.compensator_file import SCHEMA as COMPENSATOR_SCHEMA
     from dzdesign.design.compensator_file import compensator_document
     from dzdesign.design.designing import design
@@ -98,8 +99,8 @@ def run_chain(valve: "RecoveredValve", say: Callable[[str], None] = lambda _: No
         ramps = _ramp_tests(valve, bench)
         say(f"{name}: identify, design, codegen")
         identified = identify(_read_all(ramps, Path(scratch)), identify_options(valve))
-        valve_json = to_json(identified.to_document())
-        compensator = design(identified, valve_bytes=valve_json.encode())
+        valve_json = to_json_bytes(identified)
+        compensator = design(identified, valve_bytes=valve_json)
         compensator_json = to_json(compensator_document(compensator))
         firmware = generate(compensator, "host", compensator_json.encode())
         write_folder(Path(scratch) / "firmware", firmware.files, firmware.manifest)
@@ -120,7 +121,7 @@ def run_chain(valve: "RecoveredValve", say: Callable[[str], None] = lambda _: No
             "bench": asdict(bench),
             "sha256": {
                 "ramp_tests": {file: sha256_of(content) for file, content in ramps.items()},
-                "valve_json": sha256_of(valve_json.encode()),
+                "valve_json": sha256_of(valve_json),
                 "compensator_json": sha256_of(compensator_json.encode()),
                 "core": {path: sha256_of(text.encode()) for path, text in core.items()},
             },

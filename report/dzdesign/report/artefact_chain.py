@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, TOOL, parse_document, sha256_of, to_json
+from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.documents import written_by
 from dzdesign.core.errors import InputError
 from dzdesign.core.shape import check_shape
@@ -16,7 +17,7 @@ from dzdesign.design.compensator_file import SCHEMA as COMPENSATOR_SCHEMA
 from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.design.redesign_check import prove_derived
 from dzdesign.identify.valve.model import SCHEMA as VALVE_SCHEMA
-from dzdesign.identify.valve.valve_file import valve_from_document
+from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.artefact_folder import (
     EVIDENCE_SCHEMA,
     FIRMWARE_SCHEMA,
@@ -24,7 +25,8 @@ from dzdesign.report.artefact_folder import (
     is_of,
     listing,
 )
-from dzdesign.report.shapes import ASSESSMENT, FIRMWARE, LATER, REPRODUCTION, VERIFICATION
+from dzdesign.report.shapes import ASSESSMENT, FIRMWARE, LATER, REPRODUCTION
+from dzdesign.verify.evidence import Evidence
 
 ASSESSMENT_SCHEMA, REPRODUCTION_SCHEMA = "dzdesign.assessment/1", "dzdesign.reproduction/1"
 #: Kinds of artefact, from the evidence back to the recordings.
@@ -36,6 +38,7 @@ ROLES = {
     "assessment": "assessment of recordings",
     "reproduction": "the paper's numbers",
 }
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Artefact:
@@ -84,6 +87,11 @@ class Chain:
         """Return the content of an artefact, or None if it is missing."""
         found = self.artefacts.get(role)
         return None if found is None else found.document
+
+    def evidence(self) -> Evidence:
+        """Return the evidence; only where there is a document of it."""
+        one = self.artefacts["verification"]
+        return read_artefact(to_json(one.document).encode(), Evidence, one.name)
 
 
 def chain_of(shelf: Mapping[str, bytes], *, own: tuple[str, ...] = ("",), sealed: bool = True) -> Chain:
@@ -140,9 +148,7 @@ class _Search:
         if not self.sealed:
             self.missing += self.faults
             self.faults = []
-        return Chain(
-            artefacts=self.found, curves=curves, faults=tuple(self.faults), missing=tuple(self.missing)
-        )
+        return Chain(artefacts=self.found, curves=curves, faults=tuple(self.faults), missing=tuple(self.missing))
 
     # one artefact after the other -------------------------------------------------------------------------------
 
@@ -293,8 +299,7 @@ class _Search:
             (
                 name
                 for name, content in self.shelf.items()
-                if is_of(content, schema)
-                and (schema == FIRMWARE_SCHEMA or name.rpartition("/")[2] != MANIFEST_NAME)
+                if is_of(content, schema) and (schema == FIRMWARE_SCHEMA or name.rpartition("/")[2] != MANIFEST_NAME)
             ),
             None,
         )
@@ -340,7 +345,7 @@ def _origin(artefact: Artefact) -> str:
 
 #: Schema and shape of each kind.
 SCHEMAS = {
-    "verification": (EVIDENCE_SCHEMA, VERIFICATION),
+    "verification": (EVIDENCE_SCHEMA, {}),
     "firmware": (FIRMWARE_SCHEMA, FIRMWARE),
     "compensator": (COMPENSATOR_SCHEMA, {}),
     "valve": (VALVE_SCHEMA, {}),
@@ -361,8 +366,8 @@ def _checked(role: str, content: bytes, name: str) -> dict[str, Any]:
         compensator = compensator_from_document(content, name)
         if document.get("tool") == TOOL:  # another version may have chosen other tables
             prove_derived(compensator)
+    if role == "verification":
+        read_artefact(content, Evidence, name)
     if role == "valve":
-        valve_from_document(content, name)
+        read_artefact(content, ValveModel, name)
     return document
-
-

@@ -7,6 +7,7 @@ from typing import Any
 from dzdesign.core.artefact_files import to_json
 from dzdesign.core.errors import InputError
 from dzdesign.core.units import chance
+from dzdesign.core.verdicts import NOT_CHECKED
 from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.design.signal_descriptions import signals_in_words
 from dzdesign.report.artefact_chain import Chain
@@ -29,7 +30,7 @@ from dzdesign.report.sections.tables import (
     thresholds_table,
 )
 from dzdesign.verify.closed_loop.evidence_curves import closed_loop_name, input_map_name, read_curves, zero_command_name
-from dzdesign.verify.requirements import required_of
+from dzdesign.verify.requirements import requirement_statuses
 
 #: Anchor and heading of every section, in their order.
 SECTIONS = (
@@ -206,7 +207,7 @@ def _inputs_section(chain: Chain) -> Section:
                 guard = compensator["sides"][side]["certificate"]["guard"]
                 figures.append(zero_figure(curves, chain.curves[name], side, guard))
     if not evidence["inputs"]:
-        missing = "NOT CHECKED: the C did not compile or did not run, see the requirements."
+        missing = f"{NOT_CHECKED}: the C did not compile or did not run, see the requirements."
     return Section(figures=tuple(figures), lines=tuple(lines), missing=missing)
 
 
@@ -216,7 +217,7 @@ def _loop_section(chain: Chain) -> Section:
         return Section(missing="No evidence is here: `dzdesign verify` runs the closed loop.")
     loop = evidence["closed_loop"]
     if not loop["pressures"]:
-        return Section(missing="NOT CHECKED: the closed loop did not run, see the requirements.")
+        return Section(missing=f"{NOT_CHECKED}: the closed loop did not run, see the requirements.")
     sides = list(dict.fromkeys(each["side"] for each in loop["pressures"]))
     figures, missing = [], ""
     for side in sides:
@@ -269,8 +270,8 @@ def _acceptance_section(chain: Chain) -> Section:
 def _checks_section(chain: Chain) -> Section:
     evidence = chain.document("verification")
     if evidence is None:
-        return Section(missing="NOT CHECKED: no evidence is here; `dzdesign verify` makes it.")
-    return Section(tables=(checks_table(evidence, required_of(evidence)),))
+        return Section(missing=f"{NOT_CHECKED}: no evidence is here; `dzdesign verify` makes it.")
+    return Section(tables=(checks_table(evidence, requirement_statuses(chain.evidence())),))
 
 
 def _warnings_section(chain: Chain) -> Section:

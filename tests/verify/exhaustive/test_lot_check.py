@@ -23,10 +23,9 @@ from dzdesign.design.redesign_check import prove_derived
 from dzdesign.identify.identification import identify
 from dzdesign.report.artefact_chain import Artefact, Chain
 from dzdesign.report.sections.lot_setting import lot_costs, lot_figures, lot_section
-from dzdesign.verify.checks import lot_checked
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
-from dzdesign.verify.exhaustive.lot_check import check_lot
+from dzdesign.verify.exhaustive.lot_check import check_lot, lot_checked
 from dzdesign.verify.exhaustive.test_vectors import differences
 from dzdesign.verify.exhaustive.zero_command import zero_command_margins
 from tests.support.synthetic import Truth, needs_compiler, synthetic_ramp
@@ -204,7 +203,7 @@ def test_the_command_fails_and_names_the_valve(common, tmp_path, capsys):
     folder, _ = firmware_of(with_bound(common.compensator, "c", 1, -1.0), tmp_path / "firmware")
     assert main(["verify", str(folder), "-o", str(tmp_path / "evidence")]) == 1
     said = " ".join(capsys.readouterr().out.split())
-    assert "FAILS no over-compensation of any valve of the lot: 4 of 4 valves" in said
+    assert "DOES NOT HOLD no over-compensation of any valve of the lot: 4 of 4 valves" in said
     evidence = json.loads((tmp_path / "evidence" / "verification.json").read_text(encoding="utf-8"))
     assert evidence["holds"] is False and evidence["inputs"][0]["lot"]["over_compensated"] == ["c"]
     assert "1 over-compensated: c" in (tmp_path / "evidence" / "report.html").read_text(encoding="utf-8")

@@ -3,8 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-#: What a verdict is called and which sign stands beside it: colour is never the only carrier.
-VERDICTS = {True: ("holds", "✓"), False: ("DOES NOT HOLD", "✗"), None: ("NOT CHECKED", "?")}
+from dzdesign.core.verdicts import verdict_words
+
+#: The sign beside a verdict: colour is never the only carrier.
+SIGNS = {True: "✓", False: "✗", None: "?"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,8 +117,7 @@ def verdict(holds: bool | None) -> Cell:
     holds : bool or None
         None: not checked.
     """
-    words, sign = VERDICTS[holds]
-    return Cell(text=f"{sign} {words}", kind={True: "good", False: "bad", None: "open"}[holds])
+    return Cell(text=f"{SIGNS[holds]} {verdict_words(holds)}", kind={True: "good", False: "bad", None: "open"}[holds])
 
 
 def text_row(cells: Sequence[str]) -> tuple[Cell, ...]:

@@ -8,7 +8,7 @@ from dzdesign.core.documents import written_by
 from dzdesign.report.artefact_chain import ROLES, SCHEMAS, Chain
 from dzdesign.report.figures.figure import csv_text
 from dzdesign.report.sections.cells import Cell, Table, number, text_row, verdict, whole
-from dzdesign.verify.requirements import Required
+from dzdesign.verify.requirements import RequirementStatus
 
 #: Rows of a constant's table that stand in the page; all of them stand in the CSV.
 SHOWN_ROWS = 3
@@ -154,23 +154,23 @@ def _wanted_offset(valve_side: dict[str, Any], guard: str) -> float:
     return curves[guard]["u_min0_V"] if guard in curves else valve_side["reference"]["u_min_V"]
 
 
-def checks_table(evidence: dict[str, Any], required: tuple[Required, ...]) -> Table:
+def checks_table(evidence: dict[str, Any], statuses: tuple[RequirementStatus, ...]) -> Table:
     """Return every requirement with its verdict, then what was not tried.
 
     Parameters
     ----------
     evidence : dict
         verification.json.
-    required : tuple of Required
-        Of `required_of`.
+    statuses : tuple of RequirementStatus
+        Of `requirement_statuses`.
     """
     rows = [
         (verdict(check["holds"]), Cell(text=check["name"]), Cell(text=check["text"])) for check in evidence["checks"]
     ]
-    untried = [each for each in required if not each.done]
+    untried = [each for each in statuses if not each.tried]
     for each in untried:
         how = f"to try it: {each.how}".replace("`", "")
-        rows.append((Cell(text="– not tried", kind="open"), Cell(text=each.name), Cell(text=how)))
+        rows.append((verdict(None), Cell(text=each.title), Cell(text=how)))
     return Table(
         caption=f"{len(evidence['checks'])} requirements tried, {len(untried)} not",
         columns=("verdict", "requirement", "figures"),
@@ -277,7 +277,7 @@ def series_table(series: dict[str, Any] | None) -> Table | None:
     rows = []
     for each in series["pressures"]:
         spreads = [
-            [by * each["quantiles"][key][quantile] for quantile in ("0.5", "0.01", "0.99")]
+            [by * each[key][quantile] for quantile in ("p50", "p01", "p99")]
             for key, by in (("residual_opening", 100), ("residual_closing", 100), ("q_zero_L_min", 1))
         ]
         rows.append(
