@@ -22,7 +22,7 @@ def run(arguments: Arguments, json: bool) -> int:
         print(to_json(as_document(verification.evidence)), end="")
         return 0 if verification.holds else 1
     from dzdesign.report.valve_report import REPORT_NAME
-    from dzdesign.terminal.tables import print_firmware_mutants, print_verification
+    from dzdesign.terminal.verification_tables import print_firmware_mutants, print_verification
 
     print_verification(verification)
     if mutants := verification.evidence.mutants:
