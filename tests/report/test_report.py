@@ -15,11 +15,10 @@ from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.identify.identification import identify
 from dzdesign.report.artefact_chain import chain_of
-from dzdesign.report.artefact_folder import shelf_of
-from dzdesign.report.body import SECTIONS
+from dzdesign.report.artefact_folder import read_artefact_folder
 from dzdesign.report.figures.figure import PALETTE, csv_text
 from dzdesign.report.summary import headline, worst_of
-from dzdesign.report.valve_report import REPORT_NAME, report_of_folder
+from dzdesign.report.valve_report import REPORT_NAME, SECTIONS, report_of_folder
 from dzdesign.verify.closed_loop.plant import Plant
 from tests.support.page_reader import HOSTILE, Page
 from tests.support.synthetic import Truth, needs_compiler, synthetic_ramp
@@ -70,7 +69,7 @@ def test_every_section_is_there_with_its_figures_and_tables(html):
     page = Page(html)
     ids = [attributes["id"] for _, attributes in page.tags if "id" in attributes]
     assert len(ids) == len(set(ids))
-    assert [name for name, _ in SECTIONS] == [name for name in ids if name in dict(SECTIONS)]
+    assert [name for name, _ in SECTIONS if name != "lot"] == [name for name in ids if name in dict(SECTIONS)]
     figures = ("fit", "thresholds", "beta", "law", "map", "zero", "dead-zone", "loop")
     assert [f"figure-{name}-positive" for name in figures] == [name for name in ids if name.startswith("figure-")]
     links = [each["href"] for each in page.of("a")]
@@ -118,9 +117,9 @@ def test_figures_take_their_colours_from_the_page(html):
 
 def test_same_input_same_bytes_whichever_folder_is_named(reported_demo, html, copied):
     assert report_of_folder(copied).html == html
-    chain = chain_of(shelf_of(copied))
+    chain = chain_of(read_artefact_folder(copied))
     for folder in (reported_demo, reported_demo / "evidence", reported_demo / "firmware"):
-        assert chain_of(shelf_of(folder)) == chain
+        assert chain_of(read_artefact_folder(folder)) == chain
 
 
 def test_report_makes_the_page_again_and_the_folder_still_fits(copied, capsys):
@@ -245,7 +244,7 @@ def test_a_compensator_that_was_edited_by_hand_is_found(copied):
 
 def test_of_a_firmware_its_own_evidence_is_taken(copied):
     """Two firmware folders side by side, each with its evidence: the one that was named decides."""
-    chain = chain_of(shelf_of(copied / "firmware"))
+    chain = chain_of(read_artefact_folder(copied / "firmware"))
     for stage in ("firmware", "evidence"):
         shutil.copytree(copied / stage, copied / f"{stage}_b")
     manifest = change_json(copied / "firmware_b" / MANIFEST_NAME, lambda each: each.update(note="another"))
@@ -257,10 +256,10 @@ def test_of_a_firmware_its_own_evidence_is_taken(copied):
         copied / "evidence_b" / MANIFEST_NAME,
         lambda each: each["files"].update({"verification.json": sha256_of(content)}),
     )
-    assert chain_of(shelf_of(copied / "firmware")) == chain
-    other = chain_of(shelf_of(copied / "firmware_b"))
-    assert other.artefacts["verification"].name == "evidence_b/verification.json"
-    assert other.artefacts["firmware"].sha256 == digest and not other.faults
+    assert chain_of(read_artefact_folder(copied / "firmware")) == chain
+    other = chain_of(read_artefact_folder(copied / "firmware_b"))
+    assert other.places["evidence"].name == "evidence_b/verification.json"
+    assert other.places["firmware"].sha256 == digest and not other.faults
 
 
 def test_what_was_not_tried_is_said(copied):
@@ -330,7 +329,7 @@ def spoil(path: Path) -> None:
 )
 def test_a_file_that_was_changed_is_said_and_no_verdict_stands(copied, name, said):
     spoil(copied / name)
-    chain = chain_of(shelf_of(copied))
+    chain = chain_of(read_artefact_folder(copied))
     assert any(said in fault for fault in chain.faults), chain.faults
     assert headline(chain).kind == "bad" and "No verdict stands" in headline(chain).text
 
@@ -345,14 +344,14 @@ def test_a_page_of_files_that_do_not_fit_says_so_first(copied):
 
 def test_artefacts_are_found_by_their_hash_and_not_by_their_name(copied):
     (copied / "valve.json").rename(copied / "bench_7.json")
-    found = chain_of(shelf_of(copied)).artefacts["valve"]
+    found = chain_of(read_artefact_folder(copied)).places["valve"]
     assert found.name == "bench_7.json"
     other = json.loads((copied / "bench_7.json").read_bytes())
     other["u_max_V"] = 11.0
     (copied / "bench_7.json").unlink()
     (copied / "valve.json").write_text(to_json(other))
-    chain = chain_of(shelf_of(copied))  # the compensator holds its valve; the file beside it is another
-    assert chain.document("valve")["u_max_V"] == 10.0
+    chain = chain_of(read_artefact_folder(copied))  # the compensator holds its valve; the file beside it is another
+    assert chain.valve.u_max_V == 10.0
     assert [fault for fault in chain.faults if "valve.json has the SHA-256" in fault]
 
 
@@ -360,7 +359,7 @@ def test_a_manifest_reaches_no_file_outside_its_folder(copied, tmp_path):
     (tmp_path / "secret.txt").write_text("secret")
     outside = {"../../secret.txt": "0", str(tmp_path / "secret.txt"): "0"}
     change_json(copied / "firmware" / MANIFEST_NAME, lambda manifest: manifest["files"].update(outside))
-    assert not [name for name in shelf_of(copied) if "secret" in name]
+    assert not [name for name in read_artefact_folder(copied) if "secret" in name]
 
 
 # --- parts of a chain ------------------------------------------------------------------------------------------------
@@ -399,17 +398,17 @@ def test_evidence_of_an_earlier_version_without_curves(copied):
 
 def test_a_neighbour_that_can_not_be_read_does_not_hinder_the_rest(copied):
     (copied / "assessment.json").write_text('{"schema": "dzdesign.assessment/1", "holds": 3}')
-    chain = chain_of(shelf_of(copied))
+    chain = chain_of(read_artefact_folder(copied))
     assert headline(chain).kind == "good"
     assert [line for line in chain.missing if "assessment.json' lacks the key 'tool'" in line]
 
 
 def test_of_two_pieces_of_evidence_one_must_be_named(copied):
-    chain = chain_of(shelf_of(copied))
+    chain = chain_of(read_artefact_folder(copied))
     shutil.copytree(copied / "evidence", copied / "evidence of May")
     with pytest.raises(InputError, match=r"more than one piece of evidence, .* evidence of May/verification\.json"):
         report_of_folder(copied)
-    assert chain_of(shelf_of(copied / "evidence")) == chain
+    assert chain_of(read_artefact_folder(copied / "evidence")) == chain
 
 
 def test_a_folder_without_artefacts_is_refused(tmp_path):
@@ -471,9 +470,9 @@ def test_numbers_of_a_figure_are_a_table_whatever_stands_in_them():
 
 
 def test_the_headline_is_good_only_if_all_was_checked(copied):
-    assert headline(chain_of(shelf_of(copied))).kind == "good"
+    assert headline(chain_of(read_artefact_folder(copied))).kind == "good"
     change_evidence(copied, lambda evidence: evidence.update(checks=[]))
-    assert headline(chain_of(shelf_of(copied))).kind == "open"
+    assert headline(chain_of(read_artefact_folder(copied))).kind == "open"
 
 
 def test_a_series_of_plants_is_shown(copied):
