@@ -9,17 +9,32 @@ from urllib.parse import unquote
 
 import pytest
 
+from dzdesign.assess.assessment import (
+    Assessment,
+    BeforeAfter,
+    MeterTaken,
+    PressureAssessment,
+    RampSet,
+    Recording,
+    Request,
+)
+from dzdesign.assess.limits import LimitResult
+from dzdesign.assess.quantities import Quantity, Reading
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of, to_json
-from dzdesign.core.artefact_types import to_json_bytes
+from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.artefact_types import THIS_TOOL, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.identify.identification import identify
+from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.artefact_chain import chain_of
 from dzdesign.report.artefact_folder import read_artefact_folder
 from dzdesign.report.figures.figure import PALETTE, csv_text
+from dzdesign.report.reproduction import Outcome, PaperNumber, Reproduction
 from dzdesign.report.summary import headline, worst_of
 from dzdesign.report.valve_report import REPORT_NAME, SECTIONS, report_of_folder
 from dzdesign.verify.closed_loop.plant import Plant
+from dzdesign.verify.evidence import PressureResult
 from tests.support.page_reader import HOSTILE, Page
 from tests.support.synthetic import Truth, needs_compiler, synthetic_ramp
 
@@ -171,21 +186,37 @@ def test_what_was_not_checked_is_not_green(copied):
 
 
 def test_a_missed_limit_of_recordings_does_not_hold(copied):
-    valve = json.loads((copied / "valve.json").read_bytes())
-    assessment = {
-        "schema": "dzdesign.assessment/1", "tool": valve["tool"], "made_from": valve["made_from"], "holds": False,
-        "quantities": {"hysteresis": {"name": "hysteresis", "unit": "%", "formula": "f"}},
-        "pressures": [{"side": "positive", "dp_MPa": 1.0, "quantities": {"hysteresis": {"before": None, "after": {
-            "value": 4.5, "se": None, "at_most": None}}}}],
-        "limits": [{"quantity": "hysteresis", "place": "1 MPa", "limit": 4.0, "unit": "%", "holds": False,
-                    "text": "4.5 %, more than 4 %"}],
-        "notes": [],
-    }  # fmt: skip
-    (copied / "assessment.json").write_text(to_json(assessment))
+    valve = read_artefact((copied / "valve.json").read_bytes(), ValveModel, "valve.json")
+    after = Reading(value=4.5, se=None, at_most=None, not_observable=None, note=None, where=None)
+    ramps = RampSet(source="ramp.csv", ramps=("ramp.csv 1",), dp_MPa=1.0)
+    assessment = Assessment(
+        tool=THIS_TOOL,
+        made_from=tuple(Recording(source=each.source, sha256=each.sha256, set="before") for each in valve.made_from),
+        options=Request(
+            u_max_V=10.0, after_u_max_V=10.0, knee_window=(0.1, 0.5), linearity_window=(0.1, 0.9), level_L_min=None,
+            level_share=0.01, same_pressure_within=0.05,
+        ),
+        meter=MeterTaken(floor_L_min=0.1, lag_s=0.0, lag_is="unknown"),
+        quantities={"hysteresis": Quantity(name="hysteresis", unit="%", formula="f")},
+        pressures=(
+            PressureAssessment(
+                side="positive", dp_MPa=1.0, level_L_min=0.1, rated_flow_L_min=15.0, before=ramps, after=ramps,
+                quantities={"hysteresis": BeforeAfter(before=None, after=after, change=None)},
+            ),
+        ),
+        limits=(
+            LimitResult(
+                quantity="hysteresis", place="1 MPa", limit=4.0, unit="%", holds=False, text="4.5 %, more than 4 %"
+            ),
+        ),
+        notes=(),
+    )  # fmt: skip
+    (copied / "assessment.json").write_bytes(to_json_bytes(assessment))
     report = report_of_folder(copied)
     assert report.kind == "bad" and "4.5 %, more than 4 %" in report.html
-    assessment["made_from"] = [{"source": "other.csv", "sha256": "0" * 64}]
-    (copied / "assessment.json").write_text(to_json(assessment))
+    assert "hysteresis</td><td class=\"number\">–</td><td class=\"number\">4.50</td>" in report.html
+    other = replace(assessment, made_from=(Recording(source="other.csv", sha256="0" * 64, set="before"),))
+    (copied / "assessment.json").write_bytes(to_json_bytes(other))
     report = report_of_folder(copied)  # of another valve that lies about: said, not shown, and no fault of this one
     assert any("compares others, so it is not shown" in line for line in report.missing)
     assert report.kind == "good" and "4.5 %, more than 4 %" not in report.html
@@ -290,20 +321,18 @@ def test_the_plant_of_the_tests_stands_in_the_closed_loop(copied):
 
 
 def test_the_papers_numbers_are_shown_where_they_lie(copied):
-    row = {
-        "valve": "first valve", "quantity": "dead zone", "unit": "%", "dp_MPa": 1.0, "published": "53.9",
-        "outcomes": [{"by": "product", "value": 54.1, "difference": 0.2, "holds": False}], "tolerance": "0.1",
-        "why": "because", "holds": False,
-    }  # fmt: skip
-    tool = {"name": "dzdesign", "version": "0"}
-    document = {"schema": "dzdesign.reproduction/1", "tool": tool, "paper": "doi", "holds": False, "rows": [row]}
+    ours = Outcome(by="product", value=54.1, difference=0.2, allowed=(53.8, 54.0))
+    row = PaperNumber(
+        valve="first valve", quantity="dead zone", unit="%", dp_MPa=1.0, published="53.9", in_fit=False,
+        outcomes=(ours,), tolerance="0.1", why="because",
+    )  # fmt: skip
+    paper = Reproduction(tool=THIS_TOOL, made_from=(), paper="10.1/x", numbers=(row,), valves=())
     folder = copied / "paper"
     folder.mkdir()
-    content = to_json({**document, "valves": []})
-    (folder / "reproduction.json").write_text(content)
+    content = to_json_bytes(paper)
+    (folder / "reproduction.json").write_bytes(content)
     # As `reproduce -o` writes it: of the same schema, and before it in the alphabet.
-    listing = {"reproduction.json": sha256_of(content.encode())}
-    manifest = {"schema": "dzdesign.reproduction/1", "tool": tool, "files": listing}
+    manifest = {"schema": paper.schema, "tool": asdict(THIS_TOOL), "files": {"reproduction.json": sha256_of(content)}}
     (folder / MANIFEST_NAME).write_text(to_json(manifest))
     html = report_of_folder(copied).html
     assert "lacks the key" not in html
@@ -400,7 +429,7 @@ def test_a_neighbour_that_can_not_be_read_does_not_hinder_the_rest(copied):
     (copied / "assessment.json").write_text('{"schema": "dzdesign.assessment/1", "holds": 3}')
     chain = chain_of(read_artefact_folder(copied))
     assert headline(chain).kind == "good"
-    assert [line for line in chain.missing if "assessment.json' lacks the key 'tool'" in line]
+    assert [line for line in chain.missing if "assessment of recordings: 'assessment.json'" in line]
 
 
 def test_of_two_pieces_of_evidence_one_must_be_named(copied):
@@ -471,7 +500,7 @@ def test_numbers_of_a_figure_are_a_table_whatever_stands_in_them():
 
 def test_the_headline_is_good_only_if_all_was_checked(copied):
     assert headline(chain_of(read_artefact_folder(copied))).kind == "good"
-    change_evidence(copied, lambda evidence: evidence.update(checks=[]))
+    change_evidence(copied, lambda evidence: evidence["checks"][0].update(holds=None) or evidence.update(holds=False))
     assert headline(chain_of(read_artefact_folder(copied))).kind == "open"
 
 
@@ -528,4 +557,9 @@ def test_figures_of_two_sides_say_which_they_are_of(reports):
     ],
 )
 def test_of_how_many_runs_a_figure_is_the_worst(sides, said):
-    assert worst_of([{"side": name, "dp_MPa": 1.0 + n} for name, count in sides.items() for n in range(count)]) == said
+    one = PressureResult(
+        side="positive", dp_MPa=1.0, dead_zone_opening=0.5, dead_zone_closing=0.5, residual_opening=0.1,
+        residual_closing=0.1, q_zero_L_min=0.0, q_zero_without_beta_L_min=0.0, q_max_direct_L_min=1.0, q_max_L_min=1.0,
+    )  # fmt: skip
+    runs = [replace(one, side=side, dp_MPa=1.0 + n) for side, count in sides.items() for n in range(count)]
+    assert worst_of(runs) == said

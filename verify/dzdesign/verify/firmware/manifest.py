@@ -57,7 +57,7 @@ def _faults_of_origin(
     if targets != {manifest.target}:
         there = " and ".join(sorted(targets)) or "no target"
         yield f"the manifest's target is {manifest.target}, but the files are those of {there}"
-    recordings = tuple(SourceFile(source=source, sha256=sha256) for source, sha256 in valve.made_from)
+    recordings = valve.made_from
     for key, stated, value in (
         ("made_from", manifest.made_from, (SourceFile(source="compensator.json", sha256=digest),)),
         ("origin.compensator_json", manifest.origin.compensator_json, digest),
