@@ -78,7 +78,7 @@ class JsonText(ABC):
 
 def quantity(
     unit: str,
-    description: str,
+    description: str | None = None,
     *,
     ge: float | None = None,
     gt: float | None = None,
@@ -91,8 +91,8 @@ def quantity(
     ----------
     unit : str
         As a person writes it, such as ``L/min``; ``1`` of a ratio.
-    description : str
-        One sentence.
+    description : str, optional
+        One sentence; a type of several fields leaves it to them.
     ge, gt, le, lt : float, optional
         Bounds: at least, above, at most, below. Only of an ``int`` or a ``float``; those of the items of a list stand
         in the annotation of the item.
