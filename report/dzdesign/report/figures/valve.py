@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dzdesign.core.artefact_files import to_json
+from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.report.figures.figure import (
     CYCLE,
     LIGHT,
@@ -18,7 +20,7 @@ from dzdesign.report.figures.figure import (
 )
 from dzdesign.report.sections.cells import counted
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
-from dzdesign.verify.exhaustive.zero_command import bounds_of
+from dzdesign.verify.exhaustive.zero_command import guarded_bounds
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -274,7 +276,8 @@ def law_figure(compensator: dict[str, Any], name: str, both: bool) -> ReportFigu
     both : bool
         Whether the valve has two sides.
     """
-    exact = ExactLaw(compensator, 1 if name == "positive" else -1)
+    typed = compensator_from_document(to_json(compensator).encode(), "compensator.json")
+    exact = ExactLaw(typed, 1 if name == "positive" else -1)
     u_max = float(Fraction(*compensator["u_max_V"]))
     sensor = compensator["signals"]["pressure_a"]
     code_MPa = float(Fraction(*sensor["span_MPa"])) / (sensor["full_code"] - sensor["zero_code"])
@@ -288,7 +291,7 @@ def law_figure(compensator: dict[str, Any], name: str, both: bool) -> ReportFigu
         volts = [u_max * float(count) / exact.compare_max for _, count in corners]
         axes.plot(percent, volts, dash, color=LIGHT[colour], lw=1.8, label=f"at {dp_MPa:.2f} MPa")
         rows += [[round(dp_MPa, 4), round(x, 4), round(y, 6)] for x, y in zip(percent, volts, strict=True)]
-    bound = min(bounds_of(compensator["valve"]["sides"][name], compensator["sides"][name]["certificate"]["guard"]))
+    bound = min(guarded_bounds(exact.compensator, exact.sign).lower_V)
     axes.axhline(bound, color=LIGHT["green"], lw=1.2, ls="-.", label="least lower bound of the threshold")
     axes.set(xlabel="command u_i (% of full)", ylabel="output u_O (V)", xlim=(0, 100), ylim=(0, None))
     axes.legend(loc="lower right")

@@ -7,7 +7,9 @@ from functools import cache
 from itertools import pairwise
 from typing import Any
 
+from dzdesign.core.artefact_files import to_json
 from dzdesign.core.verdicts import NOT_CHECKED
+from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.report.artefact_chain import Chain
 from dzdesign.report.figures.figure import csv_text
 from dzdesign.report.page import Section
@@ -67,16 +69,17 @@ def lot_costs(compensator: dict[str, Any]) -> tuple[LotCost, ...]:
     compensator : dict
         compensator.json of a common setting.
     """
+    typed = compensator_from_document(to_json(compensator).encode(), "compensator.json")
     signs = {name: sign for name, sign in (("positive", 1), ("negative", -1)) if compensator["sides"][name]}
     found = [
-        cost for name, sign in signs.items() for cost in _costs_of_side(compensator, ExactLaw(compensator, sign), name)
+        cost for name, sign in signs.items() for cost in _costs_of_side(compensator, ExactLaw(typed, sign), name)
     ]
     return tuple(sorted(found, key=lambda each: -each.most_percent))
 
 
 def _costs_of_side(compensator: dict[str, Any], exact: ExactLaw, name: str) -> Iterator[LotCost]:
     u_max = float(Fraction(*compensator["u_max_V"]))
-    code_MPa = float(Fraction(*exact.a["span_MPa"])) / (exact.a["full_code"] - exact.a["zero_code"])
+    code_MPa = float(exact.a.span_MPa) / (exact.a.full_code - exact.a.zero_code)
 
     @cache  # the valves of a lot are tested at the same few pressure drops
     def corners_at(dp_code: int) -> list[tuple[float, float]]:
