@@ -22,7 +22,7 @@ def valve_in(compensator: Compensator) -> ValveModel:
 
 def exact_law_of(compensator: Compensator, sign: int) -> ExactLaw:
     """Return the exact law of one sign of command."""
-    return ExactLaw(compensator_document(compensator), sign)
+    return ExactLaw(compensator, sign)
 
 
 def lot_sha256(compensator: Compensator) -> str:
