@@ -15,7 +15,7 @@ from dzdesign.identify.knees.prepared_tests import found_floor, split_recordings
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.pooling import SAME_PRESSURE, pool_ramps
 from dzdesign.identify.ramps.sides import tests_of_side
-from dzdesign.identify.reading.ramp_files import RampTest
+from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.model import SIDES, Warning_
 
 MPA, L_MIN = 1e6, 1e-3 / 60

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from dzdesign.identify.data_quality.quality import LIKELY_LAG
 from dzdesign.identify.data_quality.recordings import about_recordings
 from dzdesign.identify.knees.meter_lag import MeterLag
-from dzdesign.identify.reading.ramp_files import RampTest
+from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.model import Warning_
 
 if TYPE_CHECKING:

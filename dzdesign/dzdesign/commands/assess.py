@@ -19,7 +19,7 @@ from dzdesign.terminal.progress import say, stages
 
 if TYPE_CHECKING:
     from dzdesign.assess.assessment import Assessment, AssessOptions
-    from dzdesign.identify.reading.ramp_files import RampTest
+    from dzdesign.identify.reading.ramp_test import RampTest
 
 
 def run_assess(args: argparse.Namespace) -> int:

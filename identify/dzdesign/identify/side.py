@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.identify.constants import L_MIN, MPA
 from dzdesign.identify.data_quality.quality import find_warnings
 from dzdesign.identify.fitting.bounds import Trend, find_trend
 from dzdesign.identify.fitting.constrained_fits import KneeFit, fit_knees
@@ -22,9 +23,9 @@ from dzdesign.identify.fitting.guarding import (
     opening_curve,
     order_knees,
 )
-from dzdesign.identify.knees.prepared_tests import L_MIN, MPA, DescribedTest, DescribedTests, describe_tests
+from dzdesign.identify.knees.prepared_tests import DescribedTest, DescribedTests, describe_tests
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.reading.ramp_files import RampTest
+from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.model import BranchResult, SideModel, TestResult, Warning_
 
 #: dP0 names the tested pressure drop within this share of it.

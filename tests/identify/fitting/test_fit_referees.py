@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 from scipy.special import log_ndtr, logsumexp
-from tests.synthetic import L_MIN, Truth, synthetic_ramp
 
 from dzdesign.identify.fitting import constrained_fits as fit
 from dzdesign.identify.fitting.constrained_fits import fit_knees, fit_offset
@@ -15,6 +14,7 @@ from dzdesign.identify.knees.linear_region import lay_line, read_branch
 from dzdesign.identify.knees.prepared_tests import describe_tests
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.branches import bin_branch
+from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
 
 #: Clarabel's tolerances; the problems are scaled so that they mean 1e-10 V or less.
 TIGHT = {"tol_gap_abs": 1e-12, "tol_gap_rel": 1e-12, "tol_feas": 1e-12}

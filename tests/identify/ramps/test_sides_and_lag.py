@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.synthetic import L_MIN, MPA, Truth, synthetic_ramp
 
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import to_json
@@ -16,6 +15,7 @@ from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes
 from dzdesign.identify.valve.valve_file import valve_from_document
+from tests.support.synthetic import L_MIN, MPA, Truth, synthetic_ramp
 
 PRESSURES = (1.0, 2.0, 4.0)
 

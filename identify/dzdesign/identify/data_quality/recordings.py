@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from dzdesign.identify.reading.clock import ASSUMED_MS
-from dzdesign.identify.reading.ramp_files import RampTest
+from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.model import Warning_
 
 #: Files that a text lists.
