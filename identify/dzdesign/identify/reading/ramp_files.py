@@ -69,7 +69,7 @@ def read_ramp_file(
         sha256 = sha256_of_file(file)
         recording = _read_recording(read_table(file, path, skip_rows), columns or {}, u_max, dp)
     _refuse_too_few_rows(path, recording)
-    thinned = thin(recording.rows, u_max)
+    thinned = thin(recording.rows)
     time, u, q, *measured = (np.array(column) for column in thinned.rows)
     clock = recording.clock
     doubt = clock_doubt(time, u, unit_stated=bool(clock.unit)) if recording.may_count_ms else ""

@@ -20,7 +20,7 @@ class RampTest:
     dp_is_declared : bool
         True if the pressure drop is the engineer's word (one constant) and not a recording.
     rows_read, run : int
-        Complete rows in the file, and how many of them in a row were averaged to one sample (1: none were).
+        Complete rows in the file, and how many of them in a row became one sample, their median (1: none did).
     clock_doubt : str
         What is doubtful about the unit of the time, as `clock_doubt` gives it.
     simulated : bool
