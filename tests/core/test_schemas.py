@@ -8,14 +8,15 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from dzdesign.command_line.cli import main
-from dzdesign.commands.schema import SCHEMAS, schema_document
+from dzdesign.commands.schema import SCHEMAS, schema_document, schema_text
 from dzdesign.core.artefact_files import to_json, write_folder
 from dzdesign.identify.options import IdentifyOptions
-from tests.support.paths import GOLDENS_FULL
+from tests.support.paths import GOLDENS_FULL, TESTS
 from tests.support.schema_checks import overlooked, problems, resolved, wrong_documents
 from tests.support.synthetic import Truth, needs_compiler, synthetic_ramp
 
 GOLDENS = GOLDENS_FULL
+SCHEMA_GOLDENS = TESTS / "goldens" / "schemas"
 #: End of a key's name -> unit of its value.
 UNITS = {"_V": "V", "_MPa": "MPa", "_L_min": "L/min", "_L_min_V": "L/min/V", "_V_mm": "V/mm", "_Hz": "Hz", "_s": "s"}
 
@@ -119,6 +120,15 @@ def test_a_schema_is_of_the_draft_and_describes_every_key_with_its_unit(name):
     assert lacking == []
 
 
+@pytest.mark.parametrize("name", [name for name, (place, *_) in SCHEMAS.items() if ":" in place])
+def test_a_schema_is_the_one_that_was_reviewed(name, request):
+    """A type that changes changes what others read; `pytest tests/core/test_schemas.py --update-goldens`."""
+    kept = SCHEMA_GOLDENS / f"{name}.schema.json"
+    if request.config.getoption("--update-goldens"):
+        kept.write_text(schema_text(name), encoding="utf-8", newline="")
+    assert kept.read_text(encoding="utf-8") == schema_text(name)
+
+
 @pytest.mark.parametrize("name", ["valve", "compensator", "firmware"])
 def test_the_example_fits_and_every_fault_in_it_is_seen(example_artefacts, name):
     document = example_artefacts[name]
@@ -195,3 +205,18 @@ def test_the_command_prints_them(capsys):
         assert json.loads(capsys.readouterr().out) == schema_document(name)
     assert main(["schema", "../valve"]) == 2 and main(["schema", "vavle"]) == 2
     assert "did you mean 'valve'?" in capsys.readouterr().err
+
+
+#: The schemas that types state, for review.
+STATED = GOLDENS_FULL.parent / "goldens" / "schemas"
+
+
+def test_a_schema_is_its_golden(request):
+    """After a change that is meant: `--update-goldens`, and read the diff."""
+    stated = [name for name, (place, _, _) in SCHEMAS.items() if ":" in place]
+    if request.config.getoption("--update-goldens"):
+        for name in stated:
+            (STATED / f"{name}.schema.json").write_text(schema_text(name), encoding="utf-8", newline="\n")
+    assert sorted(path.name for path in STATED.iterdir()) == sorted(f"{name}.schema.json" for name in stated)
+    for name in stated:
+        assert (STATED / f"{name}.schema.json").read_text(encoding="utf-8") == schema_text(name)

@@ -8,6 +8,7 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 
 from dzdesign.identify.identification import identify
+from tests.support.paths import ROOT
 from tests.support.synthetic import Truth, synthetic_ramp
 
 THREADS, RUNS = 4, 32
@@ -26,7 +27,8 @@ def main():
 
 
 def test_threads_do_not_disturb_one_another():
-    done = subprocess.run([sys.executable, __file__], capture_output=True, text=True, timeout=300, check=False)
+    command = [sys.executable, "-m", "tests.identify.test_threads"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, f"{done.returncode}: {done.stderr[-500:]}"
 
 

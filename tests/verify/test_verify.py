@@ -12,7 +12,8 @@ from dzdesign.core.artefact_files import to_json, write_folder
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator_file import compensator_document
 from dzdesign.verify.checks import certificate_follows, files_unchanged
-from dzdesign.verify.closed_loop.loop import PERIODS_PER_RECORD, ClosedLoop, RampSequence, dead_zone, motion
+from dzdesign.verify.closed_loop import motion
+from dzdesign.verify.closed_loop.loop import PERIODS_PER_RECORD, ClosedLoop, RampSequence, dead_zone
 from dzdesign.verify.closed_loop.plant import Plant, plants_from_tests
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from dzdesign.verify.exhaustive.exact_law import ExactLaw

@@ -1,26 +1,33 @@
-"""`dzdesign schema`: the JSON Schemas of the artefacts, each kept in the room that writes the artefact."""
+"""`dzdesign schema`: the JSON Schemas of the artefacts, as their types state them."""
 
 import argparse
 import json
 from collections.abc import Mapping
+from importlib import import_module
 from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from dzdesign.core.documents import to_json
 from dzdesign.core.errors import InputError, nearest
 
-#: Name -> (package that keeps it, the artefact, the command that writes it), in the order of the pipeline.
+#: Name -> (module and type, or the package that keeps a file of it; the artefact; the command that writes it), in the
+#: order of the pipeline.
 SCHEMAS: Mapping[str, tuple[str, str, str]] = MappingProxyType(
     {
         "valve": ("dzdesign.identify", "valve.json", "identify"),
         "compensator": ("dzdesign.design", "compensator.json", "design"),
-        "firmware": ("dzdesign.codegen", "manifest.json of a firmware", "codegen"),
+        "firmware": ("dzdesign.design.firmware_manifest:FirmwareManifest", "manifest.json of a firmware", "codegen"),
         "evidence": ("dzdesign.verify", "verification.json", "verify"),
         "assessment": ("dzdesign.assess", "assessment.json", "assess"),
         "batch": ("dzdesign.batch", "batch.json", "batch"),
         "reproduction": ("dzdesign.reproduce", "reproduction.json", "reproduce"),
-        "derivation": ("dzdesign.derivation", "derivation.json", "derive --format json"),
+        "derivation": (
+            "dzdesign.derivation.presentation.derivation_file:DerivationFile",
+            "derivation.json",
+            "derive --format json",
+        ),
     }
 )
 
@@ -47,7 +54,12 @@ def schema_text(name: str) -> str:
         raise InputError(
             f"there is no schema '{name[:40]}'{nearest(name, SCHEMAS)}; expected one of {', '.join(SCHEMAS)}"
         )
-    return (Path(str(files(SCHEMAS[name][0]))) / "schemas" / f"{name}.schema.json").read_text(encoding="utf-8")
+    module, _, kind = SCHEMAS[name][0].partition(":")
+    if kind:
+        from dzdesign.core.artefact_schema import json_schema
+
+        return to_json(json_schema(getattr(import_module(module), kind)))
+    return (Path(str(files(module))) / "schemas" / f"{name}.schema.json").read_text(encoding="utf-8")
 
 
 def schema_document(name: str) -> dict[str, Any]:

@@ -10,8 +10,9 @@ import sympy
 from dzdesign.core.errors import RequirementError
 from dzdesign.derivation import plant
 from dzdesign.derivation import symbols as s
-from dzdesign.derivation.account.account import PAPER_NUMBERS, SECTIONS, STATEMENTS, identity, verify_statements
-from dzdesign.derivation.account.account import symbol_units as units
+from dzdesign.derivation.account import identity
+from dzdesign.derivation.account import symbol_units as units
+from dzdesign.derivation.account.account import PAPER_NUMBERS, SECTIONS, STATEMENTS, verify_statements
 from dzdesign.derivation.account.mutation import score_mutations
 from dzdesign.derivation.account.proof import judge
 from dzdesign.derivation.account.published import FIRST

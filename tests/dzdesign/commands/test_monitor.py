@@ -267,7 +267,7 @@ def test_a_port_in_use_is_refused(bench):
 
 def test_a_firmware_without_telemetry_is_refused(bench, monkeypatch):
     from dzdesign.codegen.f28335.target import TARGET
-    from dzdesign.codegen.telemetry.frame import recording as telemetry_record
+    from dzdesign.codegen.telemetry import recording as telemetry_record
 
     monkeypatch.setattr(telemetry_record, "target_named", lambda name: replace(TARGET, link=None))
     with pytest.raises(InputError, match="no telemetry"):

@@ -4,7 +4,6 @@ import gzip
 import json
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +16,7 @@ from dzdesign.design.compensator_file import compensator_document
 from dzdesign.design.designing import design
 from dzdesign.design.option_texts import options_of
 from dzdesign.design.options import DesignOptions
-from dzdesign.identify.data_quality import knee_errors, quality
+from dzdesign.identify.data_quality import knee_errors
 from dzdesign.identify.data_quality.quality import MOST_SERIOUS_FIRST, most_serious_first
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
@@ -26,6 +25,7 @@ from dzdesign.identify.valve.model import Warning_
 from dzdesign.report.artefact_chain import chain_of
 from dzdesign.report.summary import headline
 from dzdesign.report.valve_report import make_report
+from tests.support.paths import ROOT
 from tests.support.synthetic import L_MIN, MPA, Truth, synthetic_ramp
 
 PRESSURES = (1.0, 2.0, 4.0)
@@ -384,7 +384,7 @@ class TestOrder:
     def test_every_code_has_its_place(self):
         written = {
             code
-            for path in Path(quality.__file__).parents[1].rglob("*.py")
+            for path in (ROOT / "identify").rglob("*.py")
             for code in re.findall(r'code="([a-z-]+)"', path.read_text("utf-8"))
         }
         assert written == set(MOST_SERIOUS_FIRST) and len(MOST_SERIOUS_FIRST) == len(written)
