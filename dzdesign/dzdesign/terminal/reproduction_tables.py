@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from dzdesign.core.verdicts import verdict_words
 from dzdesign.terminal.page import new_console, new_table, put_line
 
 if TYPE_CHECKING:
@@ -55,6 +56,6 @@ def _reproduced(row: "Row", letter: str, note: str) -> tuple[str, ...]:
         "yes" if row.in_fit else "predicted",
         *(ours.get(by, "") for by in ("valve", "paper's law", "product")),
         f"({letter})" if letter else "",
-        {True: "holds", False: "MISSED", None: ""}[row.holds],
+        "" if row.holds is None else verdict_words(row.holds),
         note,
     )

@@ -113,7 +113,7 @@ def test_a_number_that_must_agree_and_does_not_is_exit_status_one(reproduced, mo
     monkeypatch.setattr(paper_rows, "READING", {**paper_reasons.READING, "about": 0.0})
     assert again(reproduced, monkeypatch, tmp_path) == 1
     out = capsys.readouterr().out
-    assert "31 must agree: 2 DO NOT" in out and out.count("MISSED") == 2
+    assert "31 must agree: 2 DO NOT" in out and out.count("DOES NOT HOLD") == 2
     assert again(reproduced, monkeypatch, tmp_path, "--json") == 1
     assert json.loads(capsys.readouterr().out)["holds"] is False
 
@@ -196,12 +196,13 @@ def test_the_papers_numbers_catch_a_wrong_law(monkeypatch, error):
 def test_the_closed_loop_catches_a_wrong_law_in_the_c(reproduced, monkeypatch, tmp_path):
     """The C follows the wrong law faithfully at every input; only the plant behind it shows that flow is missing."""
     from dzdesign.codegen.project import generate
+    from dzdesign.core.artefact_reading import read_artefact
     from dzdesign.design.compensator_file import compensator_document
     from dzdesign.design.designing import design
-    from dzdesign.identify.valve.valve_file import valve_from_document
+    from dzdesign.identify.valve.model import ValveModel
 
     second = recover_valves()[2]
-    valve = valve_from_document((reproduced[0] / "second_valve" / "valve.json").read_bytes(), "valve.json")
+    valve = read_artefact((reproduced[0] / "second_valve" / "valve.json").read_bytes(), ValveModel, "valve.json")
     seed(monkeypatch, WRONG["beta on all of Eq. (14)"])
     compensator = design(valve)
     document = json.loads(to_json(compensator_document(compensator)))

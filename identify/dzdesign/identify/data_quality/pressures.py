@@ -10,7 +10,8 @@ from dzdesign.identify.ramps.pooling import SAME_PRESSURE
 from dzdesign.identify.ramps.splitting import SHUT, despiked
 from dzdesign.identify.reading.named_pressure import claimed_pressures, contradicts
 from dzdesign.identify.reading.ramp_test import RampTest
-from dzdesign.identify.valve.model import TestResult, Warning_
+from dzdesign.identify.valve.model import Warning_
+from dzdesign.identify.valve.ramp_result import TestResult
 
 #: Pressure drops that differ by less than this share are one number: averaging may round the last digit.
 ONE_NUMBER = 1e-12

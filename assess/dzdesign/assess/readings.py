@@ -1,0 +1,242 @@
+"""The quantities of a valve test, read from the curves of one set of recordings at one pressure drop."""
+
+import math
+
+import numpy as np
+
+from dzdesign.assess.flow_curves import CELL, ZERO, FlowCurve, PressureCurves
+from dzdesign.assess.quantities import L_MIN, Reading, hidden, in_units, observed
+from dzdesign.identify.knees.linear_region import GATE, fit_line
+from dzdesign.identify.knees.noise import median
+from dzdesign.identify.knees.profile import crossing
+
+#: Shares of the largest flow at which the branches' distance is taken, and the fewest of them.
+WIDTH_LEVELS, FEWEST_LEVELS = np.arange(5, 91, 5) / 100, 3
+#: A flow is above the meter's floor, or above what flows at zero command, from this multiple of it on.
+CLEAR = 1.2
+#: A mean flow stands out of its noise from so many standard errors on.
+STANDS_OUT = 3.0
+#: The standard error of a median over that of a mean; the course is one of five bins.
+OF_MEDIAN, BINS = 1.25, 5
+#: Cells on either side of a flow through which the line to it is laid.
+NEAR = 3
+#: Fewest cells of a curve in the window of its best straight line.
+FEWEST_CELLS = 10
+
+
+def read_quantities(
+    curves: PressureCurves, *, u_max: float, level: float, rated: float, window: tuple[float, float]
+) -> dict[str, Reading]:
+    """Read every quantity of one set at one pressure drop, in its unit; symmetry, which needs both sides, is missing.
+
+    Parameters
+    ----------
+    curves : PressureCurves
+    u_max : float
+        Full command, V.
+    level : float
+        Flow that ends the dead zone, m³/s.
+    rated : float
+        Flow of which linearity is a share, m³/s.
+    window : tuple of float
+        Commands between which linearity is taken, over u_max.
+    """
+    rising, falling = curves.rising, curves.falling
+    si = {
+        "dead_zone_opening": _dead_zone(rising, "rising", level, u_max),
+        "dead_zone_closing": _dead_zone(falling, "falling", level, u_max),
+        "knee_opening": _knee(rising, "rising", u_max),
+        "knee_closing": _knee(falling, "falling", u_max),
+        "hysteresis": _hysteresis(rising, falling, u_max),
+        "linearity": _linearity(curves, rated, window, u_max),
+        "gain": _gain(curves),
+        "flow_at_zero": _flow_at_zero(curves),
+        "largest_flow": observed(curves.q_max),
+    }
+    return in_units(si)
+
+
+def _no_branch(direction: str) -> Reading:
+    return hidden(f"there is no {direction} branch")
+
+
+def _dead_zone(curve: FlowCurve | None, direction: str, level: float, u_max: float) -> Reading:
+    """Return where a branch passes the level."""
+    if curve is None:
+        return _no_branch(direction)
+    floor, noise = curve.read.floor, _noise_of_course(curve)
+    if level < floor:
+        bound = _passing(curve, floor, noise, u_max)
+        reason = f"the meter shows nothing below {floor / L_MIN:.3g} L/min, and the level is {level / L_MIN:.3g} L/min"
+        return hidden(reason, at_most=_bound_of(bound))
+    if level < STANDS_OUT * noise:
+        bound = _passing(curve, STANDS_OUT * noise, noise, u_max)
+        return hidden(
+            f"the level of {level / L_MIN:.3g} L/min does not stand out of the noise, of which "
+            f"{noise / L_MIN:.2g} L/min are left in the averaged flow",
+            at_most=_bound_of(bound),
+        )
+    return _passing(curve, level, noise, u_max)
+
+
+def _bound_of(reading: Reading) -> float | None:
+    return reading.value if reading.value is not None else reading.at_most
+
+
+def _noise_of_course(curve: FlowCurve) -> float:
+    """Return the standard error of the smoothed course where the flow is small, m³/s."""
+    u, _ = curve.read.profile
+    n = curve.read.branch.u.size / u.size * (BINS if u.size >= 200 else 1)
+    return OF_MEDIAN * curve.sigma * math.sqrt(min(curve.colour, n) / max(n, 1.0))
+
+
+def _passing(curve: FlowCurve, level: float, noise: float, u_max: float) -> Reading:
+    """Return the command at which the smoothed course best parts into flows below and above the level."""
+    u, q = curve.read.profile
+    if level > curve.read.y_max:
+        largest = f"{curve.read.y_max / L_MIN:.3g} L/min"
+        return hidden(f"the largest flow of {largest} lies below the level of {level / L_MIN:.3g} L/min")
+    at = crossing(u, q, level)
+    if at <= u[0]:
+        if u[0] > ZERO * u_max:
+            return hidden(
+                f"the flow lies above the level from the first recorded command of {u[0]:.3g} V on; record from zero",
+                at_most=float(u[0]) / u_max,
+            )
+        return observed(0.0, note="the flow lies above the level at every command, at zero too")
+    next_ = int(np.clip(np.searchsorted(u, at), 1, u.size - 1))
+    step = float(u[next_] - u[next_ - 1])
+    rise = max(crossing(u, q, 2 * level) - at, step)
+    return observed(at / u_max, se=math.hypot(step / math.sqrt(12), noise / level * rise) / u_max)
+
+
+def _knee(curve: FlowCurve | None, direction: str, u_max: float) -> Reading:
+    """Return the zero of the straight part; a zero below the recorded commands is none of theirs."""
+    if curve is None:
+        return _no_branch(direction)
+    if curve.line is None:
+        return hidden(f"there is no straight part: {curve.no_line}")
+    line, lowest = curve.line, float(curve.read.branch.u.min())
+    if line.knee < lowest - STANDS_OUT * line.knee_se:
+        return hidden(
+            f"the straight part, extrapolated, ends at {line.knee / u_max:.2%} of command, below the lowest that was "
+            f"recorded ({lowest / u_max:.2%})",
+            at_most=max(lowest, 0.0) / u_max,
+        )
+    return observed(line.knee / u_max, se=line.knee_se / u_max)
+
+
+def _hysteresis(rising: FlowCurve | None, falling: FlowCurve | None, u_max: float) -> Reading:
+    """Return the largest distance of the branches at equal flow."""
+    if rising is None or falling is None:
+        return _no_branch("rising" if rising is None else "falling")
+    top = min(curve.read.y_max for curve in (rising, falling))
+    # What a branch does not come down to has no command.
+    lowest = max(CLEAR * max(curve.read.floor, float(curve.q[0])) for curve in (rising, falling))
+    levels = [share * top for share in WIDTH_LEVELS if share * top >= lowest]
+    if len(levels) < FEWEST_LEVELS:
+        return hidden(
+            f"only {len(levels)} of the levels from {WIDTH_LEVELS[0]:.0%} to {WIDTH_LEVELS[-1]:.0%} of the largest "
+            f"flow lie above {lowest / L_MIN:.3g} L/min, where the meter starts or the flow at zero command ends"
+        )
+    found = [(_command_at(rising, level), _command_at(falling, level)) for level in levels]
+    widths = [abs(up[0] - down[0]) for up, down in found]
+    widest = int(np.argmax(widths))
+    return observed(
+        widths[widest] / u_max,
+        se=math.hypot(found[widest][0][1], found[widest][1][1]) / u_max,
+        where=f"at {levels[widest] / top:.0%} of the largest flow",
+    )
+
+
+def _command_at(curve: FlowCurve, level: float) -> tuple[float, float]:
+    """Return the command at which the averaged curve has a flow, and its standard error, V.
+
+    A line through the nearest cells averages their noise, of which the largest of many widths would take the worst.
+    """
+    at = crossing(curve.u, curve.q, level)
+    right = int(np.clip(np.searchsorted(curve.u, at), 1, curve.u.size - 1))
+    step = float(curve.u[right] - curve.u[right - 1])
+    near = slice(max(right - NEAR, 0), right + NEAR)
+    if curve.u[near].size < 2 * NEAR or step > 2 * CELL * curve.u[-1]:
+        return at, step
+    slope, zero = fit_line(curve.u[near], curve.q[near])
+    if not slope > 0:
+        return at, step
+    on_line = float(np.clip(zero + level / slope, at - step, at + step))
+    error = float(np.sqrt(np.mean(curve.q_se[near] ** 2))) / math.sqrt(2 * NEAR) / slope
+    return on_line, error if math.isfinite(error) else step
+
+
+def _linearity(curves: PressureCurves, rated: float, window: tuple[float, float], u_max: float) -> Reading:
+    """Return the largest departure of the mean curve from its best straight line."""
+    low, high = (share * u_max for share in window)
+    for curve in curves.curves:
+        if curve.u[0] > low + CELL * u_max or curve.u[-1] < high - CELL * u_max:
+            return hidden(
+                f"the recorded commands, {curve.u[0]:.2f} to {curve.u[-1]:.2f} V, do not cover the window of {low:.3g} "
+                f"to {high:.3g} V"
+            )
+    # As many points as the branch with fewest cells has there: between levels of a staircase nothing is known.
+    count = min(int(np.sum((curve.u >= low) & (curve.u <= high))) for curve in curves.curves)
+    if count < FEWEST_CELLS:
+        return hidden(f"only {count} levels of the command lie in the window, expected {FEWEST_CELLS} at least")
+    u = np.linspace(low, high, count)
+    mean = np.mean([np.interp(u, curve.u, curve.q) for curve in curves.curves], axis=0)
+    errors = np.array([np.interp(u, curve.u, curve.q_se) for curve in curves.curves])
+    # The ends stand for half a step each: counted in full they pull the line to themselves.
+    weights = np.ones(count)
+    weights[[0, -1]] = math.sqrt(0.5)  # of the departure, not of its square
+    departure = np.abs(mean - np.polyval(np.polyfit(u, mean, 1, w=weights), u))
+    widest = int(np.argmax(departure))
+    error = float(np.sqrt(np.sum(errors[:, widest] ** 2))) / len(errors) / rated
+    return observed(
+        float(departure[widest]) / rated,
+        se=error if math.isfinite(error) else None,
+        note=_one_branch(curves, len(curves.curves)),
+        where=f"at {u[widest] / u_max:.0%} of command",
+    )
+
+
+def _one_branch(curves: PressureCurves, used: int) -> str:
+    """Say of a mean of both branches that it is of one, where it is."""
+    if used == 2:
+        return ""
+    return "of one branch only: " + (
+        "the other has no straight part" if len(curves.curves) == 2 else "the other was not recorded"
+    )
+
+
+def _gain(curves: PressureCurves) -> Reading:
+    """Return the mean slope of the straight parts."""
+    straight = [(curve.line, curve.read.branch.u) for curve in curves.curves if curve.line]
+    if not straight:
+        return hidden(f"there is no straight part: {curves.curves[0].no_line}")
+    lines, errors = [line for line, _ in straight], []
+    for line, u in straight:
+        spread = float(np.var(u[line.kept & ~line.censored])) * int(np.sum(line.kept & ~line.censored))
+        errors.append(line.sigma * math.sqrt(line.colour / spread))
+    count = len(lines)
+    return observed(
+        sum(line.slope for line in lines) / count,
+        se=math.sqrt(sum(error**2 for error in errors)) / count,
+        note=_one_branch(curves, count),
+    )
+
+
+def _flow_at_zero(curves: PressureCurves) -> Reading:
+    """Return the flow that is left at zero command."""
+    flow = curves.at_zero
+    if flow.size == 0:
+        why = "no recording holds zero command after closing" if curves.falling else "there is no falling branch"
+        return hidden(f"{why}; let the command stand at zero for some seconds at the end")
+    middle = median(flow)
+    away = np.abs(flow - middle)
+    sigma = 1.4826 * median(away)
+    kept = flow[away <= max(GATE * sigma, 1e-3 * curves.q_max)]
+    value = float(kept.mean())
+    floor = curves.curves[0].read.floor
+    if abs(value) < floor:
+        return hidden(f"the meter shows nothing below {floor / L_MIN:.3g} L/min", at_most=floor)
+    spread = float(kept.std()) * math.sqrt(min(curves.colour, kept.size) / kept.size)
+    return observed(value, se=spread)
