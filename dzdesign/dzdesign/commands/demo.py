@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Annotated
 
 from dzdesign.core.artefact_files import check_folder_may_be_written, to_json
-from dzdesign.core.artefact_types import as_document
 from dzdesign.core.errors import InputError
 from dzdesign.core.options import AnyPath, Option
 from dzdesign.example import example_folder
@@ -60,6 +59,8 @@ def run(arguments: Arguments, json: bool) -> int:
         plant_source="plant.toml of the example",
     )
     if json:
+        from dzdesign.core.artefact_types import as_document
+
         print(to_json(as_document(verification.evidence)), end="")
     else:
         print_demo(valve, verification, os.fspath(folder))

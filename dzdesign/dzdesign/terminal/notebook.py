@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from dzdesign.core.errors import one_line
+from dzdesign.terminal.page import FILE_WIDTH
 from dzdesign.terminal.tables import print_compensator, print_firmware, print_valve
 from dzdesign.terminal.verification_tables import print_verification
 
@@ -16,8 +17,6 @@ if TYPE_CHECKING:
     from dzdesign.identify.valve.model import ValveModel
     from dzdesign.verify.verification import Verification
 
-#: Columns of a page in a notebook.
-WIDTH = 120
 #: A page in a notebook; rich has escaped what stands in it.
 FRAME = '<pre style="white-space:pre;overflow-x:auto">{code}</pre>'
 
@@ -86,6 +85,6 @@ def html_of(result: object) -> str:
 def _recorded(result: object) -> "Console":
     from rich.console import Console
 
-    console = Console(record=True, file=io.StringIO(), width=WIDTH, highlight=False)
+    console = Console(record=True, file=io.StringIO(), width=FILE_WIDTH, highlight=False, force_jupyter=False)
     PAGES[type(result).__name__][1](result, console)
     return console
