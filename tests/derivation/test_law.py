@@ -77,9 +77,9 @@ def test_a_law_checks_its_output(output, complaint):
 
 
 def test_a_law_with_a_fraction_is_not_lowered_to_floats():
-    halved = Law(name="halved", equation="", output=law("paper").output / 2, note="")
+    halved = Law(name="halved", equation="", output=s.k * s.x_max / s.u_max * s.u_i / 2 + s.beta * s.u_min0, note="")
     with pytest.raises(ValueError, match="integer coefficients"):
-        halved.evaluate_offset(1, 1)
+        halved.evaluate_gain(1, 1)
 
 
 # --- the plant ----------------------------------------------------------------------------------------------
