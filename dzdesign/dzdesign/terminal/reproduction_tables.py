@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from dzdesign.core.verdicts import verdict_words
-from dzdesign.terminal.page import new_console, new_table, put_line
+from dzdesign.terminal.page import new_console, new_table, put_line, put_table
 
 if TYPE_CHECKING:
     from dzdesign.reproduce.row import Row
@@ -19,14 +19,14 @@ def print_reproduction(rows: "Sequence[Row]", valves: "Sequence[RecoveredValve]"
     for name in dict.fromkeys(row.valve for row in rows):
         table = new_table(
             f"The paper's numbers and ours: {name}", "", "MPa", "published", "in the fit", "valve", "paper's law",
-            "product", "within", "", "why", keys=2,
+            "product", "within", "", "why",
         )  # fmt: skip
         for row in rows:
             if row.valve == name:
                 letter = tolerances.setdefault(row.tolerance, chr(ord("a") + len(tolerances))) if row.tolerance else ""
                 note = f"[{reasons.setdefault(row.why, len(reasons) + 1)}]" if row.why else ""
                 table.add_row(*_reproduced(row, letter, note))
-        console.print(table)
+        put_table(console, table)
     for tolerance, letter in tolerances.items():
         put_line(console, f"({letter}) {tolerance}")
     for why, number in reasons.items():
