@@ -3,11 +3,11 @@
 import json
 from dataclasses import replace
 from fractions import Fraction
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from dzdesign.batch.summary import lacking_lines
 from dzdesign.codegen.project import generate, target_named, write_firmware
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import to_json, write_folder
@@ -22,6 +22,8 @@ from dzdesign.design.option_texts import options_of
 from dzdesign.design.redesign_check import prove_derived
 from dzdesign.identify.identification import identify
 from dzdesign.report.artefact_chain import Artefact, Chain
+from dzdesign.report.lot.setting_text import untested_lines
+from dzdesign.report.lot.summary import UntestedPressures
 from dzdesign.report.sections.lot_setting import lot_costs, lot_figures, lot_section
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
@@ -286,30 +288,33 @@ def test_a_range_that_would_be_none_without_them_and_one_that_another_side_ends(
     assert without_narrow(both, lacking_in(both)) == (frozenset(), None)
 
 
+def untested(**changes):
+    each = UntestedPressures(
+        name="V8", side="positive", dp_MPa=(2.0,), narrows=False, coarser_V=0.034, cost_percent=0.74
+    )
+    return replace(each, **changes)
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({}, "about 34 mV under what a test would show, and V8 holds the common setting down: that may cost each valve "
+        ({}, "about 34 mV under what a test would show, and V8 holds the lot setting down: that may cost each valve "
              "up to 0.74 % of command; record what is missing"),
-        ({"cost_percent": 0.0}, "which costs nothing, as other valves hold the common setting down"),
-        ({"cost_percent": 0.0, "coarser_V": 0.0}, "as the lot was: that costs the common setting nothing"),
-        (None, "between two tests only the lower of their bounds is known, which may hold the common setting down"),
+        ({"cost_percent": 0.0}, "which costs nothing, as other valves hold the lot setting down"),
+        ({"cost_percent": 0.0, "coarser_V": 0.0}, "as the lot was: that costs the lot setting nothing"),
     ],
 )  # fmt: skip
 def test_what_lacks_between_two_tests_is_said_with_its_cost(change, said):
-    each = {"name": "V8", "side": "positive", "dp_MPa": [2.0], "narrows": change is None}
-    each |= {} if change is None else {"coarser_V": 0.034, "cost_percent": 0.74, **change}
-    # The last is of an older version, which called these two ranges different.
-    wider = [1.0, 4.0004] if change is None else None
-    (line,) = lacking_lines({"lacking": [each], "dp_MPa": [1.0003, 4.0], "dp_without_MPa": wider})
+    setting = SimpleNamespace(untested=(untested(**change),), dp_MPa=(1.0003, 4.0), dp_without_MPa=None)
+    (line,) = untested_lines(setting)
     assert line.startswith("V8 was not tested at 2 MPa, as the lot was: ") and said in line
     assert "without it" not in line and "holds for all" not in line
 
 
 def test_a_range_that_no_valve_would_widen_is_said_alone():
-    each = {"name": "a", "side": "positive", "dp_MPa": [4.0], "narrows": True, "coarser_V": 0.0, "cost_percent": 0.0}
-    (line,) = lacking_lines({"lacking": [each], "dp_MPa": [2.0, 2.0], "dp_without_MPa": None})
-    assert "so the common setting holds for all at 2 MPa only; record what is missing" in line
+    each = untested(name="a", dp_MPa=(4.0,), narrows=True, coarser_V=0.0, cost_percent=0.0)
+    (line,) = untested_lines(SimpleNamespace(untested=(each,), dp_MPa=(2.0, 2.0), dp_without_MPa=None))
+    assert "so the lot setting holds for all at 2 MPa only; record what is missing" in line
 
 
 # ---- what a reader is told ----

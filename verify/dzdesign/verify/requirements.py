@@ -119,9 +119,9 @@ def requirement_statuses(evidence: Evidence) -> tuple[RequirementStatus, ...]:
     if evidence.board_not_compiled:
         found.append(_part(BOARD_FILES.title, False, evidence.board_not_compiled))
     found += [_status(evidence, requirement) for requirement in ALWAYS]
-    own_plant = evidence.closed_loop.plant is not None
-    found.append(_part("closed loop with a plant of the machine's own", own_plant, "`verify --plant`"))
-    found.append(_part("load steps and frozen sensors in the closed loop", own_plant, "`verify --plant`"))
+    plant_given = evidence.closed_loop.plant is not None
+    found.append(_part("closed loop with a plant of the machine's own", plant_given, "`verify --plant`"))
+    found.append(_part("load steps and frozen sensors in the closed loop", plant_given, "`verify --plant`"))
     series = evidence.monte_carlo is not None
     found.append(_part("a series of plants, with tolerances", series, "`verify --tolerances`"))
     found += [_status(evidence, requirement) for requirement in OPTIONAL]
