@@ -32,6 +32,7 @@ from dzdesign.core.artefact_files import (
     write_file,
     write_folder,
 )
+from dzdesign.core.artefact_types import schema_of
 from dzdesign.core.errors import DzdesignError, InputError, RequirementError
 from dzdesign.core.result_display import show_by
 from dzdesign.regeneration import with_regenerated
@@ -248,14 +249,15 @@ def generate(
     InputError
         If the file can't be read, a number in it does not follow, or the target counts otherwise.
     """
-    from dzdesign.codegen.project import SCHEMA, write_firmware
     from dzdesign.codegen.project import generate as generate_project
+    from dzdesign.codegen.project import write_firmware
     from dzdesign.design.compensator import Compensator
     from dzdesign.design.compensator_file import compensator_from_document
+    from dzdesign.design.firmware_manifest import FirmwareManifest
     from dzdesign.design.redesign_check import prove_derived, refuse_unsaid
 
     if output is not None:
-        check_folder_may_be_written(Path(output), SCHEMA)
+        check_folder_may_be_written(Path(output), schema_of(FirmwareManifest))
     content = None
     if not isinstance(compensator, Compensator):
         content = read_bytes(Path(compensator), "compensator file")

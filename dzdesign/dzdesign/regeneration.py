@@ -3,10 +3,12 @@
 Stands here and not in verify, which shares no code with what it checks: this one check asks the generator itself.
 """
 
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dzdesign.core.artefact_files import TOOL, read_bytes, sha256_of
+from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError, quoted
 
 if TYPE_CHECKING:
@@ -58,8 +60,8 @@ def regenerated(folder: Path) -> "Check":
         firmware = generate(compensator_from_document(content, str(source)), manifest["target"], content)
     except InputError as error:
         return Check(name=REGENERATED, holds=False, text=str(error))
-    made = {name: sha256_of(text.encode()) for name, text in firmware.files.items()}
-    expected: dict[str, Any] = {**firmware.manifest, "files": made}
+    expected = json.loads(to_json_bytes(firmware.manifest))
+    made = expected["files"]
     others = [name for name in sorted(made) if name not in expected["board"] and _digest(folder / name) != made[name]]
     others += [f"{key} of manifest.json" for key in sorted(expected) if manifest.get(key) != expected[key]]
     if others:

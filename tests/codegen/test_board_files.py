@@ -59,13 +59,13 @@ def test_they_are_marked_in_their_first_lines_and_in_the_manifest(compensator):
             firmware = generate(compensator, target.name)
         except InputError:  # another converter
             continue
-        found[target.name] = firmware.manifest["board"]
+        found[target.name] = firmware.manifest.board
         for name, text in firmware.files.items():
             head = " ".join(text.splitlines()[:4])
             assert ("Yours to edit" in head) is (name in target.board) and target.board <= firmware.files.keys()
             assert name == "compensator.json" or ("Do not edit" in head) is (name not in target.board)
-    assert found["cortex-m4"] == [f"cortex_m4/{name}" for name in BOARD]
-    assert found["f28335"] == [PROJECT] and found["host"] == []
+    assert found["cortex-m4"] == tuple(f"cortex_m4/{name}" for name in BOARD)
+    assert found["f28335"] == (PROJECT,) and found["host"] == ()
 
 
 def test_the_readme_marks_the_same_files(cortex):
@@ -78,7 +78,7 @@ def test_the_readme_marks_the_same_files(cortex):
 def test_nothing_of_a_compensator_stands_in_them(compensator):
     """A file that was kept would say it of the next one."""
     one, other = generate(compensator, "cortex-m4"), generate(compensator, "cortex-m4", b"another spacing")
-    for name in one.manifest["board"]:
+    for name in one.manifest.board:
         assert one.files[name] == other.files[name] and one.files[name].isascii()
 
 

@@ -125,10 +125,10 @@ def test_core_has_no_floating_point_no_division_and_no_state(example_firmware):
 
 def test_generated_files_carry_the_hash_of_their_compensator_and_no_date(example_firmware):
     """But for the user's to fill in: kept through the next generation, theirs would be the hash of another."""
-    digest = example_firmware.manifest["made_from"][0]["sha256"]
+    digest = example_firmware.manifest.made_from[0].sha256
     for name, text in example_firmware.files.items():
         if name != "compensator.json":
-            board = name in example_firmware.manifest["board"]
+            board = name in example_firmware.manifest.board
             assert (digest in text) is not board and ("Do not edit" in text) is not board, name
             assert ("Yours to edit" in text[:300]) is board, name
             assert not re.search(r"20\d\d-\d\d-\d\d", text), name

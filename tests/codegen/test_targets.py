@@ -229,7 +229,7 @@ def test_a_hostile_name_changes_nothing_but_a_harmless_comment(target, name):
         if path != "compensator.json":
             assert without_banner(text) == without_banner(honest[path]), path
             named = any(printable_name(name) in line for line in text.splitlines())
-            assert text.isascii() and (named or path in firmware.manifest["board"])
+            assert text.isascii() and (named or path in firmware.manifest.board)
             if path.endswith(".projectspec"):
                 ElementTree.fromstring(text)
 

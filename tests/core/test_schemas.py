@@ -206,3 +206,18 @@ def test_the_command_prints_them(capsys):
         assert json.loads(capsys.readouterr().out) == schema_document(name)
     assert main(["schema", "../valve"]) == 2 and main(["schema", "vavle"]) == 2
     assert "did you mean 'valve'?" in capsys.readouterr().err
+
+
+#: The schemas that types state, for review.
+STATED = GOLDENS_FULL.parent / "goldens" / "schemas"
+
+
+def test_a_schema_is_its_golden(request):
+    """After a change that is meant: `--update-goldens`, and read the diff."""
+    stated = [name for name, (place, _, _) in SCHEMAS.items() if ":" in place]
+    if request.config.getoption("--update-goldens"):
+        for name in stated:
+            (STATED / f"{name}.schema.json").write_text(schema_text(name), encoding="utf-8", newline="\n")
+    assert sorted(path.name for path in STATED.iterdir()) == sorted(f"{name}.schema.json" for name in stated)
+    for name in stated:
+        assert (STATED / f"{name}.schema.json").read_text(encoding="utf-8") == schema_text(name)

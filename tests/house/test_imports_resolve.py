@@ -98,8 +98,8 @@ def test_every_import_resolves(third_parties):
 def test_the_source_roots_of_all_tools_are_the_rooms():
     tools = CONFIG["tool"]
     built = tools["hatch"]["build"]["dev-mode-dirs"]
-    checked = (tools["pyright"]["extraPaths"], tools["mypy"]["mypy_path"])
-    for listed in (*checked, tools["coverage"]["run"]["source"], built):
+    roots = (tools["pyright"]["extraPaths"], tools["mypy"]["mypy_path"], tools["coverage"]["run"]["source"], built)
+    for listed in roots:
         assert tuple(listed[: len(ROOMS)]) == ROOMS
 
 

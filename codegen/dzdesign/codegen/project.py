@@ -13,28 +13,29 @@ from typing import TYPE_CHECKING, Any
 from dzdesign.codegen.comment_text import printable_list
 from dzdesign.codegen.core.plan import FilePlan, core_plan, drive_header_plan, drive_plan, header_plan
 from dzdesign.codegen.lot_banner import LotInWords, lot_in_words
-from dzdesign.codegen.provenance import origin_of_constants
+from dzdesign.codegen.provenance import constants_of, origin_of
 from dzdesign.codegen.target import Target, folder_of
 from dzdesign.codegen.wiring import wiring_of
 from dzdesign.core.artefact_files import (
     MANIFEST_NAME,
     TOOL,
-    parse_document,
     read_bytes,
     sha256_of,
     to_json,
     write_folder,
 )
+from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.artefact_types import THIS_TOOL, SourceFile
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.compensator_file import compensator_document
+from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.design.signal_text import Converter
 
 if TYPE_CHECKING:
     import jinja2
 
-SCHEMA = "dzdesign.firmware/1"
 PACKAGE = "dzdesign.codegen"
 #: Where neither the compensator nor anybody else says which.
 DEFAULT_TARGET = "f28335"
@@ -57,7 +58,7 @@ class Firmware(ShownInNotebooks):
     """The files of a C project, path to text, the manifest that names their origin, and what a person should know."""
 
     files: Mapping[str, str]
-    manifest: Mapping[str, Any]
+    manifest: FirmwareManifest
     note: str = ""
 
 
@@ -84,8 +85,8 @@ def write_firmware(firmware: Firmware, folder: Path) -> Firmware:
     earlier = _target_in(Path(folder))
     kept = write_folder(folder, firmware.files, firmware.manifest)
     notes = [firmware.note] if firmware.note else []
-    if earlier not in ("", firmware.manifest["target"]):
-        gone = f"the firmware for {earlier} in '{folder}' was replaced by this one for {firmware.manifest['target']}"
+    if earlier not in ("", firmware.manifest.target):
+        gone = f"the firmware for {earlier} in '{folder}' was replaced by this one for {firmware.manifest.target}"
         notes.append(f"{gone}; to have both, give each its own folder with -o")
     if kept:
         note = f"kept as you changed it: {', '.join(kept)}"
@@ -98,8 +99,8 @@ def write_firmware(firmware: Firmware, folder: Path) -> Firmware:
 def _target_in(folder: Path) -> str:
     """Return the target of the firmware that lies in a folder; nothing where there is none."""
     with contextlib.suppress(InputError):
-        manifest = read_bytes(folder / MANIFEST_NAME, "firmware manifest")
-        return str(parse_document(manifest, MANIFEST_NAME, (SCHEMA,)).get("target", ""))
+        content = read_bytes(folder / MANIFEST_NAME, "firmware manifest")
+        return read_artefact(content, FirmwareManifest, MANIFEST_NAME).target
     return ""
 
 
@@ -167,16 +168,17 @@ def generate(
         for path, renderer, template, plan in plans
     }
     files["compensator.json"] = document.decode()
-    manifest = {
-        "schema": SCHEMA,
-        "tool": TOOL,
-        "made_from": [{"source": "compensator.json", "sha256": digest}],
-        "target": target.name,
-        "law": compensator.law_name,
-        "core": sorted(path for path in files if path.startswith("core/")),
-        "board": sorted(target.board),
-        **origin_of_constants(compensator, digest, {path: plan.constants for path, _, plan in core}),
-    }
+    manifest = FirmwareManifest(
+        tool=THIS_TOOL,
+        made_from=(SourceFile(source="compensator.json", sha256=digest),),
+        target=target.name,
+        law=compensator.law_name,
+        core=tuple(sorted(path for path in files if path.startswith("core/"))),
+        board=tuple(sorted(target.board)),
+        origin=origin_of(compensator, digest),
+        constants=constants_of(compensator, {path: plan.constants for path, _, plan in core}),
+        files={path: sha256_of(text.encode()) for path, text in files.items()},
+    )
     return Firmware(files=files, manifest=manifest, note=note)
 
 

@@ -5,13 +5,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from dzdesign.codegen.core.constants import Constant
+from dzdesign.core.artefact_types import SourceFile
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.firmware_manifest import FirmwareConstant, FirmwareOrigin
 
 
-def origin_of_constants(
-    compensator: Compensator, compensator_sha256: str, constants: Mapping[str, Sequence[Constant]]
-) -> dict[str, Any]:
-    """Return the manifest's keys on the constants and on the files that they came from.
+def origin_of(compensator: Compensator, compensator_sha256: str) -> FirmwareOrigin:
+    """Return the hashes of the files that a firmware was made from.
 
     Parameters
     ----------
@@ -19,26 +19,29 @@ def origin_of_constants(
         With the valve it was designed from.
     compensator_sha256 : str
         Of compensator.json as it stands in the firmware.
+    """
+    made_from = json.loads(compensator.valve_document).get("made_from", ())
+    return FirmwareOrigin(
+        compensator_json=compensator_sha256,
+        valve_json=compensator.valve_sha256,
+        ramp_tests=tuple(SourceFile(source=str(each["source"]), sha256=str(each["sha256"])) for each in made_from),
+    )
+
+
+def constants_of(
+    compensator: Compensator, constants: Mapping[str, Sequence[Constant]]
+) -> tuple[FirmwareConstant, ...]:
+    """Return where each constant came from, in the order of the files.
+
+    Parameters
+    ----------
+    compensator : Compensator
+        With the valve it was designed from.
     constants : mapping
         Of each file of the core, path to its constants: those that were printed into it.
-
-    Returns
-    -------
-    dict
-        ``constants``, a list, and ``origin``: hashes of compensator.json, valve.json and every ramp test.
     """
-    valve = json.loads(compensator.valve_document)
-    valve_keys = _valve_keys(compensator, valve)
-    return {
-        "origin": {
-            "compensator_json": compensator_sha256,
-            "valve_json": compensator.valve_sha256,
-            "ramp_tests": [
-                {"source": str(entry["source"]), "sha256": str(entry["sha256"])} for entry in valve.get("made_from", ())
-            ],
-        },
-        "constants": [constant.entry(path, valve_keys) for path in sorted(constants) for constant in constants[path]],
-    }
+    valve_keys = _valve_keys(compensator, json.loads(compensator.valve_document))
+    return tuple(constant.entry(path, valve_keys) for path in sorted(constants) for constant in constants[path])
 
 
 def _valve_keys(compensator: Compensator, valve: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:

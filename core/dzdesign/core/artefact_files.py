@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
+from dzdesign.core.artefact_types import Artefact, as_document
 from dzdesign.core.documents import parse_document, sha256_of, sha256_of_file, to_json
 from dzdesign.core.errors import InputError
 from dzdesign.core.folder_swap import alone_in, beside, bring_back, put_in_place
@@ -280,7 +281,7 @@ def _changed_in(folder: Path, manifest: Mapping[str, Any]) -> Iterator[str]:
 def _board_of(manifest: Mapping[str, Any]) -> set[str]:
     """Return the files that are their user's to fill in."""
     board = manifest.get("board")
-    return {name for name in board if isinstance(name, str)} if isinstance(board, list) else set()
+    return {name for name in board if isinstance(name, str)} if isinstance(board, list | tuple) else set()
 
 
 def _digest(path: Path) -> str:
@@ -317,7 +318,9 @@ def _keep(
     return {name: old["files"][name] != listing[name] for name in sorted(changed)}
 
 
-def write_folder(folder: Path, files: Mapping[str, str | bytes], manifest: Mapping[str, Any]) -> Mapping[str, bool]:
+def write_folder(
+    folder: Path, files: Mapping[str, str | bytes], manifest: Artefact | Mapping[str, Any]
+) -> Mapping[str, bool]:
     """Write a folder whole or not at all; one that dzdesign made before is replaced, any other is left alone.
 
     Parameters
@@ -326,7 +329,7 @@ def write_folder(folder: Path, files: Mapping[str, str | bytes], manifest: Mappi
         Where the files go; its parents are made.
     files : mapping
         Relative POSIX path to content.
-    manifest : mapping
+    manifest : Artefact or mapping
         Written as `MANIFEST_NAME`, with the SHA-256 of every file added under ``files``: by it the folder is known
         again, and a file that somebody changed is not overwritten. Those under ``board`` are their user's to fill in:
         where one was changed in the earlier folder, it stays as it is there.
@@ -343,23 +346,24 @@ def write_folder(folder: Path, files: Mapping[str, str | bytes], manifest: Mappi
     """
     contents = {name: text.encode() if isinstance(text, str) else text for name, text in files.items()}
     listing = {name: sha256_of(data) for name, data in contents.items()}
-    contents[MANIFEST_NAME] = to_json({**manifest, "files": listing}).encode()
+    document = as_document(manifest) if isinstance(manifest, Artefact) else manifest
+    contents[MANIFEST_NAME] = to_json({**document, "files": listing}).encode()
     folder = Path(folder)
     staging: Path | None = None
     kept: dict[str, bool] = {}
     try:
         folder = Path(os.path.realpath(folder))  # a link stays, its target is replaced
         if not folder.parent.is_dir():
-            _check_folder(folder, manifest.get("schema"))
+            _check_folder(folder, document.get("schema"))
         folder.parent.mkdir(parents=True, exist_ok=True)
         with alone_in(folder.parent):
             bring_back(folder)
-            _check_folder(folder, manifest.get("schema"))
+            _check_folder(folder, document.get("schema"))
             staging = beside(folder)
             _write_staging(staging, contents)
             if folder.is_dir():
                 old = _manifest_of(folder)
-                kept = _keep(folder, staging, old, listing, _board_of(manifest)) if old else {}
+                kept = _keep(folder, staging, old, listing, _board_of(document)) if old else {}
                 _carry_over(folder, staging, set(old["files"]) if old else set())
                 put_in_place(staging, folder)
             else:

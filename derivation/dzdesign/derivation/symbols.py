@@ -1,4 +1,7 @@
-"""The paper's symbols, each made once; the comment gives its meaning and unit.
+"""Every symbol of the account, declared once: its sign, its unit, its meaning and, where the name does not spell it,
+its look.
+
+The order is the one in which a product is written: scales and gains, lengths, commands, and last what varies with time.
 
 The paper uses three names for two things each. They are kept apart here: ``u_0`` (compensation signal) and
 ``u_O`` (output of the compensator), which Eqs. (14) and (18) print alike; ``K_e`` (flow gain, Eq. 2) and
@@ -6,93 +9,204 @@ The paper uses three names for two things each. They are kept apart here: ``u_0`
 Eq. 11) and ``n_i`` (code of the command, which Eq. (29) calls u_i').
 """
 
+from dataclasses import dataclass
+from typing import Any
+
 import sympy
 
-
-def _positive(names: str) -> tuple[sympy.Symbol, ...]:
-    return sympy.symbols(names, positive=True)
-
-
-def _real(names: str) -> tuple[sympy.Symbol, ...]:
-    return sympy.symbols(names, real=True)
+#: A symbol, or a Laplace transform such as I(s).
+Name = sympy.Symbol | sympy.core.function.AppliedUndef
 
 
-# Commands: V
-u_i, u_O, u_0, u_no = _real("u_i u_O u_0 u_no")  # input; output; compensation at and off the reference
-u_max, u_min, u_min0, u_min1 = _positive("u_max u_min u_min0 u_min1")  # full command; dead-zone thresholds
-u_i_prime = sympy.Symbol("u_i'", nonnegative=True)  # command beyond the threshold, Fig. 3 and Eq. (11)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Quantity:
+    """What is known of a symbol.
+
+    Attributes
+    ----------
+    unit : str
+        As pint reads it; counts are ``code``.
+    meaning : str
+        In a few words, which may name other symbols.
+    latex : str
+        How it looks, where its name does not spell it.
+    varies : bool
+        Whether it varies with time, or is what a formula is a function of.
+    """
+
+    unit: str
+    meaning: str
+    latex: str = ""
+    varies: bool = False
+
+
+QUANTITIES: dict[Name, Quantity] = {}
+
+
+def _declare(name: Name, unit: str, meaning: str, **more: Any) -> Any:
+    QUANTITIES[name] = Quantity(unit=unit, meaning=meaning, **more)
+    return name
+
+
+def _positive(name: str, unit: str, meaning: str, **more: Any) -> sympy.Symbol:
+    return _declare(sympy.Symbol(name, positive=True), unit, meaning, **more)
+
+
+def _nonnegative(name: str, unit: str, meaning: str, **more: Any) -> sympy.Symbol:
+    return _declare(sympy.Symbol(name, nonnegative=True), unit, meaning, **more)
+
+
+def _real(name: str, unit: str, meaning: str, **more: Any) -> sympy.Symbol:
+    return _declare(sympy.Symbol(name, real=True), unit, meaning, **more)
+
+
+def _varying(name: str, unit: str, meaning: str, **more: Any) -> sympy.Symbol:
+    return _real(name, unit, meaning, varies=True, **more)
+
+
+_FLOW = "m**3/s"
+
+# Codes in the compensator, Eqs. (29)-(32), and ratios
+scale = _positive("lambda", "dimensionless", "factor between two valves of the same flow", latex=r"\lambda")
+n_full = _positive("n_full", "code", "compare value of full command")
+n_adc = _positive("n_adc", "code", "largest code of the converter")
+n_V = _positive("n_V", "code/V", "counts per volt, 1365 in the paper")
+K_c = _real("K_c", "V/code", "conversion coefficient (Eq. 32)")
+n = _positive("n", "dimensionless", "exponent of flow over pressure drop")
+beta = _positive("beta", "dimensionless", "correction coefficient, u_min1 / u_min0 (Eq. 5)")
+kappa = _positive("kappa", "dimensionless", "k x_max / u_max")
+slope = _real("slope", "dimensionless", "output per input of the compensator")
+duty = _real("duty", "dimensionless", "duty cycle")
 
 # Metering edge
-C_d, W, rho = _positive("C_d W rho")  # discharge coefficient; area gradient, m; density, kg/m^3
-x = sympy.Symbol("x", nonnegative=True)  # orifice opening: m
-x_max = sympy.Symbol("x_max", positive=True)  # its maximum: m
-k = sympy.Symbol("k", positive=True)  # command per opening, V/m, Eq. (11)
-
-# Pressure drop: Pa; at no index, at the reference (0), off the reference (1)
-dP, dP0, dP1 = _positive("dP dP0 dP1")
-f = sympy.Function("f", positive=True)  # u_min = f(dP), Eq. (4): V
-
-# Flow: m^3/s, and flow gain: m^3/s/V
-Q, Q_O, Q_O_prime = _real("Q Q_O Q_O'")
-Q_neg = sympy.Symbol("Q_neg", real=True)  # flow at the mirrored command
-Q_max = sympy.Symbol("Q_max", positive=True)
-K_e, K_0, K_1 = _positive("K_e K_0 K_1")
-gamma_0, gamma_1 = _positive("gamma_0 gamma_1")  # flow per opening, m^2/s, Eqs. (8), (15)
-
-beta = sympy.Symbol("beta", positive=True)  # correction coefficient, Eq. (5)
-kappa = sympy.Symbol("kappa", positive=True)  # k x_max / u_max: share of the drive that full opening takes
-
-Q_max0, Q_max1 = _positive("Q_max0 Q_max1")  # largest flow at dP0 and at dP1
-n = sympy.Symbol("n", positive=True)  # exponent of flow over pressure drop
-slope, jump, u_dz, duty = _real("slope jump u_dz duty")  # du_O/du_i; step of u_O at dP0; dead zone that is left, V
-drive_left, fall = _real("drive_left fall")  # drive not used at full command; of the threshold, seemingly: V
-u_above, u_below = _real("u_above u_below")  # u_O just above and just below dP0: V
-
-# A flow meter that shows nothing below a floor
-Q_floor, u_seen, u_seen0, u_seen1 = _positive("Q_floor u_seen u_seen0 u_seen1")
-s_flow, s_flow0, s_flow1 = _positive("S S_0 S_1")  # flow per command beyond the threshold: m^3/s/V
-q_x = sympy.Symbol("q_x", positive=True)  # k x_max, the command that full opening takes: V
-
-# Identifiability: a valve with other parameters and the same flow; derivatives of the flow by parameters
-scale = sympy.Symbol("lambda", positive=True)
-Q_scaled = sympy.Symbol("Q_scaled", real=True)
-dQ_dC_d, dQ_dk, dQ_dx_max = _real("dQ_dC_d dQ_dk dQ_dx_max")
-Q_1, Q_2, u_1, u_2 = _real("Q_1 Q_2 u_1 u_2")  # two samples
-
-# Codes in the compensator, Eqs. (29)-(32): counts
-n_i, n_0, n_no, n_pwm = _real("n_i n_0 n_no n_O")  # command; compensation at and off the reference; compare value
-n_adc, n_V, n_full = _positive("n_adc n_V n_full")  # full scale; per volt, 1365 in the paper; compare value of u_max
-V_pin = sympy.Symbol("V_pin", real=True)  # at the converter's pin: V
-V_adc = sympy.Symbol("V_adc", positive=True)  # full scale of the converter: V
-K_c = sympy.Symbol("K_c", real=True)  # conversion coefficient, Eq. (32): V per count
-
-# Distances that decide between the cases of Eqs. (1) and (7); where one may be zero, its case is closed
-headroom = sympy.Symbol("headroom", nonnegative=True)  # from the valve's command up to full command: V
-excess = sympy.Symbol("excess", positive=True)  # from the threshold up to the output at zero command: V
-guard = sympy.Symbol("guard", positive=True)  # from the output at zero command up to the threshold: V
-below = sympy.Symbol("below", nonnegative=True)  # dP0 - dP1: Pa
-above = sympy.Symbol("above", positive=True)  # dP1 - dP0: Pa
-y = sympy.Symbol("y", nonnegative=True)  # from the threshold up to the command: V
-rest = sympy.Symbol("rest", positive=True)  # from there up to the command of full opening: V
-DISTANCES = (headroom, excess, guard, below, above, y, rest)
+gamma_0 = _positive("gamma_0", "m**2/s", "flow per opening at the reference")
+gamma_1 = _positive("gamma_1", "m**2/s", "flow per opening at dP1")
+C_d = _positive("C_d", "dimensionless", "discharge coefficient")
+W = _positive("W", "m", "area gradient of the edge")
+rho = _positive("rho", "kg/m**3", "density of the oil")
 
 # Plant, Eqs. (19)-(24)
-u_e, u_if = _real("u_e u_if")  # output of the amplifier, feedback: V
-i, di_dt = _real("i di_dt")  # coil current: A, A/s
-f_e, f_eL = _real("f_e f_eL")  # solenoid force, load force: N
-x_e, dx_e_dt, v, dv_dt = _real("x_e dx_e_dt v dv_dt")  # armature: m, m/s, m/s, m/s^2
-K_a, K_fi, K_i = _positive("K_a K_fi K_i")  # amplifier gain; feedback, V/A; force per current, N/A
-R_c, r_p, L_c = _positive("R_c r_p L_c")  # coil, ohm; internal, ohm; inductance, H
-m_e, B_e, K_et = _positive("m_e B_e K_et")  # mass, kg; damping, N s/m; spring, N/m
+K_a = _positive("K_a", "V/V", "gain of the amplifier, K_e in the paper's (19)")
+K_i = _positive("K_i", "N/A", "force per current")
+K_fi = _positive("K_fi", "V/A", "gain of the current feedback")
+K_0 = _positive("K_0", f"{_FLOW}/V", "flow gain at the reference")
+K_1 = _positive("K_1", f"{_FLOW}/V", "flow gain at dP1")
+K_e = _positive("K_e", f"{_FLOW}/V", "flow gain: flow per command (Eq. 2)")
+L_c = _positive("L_c", "H", "inductance of the coil")
+R_c = _positive("R_c", "ohm", "resistance of the coil")
+r_p = _positive("r_p", "ohm", "internal resistance of the amplifier")
+m_e = _positive("m_e", "kg", "mass of the armature")
+B_e = _positive("B_e", "N*s/m", "damping of the armature")
+K_et = _positive("K_et", "N/m", "stiffness of the spring")
+G_0 = _positive("G_0", f"{_FLOW}/V", "static gain of the transfer function")
 
-x_ov = sympy.Symbol("x_ov", nonnegative=True)  # overlap of the spool: m
+# Flow per command beyond the threshold, command per opening, flows, openings
+s_flow = _positive("S", f"{_FLOW}/V", "flow per command beyond the threshold")
+s_flow0 = _positive("S_0", f"{_FLOW}/V", "flow per command beyond the threshold, at dP0")
+s_flow1 = _positive("S_1", f"{_FLOW}/V", "flow per command beyond the threshold, at dP1")
+k = _positive("k", "V/m", "command per opening beyond the threshold (Eq. 11)")
+Q_max = _positive("Q_max", _FLOW, "largest flow")
+Q_max0 = _positive("Q_max0", _FLOW, "largest flow at dP0")
+Q_max1 = _positive("Q_max1", _FLOW, "largest flow at dP1")
+Q_floor = _positive("Q_floor", _FLOW, "least flow that the meter shows")
+Q = _real("Q", _FLOW, "flow")
+Q_O = _real("Q_O", _FLOW, "wanted flow at the reference")
+Q_O_prime = _real("Q_O'", _FLOW, "wanted flow off the reference")
+Q_neg = _real("Q_neg", _FLOW, "flow at the opposite command", latex="Q_{-}")
+Q_scaled = _real("Q_scaled", _FLOW, "flow of the other valve")
+Q_1 = _real("Q_1", _FLOW, "flow of a first sample")
+Q_2 = _real("Q_2", _FLOW, "flow of a second sample")
+V_pin = _real("V_pin", "V", "voltage at the converter's pin")
+V_adc = _positive("V_adc", "V", "full scale of the converter")
+x = _nonnegative("x", "m", "opening of the edge")
+x_max = _positive("x_max", "m", "largest opening")
+x_ov = _nonnegative("x_ov", "m", "overlap of the spool")
+q_x = _positive("q_x", "V", "k x_max, the command that full opening takes")
 
-# Laplace transforms, Eqs. (25)-(28), and values at t = 0
-t, s = sympy.symbols("t s", positive=True)  # time, s; variable of the transform, 1/s
-U_e, U_i, U_if, I_s, F_e, F_eL, X_e, Q_s = (
-    sympy.Function(name)(s) for name in ("U_e", "U_i", "U_if", "I", "F_e", "F_eL", "X_e", "Q")
+# Pressure drop: at no index, at the reference (0), off the reference (1)
+dP = _positive("dP", "Pa", "pressure drop across the edge", latex=r"\mathrm{\Delta} P")
+dP0 = _positive("dP0", "Pa", "pressure drop at the reference", latex=r"\mathrm{\Delta} P_{0}")
+dP1 = _positive("dP1", "Pa", "a pressure drop off the reference", latex=r"\mathrm{\Delta} P_{1}")
+f = sympy.Function("f", positive=True)
+_declare(f(dP), "V", "threshold as a function of the pressure drop (Eq. 4)")
+
+# Time, and the Laplace transform of Eqs. (25)-(28)
+t = _positive("t", "s", "time")
+s = _positive("s", "1/s", "variable of the Laplace transform")
+a = _real("a", "1/s", "half the rate at which a drifting pressure drop falls")
+i_init = _real("i(0)", "A", "current at t = 0", latex="i(0)")
+x_init = _real("x_e(0)", "m", "travel at t = 0", latex="x_{e}(0)")
+v_init = _real("v(0)", "m/s", "speed at t = 0", latex="v(0)")
+
+# Thresholds, and the command as a meter sees it
+u_min = _positive("u_min", "V", "threshold of the dead zone")
+u_min0 = _positive("u_min0", "V", "threshold at the reference")
+u_min1 = _positive("u_min1", "V", "threshold at dP1")
+u_seen = _positive("u_seen", "V", "command at which the meter first shows flow")
+u_seen0 = _positive("u_seen0", "V", "command at which the meter first shows flow, at dP0")
+u_seen1 = _positive("u_seen1", "V", "command at which the meter first shows flow, at dP1")
+u_max = _positive("u_max", "V", "full command")
+u_dz = _real("u_dz", "V", "dead zone that is left")
+drive_left = _real("drive_left", "V", "drive that is not used at full command")
+jump = _real("jump", "V", "step of the output where dP passes dP0")
+fall = _real("fall", "V", "fall of the threshold as the meter shows it")
+
+# Distances that decide between the cases of Eqs. (1) and (7); where one may be zero, its case is closed
+y = _nonnegative("y", "V", "from the threshold up to the command")
+rest = _positive("rest", "V", "from the command up to that of full opening")
+headroom = _nonnegative("headroom", "V", "from the valve's command up to full command")
+excess = _positive("excess", "V", "by how much a threshold is exceeded")
+guard = _positive("guard", "V", "by how much a threshold is not reached")
+below = _nonnegative("below", "Pa", "dP0 - dP1, zero or more")
+above = _positive("above", "Pa", "dP1 - dP0, more than zero")
+DISTANCES = (headroom, excess, guard, below, above, y, rest)
+
+# What varies: the plant's state and its transforms, ...
+dv_dt = _varying("dv_dt", "m/s**2", "rate of the armature's speed", latex=r"\frac{\mathrm{d}v}{\mathrm{d}t}")
+dx_e_dt = _varying("dx_e_dt", "m/s", "rate of the armature's travel", latex=r"\frac{\mathrm{d}x_{e}}{\mathrm{d}t}")
+v = _varying("v", "m/s", "speed of the armature")
+x_e = _varying("x_e", "m", "travel of the armature")
+f_e = _varying("f_e", "N", "force of the solenoid")
+f_eL = _varying("f_eL", "N", "force of the load")
+di_dt = _varying("di_dt", "A/s", "rate of the coil's current", latex=r"\frac{\mathrm{d}i}{\mathrm{d}t}")
+i = _varying("i", "A", "current of the coil")
+u_e = _varying("u_e", "V", "output of the amplifier")
+u_if = _varying("u_if", "V", "feedback of the current")
+
+
+def _transform(name: str, unit: str, meaning: str) -> Any:
+    # A transform is an integral over time.
+    return _declare(sympy.Function(name)(s), unit, meaning, varies=True)
+
+
+X_e = _transform("X_e", "m*s", "transform of x_e")
+F_e = _transform("F_e", "N*s", "transform of f_e")
+F_eL = _transform("F_eL", "N*s", "transform of f_eL")
+U_e = _transform("U_e", "V*s", "transform of u_e")
+U_i = _transform("U_i", "V*s", "transform of u_i")
+U_if = _transform("U_if", "V*s", "transform of u_if")
+I_s = _transform("I", "A*s", "transform of i")
+Q_s = _transform("Q", "m**3", "transform of Q")
+G = _transform("G", f"{_FLOW}/V", "transfer function from command to flow")
+
+# ... what an identification differentiates, ...
+dQ_dC_d = _varying("dQ_dC_d", _FLOW, "sensitivity of the flow to C_d", latex=r"\frac{\partial Q}{\partial C_{d}}")
+dQ_dk = _varying("dQ_dk", f"{_FLOW}*m/V", "sensitivity of the flow to k", latex=r"\frac{\partial Q}{\partial k}")
+dQ_dx_max = _varying(
+    "dQ_dx_max", "m**2/s", "sensitivity of the flow to x_max", latex=r"\frac{\partial Q}{\partial x_{\text{max}}}"
 )
-i_init, x_init, v_init = _real("i(0) x_e(0) v(0)")
-G = sympy.Function("G")(s)  # transfer function from command to flow: m^3/s/V
-G_0 = sympy.Symbol("G_0", positive=True)  # its static gain
-a = sympy.Symbol("a", real=True)  # half the rate at which a drifting pressure drop falls: 1/s
+
+# ... and commands, last in a product
+u_O = _varying("u_O", "V", "output of the compensator")
+u_above = _varying("u_above", "V", "output just above dP0")
+u_below = _varying("u_below", "V", "output at dP0")
+u_0 = _varying("u_0", "V", "compensation signal at the reference")
+u_no = _varying("u_no", "V", "compensation signal off the reference")
+u_i_prime = _nonnegative("u_i'", "V", "command beyond the threshold (Fig. 3, Eq. 11)", varies=True)
+u_1 = _varying("u_1", "V", "command of the first sample")
+u_2 = _varying("u_2", "V", "command of the second sample")
+u_i = _varying("u_i", "V", "command, the compensator's input; in (1) the valve's input")
+n_pwm = _varying("n_O", "code", "code of the output")
+n_i = _varying("n_i", "code", "code of the command (Eq. 29)")
+n_0 = _varying("n_0", "code", "code of the compensation signal at the reference")
+n_no = _varying("n_no", "code", "code of the compensation signal off the reference")

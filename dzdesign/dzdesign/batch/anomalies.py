@@ -1,31 +1,33 @@
 """What is odd in a lot though each of its valves is in order: a recording that two share, valves of another lot."""
 
 import os
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
-from dzdesign.batch.table import Calibrated
-from dzdesign.batch.valves import Valve, by_name
+from dzdesign.batch.valves import Valve
 from dzdesign.core.errors import InputError, and_more
+from dzdesign.report.lot.valve_folder import VALVES, ValveFolder
+from dzdesign.report.lot.valve_names import by_name
 
 #: Names in a sentence.
 NAMED = 5
 
 
-def oddities_of(found: Mapping[str, Calibrated], folder: Path, valves: Sequence[Valve] = ()) -> list[str]:
+def anomalies_of(found: Sequence[ValveFolder], folder: Path, valves: Sequence[Valve]) -> list[str]:
     """Return sentences.
 
     Parameters
     ----------
-    found : mapping
-        Name of each valve of the lot to what was read back of it.
+    found : sequence of ValveFolder
+        The lot as read back.
     folder : Path
-        Of the batch.
+        Of the lot.
     valves : sequence of Valve
         The lot as it was given, with the patterns of the recordings.
     """
     overlapping = _overlapping(valves)
-    return [*overlapping.values(), *_shared_recordings(found, overlapping), *_left_over(found, folder)]
+    names = {each.name for each in found}
+    return [*overlapping.values(), *_shared_recordings(found, overlapping), *_left_over(names, folder)]
 
 
 def _overlapping(valves: Sequence[Valve]) -> dict[tuple[str, ...], str]:
@@ -41,24 +43,24 @@ def _overlapping(valves: Sequence[Valve]) -> dict[tuple[str, ...], str]:
     for place, by in owners.items():
         if len(by) > 1:
             shared.setdefault(tuple(by), []).append(place)
-    said = {}
+    lines = {}
     for names, places in shared.items():
         by = owners[places[0]]
         more = f" and {len(places) - 1} more" if len(places) > 1 else ""
         what = " and ".join(f"'{by[name]}' of {name}" for name in names[:2])
-        said[names] = (
+        lines[names] = (
             f"{and_more(names, NAMED)} take the same file, '{Path(places[0]).name}'{more}: in the column files {what} "
             "overlap; let each valve's match its own files alone, unless one valve is meant twice, with other options"
         )
-    return said
+    return lines
 
 
-def _shared_recordings(found: Mapping[str, Calibrated], known: Collection[tuple[str, ...]]) -> list[str]:
+def _shared_recordings(found: Sequence[ValveFolder], known: Collection[tuple[str, ...]]) -> list[str]:
     """A bench that saves a recording under the wrong name gives a valve the firmware of another."""
     owners: dict[str, list[str]] = {}
-    for name, each in found.items():
-        for _, digest in each.designed.valve.made_from if each.designed else ():
-            owners.setdefault(digest, []).append(name)
+    for each in found:
+        for source in each.manifest.made_from if each.designed else ():
+            owners.setdefault(source.sha256, []).append(each.name)
     groups = dict.fromkeys(tuple(dict.fromkeys(names)) for names in owners.values())
     return [
         f"{and_more(names, NAMED)} share a recording, byte for byte, in files of their own: was one saved under the "
@@ -68,10 +70,12 @@ def _shared_recordings(found: Mapping[str, Calibrated], known: Collection[tuple[
     ]
 
 
-def _left_over(found: Mapping[str, Calibrated], folder: Path) -> list[str]:
-    there = (path.name for path in (folder / "valves").iterdir() if path.is_dir() and path.name not in found)
+def _left_over(names: Collection[str], folder: Path) -> list[str]:
+    there = (path.name for path in (folder / VALVES).iterdir() if path.is_dir() and path.name not in names)
     others = sorted((name for name in there if not name.startswith(".")), key=by_name)
     if not others:
         return []
-    shown = and_more(others, NAMED)
-    return [f"the folder 'valves' holds {shown}, not of this lot: left by an earlier run; take them away"]
+    return [
+        f"the folder '{VALVES}' holds {and_more(others, NAMED)}, not of this lot: left by an earlier run; take them "
+        "away"
+    ]

@@ -10,11 +10,11 @@ from threading import Lock
 from typing import Any
 
 from dzdesign.core.artefact_files import TOOL, sha256_of, write_folder
+from dzdesign.core.artefact_types import THIS_TOOL, SourceFile
 from dzdesign.core.errors import DzdesignError, one_line
+from dzdesign.report.lot.summary import DOES_NOT_HOLD, FAILED, OK, Status
+from dzdesign.report.lot.valve_folder import FIRMWARE, ValveManifest
 
-OK, FAILED, DOES_NOT_HOLD = "ok", "failed", "does not hold"
-#: Folder of a valve's firmware, in the folder of its results.
-FIRMWARE = "firmware"
 #: A worker may run several threads; NumPy and the solvers of one process would only get in each other's way.
 ONE_AT_A_TIME = Lock()
 
@@ -53,7 +53,6 @@ class Task:
     @property
     def digest(self) -> str:
         """SHA-256 of all that the result depends on: recordings, options, the tool's version."""
-        plant = self.plant and (self.plant[0], sha256_of(self.plant[1]))
         inputs = {
             "tool": TOOL,
             "name": self.name,
@@ -62,73 +61,79 @@ class Task:
             "design": dict(self.design),
             "target": self.target,
             "verify": self.verify,
-            "plant": plant,
+            "plant": self.plant and (self.plant[0], sha256_of(self.plant[1])),
             "refused": self.refused,
         }
         return sha256_of(json.dumps(inputs, sort_keys=True).encode())
 
+    def outcome(
+        self, status: Status, reason: str = "", files: Mapping[str, bytes] | None = None, *, again: bool = False
+    ) -> "Outcome":
+        """Return what came of it.
+
+        Parameters
+        ----------
+        status : {"ok", "failed", "does not hold"}
+            "does not hold": a requirement of its verification.
+        reason : str
+            Why it is not ok.
+        files : mapping of str to bytes, optional
+            Path in the valve's folder to content.
+        again : bool
+            Whether the next run tries it again, as that may end otherwise.
+        """
+        manifest = ValveManifest(
+            tool=THIS_TOOL,
+            made_from=tuple(SourceFile(source=name, sha256=sha256_of(content)) for name, content in self.recordings),
+            name=self.name,
+            status=status,
+            reason=one_line(reason),
+            inputs_sha256=None if again else self.digest,
+            files={},
+        )
+        return Outcome(manifest=manifest, files=files or {})
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """What came of a valve.
+    """What came of a valve: the manifest of its folder, without hashes yet, and the files by their path in it."""
 
-    Attributes
-    ----------
-    name : str
-        Of the valve.
-    status : {"ok", "failed", "does not hold"}
-        "does not hold": a requirement of its verification.
-    reason : str
-        Why it is not ok, one sentence.
-    digest : str
-        Of the task; empty where another run may end otherwise, so that the next one tries again.
-    files : mapping of str to bytes
-        Path in the valve's folder to content.
-    tool : mapping
-        Name and version of what made it.
-    """
-
-    name: str
-    status: str
-    reason: str = ""
-    digest: str = ""
+    manifest: ValveManifest
     files: Mapping[str, bytes] = field(default_factory=dict)
-    tool: Mapping[str, str] = field(default_factory=lambda: dict(TOOL))
+
+    @property
+    def name(self) -> str:
+        """Of the valve."""
+        return self.manifest.name
 
 
 def calibrate(task: Task) -> Outcome:
     """Identify, design, generate and, if asked for, verify one valve; a failure is an outcome, never an exception."""
+    if task.refused:
+        return task.outcome(FAILED, task.refused)
     with ONE_AT_A_TIME, TemporaryDirectory() as temporary:
-        folder, digest = Path(temporary), task.digest
+        folder, again = Path(temporary), False
+        status: Status
         try:
-            status, reason = (FAILED, task.refused) if task.refused else _run(task, folder)
+            status, reason = _run(task, folder)
         except DzdesignError as error:
             status, reason = FAILED, str(error)
         except Exception as error:  # a fault of ours must not stop the batch either
-            status, reason, digest = FAILED, f"unexpected {type(error).__name__}: {error}", ""
+            status, reason, again = FAILED, f"unexpected {type(error).__name__}: {error}", True
         # The worker's own folder is no place that the user knows.
         for place in (folder / "recordings", folder):
             reason = reason.replace(f"{place}{os.sep}", "")
-        reason = one_line(reason)
-        return Outcome(name=task.name, status=status, reason=reason, digest=digest, files=_files(folder / "out"))
+        return task.outcome(status, reason, _files(folder / "out"), again=again)
 
 
-def _run(task: Task, folder: Path) -> tuple[str, str]:
+def _run(task: Task, folder: Path) -> tuple[Status, str]:
     """Run the stages into ``folder/out`` and return status and reason."""
     from dzdesign import api
     from dzdesign.codegen.project import generate
 
     out = folder / "out"
     out.mkdir()
-    paths = []
-    for index, (name, content) in enumerate(task.recordings):
-        path = folder / "recordings" / name
-        if path.exists():  # a list may name files of one name, from several folders
-            path = folder / "recordings" / str(index) / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
-        paths.append(path)
-    valve = api.identify(paths, **task.identify, output=out / "valve.json")
+    valve = api.identify(_write_recordings(task, folder), **task.identify, output=out / "valve.json")
     compensator = api.design(valve, target=task.target, **task.design, output=out / "compensator.json")
     firmware = generate(compensator, task.target)  # proved by the design, a line above
     write_folder(out / FIRMWARE, firmware.files, firmware.manifest)
@@ -143,6 +148,18 @@ def _run(task: Task, folder: Path) -> tuple[str, str]:
         return OK, ""
     check = next(check for check in verification.checks if not check.holds)
     return DOES_NOT_HOLD, f"{check.name}: {check.text}"
+
+
+def _write_recordings(task: Task, folder: Path) -> list[Path]:
+    paths = []
+    for index, (name, content) in enumerate(task.recordings):
+        path = folder / "recordings" / name
+        if path.exists():  # a list may name files of one name, from several folders
+            path = folder / "recordings" / str(index) / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+        paths.append(path)
+    return paths
 
 
 def _files(folder: Path) -> dict[str, bytes]:

@@ -5,25 +5,36 @@ import contextlib
 import errno
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
-from dzdesign.batch.anomalies import oddities_of
+from dzdesign.batch.anomalies import anomalies_of
 from dzdesign.batch.calibration import Outcome, Task
-from dzdesign.batch.lot_setting import common_of, without_binding
+from dzdesign.batch.printing import print_lot
 from dzdesign.batch.results import Results
 from dzdesign.batch.runners import run_local, run_on_cluster
-from dzdesign.batch.summary import print_batch, summary_of
-from dzdesign.batch.table import read_back, rows_of, table_files
+from dzdesign.batch.summary import (
+    SETTING_NAME,
+    designed_valves,
+    lot_setting_of,
+    setting_files,
+    setting_summary,
+    summary_of,
+)
 from dzdesign.batch.valves import Valve, valves_of
 from dzdesign.command_line.design_options import design_options
 from dzdesign.command_line.identify_options import IDENTIFY_NAMES, identify_options, record_of
-from dzdesign.core.artefact_files import read_bytes, to_json, write_file, write_files
+from dzdesign.core.artefact_files import MANIFEST_NAME, read_bytes, to_json, write_file, write_files
+from dzdesign.core.artefact_types import as_document
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.folder_swap import alone_in
 from dzdesign.design.request import DEFAULTS
 from dzdesign.recordings import rows_to_skip
+from dzdesign.report.lot.report import report_of_lot
+from dzdesign.report.lot.summary import LotSummary
+from dzdesign.report.lot.table import table_files
+from dzdesign.report.lot.table_rows import table_rows
+from dzdesign.report.valve_report import REPORT_NAME
 from dzdesign.terminal.progress import say, with_bar
 
 #: Of a disk, and of what a user may take of it; Windows knows no such limit.
@@ -37,20 +48,20 @@ IDENTIFY = (*IDENTIFY_NAMES, "columns", "dp", "skip_rows")
 def run_batch(args: argparse.Namespace) -> int:
     """Calibrate the valves of a folder or a list; raise at the end if any could not be."""
     output = Path(args.output)
-    document, report = calibrate_lot(args)
+    summary, report = calibrate_lot(args)
     if args.json:
-        print(to_json({**document, "report": report and str(report)}), end="")
+        print(to_json({**as_document(summary), "report": report and str(report)}), end="")
     else:
-        print_batch(document, str(output), report is not None)
-    if document["failed"]:
+        print_lot(summary, output, report)
+    if summary.failed:
         raise RequirementError(
-            f"{len(document['failed'])} of {document['valves']} valves are not calibrated; their reasons are in "
+            f"{len(summary.failed)} of {summary.valves} valves are not calibrated; their reasons are in "
             f"'{output / 'valves.csv'}'"
         )
     return 0
 
 
-def calibrate_lot(args: argparse.Namespace) -> tuple[dict[str, Any], Path | None]:
+def calibrate_lot(args: argparse.Namespace) -> tuple[LotSummary, Path | None]:
     """Calibrate the valves of a folder or a list; return batch.json, and where the report is if there is one.
 
     Parameters
@@ -108,37 +119,51 @@ def _is_full(error: InputError) -> bool:
 
 def _calibrate(
     args: argparse.Namespace, valves: list[Valve], plant: tuple[str, bytes] | None, results: Results, jobs: int
-) -> tuple[dict[str, Any], Path | None]:
-    output = results.folder
+) -> tuple[LotSummary, Path | None]:
     results.begin([valve.name for valve in valves])
     waiting = [valve for valve in with_bar(valves, "reading") if not _is_done(results, _task(valve, args, plant))]
     say(f"{len(valves)} valves, {len(valves) - len(waiting)} of them done before")
     tasks = (_task(valve, args, plant) for valve in waiting)
     outcomes = run_on_cluster(tasks, args.dask) if args.dask else run_local(tasks, useful_jobs(jobs, len(waiting)))
     unwritten = _write_all(results, outcomes, len(waiting))
-    found = {valve.name: read_back(results, valve.name, unwritten) for valve in with_bar(valves, "making the table")}
-    common, why_not = common_of(found)
-    rows = rows_of(found, common, {valve.name: _record(valve, args) for valve in valves})
-    files = table_files(rows)
-    without = without_binding(found, common)
-    document = summary_of(rows, common, why_not, files=files, verified=args.verify, without_binding=without)
-    document["oddities"] = oddities_of(found, output, valves)
-    if common is not None:
-        from dzdesign.design.compensator_file import compensator_document
+    summary = _finished(args, valves, results, unwritten)
+    return summary, _write_report(results.folder)
 
-        files["common_compensator.json"] = to_json(compensator_document(common.compensator)).encode()
-    else:
-        (output / "common_compensator.json").unlink(missing_ok=True)  # of an earlier run with other valves
-    write_files(output, files, "-o")
-    results.write_summary(document)
-    return document, _write_report(output)
+
+def _finished(
+    args: argparse.Namespace, valves: Sequence[Valve], results: Results, unwritten: Mapping[str, str]
+) -> LotSummary:
+    """Write table, lot setting and batch.json, from the valves' folders alone; return the last."""
+    output = results.folder
+    found = [results.read(valve.name, unwritten) for valve in with_bar(valves, "making the table")]
+    designed = designed_valves(found)
+    setting, why_not = lot_setting_of(designed)
+    rows = table_rows(
+        found, setting.compensator if setting else None, {valve.name: _record(valve, args) for valve in valves}
+    )
+    table = table_files(rows)
+    summary = summary_of(
+        rows,
+        files=table,
+        verified=args.verify,
+        setting=setting_summary(setting, designed) if setting else None,
+        why_no_setting=why_not,
+        made_from={
+            valve.name: read_bytes(results.of(valve.name) / MANIFEST_NAME, "manifest")
+            for valve in valves
+            if valve.name not in unwritten
+        },
+        anomalies=anomalies_of(found, output, valves),
+    )
+    if setting is None:
+        (output / SETTING_NAME).unlink(missing_ok=True)  # of an earlier run with other valves
+    write_files(output, {**table, **(setting_files(setting) if setting else {})}, "-o")
+    results.finish(summary)
+    return summary
 
 
 def _write_report(output: Path) -> Path | None:
     """Write the report of the lot from the files, as `dzdesign report` does; a lot too large for one has its table."""
-    from dzdesign.report.lot.report import report_of_lot
-    from dzdesign.report.valve_report import REPORT_NAME
-
     path = output / REPORT_NAME
     try:
         write_file(path, report_of_lot(output).html)
@@ -213,9 +238,7 @@ def _task(valve: Valve, args: argparse.Namespace, plant: tuple[str, bytes] | Non
     return Task(
         name=valve.name,
         recordings=tuple(recordings),
-        # Without a record the task is what it was before there were records: an earlier run is taken up.
-        identify={name: options[name] for name in IDENTIFY if options[name] is not None}
-        | ({"record": record} if record else {}),
+        identify={name: options[name] for name in IDENTIFY if options[name] is not None} | {"record": record},
         design={name: options[name] for name in DEFAULTS if options[name] is not None},
         target=options["target"],
         verify=args.verify,

@@ -1,29 +1,26 @@
-"""The folder of a batch: one folder a valve, written whole; what is there and still valid is not made again."""
+"""The folder of a lot: one folder a valve, written whole; what is there and still valid is not made again."""
 
 import json
 import re
 import shutil
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-from dzdesign.batch.calibration import DOES_NOT_HOLD, FAILED, FIRMWARE, OK, Outcome
-from dzdesign.core.artefact_files import (
-    MANIFEST_NAME,
-    TOOL,
-    parse_document,
-    sha256_of,
-    to_json,
-    write_file,
-    write_folder,
-)
+from dzdesign.batch.calibration import Outcome
+from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of, write_file, write_folder
+from dzdesign.core.artefact_types import THIS_TOOL, Artefact, as_document, to_json_bytes
 from dzdesign.core.errors import InputError
-
-SCHEMA = "dzdesign.batch/1"
-VALVE_SCHEMA = "dzdesign.batch-valve/1"
-SUMMARY = "batch.json"
-#: What to do about a file that is not as it was written.
-AGAIN = "run the batch again, which takes up what is done"
+from dzdesign.report.lot.folder import is_lot
+from dzdesign.report.lot.summary import FAILED, SUMMARY_NAME, LotSummary, UnfinishedLot
+from dzdesign.report.lot.valve_folder import (
+    FIRMWARE,
+    VALVES,
+    ValveFolder,
+    ValveManifest,
+    read_manifest,
+    read_valve_folder,
+)
 
 
 class Results:
@@ -45,87 +42,76 @@ class Results:
         if folder.is_symlink() and not folder.exists():
             raise InputError(f"'{folder}' is a link to '{folder.readlink()}', which is gone; choose another with -o")
         try:
-            if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-                self._check_is_ours()
-            (folder / "valves").mkdir(parents=True, exist_ok=True)
+            if folder.exists() and (not folder.is_dir() or any(folder.iterdir())) and not is_lot(folder):
+                raise InputError(
+                    f"'{folder}' is not empty and no folder of a batch, so it is left alone; choose another with -o"
+                )
+            (folder / VALVES).mkdir(parents=True, exist_ok=True)
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or error
             raise InputError(f"'{folder}' can't be written into: {reason}; choose another folder with -o") from error
 
-    def _check_is_ours(self) -> None:
-        try:
-            parse_document((self.folder / SUMMARY).read_bytes(), SUMMARY, (SCHEMA,))
-        except (OSError, InputError) as error:
-            raise InputError(
-                f"'{self.folder}' is not empty and no folder of a batch, so it is left alone; choose another with -o"
-            ) from error
-
     def begin(self, names: Collection[str]) -> None:
-        """Mark the folder as a batch's, and take away what a killed run left half-written of these valves."""
-        self.write_summary({"complete": False, "names": list(names)})
+        """Mark the folder as a lot's, and take away what a killed run left half-written of these valves."""
+        self._write(UnfinishedLot(tool=THIS_TOOL, made_from=(), names=tuple(names)))
         left = re.compile(r"\.(.+)\.[a-z0-9_]{8}")
-        for path in (self.folder / "valves").iterdir():
+        for path in (self.folder / VALVES).iterdir():
             found = left.fullmatch(path.name)
             if found and found[1] in names and path.is_dir():
                 shutil.rmtree(path, ignore_errors=True)
 
-    def write_summary(self, document: dict[str, Any]) -> None:
-        """Write batch.json."""
-        write_file(self.folder / SUMMARY, to_json({"schema": SCHEMA, "tool": TOOL, **document}), SCHEMA)
+    def finish(self, summary: LotSummary) -> None:
+        """Write batch.json of a lot that has come to its end."""
+        self._write(summary)
+
+    def _write(self, summary: Artefact) -> None:
+        write_file(self.folder / SUMMARY_NAME, to_json_bytes(summary))
 
     def of(self, name: str) -> Path:
         """Return a valve's folder."""
-        return self.folder / "valves" / name
+        return self.folder / VALVES / name
 
     def write(self, outcome: Outcome) -> None:
         """Write a valve's folder, whole or not at all, in place of what an earlier run made of it."""
-        files: dict[str, bytes] = dict(outcome.files)
-        if outcome.reason:
-            files["reason.txt"] = f"{outcome.reason}\n".encode()
-        manifest = {
-            "schema": VALVE_SCHEMA,
-            "tool": dict(outcome.tool),
-            "name": outcome.name,
-            "status": outcome.status,
-            "reason": outcome.reason,
-            "inputs_sha256": outcome.digest,
-            "board": _board_of(files),
-        }
-        write_folder(self.of(outcome.name), files, manifest)
+        files = dict(outcome.files)
+        if outcome.manifest.reason:
+            files["reason.txt"] = f"{outcome.manifest.reason}\n".encode()
+        write_folder(
+            self.of(outcome.name), files, as_document(replace(outcome.manifest, board=_board_files(files)))
+        )
 
-    def manifest(self, name: str) -> dict[str, Any]:
-        """Return what a valve's folder says of itself.
+    def read(self, name: str, unwritten: Mapping[str, str]) -> ValveFolder:
+        """Read a valve's folder; one that could not be written has failed, whatever an earlier run left there.
 
-        Raises
-        ------
-        InputError
-            If it is not there or is no such folder.
+        Parameters
+        ----------
+        name : str
+            Of the valve.
+        unwritten : mapping
+            Name to the reason why its folder could not be written.
         """
-        path = self.of(name) / MANIFEST_NAME
-        try:
-            document = parse_document(path.read_bytes(), str(path), (VALVE_SCHEMA,))
-        except OSError as error:
-            raise InputError(f"'{path}' can't be read: {error.strerror}; run the batch again") from error
-        if document.get("status") not in (OK, FAILED, DOES_NOT_HOLD) or not isinstance(document.get("files"), dict):
-            raise InputError(f"'{path}' is no manifest of a valve; take its folder away and run the batch again")
-        return document
+        if name not in unwritten:
+            return read_valve_folder(self.of(name))
+        return ValveFolder(
+            manifest=ValveManifest(
+                tool=THIS_TOOL, made_from=(), name=name, status=FAILED, reason=unwritten[name], files={}
+            )
+        )
 
     def is_done(self, name: str, digest: str) -> bool:
         """Tell whether a valve's folder was made from these inputs and holds every file as it was written."""
         try:
-            manifest = self.manifest(name)
-            if manifest.get("inputs_sha256") != digest:
-                return False
-            board = manifest.get("board") or ()  # of which a person's version is as good
-            return all(
-                sha256_of((self.of(name) / file).read_bytes()) == sha256 or file in board
-                for file, sha256 in manifest["files"].items()
+            manifest = read_manifest(self.of(name))
+            return manifest.inputs_sha256 == digest and all(
+                # A person's version of a board file is as good.
+                sha256_of((self.of(name) / file).read_bytes()) == sha256 or file in manifest.board
+                for file, sha256 in manifest.files.items()
             )
         except (InputError, OSError):
             return False
 
 
-def _board_of(files: Mapping[str, bytes]) -> list[str]:
+def _board_files(files: Mapping[str, bytes]) -> tuple[str, ...]:
     """Return which files of a valve's folder are its user's to fill in: those of its firmware."""
     manifest = files.get(f"{FIRMWARE}/{MANIFEST_NAME}")
-    return [f"{FIRMWARE}/{name}" for name in json.loads(manifest)["board"]] if manifest else []
+    return tuple(f"{FIRMWARE}/{name}" for name in json.loads(manifest)["board"]) if manifest else ()

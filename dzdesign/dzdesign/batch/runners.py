@@ -10,9 +10,10 @@ from itertools import count, islice
 from threading import Event, Thread
 from typing import TYPE_CHECKING
 
-from dzdesign.batch.calibration import FAILED, Outcome, Task, calibrate
-from dzdesign.core.artefact_files import TOOL
-from dzdesign.core.errors import InputError, one_line
+from dzdesign.batch.calibration import Outcome, Task, calibrate
+from dzdesign.core.artefact_types import THIS_TOOL
+from dzdesign.core.errors import InputError
+from dzdesign.report.lot.summary import FAILED
 from dzdesign.terminal.progress import say
 
 if TYPE_CHECKING:
@@ -87,7 +88,7 @@ def _alone(task: Task, work: Work) -> Outcome:
 
 def _dead(task: Task) -> Outcome:
     """Return the outcome of a valve that ends every process; without a digest, so that another run tries again."""
-    return Outcome(name=task.name, status=FAILED, reason=f"{ENDED}, and again when it was tried alone")
+    return task.outcome(FAILED, f"{ENDED}, and again when it was tried alone", again=True)
 
 
 def run_on_cluster(tasks: Iterable[Task], address: str, work: Work = calibrate) -> Iterator[Outcome]:
@@ -226,10 +227,10 @@ def _ahead(client: "Client") -> int:
 def _outcome(future: "Future", task: Task) -> Outcome:
     """Return what a worker made, if it is of this version; or why it made nothing."""
     if future.status == "error":
-        return Outcome(name=task.name, status=FAILED, reason=one_line(f"unexpected: {future.exception()}"))
+        return task.outcome(FAILED, f"unexpected: {future.exception()}", again=True)
     outcome: Outcome = future.result()
-    if dict(outcome.tool) != TOOL:
+    if outcome.manifest.tool != THIS_TOOL:
         raise InputError(
-            f"a worker runs dzdesign {outcome.tool.get('version')}, this is {TOOL['version']}; install one version"
+            f"a worker runs dzdesign {outcome.manifest.tool.version}, this is {THIS_TOOL.version}; install one version"
         )
     return outcome

@@ -12,15 +12,12 @@ from dzdesign.core.artefact_files import read_bytes
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.identify.valve.test_record import checked_record
 from dzdesign.recordings import expand
+from dzdesign.report.lot.table import RECORD
+from dzdesign.report.lot.valve_names import NAME, by_name
 
 #: What recordings are called in a valve's folder where no --pattern says so; notes and photographs may lie beside them.
 RECORDINGS = ("csv", "txt", "tsv", "dat", "gz", "tdms", "mat", "h5", "hdf5", "parquet", "feather", "arrow")
-#: A column of the CSV file that is an entry of each valve's record: record.serial.
-RECORD = "record."
-#: A name is a folder's on every system and a cell's in every spreadsheet.
-NAME = re.compile(r"[^\W_][\w .+-]{0,99}(?<![. ])")
 RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
-DIGITS = re.compile(r"([0-9]+)")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,25 +67,6 @@ class Valve:
                     )
                 found[path] = places[place] = pattern
         return found
-
-
-def by_name(name: str) -> tuple[tuple[tuple[str, int, str], ...], str]:
-    """Return what to sort a valve by: its name, the numbers in it as numbers.
-
-    Parameters
-    ----------
-    name : str
-        Of a valve.
-
-    Examples
-    --------
-    >>> sorted(["V10", "V2", "V1b", "V1"], key=by_name)
-    ['V1', 'V1b', 'V2', 'V10']
-    """
-    words, numbers = DIGITS.split(name)[::2], [digits.lstrip("0") for digits in DIGITS.findall(name)]
-    # By length first: a number may have more digits than Python makes an int of.
-    parts = ((word, len(digits), digits) for word, digits in zip(words, [*numbers, ""], strict=True))
-    return tuple(parts), name
 
 
 def valves_of(source: Path, pattern: str | None, options: Collection[str]) -> list[Valve]:

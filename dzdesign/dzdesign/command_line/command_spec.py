@@ -305,7 +305,7 @@ COMMANDS: dict[str, tuple[str, str, tuple[Option, ...]]] = {
     ),
     "reproduce": (
         "the paper's valves through the whole product; every number of the paper beside ours, its figures redrawn",
-        "dzdesign.reproduce.reproduction:run_reproduce",
+        "dzdesign.commands.reproduce:run_reproduce",
         (_given(*OUTPUT, default="reproduction", metavar="DIR", help="folder to write"),),
     ),
     "init": (

@@ -18,6 +18,7 @@ from dzdesign.core.artefact_files import (
     write_files,
     write_folder,
 )
+from dzdesign.core.artefact_types import as_document, schema_of
 from dzdesign.core.errors import InputError, one_line
 from dzdesign.core.units import parse_quantity
 from dzdesign.recordings import check_plots, read_recordings, refuse_copies
@@ -96,10 +97,11 @@ def run_design(args: argparse.Namespace) -> int:
 
 def run_codegen(args: argparse.Namespace) -> int:
     """Generate the firmware of a compensator."""
-    from dzdesign.codegen.project import DEFAULT_TARGET, SCHEMA, generate, target_named, write_firmware
+    from dzdesign.codegen.project import DEFAULT_TARGET, generate, target_named, write_firmware
     from dzdesign.command_line.design_options import given_design_options
     from dzdesign.design.compensator_file import SCHEMA as COMPENSATOR_SCHEMA
     from dzdesign.design.compensator_file import compensator_from_document
+    from dzdesign.design.firmware_manifest import FirmwareManifest
     from dzdesign.design.redesign_check import prove_derived, refuse_unsaid
     from dzdesign.identify.valve.model import SCHEMA as VALVE_SCHEMA
     from dzdesign.terminal.tables import print_firmware
@@ -109,7 +111,7 @@ def run_codegen(args: argparse.Namespace) -> int:
     if args.source is None:
         raise InputError("codegen needs a COMPENSATOR.json or a VALVE.json; see `dzdesign codegen --help`")
     target_named(args.target or DEFAULT_TARGET)
-    check_folder_may_be_written(Path(args.output), SCHEMA)
+    check_folder_may_be_written(Path(args.output), schema_of(FirmwareManifest))
     path = Path(args.source)
     content = read_bytes(path, "compensator file")
     document = parse_document(content, str(path), (COMPENSATOR_SCHEMA, VALVE_SCHEMA))
@@ -130,7 +132,7 @@ def run_codegen(args: argparse.Namespace) -> int:
     if firmware.note:
         say(firmware.note)
     if args.json:
-        print(to_json(firmware.manifest), end="")
+        print(to_json(as_document(firmware.manifest)), end="")
     else:
         print_firmware(firmware, args.output)
     return 0

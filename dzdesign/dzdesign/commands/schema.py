@@ -1,4 +1,4 @@
-"""`dzdesign schema`: the JSON Schemas of the artefacts, as their types say them."""
+"""`dzdesign schema`: the JSON Schemas of the artefacts, as their types state them."""
 
 import argparse
 import json
@@ -9,21 +9,25 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from dzdesign.core.artefact_schema import json_schema
+from dzdesign.core.documents import to_json
 from dzdesign.core.errors import InputError, nearest
 
-#: Name -> (module and class of the artefact, or the package that keeps its schema as a file; the artefact; the command
-#: that writes it), in the order of the pipeline.
+#: Name -> (module and type, or the package that keeps a file of it; the artefact; the command that writes it), in the
+#: order of the pipeline.
 SCHEMAS: Mapping[str, tuple[str, str, str]] = MappingProxyType(
     {
         "valve": ("dzdesign.identify", "valve.json", "identify"),
         "compensator": ("dzdesign.design", "compensator.json", "design"),
-        "firmware": ("dzdesign.codegen", "manifest.json of a firmware", "codegen"),
+        "firmware": ("dzdesign.design.firmware_manifest:FirmwareManifest", "manifest.json of a firmware", "codegen"),
         "evidence": ("dzdesign.verify", "verification.json", "verify"),
         "assessment": ("dzdesign.assess.assessment:Assessment", "assessment.json", "assess"),
         "batch": ("dzdesign.batch", "batch.json", "batch"),
-        "reproduction": ("dzdesign.reproduce", "reproduction.json", "reproduce"),
-        "derivation": ("dzdesign.derivation", "derivation.json", "derive --format json"),
+        "reproduction": ("dzdesign.report.reproduction:Reproduction", "reproduction.json", "reproduce"),
+        "derivation": (
+            "dzdesign.derivation.presentation.derivation_file:DerivationFile",
+            "derivation.json",
+            "derive --format json",
+        ),
     }
 )
 
@@ -50,10 +54,12 @@ def schema_text(name: str) -> str:
         raise InputError(
             f"there is no schema '{name[:40]}'{nearest(name, SCHEMAS)}; expected one of {', '.join(SCHEMAS)}"
         )
-    place, _, kind = SCHEMAS[name][0].partition(":")
+    module, _, kind = SCHEMAS[name][0].partition(":")
     if kind:
-        return json.dumps(json_schema(getattr(import_module(place), kind)), indent=2, ensure_ascii=False) + "\n"
-    return (Path(str(files(place))) / "schemas" / f"{name}.schema.json").read_text(encoding="utf-8")
+        from dzdesign.core.artefact_schema import json_schema
+
+        return to_json(json_schema(getattr(import_module(module), kind)))
+    return (Path(str(files(module))) / "schemas" / f"{name}.schema.json").read_text(encoding="utf-8")
 
 
 def schema_document(name: str) -> dict[str, Any]:
@@ -64,8 +70,7 @@ def schema_document(name: str) -> dict[str, Any]:
     name : str
         One of `SCHEMAS`.
     """
-    document: dict[str, Any] = json.loads(schema_text(name))
-    return document
+    return json.loads(schema_text(name))
 
 
 def run_schema(args: argparse.Namespace) -> int:

@@ -107,7 +107,7 @@ def compensator_html(compensator: "Compensator") -> str:
 def firmware_html(firmware: "Firmware") -> str:
     """Return the files of a firmware and their sizes in bytes."""
     rows = [[name, f"{len(text.encode())}"] for name, text in firmware.files.items()]
-    caption = f"Firmware for {firmware.manifest['target']}, law {firmware.manifest['law']}"
+    caption = f"Firmware for {firmware.manifest.target}, law {firmware.manifest.law}"
     return _table(caption, ("file", "bytes"), rows)
 
 

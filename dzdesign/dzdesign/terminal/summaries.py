@@ -55,7 +55,7 @@ def compensator_summary(compensator: "Compensator") -> str:
 
 def firmware_summary(firmware: "Firmware") -> str:
     """Return target and law, and the files."""
-    head = f"Firmware for {firmware.manifest['target']}, law {firmware.manifest['law']}, {len(firmware.files)} files"
+    head = f"Firmware for {firmware.manifest.target}, law {firmware.manifest.law}, {len(firmware.files)} files"
     note = [f"  {firmware.note}"] if firmware.note else []
     return "\n".join(map(one_line, [head, *(f"  {name}" for name in firmware.files), *note]))
 

@@ -137,7 +137,7 @@ def print_firmware(firmware: "Firmware", folder: str) -> None:
     """Print the files of a firmware folder."""
     valves = json.loads(firmware.files["compensator.json"]).get("common_valves")
     common = f", common setting of {valves} valves" if valves else ""
-    print(one_line(f"Firmware for {firmware.manifest['target']}, law {firmware.manifest['law']}{common}, in {folder}:"))
+    print(one_line(f"Firmware for {firmware.manifest.target}, law {firmware.manifest.law}{common}, in {folder}:"))
     for name in firmware.files:
         print(f"  {name}")
 

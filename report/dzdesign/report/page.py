@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dzdesign.core.artefact_files import TOOL
-from dzdesign.derivation.presentation.html import anchor
+from dzdesign.derivation.presentation.writer import anchor
 from dzdesign.report.figures.figure import PALETTE, ReportFigure, data_uri
 from dzdesign.report.sections.cells import Table
 

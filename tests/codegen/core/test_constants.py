@@ -2,12 +2,14 @@
 
 import json
 import re
+from dataclasses import replace
 
 import pytest
 
 from dzdesign.codegen.core.constants import COLUMNS
 from dzdesign.codegen.project import TARGET_NAMES, generate
 from dzdesign.core.artefact_files import sha256_of
+from dzdesign.core.artefact_types import as_document
 from tests.support.core_variants import NAMES, firmware, variant
 from tests.support.golden_firmware import golden_compensator
 from tests.support.paths import ROOT
@@ -19,8 +21,6 @@ ROW = re.compile(r"\{UINT32_C\((\d+)\), (-?\d+)u?\}")
 NUMBER = r"(?:U?INT(?:32|64)_C\((\d+)\)|(0x[0-9A-Fa-f]+|\d+)u?)"
 #: Widths of 64-, 32- and 16-bit words, their masks and top bits; none is a datum.
 WIDTHS = {"0", "1", "15", "16", "31", "32", "0xFFFF"}
-#: Fields of the manifest's entry that say something.
-SAID = ("equation", "engineering", "rounding", "generator")
 
 
 def number(text: str) -> int:
@@ -38,17 +38,16 @@ def constants_in(text: str) -> dict[str, object]:
     tables = TABLE.findall(code)
     assert len(tables) == len(re.findall(r"\[\w*\]\s*=", code)), "a table of another form"
     for name, size, body in tables:
-        found[name] = [[int(start), int(change)] for start, change in ROW.findall(body)]
+        found[name] = tuple((int(start), int(change)) for start, change in ROW.findall(body))
         assert len(found[name]) == int(size) and not re.search(r"\d", ROW.sub("", body))
     return found
 
 
 def differences(files, manifest) -> list[str]:
     """Name every number of the core that is not in the manifest with that value, and every entry that has none."""
-    in_c = {(path, name): value for path in manifest["core"] for name, value in constants_in(files[path]).items()}
-    entries = json.loads(json.dumps(manifest["constants"]))
-    listed = {(entry["file"], entry["symbol"]): entry["value"] for entry in entries}
-    assert len(listed) == len(entries)
+    in_c = {(path, name): value for path in manifest.core for name, value in constants_in(files[path]).items()}
+    listed = {(entry.file, entry.symbol): entry.value for entry in manifest.constants}
+    assert len(listed) == len(manifest.constants)
     return [
         f"{path}: {name} is {in_c.get((path, name))} in C and {listed.get((path, name))} in the manifest"
         for path, name in sorted(in_c.keys() | listed.keys())
@@ -72,7 +71,7 @@ def test_the_core_of_every_target_has_the_constants_of_its_manifest(target):
 def test_every_form_of_the_core_has_the_constants_of_its_manifest(name, arithmetic):
     made = firmware(name, arithmetic)
     assert differences(made.files, made.manifest) == []
-    for path in made.manifest["core"]:
+    for path in made.manifest.core:
         assert bare_numbers(made.files[path]) <= WIDTHS, path
         assert max(map(len, made.files[path].splitlines())) <= COLUMNS, path
 
@@ -97,11 +96,9 @@ def test_a_constant_that_is_not_the_manifests_is_seen(right, wrong):
 
 def test_an_entry_without_a_constant_and_a_bare_number_are_seen():
     made = firmware("plain", "wide")
-    (first, *_), text = made.manifest["constants"], made.files["core/dz_comp.c"]
-    manifest = {**made.manifest, "constants": [*made.manifest["constants"], {**first, "symbol": "NOBODY"}]}
-    assert differences(made.files, manifest) == [
-        f"{first['file']}: NOBODY is None in C and {first['value']} in the manifest"
-    ]
+    (first, *_), text = made.manifest.constants, made.files["core/dz_comp.c"]
+    manifest = replace(made.manifest, constants=(*made.manifest.constants, replace(first, symbol="NOBODY")))
+    assert differences(made.files, manifest) == [f"{first.file}: NOBODY is None in C and {first.value} in the manifest"]
     assert bare_numbers(text.replace("dp + STEP_CODES", "dp + 64u")) - WIDTHS == {"64"}
 
 
@@ -111,24 +108,23 @@ def test_every_entry_leads_to_its_datum(name, arithmetic):
     made, compensator = firmware(name, arithmetic), variant(name, arithmetic)
     document = json.loads(made.files["compensator.json"])
     valve = json.loads(compensator.valve_document)
-    origin = made.manifest["origin"]
-    assert origin["compensator_json"] == sha256_of(made.files["compensator.json"].encode())
-    assert origin["valve_json"] == sha256_of(compensator.valve_document.encode())
-    assert origin["ramp_tests"] == valve["made_from"]
-    for entry in made.manifest["constants"]:
-        for key, holder in [(key, document) for key in entry["compensator_json"]] + [
+    origin = made.manifest.origin
+    assert origin.compensator_json == sha256_of(made.files["compensator.json"].encode())
+    assert origin.valve_json == sha256_of(compensator.valve_document.encode())
+    assert [as_document(each) for each in origin.ramp_tests] == valve["made_from"]
+    for entry in made.manifest.constants:
+        for key, holder in [(key, document) for key in entry.compensator_json] + [
             (key, valve)
-            for key in entry["valve_json"]
+            for key in entry.valve_json
             if not key.endswith(".opening_curve")  # added by the variants
         ]:
             found = holder
             for part in key.split("."):
                 found = found[part]
             assert found is not None, key
-        assert all(entry[key] for key in SAID)
-        assert (ROOT / entry["generator"]).is_file()
-        comments = " ".join(made.files[entry["file"]].replace("\n * ", " ").split()).lower()
-        said = f"{entry['equation']}: {entry['engineering']} ({entry['rounding']}). */"
+        assert (ROOT / entry.generator).is_file()
+        comments = " ".join(made.files[entry.file].replace("\n * ", " ").split()).lower()
+        said = f"{entry.equation}: {entry.engineering} ({entry.rounding}). */"
         assert f"/* {said.lower()}" in comments
 
 
@@ -136,7 +132,7 @@ def test_a_datum_is_the_constants_value():
     """The codes that the C has as they stand in compensator.json."""
     made = firmware("bipolar, all options", "wide")
     document = json.loads(made.files["compensator.json"])
-    values = {(entry["file"], entry["symbol"]): entry["value"] for entry in made.manifest["constants"]}
+    values = {(entry.file, entry.symbol): entry.value for entry in made.manifest.constants}
     signals = document["signals"]
     assert values["core/dz_comp_negative.c", "COMMAND_ZERO"] == signals["command"]["zero_code"]
     assert values["core/dz_comp.c", "PRESSURE_B_HIGH"] == signals["pressure_b"]["valid_codes"][1]
@@ -147,10 +143,8 @@ def test_a_datum_is_the_constants_value():
 
 def test_the_engineering_values_are_those_of_the_constants():
     """By numbers typed here: 10 V over 60000 counts and 4095 codes, 20 MPa over 4095 codes."""
-    said = {
-        (entry["file"], entry["symbol"]): entry["engineering"]
-        for entry in firmware("plain", "wide").manifest["constants"]
-    }
+    manifest = firmware("plain", "wide").manifest
+    said = {(entry.file, entry.symbol): entry.engineering for entry in manifest.constants}
     side = variant("plain", "wide").positive
     core = "core/dz_comp.c"
     assert said[core, "REVERSE"].startswith(f"{40 * 20 / 4095:.3f} MPa")

@@ -320,7 +320,7 @@ def test_firmware_and_report_say_first_that_they_are_of_a_lot(common, batch, tmp
     document = json.loads((folder / "compensator.json").read_bytes())
     said = f"COMMON SETTING of 4 valves, lot SHA-256 {document['lot_sha256']}."
     for name, text in made.files.items():
-        assert name in (*made.manifest["board"], "compensator.json") or said in "\n".join(text.splitlines()[:4]), name
+        assert name in (*made.manifest.board, "compensator.json") or said in "\n".join(text.splitlines()[:4]), name
     header, readme = made.files["core/dz_comp.h"], made.files["f28335/README.md"]
     assert f"/* Valve {common.carrier} identified from: " in header
     words = " ".join(header.replace(" * ", " ").split())

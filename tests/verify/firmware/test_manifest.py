@@ -25,7 +25,7 @@ def test_every_constant_of_every_target_is_found_in_its_c(root, target, tmp_path
     write_folder(tmp_path / "firmware", firmware.files, firmware.manifest)
     check = manifest_follows(tmp_path / "firmware", manifest_of(tmp_path / "firmware"))
     assert check.holds, check.text
-    assert f" {len(firmware.manifest['constants'])} constants" in check.text
+    assert f" {len(firmware.manifest.constants)} constants" in check.text
 
 
 def change(manifest, path, value):

@@ -3,9 +3,9 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from textwrap import wrap
-from typing import Any
 
 from dzdesign.core.errors import DzdesignError
+from dzdesign.design.firmware_manifest import FirmwareConstant
 
 #: Longest line of a comment in the generated C.
 COLUMNS = 120
@@ -75,7 +75,7 @@ class Constant:
         """Return the comment and the `#define`."""
         return [*self.comment(), f"#define {self.symbol} {self.printed()}"]
 
-    def entry(self, file: str, valve_keys: Mapping[str, Sequence[str]]) -> dict[str, Any]:
+    def entry(self, file: str, valve_keys: Mapping[str, Sequence[str]]) -> FirmwareConstant:
         """Return the manifest's entry of the constant in one file.
 
         Parameters
@@ -86,17 +86,17 @@ class Constant:
             Keys of valve.json by the key of compensator.json that was designed from them.
         """
         from_valve = [key for datum in self.data for key in valve_keys.get(datum, ())]
-        return {
-            "file": file,
-            "symbol": self.symbol,
-            "value": self.value if isinstance(self.value, int) else [list(row) for row in self.value],
-            "equation": self.equation,
-            "engineering": self.engineering,
-            "rounding": self.rounding,
-            "compensator_json": list(self.data),
-            "valve_json": list(dict.fromkeys(from_valve)),
-            "generator": self.generator,
-        }
+        return FirmwareConstant(
+            file=file,
+            symbol=self.symbol,
+            value=self.value,
+            equation=self.equation,
+            engineering=self.engineering,
+            rounding=self.rounding,
+            compensator_json=self.data,
+            valve_json=tuple(dict.fromkeys(from_valve)),
+            generator=self.generator,
+        )
 
 
 def c_comment(text: str) -> list[str]:

@@ -7,7 +7,7 @@ from dataclasses import astuple, dataclass
 from fractions import Fraction
 from pathlib import Path
 
-from dzdesign.codegen.project import SCHEMA, target_named
+from dzdesign.codegen.project import target_named
 from dzdesign.codegen.telemetry.frame import (
     BETA_BITS,
     STATUS_BITS,
@@ -17,9 +17,11 @@ from dzdesign.codegen.telemetry.frame import (
     FrameReader,
     Link,
 )
-from dzdesign.core.artefact_files import MANIFEST_NAME, TOOL, parse_document, read_bytes, sha256_of
+from dzdesign.core.artefact_files import MANIFEST_NAME, TOOL, read_bytes, sha256_of
+from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator_file import compensator_from_document
+from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.design.signals import PressureSignal
 
 COLUMNS = ("time_s", "u_V", "pA_MPa", "pB_MPa", "uO_V", "beta", "compare_a", "compare_b", "status")
@@ -72,8 +74,8 @@ def scalings_of(folder: Path) -> Scalings:
         If it is no firmware of dzdesign, or its target sends no telemetry.
     """
     path = folder / MANIFEST_NAME
-    manifest = parse_document(read_bytes(path, "firmware manifest"), str(path), (SCHEMA,))
-    target = target_named(str(manifest.get("target")))
+    manifest = read_artefact(read_bytes(path, "firmware manifest"), FirmwareManifest, str(path))
+    target = target_named(manifest.target)
     if target.link is None:
         raise InputError(f"the target {target.name} of '{folder}' sends no telemetry; f28335 does")
     content = read_bytes(folder / "compensator.json", "compensator file")

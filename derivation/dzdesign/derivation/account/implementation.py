@@ -55,8 +55,7 @@ IMPLEMENTATION = (
         kind=Kind.PREMISE,
         symbol=n_i,
         members=(n_adc * V_pin / V_adc,),
-        note="n_adc = 4095 = 2^12 - 1 counts at V_adc = 3 V: the F28335 converts to 12 bits, in a register of "
-        "the text's 16.",
+        note="n_adc = 4095 counts at V_adc = 3 V: the F28335 converts to 12 bits, in a register of the text's 16.",
     ),
     Statement(
         number="attenuator",

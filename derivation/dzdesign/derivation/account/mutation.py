@@ -19,9 +19,8 @@ from dzdesign.core.artefact_files import TOOL
 from dzdesign.core.errors import RequirementError
 from dzdesign.derivation.account.identity import agree
 from dzdesign.derivation.account.proof import Verdict, judge
-from dzdesign.derivation.account.statement import Condition, Name, Statement
-from dzdesign.derivation.account.symbol_units import unit_table
-from dzdesign.derivation.symbols import u_max, u_min
+from dzdesign.derivation.account.statement import Condition, Statement
+from dzdesign.derivation.symbols import QUANTITIES, Name, u_max, u_min
 
 _FOREIGN = sympy.Symbol("foreign", positive=True)
 _SAMPLES, _SEED = 2000, 20261121
@@ -142,8 +141,12 @@ def _neighbours(users: Sequence[Statement], statements: Mapping[str, Statement])
     }
     by_unit: dict[str, list[Name]] = {}
     for name in sorted(near, key=str):
-        by_unit.setdefault(unit_table().get(name, ""), []).append(name)
+        by_unit.setdefault(_unit(name), []).append(name)
     return by_unit
+
+
+def _unit(name: Name) -> str:
+    return QUANTITIES[name].unit if name in QUANTITIES else ""
 
 
 def _names(expression: sympy.Expr) -> set[Name]:
@@ -230,7 +233,7 @@ def _changed_inside(expression: sympy.Basic, neighbours: Mapping[str, list[Name]
 
 def _changed_here(part: sympy.Basic, neighbours: Mapping[str, list[Name]]) -> Iterator[sympy.Basic]:
     if part.is_Symbol or isinstance(part, AppliedUndef):
-        unit = unit_table().get(part, "")
+        unit = _unit(part)
         yield _FOREIGN
         yield from (other for other in neighbours.get(unit, ()) if other != part)
     elif part.is_Add:

@@ -15,9 +15,10 @@ from dzdesign.derivation.account.conditions import Finding, judge_condition
 from dzdesign.derivation.account.coverage import is_exhaustive
 from dzdesign.derivation.account.identity import agree
 from dzdesign.derivation.account.solving import solve_relations
-from dzdesign.derivation.account.statement import Case, Ground, Kind, Name, Outcome, Statement
+from dzdesign.derivation.account.statement import Case, Ground, Kind, Outcome, Statement
 from dzdesign.derivation.account.steps import Relation, Step, derive_in_steps
 from dzdesign.derivation.account.symbol_units import find_unit_error
+from dzdesign.derivation.symbols import Name
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,8 +11,8 @@ from functools import lru_cache
 import sympy
 
 from dzdesign.derivation.account.identity import agree
-from dzdesign.derivation.account.statement import Name
 from dzdesign.derivation.account.steps import Relation
+from dzdesign.derivation.symbols import Name
 
 _CONTRADICTION = "the premises contradict each other"
 _SEVERAL = "the premises allow several values"

@@ -6,8 +6,8 @@ from enum import StrEnum
 import sympy
 from sympy.logic.boolalg import Boolean
 
-#: A symbol, or a Laplace transform such as I(s), that a statement gives the value of.
-Name = sympy.Symbol | sympy.core.function.AppliedUndef
+from dzdesign.derivation.symbols import Name
+
 Replacements = tuple[tuple[Name, sympy.Expr], ...]
 
 

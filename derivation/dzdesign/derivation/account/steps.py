@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import sympy
 
 from dzdesign.derivation.account.identity import agree
-from dzdesign.derivation.account.statement import Ground, Name, Statement
+from dzdesign.derivation.account.statement import Ground, Statement
+from dzdesign.derivation.symbols import Name
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""The unit of every symbol, and whether a statement adds and equates only what has one unit.
+"""Whether a statement adds and equates only what has one unit.
 
 A check that knows nothing of the derivations: each side is evaluated with pint quantities.
 """
@@ -12,62 +12,8 @@ import sympy
 from sympy.core.function import AppliedUndef
 
 from dzdesign.derivation import symbols
-from dzdesign.derivation.account.statement import Name, Statement
-
-_FLOW, _ADC = "m**3/s", "code"
-_UNITS_OF = {
-    "V": "u_i u_O u_0 u_no u_i_prime u_max u_min u_min0 u_min1 headroom excess guard drive_left fall jump u_above "
-    "u_below u_dz u_seen u_seen0 u_seen1 q_x y rest u_1 u_2 u_e u_if V_pin V_adc",
-    "m": "x x_max x_e x_ov x_init W",
-    "dimensionless": "C_d beta kappa n slope duty scale",
-    "V/m": "k",
-    "kg/m**3": "rho",
-    "Pa": "dP dP0 dP1 above below",
-    _FLOW: "Q Q_O Q_O_prime Q_neg Q_max Q_max0 Q_max1 Q_floor Q_scaled Q_1 Q_2 dQ_dC_d",
-    f"{_FLOW}/V": "K_e K_0 K_1 s_flow s_flow0 s_flow1 G G_0",
-    "m**2/s": "gamma_0 gamma_1 dQ_dx_max",
-    f"{_FLOW}*m/V": "dQ_dk",
-    _ADC: "n_i n_0 n_no n_pwm n_adc n_full",
-    f"{_ADC}/V": "n_V",
-    f"V/{_ADC}": "K_c",
-    "A": "i i_init",
-    "A/s": "di_dt",
-    "N": "f_e f_eL",
-    "m/s": "dx_e_dt v v_init",
-    "m/s**2": "dv_dt",
-    "V/V": "K_a",
-    "V/A": "K_fi",
-    "N/A": "K_i",
-    "ohm": "R_c r_p",
-    "H": "L_c",
-    "kg": "m_e",
-    "N*s/m": "B_e",
-    "N/m": "K_et",
-    "s": "t",
-    "1/s": "s a",
-    # A transform is an integral over time.
-    "V*s": "U_e U_i U_if",
-    "A*s": "I_s",
-    "N*s": "F_e F_eL",
-    "m*s": "X_e",
-    "m**3": "Q_s",
-}
-
-
-@cache
-def unit_table() -> dict[Name, str]:
-    """Return the unit of each symbol of the account, as pint reads it; counts are ``code``.
-
-    Returns
-    -------
-    dict of symbol to str
-
-    Examples
-    --------
-    >>> unit_table()[symbols.k]
-    'V/m'
-    """
-    return {getattr(symbols, name): unit for unit, names in _UNITS_OF.items() for name in names.split()}
+from dzdesign.derivation.account.statement import Statement
+from dzdesign.derivation.symbols import QUANTITIES, Name
 
 
 def print_unit(name: Name) -> str:
@@ -76,7 +22,7 @@ def print_unit(name: Name) -> str:
     Parameters
     ----------
     name : symbol or applied function
-        One of `symbols.py`; ``f(dP)`` is a threshold.
+        One of `QUANTITIES`, or one of its functions of another argument.
 
     Returns
     -------
@@ -87,8 +33,7 @@ def print_unit(name: Name) -> str:
     >>> print_unit(symbols.Q), print_unit(symbols.beta)
     ('m^3/s', '1')
     """
-    known = symbols.u_min if name.func == symbols.f else name
-    unit = _plain(_registry().Unit(unit_table()[known])).replace("code", "counts").replace("Ω", "ohm")
+    unit = _plain(_registry().Unit(QUANTITIES[_as_declared(name)].unit)).replace("code", "counts").replace("Ω", "ohm")
     return "1" if unit == "a number" else unit
 
 
@@ -153,14 +98,9 @@ def _plain(units: Any) -> str:
 
 
 def _evaluate(expression: sympy.Expr) -> Any:
-    # Transforms at shifted arguments, X_e(s + a), have the unit of the transform; f(dP) is a threshold.
-    transforms = {
-        function: symbols.u_min if function.func == symbols.f else function.func(symbols.s)
-        for function in expression.atoms(AppliedUndef)
-    }
-    stand_ins = {name: sympy.Dummy() for name in transforms}
+    stand_ins = {function: sympy.Dummy() for function in expression.atoms(AppliedUndef)}
     plain = expression.xreplace(stand_ins)
-    names = {stand_ins[function]: known for function, known in transforms.items()}
+    names = {stand_in: function for function, stand_in in stand_ins.items()}
     arguments = sorted(plain.free_symbols, key=str)
     quantities = []
     for position, name in enumerate(arguments):
@@ -173,9 +113,16 @@ def _evaluate(expression: sympy.Expr) -> Any:
 
 
 def _quantity_of(name: Name, position: int = 0) -> Any:
-    unit = unit_table().get(name)
+    known = QUANTITIES.get(_as_declared(name))
     # Values without a pattern, so that no sum is zero by chance.
-    return None if unit is None else _registry().Quantity(1 + math.sqrt(2 + position), unit)
+    return None if known is None else _registry().Quantity(1 + math.sqrt(2 + position), known.unit)
+
+
+def _as_declared(name: Name) -> Name:
+    """Return a function at its declared argument: X_e(s + a) has the unit of X_e(s), and f(dP1) that of f(dP)."""
+    if not isinstance(name, AppliedUndef):
+        return name
+    return name.func(symbols.dP if name.func == symbols.f else symbols.s)
 
 
 @cache

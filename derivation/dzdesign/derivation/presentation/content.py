@@ -6,19 +6,9 @@ from dataclasses import dataclass
 import sympy
 
 from dzdesign.derivation.account.proof import CaseProof, Verdict
-from dzdesign.derivation.account.statement import Kind
 from dzdesign.derivation.account.steps import Step
 from dzdesign.derivation.presentation.prose import Formula, Reference, Words
 
-#: What is taken as given, in the words of the report.
-GIVEN_AS = {
-    Kind.PREMISE: "premise",
-    Kind.ASSUMPTION: "assumption",
-    Kind.DEFINITION: "definition",
-    Kind.CHOICE: "our choice",
-}
-WRONG, CONDITIONAL = "What does not hold", "What holds on a condition only"
-TABLE, GLOSSARY = "The paper's equations", "Symbols"
 SOURCE = "The paper: Wu et al. 2022, doi 10.11916/j.issn.1005-9113.20063."
 #: What the marks mean, for the reader of the report.
 LEGEND = (
@@ -88,10 +78,8 @@ class Entry:
         Where it is proved, if not everywhere.
     premises : tuple of Words
     derivations : tuple of Derivation
-    differences : tuple of Line
-        Derived minus published, where they differ.
-    correction : Line or None
-        What it should read.
+    differences, corrections : tuple of Line
+        Derived minus published, where they differ; what it should read.
     signs : mapping of str to tuple of sympy.Symbol
         What is assumed of the symbols: a key of `SIGNS`, and those of which no more is assumed.
     figures : tuple of Figure
@@ -109,7 +97,7 @@ class Entry:
     premises: tuple[Words, ...]
     derivations: tuple[Derivation, ...]
     differences: tuple[Line, ...]
-    correction: Line | None
+    corrections: tuple[Line, ...]
     signs: Mapping[str, tuple[sympy.Symbol, ...]]
     figures: tuple[Figure, ...]
     note: Words
@@ -118,6 +106,15 @@ class Entry:
     @property
     def number(self) -> str:
         return self.verdict.number
+
+    @property
+    def reference(self) -> Reference:
+        return Reference(self.number)
+
+    @property
+    def corrected_by(self) -> tuple[Reference, ...]:
+        number = self.verdict.statement.corrected_by
+        return (Reference(number),) if number else ()
 
     @property
     def sign_words(self) -> Words:
@@ -144,25 +141,30 @@ class Content:
 
     Attributes
     ----------
-    title : str
-    source : str
-        The paper.
+    title, source : str
     summary : tuple of Words
         How many statements are as expected, and how many of the paper's equations follow.
-    wrong, conditional : tuple of Line
-        What does not follow or should read otherwise; what follows on a condition only.
+    findings : tuple of (str, tuple of Words)
+        What does not follow or should read otherwise; what follows on a condition only. Each with its heading.
+    legend : tuple of (str, str)
+        What the marks mean.
     table : tuple of Entry
         The paper's equations, in the paper's order.
     glossary : tuple of Term
-        The symbols that occur.
+        The symbols that occur, by name.
     sections : tuple of (str, tuple of Entry)
     """
 
     title: str
-    source: str
+    source: str = SOURCE
     summary: tuple[Words, ...]
-    wrong: tuple[Words, ...]
-    conditional: tuple[Words, ...]
+    findings: tuple[tuple[str, tuple[Words, ...]], ...]
+    legend: tuple[tuple[str, str], ...] = LEGEND
     table: tuple[Entry, ...]
     glossary: tuple[Term, ...]
     sections: tuple[tuple[str, tuple[Entry, ...]], ...]
+
+    @property
+    def entries(self) -> tuple[Entry, ...]:
+        """All statements, in order."""
+        return tuple(entry for _, entries in self.sections for entry in entries)

@@ -1,18 +1,18 @@
 """The report as one page for a browser: MathML, no scripts, nothing loaded from elsewhere."""
 
 import re
+from collections.abc import Callable, Collection
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from dzdesign.derivation.account.statement import Outcome
-from dzdesign.derivation.presentation import content as report_content
-from dzdesign.derivation.presentation.content import Content, Entry
-from dzdesign.derivation.presentation.prose import Code, Formula, Quantity, Raised, Reference, Words
+from dzdesign.derivation.presentation.formulas import to_latex, to_mathml
+from dzdesign.derivation.presentation.prose import Formula, Reference, Words
 from dzdesign.derivation.presentation.text import plain
-from dzdesign.derivation.presentation.typeset import MATHML, typeset
+from dzdesign.derivation.presentation.writer import Writer, anchor
 
 if TYPE_CHECKING:
-    import markupsafe
+    from markupsafe import Markup
 
 #: A browser would break the line between a formula and the punctuation beside it.
 _TIED = re.compile(r"(\(?)(<math(?:(?!</math>).)*</math>)([,.;:)]*)")
@@ -22,127 +22,59 @@ _LONG = 28
 _SIGNS = {Outcome.GIVEN: "▫", Outcome.FOLLOWS: "✓", Outcome.FOLLOWS_IF: "◐", Outcome.DOES_NOT_FOLLOW: "✗"}
 
 
-def write_html(content: Content) -> str:
-    """Return the report as an HTML page.
+class HtmlWriter(Writer):
+    """HTML with MathML; its words are markup that a template does not escape again."""
 
-    Parameters
-    ----------
-    content : Content
+    TEMPLATE = "derivation.html.jinja"
+    SYNTAX: ClassVar = {"autoescape": True}
 
-    Returns
-    -------
-    str
-    """
-    import jinja2
+    def words(self, words: Words) -> "Markup":
+        return _markup(_TIED.sub(_tie, super().words(words)))
 
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("dzdesign.derivation.presentation", "templates"),
-        undefined=jinja2.StrictUndefined,
-        keep_trailing_newline=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        autoescape=True,
-    )
-    page = Page({entry.number for _, entries in content.sections for entry in entries})
-    environment.filters.update(words=page.words, display=page.display, anchor=anchor, css=_css_class)
-    template = environment.get_template("derivation.html.jinja")
-    return template.render(
-        content=content,
-        shown=page.shown,
-        signs=_SIGNS,
-        lists=((report_content.WRONG, content.wrong), (report_content.CONDITIONAL, content.conditional)),
-        legend=report_content.LEGEND,
-        table_heading=report_content.TABLE,
-        glossary_heading=report_content.GLOSSARY,
-        outcomes=Outcome,
-    )
+    def text(self, text: str) -> str:
+        return escape(text)
 
+    def formula(self, formula: Formula) -> str:
+        chain = " = ".join(map(to_latex, formula.sides))
+        style = ' displaystyle="true"' if r"\frac" in chain else ""
+        math = f"<math{style}>{to_mathml(chain)}</math>"
+        return f'<span class="long">{math}</span>' if len(plain((formula,))) > _LONG else math
 
-def anchor(number: str) -> str:
-    """Return the name by which a statement can be linked to: ``eq-18``, ``T3b``.
+    def display(self, formula: Formula) -> "Markup":
+        first, *members = (to_mathml(to_latex(side)) for side in formula.sides)
+        rows = [[first]]
+        if members:
+            left = [first, *["<mrow></mrow>"] * (len(members) - 1)]
+            rows = [[side, "<mo>=</mo>", member] for side, member in zip(left, members, strict=True)]
+        table = "".join(f"<mtr>{''.join(f'<mtd>{cell}</mtd>' for cell in row)}</mtr>" for row in rows)
+        return _markup(f'<math display="block"><mtable class="chain" displaystyle="true">{table}</mtable></math>')
 
-    Parameters
-    ----------
-    number : str
+    def code(self, text: str) -> str:
+        return f"<code>{escape(text)}</code>"
 
-    Returns
-    -------
-    str
+    def link(self, number: str, text: str) -> str:
+        return f'<a href="#{anchor(number)}">{text}</a>'
 
-    Examples
-    --------
-    >>> anchor("(18)"), anchor("T3b"), anchor("Fig. 3, line")
-    ('eq-18', 'T3b', 'Fig-3-line')
-    """
-    slug = re.sub(r"\W+", "-", number).strip("-")
-    return f"eq-{slug}" if number.startswith("(") else slug
+    def references(self, references: Collection[Reference], by_number: bool = False) -> "Markup":
+        return _markup(super().references(references, by_number))
+
+    def filters(self) -> dict[str, Callable[..., Any]]:
+        return {**super().filters(), "css": _css_class, "sign": _sign}
 
 
-def _tie(found: re.Match) -> str:
+def _markup(html: str) -> "Markup":
+    from markupsafe import Markup
+
+    return Markup(html)
+
+
+def _tie(found: re.Match[str]) -> str:
     return f'<span class="tied">{found[0]}</span>' if found[1] or found[3] else found[0]
 
 
-def _css_class(entry: Entry) -> str:
-    return entry.verdict.outcome.value.replace(" ", "-")
+def _css_class(outcome: str) -> str:
+    return outcome.replace(" ", "-")
 
 
-class Page:
-    """Writes words and formulas; knows which statements there are to point to.
-
-    Parameters
-    ----------
-    shown : set of str
-        Numbers of the statements on the page.
-    """
-
-    def __init__(self, shown: set[str]) -> None:
-        self.shown = shown
-
-    def words(self, words: Words) -> "markupsafe.Markup":
-        """Return words as HTML.
-
-        Parameters
-        ----------
-        words : Words
-        """
-        from markupsafe import Markup
-
-        return Markup(_TIED.sub(_tie, "".join(map(self._part, words))))
-
-    def display(self, formula: Formula) -> "markupsafe.Markup":
-        """Return a formula on a line of its own; a chain has one member a line.
-
-        Parameters
-        ----------
-        formula : Formula
-        """
-        from markupsafe import Markup
-
-        first, *members = (typeset(side, MATHML) for side in formula.sides)
-        rows = f"<mtr><mtd>{first}</mtd></mtr>"
-        if members:
-            left = [first, *["<mrow></mrow>"] * (len(members) - 1)]
-            cells = (
-                f"<mtr><mtd>{side}</mtd><mtd><mo>=</mo></mtd><mtd>{member}</mtd></mtr>"
-                for side, member in zip(left, members, strict=True)
-            )
-            rows = "".join(cells)
-        return Markup(f'<math display="block"><mtable class="chain" displaystyle="true">{rows}</mtable></math>')
-
-    def _part(self, part: object) -> str:
-        match part:
-            case Quantity(name):
-                return f"<math>{typeset(name, MATHML)}</math>"
-            case Formula(sides):
-                chain = "<mo>=</mo>".join(typeset(side, MATHML) for side in sides)
-                style = ' displaystyle="true"' if "<mfrac" in chain else ""
-                math = f"<math{style}>{chain}</math>"
-                return f'<span class="long">{math}</span>' if len(plain((part,))) > _LONG else math
-            case Reference(number, words):
-                text = self.words(words) or escape(number)
-                return f'<a href="#{anchor(number)}">{text}</a>' if number in self.shown else str(text)
-            case Code(text):
-                return f"<code>{escape(text)}</code>"
-            case Raised(text):
-                return f"<sup>{escape(text)}</sup>"
-        return escape(str(part))
+def _sign(outcome: str) -> str:
+    return _SIGNS[Outcome(outcome)]

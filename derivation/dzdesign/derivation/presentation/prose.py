@@ -6,17 +6,8 @@ from dataclasses import dataclass
 from functools import cache
 
 import sympy
-from sympy.core.function import AppliedUndef
 
-from dzdesign.derivation import symbols
-from dzdesign.derivation.presentation.typeset import GREEK
-
-
-@dataclass(frozen=True, slots=True)
-class Quantity:
-    """A symbol in a sentence, by its name."""
-
-    name: str
+from dzdesign.derivation.symbols import QUANTITIES
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,17 +32,10 @@ class Code:
     text: str
 
 
-@dataclass(frozen=True, slots=True)
-class Raised:
-    """An exponent."""
-
-    text: str
-
-
-Words = tuple[str | Quantity | Formula | Reference | Code | Raised, ...]
+Words = tuple[str | Formula | Reference | Code, ...]
 
 #: Letters that are symbols wherever they stand alone, and those that are beside a sign only: elsewhere they are words.
-_LETTERS = ("k", "x", "f", "n", "Q", "S", "W")
+_LETTERS = ("k", "x", "f", "n", "Q", "S", "W", "beta", "gamma", "kappa", "lambda", "rho")
 _BESIDE_SIGNS = r"(?<=[(+−] )[ast]\b|(?<=[(−])[ast]\b|\b[ast](?=\)| [=+] )|(?<=−\d )[at]\b"
 _SIGNS = ((" - ", " − "), ("<=", "≤"), (">=", "≥"), (" -> ", " → "))
 _MINUS = re.compile(r"(?<![\w)-])-(?=[\w(])")
@@ -60,14 +44,12 @@ _REFERENCE = r"\(\d+[a-z]?\)|\b[TL]\d[a-z]?\b"
 
 
 @cache
-def _pattern() -> re.Pattern:
-    known = vars(symbols).values()
-    names = {value.name for value in known if isinstance(value, sympy.Symbol)}
-    names |= {value.func.__name__ for value in known if isinstance(value, AppliedUndef)}
-    names = {name for name in names if re.fullmatch(r"[A-Za-z]+_\w+'?|dP[01]?", name)} | {*GREEK, *_LETTERS}
+def _pattern() -> re.Pattern[str]:
+    declared = {name.func.__name__ if name.args else name.name for name in QUANTITIES}
+    names = {name for name in declared if re.fullmatch(r"[A-Za-z]+_\w+'?|dP[01]?", name)} | set(_LETTERS)
     alternatives = "|".join(re.escape(name) for name in sorted(names, key=len, reverse=True))
     return re.compile(
-        rf"(?P<code>`[^`]+`)|(?P<reference>{_REFERENCE})|\^(?P<raised>\d+)"
+        rf"(?P<code>`[^`]+`)|(?P<reference>{_REFERENCE})"
         rf"|(?P<name>(?<![\w`])(?:{alternatives})(?![\w'])|{_BESIDE_SIGNS})"
     )
 
@@ -88,12 +70,13 @@ def parse_prose(sentence: str, numbers: Collection[str] = ()) -> Words:
     Examples
     --------
     >>> parse_prose("u_min0 by (18)", ["(18)"])
-    (Quantity(name='u_min0'), ' by ', Reference(number='(18)', words=()))
+    (Formula(sides=(u_min0,)), ' by ', Reference(number='(18)', words=()))
     """
     return tuple(_words(_with_signs(sentence), numbers))
 
 
-def _words(sentence: str, numbers: Collection[str]) -> Iterator:
+def _words(sentence: str, numbers: Collection[str]) -> Iterator[str | Formula | Reference | Code]:
+    by_name = {str(name): name for name in QUANTITIES}
     end = 0
     for found in _pattern().finditer(sentence):
         if found["reference"] and found["reference"] not in numbers:
@@ -104,10 +87,8 @@ def _words(sentence: str, numbers: Collection[str]) -> Iterator:
             yield Code(found["code"].strip("`"))
         elif found["reference"]:
             yield Reference(found["reference"])
-        elif found["raised"]:
-            yield Raised(found["raised"])
         else:
-            yield Quantity(found["name"])
+            yield Formula((by_name.get(found["name"], sympy.Symbol(found["name"])),))
         end = found.end()
     if end < len(sentence):
         yield sentence[end:]

@@ -9,22 +9,23 @@ from dzdesign.derivation.account.equations import PAPER_NUMBERS
 from dzdesign.derivation.account.proof import Verdict
 from dzdesign.derivation.account.statement import Outcome, Statement
 from dzdesign.derivation.account.symbol_units import print_unit
-from dzdesign.derivation.presentation.content import SOURCE, Content, Entry, Term
-from dzdesign.derivation.presentation.glossary import MEANINGS
-from dzdesign.derivation.presentation.html import write_html
+from dzdesign.derivation.presentation.content import Content, Entry, Term
+from dzdesign.derivation.presentation.html import HtmlWriter
 from dzdesign.derivation.presentation.json_document import write_json
-from dzdesign.derivation.presentation.latex import write_latex
+from dzdesign.derivation.presentation.latex import LatexWriter
 from dzdesign.derivation.presentation.prose import Formula, Words, parse_prose
-from dzdesign.derivation.presentation.text import write_text
+from dzdesign.derivation.presentation.text import TextWriter
 from dzdesign.derivation.presentation.wording import describe, refer
+from dzdesign.derivation.presentation.writer import write
+from dzdesign.derivation.symbols import QUANTITIES
 
-_WRITERS: dict[str, Callable[[Content], str]] = {
-    "text": write_text,
+_FORMATS: dict[str, Callable[[Content], str]] = {
+    "text": lambda content: write(TextWriter, content),
     "json": write_json,
-    "latex": write_latex,
-    "html": write_html,
+    "latex": lambda content: write(LatexWriter, content),
+    "html": lambda content: write(HtmlWriter, content),
 }
-FORMATS = tuple(_WRITERS)
+FORMATS = tuple(_FORMATS)
 _COUNTED = {
     Outcome.GIVEN: "taken as given",
     Outcome.FOLLOWS: "follow",
@@ -80,7 +81,7 @@ def render(verdicts: Sequence[Verdict], format: str, only: Sequence[str] | None 
     missing = [number for number in PAPER_NUMBERS if number not in numbers]
     if only is None and missing:
         raise RequirementError(f"the account leaves out {', '.join(missing)} of the paper's equations")
-    return _WRITERS[format](compose(verdicts, numbers if only is None else only))
+    return _FORMATS[format](compose(verdicts, numbers if only is None else only))
 
 
 def closure(statements: Sequence[Statement], wanted: Sequence[str]) -> tuple[str, ...]:
@@ -158,16 +159,14 @@ def compose(verdicts: Sequence[Verdict], shown: Sequence[str]) -> Content:
     for entry in entries.values():
         sections.setdefault(entry.verdict.statement.section, []).append(entry)
     table = tuple(entries[number] for number in PAPER_NUMBERS if number in entries)
+    conditional = [entry for entry in entries.values() if entry.verdict.outcome is Outcome.FOLLOWS_IF]
     partial = len(shown) < len(book)
     return Content(
         title="Derivation of the dead-zone compensation law" + (", in part" if partial else ""),
-        source=SOURCE,
         summary=_summary([entry.verdict for entry in entries.values()], [entry.verdict for entry in table]),
-        wrong=tuple(_fault(entry) for entry in entries.values() if _is_wrong(entry.verdict)),
-        conditional=tuple(
-            (*_headed(entry), *entry.judgement)
-            for entry in entries.values()
-            if entry.verdict.outcome is Outcome.FOLLOWS_IF
+        findings=(
+            ("What does not hold", tuple(_fault(entry) for entry in entries.values() if _is_wrong(entry.verdict))),
+            ("What holds on a condition only", tuple(_judged(entry) for entry in conditional)),
         ),
         table=table,
         glossary=_glossary([entry.verdict.statement for entry in entries.values()]),
@@ -176,16 +175,13 @@ def compose(verdicts: Sequence[Verdict], shown: Sequence[str]) -> Content:
 
 
 def _glossary(statements: Sequence[Statement]) -> tuple[Term, ...]:
-    """Explain the symbols that occur, in the order of the account."""
+    """Explain the symbols that occur."""
     replaced = [pair for one in statements for ground in one.grounds for pair in ground.at]
     replaced += [pair for one in statements for case in one.cases for pair in case.at]
     sides = [side for one in statements for side in (one.symbol, *one.members)] + [value for _, value in replaced]
     used = set().union(*(side.free_symbols | {part.func for part in side.atoms(AppliedUndef)} for side in sides))
-    return tuple(
-        Term(Formula((name,)), parse_prose(meaning), print_unit(name))
-        for name, meaning in MEANINGS.items()
-        if name in used or name.func in used
-    )
+    names = sorted((name for name in QUANTITIES if name in used or name.func in used), key=lambda one: str(one).lower())
+    return tuple(Term(Formula((name,)), parse_prose(QUANTITIES[name].meaning), print_unit(name)) for name in names)
 
 
 def _summary(verdicts: Sequence[Verdict], paper: Sequence[Verdict]) -> tuple[Words, ...]:
@@ -213,12 +209,11 @@ def _is_wrong(verdict: Verdict) -> bool:
 
 
 def _fault(entry: Entry) -> Words:
-    words = (*_headed(entry), *(entry.judgement or ("the paper's choice; it does not meet the target (16).",)))
-    if entry.correction is None:
-        return words
-    display = entry.correction.display
-    return (*words, " ", *entry.correction.words, *((" ", display) if display else ()))
+    words = _judged(entry, otherwise="the paper's choice; it does not meet the target (16).")
+    for line in entry.corrections:
+        words = (*words, " ", *line.words, *((" ", line.display) if line.display else ()))
+    return words
 
 
-def _headed(entry: Entry) -> Words:
-    return (refer(entry.verdict.statement), " ", *entry.title, ": ")
+def _judged(entry: Entry, otherwise: str = "") -> Words:
+    return (refer(entry.verdict.statement), " ", *entry.title, ": ", *(entry.judgement or (otherwise,)))

@@ -6,11 +6,11 @@ from collections.abc import Iterator, Mapping
 import sympy
 
 from dzdesign.derivation.account.proof import CaseProof, Verdict
-from dzdesign.derivation.account.statement import Condition, Ground, Outcome, Replacements, Statement, Value
+from dzdesign.derivation.account.statement import Condition, Ground, Kind, Outcome, Replacements, Statement, Value
 from dzdesign.derivation.account.steps import Relation, Step
-from dzdesign.derivation.presentation.content import GIVEN_AS, SIGNS, Derivation, Entry, Figure, Line
+from dzdesign.derivation.presentation.content import SIGNS, Derivation, Entry, Figure, Line
+from dzdesign.derivation.presentation.formulas import to_text
 from dzdesign.derivation.presentation.prose import Formula, Reference, Words, parse_prose
-from dzdesign.derivation.presentation.typeset import TEXT, typeset
 
 _NUMBERED = re.compile(r"\(\d+[a-z]?\)|[TL]\d[a-z]?")
 _FORMS = ("first", "second", "third", "fourth")
@@ -30,20 +30,19 @@ def describe(verdict: Verdict, book: Mapping[str, Verdict]) -> Entry:
     Entry
     """
     statement = verdict.statement
-    corrected = book.get(statement.corrected_by)
     return Entry(
         verdict=verdict,
         name=parse_prose(statement.number),
         title=parse_prose(statement.title, book),
         mark=_mark(verdict),
         # Members that differ in the order of their terms only look alike.
-        chain=Formula((statement.symbol, *{_looks(member): member for member in statement.members}.values())),
+        chain=Formula((statement.symbol, *{to_text(member): member for member in statement.members}.values())),
         judgement=_judgement(verdict, book),
         scope=_scope(verdict, book),
         premises=tuple(_premise(ground, book) for ground in statement.grounds),
         derivations=tuple(_derivation(proof, index, book) for index, proof in enumerate(verdict.proofs)),
         differences=tuple(_differences(verdict, book)),
-        correction=corrected and _correction(statement, corrected.statement, book),
+        corrections=tuple(_corrections(statement, book)),
         signs=_signs(verdict, book),
         figures=tuple(_figure(value, statement, book) for value in statement.values),
         note=parse_prose(statement.note, book),
@@ -56,7 +55,8 @@ def describe(verdict: Verdict, book: Mapping[str, Verdict]) -> Entry:
 
 
 def _mark(verdict: Verdict) -> str:
-    given = GIVEN_AS.get(verdict.statement.kind)
+    kind = verdict.statement.kind
+    given = "our choice" if kind is Kind.CHOICE else kind.value
     return f"given: {given}" if verdict.outcome is Outcome.GIVEN else verdict.outcome.value
 
 
@@ -164,8 +164,8 @@ def _condition(verdict: Verdict, condition: Condition) -> Iterator:
 def _decimal(value: sympy.Expr) -> sympy.Expr:
     """Write fractions and logarithms as decimal numbers."""
     if value.is_number:
-        return value if value.is_Integer else value.evalf()
-    return value.xreplace({part: part.evalf() for part in value.atoms(sympy.Rational) if not part.is_Integer})
+        return value if value.is_Integer else value.evalf(4)
+    return value.xreplace({part: part.evalf(4) for part in value.atoms(sympy.Rational) if not part.is_Integer})
 
 
 def _differences(verdict: Verdict, book: Mapping[str, Verdict]) -> Iterator[Line]:
@@ -183,11 +183,16 @@ def _differences(verdict: Verdict, book: Mapping[str, Verdict]) -> Iterator[Line
             stated = None
 
 
-def _correction(statement: Statement, corrected: Statement, book: Mapping[str, Verdict]) -> Line:
+def _corrections(statement: Statement, book: Mapping[str, Verdict]) -> Iterator[Line]:
+    """Say what a statement should read, if something else than it does."""
+    if statement.corrected_by not in book:
+        return
+    corrected = book[statement.corrected_by].statement
     if corrected.published == statement.published:  # the same claim, of something else
-        return Line(words=("What holds is ", refer(corrected), ": ", *parse_prose(corrected.title, book), "."))
-    formula = Formula((corrected.symbol, corrected.members[-1]))
-    return Line(words=("It should read, by ", refer(corrected), ":"), display=formula)
+        yield Line(words=("What holds is ", refer(corrected), ": ", *parse_prose(corrected.title, book), "."))
+    else:
+        formula = Formula((corrected.symbol, corrected.members[-1]))
+        yield Line(words=("It should read, by ", refer(corrected), ":"), display=formula)
 
 
 def _signs(verdict: Verdict, book: Mapping[str, Verdict]) -> dict[str, tuple[sympy.Symbol, ...]]:
@@ -252,7 +257,7 @@ def _derivation(proof: CaseProof, index: int, book: Mapping[str, Verdict]) -> De
         Line(words=tuple(_step(step, before, proof, book)), display=Formula((symbol, step.result)))
         for before, step in steps
     )
-    if lines and cases and not any(proof.discrepancies) and _looks(proof.published) != _looks(steps[-1][1].result):
+    if lines and cases and not any(proof.discrepancies) and to_text(proof.published) != to_text(steps[-1][1].result):
         lines += (Line(words=("In the form stated:",), display=Formula((symbol, proof.published))),)
     at_once = Line(words=("The premises, solved together, give:",), display=Formula((symbol, proof.derived)))
     return Derivation(where=where, proof=proof, steps=tuple(step for _, step in steps), lines=lines or (at_once,))
@@ -262,13 +267,9 @@ def _visible(proof: CaseProof) -> Iterator[tuple[Step | None, Step]]:
     """Yield each step with the one before, but for rearrangements that look as before."""
     before: Step | None = None
     for step in proof.steps:
-        if step.used or before is None or _looks(step.result) != _looks(before.result):
+        if step.used or before is None or to_text(step.result) != to_text(before.result):
             yield before, step
         before = step
-
-
-def _looks(expression: sympy.Expr) -> str:
-    return typeset(expression, TEXT)
 
 
 def _step(step: Step, before: Step | None, proof: CaseProof, book: Mapping[str, Verdict]) -> Iterator:

@@ -18,7 +18,8 @@ from dzdesign.report.figures.figure import (
     new_figure,
     svg_of,
 )
-from dzdesign.report.lot.spread import FAR, TWENTY, Spread, short
+from dzdesign.report.lot.spread import FAR, TWENTY, Spread
+from dzdesign.report.lot.valve_names import short
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -100,7 +101,7 @@ def spread_figure(name: str, spreads: Sequence[Spread], caption: str, *, one_sca
             ("quantity", "valve", "value", "robust_sd_from_median"),
             (
                 (
-                    spread.side + spread.quantity.column, valve, value,
+                    spread.column, valve, value,
                     round(spread.distance(value), 2) if spread.limits else None,
                 )
                 for spread in spreads
@@ -113,7 +114,7 @@ def spread_figure(name: str, spreads: Sequence[Spread], caption: str, *, one_sca
 def in_words(spread: Spread) -> str:
     """Say how a quantity scatters, for who can't see the figure."""
     digits = spread.quantity.digits
-    low, middle, high = (f"{spread.at[q]:.{digits}f}" for q in ("0", "0.5", "1"))
+    low, middle, high = (f"{value:.{digits}f}" for value in (spread.at.least, spread.at.median, spread.at.largest))
     return f"{spread.heading}: {len(spread.values)} valves from {low} to {high}, median {middle}"
 
 
@@ -123,12 +124,12 @@ def _is_strip(spread: Spread) -> bool:
 
 def _are_alike(spread: Spread) -> bool:
     """Tell whether all valves have one value, as far as its decimals are shown."""
-    return spread.at["1"] - spread.at["0"] < 10.0**-spread.quantity.digits
+    return spread.at.largest - spread.at.least < 10.0**-spread.quantity.digits
 
 
 def _strip(axes: "Axes", spread: Spread) -> None:
     """Draw every valve on one line, with the median."""
-    low, high = spread.at["0"], spread.at["1"]
+    low, high = spread.at.least, spread.at.largest
     if _are_alike(spread):
         room = 10.0 ** (1 - spread.quantity.digits)
         axes.set_xlim(low - room, high + room)
@@ -145,7 +146,7 @@ def _strip(axes: "Axes", spread: Spread) -> None:
 
 def _limit_lines(axes: "Axes", spread: Spread, low: float, high: float) -> None:
     """Draw the median, and the limits of what lies far where they are near the valves."""
-    axes.axvline(spread.at["0.5"], color=LIGHT["ink"], lw=1.6, label="median")
+    axes.axvline(spread.at.median, color=LIGHT["ink"], lw=1.6, label="median")
     for limit in spread.limits or ():
         if low - 0.15 * (high - low) < limit < high + 0.15 * (high - low):
             axes.axvline(limit, color=LIGHT["vermilion"], lw=1.2, ls=":", label=f"{FAR:g} robust s.d. from it")
@@ -160,8 +161,8 @@ def _bars(axes: "Axes", spread: Spread) -> None:
     axes.stairs(counts, edges, fill=True, color=LIGHT["sky"], alpha=0.35)
     axes.stairs(counts, edges, color=LIGHT["blue"], lw=1.1)
     _limit_lines(axes, spread, min(edges), max(edges))
-    for quantile in ("0.05", "0.95") if len(spread.values) >= TWENTY else ():
-        axes.axvline(spread.at[quantile], color=LIGHT["soft"], lw=1.2, ls="--", label="5 and 95 %")
+    for value in (spread.at.q05, spread.at.q95) if len(spread.values) >= TWENTY else ():
+        axes.axvline(value, color=LIGHT["soft"], lw=1.2, ls="--", label="5 and 95 %")
     if len(spread.values) <= EVERY_DOT:
         axes.plot(spread.values, [-0.09 * top] * len(spread.values), "o", ms=3.5, mfc="none", color=LIGHT["blue"],
                   clip_on=False, label="a valve")  # fmt: skip
@@ -173,8 +174,8 @@ def _bars(axes: "Axes", spread: Spread) -> None:
 
 def _edges(spread: Spread) -> np.ndarray:
     """Return edges of bars by the rule of Freedman and Diaconis, and no more of them than can be seen."""
-    low, high = spread.at["0"], spread.at["1"]
-    width = 2 * (spread.at["0.75"] - spread.at["0.25"]) / len(spread.values) ** (1 / 3)
+    low, high = spread.at.least, spread.at.largest
+    width = 2 * (spread.at.q75 - spread.at.q25) / len(spread.values) ** (1 / 3)
     fewest = math.ceil(math.log2(len(spread.values))) + 1
     wanted = (high - low) / width if width > 0 else fewest
     most = min(MOST_BARS, 2 * math.sqrt(len(spread.values)))  # of a few valves a quartile says little
@@ -197,7 +198,7 @@ def _name_valves(axes: "Axes", spread: Spread) -> None:
     strip = _is_strip(spread)
     named = [one for one in zip(spread.names, spread.values, strict=True) if strip or one[0] in far]
     if _are_alike(spread) and len(named) > 1:
-        named = [(f"all {len(named)}", spread.at["0.5"])]
+        named = [(f"all {len(named)}", spread.at.median)]
     lowest, step = (LINE + 0.16, 0.17) if strip else (0.2, 0.13)
     ends = [-1.0] * LEVELS
     for valve, value in sorted(named, key=lambda one: one[1]):
@@ -224,16 +225,17 @@ def order_figure(name: str, spread: Spread, caption: str) -> ReportFigure:
     caption : str
         What it shows.
     """
+    from matplotlib.ticker import MaxNLocator
+
     figure = new_figure(2.9, legend_rows=1)
     axes = figure.subplots()
     count = len(spread.values)
     size = min(max(30 / math.sqrt(count), 1.8), 4.0)
     axes.plot(range(1, count + 1), spread.values, "o", ms=size, mew=0,
               color=LIGHT["blue"], label="a valve")  # fmt: skip
-    axes.axhline(spread.at["0.5"], color=LIGHT["ink"], lw=1.4, label="median")
-    for quantile in ("0.05", "0.95") if count >= TWENTY else ():
-        axes.axhline(spread.at[quantile], color=LIGHT["soft"], lw=1.1, ls="--",
-                     label="5 and 95 %" if quantile == "0.05" else None)  # fmt: skip
+    axes.axhline(spread.at.median, color=LIGHT["ink"], lw=1.4, label="median")
+    for value, label in ((spread.at.q05, "5 and 95 %"), (spread.at.q95, None)) if count >= TWENTY else ():
+        axes.axhline(value, color=LIGHT["soft"], lw=1.1, ls="--", label=label)
     far = dict(spread.far())
     places = {valve: place for place, valve in enumerate(spread.names, start=1)}
     if far:
@@ -241,7 +243,7 @@ def order_figure(name: str, spread: Spread, caption: str) -> ReportFigure:
                   color=LIGHT["vermilion"], label="far from the rest", zorder=4)  # fmt: skip
     named: list[tuple[float, float]] = []
     for valve in far:
-        at = places[valve] / count, (far[valve] - spread.at["0"]) / (spread.at["1"] - spread.at["0"])
+        at = places[valve] / count, (far[valve] - spread.at.least) / (spread.at.largest - spread.at.least)
         if any(abs(at[0] - x) < CLOSE[0] and abs(at[1] - y) < CLOSE[1] for x, y in named):
             continue  # covered; the table names it
         named.append(at)
@@ -254,7 +256,7 @@ def order_figure(name: str, spread: Spread, caption: str) -> ReportFigure:
     if count <= STRIP and max(map(len, spread.names)) <= SHORT_NAME:
         axes.set(xticks=range(1, count + 1), xticklabels=[short(name) for name in spread.names])
     else:
-        axes.xaxis.get_major_locator().set_params(integer=True)
+        axes.xaxis.set_major_locator(MaxNLocator(nbins="auto", steps=[1, 2, 2.5, 5, 10], integer=True))
     edge = 0.5 if count <= STRIP else 1
     axes.set_xlim(1 - edge, count + edge)
     legend_below(figure, 4)
@@ -266,7 +268,7 @@ def order_figure(name: str, spread: Spread, caption: str) -> ReportFigure:
         description=description,
         svg=svg_of(figure, name, description),
         csv=csv_text(
-            ("place", "valve", spread.side + spread.quantity.column),
+            ("place", "valve", spread.column),
             zip(range(1, count + 1), spread.names, spread.values, strict=True),
         ),
     )

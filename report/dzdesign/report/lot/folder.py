@@ -1,53 +1,26 @@
-"""What lies in the folder of a batch, read back for its report: hashes decide what belongs to it.
+"""What lies in the folder of a lot, read back for its report: hashes decide what belongs to it.
 
-A finished batch states the hashes of its table and of its common setting in batch.json, and the table those of each
-valve's artefacts. A file whose hash is another is said, and not used. Of a batch that was stopped there is no table
-yet; then the valves' folders themselves are read.
+A finished lot states the hashes of its table and of its lot setting in batch.json, and the table those of each valve's
+artefacts. A file whose hash is another is named, and not used. Of a lot whose batch was stopped there is no table yet;
+then the valves' folders themselves are read.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import NoneType
-from typing import Any
 
-from dzdesign.batch.calibration import OK
-from dzdesign.batch.results import AGAIN, SCHEMA, SUMMARY, VALVE_SCHEMA, Results
-from dzdesign.batch.table import HASHED, TABLE, Calibrated, read_back, rows_from, rows_of
-from dzdesign.batch.valves import NAME, by_name
 from dzdesign.core.artefact_files import MANIFEST_NAME, parse_document, read_bytes, sha256_of
+from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.artefact_types import Tool, schema_of
 from dzdesign.core.errors import InputError, and_more
 from dzdesign.core.input_files import MOST_DOCUMENT
-from dzdesign.core.shape import Exactly, check_shape
-from dzdesign.terminal.progress import with_bar
+from dzdesign.identify.valve.valve_file import valve_from_document
+from dzdesign.report.lot.summary import AGAIN, OK, SUMMARY_NAME, LotSummary, UnfinishedLot
+from dzdesign.report.lot.table import HASHED, TABLE, TableRow, read_table
+from dzdesign.report.lot.table_rows import table_rows
+from dzdesign.report.lot.valve_folder import VALVES, ValveManifest, read_manifest, read_valve_folder
+from dzdesign.report.lot.valve_names import NAME
 
-#: What the report reads of a finished batch.json.
-FINISHED = {
-    "tool": {"name": str, "version": str},
-    "verified": bool,
-    "valves": int,
-    "calibrated": int,
-    "files": {TABLE: str},
-    "common_setting": dict,
-}
-COMMON = {
-    "file": str,
-    "sha256": str,
-    "dp_MPa": Exactly(2, float),
-    "carrier": str,
-    "binding": [str],
-    "smallest_margin_V": dict,
-    "without_binding": (dict, NoneType),
-}
-#: Of the common setting, as later versions write it.
-COMMON_LATER = {
-    "lacking": [{"name": str, "side": str, "dp_MPa": [float], "narrows": bool}],
-    "dp_without_MPa": (Exactly(2, float), NoneType),
-    "checked": {"valves": int, "worst": str, "dp_MPa": float, "smallest_margin_V": float},
-}
-#: Of a valve that lacks a pressure drop, as still later ones do.
-LACKING_LATER = {"coarser_V": float, "cost_percent": float}
-AT = {"0.5": float, "0.95": float, "1": float}
 #: Largest table of which a report is made: beyond it, some 25 000 valves, no browser would show the page.
 MOST_TABLE = MOST_DOCUMENT
 #: Files or valves that a sentence names.
@@ -60,14 +33,15 @@ class Lot:
 
     Attributes
     ----------
-    document : mapping
-        batch.json.
-    rows : tuple of mapping
-        The table, a row a valve; numbers are float or None.
+    tool : Tool
+        That wrote batch.json.
+    summary : LotSummary or None
+        None of a lot whose batch did not come to its end.
+    rows : tuple of TableRow
     table : str
         valves.csv; empty where it was not used.
     expected : int
-        How many valves the batch has.
+        How many valves the lot has.
     hashes : tuple of (str, str)
         Name and SHA-256 of the files that were read.
     faults, missing : tuple of str
@@ -78,9 +52,10 @@ class Lot:
         Code of a warning to its text in the first valve that has it.
     """
 
-    document: Mapping[str, Any]
-    rows: tuple[Mapping[str, Any], ...]
-    table: str
+    tool: Tool
+    summary: LotSummary | None
+    rows: tuple[TableRow, ...]
+    table: str = ""
     expected: int
     hashes: tuple[tuple[str, str], ...]
     faults: tuple[str, ...] = ()
@@ -89,245 +64,188 @@ class Lot:
     warning_texts: Mapping[str, str] = field(default_factory=dict)
 
     @property
-    def oddities(self) -> tuple[str, ...]:
-        """What is odd in the lot though each of its valves is in order; of an older batch.json none."""
-        return tuple(self.document.get("oddities", ()))
-
-    @property
-    def complete(self) -> bool:
-        """Whether the batch came to its end."""
-        return self.document["complete"] is True
-
-    @property
     def sides(self) -> tuple[str, ...]:
-        """What stands before the name of a column of either side."""
-        both = any("positive_offset_V" in row for row in self.rows[:1])
-        return ("positive_", "negative_") if both else ("",)
+        """Sides of the table: "positive" and "negative", or one without a name."""
+        return tuple(self.rows[0].sides) if self.rows else ("",)
 
     @property
-    def calibrated(self) -> tuple[Mapping[str, Any], ...]:
+    def calibrated(self) -> tuple[TableRow, ...]:
         """The rows of the valves that are."""
-        return tuple(row for row in self.rows if row["status"] == OK)
+        return tuple(row for row in self.rows if row.calibrated)
 
     @property
-    def failed(self) -> tuple[Mapping[str, Any], ...]:
+    def failed(self) -> tuple[TableRow, ...]:
         """The rows of the others."""
-        return tuple(row for row in self.rows if row["status"] != OK)
-
-    def common(self) -> Mapping[str, Any] | None:
-        """Return what batch.json says of the common setting, or None if there is none."""
-        setting = self.document.get("common_setting", {})
-        return setting if "sha256" in setting else None
+        return tuple(row for row in self.rows if not row.calibrated)
 
 
 def is_lot(folder: Path) -> bool:
-    """Tell whether a folder is of a batch.
+    """Tell whether a folder is of a lot."""
+    return _is_of(folder / SUMMARY_NAME, schema_of(LotSummary), schema_of(UnfinishedLot))
 
-    Parameters
-    ----------
-    folder : Path
-    """
-    return _has(folder / SUMMARY, SCHEMA)
+
+def _is_of(path: Path, *schemas: str) -> bool:
+    try:
+        parse_document(path.read_bytes(), str(path), schemas)
+    except (OSError, InputError):
+        return False
+    return True
 
 
 def refuse_uncalibrated(folder: Path) -> None:
-    """Refuse the folder of a valve of a batch that was not calibrated: there is nothing to report but its reason.
-
-    Parameters
-    ----------
-    folder : Path
-        Of artefacts.
+    """Refuse the folder of a valve of a lot that was not calibrated: there is nothing to report but its reason.
 
     Raises
     ------
     InputError
         With that reason.
     """
-    path = folder / MANIFEST_NAME
-    if not _has(path, VALVE_SCHEMA) or (folder / "valve.json").exists():
+    if not _is_of(folder / MANIFEST_NAME, schema_of(ValveManifest)) or (folder / "valve.json").exists():
         return
-    manifest = parse_document(read_bytes(path, "manifest"), str(path), (VALVE_SCHEMA,))
-    if manifest.get("status") != OK:
-        raise InputError(f"'{folder}' is of a valve that was not calibrated: {manifest.get('reason')}")
+    manifest = read_manifest(folder)
+    if manifest.status != OK:
+        raise InputError(f"'{folder}' is of a valve that was not calibrated: {manifest.reason}")
 
 
-def _has(path: Path, schema: str) -> bool:
-    try:
-        parse_document(path.read_bytes(), str(path), (schema,))
-    except (OSError, InputError):
-        return False
-    return True
-
-
-def lot_of(folder: Path) -> Lot:
-    """Read the folder of a batch.
-
-    Parameters
-    ----------
-    folder : Path
-        Finished or stopped.
+def read_lot(folder: Path) -> Lot:
+    """Read the folder of a lot, finished or stopped.
 
     Raises
     ------
     InputError
         If batch.json or the table is not what `dzdesign batch` writes.
     """
-    content = read_bytes(folder / SUMMARY, "summary of a batch")
-    document = parse_document(content, str(folder / SUMMARY), (SCHEMA,))
-    hashes = [(SUMMARY, sha256_of(content))]
-    if document.get("complete") is not True:
-        return _stopped(folder, document, hashes)
-    check_shape(document, FINISHED, str(folder / SUMMARY), AGAIN)
-    if "oddities" in document:  # they came later
-        check_shape(document, {"oddities": [str]}, str(folder / SUMMARY), AGAIN)
-    if "why_not" not in document["common_setting"]:
-        _check_common(document["common_setting"], f"{folder / SUMMARY}: common_setting")
-    faults: list[str] = []
-    missing: list[str] = []
-    found = _table(folder, document, faults, missing)
-    rows = [] if found is None else rows_from(found, str(folder / TABLE))
-    rows.sort(key=lambda row: by_name(row["name"]))  # an older version had V10 before V2
-    hashes += [] if found is None else [(TABLE, sha256_of(found))]
-    counted = {"valves": len(rows), "calibrated": sum(row["status"] == OK for row in rows)}
-    faults += [
-        f"{SUMMARY} was changed: it counts {document[key]} valves as '{key}', the table has {count}"
-        for key, count in counted.items()
-        if found is not None and document[key] != count
-    ]
-    hashes += _common(folder, document["common_setting"], faults, missing)
-    return Lot(
-        document=document,
-        rows=tuple(rows),
-        table=found.decode("utf-8") if found else "",
-        expected=document["valves"],
-        hashes=tuple(hashes),
-        compared=(folder / "valves").is_dir(),
-        warning_texts=_look_at_valves(folder, rows, faults, missing),
-        faults=tuple(faults),
-        missing=tuple(missing),
-    )
+    content = read_bytes(folder / SUMMARY_NAME, "summary of a lot")
+    kinds: tuple[type[LotSummary | UnfinishedLot], ...] = (LotSummary, UnfinishedLot)
+    found = read_artefact(content, kinds, str(folder / SUMMARY_NAME), AGAIN)
+    own_hash = (SUMMARY_NAME, sha256_of(content))
+    if isinstance(found, UnfinishedLot):
+        return _unfinished(folder, found, own_hash)
+    return _LotFiles(folder, found).lot(own_hash)
 
 
-def _check_common(setting: Mapping[str, Any], source: str) -> None:
-    check_shape(setting, COMMON, source, AGAIN)
-    check_shape(setting, {key: shape for key, shape in COMMON_LATER.items() if key in setting}, source, AGAIN)
-    for each in setting.get("lacking", ()):
-        if LACKING_LATER.keys() & each.keys():
-            check_shape(each, LACKING_LATER, f"{source}.lacking", AGAIN)
-    without = setting["without_binding"]
-    if without is not None:
-        shape = {"why_not": str} if "why_not" in without else {"left_out": [str], "quantiles": dict}
-        check_shape(without, shape, f"{source}.without_binding", AGAIN)
-        for at in without.get("quantiles", {}).values():
-            check_shape({"quantiles": at}, {"quantiles": AT}, f"{source}.without_binding", AGAIN)
+class _LotFiles:
+    """The files of a finished lot, compared with the hashes that batch.json and the table state."""
 
+    def __init__(self, folder: Path, summary: LotSummary) -> None:
+        self.folder, self.summary = folder, summary
+        self.faults: list[str] = []
+        self.missing: list[str] = []
+        self.hashes: list[tuple[str, str]] = []
 
-def _fits(path: Path, stated: str, faults: list[str], missing: list[str]) -> bytes | None:
-    """Return a file's content; where it is gone or its hash is another, say so and return None."""
-    if not path.is_file():
-        missing.append(f"{path.name}: `dzdesign batch` makes it, from the folders that are done")
-        return None
-    content = read_bytes(path, "file of the batch")
-    if sha256_of(content) != stated:
-        faults.append(
-            f"{path.name} was changed since `dzdesign batch` wrote it (SHA-256 {sha256_of(content)}, {SUMMARY} says "
-            f"{stated}): not used"
+    def lot(self, own_hash: tuple[str, str]) -> Lot:
+        table = self._table()
+        rows = read_table(table, str(self.folder / TABLE)) if table else []
+        counted = {
+            "valves": (self.summary.valves, len(rows)),
+            "calibrated": (self.summary.calibrated, sum(row.calibrated for row in rows)),
+        }
+        self.faults += [
+            f"{SUMMARY_NAME} was changed: it counts {stated} valves as '{key}', the table has {count}"
+            for key, (stated, count) in counted.items()
+            if table and stated != count
+        ]
+        if setting := self.summary.lot_setting:
+            self._fitting(setting.file, setting.sha256)
+        texts = self._compared_valves(rows)
+        return Lot(
+            tool=self.summary.tool,
+            summary=self.summary,
+            rows=tuple(rows),
+            table=table.decode("utf-8"),
+            expected=self.summary.valves,
+            hashes=(own_hash, *((name, digest) for name, digest in self.hashes if name != "valves.parquet")),
+            compared=(self.folder / VALVES).is_dir(),
+            warning_texts=texts,
+            faults=tuple(self.faults),
+            missing=tuple(self.missing),
         )
-        return None
-    return content
 
+    def _table(self) -> bytes:
+        """Return valves.csv if it is as it was written, and compare the other files of the table."""
+        path = self.folder / TABLE
+        if path.is_file() and path.stat().st_size > MOST_TABLE:
+            raise InputError(
+                f"the table of {self.summary.valves} valves, '{path}', is larger than {MOST_TABLE >> 20} MiB, too "
+                "large for one page; read the table itself, or calibrate the lot in parts, each with a folder of its "
+                "own"
+            )
+        if TABLE not in self.summary.files:
+            raise InputError(f"'{self.folder / SUMMARY_NAME}' lacks the key 'files.{TABLE}'; {AGAIN}")
+        found = {
+            name: self._fitting(name, stated) for name, stated in self.summary.files.items() if NAME.fullmatch(name)
+        }
+        return found[TABLE] or b""
 
-def _table(folder: Path, document: Mapping[str, Any], faults: list[str], missing: list[str]) -> bytes | None:
-    if (folder / TABLE).is_file() and (folder / TABLE).stat().st_size > MOST_TABLE:
-        raise InputError(
-            f"the table of {document['valves']} valves, '{folder / TABLE}', is larger than {MOST_TABLE >> 20} MiB, too "
-            "large for one page; read the table itself, or calibrate the lot in parts, each with a folder of its own"
-        )
-    content = _fits(folder / TABLE, document["files"][TABLE], faults, missing)
-    for name, stated in document["files"].items():
-        if name != TABLE and isinstance(stated, str) and NAME.fullmatch(name):
-            _fits(folder / name, stated, faults, missing)
-    return content
+    def _fitting(self, name: str, stated: str) -> bytes | None:
+        """Return a file's content; where it is gone or its hash is another, say so and return None."""
+        path = self.folder / name
+        if not path.is_file():
+            self.missing.append(f"{name}: `dzdesign batch` makes it, from the folders that are done")
+            return None
+        content = read_bytes(path, "file of the lot")
+        digest = sha256_of(content)
+        if digest != stated:
+            self.faults.append(
+                f"{name} was changed since `dzdesign batch` wrote it (SHA-256 {digest}, {SUMMARY_NAME} says {stated}): "
+                "not used"
+            )
+            return None
+        self.hashes.append((name, digest))
+        return content
 
-
-def _common(
-    folder: Path, setting: Mapping[str, Any], faults: list[str], missing: list[str]
-) -> list[tuple[str, str]]:
-    """Return name and hash of the common setting's file, if there is one and it fits."""
-    if "sha256" not in setting or not NAME.fullmatch(setting["file"]):
-        return []
-    found = _fits(folder / setting["file"], setting["sha256"], faults, missing)
-    return [(setting["file"], setting["sha256"])] if found is not None else []
-
-
-def _look_at_valves(
-    folder: Path, rows: Sequence[Mapping[str, Any]], faults: list[str], missing: list[str]
-) -> dict[str, str]:
-    """Compare each valve's artefacts with the table's hashes; return a text of each warning."""
-    if not (folder / "valves").is_dir():
-        missing.append("the folders of the valves: they are not beside this table, so their hashes were not compared")
-        return {}
-    other: list[str] = []
-    texts: dict[str, str] = {}
-    for row in rows:
-        if not NAME.fullmatch(row["name"]):
-            other.append(row["name"])
-            continue
-        for column, file in HASHED.items():
-            path = folder / "valves" / row["name"] / file
-            if not row[column]:
+    def _compared_valves(self, rows: Sequence[TableRow]) -> dict[str, str]:
+        """Compare each valve's artefacts with the table's hashes; return a text of each warning."""
+        if not (self.folder / VALVES).is_dir():
+            self.missing.append(
+                "the folders of the valves: they are not beside this table, so their hashes were not compared"
+            )
+            return {}
+        other: list[str] = []
+        texts: dict[str, str] = {}
+        for row in rows:
+            if not NAME.fullmatch(row.name):
+                other.append(row.name)
                 continue
-            content = path.read_bytes() if path.is_file() else b""
-            if sha256_of(content) != row[column]:
-                other.append(f"{row['name']}/{file}")
-            elif file == "valve.json" and set(row["warnings"].split()) - set(texts):
-                texts = {**_texts(content, str(path)), **texts}
-    if other:
-        faults.append(
-            f"files of valves are not those that the table was made from ({len(other)}): {and_more(other, NAMED)}"
-        )
-    return texts
+            for file, stated in ((file, row.hashes.get(column)) for column, file in HASHED.items()):
+                path = self.folder / VALVES / row.name / file
+                content = path.read_bytes() if stated and path.is_file() else b""
+                if stated and sha256_of(content) != stated:
+                    other.append(f"{row.name}/{file}")
+                elif content and file == "valve.json" and not texts.keys() >= set(row.warnings):
+                    valve = valve_from_document(content, str(path))
+                    texts = {**{each.code: each.text for each in reversed(valve.warnings)}, **texts}
+        if other:
+            self.faults.append(
+                f"files of valves are not those that the table was made from ({len(other)}): {and_more(other, NAMED)}"
+            )
+        return texts
 
 
-def _texts(content: bytes, source: str) -> dict[str, str]:
-    """Return the warnings of a valve.json, the first text of each code."""
-    document = parse_document(content, source, ("dzdesign.valve/1",))
-    check_shape(document, {"warnings": [{"code": str, "text": str}]}, source, AGAIN)
-    return {each["code"]: each["text"] for each in reversed(document["warnings"])}
-
-
-def _stopped(folder: Path, document: dict[str, Any], hashes: list[tuple[str, str]]) -> Lot:
+def _unfinished(folder: Path, found: UnfinishedLot, own_hash: tuple[str, str]) -> Lot:
     """Read what a batch that was stopped, or still runs, has come to."""
-    names = document.get("names")
-    if not isinstance(names, list) or not all(isinstance(name, str) and NAME.fullmatch(name) for name in names):
-        names = sorted((path.name for path in _folders(folder)), key=by_name)
-    there = [name for name in names if (folder / "valves" / name / MANIFEST_NAME).is_file()]
-    found: dict[str, Calibrated] = {}
-    faults: list[str] = []
-    for name in with_bar(there, "reading the valves"):
+    names = [name for name in found.names if NAME.fullmatch(name)]
+    there = [name for name in names if (folder / VALVES / name / MANIFEST_NAME).is_file()]
+    valves, faults = [], []
+    for name in there:
         try:
-            found[name] = read_back(Results(folder), name, {})
+            valves.append(read_valve_folder(folder / VALVES / name))
         except InputError as error:
             faults.append(str(error))
     return Lot(
-        document={**document, "complete": False},
-        rows=tuple(rows_of(found, None)) if found else (),
-        table="",
-        expected=max(len(names), len(there)),
-        hashes=tuple(hashes),
+        tool=found.tool,
+        summary=None,
+        rows=tuple(table_rows(valves)),
+        expected=len(names),
+        hashes=(own_hash,),
         warning_texts={
             warning.code: warning.text
-            for each in reversed(found.values())
+            for each in reversed(valves)
             for warning in (reversed(each.designed.valve.warnings) if each.designed else ())
         },
         faults=tuple(faults),
         missing=(
-            f"{len(names) - len(there)} of {len(names)} valves, the table and the common setting: the batch did not "
+            f"{len(names) - len(there)} of {len(names)} valves, the table and the lot setting: the batch did not "
             "come to its end; the same `dzdesign batch` takes it up",
         ),
     )
-
-
-def _folders(folder: Path) -> Iterator[Path]:
-    place = folder / "valves"
-    return (path for path in (place.iterdir() if place.is_dir() else ()) if NAME.fullmatch(path.name))

@@ -5,19 +5,20 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from dzdesign.batch.calibration import DOES_NOT_HOLD
-from dzdesign.batch.summary import lacking_lines
-from dzdesign.report.lot.folder import Lot, lot_of
-from dzdesign.report.lot.sections import HEADINGS, sections_of, spreads_of
-from dzdesign.report.lot.spread import FAR, TWENTY, Spread
-from dzdesign.report.lot.tables import named
+from dzdesign.core.errors import and_more
+from dzdesign.report.lot.folder import Lot, read_lot
+from dzdesign.report.lot.sections import HEADINGS, sections_of
+from dzdesign.report.lot.setting_text import untested_lines
+from dzdesign.report.lot.spread import FAR, TWENTY, Spread, spreads_of
+from dzdesign.report.lot.summary import DOES_NOT_HOLD
+from dzdesign.report.lot.table import column_of
 from dzdesign.report.page import render_page
 from dzdesign.report.sections.cells import whole
 from dzdesign.report.summary import Figure, Headline
 from dzdesign.report.valve_report import Report
 
-#: Valves that the verdict names, and oddities.
-IN_VERDICT, ODD_IN_VERDICT = 8, 3
+#: Valves that the verdict names, and anomalies.
+IN_VERDICT, ANOMALIES_IN_VERDICT = 8, 3
 
 
 def report_of_lot(folder: Path) -> Report:
@@ -33,7 +34,7 @@ def report_of_lot(folder: Path) -> Report:
     InputError
         If it is not what `dzdesign batch` writes.
     """
-    return make_lot_report(lot_of(folder))
+    return make_lot_report(read_lot(folder))
 
 
 def make_lot_report(lot: Lot) -> Report:
@@ -42,12 +43,12 @@ def make_lot_report(lot: Lot) -> Report:
     Parameters
     ----------
     lot : Lot
-        Of `lot_of`.
+        Of `read_lot`.
     """
     verdict = lot_headline(lot)
-    spreads = spreads_of(lot)
+    spreads = spreads_of(lot.rows)
     missing = list(lot.missing)
-    if lot.complete and lot.calibrated and not lot.document["verified"]:
+    if lot.summary and lot.calibrated and not lot.summary.verified:
         missing.append("the evidence of each valve: `dzdesign batch --verify` makes it")
     html = render_page(
         title=f"Lot of {whole(lot.expected)} valve{'' if lot.expected == 1 else 's'}",
@@ -75,14 +76,16 @@ def lot_headline(lot: Lot) -> Headline:
     ----------
     lot : Lot
     """
-    more = len(lot.oddities) - ODD_IN_VERDICT
-    odd = [f"odd: {text}" for text in lot.oddities[:ODD_IN_VERDICT]]
-    simulated = [row["name"] for row in lot.calibrated if "simulated" in row["warnings"].split()]
+    anomalies = lot.summary.anomalies if lot.summary else ()
+    lines = [f"odd: {text}" for text in anomalies[:ANOMALIES_IN_VERDICT]]
+    simulated = [row.name for row in lot.calibrated if "simulated" in row.warnings]
     if simulated:
-        odd.insert(0, f"SIMULATED recordings, not of measured valves: {named(simulated, IN_VERDICT)}")
-    odd += lacking_lines(lot.common() or {})
-    odd += [f"odd: {more} more, under “What the recordings leave open”"] if more > 0 else []
-    return replace(_verdict(lot), cautions=tuple(odd))
+        lines.insert(0, f"SIMULATED recordings, not of measured valves: {and_more(simulated, IN_VERDICT)}")
+    if lot.summary and lot.summary.lot_setting:
+        lines += untested_lines(lot.summary.lot_setting)
+    more = len(anomalies) - ANOMALIES_IN_VERDICT
+    lines += [f"odd: {more} more, under “What the recordings leave open”"] if more > 0 else []
+    return replace(_verdict(lot), cautions=tuple(lines))
 
 
 def _verdict(lot: Lot) -> Headline:
@@ -92,7 +95,7 @@ def _verdict(lot: Lot) -> Headline:
         )
     done, count, expected = len(lot.calibrated), len(lot.rows), lot.expected
     reasons = _not_calibrated(lot)
-    if not lot.complete:
+    if lot.summary is None:
         text = f"NOT FINISHED: {whole(count)} of {whole(expected)} valves tried, {whole(done)} calibrated"
         return Headline(kind="open", sign="?", text=text, reasons=reasons)
     if not count:
@@ -102,21 +105,21 @@ def _verdict(lot: Lot) -> Headline:
         text = f"NONE of {whole(count)} valves calibrated" if count > 1 else "The valve is NOT calibrated"
         return Headline(kind="bad", sign="✗", text=text, reasons=reasons)
     if reasons:
-        refuted = any(row["status"] == DOES_NOT_HOLD for row in lot.failed)
+        refuted = any(row.status == DOES_NOT_HOLD for row in lot.failed)
         text = f"{words}, {whole(count - done)} NOT"
         return Headline(
             kind="bad" if refuted else "open", sign="✗" if refuted else "!", text=text, reasons=reasons
         )
-    if not lot.document["verified"]:
+    if not lot.summary.verified:
         return Headline(kind="open", sign="?", text=f"{words}; their firmware is NOT VERIFIED")
     return Headline(kind="good", sign="✓", text=f"{words}, and the firmware of each is verified")
 
 
 def _not_calibrated(lot: Lot) -> tuple[str, ...]:
     """Return for each status how many valves have it, and which."""
-    counts = Counter(row["status"] for row in lot.failed)
+    counts = Counter(row.status for row in lot.failed)
     return tuple(
-        f"{whole(count)} {status}: {named([row['name'] for row in lot.failed if row['status'] == status], IN_VERDICT)}"
+        f"{whole(count)} {status}: {and_more([row.name for row in lot.failed if row.status == status], IN_VERDICT)}"
         for status, count in counts.most_common()
     )
 
@@ -130,25 +133,25 @@ def key_figures_of_lot(lot: Lot, spreads: Sequence[Spread]) -> tuple[Figure, ...
     spreads : sequence of Spread
         Of `spreads_of`.
     """
-    by_column = {spread.side + spread.quantity.column: spread for spread in spreads}
+    by_column = {spread.column: spread for spread in spreads}
     figures = [_counts(lot), _look(lot, spreads)]
     for column, label, note in (
         ("dead_zone_opening_percent", "Dead zone left on opening", "of command, the worst of a valve's pressure drops"),
         ("dead_zone_closing_percent", "Dead zone left on closing", "of command, the worst of a valve's pressure drops"),
-        ("common_extra_dead_zone_percent", "Cost of one common setting", "more dead zone than with each valve's own"),
+        ("lot_extra_dead_zone_percent", "Cost of one lot setting", "more dead zone than with each valve's own"),
         ("knee_opening_V", "Threshold: knee on opening", "at dP0"),
     ):
-        of_sides = [by_column[side + column] for side in lot.sides if side + column in by_column]
+        of_sides = [by_column[name] for side in lot.sides if (name := column_of(side, column)) in by_column]
         if of_sides:
             figures.append(_spread_figure(label, note, of_sides))
     return tuple(figures)
 
 
 def _counts(lot: Lot) -> Figure:
-    failed = Counter(row["status"] for row in lot.failed)
+    failed = Counter(row.status for row in lot.failed)
     note = ", ".join(f"{whole(count)} {status}" for status, count in failed.most_common()) or "none left out"
-    if lot.complete and lot.calibrated:
-        note += "; verified" if lot.document["verified"] else "; not verified"
+    if lot.summary and lot.calibrated:
+        note += "; verified" if lot.summary.verified else "; not verified"
     kind = "text" if not lot.failed else "bad" if DOES_NOT_HOLD in failed or not lot.calibrated else "open"
     return Figure(
         label="Calibrated", value=f"{whole(len(lot.calibrated))} of {whole(lot.expected)}", note=note, kind=kind
@@ -158,7 +161,7 @@ def _counts(lot: Lot) -> Figure:
 def _look(lot: Lot, spreads: Sequence[Spread]) -> Figure:
     """Return how many valves need a look: those not calibrated, and those far from the rest."""
     far = {name for spread in spreads for name, _ in spread.far()}
-    warned = sum(bool(row["warnings"]) for row in lot.calibrated)
+    warned = sum(bool(row.warnings) for row in lot.calibrated)
     known = any(spread.limits for spread in spreads)
     parts = [
         f"{whole(len(lot.failed))} not calibrated",
@@ -174,11 +177,12 @@ def _look(lot: Lot, spreads: Sequence[Spread]) -> Figure:
 def _spread_figure(label: str, note: str, spreads: Sequence[Spread]) -> Figure:
     """Return median, the middle nine tenths and the largest of a quantity, of each side."""
     unit, digits = spreads[0].quantity.unit, spreads[0].quantity.digits
-    medians = " and ".join(f"{spread.at['0.5']:.{digits}f}" for spread in spreads)
+    medians = " and ".join(f"{spread.at.median:.{digits}f}" for spread in spreads)
     parts = []
     for spread in spreads:
-        least, low, high, most = (f"{spread.at[q]:.{digits}f}" for q in ("0", "0.05", "0.95", "1"))
-        side = f"{spread.side.rstrip('_')}: " if spread.side else ""
+        at = spread.at
+        least, low, high, most = (f"{value:.{digits}f}" for value in (at.least, at.q05, at.q95, at.largest))
+        side = f"{spread.side}: " if spread.side else ""
         if len(spread.values) < TWENTY:
             parts.append(f"{side}all from {least} to {most} {unit}")
         else:

@@ -1,25 +1,27 @@
 """What stands in each section of the report of a lot."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections import Counter
+from collections.abc import Sequence
 
-from dzdesign.batch.reasons import reason_groups
-from dzdesign.batch.summary import checked_lines, lacking_lines, span
+from dzdesign.core.errors import and_more
 from dzdesign.report.lot.figures import lot_style, order_figure, spread_figure
 from dzdesign.report.lot.folder import Lot
-from dzdesign.report.lot.spread import FAR, FEWEST, QUANTITIES, TWENTY, Spread, spread_of
+from dzdesign.report.lot.reasons import reason_groups
+from dzdesign.report.lot.setting_text import checked_line, span, untested_lines
+from dzdesign.report.lot.spread import FAR, FEWEST, TWENTY, Spread
+from dzdesign.report.lot.summary import Quantiles, SettingOfOthers
 from dzdesign.report.lot.tables import (
+    NAMED,
     failed_table,
     far_table,
     holding_table,
-    named,
     provenance_table,
     spread_table,
     valves_table,
     warnings_table,
 )
 from dzdesign.report.page import Section
-from dzdesign.report.sections.cells import whole
+from dzdesign.report.sections.cells import counted, whole
 
 #: Anchor and heading of every section, in their order.
 HEADINGS = (
@@ -27,7 +29,7 @@ HEADINGS = (
     ("spread", "Spread of the lot"),
     ("far", "Far from the rest"),
     ("left", "Dead zone that remains"),
-    ("common", "One setting for all"),
+    ("setting", "One setting for all"),
     ("valves", "The valves"),
     ("recordings", "What the recordings leave open"),
     ("warnings", "Warnings: what is not covered"),
@@ -37,24 +39,13 @@ HEADINGS = (
 NOT_PROVED = (
     "A valve counts as calibrated if it was identified, its compensator designed and its C made. That the C does what "
     "the law says is known of those that were verified.",
-    "The common setting is certified for each valve of this batch with the confidence of that valve's own bounds, not "
-    "for all of them at once. Of a valve that is not in the batch it says nothing.",
+    "The lot setting is certified for each valve of this lot with the confidence of that valve's own bounds, not "
+    "for all of them at once. Of a valve that is not in the lot it says nothing.",
     "Spread is of the valves and of the bench: a meter or an oil temperature that drifts while a lot is measured looks "
     "like valves that differ. Measure one valve again at the end of the lot to tell.",
     "Far from the rest is a place to look, no verdict: such a valve is calibrated as certainly as any other.",
     "Quantiles are those of the valves that were calibrated; the others have no numbers.",
 )
-
-
-def spreads_of(lot: Lot) -> tuple[Spread, ...]:
-    """Return how every quantity scatters that some valve has.
-
-    Parameters
-    ----------
-    lot : Lot
-    """
-    found = (spread_of(lot.calibrated, column, side) for side in lot.sides for column in QUANTITIES if lot.calibrated)
-    return tuple(spread for spread in found if spread is not None)
 
 
 def sections_of(lot: Lot, spreads: Sequence[Spread]) -> dict[str, Section]:
@@ -72,7 +63,7 @@ def sections_of(lot: Lot, spreads: Sequence[Spread]) -> dict[str, Section]:
             "spread": _spread_section(lot, spreads),
             "far": _far_section(spreads),
             "left": _left_section(lot, spreads),
-            "common": _common_section(lot, spreads),
+            "setting": _setting_section(lot, spreads),
             "valves": _valves_section(lot, spreads),
             "recordings": _recordings_section(lot),
             "warnings": Section(lines=NOT_PROVED),
@@ -89,8 +80,7 @@ def _failed_section(lot: Lot) -> Section:
     if not lot.failed:
         return Section(lines=("Every valve that was tried is calibrated.",) if lot.rows else ())
     groups = reason_groups(lot.failed)
-    many = "1 valve" if len(lot.failed) == 1 else f"{whole(len(lot.failed))} valves"
-    kinds = "1 kind" if len(groups) == 1 else f"{len(groups)} kinds"
+    many, kinds = counted(len(lot.failed), "valve"), counted(len(groups), "kind")
     return Section(
         note="The reason of a valve also stands in its `reason.txt`. Correct what it says, then run the same "
         "`dzdesign batch` again: only what changed is done anew.",
@@ -108,7 +98,7 @@ def _spread_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
     figures = []
     for side in lot.sides:
         own = [spread for spread in spreads if spread.side == side]
-        of, words = (f"-{side.rstrip('_')}", f" {side.rstrip('_').capitalize()} commands.") if side else ("", "")
+        of, words = (f"-{side}", f" {side.capitalize()} commands.") if side else ("", "")
         figures += [
             spread_figure(
                 f"thresholds{of}", _of(own, "knee_opening_V", "knee_closing_V"),
@@ -142,24 +132,22 @@ def _lot_lines(lot: Lot) -> list[str]:
     """Say at which pressure drops the numbers hold, and which way the thresholds move."""
     lines = []
     for side in lot.sides:
-        of = f"{side.rstrip('_').capitalize()} commands: " if side else ""
-        rows = [row for row in lot.calibrated if row[f"{side}dp0_MPa"] is not None]
-        if not rows:
+        of = f"{side.capitalize()} commands: " if side else ""
+        tested = [figures for row in lot.calibrated if (figures := row.sides[side]).dp0_MPa is not None]
+        if not tested:
             lines.append(f"{of}no valve was tested.")
             continue
-        ends = [_span([row[side + key] for row in rows]) for key in ("dp0_MPa", "highest_dp_MPa")]
-        trends: dict[str, int] = {}
-        for row in rows:
-            trends[row[f"{side}trend"] or "not known"] = trends.get(row[f"{side}trend"] or "not known", 0) + 1
-        counts = ", ".join(f"{word} in {whole(n)}" for word, n in sorted(trends.items(), key=lambda one: -one[1]))
+        trends = Counter(each.trend or "not known" for each in tested)
+        counts = ", ".join(f"{word} in {whole(count)}" for word, count in trends.most_common())
         lines.append(
-            f"{of}dP0 is {ends[0]} MPa, the highest tested pressure drop {ends[1]} MPa. Threshold over the pressure "
-            f"drop: {counts} valves."
+            f"{of}dP0 is {_from_to([each.dp0_MPa for each in tested])} MPa, the highest tested pressure drop "
+            f"{_from_to([each.highest_dp_MPa for each in tested])} MPa. Threshold over the pressure drop: {counts} "
+            "valves."
         )
     return lines
 
 
-def _span(values: Sequence[float | None]) -> str:
+def _from_to(values: Sequence[float | None]) -> str:
     known = [value for value in values if value is not None]
     if not known:
         return "not known"
@@ -188,7 +176,7 @@ def _left_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
     figures = []
     for side in lot.sides:
         own = [spread for spread in spreads if spread.side == side]
-        of, words = (f"-{side.rstrip('_')}", f", {side.rstrip('_')} commands") if side else ("", "")
+        of, words = (f"-{side}", f", {side} commands") if side else ("", "")
         figures.append(
             spread_figure(
                 f"left{of}", _of(own, "dead_zone_opening_percent", "dead_zone_closing_percent"),
@@ -199,62 +187,58 @@ def _left_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
     return Section(figures=tuple(figure for figure in figures if figure))
 
 
-def _common_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
-    common = lot.common()
-    if common is None:
-        if not lot.complete:
-            return Section(missing="The common setting is made at the end of a batch.")
-        why = lot.document["common_setting"].get("why_not", "not known")
-        return Section(missing=f"There is no common setting: {why}.", optional=True)
-    costs = _of(spreads, "common_extra_dead_zone_percent")
-    lines = [
+def _setting_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
+    if lot.summary is None:
+        return Section(missing="The lot setting is made at the end of a batch.")
+    setting = lot.summary.lot_setting
+    if setting is None:
+        return Section(missing=f"There is no lot setting: {lot.summary.why_no_lot_setting}.", optional=True)
+    costs = _of(spreads, "lot_extra_dead_zone_percent")
+    checked = checked_line(setting)
+    lines = (
         "The largest offset that over-compensates none of the valves, certified for each of them "
-        f"{span(*common['dp_MPa'])}, is in {common['file']}; its trend is that of {common['carrier']}.",
-        *(
-            f"{line[0].upper()}{line[1:]}. The C made of the file is compared with all bounds by dzdesign verify."
-            for line in checked_lines(common)
-        ),
-        *(f"{line}." for line in lacking_lines(common)),
+        f"{span(*setting.dp_MPa)}, is in {setting.file}; its trend is that of {setting.carrier}.",
+        f"{checked[0].upper()}{checked[1:]}. The C made of the file is compared with all bounds by dzdesign verify.",
+        *(f"{line}." for line in untested_lines(setting)),
         *(_cost_line(spread) for spread in costs),
-        f"It is held down by {named(common['binding'])}.",
-        *_without_lines(common.get("without_binding"), len(lot.calibrated)),
-    ]
+        f"It is held down by {and_more(setting.binding, NAMED)}.",
+        *_without_lines(setting.without_binding, len(lot.calibrated)),
+    )
     figure = spread_figure(
-        "common", costs,
+        "lot-setting", costs,
         "What one setting for all costs each valve: the dead zone that it leaves on opening less what the valve's own "
         "setting leaves, at the worst pressure drop of its tests. The valves that hold the setting down stand at the "
         "left.", one_scale=True,
     )  # fmt: skip
-    table = holding_table(lot)
-    return Section(lines=tuple(lines), figures=(figure,) if figure else (), tables=(table,) if table else ())
+    return Section(lines=lines, figures=(figure,) if figure else (), tables=(holding_table(lot, setting),))
 
 
 def _cost_line(spread: Spread) -> str:
-    side = f"{spread.side.rstrip('_').capitalize()} side: it" if spread.side else "It"
+    side = f"{spread.side.capitalize()} side: it" if spread.side else "It"
     return (
         f"{side} leaves more dead zone than each valve's own setting: {_three(spread.at, len(spread.values))} "
-        f"({spread.name_at('1')})."
+        f"({spread.ends[1]})."
     )
 
 
-def _three(at: Mapping[str, float], count: int) -> str:
+def _three(at: Quantiles, count: int) -> str:
     """Say a cost at the median valve, at one in twenty if there are so many, and at worst."""
-    twentieth = f"{at['0.95']:.2f} % at one in twenty, " if count >= TWENTY else ""
-    return f"{at['0.5']:.2f} % of command at the median valve, {twentieth}{at['1']:.2f} % at worst"
+    twentieth = f"{at.q95:.2f} % at one in twenty, " if count >= TWENTY else ""
+    return f"{at.median:.2f} % of command at the median valve, {twentieth}{at.largest:.2f} % at worst"
 
 
-def _without_lines(without: Mapping[str, Any] | None, count: int) -> list[str]:
+def _without_lines(without: SettingOfOthers | None, count: int) -> list[str]:
     """Say what the setting would cost without the valves that hold it down."""
     if without is None:
         return []
-    if "why_not" in without:
-        return [f"Without them there is no common setting of the others: {without['why_not']}."]
+    if without.why_not is not None:
+        return [f"Without them there is no lot setting of the others: {without.why_not}."]
     lines = []
-    for column, at in without["quantiles"].items():
+    for column, at in without.quantiles.items():
         side = f" on the {column.partition('_')[0]} side" if column.startswith(("positive", "negative")) else ""
         lines.append(
-            f"With settings of their own for {named(without['left_out'], 5)}, the common setting of the others would "
-            f"cost{side} {_three(at, count - len(without['left_out']))}."
+            f"With settings of their own for {and_more(without.left_out, 5)}, the lot setting of the others would "
+            f"cost{side} {_three(at, count - len(without.left_out))}."
         )
     return lines
 
@@ -271,7 +255,7 @@ def _valves_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
 
 def _recordings_section(lot: Lot) -> Section:
     table = warnings_table(lot)
-    odd = tuple(f"Odd: {text}." for text in lot.oddities)
+    odd = tuple(f"Odd: {text}." for text in (lot.summary.anomalies if lot.summary else ()))
     if table is None:
         none = ("No recording of a calibrated valve has a warning.",) if lot.calibrated else ()
         return Section(lines=(*odd, *none))
@@ -285,8 +269,8 @@ def _recordings_section(lot: Lot) -> Section:
 
 def _provenance_section(lot: Lot) -> Section:
     lines = []
-    if lot.complete and lot.rows:
-        hashed = sum(bool(row["inputs_sha256"]) for row in lot.rows)
+    if lot.summary and lot.rows:
+        hashed = sum("inputs_sha256" in row.hashes for row in lot.rows)
         lines.append(
             f"The table has, for {whole(hashed)} of its {whole(len(lot.rows))} valves, the SHA-256 of recordings and "
             "options, and of a calibrated one those of valve.json, compensator.json and the firmware's manifest"

@@ -1,13 +1,15 @@
 """How a quantity scatters over a lot, and which valves lie far from the rest of it."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from statistics import median
-from typing import Any
 
-from dzdesign.batch.valves import by_name
+from dzdesign.report.lot.summary import Quantiles
+from dzdesign.report.lot.table import TableRow, column_of
+from dzdesign.report.lot.valve_names import by_name
 
-QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
+#: Of the fields of `Quantiles`, in their order.
+LEVELS = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 #: Beyond so many robust standard deviations a valve is far from the rest: the limit that Iglewicz and Hoaglin (1993)
 #: recommend. Of a normal lot one valve in 2000 lies there, which keeps a list of a thousand valves short.
 FAR = 3.5
@@ -17,8 +19,6 @@ PER_MAD = 1.4826
 FEWEST = 8
 #: In a smaller lot a twentieth is less than a valve: 5 and 95 % say no more than the ends.
 TWENTY = 20
-#: Characters of a valve's name in a figure or a narrow cell; names may have a hundred.
-SHOWN_NAME = 18
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,7 +34,7 @@ class Quantity:
     digits : int
         Decimals.
     judged : bool
-        Whether a valve can be far from the rest in it. The cost of the common setting follows from the offsets, and
+        Whether a valve can be far from the rest in it. The cost of the lot setting follows from the offsets, and
         its least is no merit.
     """
 
@@ -62,11 +62,14 @@ QUANTITIES = {
         Quantity(column="dead_zone_opening_percent", label="dead zone left on opening", unit="%", digits=2),
         Quantity(column="dead_zone_closing_percent", label="dead zone left on closing", unit="%", digits=2),
         Quantity(
-            column="common_extra_dead_zone_percent", label="extra dead zone of the common setting", unit="%",
-            digits=2, judged=False,
+            column="lot_extra_dead_zone_percent",
+            label="extra dead zone of the lot setting",
+            unit="%",
+            digits=2,
+            judged=False,
         ),
     )
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,41 +80,43 @@ class Spread:
     ----------
     quantity : Quantity
     side : str
-        ``positive_``, ``negative_`` or empty.
+        "positive", "negative", or empty in a lot of one side.
     names : tuple of str
         Of the valves that have it, in the order of the table.
     values : tuple of float
         One each.
-    at : mapping of str to float
-        Quantiles, as in batch.json.
-    median, deviation : float
-        Deviation: robust, in the quantity's unit; 0 where it says nothing.
+    at : Quantiles
+    deviation : float
+        Robust standard deviation, in the quantity's unit; 0 where it says nothing.
     """
 
     quantity: Quantity
     side: str
     names: tuple[str, ...]
     values: tuple[float, ...]
-    at: Mapping[str, float]
-    median: float
+    at: Quantiles
     deviation: float
 
     @property
     def heading(self) -> str:
         """What stands on its axis."""
-        side = f"{self.side.rstrip('_')} side: " if self.side else ""
-        return side + self.quantity.heading
+        return (f"{self.side} side: " if self.side else "") + self.quantity.heading
+
+    @property
+    def column(self) -> str:
+        """Its column of the table."""
+        return column_of(self.side, self.quantity.column)
 
     @property
     def limits(self) -> tuple[float, float] | None:
         """Beyond which a valve is far from the rest; None where the lot is too small or has no spread."""
         if not self.deviation or not self.quantity.judged:
             return None
-        return self.median - FAR * self.deviation, self.median + FAR * self.deviation
+        return self.at.median - FAR * self.deviation, self.at.median + FAR * self.deviation
 
     def distance(self, value: float) -> float:
         """Return how many robust standard deviations a value lies from the median."""
-        return (value - self.median) / self.deviation
+        return (value - self.at.median) / self.deviation
 
     def far(self) -> tuple[tuple[str, float], ...]:
         """Return name and value of the valves far from the rest, the farthest first."""
@@ -120,28 +125,33 @@ class Spread:
         found = [one for one in zip(self.names, self.values, strict=True) if abs(self.distance(one[1])) > FAR]
         return tuple(sorted(found, key=lambda one: (-abs(self.distance(one[1])), by_name(one[0]))))
 
-    def name_at(self, quantile: str) -> str:
-        """Return a valve that has the least (``0``) or the largest (``1``) value."""
-        return self.names[self.values.index(self.at[quantile])]
+    @property
+    def ends(self) -> tuple[str, str]:
+        """A valve that has the least value, and one that has the largest."""
+        low, high = (self.names[self.values.index(value)] for value in (self.at.least, self.at.largest))
+        return low, high
 
 
-def quantiles(values: Sequence[float | None]) -> dict[str, float]:
-    """Return quantiles, straight between the two nearest valves (the seventh method of Hyndman and Fan, 1996).
+def quantiles(values: Sequence[float]) -> Quantiles:
+    """Return quantiles, linear between the two nearest valves (the seventh method of Hyndman and Fan, 1996).
 
     The median of an even number is then the mean of the two middle ones, the ends are values of valves.
 
     Parameters
     ----------
-    values : sequence of float or None
-        None of a valve that has none.
+    values : sequence of float
+        One at least.
 
     Examples
     --------
-    >>> quantiles([1.0, None, 2.0, 5.0, 4.0])["0.5"]
+    >>> quantiles([1.0, 2.0, 5.0, 4.0]).median
     3.0
     """
-    known = sorted(value for value in values if value is not None)
-    return {f"{q:g}": _between(known, q * (len(known) - 1)) for q in QUANTILES} if known else {}
+    known = sorted(values)
+    names = (each.name for each in fields(Quantiles))
+    return Quantiles(
+        **{name: _between(known, level * (len(known) - 1)) for name, level in zip(names, LEVELS, strict=True)}
+    )
 
 
 def _between(known: Sequence[float], place: float) -> float:
@@ -152,48 +162,42 @@ def _between(known: Sequence[float], place: float) -> float:
     return round(known[index] + share * (known[index + 1] - known[index]), 7)
 
 
-def short(name: str) -> str:
-    """Return a valve's name for a narrow place.
-
-    Parameters
-    ----------
-    name : str
-        Somebody's text.
-
-    Examples
-    --------
-    >>> short("V0001"), short("a" * 30)
-    ('V0001', 'aaaaaaaaaaaaaaaaa…')
-    """
-    shown = "".join(letter if letter.isprintable() else "·" for letter in name)
-    return shown if len(shown) <= SHOWN_NAME else f"{shown[: SHOWN_NAME - 1]}…"
-
-
-def spread_of(rows: Sequence[Mapping[str, Any]], column: str, side: str) -> Spread | None:
+def spread_of(rows: Sequence[TableRow], column: str, side: str) -> Spread | None:
     """Return how a column scatters; None where no valve has it.
 
     Parameters
     ----------
-    rows : sequence of mapping
-        Of the table.
+    rows : sequence of TableRow
+        Of the calibrated valves.
     column : str
         A key of `QUANTITIES`.
     side : str
-        What stands before it.
+        Side of the column.
     """
-    known = [(row["name"], row[side + column]) for row in rows if row[side + column] is not None]
+    known = {row.name: value for row in rows if (value := row.number(side, column)) is not None}
     if not known:
         return None
-    names, values = zip(*known, strict=True)
+    values = tuple(known.values())
     at = quantiles(values)
-    middle = at["0.5"]
-    deviation = PER_MAD * median(abs(value - middle) for value in values)
+    deviation = PER_MAD * median(abs(value - at.median) for value in values)
     return Spread(
         quantity=QUANTITIES[column],
         side=side,
-        names=names,
+        names=tuple(known),
         values=values,
         at=at,
-        median=middle,
         deviation=deviation if len(values) >= FEWEST else 0.0,
     )
+
+
+def spreads_of(rows: Sequence[TableRow]) -> tuple[Spread, ...]:
+    """Return how every quantity scatters that some calibrated valve has, side by side.
+
+    Parameters
+    ----------
+    rows : sequence of TableRow
+        Of the whole lot.
+    """
+    calibrated = [row for row in rows if row.calibrated]
+    found = (spread_of(calibrated, column, side) for side in rows[0].sides for column in QUANTITIES) if rows else ()
+    return tuple(spread for spread in found if spread is not None)

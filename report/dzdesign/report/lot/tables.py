@@ -1,15 +1,16 @@
 """Tables of the report of a lot."""
 
-from collections.abc import Collection, Mapping, Sequence
-from typing import Any
+from collections.abc import Collection, Sequence
+from dataclasses import astuple, fields
 
-from dzdesign.batch.calibration import OK
-from dzdesign.batch.reasons import ReasonGroup
-from dzdesign.batch.table import TABLE, safe_cell
-from dzdesign.batch.valves import RECORD
+from dzdesign.core.errors import and_more
 from dzdesign.report.figures.figure import csv_text
 from dzdesign.report.lot.folder import Lot
-from dzdesign.report.lot.spread import Spread, short
+from dzdesign.report.lot.reasons import ReasonGroup
+from dzdesign.report.lot.spread import Spread
+from dzdesign.report.lot.summary import LotSettingSummary, Quantiles
+from dzdesign.report.lot.table import TABLE, TableRow, safe_cell
+from dzdesign.report.lot.valve_names import short
 from dzdesign.report.sections.cells import Cell, Table, number, whole
 
 #: Valves that a cell names, and rows that a table has in the page; all of them stand in the CSV.
@@ -19,7 +20,7 @@ SMALL_LOT, FIRST = 50, 10
 #: Characters of a table that the page holds: some 4000 valves.
 EMBEDDED = 2_000_000
 #: Columns of the whole table that the page shows, with heading and decimals.
-SHOWN = (
+NUMBERS = (
     ("knee_opening_V", "knee opening (V)", 3),
     ("knee_closing_V", "knee closing (V)", 3),
     ("offset_V", "offset (V)", 3),
@@ -27,36 +28,17 @@ SHOWN = (
     ("k_x_max_over_u_max", "k x_max/u_max", 4),
     ("dead_zone_opening_percent", "left on opening (%)", 2),
     ("dead_zone_closing_percent", "left on closing (%)", 2),
-    ("common_extra_dead_zone_percent", "extra of the common setting (%)", 2),
+    ("lot_extra_dead_zone_percent", "extra of the lot setting (%)", 2),
 )
 
 
-def named(names: Sequence[str], most: int = NAMED) -> str:
-    """Return names for a sentence or a cell, and how many more there are.
-
-    Parameters
-    ----------
-    names : sequence of str
-    most : int
-        That are named.
-
-    Examples
-    --------
-    >>> named(["a", "b", "c"], 2)
-    'a, b and 1 more'
-    """
-    more = f" and {whole(len(names) - most)} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + more
-
-
-def failed_table(groups: Sequence[ReasonGroup], failed: Sequence[Mapping[str, Any]]) -> Table:
+def failed_table(groups: Sequence[ReasonGroup], failed: Sequence[TableRow]) -> Table:
     """Return the reasons, those of one kind in one row.
 
     Parameters
     ----------
     groups : sequence of ReasonGroup
-    failed : sequence of mapping
-        Rows of the table.
+    failed : sequence of TableRow
     """
     rows = []
     for group in groups:
@@ -67,7 +49,7 @@ def failed_table(groups: Sequence[ReasonGroup], failed: Sequence[Mapping[str, An
                 Cell(text=whole(len(names)), kind="number"),
                 Cell(text=group.what),
                 Cell(text=group.advice or "–"),
-                Cell(text=named(names)),
+                Cell(text=and_more(names, NAMED)),
             )
         )
     return Table(
@@ -76,7 +58,7 @@ def failed_table(groups: Sequence[ReasonGroup], failed: Sequence[Mapping[str, An
         rows=tuple(rows),
         csv=csv_text(
             ("name", "status", "reason"),
-            ([safe_cell(row[key]) for key in ("name", "status", "reason")] for row in failed),
+            ([safe_cell(text) for text in (row.name, row.status, row.reason)] for row in failed),
         ),
         name="not-calibrated",
     )
@@ -91,36 +73,32 @@ def spread_table(spreads: Sequence[Spread]) -> Table:
     """
     cells, rows = [], []
     for spread in spreads:
-        digits, far = spread.quantity.digits, spread.far()
-        ends = [
-            Cell(text=number(spread.at[q], digits).text, kind="number", more=short(spread.name_at(q))) for q in "01"
-        ]
-        middle = [number(spread.at[q], digits) for q in ("0.05", "0.5", "0.95")]
+        digits, far, at = spread.quantity.digits, spread.far(), spread.at
+        least, largest = (
+            Cell(text=number(value, digits).text, kind="number", more=short(name))
+            for value, name in zip((at.least, at.largest), spread.ends, strict=True)
+        )
         known = spread.limits is not None
         cells.append(
             (
                 Cell(text=spread.heading),
                 Cell(text=whole(len(spread.values)), kind="number"),
-                ends[0], *middle, ends[1],
+                least, *(number(value, digits) for value in (at.q05, at.median, at.q95)), largest,
                 number(spread.deviation if known else None, digits + 1),
                 Cell(text=whole(len(far)) if known else "–", kind="number"),
             )
         )  # fmt: skip
-        rows.append(
-            [
-                spread.side + spread.quantity.column, len(spread.values),
-                *(spread.at[q] for q in ("0", "0.05", "0.25", "0.5", "0.75", "0.95", "1")),
-                spread.name_at("0"), spread.name_at("1"), round(spread.deviation, 7) if known else None,
-                len(far) if known else None,
-            ]
-        )  # fmt: skip
+        deviation, count = (round(spread.deviation, 7), len(far)) if known else (None, None)
+        rows.append([spread.column, len(spread.values), *astuple(at), *spread.ends, deviation, count])
     return Table(
         caption="How the calibrated valves scatter",
         columns=("quantity", "valves", "least", "5 %", "median", "95 %", "largest", "robust s.d.", "far from the rest"),
         rows=tuple(cells),
         csv=csv_text(
-            ("quantity", "valves", "least", "q05", "q25", "median", "q75", "q95", "largest", "least_is", "largest_is",
-             "robust_sd", "far"),
+            (
+                "quantity", "valves", *(each.name for each in fields(Quantiles)), "least_is", "largest_is",
+                "robust_sd", "far",
+            ),
             rows,
         ),
         name="spread",
@@ -143,7 +121,7 @@ def far_table(spreads: Sequence[Spread]) -> Table | None:
             Cell(text=name),
             Cell(text=spread.heading),
             number(value, spread.quantity.digits),
-            number(spread.at["0.5"], spread.quantity.digits),
+            number(spread.at.median, spread.quantity.digits),
             number(spread.distance(value), 1, "+"),
         )
         for spread, name, value in found[:ROWS]
@@ -155,7 +133,7 @@ def far_table(spreads: Sequence[Spread]) -> Table | None:
         csv=csv_text(
             ("valve", "quantity", "value", "median", "robust_sd_from_median"),
             (
-                (name, spread.side + spread.quantity.column, value, spread.at["0.5"], round(spread.distance(value), 2))
+                (name, spread.column, value, spread.at.median, round(spread.distance(value), 2))
                 for spread, name, value in found
             ),
         ),
@@ -172,8 +150,8 @@ def warnings_table(lot: Lot) -> Table | None:
     """
     by_code: dict[str, list[str]] = {}
     for row in lot.calibrated:
-        for code in row["warnings"].split():
-            by_code.setdefault(code, []).append(row["name"])
+        for code in row.warnings:
+            by_code.setdefault(code, []).append(row.name)
     if not by_code:
         return None
     ordered = sorted(by_code.items(), key=lambda one: (-len(one[1]), one[0]))
@@ -186,7 +164,7 @@ def warnings_table(lot: Lot) -> Table | None:
                 Cell(text=code, kind="symbol"),
                 Cell(text=f"{whole(len(names))} of {whole(count)}", kind="number"),
                 Cell(text=lot.warning_texts.get(code, "–")),
-                Cell(text="all" if len(names) == count > 1 else named(names)),
+                Cell(text="all" if len(names) == count > 1 else and_more(names, NAMED)),
             )
             for code, names in ordered
         ),
@@ -195,32 +173,33 @@ def warnings_table(lot: Lot) -> Table | None:
     )
 
 
-def holding_table(lot: Lot) -> Table | None:
-    """Return the valves that hold the common setting down; None if there is no such setting.
+def holding_table(lot: Lot, setting: LotSettingSummary) -> Table:
+    """Return the valves that hold the lot setting down.
 
     Parameters
     ----------
     lot : Lot
+    setting : LotSettingSummary
+        Of it.
     """
-    common = lot.common()
-    if common is None:
-        return None
-    rows = {row["name"]: row for row in lot.rows}
-    margins = common["smallest_margin_V"]
+    rows = {row.name: row for row in lot.rows}
     cells = []
-    for name in common["binding"]:
-        row = rows.get(name, {})
-        margin = [f"{1e3 * each:.3f}" for each in margins.get(name, []) if isinstance(each, int | float)]
+    for name in setting.binding:
+        row = rows.get(name)
+        margins = [f"{1e3 * margin:.3f}" for margin in setting.smallest_margin_V.get(name, ())]
         cells.append(
             (
                 Cell(text=name),
-                Cell(text=" and ".join(margin) or "–", kind="number"),
-                *(number(row.get(side + "offset_V"), 3) for side in lot.sides),
-                *(number(row.get(side + "common_extra_dead_zone_percent"), 2) for side in lot.sides),
+                Cell(text=" and ".join(margins) or "–", kind="number"),
+                *(
+                    number(row.number(side, column) if row else None, digits)
+                    for column, digits in (("offset_V", 3), ("lot_extra_dead_zone_percent", 2))
+                    for side in lot.sides
+                ),
             )
         )
-    of = [f", {side.rstrip('_')}" if side else "" for side in lot.sides]
-    caption = "Valves that hold the common setting down"
+    of = [f", {side}" if side else "" for side in lot.sides]
+    caption = "Valves that hold the lot setting down"
     return Table(
         caption=f"{caption}, the first {ROWS} of {len(cells)}" if len(cells) > ROWS else caption,
         columns=(
@@ -250,36 +229,39 @@ def valves_table(lot: Lot, far: Collection[str]) -> Table | None:
         return None
     rows, caption = lot.rows, "All valves"
     if len(rows) > SMALL_LOT:
-        rows, caption = tuple(row for row in rows if row["name"] in far), "Calibrated valves far from the rest"
+        rows, caption = tuple(row for row in rows if row.name in far), "Calibrated valves far from the rest"
     if not rows:
         rows, caption = lot.rows[:FIRST], f"The first {FIRST} valves, since none lies far from the rest"
     if len(rows) > ROWS:
         rows, caption = rows[:ROWS], f"{caption}, the first {ROWS} of {len(rows)}"
     columns = [
-        (side + column, f"{side.rstrip('_')} {heading}" if side else heading, digits)
+        (side, column, f"{side} {heading}" if side else heading, digits)
         for side in lot.sides
-        for column, heading, digits in SHOWN
+        for column, heading, digits in NUMBERS
     ]
-    serials = [column for column in lot.rows[0] if column.casefold() == f"{RECORD}serial"]
-    serial = ("serial",) if serials else ()
+    serials = [_serial(row) for row in rows] if any(map(_serial, lot.rows)) else None
     good, embedded = Cell(text="✓ ok", kind="good"), len(lot.table) <= EMBEDDED
     return Table(
         caption=caption,
-        columns=("valve", *serial, "status", *(heading for _, heading, _ in columns), "warnings"),
+        columns=("valve", *(("serial",) if serials else ()), "status", *(each[2] for each in columns), "warnings"),
         rows=tuple(
             (
-                Cell(text=row["name"]),
-                *(Cell(text=next((row[key] for key in serials if row[key]), "–")) for _ in serial),
-                good if row["status"] == OK else Cell(text=f"✗ {row['status']}", kind="bad"),
-                *(number(row[column], digits) for column, _, digits in columns),
-                Cell(text=row["warnings"] or "–"),
+                Cell(text=row.name),
+                *((Cell(text=serials[place] or "–"),) if serials else ()),
+                good if row.calibrated else Cell(text=f"✗ {row.status}", kind="bad"),
+                *(number(row.number(side, column), digits) for side, column, _, digits in columns),
+                Cell(text=" ".join(row.warnings) or "–"),
             )
-            for row in rows
+            for place, row in enumerate(rows)
         ),
         csv=lot.table if embedded else "",
         name="valves",
         notes=() if embedded else (f"The whole table is too large for a page; it is {TABLE} beside it.",),
     )
+
+
+def _serial(row: TableRow) -> str:
+    return next((text for name, text in row.record.items() if name.casefold() == "serial"), "")
 
 
 def provenance_table(lot: Lot) -> Table:
@@ -289,8 +271,7 @@ def provenance_table(lot: Lot) -> Table:
     ----------
     lot : Lot
     """
-    tool = lot.document.get("tool")
-    made_by = f"{tool.get('name')} {tool.get('version')}" if isinstance(tool, dict) else "–"
+    made_by = f"{lot.tool.name} {lot.tool.version}"
     return Table(
         caption="What this report was made from, with the SHA-256 of the bytes",
         columns=("file", "SHA-256", "made by"),

@@ -10,7 +10,7 @@ from dzdesign.derivation.account.statement import Outcome
 from dzdesign.derivation.account.target_flow import TARGET, TIES
 from dzdesign.derivation.law import law
 from dzdesign.derivation.presentation.content import Entry, Term
-from dzdesign.derivation.presentation.html import Page
+from dzdesign.derivation.presentation.html import HtmlWriter
 from dzdesign.derivation.presentation.prose import Words, parse_prose
 from dzdesign.derivation.presentation.report import closure, compose
 
@@ -34,7 +34,7 @@ class LawAccount:
         What these rest on, in the account's order.
     glossary : tuple of Term
         The symbols.
-    page : Page
+    page : HtmlWriter
         Writes words and formulas.
     """
 
@@ -42,7 +42,7 @@ class LawAccount:
     main: tuple[Entry, ...]
     rest: tuple[Entry, ...]
     glossary: tuple[Term, ...]
-    page: Page
+    page: HtmlWriter
 
     @property
     def holds(self) -> bool:
@@ -74,14 +74,13 @@ def account_of(law_name: str) -> LawAccount:
     numbers = closure(STATEMENTS, [number])
     statements = [statement for statement in STATEMENTS if statement.number in numbers]
     content = compose(prove(statements), numbers)
-    entries = [entry for _, section in content.sections for entry in section]
     direct = {ground.number for ground in statements[-1].grounds} | {number}
     return LawAccount(
         note=parse_prose(law(law_name).note),
-        main=_in(entries, direct),
-        rest=_in(entries, set(numbers) - direct),
+        main=_in(content.entries, direct),
+        rest=_in(content.entries, set(numbers) - direct),
         glossary=content.glossary,
-        page=Page(set(numbers)),
+        page=HtmlWriter(numbers),
     )
 
 

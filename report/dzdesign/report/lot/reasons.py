@@ -1,11 +1,11 @@
 """Reasons why valves were not calibrated, those of one kind together."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
-from dzdesign.batch.calibration import DOES_NOT_HOLD
+from dzdesign.report.lot.summary import DOES_NOT_HOLD
+from dzdesign.report.lot.table import TableRow
 
 #: What differs between two reasons of one kind: names in quotes, and numbers.
 PARTICULAR = re.compile(r"'[^']*'|\d+(?:\.\d+)?(?:e[+-]?\d+)?")
@@ -31,33 +31,35 @@ class ReasonGroup:
     valves: tuple[tuple[str, str], ...]
 
 
-def reason_groups(failed: Sequence[Mapping[str, Any]]) -> tuple[ReasonGroup, ...]:
+def reason_groups(failed: Sequence[TableRow]) -> tuple[ReasonGroup, ...]:
     """Return the groups, the largest first.
 
     Parameters
     ----------
-    failed : sequence of mapping
-        Rows of the table.
+    failed : sequence of TableRow
 
     Examples
     --------
-    >>> row = {"name": "V1", "status": "failed", "reason": "'a.csv' row 7: no number; correct it"}
-    >>> (group,) = reason_groups([row, {**row, "name": "V2", "reason": "'b.csv' row 7: no number; correct it"}])
+    >>> rows = [
+    ...     TableRow(name=name, status="failed", reason=f"'{file}.csv' row 7: no number; correct it", sides={})
+    ...     for name, file in (("V1", "a"), ("V2", "b"))
+    ... ]
+    >>> (group,) = reason_groups(rows)
     >>> group.what, group.advice, group.valves
     ('… row 7: no number', 'correct it', (('V1', 'a.csv'), ('V2', 'b.csv')))
     """
-    kinds: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
+    kinds: dict[tuple[str, str], list[TableRow]] = {}
     for row in failed:
-        kinds.setdefault((row["status"], PARTICULAR.sub(GAP, row["reason"])), []).append(row)
+        kinds.setdefault((row.status, PARTICULAR.sub(GAP, row.reason)), []).append(row)
     groups = [_group(status, rows) for (status, _), rows in kinds.items()]
     return tuple(sorted(groups, key=lambda group: -len(group.valves)))
 
 
-def _group(status: str, rows: Sequence[Mapping[str, Any]]) -> ReasonGroup:
-    found = [PARTICULAR.findall(row["reason"]) for row in rows]
+def _group(status: str, rows: Sequence[TableRow]) -> ReasonGroup:
+    found = [PARTICULAR.findall(row.reason) for row in rows]
     shared = [len(set(parts)) == 1 for parts in zip(*found, strict=True)]
     places = iter(shared)
-    text = PARTICULAR.sub(lambda part: part[0] if next(places) else GAP, rows[0]["reason"])
+    text = PARTICULAR.sub(lambda part: part[0] if next(places) else GAP, rows[0].reason)
     what, _, advice = text.rpartition("; ")
     if status == DOES_NOT_HOLD:
         what, advice = text, "see the report of the valve: a requirement of its verification is not met"
@@ -68,6 +70,6 @@ def _group(status: str, rows: Sequence[Mapping[str, Any]]) -> ReasonGroup:
         advice = expected.removeprefix(", ") + advice
     valves = []
     for row, parts in zip(rows, found, strict=True):
-        own = [part.strip("'") for part, same in zip(parts, shared, strict=True) if not same]
-        valves.append((row["name"], ", ".join(dict.fromkeys(part for part in own if part != row["name"]))))
+        particular = [part.strip("'") for part, same in zip(parts, shared, strict=True) if not same]
+        valves.append((row.name, ", ".join(dict.fromkeys(part for part in particular if part != row.name))))
     return ReasonGroup(status=status, what=what, advice=advice, valves=tuple(valves))

@@ -1,13 +1,14 @@
 """The ramps and steps of Sections 2 and 4 on a recovered valve: bare, with the paper's law, and with the product."""
 
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from dzdesign.derivation.account.published import DP0_MPA, DP1_MPA, DUTY_COMMAND_V, RAMP_S, U_MAX_V, PublishedValve
 from dzdesign.derivation.law import law
-from dzdesign.reproduce.valves import RecoveredValve
+from dzdesign.report.reproduction import Driver
+from dzdesign.reproduce.recovered_valves import RecoveredValve
 from dzdesign.verify.closed_loop.loop import FLOW_SHARE, ClosedLoop, LoopRun, RampSequence, dead_zone
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S
 
@@ -16,14 +17,16 @@ PRESSURES_MPA = (float(DP0_MPA), float(DP1_MPA))
 STEP_AT_S, STEP_FOR_S = 0.05, 0.1
 #: The largest flow is reached where the flow comes this close to it.
 REACHED = 0.999
-#: Who drives the valve.
-DIRECT, PAPER, PRODUCT = "direct", "paper", "product"
+#: Who drives the valve: nobody between, the paper's law, or the product.
+DIRECT: Literal["valve"] = "valve"
+PAPER: Literal["paper's law"] = "paper's law"
+PRODUCT: Literal["product"] = "product"
 
 
 class Drive(NamedTuple):
     """What drives the valve, and whether it knows of beta."""
 
-    by: str
+    by: Driver
     with_beta: bool = True
 
 
@@ -103,7 +106,7 @@ def paper_drive(valve: PublishedValve, command: np.ndarray, dp_MPa: float, with_
     beta = u_min1 / u_min0 if with_beta and dp_MPa > DP0_MPA else 1.0  # Eqs. (5), (7)
     chosen = law("paper")
     drive = chosen.evaluate_gain(beta, 1 - u_min0) * command + chosen.evaluate_offset(beta, u_min0)
-    return np.clip(drive, 0.0, 1.0)
+    return np.asarray(np.clip(drive, 0.0, 1.0))
 
 
 def paper_duty_percent(valve: PublishedValve) -> float:

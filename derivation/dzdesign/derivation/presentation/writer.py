@@ -1,0 +1,123 @@
+"""Writes words and formulas in one notation, and fills the template that holds the structure of a document."""
+
+import re
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Collection, Mapping
+from typing import Any, ClassVar
+
+from dzdesign.derivation.presentation.content import Content
+from dzdesign.derivation.presentation.prose import Code, Formula, Reference, Words
+
+
+class Writer(ABC):
+    """A notation.
+
+    Parameters
+    ----------
+    shown : collection of str
+        Numbers of the statements in the document: those that can be pointed to.
+    """
+
+    #: The template of a whole document.
+    TEMPLATE: ClassVar[str]
+    #: What sets this template's syntax apart.
+    SYNTAX: ClassVar[Mapping[str, Any]] = {}
+
+    def __init__(self, shown: Collection[str] = ()) -> None:
+        self.shown = shown
+
+    def words(self, words: Words) -> str:
+        """Return words in this notation.
+
+        Parameters
+        ----------
+        words : Words
+        """
+        return "".join(map(self._part, words))
+
+    def _part(self, part: str | Formula | Reference | Code) -> str:
+        match part:
+            case Formula():
+                return self.formula(part)
+            case Code(text):
+                return self.code(text)
+            case Reference(number, words):
+                text = self.words(words) or self.text(number)
+                return self.link(number, text) if number in self.shown else text
+        return self.text(part)
+
+    @abstractmethod
+    def text(self, text: str) -> str:
+        """Return plain words, escaped."""
+
+    @abstractmethod
+    def formula(self, formula: Formula) -> str:
+        """Return a formula within a sentence."""
+
+    @abstractmethod
+    def display(self, formula: Formula) -> str:
+        """Return a formula on a line of its own; a chain has one member a line."""
+
+    @abstractmethod
+    def code(self, text: str) -> str:
+        """Return a word of the command line or of a file."""
+
+    @abstractmethod
+    def link(self, number: str, text: str) -> str:
+        """Return a text that leads to a statement of the document."""
+
+    def filters(self) -> dict[str, Callable[..., Any]]:
+        """Return what the template may apply."""
+        return {"words": self.words, "display": self.display, "references": self.references, "anchor": anchor}
+
+    def references(self, references: Collection[Reference], by_number: bool = False) -> str:
+        """Return references with commas between, by their numbers alone or by the words that name them."""
+        named = (Reference(one.number) if by_number else one for one in references)
+        return ", ".join(self.words((one,)) for one in named)
+
+
+def write(kind: type[Writer], content: Content) -> str:
+    """Return a whole document.
+
+    Parameters
+    ----------
+    kind : type
+        The notation.
+    content : Content
+
+    Returns
+    -------
+    str
+    """
+    import jinja2
+
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("dzdesign.derivation.presentation", "templates"),
+        undefined=jinja2.StrictUndefined,
+        keep_trailing_newline=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        **kind.SYNTAX,
+    )
+    environment.filters.update(kind({entry.number for entry in content.entries}).filters())
+    return environment.get_template(kind.TEMPLATE).render(content=content)
+
+
+def anchor(number: str) -> str:
+    """Return the name by which a statement can be linked to: ``eq-18``, ``T3b``.
+
+    Parameters
+    ----------
+    number : str
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> anchor("(18)"), anchor("T3b"), anchor("Fig. 3, line")
+    ('eq-18', 'T3b', 'Fig-3-line')
+    """
+    slug = re.sub(r"\W+", "-", number).strip("-")
+    return f"eq-{slug}" if number.startswith("(") else slug

@@ -1,0 +1,73 @@
+"""manifest.json of a firmware as a type: which files it has, and where every number in its core came from.
+
+`codegen` writes it and `verify` compares it with the folder. These share no code, so what both read stands before them.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, ClassVar, Literal
+
+from msgspec import Meta
+
+from dzdesign.core.artefact_files import MANIFEST_NAME
+from dzdesign.core.artefact_types import Artefact, SourceFile
+
+Sha256 = Annotated[str, Meta(pattern="^[0-9a-f]{64}$", max_length=64)]
+Text = Annotated[str, Meta(min_length=1)]
+#: A number of the C fits 64 bits with sign: every sum of the core is proved to.
+Number = Annotated[int, Meta(ge=-(2**31), le=2**63 - 1)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FirmwareOrigin:
+    """Hashes of everything the firmware was made from."""
+
+    compensator_json: Annotated[Sha256, Meta(description="SHA-256 of compensator.json.")]
+    valve_json: Annotated[Sha256, Meta(description="SHA-256 of valve.json.")]
+    ramp_tests: Annotated[tuple[SourceFile, ...], Meta(description="Recordings that the valve was identified from.")]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FirmwareConstant:
+    """One `#define` or table of the core."""
+
+    file: Annotated[Text, Meta(description="File in the firmware.")]
+    symbol: Annotated[Text, Meta(description="Name in C.")]
+    value: Annotated[
+        Number | tuple[tuple[Number, Number], ...],
+        Meta(description="Its value in C; of a table the rows, start and change each."),
+    ]
+    equation: Annotated[Text, Meta(description="Equation that it is from, and what it is there.")]
+    engineering: Annotated[Text, Meta(description="The same in engineering units.")]
+    rounding: Annotated[Text, Meta(description="How it was rounded.")]
+    compensator_json: Annotated[
+        tuple[Text, ...], Meta(description="Keys of compensator.json that it was computed from.")
+    ]
+    valve_json: Annotated[
+        tuple[Text, ...],
+        Meta(description="Keys of valve.json that it was computed from; empty: an option of `design`."),
+    ]
+    generator: Annotated[Text, Meta(description="Source file of dzdesign that computes it.")]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FirmwareManifest(Artefact):
+    """Which files a firmware has, and where every number in its core came from, as `dzdesign codegen` writes it."""
+
+    FILE_NAME: ClassVar[str] = MANIFEST_NAME
+    schema: Annotated[
+        Literal["dzdesign.firmware/1"], Meta(description="Name and version of this schema.")
+    ] = "dzdesign.firmware/1"
+    target: Annotated[Text, Meta(description="Microcontroller, as `codegen --list-targets` names it.")]
+    law: Annotated[Text, Meta(description="Name of the law, as compensator.json has it.")]
+    core: Annotated[tuple[Text, ...], Meta(description="Files that are free of hardware.", min_length=1)]
+    board: Annotated[
+        tuple[Text, ...],
+        Meta(
+            description="Files that are the user's to fill in: `codegen` keeps them where they were changed, and "
+            "`verify` does not check them."
+        ),
+    ]
+    origin: Annotated[FirmwareOrigin, Meta(description="Hashes of everything it was made from.")]
+    constants: Annotated[tuple[FirmwareConstant, ...], Meta(description="In the order of the files.")]
+    files: Annotated[Mapping[Text, Sha256], Meta(description="File to the SHA-256 of its bytes, as generated.")]

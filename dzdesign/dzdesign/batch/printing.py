@@ -1,0 +1,84 @@
+"""What `dzdesign batch` prints: counts, spread, the cost of the lot setting, and why valves failed."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from dzdesign.core.errors import and_more
+from dzdesign.report.lot.setting_text import checked_line, span, untested_lines
+from dzdesign.report.lot.spread import TWENTY
+from dzdesign.report.lot.summary import LotSummary
+
+#: Valves of one warning that are named, and of those that hold the lot setting down.
+NAMED, BINDING_NAMED = 3, 5
+COST = "lot_extra_dead_zone_percent"
+UNITS = {"V": "V", "percent": "%"}
+
+
+def print_lot(summary: LotSummary, folder: Path, report: Path | None) -> None:
+    """Print what a lot came to.
+
+    Parameters
+    ----------
+    summary : LotSummary
+    folder : Path
+        Where it was written.
+    report : Path or None
+        The lot's report, if there is one.
+    """
+    from dzdesign.terminal.page import new_console, new_table, put_line
+
+    console = new_console()
+    count = summary.calibrated
+    title = f"{count} calibrated valve{'' if count == 1 else 's'} of {summary.valves}"
+    table = new_table(title, "", "least", "5 %", "median", "95 %", "largest")
+    for column, at in summary.quantiles.items():
+        values = (at.least, at.q05, at.median, at.q95, at.largest)
+        table.add_row(_in_words(column), *(f"{value:.3f}" for value in values))
+    console.print(table)
+    for line in _setting_lines(summary):
+        put_line(console, line)
+    warned = sorted(summary.warnings.items(), key=lambda item: len(item[1]))
+    if warned:
+        put_line(console, "warnings: " + ", ".join(_warned(code, names) for code, names in warned))
+    for each in summary.failed:
+        put_line(console, f"{each.status}  {each.name}: {each.reason}")
+    for line in summary.anomalies:
+        put_line(console, f"odd: {line}")
+    put_line(
+        console,
+        f"{count} of {summary.valves} valves calibrated, {len(summary.failed)} not. Table: {folder}/valves.csv, "
+        f"valves.parquet; {f'to be read: {report}' if report else 'no report.html'}",
+    )
+
+
+def _in_words(column: str) -> str:
+    """Return a column's name with its unit in brackets."""
+    name, _, unit = column.rpartition("_")
+    return f"{name.replace('_', ' ')} ({UNITS[unit]})" if unit in UNITS else column.replace("_", " ")
+
+
+def _warned(code: str, names: Sequence[str]) -> str:
+    """Return a code with how many valves have it; a few are named, for those are where to look."""
+    return f"{code} {len(names)}" + (f" ({', '.join(names)})" if len(names) <= NAMED else "")
+
+
+def _setting_lines(summary: LotSummary) -> list[str]:
+    """Say what one setting for all would cost, or why there is none."""
+    setting = summary.lot_setting
+    if setting is None:
+        return [f"no lot setting: {summary.why_no_lot_setting}"]
+    lines = [
+        f"one lot setting, safe for each of these valves {span(*setting.dp_MPa)}, is held down by "
+        f"{and_more(setting.binding, BINDING_NAMED)}; it is in {setting.file}",
+        checked_line(setting),
+        *untested_lines(setting),
+    ]
+    for column, at in summary.quantiles.items():
+        if column.endswith(COST):
+            one_in_twenty = f"{at.q95:.2f} % at one in twenty, " if summary.calibrated >= TWENTY else ""
+            side = f"{column.removesuffix(COST).rstrip('_')} side: " if column != COST else ""
+            lines.append(
+                f"{side}it leaves more dead zone than each valve's own setting: {at.median:.2f} % of command at the "
+                f"median valve, {one_in_twenty}{at.largest:.2f} % at most"
+            )
+    return lines

@@ -1,0 +1,126 @@
+"""Rows of a lot's table, made from the valves' folders alone, whenever these were written."""
+
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+from dzdesign.core.errors import InputError
+from dzdesign.identify.valve.test_record import checked_record
+from dzdesign.report.lot.table import HASHED, SideFigures, TableRow
+from dzdesign.report.lot.valve_folder import ValveFolder
+from dzdesign.report.lot.valve_names import by_name
+
+if TYPE_CHECKING:
+    from dzdesign.design.compensator import Compensator
+    from dzdesign.design.lot_setting import Designed
+    from dzdesign.identify.valve.model import SideModel
+
+SIGNS = {"positive": 1, "negative": -1}
+
+
+def table_rows(
+    valves: Sequence[ValveFolder],
+    lot_law: "Compensator | None" = None,
+    records: Mapping[str, Mapping[str, str]] | None = None,
+) -> list[TableRow]:
+    """Return the rows, in the order of the names.
+
+    Parameters
+    ----------
+    valves : sequence of ValveFolder
+        As read back.
+    lot_law : Compensator, optional
+        The lot setting, for the cost of it at each valve.
+    records : mapping, optional
+        Name to the record that the valve was given, for those without a valve.json that has it.
+    """
+    both = any(each.designed and each.designed.own.negative for each in valves)
+    sides = tuple(SIGNS) if both else ("",)
+    return [
+        TableRow(
+            name=each.name,
+            status=each.manifest.status,
+            reason=each.manifest.reason,
+            sides={side: _figures(each.designed, SIGNS.get(side, 1), lot_law) for side in sides},
+            warnings=tuple(dict.fromkeys(w.code for w in each.designed.valve.warnings)) if each.designed else (),
+            hashes=_hashes(each),
+            record=_record(each, (records or {}).get(each.name, {})),
+        )
+        for each in sorted(valves, key=lambda valve: by_name(valve.name))
+    ]
+
+
+def _hashes(valve: ValveFolder) -> dict[str, str]:
+    files = {column: valve.manifest.files.get(file) for column, file in HASHED.items()}
+    return {name: value for name, value in {"inputs_sha256": valve.manifest.inputs_sha256, **files}.items() if value}
+
+
+def _record(valve: ValveFolder, given: Mapping[str, str]) -> Mapping[str, str]:
+    """Return a valve's record: of its valve.json, or as it was given if that can be a record."""
+    if valve.designed:
+        return valve.designed.valve.record
+    try:
+        return checked_record(given.items(), "the record")
+    except InputError:  # such a valve has failed, and says why itself
+        return {}
+
+
+def _figures(designed: "Designed | None", sign: int, lot_law: "Compensator | None") -> SideFigures:
+    """Return the columns of one side; numbers as valve.json has them."""
+    if designed is None or (sign < 0 and designed.own.negative is None):
+        return SideFigures()
+    own, side = designed.own, _side(designed, sign)
+    test = min(side.tests, key=lambda test: abs((test.dp_MPa or 0.0) - (side.reference_dp_MPa or 0.0)))
+    left = {
+        branch: round(100 * max(values), 5)
+        for branch, values in _remaining(own, side, sign).items()
+    }
+    curve = side.guards[own.side(sign).certificate.guard]
+    code = round(own.signals.dp_code(Fraction(repr(side.reference_dp_MPa))))
+    return SideFigures(
+        dp0_MPa=side.reference_dp_MPa,
+        knee_opening_V=test.u_knee_rising_V,
+        knee_closing_V=test.u_knee_falling_V,
+        knee_se_V=test.u_knee_se_V,
+        bound_V=curve.u_lower_V[side.tests.index(test)],
+        offset_V=round(float(own.beta(code, sign) * own.side(sign).u_min0_over_u_max * own.u_max_V), 7),
+        trend=side.trend,
+        highest_dp_MPa=side.beta_dp_MPa[-1],
+        beta_at_highest_dp=curve.beta[-1],
+        k_x_max_over_u_max=side.k_x_max_over_u_max,
+        dead_zone_opening_percent=left.get("opening"),
+        dead_zone_closing_percent=left.get("closing"),
+        lot_extra_dead_zone_percent=extra_dead_zone(designed, lot_law, sign) if lot_law else None,
+    )
+
+
+def _side(designed: "Designed", sign: int) -> "SideModel":
+    return designed.valve.sides["positive" if sign > 0 else "negative"]
+
+
+def _remaining(law: "Compensator", side: "SideModel", sign: int) -> dict[str, list[float]]:
+    """Return the dead zone that a law leaves at each of a valve's tests, by branch, as shares of command."""
+    from dzdesign.design.costs import remaining_dead_zone
+
+    left = [remaining_dead_zone(law, test, sign) for test in side.tests]
+    return {branch: [each[branch] for each in left] for branch in left[0]}
+
+
+def extra_dead_zone(designed: "Designed", lot_law: "Compensator", sign: int) -> float:
+    """Return how much more dead zone the lot setting leaves than a valve's own, in percent of command.
+
+    At the pressure drop of its tests where that is most, on opening; on closing where no opening was recorded.
+
+    Parameters
+    ----------
+    designed : Designed
+        The valve and its own compensator.
+    lot_law : Compensator
+        The lot setting.
+    sign : {1, -1}
+        Of the command.
+    """
+    side = _side(designed, sign)
+    branch = "opening" if side.tests[0].rising is not None else "closing"
+    with_lot, with_own = (_remaining(law, side, sign)[branch] for law in (lot_law, designed.own))
+    return round(100 * max(lot - own for lot, own in zip(with_lot, with_own, strict=True)), 5)

@@ -1,0 +1,83 @@
+"""The folder of one valve of a lot: its manifest as a type, and the calibrated valve read back from it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, ClassVar, Literal
+
+from msgspec import Meta
+
+from dzdesign.core.artefact_files import MANIFEST_NAME, read_bytes, sha256_of
+from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.artefact_types import Artefact
+from dzdesign.core.errors import InputError
+from dzdesign.design.compensator_file import compensator_from_document
+from dzdesign.design.lot_setting import Designed
+from dzdesign.report.lot.summary import AGAIN, OK, Sha256, Status
+
+#: Folder of a lot in which each valve has its own.
+VALVES = "valves"
+#: Folder of a valve's firmware, in the folder of its results.
+FIRMWARE = "firmware"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ValveManifest(Artefact):
+    """What came of one valve of a lot."""
+
+    FILE_NAME: ClassVar[str] = MANIFEST_NAME
+    schema: Annotated[Literal["dzdesign.batch-valve/1"], Meta(description="Name and version of this schema.")] = (
+        "dzdesign.batch-valve/1"
+    )
+    name: Annotated[str, Meta(description="Name of the valve.")]
+    status: Annotated[Status, Meta(description="Whether it is calibrated; does not hold: a requirement.")]
+    reason: Annotated[str, Meta(description="Why it is not, in one sentence.")] = ""
+    inputs_sha256: Annotated[
+        Sha256 | None,
+        Meta(description="SHA-256 of recordings, options and version; null where the next run tries it again."),
+    ] = None
+    board: Annotated[tuple[str, ...], Meta(description="Files of its firmware that are the user's to fill in.")] = ()
+    files: Annotated[Mapping[str, Sha256], Meta(description="SHA-256 of each file beside this one.")]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ValveFolder:
+    """A valve of a lot, as its folder has it: its manifest and, where it was calibrated, valve and compensator."""
+
+    manifest: ValveManifest
+    designed: Designed | None = None
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return self.manifest.name
+
+
+def read_manifest(folder: Path) -> ValveManifest:
+    """Return what a valve's folder says of itself.
+
+    Raises
+    ------
+    InputError
+        If it is not there or is no such folder.
+    """
+    path = folder / MANIFEST_NAME
+    return read_artefact(read_bytes(path, "manifest of a valve"), ValveManifest, str(path), AGAIN)
+
+
+def read_valve_folder(folder: Path) -> ValveFolder:
+    """Read a valve's folder.
+
+    Raises
+    ------
+    InputError
+        If it is no such folder, or the compensator in it is not as it was written.
+    """
+    manifest = read_manifest(folder)
+    if manifest.status != OK:
+        return ValveFolder(manifest=manifest)
+    path = folder / "compensator.json"
+    content = read_bytes(path, "compensator of the lot")
+    if sha256_of(content) != manifest.files.get(path.name):
+        raise InputError(f"'{path}' was changed; take the valve's folder away and {AGAIN}")
+    return ValveFolder(manifest=manifest, designed=Designed.of(compensator_from_document(content, str(path))))
