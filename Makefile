@@ -23,7 +23,7 @@ lint: $(STAMP)
 
 # After a change of what codegen writes: tests/goldens anew, then the tests that compile and run them. Read the diff.
 goldens: $(STAMP)
-	$(BIN)/pytest tests/codegen/test_goldens.py --update-goldens
+	$(BIN)/pytest tests/codegen/test_goldens.py tests/core/test_schemas.py --update-goldens
 
 # All benchmarks and one Markdown table of every limit: hours; `make bench BENCH=--quick` takes a quarter of one.
 bench: $(VENV)/.bench

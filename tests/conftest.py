@@ -76,23 +76,22 @@ def firmware_folder(example_firmware, tmp_path):
 def reported_demo(example_valve, tmp_path_factory):
     """A folder as `dzdesign demo` leaves it, with quicker ramps: valve.json, compensator.json, firmware, evidence."""
     from dzdesign.codegen.project import generate
-    from dzdesign.core.artefact_files import TOOL
+    from dzdesign.core.artefact_types import to_json_bytes
     from dzdesign.design.compensator_file import compensator_document
     from dzdesign.design.designing import design
     from dzdesign.report.valve_report import with_report
     from dzdesign.verify.closed_loop.loop import RampSequence
-    from dzdesign.verify.verification import SCHEMA, evidence_files, verify
+    from dzdesign.verify.verification import evidence_files, evidence_manifest, verify
 
     folder = tmp_path_factory.mktemp("reported")
-    valve_json = to_json(example_valve.to_document())
-    compensator = design(example_valve, default_options(), valve_json.encode())
+    valve_json = to_json_bytes(example_valve)
+    compensator = design(example_valve, default_options(), valve_json)
     compensator_json = to_json(compensator_document(compensator))
-    (folder / "valve.json").write_text(valve_json, encoding="utf-8", newline="")
+    (folder / "valve.json").write_bytes(valve_json)
     (folder / "compensator.json").write_text(compensator_json, encoding="utf-8", newline="")
     firmware = generate(compensator, "f28335", compensator_json.encode())
     write_folder(folder / "firmware", firmware.files, firmware.manifest)
     evidence = verify(folder / "firmware", sequence=RampSequence(rest=0.5, ramp=10.0, top=0.5))
     files = with_report(evidence_files(evidence), folder / "firmware", folder / "evidence")
-    manifest = {"schema": SCHEMA, "tool": TOOL, "made_from": evidence.document["made_from"]}
-    write_folder(folder / "evidence", files, manifest)
+    write_folder(folder / "evidence", files, evidence_manifest(evidence.evidence))
     return folder

@@ -9,7 +9,8 @@ from pathlib import Path
 
 from dzdesign.assess.limits import parse_limits
 from dzdesign.codegen.telemetry.frame import FRAME_OCTETS, FrameReader
-from dzdesign.command_line.toml_options import options_from_file
+from dzdesign.command_line.options_file import options_from_file
+from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
 from dzdesign.core.units import SI_UNIT, parse_quantity
 from dzdesign.design.compensator_file import compensator_from_document
@@ -17,7 +18,7 @@ from dzdesign.design.signal_text import parse_signal
 from dzdesign.identify.reading.column_labels import find_columns, parse_columns
 from dzdesign.identify.reading.ramp_files import read_ramp_file
 from dzdesign.identify.reading.text.tables import text_tables
-from dzdesign.identify.valve.valve_file import valve_from_document
+from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.closed_loop.plant import read_plant
 from dzdesign.verify.closed_loop.tolerances import read_tolerances
 
@@ -89,7 +90,7 @@ TARGETS = {
         run=_stored(read_ramp_file, "ramp.mat"), seeds=(CSV, b"PAR1", b"ARROW1", b"TDSm", b"MATLAB 5.0")
     ),
     "valve": Target(
-        run=lambda data: valve_from_document(data, "valve.json"), seeds=((GOLDENS / "valve.json").read_bytes(),)
+        run=lambda data: read_artefact(data, ValveModel, "valve.json"), seeds=((GOLDENS / "valve.json").read_bytes(),)
     ),
     "compensator": Target(
         run=lambda data: compensator_from_document(data, "compensator.json"),

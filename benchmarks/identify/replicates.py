@@ -128,8 +128,8 @@ def _held_against_truth(valve: ValveModel, bench: Bench, dp: np.ndarray) -> dict
     opening = np.array([test.u_knee_rising_V for test in side.tests])
     closing = np.array([test.u_knee_falling_V for test in side.tests])
     grid = np.linspace(dp[0], dp[-1], GRID)
-    beta = np.interp(grid, side.beta_dp_MPa, side.beta)
-    offset, true_closing = side.u_min0_V * beta, bench.closing_V(grid)
+    beta = np.interp(grid, side.beta.dp_MPa, side.beta.beta)
+    offset, true_closing = side.reference.u_min_V * beta, bench.closing_V(grid)
     gain = beta * (side.k_x_max_over_u_max - 1) + 1  # Eq. (18)
     short = (true_closing - offset) / U_MAX_V
     middle = (opening + closing) / 2
@@ -142,5 +142,5 @@ def _held_against_truth(valve: ValveModel, bench: Bench, dp: np.ndarray) -> dict
         "offset_excess": float((offset - true_closing).max()),
         "residual": float((short / gain).max()),
         "residual_volts": float(short.max()),
-        "beta_last": side.beta[-1],
+        "beta_last": side.beta.beta[-1],
     }

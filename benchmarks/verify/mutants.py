@@ -8,7 +8,7 @@ from time import perf_counter
 from firmware import example_firmware
 from scoreboard import Row, print_rows, say
 
-from dzdesign.verify.analysis.mutation import MutationBench, all_mutants, judge_all, mutation_document
+from dzdesign.verify.analysis.mutation import MutationBench, all_mutants, judge_all, mutation_score
 
 QUICK = 60
 
@@ -25,14 +25,14 @@ def print_mutants(quick: bool = False, seed: int = 0) -> list[Row]:
             tried = random.Random(seed).sample(mutants, QUICK) if quick else mutants
             say(f"{target}: {len(tried)} of {len(mutants)} mutants ...")
             start = perf_counter()
-            document = mutation_document(judge_all(bench, tried))
+            score = mutation_score(judge_all(bench, tried))
             seconds = perf_counter() - start
-        note = f"{document['killed']} killed, {document['same_object']} of the same object code, "
-        note += f"{document['same_outputs']} of the same outputs, {document['refused']} refused; {seconds:.0f} s"
+        note = f"{score.killed} killed, {score.same_object} of the same object code, "
+        note += f"{score.same_outputs} of the same outputs, {score.refused} refused; {seconds:.0f} s"
         rows.append(
-            Row(what=f"{target}: mutants of {len(tried)} that survive", value=document["survived"], limit=0, note=note)
+            Row(what=f"{target}: mutants of {len(tried)} that survive", value=score.survived, limit=0, note=note)
         )
-        for each in document["not_killed"]:
-            print(f"{target}: {each['verdict']}, {each['file']} line {each['line']}: {each['change']}")
+        for each in score.not_killed:
+            print(f"{target}: {each.verdict}, {each.file} line {each.line}: {each.change}")
     print_rows("Wrong C", rows)
     return rows

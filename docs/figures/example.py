@@ -18,7 +18,7 @@ from dzdesign.design.options import DesignOptions
 from dzdesign.example import example_folder
 from dzdesign.identify.identification import Identified, identify_sides
 from dzdesign.identify.reading.ramp_files import read_ramp_file
-from dzdesign.identify.valve.model import SideModel
+from dzdesign.identify.valve.side_model import SideModel
 from dzdesign.verify.closed_loop.loop import ClosedLoop, LoopRun, RampSequence
 from dzdesign.verify.closed_loop.plant import Plant, read_plant
 
@@ -60,7 +60,7 @@ class Example:
 
     def ramp(self, dp_MPa: float, mode: str) -> LoopRun:
         """Return a ramp up and down; without beta the core is shown the reference pressure."""
-        return self.loop.run(RAMP.command(), dp_MPa, mode, dp_frozen_MPa=self.side.reference_dp_MPa)
+        return self.loop.run(RAMP.command(), dp_MPa, mode, dp_frozen_MPa=self.side.reference.dp_MPa)
 
     def offset_V(self, dp_MPa: np.ndarray) -> np.ndarray:
         """Return the drive at zero command over the pressure drop, with its beta as the integers have it."""

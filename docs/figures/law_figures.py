@@ -18,9 +18,9 @@ def over_compensation(example: Example) -> "Figure":
     """Offset and closing threshold over the pressure drop without and with beta, and the flow at zero command."""
     figure, (left, right) = panels(3.7, 2)
     side = example.side
-    dp = np.array(side.beta_dp_MPa)
+    dp = np.array(side.beta.dp_MPa)
     closing = np.array([test.u_knee_falling_V for test in side.tests])
-    fixed = np.full(dp.size, side.u_min0_V)
+    fixed = np.full(dp.size, side.reference.u_min_V)
     left.plot(dp, closing, "v-", color=ORANGE, label="closing threshold")
     left.plot(dp, fixed, "--", color=PURPLE, lw=1.8, label="offset without beta")
     fine = np.linspace(dp[0], dp[-1], 181)

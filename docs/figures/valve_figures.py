@@ -38,7 +38,7 @@ def thresholds(example: Example) -> "Figure":
     figure, axes = panels(3.9, 2, sharey=True)
     side = example.found.sides["positive"]
     item, test = side.described.tests[AT_1_MPA], side.model.tests[AT_1_MPA]
-    level = side.model.level_L_min
+    level = side.model.certificate.level_L_min
     names = ("opening (rising command)", "closing (falling command)")
     for panel, shape, branch, name, colour in zip(
         axes, item.shapes, (test.rising, test.falling), names, (BLUE, ORANGE), strict=True
@@ -83,12 +83,18 @@ def beta(example: Example) -> "Figure":
     """The thresholds over the pressure drop, and beta: the closing one relative to its value at dP0."""
     figure, (left, right) = panels(3.4, 2)
     side = example.side
-    dp = np.array(side.beta_dp_MPa)
+    dp = np.array(side.beta.dp_MPa)
     for values, errors, marker, colour, name in (
-        ([test.u_knee_rising_V for test in side.tests], [t.rising.knee_se_V for t in side.tests], "^", BLUE, "opening"),
+        (
+            [test.u_knee_rising_V for test in side.tests],
+            [t.u_knee_rising_se_V for t in side.tests],
+            "^",
+            BLUE,
+            "opening",
+        ),
         (
             [test.u_knee_falling_V for test in side.tests],
-            [t.falling.knee_se_V for t in side.tests],
+            [t.u_knee_falling_se_V for t in side.tests],
             "v",
             ORANGE,
             "closing",
@@ -100,12 +106,12 @@ def beta(example: Example) -> "Figure":
     fall = side.trend_change_V
     left.set(xlabel="pressure drop (MPa)", ylabel="threshold (V)", title=f"The threshold falls by {-1e3 * fall:.0f} mV")
     left.legend(title="bars: 3 standard errors", title_fontsize=8)
-    right.plot(dp, side.beta, "o-", color=PURPLE, label="beta, identified")
+    right.plot(dp, side.beta.beta, "o-", color=PURPLE, label="beta, identified")
     fine = np.linspace(0.0, 6.0, 241)
-    held = example.offset_V(fine) / side.u_min0_V
+    held = example.offset_V(fine) / side.reference.u_min_V
     right.plot(fine, held, color=BLACK, ls="--", lw=1.2, label="beta, as the firmware has it")
-    right.axvline(side.reference_dp_MPa, color=GREY, ls=":", lw=1.2)
-    note(right, "dP0", (side.reference_dp_MPa + 0.4, 0.9745))
+    right.axvline(side.reference.dp_MPa, color=GREY, ls=":", lw=1.2)
+    note(right, "dP0", (side.reference.dp_MPa + 0.4, 0.9745))
     note(right, "below dP0 the paper\nholds beta at 1", (2.9, 1.0075), (0.6, 1.001))
     right.set(
         xlabel="pressure drop (MPa)", ylabel="beta = u_min(dP) / u_min0 (1)", title="beta, straight between the tests"
@@ -117,7 +123,7 @@ def beta(example: Example) -> "Figure":
 
 def _steps(axes: "Axes", side: object) -> None:
     """Draw the staircase: between two tests the lower of their bounds."""
-    dp, steps = side.beta_dp_MPa, side.certified_steps_V
+    dp, steps = side.beta.dp_MPa, side.curve.certified_steps_V
     for index, step in enumerate(steps):
         label = "staircase: certain between the tests" if index == 0 else None
         axes.plot(dp[index : index + 2], (step, step), color=GREEN, lw=3, solid_capstyle="butt", label=label)
@@ -127,10 +133,10 @@ def staircase(example: Example) -> "Figure":
     """Thresholds, bounds, the staircase and the offset that stays below all of it; right enlarged."""
     figure, axes = panels(3.9, 2, width_ratios=(3, 2))
     side = example.side
-    fine = np.linspace(side.beta_dp_MPa[0], side.beta_dp_MPa[-1], 1801)
+    fine = np.linspace(side.beta.dp_MPa[0], side.beta.dp_MPa[-1], 1801)
     offset = example.offset_V(fine)
     for panel in axes:
-        dp = side.beta_dp_MPa
+        dp = side.beta.dp_MPa
         panel.plot(dp, [t.u_guard_V for t in side.tests], "v", color=ORANGE, ms=6, label="closing threshold")
         panel.plot(
             dp, [t.u_guard_lower_V for t in side.tests], "_", color=BLACK, ms=13, mew=2, label="its 99 % lower bound"

@@ -470,7 +470,7 @@ def test_same_recordings_same_bytes(bench, capsys):
 
 def test_limits_in_the_file_of_options_decide_the_exit_status(bench, capsys):
     config = bench / "dzdesign.toml"
-    for opening, status, words in (("12 %", 0, "Every limit holds."), ("6 %", 1, "MISSED  dead zone, opening")):
+    for opening, status, words in (("12 %", 0, "Every limit holds."), ("6 %", 1, "DOES NOT HOLD  dead zone, opening")):
         config.write_text(f'meter-lag = "0 s"\nlevel = "1 L/min"\n[limits]\ndead_zone_opening = "{opening}"\n')
         found, out, _ = run(capsys, *SETS[:3], "--config", "dzdesign.toml")
         assert found == status and words in out
@@ -492,7 +492,7 @@ def test_over_compensation_is_printed_beside_a_dead_zone_of_none(bench, capsys):
     assert status == 1
     assert "dead zone, opening, AFTER at positive commands, 4.00 MPa: the flow lies above the level at every" in out
     assert "holds  dead zone, opening, positive commands, 4.00 MPa: 0 %" in out
-    assert "MISSED  flow at zero, positive commands, 4.00 MPa" in out
+    assert "DOES NOT HOLD  flow at zero, positive commands, 4.00 MPa" in out
 
 
 def test_of_one_branch_the_gain_says_so(bench, capsys):

@@ -15,14 +15,15 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.compensator_file import compensator_document
 from dzdesign.design.designing import design
 from dzdesign.report.valve_report import REPORT_NAME, report_of_folder, with_report
-from dzdesign.verify.checks import files_unchanged
 from dzdesign.verify.closed_loop.loop import RampSequence
-from dzdesign.verify.firmware import board_files
-from dzdesign.verify.firmware.board_files import BoardCompiled, board_compiles
+from dzdesign.verify.firmware import compilation
+from dzdesign.verify.firmware.compilation import BoardCompiled, board_compiles
 from dzdesign.verify.firmware.folder import read_firmware_manifest
-from dzdesign.verify.requirements import untried_of
-from dzdesign.verify.verification import SCHEMA, evidence_files, verify
+from dzdesign.verify.firmware.unchanged_files import files_unchanged
+from dzdesign.verify.requirements import not_tried
+from dzdesign.verify.verification import evidence_files, evidence_manifest, verify
 from tests.conftest import default_options
+from tests.support.evidence import evidence_with
 from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler
@@ -49,7 +50,7 @@ def fill_in(folder, name="cortex_m4/dz_board.c", old="return dz_board_u_adc;", n
 
 
 def unchanged(folder):
-    return files_unchanged(folder, json.loads((folder / MANIFEST_NAME).read_text()))
+    return files_unchanged(folder, read_firmware_manifest(folder))
 
 
 def test_they_are_marked_in_their_first_lines_and_in_the_manifest(compensator):
@@ -172,13 +173,13 @@ def test_an_edited_file_that_is_not_the_users_still_fails(cortex, name):
 
 
 @pytest.mark.parametrize(
-    "name", ["core/dz_comp.c", "core/dz_drive.h", "compensator.json", "cortex_m4/missing.c", "../other.c", ""]
+    "name", ["core/dz_comp.c", "core/dz_drive.h", "compensator.json", "cortex_m4/missing.c", "../other.c"]
 )
 def test_a_manifest_can_not_hand_over_the_core(cortex, name):
     manifest = json.loads((cortex / MANIFEST_NAME).read_text())
     manifest["board"].append(name)
     (cortex / MANIFEST_NAME).write_text(to_json(manifest))
-    check = files_unchanged(cortex, read_firmware_manifest(cortex)[1])
+    check = files_unchanged(cortex, read_firmware_manifest(cortex))
     assert check.holds is False and f"calls {name} the user's to fill in" in check.text
 
 
@@ -194,21 +195,21 @@ def test_a_manifest_whose_board_is_no_list_is_bad_input(cortex):
     ("new", "holds"), [("return 7u;", True), ("return seven;", False), ("return 7u;\n}\n#include <my_chip.h>\n{", None)]
 )
 def test_it_is_compiled_if_that_can_be_done(cortex, new, holds):
-    _, manifest = read_firmware_manifest(cortex)
+    manifest = read_firmware_manifest(cortex)
     assert board_compiles(cortex, manifest) == BoardCompiled()
     fill_in(cortex, new=new)
     found = board_compiles(cortex, manifest)
     checks = found.checks
-    assert bool(found.untried) is (holds is None)
+    assert bool(found.not_compiled) is (holds is None)
     assert [check.holds for check in checks] == ([] if holds is None else [holds])
     assert holds is not False or ("cortex_m4/dz_board.c" in checks[0].text and "seven" in checks[0].text)
 
 
 def test_without_the_compiler_it_is_said_why(cortex, monkeypatch):
-    monkeypatch.setitem(board_files.COMPILERS, "cortex-m4", ("no-such-gcc",))
+    monkeypatch.setitem(compilation.COMPILERS, "cortex-m4", ("no-such-gcc",))
     fill_in(cortex, new="return seven;")
-    found = board_compiles(cortex, read_firmware_manifest(cortex)[1])
-    assert found == BoardCompiled(untried="no-such-gcc is not on the path; install it, then `verify`")
+    found = board_compiles(cortex, read_firmware_manifest(cortex))
+    assert found == BoardCompiled(not_compiled="no-such-gcc is not on the path; install it, then `verify`")
 
 
 @needs_arm
@@ -218,7 +219,7 @@ def test_a_vendors_header_is_named_and_found_by_an_option(cortex, tmp_path, caps
     assert main(["verify", str(cortex), "-o", str(evidence)]) == 0
     said = " ".join(capsys.readouterr().out.split())
     why = "stm32_chip.h, which cortex_m4/dz_board.c includes, was not found in the firmware; verify --include DIR"
-    assert f"NOT TRIED your board files compile: {why}" in said
+    assert f"NOT CHECKED your board files compile: {why}" in said
     assert "stm32_chip.h, which" in (evidence / REPORT_NAME).read_text(encoding="utf-8")
     headers = [tmp_path / "device", tmp_path / "cmsis"]
     for folder, text in zip(headers, ['#include "core_cm4.h"\n', "int narrow(long x);\n"], strict=True):
@@ -230,10 +231,10 @@ def test_a_vendors_header_is_named_and_found_by_an_option(cortex, tmp_path, caps
     assert f"core_cm4.h, which cortex_m4/dz_board.c includes, was not found in the firmware nor in {headers[0]}" in said
     assert main(["verify", str(cortex), "-o", str(evidence), *one, "--include", str(headers[1])]) == 0
     said = " ".join(capsys.readouterr().out.split())
-    assert "holds your board files compile: one by one, with cortex_m4/dz_board.c" in said
+    assert "HOLDS your board files compile: one by one, with cortex_m4/dz_board.c" in said
     (cortex / "board").mkdir()
     (cortex / "board/adc.c").write_text("int adc(void);\nint adc(void) { return 1; }\n")
-    manifest = json.loads((cortex / MANIFEST_NAME).read_text())
+    manifest = read_firmware_manifest(cortex)
     (check,) = board_compiles(cortex, manifest, headers).checks
     assert check.holds and "as you changed them and board/adc.c" in check.text
     (cortex / "board/adc.c").write_text("#error broken\n")
@@ -260,8 +261,8 @@ def test_files_in_the_folder_for_them_are_named_kept_and_not_checked(compensator
     assert check.holds and check.text.endswith("yours, in board/, and not checked: board/adc.c, board/my_chip.ld")
     write_firmware(generate(compensator, "cortex-m4"), cortex)
     assert (cortex / "board/adc.c").read_text() == "this is no C"
-    evidence = {"checks": [], "closed_loop": {}, "monte_carlo": None, "own": ["board/adc.c"]}
-    assert "board/adc.c, which is yours: review it, and try it on the machine" in untried_of(evidence)
+    evidence = evidence_with(user_files=("board/adc.c",))
+    assert "board/adc.c, which is yours: review it, and try it on the machine" in not_tried(evidence)
 
 
 @pytest.mark.parametrize(
@@ -326,11 +327,11 @@ def test_an_earlier_target_that_is_replaced_is_said_so(compensator, cortex, tmp_
 def test_verify_holds_and_says_that_it_was_not_checked(cortex, tmp_path):
     fill_in(cortex)
     result = verify(cortex, sequence=RampSequence(rest=0.5, ramp=4.0, top=0.5))
-    assert result.holds and result.document["yours"] == ["cortex_m4/dz_board.c"]
+    assert result.holds and result.evidence.changed_board_files == ("cortex_m4/dz_board.c",)
     said = "cortex_m4/dz_board.c, which is yours and was changed: review it, and try it on the machine"
-    assert said in untried_of(result.document)
-    assert "NOT TRIED: cortex_m4/dz_board.c, which is yours" in str(result)
-    manifest = {"schema": SCHEMA, "made_from": result.document["made_from"]}
+    assert said in not_tried(result.evidence)
+    assert "NOT CHECKED: cortex_m4/dz_board.c, which is yours" in str(result)
+    manifest = evidence_manifest(result.evidence)
     write_folder(tmp_path / "evidence", with_report(evidence_files(result), cortex, tmp_path / "evidence"), manifest)
     html = (tmp_path / "evidence" / REPORT_NAME).read_text(encoding="utf-8")
     assert 'class="verdict good"' in html and "which is yours and was changed" in html

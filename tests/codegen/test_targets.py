@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dzdesign.codegen import project
+from dzdesign.codegen import banner, project
 from dzdesign.codegen.avr import target as avr
 from dzdesign.codegen.comment_text import LONGEST, printable_list, printable_name
 from dzdesign.codegen.cortex_m4 import target as cortex_m4
@@ -248,7 +248,7 @@ def test_hostile_names_build_in_a_hostile_folder(tmp_path):
 
 
 def test_the_check_of_hostile_names_sees_one_that_gets_through(monkeypatch):
-    monkeypatch.setattr(project, "printable_list", ", ".join)
+    monkeypatch.setattr(banner, "printable_list", ", ".join)
     files = generate(hostile_compensator("host", [HOSTILE[1]]), "host").files
     honest = generate(golden_compensator("host"), "host").files
     assert without_banner(files["core/dz_comp.c"]) != without_banner(honest["core/dz_comp.c"])

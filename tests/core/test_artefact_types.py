@@ -16,7 +16,15 @@ from msgspec import Meta
 
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_schema import LARGEST_INTEGER, json_schema
-from dzdesign.core.artefact_types import THIS_TOOL, Artefact, RuleError, SourceFile, quantity, to_json_bytes
+from dzdesign.core.artefact_types import (
+    THIS_TOOL,
+    Artefact,
+    RuleError,
+    SourceFile,
+    as_document,
+    quantity,
+    to_json_bytes,
+)
 from dzdesign.core.documents import DEEPEST, MOST_DIGITS
 from dzdesign.core.errors import InputError
 
@@ -186,7 +194,10 @@ def test_a_value_that_does_not_fit_is_named_with_what_was_expected(place, fault,
 
 @pytest.mark.parametrize(
     "place",
-    [("tool",), ("made_from", 0, "source"), ("runs",), ("curves", "1500", "gain"), ("spare", "points", 1, "p_MPa")],
+    [
+        *(("tool",), ("made_from", 0, "source"), ("runs",), ("curves", "1500", "gain"), ("spare",)),
+        *(("spare", "points", 1, "p_MPa"), ("spare", "points", 0, "note")),
+    ],
 )
 def test_a_missing_key_is_named_by_its_place(place):
     text = refusal(changed(*place, without=True))
@@ -289,7 +300,7 @@ def test_the_schema_says_unit_bounds_and_meaning_of_every_key():
     schema = json_schema(Pump)
     Draft202012Validator.check_schema(schema)
     assert (schema["$id"], schema["title"]) == ("urn:dzdesign:schema:pump:2", "pump.json")
-    assert schema["required"] == ["schema", "tool", "made_from", "runs", "variable", "name", "curves"]
+    assert schema["required"] == list(schema["properties"]) == list(as_document(pump()))
     point = schema["$defs"]["Point"]
     assert point["description"] == "One point of a pump's curve."
     assert point["properties"]["p_MPa"] == {

@@ -49,7 +49,7 @@ def test_zero_command_stays_under_the_true_closing_threshold_at_every_pressure_c
 
 def test_beta_never_exceeds_one_up_to_the_reference(designed):
     valve, compensator, _ = designed
-    code = int(compensator.signals.dp_code(Fraction(repr(valve.positive.reference_dp_MPa))))
+    code = int(compensator.signals.dp_code(Fraction(repr(valve.positive.reference.dp_MPa))))
     assert all(compensator.beta(each) <= 1 + Fraction(1, 1000) for each in range(code + 1))
 
 
@@ -102,12 +102,13 @@ def test_document_round_trip(example_compensator):
 def with_curve(side, **changes):
     """Return a side whose closing curve is changed."""
     curve = dataclasses.replace(side.guards["closing"], **changes)
-    return dataclasses.replace(side, guards={**side.guards, "closing": curve})
+    reference = dataclasses.replace(side.reference, u_min_V=curve.u_min0_V)
+    return dataclasses.replace(side, guards={**side.guards, "closing": curve}, reference=reference)
 
 
 def test_a_valve_file_that_contradicts_itself_is_refused(example_valve):
     side = example_valve.positive
-    greedy = with_curve(side, u_min0_V=side.u_min0_V + 0.02)
+    greedy = with_curve(side, u_min0_V=side.reference.u_min_V + 0.02)
     with pytest.raises(RequirementError, match="above the threshold's lower bound"):
         design(dataclasses.replace(example_valve, sides={"positive": greedy}))
 
@@ -131,8 +132,8 @@ def test_loss_against_the_certified_curve_is_small(example_valve, example_compen
     codes = np.arange(low, high + 1)
     table = np.array([float(c.drive(0, int(code))) for code in codes]) * 10
     dp = codes * 20 / 4095
-    curve = np.minimum(np.interp(dp, side.beta_dp_MPa, side.beta), np.where(dp <= side.reference_dp_MPa, 1, 9))
-    loss = curve * side.u_min0_V - table
+    curve = np.minimum(np.interp(dp, side.beta.dp_MPa, side.beta.beta), np.where(dp <= side.reference.dp_MPa, 1, 9))
+    loss = curve * side.reference.u_min_V - table
     assert loss.min() > 0
     assert loss.mean() < 0.005
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_files import to_json
+from dzdesign.core.artefact_types import to_json_bytes
 from tests.support.paths import GOLDENS_FULL
 
 #: A valve with both sides.
@@ -17,7 +17,7 @@ BOTH_SIGNS = "--command-signal=-10..10 V x 0.15 + 1.5 V"
 @pytest.fixture
 def valve_file(example_valve, tmp_path) -> Path:
     path = tmp_path / "valve.json"
-    path.write_text(to_json(example_valve.to_document()))
+    path.write_bytes(to_json_bytes(example_valve))
     return path
 
 

@@ -5,6 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
 from dzdesign.design.beta_table import offset_ceiling
 from dzdesign.design.certificate import guarded_curve
@@ -14,7 +15,7 @@ from dzdesign.design.options import DesignOptions
 from dzdesign.design.signal_text import command_signal, parse_signal
 from dzdesign.design.signals import Signals
 from dzdesign.identify.identification import identify
-from dzdesign.identify.valve.valve_file import valve_from_document
+from dzdesign.identify.valve.model import ValveModel
 from tests.support.paths import GOLDENS_FULL
 from tests.support.synthetic import Truth, synthetic_ramp
 
@@ -64,11 +65,9 @@ def test_of_valves_that_are_alike_it_is_their_own(falling):
 def test_both_signs():
     content = BOTH_SIDES.read_bytes()
     signals = Signals()
-    command = command_signal(
-        parse_signal("-10..10 V x 0.15 + 1.5 V", "command"), _converter(signals), inverted=False
-    )
+    command = command_signal(parse_signal("-10..10 V x 0.15 + 1.5 V", "command"), _converter(signals), inverted=False)
     options = DesignOptions(signals=_with_command(signals, command))
-    each = designed(valve_from_document(content, "valve.json"), options)
+    each = designed(read_artefact(content, ValveModel, "valve.json"), options)
     common = common_setting({"a": each, "b": each}).compensator
     assert (common.positive, common.negative) == (each.own.positive, each.own.negative)
     assert highest_over(common, each, "negative", -1) <= 0

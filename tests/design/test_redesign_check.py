@@ -16,7 +16,7 @@ from dzdesign.design.lot_setting import Designed, common_setting
 from dzdesign.design.option_texts import options_of
 from dzdesign.design.redesign_check import prove_derived
 from dzdesign.identify.identification import identify
-from dzdesign.verify.checks import law_follows
+from dzdesign.verify.firmware.compensator_checks import law_follows
 from dzdesign.verify.firmware.manifest import manifest_follows
 from tests.support.synthetic import Truth, synthetic_ramp
 

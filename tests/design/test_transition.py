@@ -60,7 +60,7 @@ def test_no_leak_and_one_per_cent_of_dead_zone_on_the_example(edged, example_fol
     write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
     plant = read_plant(example_folder / "plant.toml")
     result = verify(tmp_path / "fw", plant, sequence=RampSequence(rest=1.0, ramp=40.0, top=1.0))
-    assert result.holds, [check for check in result.checks if not check.holds]
+    assert result.holds, [check for check in result.evidence.checks if not check.holds]
     for loop in result.loops:
         assert loop.result.q_zero_L_min <= 1e-9
         assert loop.result.residual_opening <= 0.01

@@ -1,10 +1,13 @@
 """What the outputs say, in words that an engineer has, each of them in the glossary."""
 
 import re
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
+from dzdesign.core.artefact_types import THIS_TOOL
+from dzdesign.report.lot.summary import FailedValve, LotSummary
 from dzdesign.terminal.notebook import valve_html
 from dzdesign.terminal.tables import print_compensator, print_scenarios, print_valve
 from tests.support.paths import ROOT
@@ -78,21 +81,31 @@ def test_every_word_of_the_outputs_is_in_the_glossary():
         "knee", "onset", "level", "s.e.", "bound", "beta", "dP0", "u_min0", "drive range", "k x_max/u_max", "trend",
         "cost", "certificate", "guard", "edge", "over-compensation", "residual dead zone", "staircase", "offset",
         "drive", "code", "valid range", "compare value", "exactly rounded law", "monotone", "closed loop", "plant",
-        "scenario", "mutant", "holds", "DOES NOT HOLD", "NOT CHECKED", "NOT TRIED", "SHA-256", "record", "calibrated",
-        "common setting", "saturates", "FAILS", "NOT VERIFIED", "THE FILES DO NOT BELONG TOGETHER", "SIMULATED",
-        "ACCEPTED", "THE EVIDENCE CONTRADICTS ITSELF", "EXCEEDED", "OVER-COMPENSATED", "board file", "MISSED",
+        "scenario", "mutant", "HOLDS", "DOES NOT HOLD", "NOT CHECKED", "SHA-256", "record", "calibrated",
+        "common setting", "saturates", "NOT VERIFIED", "THE FILES DO NOT BELONG TOGETHER", "SIMULATED",
+        "ACCEPTED", "THE EVIDENCE CONTRADICTS ITSELF", "EXCEEDED", "OVER-COMPENSATED", "board file",
     }  # fmt: skip
     assert said <= known, said - known
     assert len(known) == sum(len(term.split(", ")) for term in terms), "a word stands there twice"
 
 
 def test_the_headline_of_a_batch_counts_calibrated_valves(capsys):
-    from dzdesign.batch.summary import print_batch
+    from dzdesign.batch.printing import print_lot
 
-    document = {"valves": 4, "calibrated": 3, "failed": [], "quantiles": {}, "common_setting": {"why_not": "none"}}
-    document["oddities"] = ["two share a recording"]
-    document["warnings"] = {"onset-hidden": ["V1", "V2", "V3", "V4"], "pressure-stuck": ["V3"]}
-    print_batch(document, "out")
+    summary = LotSummary(
+        tool=THIS_TOOL,
+        made_from=(),
+        valves=4,
+        failed=(FailedValve(name="V4", status="failed", reason="no flow"),),
+        verified=False,
+        quantiles={},
+        files={},
+        lot_setting=None,
+        why_no_lot_setting="none",
+        anomalies=("two share a recording",),
+        warnings={"onset-hidden": ("V1", "V2", "V3", "V4"), "pressure-stuck": ("V3",)},
+    )
+    print_lot(summary, Path("out"), None)
     said = capsys.readouterr().out
     assert "3 calibrated valves of 4" in said and "odd: two share a recording" in said
     assert "warnings: pressure-stuck 1 (V3), onset-hidden 4" in said

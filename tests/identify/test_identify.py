@@ -6,6 +6,8 @@ import math
 import numpy as np
 import pytest
 
+from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.identify.fitting.bounds import find_trend, lower_bounds, staircase
 from dzdesign.identify.identification import identify
@@ -13,7 +15,7 @@ from dzdesign.identify.knees.characteristic import find_meter_floor
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.branches import bin_branch
 from dzdesign.identify.ramps.splitting import split_ramps, sweep_direction
-from dzdesign.identify.valve.valve_file import valve_from_document
+from dzdesign.identify.valve.model import ValveModel
 from tests.support.synthetic import L_MIN, MPA, Truth, synthetic_ramp
 
 PRESSURES = (0.5, 1.0, 2.0, 3.0, 5.0)
@@ -99,34 +101,34 @@ class TestLaw:
         side = falling_valve.positive
         low, high = side.valid_dp_MPa
         for dp in np.linspace(low, high, 400):
-            offset = side.u_min0_V * np.interp(dp, side.beta_dp_MPa, side.beta)
+            offset = side.reference.u_min_V * np.interp(dp, side.beta.dp_MPa, side.beta.beta)
             assert offset < falling_threshold(dp) - 0.1
 
     def test_beta_is_one_at_the_reference_and_monotone(self, falling_valve):
         side = falling_valve.positive
-        assert np.interp(side.reference_dp_MPa, side.beta_dp_MPa, side.beta) == pytest.approx(1, abs=1e-6)
-        assert np.all(np.diff(side.beta) <= 1e-6)
+        assert np.interp(side.reference.dp_MPa, side.beta.dp_MPa, side.beta.beta) == pytest.approx(1, abs=1e-6)
+        assert np.all(np.diff(side.beta.beta) <= 1e-6)
         assert side.trend == "decreasing"
 
     def test_offset_lies_under_the_staircase_at_every_node(self, falling_valve):
         side = falling_valve.positive
-        for index, step in enumerate(side.certified_steps_V):
+        for index, step in enumerate(side.curve.certified_steps_V):
             for node in (index, index + 1):
-                if node == index or node == len(side.beta) - 1:
-                    assert side.beta[node] * side.u_min0_V <= step + 1e-6
+                if node == index or node == len(side.beta.beta) - 1:
+                    assert side.beta.beta[node] * side.reference.u_min_V <= step + 1e-6
 
     def test_growing_threshold_gives_growing_beta_under_the_truth(self):
         side = valve_of(lambda dp: 5.0 + 0.05 * dp).positive
         assert side.trend == "increasing"
-        assert np.all(np.diff(side.beta) >= -1e-6)
+        assert np.all(np.diff(side.beta.beta) >= -1e-6)
         for dp in np.linspace(*side.valid_dp_MPa, 200):
-            assert side.u_min0_V * np.interp(dp, side.beta_dp_MPa, side.beta) < 5.0 + 0.05 * dp - 0.1
+            assert side.reference.u_min_V * np.interp(dp, side.beta.dp_MPa, side.beta.beta) < 5.0 + 0.05 * dp - 0.1
 
     def test_constant_threshold_is_flat_although_first_flow_seen_falls(self):
         # A floor of 0.6 L/min is reached at a lower command where the slope is steeper: no trend of the valve.
         valve = valve_of(lambda dp: 3.5, floor=0.6)
         assert valve.positive.trend == "flat"
-        assert valve.positive.beta == pytest.approx((1.0,) * len(PRESSURES))
+        assert valve.positive.beta.beta == pytest.approx((1.0,) * len(PRESSURES))
         assert "flat-trend" in {warning.code for warning in valve.warnings}
 
     def test_k_x_max_comes_from_saturation(self):
@@ -152,7 +154,7 @@ class TestLaw:
 class TestInvariance:
     def test_order_of_files_does_not_matter(self):
         tests = [synthetic_ramp(dp, Truth(knee_rising=falling_threshold(dp))) for dp in PRESSURES]
-        assert identify(tests).to_document() == identify(tests[::-1]).to_document()
+        assert identify(tests) == identify(tests[::-1])
 
     def test_samples_in_the_dead_zone_do_not_move_the_knee(self):
         test = synthetic_ramp(1.0, Truth(), seed=4)
@@ -169,11 +171,10 @@ class TestInvariance:
         assert abs(long.u_knee_rising_V - short.u_knee_rising_V) < 0.5 * short.u_knee_se_V
 
     def test_document_round_trip(self, falling_valve):
-        from dzdesign.core.artefact_files import to_json
 
-        text = to_json(falling_valve.to_document())
-        again = valve_from_document(text.encode(), "valve.json")
-        assert to_json(again.to_document()) == text
+        text = to_json_bytes(falling_valve).decode()
+        again = read_artefact(text.encode(), ValveModel, "valve.json")
+        assert to_json_bytes(again).decode() == text
 
 
 class TestParts:
@@ -256,7 +257,7 @@ class TestParts:
 
 def test_one_branch_is_said_and_guards_opening():
     valve = identify([synthetic_ramp(1.0, Truth(), falling=False)])
-    assert valve.positive.guard == "opening"
+    assert valve.positive.certificate.guard == "opening"
     assert "one-branch" in {warning.code for warning in valve.warnings}
     assert valve.positive.trend is None
 
@@ -310,7 +311,7 @@ def test_random_valves_without_a_start_value_are_found_and_never_over_compensate
         for test in side.tests:
             assert test.u_knee_rising_V == pytest.approx(dead_zone + drift * test.dp_MPa, abs=0.1), valve_number
         for dp in np.linspace(*side.valid_dp_MPa, 60):
-            offset = side.u_min0_V * np.interp(dp, side.beta_dp_MPa, side.beta)
+            offset = side.reference.u_min_V * np.interp(dp, side.beta.dp_MPa, side.beta.beta)
             assert offset < dead_zone + drift * dp - hysteresis, valve_number
     assert len(refused) <= 2
     assert all(dead_zone < 0.5 and noise_share > 0.005 for dead_zone, noise_share in refused)
@@ -347,7 +348,7 @@ class TestHonesty:
         assert "not-monotone" in {warning.code for warning in valve.warnings}
         side = valve.positive
         for dp in np.linspace(*side.valid_dp_MPa, 100):
-            offset = side.u_min0_V * np.interp(dp, side.beta_dp_MPa, side.beta)
+            offset = side.reference.u_min_V * np.interp(dp, side.beta.dp_MPa, side.beta.beta)
             assert offset < np.interp(dp, PRESSURES, list(opening.values())) - 0.1
 
     def test_a_progressive_spool_is_no_meter_floor(self):
@@ -358,9 +359,9 @@ class TestHonesty:
         noise = test.q - np.clip(4 * (test.u - np.where(rising, 5.4, 5.3)), 0, 100) * L_MIN
         progressive = dataclasses.replace(test, q=3 * travel**2 * L_MIN + noise)
         valve = identify([progressive])
-        assert valve.meter_floor_L_min == 0
+        assert valve.meter.floor_L_min == 0
         # At the offset the closing valve passes less than the level that counts as flow.
-        assert 3 * max(valve.positive.u_min0_V - 4.9, 0) ** 2 < valve.positive.level_L_min
+        assert 3 * max(valve.positive.reference.u_min_V - 4.9, 0) ** 2 < valve.positive.certificate.level_L_min
 
     def test_branches_that_trend_apart_follow_the_guarded_one(self):
         tests = []
@@ -371,4 +372,4 @@ class TestHonesty:
         side = identify(tests).positive
         assert side.trend == "increasing"
         for dp in np.linspace(*side.valid_dp_MPa, 50):
-            assert side.u_min0_V * np.interp(dp, side.beta_dp_MPa, side.beta) < 5.0 + 0.02 * dp
+            assert side.reference.u_min_V * np.interp(dp, side.beta.dp_MPa, side.beta.beta) < 5.0 + 0.02 * dp

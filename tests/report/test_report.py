@@ -3,7 +3,7 @@
 import json
 import re
 import shutil
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from urllib.parse import unquote
 
@@ -11,6 +11,7 @@ import pytest
 
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of, to_json
+from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.identify.identification import identify
 from dzdesign.report.artefact_chain import chain_of
@@ -19,6 +20,7 @@ from dzdesign.report.body import SECTIONS
 from dzdesign.report.figures.figure import PALETTE, csv_text
 from dzdesign.report.summary import headline, worst_of
 from dzdesign.report.valve_report import REPORT_NAME, report_of_folder
+from dzdesign.verify.closed_loop.plant import Plant
 from tests.support.page_reader import HOSTILE, Page
 from tests.support.synthetic import Truth, needs_compiler, synthetic_ramp
 
@@ -270,15 +272,15 @@ def test_what_was_not_tried_is_said(copied):
     assert "machine code of other processors" in said
 
     def with_plant(evidence):
-        evidence["closed_loop"].update(plant={"K_a": 1.0, "m_e_kg": 0.06}, plant_sha256="5" * 64, plants=[])
-        evidence["checks"].append({"name": "machine code of the AVR", "holds": True, "text": ""})
-        kept = "the core keeps no state between calls"
-        evidence["checks"] = [one for one in evidence["checks"] if one["name"] != kept]
+        evidence["closed_loop"].update(plant={**asdict(Plant()), "K_a": 1.0}, plant_sha256="5" * 64, plants=[])
+        evidence["checks"].append({"id": "machine-code", "name": "machine code of the AVR", "holds": True, "text": ""})
+        removed = "the drive follows its model"
+        evidence["checks"] = [one for one in evidence["checks"] if one["name"] != removed]
 
     change_evidence(copied, with_plant)
     html = report_of_folder(copied).html
     said = html[html.index('class="verdict good"') : html.index('<dl class="numbers">')]
-    assert "load steps" not in said and "machine code" not in said and "the core keeps no state between calls" in said
+    assert "load steps" not in said and "machine code" not in said and "the drive follows its model" in said
     assert f"SHA-256 {'5' * 64}" in html and "m_e_kg" in html[html.index('id="loop"') :]
 
 
@@ -475,12 +477,13 @@ def test_the_headline_is_good_only_if_all_was_checked(copied):
 
 
 def test_a_series_of_plants_is_shown(copied):
-    spread = {"0.5": 0.021, "0.01": 0.01, "0.99": 0.0345}
+    spread = {"p01": 0.01, "p05": 0.011, "p50": 0.021, "p95": 0.033, "p99": 0.0345, "worst": 0.04, "worst_plant": {}}
     one = {
         "side": "positive", "dp_MPa": 1.0, "plants": 200, "leaking": 3,
-        "quantiles": {"residual_opening": spread, "residual_closing": spread, "q_zero_L_min": spread},
+        "residual_opening": spread, "residual_closing": spread, "q_zero_L_min": spread, "q_max_L_min": spread,
     }  # fmt: skip
-    change_evidence(copied, lambda evidence: evidence.update(monte_carlo={"pressures": [one]}))
+    series = {"plants": 200, "seed": 1, "spreads": {}, "pressures": [one]}
+    change_evidence(copied, lambda evidence: evidence.update(monte_carlo=series))
     html = report_of_folder(copied).html
     assert "2.10 (1.00 to 3.45)" in html and "3 of 200" in html
 
@@ -497,7 +500,7 @@ def reports(tmp_path_factory):
     found = {}
     for name, ramps in (("one", [one]), ("both", [one, other, *mirrored])):
         folder = tmp_path_factory.mktemp(name)
-        (folder / "valve.json").write_text(to_json(identify(ramps).to_document()), encoding="utf-8")
+        (folder / "valve.json").write_bytes(to_json_bytes(identify(ramps)))
         found[name] = report_of_folder(folder).html
     return found
 

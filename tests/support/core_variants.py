@@ -7,14 +7,15 @@ from functools import cache
 from itertools import product
 
 from dzdesign.codegen.project import Firmware, generate, target_named
+from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.signal_text import Converter, command_signal, parse_signal, pressure_signal
 from dzdesign.design.signals import Signals
 from dzdesign.identify.fitting.guard_curve import OpeningCurve
-from dzdesign.identify.valve.model import SideModel
-from dzdesign.identify.valve.valve_file import valve_from_document
+from dzdesign.identify.valve.model import ValveModel
+from dzdesign.identify.valve.side_model import SideModel
 from tests.support.golden_firmware import GOLDENS
 
 #: One target of each arithmetic, products of 32x32->64 bits and none longer than 32 bits.
@@ -62,7 +63,7 @@ def variant(name: str, arithmetic: str) -> Compensator:
     """Design a variant for the target of that arithmetic."""
     target = target_named(TARGETS[arithmetic])
     content = (GOLDENS / "valve.json").read_bytes()
-    valve = valve_from_document(content, "valve.json")
+    valve = read_artefact(content, ValveModel, "valve.json")
     options = dict(VARIANTS[name])
     given = options.pop("signals", {})
     signals = Signals(compare_max=target.compare_max, sample_Hz=target.sample_Hz, tick_Hz=target.tick_Hz, **given)

@@ -7,8 +7,9 @@ from xml.etree import ElementTree
 
 import pytest
 
+from dzdesign.codegen.banner import Banner
 from dzdesign.codegen.f28335.target import TARGET
-from dzdesign.codegen.project import banner, environment, hardware_context
+from dzdesign.codegen.project import target_files
 from tests.support.golden_firmware import FULL, GOLDENS, golden_compensator
 
 HERE = Path(__file__).parent / "f28335"
@@ -18,14 +19,9 @@ needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no C compiler (cc,
 
 def render_firmware(folder: Path, *signs: int) -> dict[str, Path]:
     """Write the target's files below `folder`, by the real renderer; output path to file. One sign by default."""
-    renderer = environment("dzdesign.codegen.f28335")
+    compensator = golden_compensator("f28335", FULL if -1 in signs else GOLDENS)
     written = {}
-    for path, template in TARGET.templates.items():
-        text = renderer.get_template(template).render(
-            **hardware_context(golden_compensator("f28335", FULL if -1 in signs else GOLDENS), TARGET, "1234"),
-            banner=banner(template, "0123456789abcdef"),
-            project="paper_valve",
-        )
+    for path, text in target_files(compensator, TARGET, Banner(digest="1234567890abcdef")).items():
         written[path] = folder / path
         written[path].parent.mkdir(parents=True, exist_ok=True)
         written[path].write_text(text, encoding="utf-8", newline="\n")

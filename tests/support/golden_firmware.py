@@ -13,13 +13,14 @@ from pathlib import Path
 
 from dzdesign.codegen.project import generate, target_named, targets
 from dzdesign.core.artefact_files import to_json
+from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.compensator_file import compensator_document, compensator_from_document
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.signal_text import Converter, command_signal, parse_signal, pressure_signal
 from dzdesign.design.signals import Signals
-from dzdesign.identify.valve.valve_file import valve_from_document
+from dzdesign.identify.valve.model import ValveModel
 from tests.support.paths import TESTS
 
 GOLDENS = TESTS / "goldens"
@@ -100,10 +101,10 @@ def update() -> None:
     every = tuple(target.name for target in targets())
     for root, names, options in ((GOLDENS, every, None), (FULL, FULL_TARGETS, full_options())):
         content = (root / "valve.json").read_bytes()
-        document = compensator_document(design(valve_from_document(content, "valve.json"), options, content))
+        document = compensator_document(design(read_artefact(content, ValveModel, "valve.json"), options, content))
         (root / INPUT).write_text(to_json(document), encoding="utf-8", newline="\n")
         for folder in root.iterdir():
-            if folder.is_dir() and folder != SCHEMAS:
+            if folder.is_dir() and folder.name != "schemas":
                 shutil.rmtree(folder)
         for target in names:
             for name, text in golden_files(target, root).items():

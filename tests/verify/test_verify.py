@@ -11,12 +11,14 @@ import pytest
 from dzdesign.core.artefact_files import to_json, write_folder
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator_file import compensator_document
-from dzdesign.verify.checks import certificate_follows, files_unchanged
 from dzdesign.verify.closed_loop import motion
 from dzdesign.verify.closed_loop.loop import PERIODS_PER_RECORD, ClosedLoop, RampSequence, dead_zone
 from dzdesign.verify.closed_loop.plant import Plant, plants_from_tests
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
+from dzdesign.verify.firmware.compensator_checks import certificate_follows
+from dzdesign.verify.firmware.folder import read_firmware_manifest
+from dzdesign.verify.firmware.unchanged_files import files_unchanged
 from dzdesign.verify.verification import verify
 from tests.support import plant_oracle
 from tests.support.plant_oracle import Oracle
@@ -117,7 +119,7 @@ def test_a_changed_file_fails_the_verification(firmware_folder):
     readme = firmware_folder / "f28335" / "README.md"
     readme.write_text(readme.read_text() + "\n")
     result = verify(firmware_folder, sequence=QUICK)
-    assert [check.name for check in result.checks if not check.holds] == ["files as generated"]
+    assert [check.name for check in result.evidence.checks if not check.holds] == ["files as generated"]
 
 
 @pytest.mark.parametrize(
@@ -125,7 +127,7 @@ def test_a_changed_file_fails_the_verification(firmware_folder):
     ["f28335/extra.c", "more/extra.CPP", "f28335/startup.asm", "F28335.cmd", "f28335/own.projectspec", "rules.mk"],
 )
 def test_source_and_project_files_that_were_added_are_refused(firmware_folder, name):
-    manifest = json.loads((firmware_folder / "manifest.json").read_text())
+    manifest = read_firmware_manifest(firmware_folder)
     for built in ("f28335/main.o", "f28335/firmware.out", "f28335/firmware.map"):
         (firmware_folder / built).write_text("")
     assert files_unchanged(firmware_folder, manifest).holds
@@ -136,7 +138,7 @@ def test_source_and_project_files_that_were_added_are_refused(firmware_folder, n
 
 
 def test_a_file_of_ones_own_in_the_core_is_told_where_it_belongs(firmware_folder):
-    manifest = json.loads((firmware_folder / "manifest.json").read_text())
+    manifest = read_firmware_manifest(firmware_folder)
     (firmware_folder / "core" / "my.c").write_text("")
     added = files_unchanged(firmware_folder, manifest)
     assert added.holds is False
@@ -144,13 +146,13 @@ def test_a_file_of_ones_own_in_the_core_is_told_where_it_belongs(firmware_folder
 
 
 def test_a_file_whose_line_was_taken_from_the_manifest_is_refused(firmware_folder):
-    manifest = json.loads((firmware_folder / "manifest.json").read_text())
-    del manifest["files"]["f28335/dz_isr.c"]
-    assert "does not name f28335/dz_isr.c;" in files_unchanged(firmware_folder, manifest).text
+    manifest = read_firmware_manifest(firmware_folder)
+    files = {name: digest for name, digest in manifest.files.items() if name != "f28335/dz_isr.c"}
+    assert "does not name f28335/dz_isr.c;" in files_unchanged(firmware_folder, replace(manifest, files=files)).text
 
 
 def test_what_cmake_built_may_stay_where_nothing_of_ours_is(firmware_folder):
-    manifest = json.loads((firmware_folder / "manifest.json").read_text())
+    manifest = read_firmware_manifest(firmware_folder)
     for name in ("build/CMakeCache.txt", "build/Makefile", "build/CMakeFiles/3.30/CMakeCCompilerId.c"):
         (firmware_folder / name).parent.mkdir(parents=True, exist_ok=True)
         (firmware_folder / name).write_text("")
@@ -162,7 +164,7 @@ def test_what_cmake_built_may_stay_where_nothing_of_ours_is(firmware_folder):
 
 
 def test_a_header_that_may_be_taken_for_ours_is_said(firmware_folder):
-    manifest = json.loads((firmware_folder / "manifest.json").read_text())
+    manifest = read_firmware_manifest(firmware_folder)
     (firmware_folder / "f28335" / "dz_comp.h").write_text("#define DZ_COMPARE_MAX 1u\n")  # goes before core's
     shadowed = files_unchanged(firmware_folder, manifest)
     assert shadowed.holds is False and "f28335/dz_comp.h" in shadowed.text
@@ -171,14 +173,17 @@ def test_a_header_that_may_be_taken_for_ours_is_said(firmware_folder):
 def test_a_manifest_that_names_no_file_is_no_evidence(firmware_folder):
     manifest = json.loads((firmware_folder / "manifest.json").read_text())
     (firmware_folder / "manifest.json").write_text(to_json(manifest | {"files": {}, "core": []}))
+    with pytest.raises(InputError, match="'core' is"):
+        verify(firmware_folder, sequence=QUICK)
+    (firmware_folder / "manifest.json").write_text(to_json(manifest | {"files": {}}))
     result = verify(firmware_folder, sequence=QUICK)
-    assert "files as generated" in {check.name for check in result.checks if not check.holds}
+    assert "files as generated" in {check.name for check in result.evidence.checks if not check.holds}
 
 
 def test_a_core_that_does_not_compile_fails_the_verification(firmware_folder):
     mutate(firmware_folder, r"const uint32_t sum = law;|const uint64_t sum = law;", "const uint64_t sum = lav;")
     result = verify(firmware_folder, sequence=QUICK)
-    assert not result.holds and result.inputs == ()
+    assert not result.holds and result.evidence.inputs == ()
 
 
 def test_reference_agrees_with_the_compensator_at_random(example_compensator):
@@ -329,7 +334,7 @@ def test_a_law_without_its_guard_leaks_in_the_loop(example_compensator, example_
     firmware = generate(leaky, "f28335")
     write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
     result = verify(tmp_path / "fw", read_plant(example_folder / "plant.toml"), sequence=QUICK)
-    failed = {check.name for check in result.checks if not check.holds}
+    failed = {check.name for check in result.evidence.checks if not check.holds}
     assert "no flow at zero command in the closed loop" in failed
 
 
@@ -345,8 +350,8 @@ def test_what_could_not_be_checked_is_not_passed(tmp_path):
     firmware = generate(design(valve, DesignOptions(guard="opening")), "f28335")
     write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
     result = verify(tmp_path / "fw", sequence=QUICK)
-    assert [check.holds for check in result.checks if "zero command in" in check.name] == [None]
-    assert not result.holds and result.document["holds"] is False
+    assert [check.holds for check in result.evidence.checks if "zero command in" in check.name] == [None]
+    assert not result.holds and result.evidence.holds is False
 
 
 def test_a_span_that_ends_at_the_tested_pressure_can_be_verified(example_valve, tmp_path):

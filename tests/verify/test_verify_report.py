@@ -8,14 +8,16 @@ import pytest
 from dzdesign.codegen.project import generate
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import MANIFEST_NAME, TOOL, sha256_of, to_json, write_folder
+from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.design.compensator_file import compensator_document
 from dzdesign.design.designing import design
-from dzdesign.identify.valve.valve_file import valve_from_document
+from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.valve_report import REPORT_NAME, report_of_folder, with_report
-from dzdesign.verify.firmware.valve_check import valve_follows
-from dzdesign.verify.requirements import VALVE, untried_of
+from dzdesign.verify.firmware.compensator_checks import valve_follows
+from dzdesign.verify.requirements import VALVE, not_tried
 from dzdesign.verify.verification import SCHEMA
 from tests.conftest import default_options
+from tests.support.evidence import EVIDENCE, evidence_with
 from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler
@@ -121,7 +123,7 @@ def test_a_firmware_among_many_folders_is_found(copied):
 def spaced(copied):
     """The firmware of a valve.json that somebody saved with another spacing; its compensator's document."""
     content = json.dumps(json.loads((copied / "valve.json").read_bytes())).encode()
-    compensator = design(valve_from_document(content, "valve.json"), default_options(), content)
+    compensator = design(read_artefact(content, ValveModel, "valve.json"), default_options(), content)
     write_folder(copied / "firmware", *_made(compensator))
     (copied / "valve.json").write_bytes(content)
     return json.loads(to_json(compensator_document(compensator)))
@@ -136,7 +138,7 @@ def test_the_hash_of_a_valve_as_identify_writes_it_needs_no_file(copied):
     document = json.loads((copied / "compensator.json").read_bytes())
     (copied / "valve.json").unlink()
     (check,) = valve_follows(copied / "firmware", document)
-    assert check.holds and check.name == VALVE
+    assert check.holds and check.id == VALVE.id
 
 
 def test_of_another_spacing_it_is_compared_with_the_file_and_not_tried_without(copied):
@@ -147,8 +149,7 @@ def test_of_another_spacing_it_is_compared_with_the_file_and_not_tried_without(c
     assert valve_follows(copied / "firmware", document)[0].holds
     (copied / "bench 7.json").unlink()
     assert valve_follows(copied / "firmware", document) == []
-    evidence = {"checks": [], "closed_loop": {}, "monte_carlo": None}
-    (said,) = [line for line in untried_of(evidence) if line.startswith(VALVE)]
+    (said,) = [line for line in not_tried(EVIDENCE) if line.startswith(VALVE.title)]
     assert "with the valve.json that compensator.json names by its SHA-256 beside the firmware" in said
 
 
@@ -203,5 +204,4 @@ def test_another_valve_under_the_hash_of_the_file_is_found(copied):
 
 @pytest.mark.parametrize(("target", "said"), [("f28335", True), ("cortex-m4", False), ("host", False)])
 def test_the_headers_of_ti_are_named_where_they_make_sense(target, said):
-    evidence = {"checks": [], "closed_loop": {}, "monte_carlo": None, "target": target}
-    assert any("--c2000ware" in line for line in untried_of(evidence)) is said
+    assert any("--c2000ware" in line for line in not_tried(evidence_with(target=target))) is said

@@ -1,4 +1,4 @@
-"""What generated files say of a common setting: of how many valves it is, and whose recordings it shows."""
+"""What generated files say of a lot setting: of how many valves it is, and whose recordings it shows."""
 
 from dataclasses import dataclass
 
@@ -30,7 +30,7 @@ class LotInWords:
 
 
 def lot_in_words(compensator: Compensator) -> LotInWords | None:
-    """Return the words on a common setting; None of a valve's own.
+    """Return the words on a lot setting; None of a valve's own.
 
     Parameters
     ----------
@@ -46,12 +46,12 @@ def lot_in_words(compensator: Compensator) -> LotInWords | None:
     known = f"lot SHA-256 {digest}" if digest else "the file does not say which"
     return LotInWords(
         carrier=carrier,
-        banner=f"COMMON SETTING of {count} valves, {known}.",
-        readme=f"**This is a common setting of {count} valves**, not one valve's own.\n"
+        banner=f"LOT SETTING of {count} valves, {known}.",
+        readme=f"**This is a lot setting of {count} valves**, not one valve's own.\n"
         f"Lot SHA-256: {digest or 'not known'}. Recordings and certificate that these files name are those of one\n"
         f"of them, the carrier: {carrier[0].lower()}{carrier[1:]}. `../compensator.json` lists all under `lot`.",
-        certificate=f"The certificate is that of one of the {count} valves of this common setting, "
+        certificate=f"The certificate is that of one of the {count} valves of this lot setting, "
         f"{carrier[0].lower()}{carrier[1:]}; of the others codegen proved the same under their own bounds."
         if digest
-        else f"The certificate is that of one of the {count} valves of this common setting.",
+        else f"The certificate is that of one of the {count} valves of this lot setting.",
     )

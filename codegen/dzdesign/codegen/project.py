@@ -1,24 +1,22 @@
 """`generate`: a `Compensator` and a target in, the files of a C project out."""
 
 import contextlib
-import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib import import_module
 from importlib.resources import files as files_of
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from dzdesign.codegen.comment_text import printable_list
-from dzdesign.codegen.core.plan import FilePlan, core_plan, drive_header_plan, drive_plan, header_plan
-from dzdesign.codegen.lot_banner import LotInWords, lot_in_words
+from dzdesign.codegen.banner import Banner, banner_of, board_lines
+from dzdesign.codegen.core.certificate_text import zero_command
+from dzdesign.codegen.core.files import CORE_HEADERS, CORE_SOURCES, core_files
 from dzdesign.codegen.provenance import constants_of, origin_of
 from dzdesign.codegen.target import Target, folder_of
 from dzdesign.codegen.wiring import wiring_of
 from dzdesign.core.artefact_files import (
     MANIFEST_NAME,
-    TOOL,
     read_bytes,
     sha256_of,
     to_json,
@@ -39,8 +37,6 @@ if TYPE_CHECKING:
 PACKAGE = "dzdesign.codegen"
 #: Where neither the compensator nor anybody else says which.
 DEFAULT_TARGET = "f28335"
-#: One file a sign of command, all from one template.
-CORE_SOURCES = {1: "dz_comp.c", -1: "dz_comp_negative.c"}
 
 
 def _found_targets() -> tuple[str, ...]:
@@ -114,7 +110,8 @@ def target_named(name: str) -> Target:
     """
     if name not in TARGET_NAMES:
         raise InputError(f"there is no target '{name}'{nearest(name, TARGET_NAMES)}; known: {', '.join(TARGET_NAMES)}")
-    return import_module(f"{PACKAGE}.{folder_of(name)}.target").TARGET
+    target: Target = import_module(f"{PACKAGE}.{folder_of(name)}.target").TARGET
+    return target
 
 
 def targets() -> tuple[Target, ...]:
@@ -150,55 +147,28 @@ def generate(
     note = target.check_designed_for(designed_for)
     document = compensator_bytes or to_json(compensator_document(compensator)).encode()
     digest = sha256_of(document)
-    opening = banner_of(compensator, digest)
-    header = header_plan(compensator)
-    hardware = hardware_context(compensator, target, digest)
-    shared = environment(PACKAGE)
-    core = _core_files(compensator, target, header)
-    plans = [(path, shared, template, plan.values) for path, template, plan in core]
-    own = environment(f"{PACKAGE}.{target.folder}")
-    plans += [(path, own, template, hardware) for path, template in target.templates.items()]
+    core = {f"core/{name}": file for name, file in core_files(compensator, target.arithmetic).items()}
+    banner = banner_of(compensator, digest)
     files = {
-        path: _render(
-            renderer,
-            template,
-            board_banner(template) if path in target.board else opening(template),
-            plan,
-        )
-        for path, renderer, template, plan in plans
+        path: _render(PACKAGE, file.template, banner.lines(file.template), file.values) for path, file in core.items()
     }
-    files["compensator.json"] = document.decode()
+    files |= {**target_files(compensator, target, banner), "compensator.json": document.decode()}
     manifest = FirmwareManifest(
         tool=THIS_TOOL,
         made_from=(SourceFile(source="compensator.json", sha256=digest),),
         target=target.name,
         law=compensator.law_name,
-        core=tuple(sorted(path for path in files if path.startswith("core/"))),
+        core=tuple(sorted(core)),
         board=tuple(sorted(target.board)),
         origin=origin_of(compensator, digest),
-        constants=constants_of(compensator, {path: plan.constants for path, _, plan in core}),
+        constants=constants_of(compensator, {path: file.constants for path, file in core.items()}),
         files={path: sha256_of(text.encode()) for path, text in files.items()},
     )
     return Firmware(files=files, manifest=manifest, note=note)
 
 
-def _core_files(compensator: Compensator, target: Target, header: FilePlan) -> list[tuple[str, str, FilePlan]]:
-    """Return path, template and plan of every file of the core."""
-    sides = [
-        (f"core/{name}", "dz_comp.c.jinja", core_plan(compensator, sign, target.arithmetic))
-        for sign, name in CORE_SOURCES.items()
-        if sign in compensator.signals.signs
-    ]
-    return [
-        *sides,
-        ("core/dz_comp.h", "dz_comp.h.jinja", header),
-        ("core/dz_drive.c", "dz_drive.c.jinja", drive_plan(compensator)),
-        ("core/dz_drive.h", "dz_drive.h.jinja", drive_header_plan(compensator)),
-    ]
-
-
-def hardware_context(compensator: Compensator, target: Target, digest: str) -> dict[str, Any]:
-    """Return what the templates of a target print, but for banner and project.
+def target_files(compensator: Compensator, target: Target, banner: Banner) -> dict[str, str]:
+    """Return the files around the core, path to text.
 
     Parameters
     ----------
@@ -206,56 +176,40 @@ def hardware_context(compensator: Compensator, target: Target, digest: str) -> d
         What the firmware is of.
     target : Target
         Where it goes.
-    digest : str
-        SHA-256 of compensator.json.
+    banner : Banner
+        First lines of the files.
     """
-    levels = compensator.signals.code_max + 1  # a target without a converter of its own takes any
-    full_V = target.adc_full_V
-    if target.takes_any_signals and compensator.request:
+    signals = compensator.signals
+    levels, full_V = signals.code_max + 1, target.adc_full_V
+    if target.takes_any_signals and compensator.request:  # a target without a converter of its own takes any
         full_V = compensator.request.target.converter.full_V
-    return {
+    values = {
         **target.context,
-        **core_context(compensator.signals.signs),
+        "bipolar": len(signals.signs) == 2,
+        "signals": signals,
+        "u_max_V": f"{float(compensator.u_max_V):g}",
+        "drive": compensator.amplifier,
+        "limited": compensator.amplifier.compare_limit < signals.compare_max,
+        "at_zero": {sign: zero_command(compensator, sign) for sign in signals.signs},
+        "core_sources": (*(CORE_SOURCES[sign] for sign in signals.signs), "dz_drive.c"),
+        "core_headers": CORE_HEADERS,
         "wiring": wiring_of(compensator, Converter(full_V=full_V, levels=levels)),
-        "firmware_origin": f"0x{digest[:4].upper()}",
-        "common_setting": lot_in_words(compensator),
+        "firmware_origin": f"0x{banner.digest[:4].upper()}",
+        "lot_setting": banner.lot,
     }
-
-
-def core_context(signs: Sequence[int]) -> dict[str, Any]:
-    """Return what the templates of a target print of the core.
-
-    Parameters
-    ----------
-    signs : sequence of int
-        Signs of command that it has a law for.
-
-    Returns
-    -------
-    dict
-        ``bipolar``, and the core's files in the order of a makefile: ``core_sources``, ``core_headers``.
-    """
     return {
-        "bipolar": len(signs) == 2,
-        "core_sources": [*(CORE_SOURCES[sign] for sign in signs), "dz_drive.c"],
-        "core_headers": ["dz_comp.h", "dz_drive.h"],
+        path: _render(
+            f"{PACKAGE}.{target.folder}",
+            template,
+            board_lines(template) if path in target.board else banner.lines(template),
+            values,
+        )
+        for path, template in target.templates.items()
     }
-
-
-def ramp_tests_of(compensator: Compensator) -> tuple[str, ...]:
-    """Return the names of the recordings that the valve was identified from, as their users gave them."""
-    made_from = json.loads(compensator.valve_document).get("made_from", ())
-    return tuple(str(entry["source"]) for entry in made_from)
-
-
-def is_simulated(compensator: Compensator) -> bool:
-    """Tell whether a recording that the valve was identified from is marked as simulated."""
-    warnings = json.loads(compensator.valve_document).get("warnings", ())
-    return any(warning["code"] == "simulated" for warning in warnings)
 
 
 @cache
-def environment(package: str) -> "jinja2.Environment":
+def _environment(package: str) -> "jinja2.Environment":
     """Return the renderer of a package's templates, then of the shared ones: strict, a name without a value fails.
 
     Kept, with the templates that it has compiled.
@@ -272,68 +226,5 @@ def environment(package: str) -> "jinja2.Environment":
     )
 
 
-def banner_of(compensator: Compensator, digest: str) -> Callable[[str], tuple[str, ...]]:
-    """Return what gives each template's file its first lines.
-
-    Parameters
-    ----------
-    compensator : Compensator
-        What the firmware is of.
-    digest : str
-        SHA-256 of compensator.json.
-    """
-    recordings, simulated, lot = ramp_tests_of(compensator), is_simulated(compensator), lot_in_words(compensator)
-    return lambda template: banner(template, digest, recordings, simulated, lot)
-
-
-def banner(
-    template: str, digest: str, recordings: Sequence[str] = (), simulated: bool = False, lot: LotInWords | None = None
-) -> tuple[str, ...]:
-    """Return the lines that open every generated file: tool, template, hash and recordings; no date.
-
-    Parameters
-    ----------
-    template : str
-        File name of the template.
-    digest : str
-        SHA-256 of compensator.json.
-    recordings : sequence of str
-        Names from users; whatever could act in a comment is replaced.
-    simulated : bool
-        Whether they are marked as simulated.
-    lot : LotInWords, optional
-        Of a common setting: its valves, of which the recordings are those of one.
-    """
-    lines = [
-        f"Generated by dzdesign {TOOL['version']} from template {template}. Do not edit: generate it again.",
-        f"Compensator SHA-256: {digest}",
-    ]
-    lines += [lot.banner] if lot else []
-    if recordings:
-        of = f"{lot.carrier} identified from" if lot else "Valve identified from"
-        lines.append(f"{of}: {printable_list(recordings)}")
-    if simulated:
-        lines.append("SIMULATED recordings: an example, not of a measured valve. Not for a machine.")
-    return tuple(lines)
-
-
-def board_banner(template: str) -> tuple[str, ...]:
-    """Return the lines that open a file which its user fills in.
-
-    Nothing in them, such as a hash, grows old where the file is kept through the next generation.
-
-    Parameters
-    ----------
-    template : str
-        File name of the template.
-    """
-    return (
-        f"Written by dzdesign {TOOL['version']} from template {template}. Yours to edit: `dzdesign codegen` keeps what",
-        "you change here, and `dzdesign verify` names this file as yours and does not check it.",
-    )
-
-
-def _render(
-    renderer: "jinja2.Environment", template: str, opening: tuple[str, ...], values: Mapping[str, object]
-) -> str:
-    return renderer.get_template(template).render(banner=opening, project="dzdesign", **values)
+def _render(package: str, template: str, banner: Sequence[str], values: Mapping[str, object]) -> str:
+    return str(_environment(package).get_template(template).render(banner=banner, project="dzdesign", **values))

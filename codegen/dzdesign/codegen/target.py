@@ -16,10 +16,11 @@ from dzdesign.design.signals import Signals
 #: Products that the core may use: 32x32->64 bits, or none longer than 32 bits.
 ARITHMETICS = ("wide", "narrow")
 
+#: Names that the renderer itself passes to every template; a target's context may not use them.
 RENDERER_NAMES = frozenset(
-    {"banner", "project", "wiring", "firmware_origin", "bipolar", "core_sources", "core_headers", "common_setting"}
+    {"banner", "project", "signals", "u_max_V", "drive", "limited", "at_zero", "bipolar", "wiring", "lot_setting"}
+    | {"core_sources", "core_headers", "firmware_origin"}
 )
-"""Names that the renderer itself passes to every template; a target's context may not use them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,9 +84,9 @@ class Target:
             raise DzdesignError(f"target name: expected words of a-z and 0-9 with hyphens, got {self.name!r}")
         if self.arithmetic not in ARITHMETICS:
             raise DzdesignError(f"target {self.name}: arithmetic must be one of {ARITHMETICS}, got {self.arithmetic!r}")
-        for label, value in (("compare_max", self.compare_max), ("adc_code_max", self.adc_code_max)):
-            if not 0 < value <= 0xFFFF:
-                raise DzdesignError(f"target {self.name}: {label} must fit 16 bits unsigned, got {value}")
+        for label, number in (("compare_max", self.compare_max), ("adc_code_max", self.adc_code_max)):
+            if not 0 < number <= 0xFFFF:
+                raise DzdesignError(f"target {self.name}: {label} must fit 16 bits unsigned, got {number}")
         for path in self.templates:
             parts = PurePosixPath(path)
             if parts.is_absolute() or ".." in parts.parts or "\\" in path:

@@ -3,6 +3,7 @@
 import logging
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import MISSING
 from fractions import Fraction
 from typing import Any, TypeVar
 
@@ -32,8 +33,9 @@ def read_artefact(
 ) -> AnArtefact:
     """Read an artefact; what is missing, does not fit or contradicts the rest is named.
 
-    Keys that the type does not know are ignored, and logged. A value that would be written in another way than it was
-    read, such as a derived one that does not follow from the others, is refused: no value is changed silently.
+    Every key of the type must be there: a default is for who makes one in Python. Keys that the type does not know are
+    ignored, and logged. A value that would be written in another way than it was read, such as a derived one that does
+    not follow from the others, is refused: no value is changed silently.
 
     Parameters
     ----------
@@ -64,12 +66,27 @@ def read_artefact(
         raise InputError(f"'{source}': {error}; {remedy}") from error
     unknown: list[str] = []
     for place, value, follows in _differences(document, as_document(artefact), "", unknown):
+        if value is MISSING:
+            raise InputError(f"'{source}' lacks the key '{place}'; {remedy}")
         raise InputError(
             f"'{source}': '{place}' is {quoted(value)}, but {quoted(follows)} follows from the rest of it; {remedy}"
         )
     if unknown:
         logger.info("'%s': keys without a meaning here are ignored: %s", source, and_more(unknown, MOST_NAMED))
     return artefact
+
+
+def rounded(artefact: AnArtefact, decimals: int) -> AnArtefact:
+    """Return an artefact with every float in it rounded, as its file is to have them."""
+    return convert(_rounded(as_document(artefact), decimals), type(artefact), dec_hook=_decoded)
+
+
+def _rounded(value: Any, decimals: int) -> Any:
+    if isinstance(value, float):
+        return round(value, decimals)
+    if isinstance(value, dict):
+        return {key: _rounded(item, decimals) for key, item in value.items()}
+    return [_rounded(item, decimals) for item in value] if isinstance(value, list | tuple) else value
 
 
 def _decoded(kind: type, value: object) -> object:
@@ -144,6 +161,9 @@ def _written(path: Path) -> str:
 def _differences(found: Any, written: Any, place: str, unknown: list[str]) -> Iterator[tuple[str, object, object]]:
     """Yield place, value and what would be written, of each that differs; collect keys that would not be written."""
     if isinstance(written, dict):
+        for key in written:
+            if key not in found:
+                yield f"{place}.{key}" if place else key, MISSING, written[key]
         for key, value in found.items():
             path = f"{place}.{key}" if place else key
             if key in written:

@@ -1,5 +1,7 @@
 """JSON Schema of a type: what `dzdesign schema` prints, and what a message says was expected."""
 
+from collections.abc import Iterator
+from dataclasses import fields
 from fractions import Fraction
 from typing import Any
 
@@ -37,11 +39,13 @@ def json_schema(kind: type[Artefact]) -> Node:
     """
     components = msgspec.json.schema(kind, schema_hook=_schema_of_other_types)["$defs"]
     definitions: dict[str, Node] = {name: _tidy(node) for name, node in components.items()}
+    for found in _dataclasses(msgspec.inspect.type_info(kind)):
+        node, names = definitions[found.__name__], [field.name for field in fields(found)]
+        # In the order of the file, and each of them: a default is for who makes one in Python.
+        node |= {"properties": {name: node["properties"][name] for name in names}, "required": names}
     root = definitions.pop(kind.__name__)
     if "#/$defs/Fraction" in str((root, definitions)):
         definitions["Fraction"] = {"description": "An exact number.", **FRACTION}
-    root["properties"] = {"schema": root["properties"].pop("schema"), **root["properties"]}
-    root["required"] = [name for name in root["properties"] if name == "schema" or name in root["required"]]
     family, _, version = schema_of(kind).removeprefix("dzdesign.").partition("/")
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -141,6 +145,17 @@ def _schema_of_other_types(kind: type) -> Node:
     raise NotImplementedError  # msgspec then names the type
 
 
+def _dataclasses(info: object) -> Iterator[type]:
+    """Yield the dataclasses that a type is made of, some of them more than once."""
+    if isinstance(info, msgspec.inspect.DataclassType):
+        yield info.cls
+    for name in getattr(info, "__struct_fields__", ()):
+        value = getattr(info, name)
+        for part in value if isinstance(value, tuple) else (value,):
+            if isinstance(part, msgspec.inspect.Type | msgspec.inspect.Field):
+                yield from _dataclasses(part)
+
+
 def _tidy(node: Any) -> Any:
     """Return a node as a person would write it: a short description, and null as one of the types."""
     if isinstance(node, list):
@@ -150,6 +165,8 @@ def _tidy(node: Any) -> Any:
     node = {key: _tidy(value) for key, value in node.items()}
     if "properties" in node:  # of a class: its name is the definition's, and of its docstring the first paragraph
         node.pop("title", None)
+        for value in node["properties"].values():
+            value.pop("default", None)  # it stands in every file
         node["description"] = " ".join(node["description"].partition("\n\n")[0].split())
     match node:
         case {"prefixItems": [{"title": "numerator"}, _]}:

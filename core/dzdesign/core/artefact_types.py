@@ -69,7 +69,7 @@ class Artefact:
 
 def quantity(
     unit: str,
-    description: str,
+    description: str | None = None,
     *,
     ge: float | None = None,
     gt: float | None = None,
@@ -82,8 +82,8 @@ def quantity(
     ----------
     unit : str
         As a person writes it, such as ``L/min``; ``1`` of a ratio.
-    description : str
-        One sentence.
+    description : str, optional
+        One sentence; a type of several fields leaves it to them.
     ge, gt, le, lt : float, optional
         Bounds: at least, above, at most, below. Only of an ``int`` or a ``float``; those of the items of a list stand
         in the annotation of the item.

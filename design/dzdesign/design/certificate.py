@@ -8,13 +8,14 @@ from collections.abc import Sequence
 from dataclasses import fields
 from fractions import Fraction
 
+from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.beta_table import STEP_CODES, OffsetCeiling, OffsetCurve, offset_ceiling
 from dzdesign.design.compensator import Certificate, Compensator
 from dzdesign.design.signals import Signals
 from dzdesign.identify.fitting.guard_curve import GuardCurve
-from dzdesign.identify.valve.model import SideModel
-from dzdesign.identify.valve.valve_file import valve_from_document
+from dzdesign.identify.valve.model import ValveModel
+from dzdesign.identify.valve.side_model import SideModel
 
 #: Of a loss in V: tenths of a microvolt.
 LOSS_DIGITS = 7
@@ -60,9 +61,9 @@ def certify(
     """
     losses = _losses_V(curve, ceiling, signals, table, u_min0 * u_max_V / denominator)
     return Certificate(
-        confidence=side.confidence,
+        confidence=side.certificate.confidence,
         guard=guard,
-        level_L_min=side.level_L_min,
+        level_L_min=side.certificate.level_L_min,
         dp_MPa=(curve.dp_MPa[0], curve.dp_MPa[-1]),
         smallest_margin_V=_smallest_margin(ceiling, table, u_min0, denominator) * u_max_V,
         mean_loss_V=round(sum(losses) / len(losses), LOSS_DIGITS),
@@ -78,7 +79,7 @@ def prove_certificates(compensator: Compensator) -> None:
     InputError
         If one does not follow, with the first statement that differs.
     """
-    valve = valve_from_document(compensator.valve_document.encode(), "compensator.json: valve")
+    valve = read_artefact(compensator.valve_document.encode(), ValveModel, "compensator.json: valve")
     signals, dither = compensator.signals, compensator.amplifier.dither_counts
     for sign in signals.signs:
         name = "positive" if sign > 0 else "negative"
@@ -126,10 +127,10 @@ def guarded_curve(side: SideModel, guard: str, below_reference: str) -> OffsetCu
     InputError
         If the valve has no curve for that guard; why, and what to do.
     """
-    if not side.beta_dp_MPa:
+    if not side.beta.dp_MPa:
         raise InputError(
             "the valve was identified without a pressure drop, so no offset can be certified at any pressure; "
-            "record the ramp test again with a column of dP (or pA and pB), or declare it: identify --dp \"1 MPa\""
+            'record the ramp test again with a column of dP (or pA and pB), or declare it: identify --dp "1 MPa"'
         )
     curve = _curve_of(side, guard)
     u_min0 = Fraction(repr(curve.u_min0_V))
@@ -144,7 +145,7 @@ def guarded_curve(side: SideModel, guard: str, below_reference: str) -> OffsetCu
 
 def hold_below(side: SideModel, below_reference: str) -> Fraction | None:
     """Return the pressure drop below which beta is held at 1, MPa; None where the tests are followed there."""
-    return Fraction(repr(side.reference_dp_MPa)) if below_reference == "hold" else None
+    return Fraction(repr(side.reference.dp_MPa)) if below_reference == "hold" else None
 
 
 def _curve_of(side: SideModel, guard: str) -> GuardCurve:
@@ -158,7 +159,7 @@ def _curve_of(side: SideModel, guard: str) -> GuardCurve:
 
 
 def _remedy(side: SideModel, guard: str) -> str:
-    has_rising, has_falling = side.tests[0].rising is not None, side.tests[0].falling is not None
+    has_rising, has_falling = side.tests[0].u_knee_rising_V is not None, side.tests[0].u_knee_falling_V is not None
     if guard != "opening" and not has_falling:
         return "record the falling branch too, or accept flow at zero command after closing with --guard opening"
     if guard != "closing" and not has_rising:

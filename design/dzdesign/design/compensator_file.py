@@ -7,6 +7,7 @@ from types import NoneType
 from typing import Any
 
 from dzdesign.core.artefact_files import TOOL, parse_document, sha256_of, to_json
+from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError, quoted
 from dzdesign.core.shape import Exactly, Number, check_shape
 from dzdesign.design.compensator import Certificate, Compensator, SideLaw
@@ -15,7 +16,7 @@ from dzdesign.design.lot_file import LOT, check_lot_hash, lot_document, lot_from
 from dzdesign.design.request import DesignRequest, TargetInputs
 from dzdesign.design.signal_text import Converter
 from dzdesign.design.signals import CommandSignal, PressureSignal, Signals
-from dzdesign.identify.valve.valve_file import valve_from_document
+from dzdesign.identify.valve.model import ValveModel
 
 SCHEMA = "dzdesign.compensator/1"
 REMEDY = "make it again with `dzdesign design`"
@@ -216,7 +217,7 @@ def compensator_from_document(content: bytes, source: str) -> Compensator:
     _check_asked(document, source)
     check_shape(document, {key: shape for key, shape in LATER.items() if key in document}, source, REMEDY)
     _check_hashes(document, source)
-    valve = valve_from_document(to_json(document["valve"]).encode(), f"{source}: valve")
+    valve = read_artefact(to_json(document["valve"]).encode(), ValveModel, f"{source}: valve")
     if _fraction(document["u_max_V"], "u_max_V") != Fraction(repr(valve.u_max_V)):
         raise InputError(f"'{source}': 'u_max_V' is not that of its valve, {valve.u_max_V:g} V; {REMEDY}")
     if document.get("valve_sha256", _hash_of(document["valve"])) != _hash_of(document["valve"]):
@@ -260,9 +261,7 @@ def _check_asked(document: dict[str, Any], source: str) -> None:
     """Refuse half of what the law is derived again from: the other half would be believed."""
     missing = [key for key in ASKED if document.get(key) is None]
     if missing and any(key in document for key in ASKED):
-        raise InputError(
-            f"'{source}' does not say '{missing[0]}', expected all of {', '.join(ASKED)}; {REMEDY}"
-        )
+        raise InputError(f"'{source}' does not say '{missing[0]}', expected all of {', '.join(ASKED)}; {REMEDY}")
 
 
 def _check_hashes(document: dict[str, Any], source: str) -> None:

@@ -6,7 +6,9 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.drive import RAMP_UNIT
 from dzdesign.design.signal_descriptions import unseen_failures
-from dzdesign.identify.valve.model import SideModel, TestResult, ValveModel
+from dzdesign.identify.valve.model import ValveModel
+from dzdesign.identify.valve.ramp_result import TestResult
+from dzdesign.identify.valve.side_model import SideModel
 
 
 def costs_of(compensator: Compensator, valve: ValveModel) -> tuple[str, ...]:

@@ -3,7 +3,9 @@
 from dataclasses import replace
 from fractions import Fraction
 
-from dzdesign.core.artefact_files import sha256_of, to_json
+from dzdesign.core.artefact_files import sha256_of
+from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.derivation.law import law
 from dzdesign.design.beta_table import STEP_CODES, OffsetCeiling, OffsetCurve, choose_beta_table, offset_ceiling
@@ -14,8 +16,8 @@ from dzdesign.design.options import DesignOptions
 from dzdesign.design.quantise import Units, finest_units
 from dzdesign.design.signals import Signals
 from dzdesign.identify.fitting.guard_curve import GUARDS
-from dzdesign.identify.valve.model import SideModel, ValveModel
-from dzdesign.identify.valve.valve_file import valve_from_document
+from dzdesign.identify.valve.model import ValveModel
+from dzdesign.identify.valve.side_model import SideModel
 
 #: Share of the sensor's span by which the difference may read negative before it counts as a failed sensor.
 REVERSE_SHARE = Fraction(1, 100)
@@ -43,9 +45,9 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
         If a proof fails.
     """
     options = options or DesignOptions()
-    document = valve_bytes.decode() if valve_bytes is not None else to_json(valve.to_document())
+    document = valve_bytes.decode() if valve_bytes is not None else to_json_bytes(valve).decode()
     # The file's rounded numbers, so that the same valve gives the same firmware by whichever way it comes here.
-    valve = valve_from_document(document.encode(), "valve.json")
+    valve = read_artefact(document.encode(), ValveModel, "valve.json")
     signals = options.signals
     law(options.law_name)
     u_max = Fraction(repr(valve.u_max_V))
@@ -87,7 +89,7 @@ def _side_law(side: SideModel, options: DesignOptions, u_max: Fraction, sign: in
         _refuse_crossed_branches(side)
     certified = guarded_curve(side, options.guard, options.below_reference)
     opening = _opening_curve(side, options) if options.edge else None
-    reference = Fraction(repr(side.reference_dp_MPa))
+    reference = Fraction(repr(side.reference.dp_MPa))
     top = (opening or certified).at(reference)
     # Half a count less, because the compare value of the offset may be rounded up.
     u_min0 = over(top / u_max - Fraction(1, 2 * signals.compare_max), "down", units.coefficient)
@@ -192,7 +194,7 @@ def travel(side: SideModel, u_max: Fraction, offset_V: Fraction) -> Fraction:
     Identification gives k x_max from the knee on. The law starts lower, at the guarded offset; without the difference
     full command would not reach full flow (u_O(u_max) = u_max exactly if k x_max = u_max - u_min0).
     """
-    reference = min(side.tests, key=lambda test: abs(test.dp_MPa - side.reference_dp_MPa))
+    reference = min(side.tests, key=lambda test: abs(test.dp_MPa - side.reference.dp_MPa))
     knee = reference.u_knee_rising_V if reference.u_knee_rising_V is not None else reference.u_knee_falling_V
     below_knee = max(Fraction(repr(knee)) - offset_V, Fraction(0))
     travel = Fraction(repr(side.k_x_max_over_u_max)) + below_knee / u_max

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError, and_more, quoted
-from dzdesign.identify.valve.model import TRENDS, SideModel
+from dzdesign.identify.valve.side_model import TRENDS, SideModel
 
 if TYPE_CHECKING:
     from dzdesign.design.compensator import Compensator
@@ -55,7 +55,7 @@ class LotSide:
         """Return the bounds of an identified side."""
         return cls(
             trend=side.trend,
-            confidence=side.confidence,
+            confidence=side.certificate.confidence,
             dp_MPa=side.guards[guard].beta_dp_MPa,
             lower_V=side.guards[guard].u_lower_V,
         )

@@ -16,6 +16,7 @@ from math import ceil, floor
 
 import numpy as np
 
+from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.beta_table import OffsetCeiling, OffsetCurve, choose_beta_table, offset_ceiling, pressures_MPa
 from dzdesign.design.certificate import certify, guarded_curve, prove_certificates
@@ -25,8 +26,8 @@ from dzdesign.design.designing import over, prove_monotone, travel
 from dzdesign.design.lot import LotMargin, LotValve, prove_lot
 from dzdesign.design.quantise import finest_units
 from dzdesign.design.signals import Signals
-from dzdesign.identify.valve.model import SideModel, ValveModel
-from dzdesign.identify.valve.valve_file import valve_from_document
+from dzdesign.identify.valve.model import ValveModel
+from dzdesign.identify.valve.side_model import SideModel
 
 #: Of u_max: a ceiling that is nowhere this near to the least one can't be the least by a rounding error (1e-12).
 CLEAR = 1e-6
@@ -46,7 +47,7 @@ class Designed:
     @classmethod
     def of(cls, own: Compensator) -> "Designed":
         """Return a compensator with the valve that it was designed from."""
-        return cls(valve=valve_from_document(own.valve_document.encode(), "compensator.json: valve"), own=own)
+        return cls(valve=read_artefact(own.valve_document.encode(), ValveModel, "compensator.json: valve"), own=own)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -260,7 +261,7 @@ def _carriers(batch: Mapping[str, Designed], sides: Sequence[_Side]) -> list[str
 def _law(side: _Side, carrier: str, first: Compensator) -> SideLaw:
     """Choose the common coefficients and table of one side; certified for the carrier."""
     model, u_max = side.models[carrier], first.u_max_V
-    reference = Fraction(repr(model.reference_dp_MPa))
+    reference = Fraction(repr(model.reference.dp_MPa))
     top = min(curve.at(reference) for curve in side.curves.values())
     scale = finest_units(first.signals, edge_codes=0).coefficient
     u_min0 = over(top / u_max - Fraction(1, 2 * first.signals.compare_max), "down", scale)
@@ -288,9 +289,7 @@ def _certified(side: _Side, name: str, law: SideLaw, first: Compensator) -> Cert
     """Prove the common law for one valve, on the whole interval that it was tested over."""
     reserve = Fraction(first.amplifier.dither_counts, first.signals.compare_max)
     curve = side.curves[name]
-    own = side.exact.get(name) or offset_ceiling(
-        curve, first.signals, first.u_max_V, sign=side.sign, reserve=reserve
-    )
+    own = side.exact.get(name) or offset_ceiling(curve, first.signals, first.u_max_V, sign=side.sign, reserve=reserve)
     return certify(
         side.models[name],
         curve,

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from fractions import Fraction
 from typing import Any
 
+from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError, RequirementError, quoted
 from dzdesign.design.certificate import prove_certificates
 from dzdesign.design.compensator import Compensator
@@ -12,7 +13,7 @@ from dzdesign.design.compensator_file import REMEDY, compensator_document
 from dzdesign.design.designing import design
 from dzdesign.design.lot import LotSide, prove_lot
 from dzdesign.design.option_texts import options_of
-from dzdesign.identify.valve.valve_file import valve_from_document
+from dzdesign.identify.valve.model import ValveModel
 
 #: What of a common setting no single valve gives.
 OF_ALL_VALVES = ("k_x_max_over_u_max", "u_min0_over_u_max", "beta", "certificate")
@@ -66,7 +67,7 @@ def prove_derived(compensator: Compensator) -> None:
     try:
         options = options_of(dict(compensator.request.options), compensator.request.target)
         content = compensator.valve_document.encode()
-        own = design(valve_from_document(content, "compensator.json: valve"), options, content)
+        own = design(read_artefact(content, ValveModel, "compensator.json: valve"), options, content)
     except InputError as error:
         raise InputError(f"its valve can't be designed with its options: {error}; {REMEDY}") from error
     said, follows = compensator_document(compensator), compensator_document(own)
@@ -91,7 +92,7 @@ def _prove_common(compensator: Compensator, own: Compensator) -> None:
 
     Full command must not ask for more than full drive either. That valve is one of the lot, with the bounds it has.
     """
-    valve = valve_from_document(compensator.valve_document.encode(), "compensator.json: valve")
+    valve = read_artefact(compensator.valve_document.encode(), ValveModel, "compensator.json: valve")
     of_carrier = [each for each in compensator.lot if each.valve_sha256 == compensator.valve_sha256]
     for sign in compensator.signals.signs:
         common, single = compensator.side(sign), own.side(sign)

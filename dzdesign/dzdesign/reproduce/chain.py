@@ -7,6 +7,7 @@ from pathlib import Path
 
 from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_files import parse_document, sha256_of, to_json, write_folder
+from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.derivation.account.published import DP0_MPA, RAMP_S, RECORDS_HZ, U_MAX_V
 from dzdesign.design.compensator_file import SCHEMA as COMPENSATOR_SCHEMA
 from dzdesign.design.compensator_file import compensator_document
@@ -52,8 +53,8 @@ def run_chain(valve: RecoveredValve, say: Callable[[str], None] = lambda _: None
         ramps = _ramp_tests(valve, bench)
         say(f"{name}: identify, design, codegen")
         identified = identify(_read_all(ramps, Path(scratch)), identify_options(valve))
-        valve_json = to_json(identified.to_document())
-        compensator = design(identified, valve_bytes=valve_json.encode())
+        valve_json = to_json_bytes(identified)
+        compensator = design(identified, valve_bytes=valve_json)
         compensator_json = to_json(compensator_document(compensator))
         firmware = generate(compensator, "host", compensator_json.encode())
         write_folder(Path(scratch) / "firmware", firmware.files, firmware.manifest)
@@ -65,7 +66,7 @@ def run_chain(valve: RecoveredValve, say: Callable[[str], None] = lambda _: None
     return Chain(
         files={
             f"{place}/plant.toml": _plant_toml(valve),
-            f"{place}/valve.json": valve_json,
+            f"{place}/valve.json": valve_json.decode(),
             f"{place}/compensator.json": compensator_json,
         },
         valve=ReproducedValve(
@@ -77,7 +78,7 @@ def run_chain(valve: RecoveredValve, say: Callable[[str], None] = lambda _: None
             bench=bench,
             sha256=Hashes(
                 ramp_tests={file: sha256_of(content) for file, content in ramps.items()},
-                valve_json=sha256_of(valve_json.encode()),
+                valve_json=sha256_of(valve_json),
                 compensator_json=sha256_of(compensator_json.encode()),
                 core={
                     path: sha256_of(text.encode())

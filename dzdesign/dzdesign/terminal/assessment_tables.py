@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING
 
+from dzdesign.core.verdicts import DOES_NOT_HOLD, verdict_words
 from dzdesign.terminal.page import new_console, new_table, put_line
 
 if TYPE_CHECKING:
@@ -11,7 +12,6 @@ if TYPE_CHECKING:
 
 #: Decimals in the unit of a quantity.
 DECIMALS = {"%": 2, "L/min": 3, "L/min/V": 4}
-VERDICTS = {True: "holds", False: "MISSED", None: "NOT CHECKED"}
 
 
 def print_assessment(assessment: "Assessment") -> None:
@@ -148,9 +148,9 @@ def _limits(assessment: "Assessment") -> list[str]:
     if not assessment.limits:
         return ["No limits were given (--limits, or [limits] in the file of options): nothing was required."]
     lines = [
-        f"{VERDICTS[result.holds]}  {LIMITED[result.quantity].name}, {result.place}: {result.text}"
+        f"{verdict_words(result.holds)}  {LIMITED[result.quantity].name}, {result.place}: {result.text}"
         for result in assessment.limits
     ]
     bad = sum(not result.holds for result in assessment.limits)
-    verdict = f"DOES NOT HOLD: {bad} of {len(lines)} limits are missed or could not be checked"
+    verdict = f"{DOES_NOT_HOLD}: {bad} of {len(lines)} limits are missed or could not be checked"
     return [*lines, verdict if bad else "Every limit holds."]

@@ -5,14 +5,14 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 from dzdesign.core.units import chance
+from dzdesign.core.verdicts import verdict_words
 
 if TYPE_CHECKING:
     from dzdesign.codegen.project import Firmware
     from dzdesign.design.compensator import Compensator
-    from dzdesign.identify.valve.model import BranchResult, SideModel, ValveModel
+    from dzdesign.identify.valve.model import ValveModel
+    from dzdesign.identify.valve.side_model import SideModel
     from dzdesign.verify.verification import Verification
-
-VERDICTS = {True: "holds", False: "FAILS", None: "NOT CHECKED"}
 
 
 def _table(caption: str, headings: Sequence[str], rows: Iterable[Sequence[str]], words: Sequence[int] = (0,)) -> str:
@@ -35,8 +35,8 @@ def _sentences(lines: Iterable[str]) -> str:
     return f"<ul>{items}</ul>" if items else ""
 
 
-def _knee(branch: "BranchResult | None") -> str:
-    return "-" if branch is None else f"{branch.knee_V:.3f} ± {branch.knee_se_V:.4f}"
+def _knee(u_V: float | None, se_V: float | None) -> str:
+    return "-" if u_V is None else f"{u_V:.3f} ± {se_V:.4f}"
 
 
 def valve_html(valve: "ValveModel") -> str:
@@ -44,13 +44,13 @@ def valve_html(valve: "ValveModel") -> str:
     parts = [_table("Record", ("entry", "text"), valve.record.items(), words=(0, 1))] if valve.record else []
     for name, side in valve.sides.items():
         rows = []
-        for test, beta in zip(side.tests, side.beta or (None,), strict=True):
+        for test, beta in zip(side.tests, side.beta.beta or (None,), strict=True):
             rows.append(
                 [
                     test.source,
                     "?" if test.dp_MPa is None else f"{test.dp_MPa:.3f}",
-                    _knee(test.rising),
-                    _knee(test.falling),
+                    _knee(test.u_knee_rising_V, test.u_knee_rising_se_V),
+                    _knee(test.u_knee_falling_V, test.u_knee_falling_se_V),
                     f"{test.u_guard_lower_V:.3f}",
                     "-" if beta is None else f"{beta:.4f}",
                     f"{test.q_max_L_min:.2f}",
@@ -66,10 +66,10 @@ def valve_html(valve: "ValveModel") -> str:
 
 def side_lines(side: "SideModel") -> list[str]:
     """Say what the law takes from a side."""
-    at = "" if side.reference_dp_MPa is None else f" at dP0 = {side.reference_dp_MPa:.3f} MPa"
+    at = "" if side.reference.dp_MPa is None else f" at dP0 = {side.reference.dp_MPa:.3f} MPa"
     lines = [
-        f"u_min0 = {side.u_min0_V:.4f} V{at}, under the {100 * side.confidence:.6g}% lower bound of the {side.guard} "
-        "threshold, for all tests together",
+        f"u_min0 = {side.reference.u_min_V:.4f} V{at}, under the {100 * side.certificate.confidence:.6g}% lower bound "
+        f"of the {side.certificate.guard} threshold, for all tests together",
         f"drive range of the valve k x_max/u_max = {side.k_x_max_over_u_max:.4f}: command from the knee to full "
         "stroke, as a share of full command; the law's counts from its offset, which lies lower",
     ]
@@ -116,7 +116,7 @@ def verification_html(verification: "Verification") -> str:
     checks = _table(
         verification.verdict,
         ("requirement", "verdict", "figures"),
-        ((check.name, VERDICTS[check.holds], check.text) for check in verification.checks),
+        ((check.name, verdict_words(check.holds), check.text) for check in verification.evidence.checks),
         words=(0, 1, 2),
     )
     rows = [
@@ -130,7 +130,7 @@ def verification_html(verification: "Verification") -> str:
         for loop in verification.loops
     ]
     headings = ("side, dP (MPa)", "dead zone without (%)", "with: opening (%)", "closing (%)", "Q at zero (L/min)")
-    caption = f"Closed loop (plant: {verification.plant_source})"
+    caption = f"Closed loop (plant: {verification.evidence.closed_loop.plant_source})"
     return checks + (_table(caption, headings, rows) if rows else "")
 
 

@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING
 
+from dzdesign.core.verdicts import verdict_words
 from dzdesign.terminal.page import new_console, new_table, put_line
 
 if TYPE_CHECKING:
@@ -54,6 +55,6 @@ def _cells(item: "PaperNumber", letter: str, note: str) -> tuple[str, ...]:
         "yes" if item.in_fit else "predicted",
         *(ours.get(by, "") for by in ("valve", "paper's law", "product")),
         f"({letter})" if letter else "",
-        {True: "holds", False: "MISSED", None: ""}[item.holds],
+        "" if item.holds is None else verdict_words(item.holds),
         note,
     )

@@ -4,17 +4,18 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from dzdesign.core.errors import one_line
-from dzdesign.terminal.notebook import VERDICTS, side_lines
+from dzdesign.core.verdicts import NOT_CHECKED, verdict_words
+from dzdesign.terminal.notebook import side_lines
 
 if TYPE_CHECKING:
     from dzdesign.codegen.project import Firmware
     from dzdesign.design.compensator import Compensator
-    from dzdesign.identify.valve.model import BranchResult, ValveModel
+    from dzdesign.identify.valve.model import ValveModel
     from dzdesign.verify.verification import Verification
 
 
-def _knee(branch: "BranchResult | None") -> str:
-    return "not recorded" if branch is None else f"{branch.knee_V:.3f} ± {branch.knee_se_V:.3f}"
+def _knee(u_V: float | None, se_V: float | None) -> str:
+    return "not recorded" if u_V is None else f"{u_V:.3f} ± {se_V:.3f}"
 
 
 def valve_summary(valve: "ValveModel") -> str:
@@ -28,9 +29,11 @@ def valve_summary(valve: "ValveModel") -> str:
         lines.append(f"  {name} side, thresholds in V:")
         for test in side.tests:
             at = "dP unknown" if test.dp_MPa is None else f"{test.dp_MPa:.3f} MPa"
+            opens = _knee(test.u_knee_rising_V, test.u_knee_rising_se_V)
+            closes = _knee(test.u_knee_falling_V, test.u_knee_falling_se_V)
             lines.append(
-                f"    {at}: knee opening {_knee(test.rising)}, closing {_knee(test.falling)}; lower bound of "
-                f"the {side.guard} threshold {test.u_guard_lower_V:.3f}; largest flow {test.q_max_L_min:.2f} L/min"
+                f"    {at}: knee opening {opens}, closing {closes}; lower bound of the {side.certificate.guard} "
+                f"threshold {test.u_guard_lower_V:.3f}; largest flow {test.q_max_L_min:.2f} L/min"
             )
         lines += [f"    {line}" for line in side_lines(side)]
     codes = list(dict.fromkeys(warning.code for warning in valve.warnings))
@@ -62,10 +65,10 @@ def firmware_summary(firmware: "Firmware") -> str:
 
 def verification_summary(verification: "Verification") -> str:
     """Return the verdict, every requirement with its figures, and what was not tried."""
-    from dzdesign.verify.requirements import untried_of
+    from dzdesign.verify.requirements import not_tried
 
-    checks = [f"  {VERDICTS[check.holds]}: {check.name}: {check.text}" for check in verification.checks]
-    untried = [f"  NOT TRIED: {name}".replace("`", "") for name in untried_of(verification.document)]
+    checks = [f"  {verdict_words(check.holds)}: {check.name}: {check.text}" for check in verification.evidence.checks]
+    untried = [f"  {NOT_CHECKED}: {name}".replace("`", "") for name in not_tried(verification.evidence)]
     return "\n".join(map(one_line, [f"Verification: {verification.verdict}", *checks, *untried]))
 
 

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from dzdesign.core.errors import one_line
 from dzdesign.core.units import chance, span_MPa
+from dzdesign.core.verdicts import NOT_CHECKED, verdict_words
 from dzdesign.terminal.page import new_console, new_table, put_line
 
 if TYPE_CHECKING:
@@ -13,10 +14,10 @@ if TYPE_CHECKING:
 
     from dzdesign.codegen.project import Firmware
     from dzdesign.design.compensator import Compensator
-    from dzdesign.identify.valve.model import SideModel, ValveModel
+    from dzdesign.identify.valve.model import ValveModel
+    from dzdesign.identify.valve.side_model import SideModel
     from dzdesign.terminal.page import Grid
-    from dzdesign.verify.closed_loop.scenarios import ScenarioResult
-    from dzdesign.verify.closed_loop.tolerances import Scatter
+    from dzdesign.verify.evidence import MonteCarlo, MutationScore, ScenarioResult, Spread
     from dzdesign.verify.verification import Verification
 
 
@@ -47,8 +48,8 @@ def print_valve(valve: "ValveModel") -> None:
     how = {"declared": "declared", "identified": "from ramps of two rates", "unknown": "none declared"}
     put_line(
         console,
-        f"meter floor: {valve.meter_floor_L_min:.2f} L/min; lag taken as {valve.meter_lag_s:.3g} s "
-        f"({how.get(valve.meter_lag_is, valve.meter_lag_is)})",
+        f"meter floor: {valve.meter.floor_L_min:.2f} L/min; lag taken as {valve.meter.lag_s:.3g} s "
+        f"({how.get(valve.meter.lag_is, valve.meter.lag_is)})",
     )
     for warning in valve.warnings:
         source = f"{warning.source}: " if warning.source else ""
@@ -60,7 +61,7 @@ def _thresholds(side: "SideModel", title: str) -> "Grid":
         title, "ramp test", "dP (MPa)", "knee opening", "knee closing", "s.e. of knee", "onset closing",
          "bound", "beta", "Q max (L/min)",
     )  # fmt: skip
-    betas = side.beta or ("-",)
+    betas = side.beta.beta or ("-",)
     for test, beta in zip(side.tests, betas, strict=True):
         table.add_row(
             test.source,
@@ -77,13 +78,14 @@ def _thresholds(side: "SideModel", title: str) -> "Grid":
 
 
 def _side_lines(side: "SideModel") -> tuple[str, ...]:
-    at = "" if side.reference_dp_MPa is None else f" at dP0 = {side.reference_dp_MPa:.3f} MPa"
+    at = "" if side.reference.dp_MPa is None else f" at dP0 = {side.reference.dp_MPa:.3f} MPa"
+    certificate = side.certificate
     return (
-        f"bound: {100 * side.confidence:.6g}% lower bound, for all tests together, of the {side.guard} threshold (the "
-        f"knee, or the tail's zero where the edge is soft); flow below {side.level_L_min:.2f} L/min (meter's floor, "
-        "its noise, or 0.5 % of the largest flow) counts as none",
-        f"u_min0 = {side.u_min0_V:.4f} V{at}: the largest certified offset. Between two tests only the lower of their "
-        "bounds is certain, so each offset stays under the neighbour's; more tests raise it",
+        f"bound: {100 * certificate.confidence:.6g}% lower bound, for all tests together, of the {certificate.guard} "
+        "threshold (the knee, or the tail's zero where the edge is soft); flow below "
+        f"{certificate.level_L_min:.2f} L/min (meter's floor, its noise, or 0.5 % of the largest flow) counts as none",
+        f"u_min0 = {side.reference.u_min_V:.4f} V{at}: the largest certified offset. Between two tests only the lower "
+        "of their bounds is certain, so each offset stays under the neighbour's; more tests raise it",
         f"drive range of the valve k x_max/u_max = {side.k_x_max_over_u_max:.4f}: command from the knee to full "
         "stroke, as a share of full command; the law's counts from its offset, which lies lower"
         + (f"; k = {side.k_V_mm:.4f} V/mm" if side.k_V_mm is not None else ""),
@@ -96,10 +98,11 @@ def _side_lines(side: "SideModel") -> tuple[str, ...]:
 
 def print_compensator(compensator: "Compensator") -> None:
     """Print the law, the certificate and what the choices cost."""
+    from dzdesign.core.artefact_reading import read_artefact
     from dzdesign.derivation.law import law
     from dzdesign.design.costs import hidden_failures
     from dzdesign.design.signal_descriptions import signals_in_words
-    from dzdesign.identify.valve.valve_file import valve_from_document
+    from dzdesign.identify.valve.model import ValveModel
 
     chosen = law(compensator.law_name)
     lines = [
@@ -125,7 +128,7 @@ def print_compensator(compensator: "Compensator") -> None:
         share = compensator.edge_codes / compensator.signals.command.span(1)
         guard = compensator.positive.certificate.guard
         lines.append(f"edge: from the {guard} to the opening threshold over the first {share:.2%} of command")
-    valve = valve_from_document(compensator.valve_document.encode(), "compensator.json: valve")
+    valve = read_artefact(compensator.valve_document.encode(), ValveModel, "compensator.json: valve")
     hidden = hidden_failures(compensator, valve)
     costs = [line for line in compensator.costs if line not in hidden]
     console = new_console()
@@ -144,24 +147,24 @@ def print_firmware(firmware: "Firmware", folder: str) -> None:
 
 def print_verification(verification: "Verification") -> None:
     """Print every check, what was not tried, and the closed loop per pressure drop."""
-    from dzdesign.verify.requirements import untried_of
+    from dzdesign.verify.requirements import not_tried
 
     console = new_console()
-    for check in verification.checks:
-        verdict = {True: "holds", False: "FAILS", None: "NOT CHECKED"}[check.holds]
-        put_line(console, f"{verdict}  {check.name}: {check.text}")
-    for name in untried_of(verification.document):
-        put_line(console, f"NOT TRIED  {name}".replace("`", ""))
+    for check in verification.evidence.checks:
+        put_line(console, f"{verdict_words(check.holds)}  {check.name}: {check.text}")
+    for name in not_tried(verification.evidence):
+        put_line(console, f"{NOT_CHECKED}  {name}".replace("`", ""))
     if verification.loops:
         console.print(_closed_loop(verification))
-    print_scenarios(verification.scenarios)
-    print_scatter(verification.scatter)
+    print_scenarios(verification.evidence.scenarios)
+    print_scatter(verification.evidence.monte_carlo)
     put_line(console, verification.verdict)
 
 
 def _closed_loop(verification: "Verification") -> "Grid":
+    plant = verification.evidence.closed_loop.plant_source
     table = new_table(
-        f"Closed loop (plant: {verification.plant_source}); dead zones in per cent of full command, onset of flow",
+        f"Closed loop (plant: {plant}); dead zones in per cent of full command, onset of flow",
         "dP (MPa)", "without: opening", "without: closing", "with: opening", "with: closing", "Q at zero, no beta",
         "Q at zero, beta", "Q max without", "Q max with (L/min)",
     )  # fmt: skip
@@ -230,38 +233,38 @@ def _figure(key: str, value: float) -> str:
     return f"{key} {value:.3g}"
 
 
-def print_scatter(series: "Sequence[Scatter]") -> None:
+def print_scatter(series: "MonteCarlo | None") -> None:
     """Print the quantiles of a series of plants per pressure drop."""
-    if not series:
+    if series is None:
         return
     table = new_table(
-        f"Series of {series[0].plants} plants: median (1 to 99 %)", "side", "dP (MPa)", "dead zone opening (%)",
+        f"Series of {series.plants} plants: median (1 to 99 %)", "side", "dP (MPa)", "dead zone opening (%)",
         "closing (%)", "Q max (L/min)", "Q at zero (L/min)", "plants that leak", keys=2,
     )  # fmt: skip
 
-    def spread(quantiles: dict[str, float], by: float, digits: int) -> str:
-        middle, low, high = (by * quantiles[q] for q in ("0.5", "0.01", "0.99"))
+    def spread(of: "Spread", by: float, digits: int) -> str:
+        middle, low, high = (by * value for value in (of.p50, of.p01, of.p99))
         return f"{middle:.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
 
-    for each in series:
+    for each in series.pressures:
         table.add_row(
             each.side,
             f"{each.dp_MPa:.2f}",
-            spread(each.quantiles["residual_opening"], 100, 1),
-            spread(each.quantiles["residual_closing"], 100, 1),
-            spread(each.quantiles["q_max_L_min"], 1, 1),
-            spread(each.quantiles["q_zero_L_min"], 1, 2),
+            spread(each.residual_opening, 100, 1),
+            spread(each.residual_closing, 100, 1),
+            spread(each.q_max_L_min, 1, 1),
+            spread(each.q_zero_L_min, 1, 2),
             f"{each.leaking} of {each.plants}",
         )
     console = new_console()
     console.print(table)
-    at = max(series, key=lambda each: each.worst["q_zero_L_min"]["value"])
-    worst = at.worst["q_zero_L_min"]
-    if worst["value"] > 0:
-        plant = ", ".join(f"{name} {value:.4g}" for name, value in worst["plant"].items())
+    at = max(series.pressures, key=lambda each: each.q_zero_L_min.worst)
+    worst = at.q_zero_L_min
+    if worst.worst > 0:
+        plant = ", ".join(f"{name} {value:.4g}" for name, value in worst.worst_plant.items())
         put_line(
             console,
-            f"Most at zero command: {worst['value']:.2f} L/min at {at.dp_MPa:.2f} MPa, by the plant with {plant}. "
+            f"Most at zero command: {worst.worst:.2f} L/min at {at.dp_MPa:.2f} MPa, by the plant with {plant}. "
             "A series is no requirement: the compensator is certified for the valve of its ramp tests.",
         )
 
@@ -288,7 +291,7 @@ def print_demo(valve: "ValveModel", verification: "Verification", folder: str) -
         )
     console = new_console()
     console.print(table)
-    checked, wrong = (sum(getattr(each, name) for each in verification.inputs) for name in ("inputs", "wrong"))
+    checked, wrong = (sum(getattr(each, name) for each in verification.evidence.inputs) for name in ("inputs", "wrong"))
     put_line(console, f"Inputs checked: {checked}, wrong: {wrong}")
     put_line(console, verification.verdict)
     put_line(console, f"Artefacts: {folder}")
@@ -309,10 +312,9 @@ def print_mutations(document: dict) -> None:
     console.print(f"{document['caught']} of {document['mutants']} wrong equations are caught.")
 
 
-def print_firmware_mutants(document: dict) -> None:
+def print_firmware_mutants(score: "MutationScore") -> None:
     """Print what of the wrong C was not killed, and why."""
     console = new_console()
-    put_line(console, f"Mutants that were not killed; equivalent: {document['equivalent_means']}")
-    for row in document["not_killed"]:
-        place = f"{row['file']} line {row['line']}"
-        put_line(console, f"{row['verdict']}, {place}: {row['change']}")
+    put_line(console, f"Mutants that were not killed; equivalent: {score.equivalent_means}")
+    for each in score.not_killed:
+        put_line(console, f"{each.verdict}, {each.file} line {each.line}: {each.change}")

@@ -3,6 +3,8 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from dzdesign.core.artefact_reading import rounded
+from dzdesign.core.artefact_types import THIS_TOOL, SourceFile
 from dzdesign.core.errors import InputError
 from dzdesign.identify.data_quality.clipped_meter import without_clipping
 from dzdesign.identify.data_quality.pressures import (
@@ -18,7 +20,7 @@ from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.sides import tests_of_side
 from dzdesign.identify.reading.ramp_files import RampTest
 from dzdesign.identify.side import IdentifiedSide, identify_side
-from dzdesign.identify.valve.model import SIDES, ValveModel, Warning_
+from dzdesign.identify.valve.model import DECIMALS, SIDES, Meter, ValveModel, Warning_
 
 #: What ramps of several pressure drops show where a stuck sensor has made one test of them: no word on meter or valve.
 ALSO_OF_A_MIXTURE = ("noise", "bend")
@@ -90,23 +92,28 @@ def identify_sides(
         own_words = [item for item in sides[name].warnings if not mixed or item.code not in ALSO_OF_A_MIXTURE]
         warnings += [replace(item, text=prefix + item.text) for item in (*pressures, *clipped, *own_words)]
     lag = next(iter(sides.values())).described.lag
+    files = dict.fromkeys(file for side in sides.values() for item in side.described.tests for file in item.files)
     model = ValveModel(
+        tool=THIS_TOOL,
+        made_from=tuple(SourceFile(source=source, sha256=digest) for source, digest in files),
         u_max_V=options.u_max,
-        meter_floor_L_min=max(side.described.floor for side in sides.values()) / L_MIN,
-        meter_lag_s=lag.seconds,
-        meter_lag_is=lag.origin,
-        meter_zero_L_min=options.meter_zero / L_MIN,
+        meter=Meter(
+            floor_L_min=max(side.described.floor for side in sides.values()) / L_MIN,
+            lag_s=lag.seconds,
+            lag_is=lag.origin,
+            zero_L_min=options.meter_zero / L_MIN,
+        ),
         knee_window=options.knee_window,
         sides={name: side.model for name, side in sides.items()},
         warnings=most_serious_first(
             (*about_recordings(tests), *([_about_two_sides()] if len(sides) > 1 else []), *warnings)
         ),
-        made_from=tuple(
-            dict.fromkeys(file for side in sides.values() for item in side.described.tests for file in item.files)
-        ),
-        record=record or {},
+        record=dict(record or {}),
     )
-    return Identified(model=model, sides=sides)
+    model = rounded(model, DECIMALS)
+    return Identified(
+        model=model, sides={name: replace(side, model=model.sides[name]) for name, side in sides.items()}
+    )
 
 
 def _about_single_pressures(mine: Sequence[RampTest]) -> list[Warning_]:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +26,9 @@ from dzdesign.identify.fitting.guarding import (
 from dzdesign.identify.knees.prepared_tests import L_MIN, MPA, DescribedTest, DescribedTests, describe_tests
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_files import RampTest
-from dzdesign.identify.valve.model import BranchResult, SideModel, TestResult, Warning_
+from dzdesign.identify.valve.model import Warning_
+from dzdesign.identify.valve.ramp_result import BRANCHES, TestResult
+from dzdesign.identify.valve.side_model import Certificate, Reference, SideModel
 
 #: dP0 names the tested pressure drop within this share of it.
 REFERENCE_TOLERANCE = 0.1
@@ -74,7 +77,7 @@ def _fit_with_trend(group: DescribedTests, options: IdentifyOptions) -> tuple[Tr
     free = fit_knees([item.shapes for item in group.tests], floor=group.floor, u_max=options.u_max, trend="flat")
     dp = np.array([item.dp or math.nan for item in group.tests])
     column = _guarded_column(group.tests)
-    budget = options.flat_change * options.u_max
+    budget = options.flat_below * options.u_max
     trend = find_trend(dp, free.knee[:, column], free.knee_se[:, column], options.u_max, budget)
     return trend, free, order_knees(group, free, trend.direction, column, options)
 
@@ -118,18 +121,20 @@ def _side_model(
     several = len(described) > 1
     return SideModel(
         tests=tuple(_test_result(group, knees, row, threshold) for row in range(len(described))),
-        reference_dp_MPa=described[reference].dp / MPA if known else None,
+        reference=Reference(dp_MPa=described[reference].dp / MPA if known else None, u_min_V=guards[guard].u_min0_V),
         k_x_max_over_u_max=k_x_max / options.u_max,
         k_V_mm=k_x_max / (options.x_max * 1e3) if options.x_max else None,
         trend=trend.direction if several else None,
         trend_change_V=trend.change if several else None,
         trend_change_se_V=trend.change_se if several else None,
         trend_p=trend.p_value if several else None,
-        confidence=options.confidence,
-        guard=guard,
+        certificate=Certificate(
+            confidence=options.confidence,
+            guard=guard,
+            level_L_min=max(shape.level for item in described for shape in item.shapes if shape) / L_MIN,
+        ),
         guards=guards,
         opening_curve=opening,
-        level_L_min=max(shape.level for item in described for shape in item.shapes if shape) / L_MIN,
         active_constraints=knees.active
         + tuple(f"offset at test {row + 1}" for row, holds in enumerate(active) if holds),
     )
@@ -176,8 +181,8 @@ def _test_result(group: DescribedTests, knees: KneeFit, row: int, guarded: Thres
     return TestResult(
         source=item.test.source,
         dp_MPa=None if item.dp is None else item.dp / MPA,
-        rising=_branch_result(group, knees, row, 0),
-        falling=_branch_result(group, knees, row, 1),
+        **_thresholds(group, knees, row, "rising"),
+        **_thresholds(group, knees, row, "falling"),
         not_observable=_not_observable(group, row),
         u_guard_V=float(guarded.value[row]),
         u_guard_lower_V=float(guarded.bound[row]),
@@ -185,31 +190,30 @@ def _test_result(group: DescribedTests, knees: KneeFit, row: int, guarded: Thres
         q_max_L_min=item.q_max / L_MIN,
         saturates=all(shape.saturates for shape in shapes),
         noise_L_min=max(shape.sigma for shape in shapes) / L_MIN,
-        noise_colour=max(shape.colour for shape in shapes),
+        noise_variance_inflation=max(shape.colour for shape in shapes),
         outliers=sum(shape.outliers for shape in shapes),
         ramps=item.ramps,
     )
 
 
-def _branch_result(group: DescribedTests, knees: KneeFit, row: int, column: int) -> BranchResult | None:
+def _thresholds(group: DescribedTests, knees: KneeFit, row: int, branch: str) -> dict[str, Any]:
+    """Return the thresholds of one branch under their keys in valve.json; None where it was not recorded."""
+    column = BRANCHES.index(branch)
     shape = group.tests[row].shapes[column]
-    if shape is None:
-        return None
-    return BranchResult(
-        knee_V=float(knees.knee[row, column]),
-        knee_se_V=float(knees.knee_se[row, column]),
-        level_V=shape.tail.at_level,
-        level_se_V=shape.tail.at_level_se,
-        onset_V=shape.onset,
-        onset_se_V=shape.onset_se,
-        straight=shape.window,
-    )
+    found = {
+        "knee": (float(knees.knee[row, column]), float(knees.knee_se[row, column])) if shape else (None, None),
+        "level": (shape.tail.at_level, shape.tail.at_level_se) if shape else (None, None),
+        "onset": (shape.onset, shape.onset_se) if shape else (None, None),
+    }
+    values = {f"u_{name}_{branch}_V": value for name, (value, _) in found.items()}
+    errors = {f"u_{name}_{branch}_se_V": error for name, (_, error) in found.items()}
+    return {**values, **errors, f"straight_{branch}": shape.window if shape else None}
 
 
 def _not_observable(group: DescribedTests, row: int) -> dict[str, str]:
     """Say of thresholds that can't be seen why; what valve.json gives instead is said too."""
     reasons = {}
-    for direction, shape in zip(("rising", "falling"), group.tests[row].shapes, strict=True):
+    for direction, shape in zip(BRANCHES, group.tests[row].shapes, strict=True):
         if shape is None:
             for name in ("knee", "level", "onset"):
                 reasons[f"u_{name}_{direction}_V"] = f"there is no {direction} branch"

@@ -6,9 +6,10 @@ from fractions import Fraction
 from typing import Any
 
 from dzdesign.core.units import span_MPa
+from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED
 from dzdesign.report.artefact_chain import Chain
 from dzdesign.report.sections.cells import counted, whole
-from dzdesign.verify.requirements import untried_of
+from dzdesign.verify.requirements import not_tried
 
 #: What the check of the inputs counts, each of which a requirement has to say.
 COUNTS = (
@@ -61,7 +62,7 @@ def headline(chain: Chain) -> Headline:
     chain : Chain
     """
     evidence = chain.document("verification")
-    untried = untried_of(evidence) if evidence and not chain.faults else ()
+    untried = not_tried(chain.evidence()) if evidence and not chain.faults else ()
     return replace(_verdict(chain), cautions=tuple(_cautions(chain)), untried=untried)
 
 
@@ -105,14 +106,14 @@ def _verdict(chain: Chain) -> Headline:
     unknown = [check for check in checks if check["holds"] is None]
     reasons = tuple(
         f"{word}: {check['name']}: {check['text']}"
-        for word, group in (("does not hold", missed), ("NOT CHECKED", unknown))
+        for word, group in ((DOES_NOT_HOLD, missed), (NOT_CHECKED, unknown))
         for check in group
     )
     if missed:
-        text = f"DOES NOT HOLD: {len(missed)} of {len(checks)} requirements not met"
+        text = f"{DOES_NOT_HOLD}: {len(missed)} of {len(checks)} requirements not met"
         return Headline(kind="bad", sign="✗", text=text, reasons=reasons)
     if unknown or not checks or not evidence["holds"]:
-        text = f"NOT CHECKED in full: {len(unknown)} of {len(checks)} requirements are open"
+        text = f"{NOT_CHECKED} in full: {len(unknown)} of {len(checks)} requirements are open"
         return Headline(kind="open", sign="?", text=text, reasons=reasons)
     text = f"Every requirement holds, all {len(checks)} that were tried"
     return Headline(kind="good", sign="✓", text=text)
@@ -239,7 +240,7 @@ def _certificate(compensator: dict[str, Any], inputs: list[dict[str, Any]]) -> F
 
 def _inputs(inputs: list[dict[str, Any]]) -> Figure:
     if not inputs:
-        return Figure(label="Inputs checked", value="NOT CHECKED", note="the C did not get so far", kind="open")
+        return Figure(label="Inputs checked", value=NOT_CHECKED, note="the C did not get so far", kind="open")
     wrong, every = (sum(each[key] for each in inputs) for key in ("wrong", "inputs"))
     if wrong:
         note = f"of {whole(every)} pairs of command and pressure-difference code"

@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from dzdesign.codegen.project import generate
+from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.signal_text import Converter, command_signal, parse_signal
-from dzdesign.identify.valve.valve_file import valve_from_document
+from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.exhaustive.drive_check import drive_samples as sequence
 from dzdesign.verify.exhaustive.exact_drive import STEP_UNIT, DriveModel
 from dzdesign.verify.toolchain.host_compiler import load_library
@@ -94,7 +95,7 @@ SETS = (
 @cache
 def compensator_named(name: str) -> Compensator:
     content = (FULL / "valve.json").read_bytes()
-    return design(valve_from_document(content, "valve.json"), options_named(name), content)
+    return design(read_artefact(content, ValveModel, "valve.json"), options_named(name), content)
 
 
 def first_difference(firmware, model: DriveModel, samples: list[tuple[int, int, int]]) -> str:
@@ -235,7 +236,7 @@ def test_zero_command_stays_under_the_certified_bound_at_the_waves_top(side):
     """The bound, in closed form: of all thresholds' lower bounds of the side's tests at these pressures the lowest."""
     compensator = compensator_named("everything")
     signals = compensator.signals
-    valve = valve_from_document(compensator.valve_document.encode(), "valve.json")
+    valve = read_artefact(compensator.valve_document.encode(), ValveModel, "valve.json")
     tests = valve.sides["positive" if side > 0 else "negative"].tests
     rising = valve.sides["positive" if side > 0 else "negative"].trend == "increasing"
     counts_in_V = signals.compare_max / float(compensator.u_max_V)

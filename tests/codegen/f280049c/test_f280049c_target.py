@@ -13,9 +13,10 @@ from xml.etree import ElementTree
 
 import pytest
 
+from dzdesign.codegen.banner import Banner
 from dzdesign.codegen.f280049c import target as f280049c
 from dzdesign.codegen.f280049c.target import TARGET
-from dzdesign.codegen.project import banner, environment, hardware_context
+from dzdesign.codegen.project import target_files
 from dzdesign.core.errors import DzdesignError
 from dzdesign.verify.toolchain.host_compiler import STRICT, host_compiler
 from tests.support.golden_firmware import FULL, GOLDENS, golden_compensator
@@ -38,13 +39,8 @@ def bipolar(tmp_path) -> Path:
 
 def render(tmp_path: Path, *signs: int) -> Path:
     """Write the target's folder, by the real renderer."""
-    renderer = environment("dzdesign.codegen.f280049c")
-    for path, template in TARGET.templates.items():
-        text = renderer.get_template(template).render(
-            **hardware_context(golden_compensator("f280049c", FULL if -1 in signs else GOLDENS), TARGET, "0" * 64),
-            banner=banner(template, "0" * 64),
-            project="dzdesign",
-        )
+    compensator = golden_compensator("f280049c", FULL if -1 in signs else GOLDENS)
+    for path, text in target_files(compensator, TARGET, Banner(digest="0" * 64)).items():
         (tmp_path / path).parent.mkdir(exist_ok=True)
         (tmp_path / path).write_text(text, encoding="utf-8", newline="\n")
     return tmp_path / "f280049c"

@@ -261,7 +261,7 @@ def test_what_the_command_line_says_is_not_blamed_on_the_file(refusal, bench):
 
 
 def test_an_example_for_a_part_of_a_value_is_none_for_the_whole():
-    from dzdesign.command_line.toml_options import in_words_of_the_file
+    from dzdesign.command_line.options_file import in_words_of_the_file
 
     values = {"ramp_up": "0.5 s / 0.8", "ramp": "1"}
     said = in_words_of_the_file("--ramp-up is '0.8' without a unit; write for example '0.8 s'", "dz.toml", values)
@@ -289,14 +289,14 @@ def test_options_from_a_file_stand_in_for_the_defaults(bench, capsys):
         ("dp = '2 MPa'", [], ["2 MPa"]),
         ("dp = ['2 MPa', '3 MPa']", [], ["2 MPa", "3 MPa"]),
         ("dp = ['2 MPa', '3 MPa']", ["--dp", "1 MPa"], ["1 MPa"]),
-        ("seed = 3", [], None),
+        ("seed = 3", [], ()),
     ],
 )
 def test_an_option_given_several_times_replaces_the_file(bench, text, argv, expected):
-    from dzdesign.command_line.cli import parse
+    from dzdesign.command_line.invocation import parse
 
     (bench / "options.toml").write_text(text)
-    assert parse(["simulate", *argv, "--config", "options.toml"]).dp == expected
+    assert parse(["simulate", *argv, "--config", "options.toml"]).arguments.dp == expected
 
 
 # artefacts
@@ -323,34 +323,34 @@ VALVES = [
     (("u_max_V",), True, "'u_max_V' is True, expected a number"),
     (("u_max_V",), 0, "'u_max_V' is 0, expected a number"),
     (("sides",), [], "'sides' is []"),
-    ((*SIDE, "tests"), [], "0 tests stand beside 2 nodes of beta"),
-    ((*SIDE, "tests", 0), None, "1 tests stand beside 2 nodes of beta"),
+    ((*SIDE, "tests"), [], "'sides.positive.tests' is [], expected a list that is not empty"),
+    ((*SIDE, "tests", 0), None, "'sides.positive': a curve has 2 thresholds for 1 tests"),
     ((*SIDE, "tests", 1, "dp_MPa"), "4", "'sides.positive.tests[1].dp_MPa' is '4', expected a number"),
     ((*SIDE, "tests", 1, "u_guard_lower_V"), None, "lacks the key 'sides.positive.tests[1].u_guard_lower_V'"),
     ((*SIDE, "tests", 1, "u_knee_rising_V"), "x", "'sides.positive.tests[1].u_knee_rising_V' is 'x'"),
     ((*SIDE, "reference", "u_min_V"), "5", "'sides.positive.reference.u_min_V' is '5'"),
-    ((*SIDE, "reference", "u_min_V"), -5, "u_min0 is -5 V, expected a positive threshold"),
+    ((*SIDE, "reference", "u_min_V"), -5, "the reference's u_min_V is -5 V, not that of the closing curve"),
     ((*SIDE, "k_x_max_over_u_max"), 10**40, "'sides.positive.k_x_max_over_u_max' is 1000"),
-    ((*SIDE, "trend"), "downhill", "trend is 'downhill', expected one of decreasing, flat, increasing"),
+    ((*SIDE, "trend"), "downhill", "'sides.positive.trend' is 'downhill', expected 'decreasing', 'flat'"),
     ((*SIDE, "beta", "beta", 0), 1e308, "'sides.positive.beta.beta[0]' is 1e+308"),
-    ((*SIDE, "beta", "dp_MPa"), [4, 1], "which must rise"),
-    ((*SIDE, "certificate", "steps_V"), [], "0 steps bound 2 tests"),
+    ((*SIDE, "beta", "dp_MPa"), [4, 1], "'sides.positive.beta.dp_MPa[0]' is 4, but 1.0 follows"),
+    ((*SIDE, "guards", "closing", "certified_steps_V"), [], "0 steps bound 2 tests"),
     ((*SIDE, "certificate", "confidence"), "high", "'sides.positive.certificate.confidence' is 'high'"),
     ((*SIDE, "guards"), [], "'sides.positive.guards' is [], expected an object"),
     ((*SIDE, "guards", "mean"), 5, "'sides.positive.guards.mean' is 5, expected an object with u_min0_V"),
     ((*SIDE, "guards", "mean", "beta"), None, "lacks the key 'sides.positive.guards.mean.beta'"),
     ((*SIDE, "guards", "mean", "u_lower_V", 1), "5", "'sides.positive.guards.mean.u_lower_V[1]' is '5'"),
-    ((*SIDE, "guards", "opening", "u_min0_V"), 0, "'guards.opening': u_min0 is 0 V, expected a positive threshold"),
-    ((*SIDE, "guards", "opening", "beta_dp_MPa"), [4, 1], "'guards.opening': the nodes of beta must be as many"),
+    ((*SIDE, "guards", "opening", "u_min0_V"), 0, "guards.opening': u_min0 is 0 V, expected a positive threshold"),
+    ((*SIDE, "guards", "opening", "beta_dp_MPa"), [4, 1], "guards.opening': the nodes of beta must be as many"),
     ((*SIDE, "guards", "opening", "beta_dp_MPa"), [1, 3], "the nodes of beta must stand at the tests' pressure drops"),
-    ((*SIDE, "guards", "opening", "u_threshold_V"), [5], "'guards.opening': 2 lower bounds stand beside 1 thresholds"),
+    ((*SIDE, "guards", "opening", "u_threshold_V"), [5], "guards.opening': 2 lower bounds stand beside 1 thresholds"),
     ((*SIDE, "guards", "opening", "certified_steps_V"), [1], "the certified steps do not follow"),
-    ((*SIDE, "guards", "opening", "u_lower_V", 0), 9, "'guards.opening': a lower bound lies above the threshold"),
-    ((*SIDE, "guards", "closing", "u_min0_V"), 4, "'guards.closing' is not the curve of 'reference', 'beta'"),
-    ((*SIDE, "certificate", "guard"), "shut", "expected the guard among them, and no others than closing, mean, open"),
-    ((*SIDE, "tests", 1, "ramps", "sources"), None, "lacks the key 'sides.positive.tests[1].ramps.sources'"),
-    ((*SIDE, "tests", 1, "ramps"), [], "'sides.positive.tests[1].ramps' is [], expected an object with sources"),
-    ((*SIDE, "tests", 1, "ramps", "sources"), "a.csv", "'sides.positive.tests[1].ramps.sources' is 'a.csv'"),
+    ((*SIDE, "guards", "opening", "u_lower_V", 0), 9, "guards.opening': a lower bound lies above the threshold"),
+    ((*SIDE, "guards", "closing", "u_min0_V"), 4, "u_min_V is 4.69869 V, not that of the closing curve"),
+    ((*SIDE, "certificate", "guard"), "shut", "'sides.positive.certificate.guard' is 'shut', expected 'closing'"),
+    ((*SIDE, "tests", 1, "ramps"), None, "lacks the key 'sides.positive.tests[1].ramps'"),
+    ((*SIDE, "tests", 1, "ramps"), [], "'sides.positive.tests[1].ramps' is [], expected a list that is not empty"),
+    ((*SIDE, "tests", 1, "ramps"), "a.csv", "'sides.positive.tests[1].ramps' is 'a.csv'"),
     ((*SIDE, "opening_curve"), [], "'sides.positive.opening_curve' is [], expected an object"),
     ((*SIDE, "opening_curve", "u_V"), None, "lacks the key 'sides.positive.opening_curve.u_V'"),
     ((*SIDE, "opening_curve", "u_V", 0), None, "the opening curve has 1 thresholds and 2 errors at 2 pressure drops"),
@@ -556,11 +556,11 @@ def test_a_folder_that_is_no_firmware(refusal, bench, name, content, words):
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (b"int (\n", "FAILS  compiles without a warning"),
-        (b"", "FAILS"),
-        (b"typedef int nothing;\n", "FAILS"),
-        (b"/* \xe9 */\n", "FAILS"),
-        (None, "FAILS  compiles without a warning"),
+        (b"int (\n", "DOES NOT HOLD  compiles without a warning"),
+        (b"", "DOES NOT HOLD"),
+        (b"typedef int nothing;\n", "DOES NOT HOLD"),
+        (b"/* \xe9 */\n", "DOES NOT HOLD"),
+        (None, "DOES NOT HOLD  compiles without a warning"),
     ],
 )
 def test_a_core_that_is_none_does_not_hold(bench, capsys, content, words):
@@ -570,7 +570,7 @@ def test_a_core_that_is_none_does_not_hold(bench, capsys, content, words):
         core.write_bytes(content)
     assert main(["verify", "firmware"]) == 1
     out = capsys.readouterr().out
-    assert "FAILS  files as generated: changed or missing: core/dz_comp.c" in out and words in out
+    assert "DOES NOT HOLD  files as generated: changed or missing: core/dz_comp.c" in out and words in out
 
 
 @needs_compiler
@@ -579,7 +579,7 @@ def test_a_core_that_somebody_edited_does_not_hold(bench, capsys):
     core.write_text(core.read_text() + "/* tuned on the bench */\n")
     assert main(["verify", "firmware"]) == 1
     out = capsys.readouterr().out
-    assert "FAILS  files as generated: changed or missing: core/dz_comp.c" in out
+    assert "DOES NOT HOLD  files as generated: changed or missing: core/dz_comp.c" in out
     assert "holds  equals the exactly rounded law" in out
 
 
@@ -588,7 +588,7 @@ def test_a_plant_that_stays_shut_is_no_evidence(bench, capsys):
     """The spring holds it shut: no flow at zero command means nothing."""
     (bench / "plant.toml").write_text("preload_N = 1e6")
     assert main(["verify", "firmware", "--plant", "plant.toml"]) == 1
-    assert "FAILS  the plant of the closed loop opens" in capsys.readouterr().out
+    assert "DOES NOT HOLD  the plant of the closed loop opens" in capsys.readouterr().out
 
 
 # the installed program

@@ -17,7 +17,7 @@ from dzdesign.derivation import symbols as s
 from dzdesign.derivation.account.published import FIRST, VALVES
 from dzdesign.identify.plots.frame import plot_style, saved
 from dzdesign.report.reproduction import Reproduction
-from dzdesign.reproduce import chain, explanations, paper_figures, paper_numbers, recovered_valves
+from dzdesign.reproduce import chain, explanations, paper_figures, paper_numbers, recovered_valves, reproduction
 from dzdesign.reproduce.recovered_valves import at_rest, recover_valves
 from dzdesign.reproduce.valve_runs import DIRECT, PRODUCT, Drive, run_valve
 from dzdesign.verify.closed_loop.loop import ClosedLoop
@@ -41,7 +41,7 @@ def reproduced(tmp_path_factory):
         return chains[-1]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(chain, "run_chain", recorded)
+        patch.setattr(reproduction, "run_chain", recorded)
         assert main(["reproduce", "-o", str(folder)]) == 0
     return folder, chains
 
@@ -49,8 +49,8 @@ def reproduced(tmp_path_factory):
 def again(reproduced, monkeypatch, folder, *arguments):
     """Run the command on the runs that are there, without its figures."""
     chains = {each.valve.valve: each for each in reproduced[1]}
-    monkeypatch.setattr(chain, "run_chain", lambda valve, say: chains[valve.published.name])
-    monkeypatch.setattr(paper_figures, "figure_files", lambda runs: {})
+    monkeypatch.setattr(reproduction, "run_chain", lambda valve, say: chains[valve.published.name])
+    monkeypatch.setattr(reproduction, "figure_files", lambda runs: {})
     return main(["reproduce", "-o", str(folder / "again"), *arguments])
 
 
@@ -114,7 +114,7 @@ def test_a_number_that_must_agree_and_does_not_is_exit_status_one(reproduced, mo
     monkeypatch.setattr(paper_numbers, "READING", {**explanations.READING, "about": 0.0})
     assert again(reproduced, monkeypatch, tmp_path) == 1
     out = capsys.readouterr().out
-    assert "31 must agree: 2 DO NOT" in out and out.count("MISSED") == 2
+    assert "31 must agree: 2 DO NOT" in out and out.count("DOES NOT HOLD") == 2
     assert again(reproduced, monkeypatch, tmp_path, "--json") == 1
     assert json.loads(capsys.readouterr().out)["holds"] is False
 
@@ -197,12 +197,13 @@ def test_the_papers_numbers_catch_a_wrong_law(monkeypatch, error):
 def test_the_closed_loop_catches_a_wrong_law_in_the_c(reproduced, monkeypatch, tmp_path):
     """The C follows the wrong law faithfully at every input; only the plant behind it shows that flow is missing."""
     from dzdesign.codegen.project import generate
+    from dzdesign.core.artefact_reading import read_artefact
     from dzdesign.design.compensator_file import compensator_document
     from dzdesign.design.designing import design
-    from dzdesign.identify.valve.valve_file import valve_from_document
+    from dzdesign.identify.valve.model import ValveModel
 
     second = recover_valves()[2]
-    valve = valve_from_document((reproduced[0] / "second_valve" / "valve.json").read_bytes(), "valve.json")
+    valve = read_artefact((reproduced[0] / "second_valve" / "valve.json").read_bytes(), ValveModel, "valve.json")
     seed(monkeypatch, WRONG["beta on all of Eq. (14)"])
     compensator = design(valve)
     document = json.loads(to_json(compensator_document(compensator)))

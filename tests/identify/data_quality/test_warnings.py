@@ -11,6 +11,7 @@ import pytest
 from dzdesign.codegen.project import generate, target_named
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import to_json
+from dzdesign.core.artefact_types import as_document, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator_file import compensator_document
 from dzdesign.design.designing import design
@@ -84,7 +85,7 @@ class TestSimulated:
             for name, text in firmware.files.items():
                 assert ("SIMULATED" in text) is simulated or name == "compensator.json", name
             shelf = {
-                "valve.json": to_json(valve.to_document()).encode(),
+                "valve.json": to_json_bytes(valve),
                 "compensator.json": to_json(compensator_document(compensator)).encode(),
             }
             cautions = headline(chain_of(shelf)).cautions
@@ -119,7 +120,7 @@ class TestBranchOrder:
         options = options_of({"accept": "branch-order"}, target_named("f28335").inputs())
         for valve, accepted in ((crossed, True), (identify([valve_at(dp) for dp in PRESSURES]), False)):
             shelf = {
-                "valve.json": to_json(valve.to_document()).encode(),
+                "valve.json": to_json_bytes(valve),
                 "compensator.json": to_json(compensator_document(design(valve, options))).encode(),
             }
             said = [line for line in headline(chain_of(shelf)).cautions if line.startswith("ACCEPTED warning, branch-")]
@@ -135,7 +136,7 @@ class TestBranchOrder:
 
     def test_the_command_line_and_a_file_of_options_accept_it(self, crossed, tmp_path, monkeypatch, capsys):
         monkeypatch.chdir(tmp_path)
-        (tmp_path / "valve.json").write_text(to_json(crossed.to_document()))
+        (tmp_path / "valve.json").write_bytes(to_json_bytes(crossed))
         (tmp_path / "options.toml").write_text('accept = "branch-order"\n')
         assert main(["design", "valve.json"]) == 2 and not (tmp_path / "compensator.json").exists()
         assert "--accept branch-order" in capsys.readouterr().err
@@ -168,7 +169,7 @@ def test_a_side_that_the_firmware_leaves_out_is_said_from_identify_to_the_report
     assert "--command-signal" in warning.text and not warned(one, "two-sides")
     for valve, said in ((both, True), (one, False)):
         shelf = {
-            "valve.json": to_json(valve.to_document()).encode(),
+            "valve.json": to_json_bytes(valve),
             "compensator.json": to_json(compensator_document(design(valve))).encode(),
         }
         assert any("negative side" in text for text in headline(chain_of(shelf)).cautions) is said
@@ -213,7 +214,6 @@ class TestKneeErrors:
         valve = identify(self.curved(1.0))
         assert not {"noise", "bend", "coarse-levels"} & {warning.code for warning in valve.warnings}
 
-
     @pytest.mark.parametrize("window", [(0.12, 0.5), (0.6, 0.8)])
     def test_the_window_of_the_line_is_named(self, window):
         (warning, *_) = warned(identify(self.curved(0.5), IdentifyOptions(knee_window=window)), "bend")
@@ -223,7 +223,7 @@ class TestKneeErrors:
     def test_a_window_that_was_widened_is_named_beside_the_one_that_was_asked_for(self):
         valve = identify(self.curved(0.5))
         row = valve.positive.tests[0]
-        row = replace(row, rising=replace(row.rising, straight=(0.12, 0.9), knee_se_V=1.0))
+        row = replace(row, straight_rising=(0.12, 0.9), u_knee_rising_se_V=1.0)
         warning = knee_errors._bent(row, 0.1, (0.12, 0.5))
         assert "between 12 and 90 % of its largest (--knee-window 12-50, widened as far" in warning.text
 
@@ -358,7 +358,7 @@ class TestClippedMeter:
     def test_a_floor_that_is_written_as_such_is_no_zero_error(self, tmp_path):
         valve = identify(self.recordings(tmp_path, lambda q: np.maximum(q, 0.6)))
         assert len(warned(valve, "meter-clipped")) == 3 and not warned(valve, "meter-zero")
-        assert valve.meter_floor_L_min == pytest.approx(0.6)
+        assert valve.meter.floor_L_min == pytest.approx(0.6)
 
     def test_a_zero_error_stays_one(self, tmp_path):
         valve = identify(self.recordings(tmp_path, lambda q: q + 0.6))
@@ -395,6 +395,6 @@ class TestOrder:
 
 
 def test_warnings_reach_the_file(tmp_path):
-    document = identify([replace(valve_at(1.0), simulated=True)]).to_document()
+    document = as_document(identify([replace(valve_at(1.0), simulated=True)]))
     assert document["warnings"][0]["code"] == "simulated"
     assert json.loads(to_json(document))["warnings"][0]["source"] == "ramp_dP1.csv"

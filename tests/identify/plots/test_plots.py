@@ -97,7 +97,7 @@ class TestFlow:
             assert labelled(axes, label).get_xydata().tolist() == [[u, 0]]
             assert axes.get_xlim()[0] < u < axes.get_xlim()[1]
         assert set(labelled(axes, "certified bound").get_xdata()) == {test.u_guard_lower_V}
-        assert set(labelled(axes, "meter's floor").get_ydata()) == {found.model.meter_floor_L_min}
+        assert set(labelled(axes, "meter's floor").get_ydata()) == {found.model.meter.floor_L_min}
 
     def test_the_solid_line_spans_the_window_and_the_dashed_one_goes_on_to_the_knee(self, found, figures):
         test, item = found.model.positive.tests[0], found.sides["positive"].described.tests[0]
@@ -172,10 +172,10 @@ class TestOverPressure:
         side = found.model.positive
         axes = figures["thresholds"].axes[0]
         steps, edges, _ = labelled(axes, "certified staircase").get_data()
-        assert tuple(steps) == side.certified_steps_V
-        assert tuple(edges) == side.beta_dp_MPa
+        assert tuple(steps) == side.curve.certified_steps_V
+        assert tuple(edges) == side.beta.dp_MPa
         offset = labelled(axes, "largest certified offset").get_xydata()
-        assert offset[:, 1] == pytest.approx(side.u_min0_V * np.array(side.beta))
+        assert offset[:, 1] == pytest.approx(side.reference.u_min_V * np.array(side.beta.beta))
         for left, right, step in zip(offset, offset[1:], steps, strict=False):
             assert max(left[1], right[1]) <= step + 1e-9
 
@@ -183,14 +183,14 @@ class TestOverPressure:
         side = found.model.positive
         axes = figures["beta"].axes[0]
         nodes = labelled(axes, "β(dP), straight between its nodes").get_xydata()
-        assert nodes.tolist() == np.column_stack([side.beta_dp_MPa, side.beta]).tolist()
+        assert nodes.tolist() == np.column_stack([side.beta.dp_MPa, side.beta.beta]).tolist()
         bound = labelled(axes, "lower bound / u_min0, at the test").get_ydata()
-        assert bound * side.u_min0_V == pytest.approx([test.u_guard_lower_V for test in side.tests])
+        assert bound * side.reference.u_min_V == pytest.approx([test.u_guard_lower_V for test in side.tests])
         assert np.all(nodes[:, 1] <= bound + 1e-9)
         for label in ("certified staircase / u_min0", "allowed by all bounds together"):
             steps = labelled(axes, label).get_data().values
-            assert steps * side.u_min0_V == pytest.approx(side.certified_steps_V)
-        assert labelled(axes, "dP0, where β = 1").get_xydata().tolist() == [[side.reference_dp_MPa, 1]]
+            assert steps * side.reference.u_min_V == pytest.approx(side.curve.certified_steps_V)
+        assert labelled(axes, "dP0, where β = 1").get_xydata().tolist() == [[side.reference.dp_MPa, 1]]
 
 
 class TestOneTest:
@@ -203,7 +203,7 @@ class TestOneTest:
         axes = figures["thresholds"].axes[0]
         test = single.model.positive.tests[0]
         assert labelled(axes, "guarded threshold").get_ydata().tolist() == [test.u_guard_V]
-        assert labelled(axes, "largest certified offset").get_ydata() == [single.model.positive.u_min0_V]
+        assert labelled(axes, "largest certified offset").get_ydata() == [single.model.positive.reference.u_min_V]
         assert axes.get_xticks().size == 0
         assert "not recorded" in axes.get_xlabel()
 

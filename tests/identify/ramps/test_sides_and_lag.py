@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_files import to_json
+from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.artefact_types import as_document, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.designing import design
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes
-from dzdesign.identify.valve.valve_file import valve_from_document
+from dzdesign.identify.valve.model import ValveModel
 from tests.support.synthetic import L_MIN, MPA, Truth, synthetic_ramp
 
 PRESSURES = (1.0, 2.0, 4.0)
@@ -79,14 +80,14 @@ class TestSides:
         mirrored = [replace(test, source=f"minus_{test.source}", u=-test.u, q=-test.q) for test in tests]
         both = identify([*mirrored, *tests])
         assert [test.source for test in both.sides["negative"].tests] == [test.source for test in mirrored]
-        assert both.sides["negative"].u_min0_V == pytest.approx(both.positive.u_min0_V, abs=1e-6)
+        assert both.sides["negative"].reference.u_min_V == pytest.approx(both.positive.reference.u_min_V, abs=1e-6)
 
     def test_a_side_without_data_is_said_to_be_missing(self, valve):
-        assert valve.to_document()["untested_sides"] == []
+        assert valve.untested_sides == ()
         test = synthetic_ramp(1.0, Truth())
-        assert identify([test]).to_document()["untested_sides"] == ["negative"]
+        assert identify([test]).untested_sides == ("negative",)
         only_negative = identify([replace(test, u=-test.u, q=-test.q)])
-        assert only_negative.to_document()["untested_sides"] == ["positive"]
+        assert only_negative.untested_sides == ("positive",)
         with pytest.raises(InputError, match="negative commands only; record ramp tests with positive ones"):
             design(only_negative)
 
@@ -98,8 +99,8 @@ class TestSides:
         assert "the negative side is missing" in warning.text and "never opens" in warning.text
 
     def test_the_file_holds_both_sides(self, valve):
-        read = valve_from_document(to_json(valve.to_document()).encode(), "valve.json")
-        assert read.to_document() == valve.to_document()
+        read = read_artefact(to_json_bytes(valve), ValveModel, "valve.json")
+        assert read == valve
 
     def test_the_command_prints_both(self, recordings, tmp_path, monkeypatch, capsys):
         monkeypatch.chdir(tmp_path)
@@ -135,7 +136,7 @@ class TestLag:
     @pytest.mark.parametrize("lag", [0.05, 0.1, 0.5])
     def test_two_rates_tell_the_lag_from_hysteresis(self, lag):
         valve = identify(two_rates(lag))
-        assert (valve.meter_lag_is, valve.meter_lag_s) == ("identified", pytest.approx(lag, abs=0.012, rel=0.05))
+        assert (valve.meter.lag_is, valve.meter.lag_s) == ("identified", pytest.approx(lag, abs=0.012, rel=0.05))
         for test in valve.positive.tests:
             assert test.u_knee_rising_V == pytest.approx(5.4, abs=5e-3)
             assert test.u_knee_falling_V == pytest.approx(5.3, abs=5e-3)
@@ -143,12 +144,12 @@ class TestLag:
 
     def test_no_lag_is_found_where_there_is_none(self):
         valve = identify(two_rates(1e-6))
-        assert valve.meter_lag_s == pytest.approx(0.0, abs=0.01)
+        assert valve.meter.lag_s == pytest.approx(0.0, abs=0.01)
 
     def test_one_rate_does_not_tell(self):
         tests = two_rates(0.1, seconds=(100.0,))
         valve = identify(tests)
-        assert (valve.meter_lag_is, valve.meter_lag_s) == ("unknown", 0.0)
+        assert (valve.meter.lag_is, valve.meter.lag_s) == ("unknown", 0.0)
         (warning,) = [warning for warning in valve.warnings if warning.code == "lag-unknown"]
         assert "10 mV at 0.1 V/s" in warning.text and "--meter-lag" in warning.text
         hysteresis = [test.u_knee_rising_V - test.u_knee_falling_V for test in valve.positive.tests]
@@ -156,7 +157,7 @@ class TestLag:
 
     def test_a_declared_lag_is_taken_as_it_is(self):
         valve = identify(two_rates(0.1), IdentifyOptions(meter_lag=0.02))
-        assert (valve.meter_lag_is, valve.meter_lag_s) == ("declared", 0.02)
+        assert (valve.meter.lag_is, valve.meter.lag_s) == ("declared", 0.02)
         assert "lag-unknown" not in {warning.code for warning in valve.warnings}
 
 
@@ -188,7 +189,7 @@ class TestQualityGate:
 
     def test_what_the_meter_hides_is_said_beside_the_threshold(self):
         test = synthetic_ramp(1.0, Truth(floor=0.6), falling=False)
-        row = identify([test], IdentifyOptions(meter_floor=0.6 * L_MIN)).to_document()["sides"]["positive"]["tests"][0]
+        row = as_document(identify([test], IdentifyOptions(meter_floor=0.6 * L_MIN)))["sides"]["positive"]["tests"][0]
         assert "nothing below 0.60 L/min" in row["not_observable"]["u_onset_rising_V"]
         assert row["not_observable"]["u_knee_falling_V"] == "there is no falling branch"
         assert row["u_level_rising_V"] == pytest.approx(5.4 + 0.6 / 4, abs=0.02)
@@ -198,9 +199,9 @@ class TestQualityGate:
     def test_flat_is_what_the_engineer_says(self):
         tests = [synthetic_ramp(dp, Truth(knee_rising=5.4 - 0.01 * dp, noise=0.02)) for dp in PRESSURES]
         assert identify(tests).positive.trend == "decreasing"
-        flat = identify(tests, IdentifyOptions(flat_change=5e-3)).positive
-        assert flat.trend == "flat" and set(flat.beta) == {1.0} and flat.trend_p < 0.01
-        assert max(flat.certified_steps_V) <= min(test.u_guard_lower_V for test in flat.tests)
+        flat = identify(tests, IdentifyOptions(flat_below=5e-3)).positive
+        assert flat.trend == "flat" and set(flat.beta.beta) == {1.0} and flat.trend_p < 0.01
+        assert max(flat.curve.certified_steps_V) <= min(test.u_guard_lower_V for test in flat.tests)
 
 
 def test_the_pressure_of_a_side_is_read_where_it_is_shut(recordings):

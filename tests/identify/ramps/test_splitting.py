@@ -7,13 +7,14 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from dzdesign.core.artefact_files import to_json
+from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.artefact_types import as_document, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.splitting import split_ramps
 from dzdesign.identify.reading.ramp_files import RampTest, ramp_file_bytes, read_ramp_file
-from dzdesign.identify.valve.valve_file import valve_from_document
+from dzdesign.identify.valve.model import ValveModel
 from tests.support.synthetic import MPA, Truth, synthetic_ramp
 
 laws = settings(
@@ -66,9 +67,7 @@ class TestLaws:
     def test_the_order_of_files_does_not_matter(self, seed, order):
         tests = [ramp(1.0, seed), ramp(1.0, seed + 1), ramp(2.0, seed), ramp(4.0, seed)]
         tests = [dataclasses.replace(test, source=f"{number}.csv") for number, test in enumerate(tests)]
-        assert to_json(identify([tests[index] for index in order]).to_document()) == to_json(
-            identify(tests).to_document()
-        )
+        assert to_json_bytes(identify([tests[index] for index in order])) == to_json_bytes(identify(tests))
 
     @laws
     @given(seed=seeds, at=st.floats(0.1, 0.9))
@@ -132,14 +131,14 @@ class TestSplitting:
         recording = one_after_another(ramp(1.0, 1), ramp(2.0, 2), ramp(1.0, 3))
         other = dataclasses.replace(ramp(2.0, 4), source="b.csv")
         valve = identify([recording, other])
-        low, high = valve.to_document()["sides"]["positive"]["tests"]
+        low, high = as_document(valve)["sides"]["positive"]["tests"]
         assert low["source"] == "all.csv (ramps 1, 3)"
-        assert low["ramps"] == {"count": 2, "sources": ["all.csv (ramp 1)", "all.csv (ramp 3)"]}
+        assert low["ramps"] == ("all.csv (ramp 1)", "all.csv (ramp 3)")
         assert high["source"] == "all.csv (ramp 2), b.csv"
-        assert high["ramps"] == {"count": 2, "sources": ["all.csv (ramp 2)", "b.csv"]}
-        assert [source for source, _ in valve.made_from] == ["all.csv", "b.csv"]
-        text = to_json(valve.to_document())
-        assert to_json(valve_from_document(text.encode(), "valve.json").to_document()) == text
+        assert high["ramps"] == ("all.csv (ramp 2)", "b.csv")
+        assert [file.source for file in valve.made_from] == ["all.csv", "b.csv"]
+        text = to_json_bytes(valve).decode()
+        assert to_json_bytes(read_artefact(text.encode(), ValveModel, "valve.json")).decode() == text
 
     def test_repeating_shrinks_the_error(self):
         once = thresholds([ramp(1.0, 1)])[0][0].u_knee_se_V
@@ -173,7 +172,7 @@ class TestSplitting:
             dp=np.concatenate([up.dp, np.full(n, MPA)]),
         )
         valve = identify([one_after_another(tooth, tooth, tooth)])
-        assert valve.positive.guard == "opening" and valve.positive.tests[0].u_knee_falling_V is None
+        assert valve.positive.certificate.guard == "opening" and valve.positive.tests[0].u_knee_falling_V is None
 
     def test_a_shut_valve_is_not_hidden_by_a_good_recording(self):
         shut = dataclasses.replace(ramp(1.0, 2, knee_rising=50.0), source="shut.csv")

@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 from dzdesign.command_line.cli import main
 from dzdesign.core import input_files
 from dzdesign.core.artefact_files import parse_document, read_bytes, write_file
+from dzdesign.core.artefact_types import as_document
 from dzdesign.core.errors import InputError
 from dzdesign.core.units import SI_UNIT, parse_quantity, si_factor
 from dzdesign.design.signal_text import parse_signal
@@ -249,7 +250,7 @@ JSON = st.recursive(
 def documents(example_valve, example_compensator):
     from dzdesign.design.compensator_file import compensator_document
 
-    return {"valve": example_valve.to_document(), "compensator": compensator_document(example_compensator)}
+    return {"valve": as_document(example_valve), "compensator": compensator_document(example_compensator)}
 
 
 def places(value, way=()):
@@ -262,10 +263,14 @@ def places(value, way=()):
 
 @pytest.mark.parametrize("kind", ["valve", "compensator"])
 def test_a_changed_artefact(documents, kind):
+    from dzdesign.core.artefact_reading import read_artefact
     from dzdesign.design.compensator_file import compensator_from_document
-    from dzdesign.identify.valve.valve_file import valve_from_document
+    from dzdesign.identify.valve.model import ValveModel
 
-    read = {"valve": valve_from_document, "compensator": compensator_from_document}[kind]
+    read = {
+        "valve": lambda *file: read_artefact(file[0], ValveModel, file[1]),
+        "compensator": compensator_from_document,
+    }[kind]
     sound = documents[kind]
     ways = list(places(sound))
 

@@ -2,19 +2,21 @@
 
 import json
 import tomllib
-from argparse import Namespace
 from pathlib import Path
 
 import pytest
 
 from dzdesign import api
 from dzdesign.command_line.cli import main
-from dzdesign.command_line.identify_options import record_of
+from dzdesign.command_line.invocation import merged_entries
 from dzdesign.core.artefact_files import sha256_of, to_json
+from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.artefact_types import as_document, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.identify.identification import identify
+from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.test_record import LONGEST_NAME, LONGEST_TEXT, MOST_ENTRIES, checked_record
-from dzdesign.identify.valve.valve_file import valve_from_document
+from dzdesign.stages.identify import record_of
 from tests.support.page_reader import Page
 from tests.support.schema_checks import problems
 from tests.support.synthetic import Truth, synthetic_ramp
@@ -55,22 +57,20 @@ def test_the_command_line_goes_before_the_file_entry_by_entry(here, capsys):
     assert "<td" in valve._repr_html_() and "HLP 46" in valve._repr_html_()
 
 
-def test_no_number_hangs_on_it_and_without_one_nothing_is_written(here):
+def test_no_number_hangs_on_it(here):
     test = synthetic_ramp(1.0, Truth(noise=0.02), ramp_s=20, rate_Hz=25)
-    with_record, without = identify([test], record=HOSTILE).to_document(), identify([test]).to_document()
-    assert with_record.pop("record") == HOSTILE and "record" not in without
+    with_record, without = as_document(identify([test], record=HOSTILE)), as_document(identify([test]))
+    assert with_record.pop("record") == HOSTILE and without.pop("record") == {}
     assert with_record == without
 
 
-def test_valve_json_is_read_back_with_it_and_an_older_one_without(here):
+def test_valve_json_is_read_back_with_it(here):
     valve = identify([synthetic_ramp(1.0, Truth(noise=0.02), ramp_s=20, rate_Hz=25)], record=HOSTILE)
-    document = valve.to_document()
-    assert valve_from_document(to_json(document).encode(), "valve.json").to_document() == document
-    del document["record"]
-    assert valve_from_document(to_json(document).encode(), "valve.json").record == {}
+    document = as_document(valve)
+    assert as_document(read_artefact(to_json(document).encode(), ValveModel, "valve.json")) == document
     for wrong in ([], {"serial": 4711}, {"": "x"}, {"a": "b\nc"}, {"a": "x" * 201}, {str(n): "x" for n in range(41)}):
         with pytest.raises(InputError, match=r"'valve.json'.*record"):
-            valve_from_document(to_json({**document, "record": wrong}).encode(), "valve.json")
+            read_artefact(to_json({**document, "record": wrong}).encode(), ValveModel, "valve.json")
         if wrong != {"a": "b\nc"}:  # a schema counts, and does not look at characters
             assert problems("valve", {**document, "record": wrong}) != []
 
@@ -78,7 +78,7 @@ def test_valve_json_is_read_back_with_it_and_an_older_one_without(here):
 def test_none_of_it_reaches_the_c(here):
     """Its one way into a firmware folder is compensator.json, whose valve is that of the hash."""
     valve = identify([synthetic_ramp(1.0, Truth(noise=0.02), ramp_s=20, rate_Hz=25)], record=HOSTILE)
-    Path("valve.json").write_text(to_json(valve.to_document()))
+    Path("valve.json").write_bytes(to_json_bytes(valve))
     for target in ("f28335", "avr"):
         files = api.generate(api.design("valve.json", target=target), target=target).files
         compensator = json.loads(files["compensator.json"])
@@ -96,7 +96,6 @@ def test_none_of_it_reaches_the_c(here):
         (["serial = "], "--record: serial is empty"),
         (["serial = 1", "serial = 1"], "--record has 'serial' twice"),
         (["serial = 1", "Serial = 2"], "--record has 'serial' and 'Serial' twice"),
-        ([{"Serial": "1"}, "serial = 2"], "the record has 'Serial' and 'serial' twice"),
         (["a = b\nc"], "expected one line of characters that are printed"),
         (["a = \x1b[2J"], "expected one line of characters that are printed"),
         (["a = \u202egnp"], "expected one line of characters that are printed"),
@@ -110,8 +109,13 @@ def test_none_of_it_reaches_the_c(here):
 )
 def test_what_is_no_record_is_refused(entries, words):
     with pytest.raises(InputError) as error:
-        record_of(entries)
+        record_of(entries) if isinstance(entries, dict) else merged_entries("--record", None, entries)
     assert words in str(error.value)
+
+
+def test_a_name_of_the_file_and_of_the_command_line_that_differ_in_a_capital_are_refused():
+    with pytest.raises(InputError, match="the record has 'Serial' and 'serial' twice"):
+        merged_entries("--record", {"Serial": "1"}, ["serial = 2"])
 
 
 def test_the_largest_record_is_one():
@@ -132,7 +136,7 @@ def test_the_largest_record_is_one():
 def test_what_the_file_may_hold(here, text, record):
     Path("dzdesign.toml").write_text(text)
     assert main(["-q", "identify", "ramp.csv", "--config", "dzdesign.toml"]) == 0
-    assert json.loads(Path("valve.json").read_text()).get("record") == record
+    assert json.loads(Path("valve.json").read_text())["record"] == (record or {})
 
 
 def test_the_file_that_init_writes_has_a_record_to_fill_in(here):
@@ -149,11 +153,10 @@ def test_the_file_that_init_writes_has_a_record_to_fill_in(here):
 def test_each_valve_of_a_list_has_its_own_beside_that_of_all(here):
     from dzdesign.batch.command import _task
     from dzdesign.batch.valves import valves_of
-    from dzdesign.command_line.command_spec import language
-    from dzdesign.command_line.parsing import parse
+    from dzdesign.command_line.invocation import parse
 
     Path("lot.csv").write_text("name,files,record.serial,record.oil-type\na,ramp.csv,4711,\nb,ramp.csv,4712,HLP 32\n")
-    args: Namespace = parse(["batch", "lot.csv", "--record", "bench = 2", "--record", "oil-type = HLP 46"], language())
+    args = parse(["batch", "lot.csv", "--record", "bench = 2", "--record", "oil-type = HLP 46"]).arguments
     tasks = [_task(valve, args, None) for valve in valves_of(Path("lot.csv"), None, ())]
     assert [task.identify["record"] for task in tasks] == [
         {"bench": "2", "oil-type": "HLP 46", "serial": "4711"},
@@ -170,12 +173,12 @@ def test_the_report_shows_it_under_the_verdict_and_as_text(here):
 
     valve = identify([synthetic_ramp(1.0, Truth(noise=0.02), ramp_s=20, rate_Hz=25)], record=HOSTILE)
     Path("lone").mkdir()
-    Path("lone/valve.json").write_text(to_json(valve.to_document()))
+    Path("lone/valve.json").write_bytes(to_json_bytes(valve))
     html = report_of_folder(Path("lone")).html
     head = Page(html[html.index('<div class="verdict') : html.index('<dl class="numbers">')])
     assert all(name in head.text and text in head.text for name, text in HOSTILE.items())
     assert len(head.of("dt")) == len(head.of("dd")) == len(HOSTILE)
     assert not Page(html).of("script") and not Page(html).of("img")
     assert [word for word in ("Tested by", "Checked by", "Date") if f"<p>{word}</p>" not in html] == []
-    Path("lone/valve.json").write_text(to_json({**valve.to_document(), "record": {}}))
+    Path("lone/valve.json").write_text(to_json({**as_document(valve), "record": {}}))
     assert 'class="record"' not in report_of_folder(Path("lone")).html

@@ -24,7 +24,7 @@ from dzdesign.verify.analysis.mutation import (
     all_mutants,
     judge_all,
     mutation_check,
-    mutation_document,
+    mutation_score,
 )
 from dzdesign.verify.exhaustive.drive_check import FIELDS, CompiledDrive, PreparedDrive
 from tests.support.golden_firmware import FULL, GOLDENS, INPUT
@@ -54,7 +54,7 @@ def full(tmp_path_factory):
 def edited(bench: MutationBench, file: str, old: str, new: str) -> Mutant:
     text = bench.sources[file]
     assert text.count(old) >= 1, old
-    return Mutant(file=file, line=0, change=f"{old} -> {new}", text=text.replace(old, new, 1))
+    return Mutant(file=file, line=1, change=f"{old} -> {new}", text=text.replace(old, new, 1))
 
 
 def changes(text: str) -> list[str]:
@@ -113,9 +113,9 @@ JUDGED = [
 def test_a_verdict_is_given_where_it_is_due(plain, file, old, new, verdict):
     outcome = plain.judge(edited(plain, file, old, new))
     assert outcome.verdict == verdict, outcome
-    document = mutation_document([outcome, plain.judge(edited(plain, *JUDGED[0][:3]))])
-    assert mutation_check(document).holds
-    assert [row["verdict"] for row in document["not_killed"]] == ([] if verdict == KILLED else [verdict])
+    score = mutation_score([outcome, plain.judge(edited(plain, *JUDGED[0][:3]))])
+    assert mutation_check(score).holds
+    assert [row.verdict for row in score.not_killed] == ([] if verdict == KILLED else [verdict])
 
 
 def test_a_fault_that_no_converter_shows_survives(plain):
@@ -124,9 +124,9 @@ def test_a_fault_that_no_converter_shows_survives(plain):
     text = plain.sources["dz_comp.c"].replace(head, "static " + head.replace("dz_comp", "right"))
     text += f"{head}\n    const uint16_t beyond = p_a_adc > 5000u && p_a_adc < 60000u;\n"
     text += "    return (uint16_t)(right(u_adc, p_a_adc, p_b_adc) ^ beyond);\n}\n"
-    outcome = plain.judge(Mutant(file="dz_comp.c", line=0, change="beyond", text=text))
+    outcome = plain.judge(Mutant(file="dz_comp.c", line=1, change="beyond", text=text))
     assert outcome.verdict == SURVIVED
-    check = mutation_check(mutation_document([outcome, plain.judge(edited(plain, *JUDGED[0][:3]))]))
+    check = mutation_check(mutation_score([outcome, plain.judge(edited(plain, *JUDGED[0][:3]))]))
     assert not check.holds and check.text.endswith("1 survived")
 
 
@@ -135,18 +135,18 @@ def test_a_part_of_all_mutants_is_killed_or_equivalent(name, request):
     bench = request.getfixturevalue(name)
     every = all_mutants(bench)
     assert {mutant.file for mutant in every} >= {"dz_comp.c", "dz_comp.h", "dz_drive.c"} and len(every) > 300
-    document = mutation_document(judge_all(bench, random.Random(SEED).sample(every, TRIED)))
-    assert document["survived"] == 0 and document["refused"] == 0
-    assert document["killed"] >= 0.7 * TRIED
-    assert sum(document["killers"].values()) == document["killed"]
+    score = mutation_score(judge_all(bench, random.Random(SEED).sample(every, TRIED)))
+    assert score.survived == 0 and score.refused == 0
+    assert score.killed >= 0.7 * TRIED
+    assert sum(score.killers.values()) == score.killed
 
 
 def test_the_command_line_adds_the_row_and_the_list(firmware_folder, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(mutation, "all_mutants", lambda bench: [edited(bench, *JUDGED[k][:3]) for k in (0, 3)])
     assert main(["verify", str(firmware_folder), "--mutate", "-o", str(tmp_path / "evidence")]) == 0
     out = capsys.readouterr().out
-    assert "holds  wrong C is caught: 1 of 2 mutants killed, 1 equivalent (1 of the same object code" in out
-    assert "same object code, dz_comp.h line 0: DZ_ADC_CODE_MAX 4095u -> DZ_ADC_CODE_MAX 4096u" in out
+    assert "HOLDS  wrong C is caught: 1 of 2 mutants killed, 1 equivalent (1 of the same object code" in out
+    assert "same object code, dz_comp.h line 1: DZ_ADC_CODE_MAX 4095u -> DZ_ADC_CODE_MAX 4096u" in out
     document = json.loads((tmp_path / "evidence" / "verification.json").read_text())
     assert document["mutants"]["killed"] == 1 and document["holds"]
     assert [check["holds"] for check in document["checks"] if check["name"] == "the drive follows its model"] == [True]

@@ -9,9 +9,10 @@ import pytest
 
 from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_files import write_folder
+from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.design.compensator_file import compensator_document
 from dzdesign.design.designing import design
-from dzdesign.identify.valve.valve_file import valve_from_document
+from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence, compare_at_pressure
 from dzdesign.verify.closed_loop.plant import plants_from_tests
 from tests.support.golden_firmware import FULL, full_options
@@ -25,7 +26,7 @@ NO_DITHER = {"dither_Hz": 0.0, "dither_peak": Fraction(0)}
 
 @cache
 def valve():
-    return valve_from_document((FULL / "valve.json").read_bytes(), "valve.json")
+    return read_artefact((FULL / "valve.json").read_bytes(), ValveModel, "valve.json")
 
 
 def compared(folder, side: int = 1, change=lambda compensator: compensator, **options):

@@ -92,7 +92,7 @@ def test_a_core_that_holds_its_offset_when_a_sensor_fails_leaks(firmware, exampl
 def test_a_plant_that_is_not_the_identified_valve_is_seen(firmware, plant):
     """With 45 N of preload it opens at 83 % of command and not at 54 %: the residual dead zone would be the plant's."""
     found = verify(firmware, replace(plant, preload_N=45.0), sequence=QUICK)
-    (check,) = [check for check in found.checks if "identified valve" in check.name]
+    (check,) = [check for check in found.evidence.checks if "identified valve" in check.name]
     assert check.holds is False and "preload" in check.text
 
 
@@ -117,14 +117,15 @@ def test_verification_fails_where_a_scenario_leaves_the_valve_open(example_compe
     made = generate(leaky, "f28335")
     write_folder(tmp_path / "fw", made.files, made.manifest)
     found = verify(tmp_path / "fw", plant, sequence=QUICK)
-    failed = {check.name for check in found.checks if not check.holds}
+    failed = {check.name for check in found.evidence.checks if not check.holds}
     assert "no flow at zero command after any scenario" in failed
-    assert len(found.document["scenarios"]) == len(found.scenarios) > 40
+    assert len(found.evidence.scenarios) > 40
 
 
 def test_a_plant_for_one_pressure_drop_gets_no_load_steps(firmware):
     found = verify(firmware, sequence=QUICK)
-    assert found.scenarios and not [each for each in found.scenarios if "load" in each.name or "frozen" in each.name]
+    names = [each.name for each in found.evidence.scenarios]
+    assert names and not [name for name in names if "load" in name or "frozen" in name]
 
 
 SPREADS = {"preload_N": (0.01, "uniform"), "rho_kg_m3": (0.02, "normal")}
@@ -147,16 +148,16 @@ class TestSeries:
         loop = ClosedLoop(plant, firmware, compensator_document(example_compensator))
         found = scatter(loop, plant, Tolerances(spreads={"preload_N": (1e-12, "uniform")}, plants=3), 5.0)
         assert found.leaking == 0
-        for quantiles in found.quantiles.values():
-            assert quantiles["0.01"] == pytest.approx(quantiles["0.99"], abs=1e-6)
+        for spread in (found.residual_opening, found.residual_closing, found.q_zero_L_min, found.q_max_L_min):
+            assert spread.p01 == pytest.approx(spread.p99, abs=1e-6)
 
     def test_plants_that_open_earlier_leak_and_the_worst_is_named(self, firmware, example_compensator, plant):
         loop = ClosedLoop(plant, firmware, compensator_document(example_compensator))
         found = scatter(loop, plant, Tolerances(spreads={"preload_N": (0.02, "uniform")}, plants=20), 5.0)
         assert 0 < found.leaking < 20
-        worst = found.worst["q_zero_L_min"]
-        run = loop.with_plant(replace(plant, **worst["plant"])).run(SEQUENCE.command(), 5.0, "compensated")
-        assert run.q_largest_L_min[-1] == pytest.approx(worst["value"]) and worst["value"] > 0.3
+        worst = found.q_zero_L_min
+        run = loop.with_plant(replace(plant, **worst.worst_plant)).run(SEQUENCE.command(), 5.0, "compensated")
+        assert run.q_largest_L_min[-1] == pytest.approx(worst.worst) and worst.worst > 0.3
 
     def test_a_series_needs_its_plant(self, firmware):
         with pytest.raises(InputError, match="--plant"):

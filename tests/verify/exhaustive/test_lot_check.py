@@ -23,10 +23,9 @@ from dzdesign.design.redesign_check import prove_derived
 from dzdesign.identify.identification import identify
 from dzdesign.report.artefact_chain import Artefact, Chain
 from dzdesign.report.sections.lot_setting import lot_costs, lot_figures, lot_section
-from dzdesign.verify.checks import lot_checked
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
-from dzdesign.verify.exhaustive.lot_check import check_lot
+from dzdesign.verify.exhaustive.lot_check import check_lot, lot_checked
 from dzdesign.verify.exhaustive.test_vectors import differences
 from dzdesign.verify.exhaustive.zero_command import zero_command_margins
 from tests.support.synthetic import Truth, needs_compiler, synthetic_ramp
@@ -204,7 +203,7 @@ def test_the_command_fails_and_names_the_valve(common, tmp_path, capsys):
     folder, _ = firmware_of(with_bound(common.compensator, "c", 1, -1.0), tmp_path / "firmware")
     assert main(["verify", str(folder), "-o", str(tmp_path / "evidence")]) == 1
     said = " ".join(capsys.readouterr().out.split())
-    assert "FAILS no over-compensation of any valve of the lot: 4 of 4 valves" in said
+    assert "DOES NOT HOLD no over-compensation of any valve of the lot: 4 of 4 valves" in said
     evidence = json.loads((tmp_path / "evidence" / "verification.json").read_text(encoding="utf-8"))
     assert evidence["holds"] is False and evidence["inputs"][0]["lot"]["over_compensated"] == ["c"]
     assert "1 over-compensated: c" in (tmp_path / "evidence" / "report.html").read_text(encoding="utf-8")
@@ -318,16 +317,16 @@ def test_firmware_and_report_say_first_that_they_are_of_a_lot(common, batch, tmp
     made = generate(common.compensator, "f28335")
     write_firmware(made, folder)
     document = json.loads((folder / "compensator.json").read_bytes())
-    said = f"COMMON SETTING of 4 valves, lot SHA-256 {document['lot_sha256']}."
+    said = f"LOT SETTING of 4 valves, lot SHA-256 {document['lot_sha256']}."
     for name, text in made.files.items():
         assert name in (*made.manifest.board, "compensator.json") or said in "\n".join(text.splitlines()[:4]), name
     header, readme = made.files["core/dz_comp.h"], made.files["f28335/README.md"]
     assert f"/* Valve {common.carrier} identified from: " in header
     words = " ".join(header.replace(" * ", " ").split())
-    assert f"of one of the 4 valves of this common setting, valve {common.carrier}; of the others" in words
-    assert "**This is a common setting of 4 valves**" in readme and document["lot_sha256"] in readme
+    assert f"of one of the 4 valves of this lot setting, valve {common.carrier}; of the others" in words
+    assert "**This is a lot setting of 4 valves**" in readme and document["lot_sha256"] in readme
     own = generate(batch["a"].own, "host")
-    assert not any("common setting" in text.lower() for text in own.files.values())
+    assert not any("lot setting" in text.lower() for text in own.files.values())
     evidence = tmp_path / "evidence"
     main(["verify", str(folder), "-o", str(evidence), "--quiet"])  # its verdict is no matter here
     report = (evidence / "report.html").read_text(encoding="utf-8")
@@ -365,7 +364,7 @@ def test_an_old_common_file_without_its_lot_says_that_it_is_not_known(document):
     old = {name: value for name, value in document.items() if name not in ("lot", "lot_sha256")}
     compensator = read(old)
     said = generate(compensator, "host").files["core/dz_comp.h"]
-    assert "COMMON SETTING of 4 valves, the file does not say which." in said
+    assert "LOT SETTING of 4 valves, the file does not say which." in said
     artefacts = {
         "compensator": Artefact(role="compensator", name="compensator.json", sha256="0" * 64, document=old),
     }

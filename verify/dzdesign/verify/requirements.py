@@ -1,122 +1,152 @@
-"""What a firmware can be tried for, and which of it an evidence has: a reader sees what is missing too.
-
-The names are those of the checks; a check of a name that is not here stands in the evidence all the same.
-"""
+"""Every requirement on a firmware, declared once: id, title and how to have it checked; and which of them were."""
 
 from dataclasses import dataclass
-from typing import Any
 
-VALVE = "the valve is the one that compensator.json was made from"
-COMPILES = "your board files compile"
-#: The generator itself is asked by the command, not by this room.
-REGENERATED = "the files are those that codegen makes of compensator.json"
-#: Of a board file that its user filled in: nothing that was generated is there to compare it with.
-REVIEW = "review it, and try it on the machine"
-#: How to have tried what `verify` could not try. Of a valve.json that is not written as `identify` writes it, the hash
-#: is known from the file alone.
-HOW = {
-    VALVE: "`verify` with the valve.json that compensator.json names by its SHA-256 beside the firmware",
-}
-#: What every `verify` tries.
-ALWAYS = (
-    "files as generated",
-    "the manifest says what is in the firmware",
-    "compiles without a warning",
-    "every compiler sees the same core",
-    "equals the exactly rounded law",
-    "within range, monotone",
-    "no over-compensation on the tested interval",
-    "depends on the pressures by their difference only",
-    "codes outside their signal's valid range fall back",
-    "the drive follows its model",
-    "the core keeps no state between calls",
-    "the plant of the closed loop opens",
-    "the plant opens where the identified valve does",
-    "no flow at zero command in the closed loop",
-    "no flow at zero command after any scenario",
-    "the certificate follows from the valve",
-    "the law follows from the valve and the options",
-    VALVE,
-    REGENERATED,
-)
-#: What is tried if it is asked for: how its checks' names begin, what it is, the option.
-ASKED_FOR = (
-    ("machine code of the ", "machine code of other processors, in simulators", "--machine-code"),
-    ("no undefined behaviour with an int of 16 bits", "no undefined behaviour with an int of 16 bits", "--proof"),
-    ("wrong C is caught", "wrong C is caught, a fault at every place", "--mutate"),
-)
+from dzdesign.verify.evidence import Check, Evidence
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Required:
-    """One thing to try.
+class Requirement:
+    """One requirement.
 
     Attributes
     ----------
-    name : str
-        What.
-    done : bool
-        Whether it was tried.
+    id : str
+        Short name, the same in every version.
+    title : str
+        What is required.
+    how : str
+        What to do to have it checked; a command stands in backticks.
+    """
+
+    id: str
+    title: str
+    how: str = "`verify`"
+
+    def check(self, *, holds: bool | None, text: str, name: str = "") -> Check:
+        """Return what was found.
+
+        Parameters
+        ----------
+        holds : bool or None
+            None: it could not be checked.
+        text : str
+            What was found, with its figures.
+        name : str
+            In place of the title: what of it was tried, such as one processor's machine code.
+        """
+        return Check(id=self.id, name=name or self.title, holds=holds, text=text)
+
+
+FILES = Requirement(id="files-as-generated", title="files as generated")
+MANIFEST = Requirement(id="manifest", title="the manifest says what is in the firmware")
+COMPILES = Requirement(id="compiles", title="compiles without a warning")
+EXACT_LAW = Requirement(id="exact-law", title="equals the exactly rounded law")
+MONOTONE = Requirement(id="monotone", title="within range, monotone")
+ZERO_COMMAND = Requirement(id="over-compensation", title="no over-compensation on the tested interval")
+LOT = Requirement(id="over-compensation-of-lot", title="no over-compensation of any valve of the lot")
+PRESSURE_DIFFERENCE = Requirement(id="pressure-difference", title="depends on the pressures by their difference only")
+FALLBACK = Requirement(id="fallback", title="codes outside their signal's valid range fall back")
+DRIVE = Requirement(id="drive", title="the drive follows its model")
+PLANT_OPENS = Requirement(id="plant-opens", title="the plant of the closed loop opens")
+PLANT_IS_THE_VALVE = Requirement(id="plant-is-the-valve", title="the plant opens where the identified valve does")
+ZERO_FLOW = Requirement(id="zero-flow", title="no flow at zero command in the closed loop")
+ZERO_FLOW_AFTER_SCENARIOS = Requirement(
+    id="zero-flow-after-scenarios", title="no flow at zero command after any scenario"
+)
+CERTIFICATE = Requirement(id="certificate", title="the certificate follows from the valve")
+LAW = Requirement(id="law", title="the law follows from the valve and the options")
+#: Of a valve.json that is written as `identify` writes it the hash is known without the file.
+VALVE = Requirement(
+    id="valve",
+    title="the valve is the one that compensator.json was made from",
+    how="`verify` with the valve.json that compensator.json names by its SHA-256 beside the firmware",
+)
+#: Checked by the front door, which may ask the generator; this room shares no code with it.
+REGENERATED = Requirement(id="regenerated", title="the files are those that codegen makes of compensator.json")
+BOARD_FILES = Requirement(id="board-files", title="your board files compile")
+MACHINE_CODE = Requirement(
+    id="machine-code", title="machine code of other processors, in simulators", how="`verify --machine-code`"
+)
+UNDEFINED_BEHAVIOUR = Requirement(
+    id="undefined-behaviour", title="no undefined behaviour with an int of 16 bits", how="`verify --proof`"
+)
+MUTATION = Requirement(id="mutation", title="wrong C is caught", how="`verify --mutate`")
+C2000WARE = Requirement(id="c2000ware", title="compiles against C2000Ware", how="`verify --c2000ware`")
+#: What every `verify` checks, in the order of the report.
+ALWAYS = (
+    FILES, MANIFEST, COMPILES, EXACT_LAW, MONOTONE, ZERO_COMMAND, PRESSURE_DIFFERENCE, FALLBACK, DRIVE, PLANT_OPENS,
+    PLANT_IS_THE_VALVE, ZERO_FLOW, ZERO_FLOW_AFTER_SCENARIOS, CERTIFICATE, LAW, VALVE, REGENERATED,
+)  # fmt: skip
+#: What is checked if it is asked for.
+OPTIONAL = (MACHINE_CODE, UNDEFINED_BEHAVIOUR, MUTATION)
+#: Of a file of the user's: nothing that was generated is there to compare it with.
+REVIEW = "review it, and try it on the machine"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RequirementStatus:
+    """What the evidence says of one requirement.
+
+    Attributes
+    ----------
+    title : str
+        What is required.
+    tried : bool
+        Whether the evidence has a check of it.
     holds : bool or None
         As found; None where it was not tried or could not be checked.
     how : str
         What to do to have it tried; a command stands in backticks.
     """
 
-    name: str
-    done: bool
+    title: str
+    tried: bool
     holds: bool | None
     how: str
 
 
-def required_of(evidence: dict[str, Any]) -> tuple[Required, ...]:
-    """Return everything that can be tried, with what the evidence says of it.
+def requirement_statuses(evidence: Evidence) -> tuple[RequirementStatus, ...]:
+    """Return everything that can be checked of a firmware, with what the evidence says of it.
 
     Parameters
     ----------
-    evidence : dict
-        verification.json.
+    evidence : Evidence
+        Of the firmware.
     """
-    checks = evidence["checks"]
-    found = [_part(f"{name}, which is yours and was changed", False, REVIEW) for name in evidence.get("yours", ())]
-    found += [_part(f"{name}, which is yours", False, REVIEW) for name in evidence.get("own", ())]
-    if evidence.get("board_untried"):
-        found.append(_part(COMPILES, False, evidence["board_untried"]))
-    found += [_tried(checks, name, name, HOW.get(name, "`verify`")) for name in ALWAYS]
-    own = bool(evidence["closed_loop"].get("plant"))
-    found.append(_part("closed loop with a plant of the machine's own", own, "`verify --plant`"))
-    found.append(_part("load steps and frozen sensors in the closed loop", own, "`verify --plant`"))
-    series = bool(evidence["monte_carlo"])
+    found = [_part(f"{name}, which is yours and was changed", False, REVIEW) for name in evidence.changed_board_files]
+    found += [_part(f"{name}, which is yours", False, REVIEW) for name in evidence.user_files]
+    if evidence.board_not_compiled:
+        found.append(_part(BOARD_FILES.title, False, evidence.board_not_compiled))
+    found += [_status(evidence, requirement) for requirement in ALWAYS]
+    own_plant = evidence.closed_loop.plant is not None
+    found.append(_part("closed loop with a plant of the machine's own", own_plant, "`verify --plant`"))
+    found.append(_part("load steps and frozen sensors in the closed loop", own_plant, "`verify --plant`"))
+    series = evidence.monte_carlo is not None
     found.append(_part("a series of plants, with tolerances", series, "`verify --tolerances`"))
-    found += [_tried(checks, begins, name, f"`verify {option}`") for begins, name, option in ASKED_FOR]
-    if evidence.get("target") in (None, "f28335"):
-        name = "compiles against C2000Ware"
-        found.append(_tried(checks, name, f"{name}, TI's headers", "`verify --c2000ware`"))
+    found += [_status(evidence, requirement) for requirement in OPTIONAL]
+    if evidence.target in ("", "f28335"):
+        found.append(_status(evidence, C2000WARE))
     return tuple(found)
 
 
-def untried_of(evidence: dict[str, Any]) -> tuple[str, ...]:
+def not_tried(evidence: Evidence) -> tuple[str, ...]:
     """Return what was not tried, each with the command that would.
 
     Parameters
     ----------
-    evidence : dict
-        verification.json.
+    evidence : Evidence
+        Of the firmware.
     """
-    return tuple(f"{each.name}: {each.how}" for each in required_of(evidence) if not each.done)
+    return tuple(f"{each.title}: {each.how}" for each in requirement_statuses(evidence) if not each.tried)
 
 
-def _tried(checks: list[dict[str, Any]], begins: str, name: str, how: str) -> Required:
-    """Return a requirement by the checks whose names begin so, of both signs of command."""
-    said = [check["holds"] for check in checks if _plain(check["name"]).startswith(begins)]
-    holds = False if False in said else None if None in said or not said else True
-    return Required(name=name, done=bool(said), holds=holds, how=how)
+def _status(evidence: Evidence, requirement: Requirement) -> RequirementStatus:
+    """Return the status of a requirement over its checks: of both signs of command, of every processor."""
+    found = [check.holds for check in evidence.checks if check.id == requirement.id]
+    holds = False if False in found else None if None in found or not found else True
+    return RequirementStatus(title=requirement.title, tried=bool(found), holds=holds, how=requirement.how)
 
 
-def _part(name: str, done: bool, how: str) -> Required:
-    return Required(name=name, done=done, holds=True if done else None, how=how)
-
-
-def _plain(name: str) -> str:
-    """Return a check's name without the sign of command that it is of."""
-    return name.removeprefix("positive commands: ").removeprefix("negative commands: ")
+def _part(title: str, tried: bool, how: str) -> RequirementStatus:
+    return RequirementStatus(title=title, tried=tried, holds=True if tried else None, how=how)

@@ -1,4 +1,4 @@
-"""`Constant`: a number of the generated C, and where it is from; C's comment and the manifest's entry print it."""
+"""A `#define` or a table of the generated C, and where it is from; C's comment and the manifest's entry print it."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -21,14 +21,14 @@ EXACT = "exact"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Constant:
-    """One `#define` or table.
+    """What a `#define` or a table is, and where it is from.
 
     Attributes
     ----------
     symbol : str
         Name in C.
     value : int or tuple of (int, int)
-        The number, or a table's rows (start, change), as the C has them.
+        The number, or a table's rows, start and change, as the C has them.
     equation : str
         What it is, with the equation of the paper where there is one.
     engineering : str
@@ -39,8 +39,6 @@ class Constant:
         Keys of compensator.json that it was computed from, dotted; none for what codegen chooses itself.
     generator : str
         Source file of dzdesign that computes it.
-    literal : str
-        One of `LITERALS`.
     """
 
     symbol: str
@@ -50,11 +48,6 @@ class Constant:
     rounding: str = EXACT
     data: tuple[str, ...] = ()
     generator: str
-    literal: str = "plain"
-
-    def __post_init__(self) -> None:
-        if isinstance(self.value, int) and self.value < 0 and not self.literal.startswith("int"):
-            raise DzdesignError(f"constant {self.symbol} is {self.value}, which its unsigned type can't hold")
 
     @property
     def text(self) -> str:
@@ -65,15 +58,6 @@ class Constant:
     def comment(self) -> list[str]:
         """Return the comment in C, wrapped."""
         return c_comment(self.text)
-
-    def printed(self) -> str:
-        """Return the number of a `#define` as C prints it; a negative one in brackets."""
-        literal = LITERALS[self.literal].format(abs(self.value))
-        return f"(-{literal})" if self.value < 0 else literal
-
-    def lines(self) -> list[str]:
-        """Return the comment and the `#define`."""
-        return [*self.comment(), f"#define {self.symbol} {self.printed()}"]
 
     def entry(self, file: str, valve_keys: Mapping[str, Sequence[str]]) -> FirmwareConstant:
         """Return the manifest's entry of the constant in one file.
@@ -99,6 +83,30 @@ class Constant:
         )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Define(Constant):
+    """One `#define`; `literal` is one of `LITERALS`."""
+
+    value: int
+    literal: str = "plain"
+
+    def __post_init__(self) -> None:
+        if self.value < 0 and not self.literal.startswith("int"):
+            raise DzdesignError(f"constant {self.symbol} is {self.value}, which its unsigned type can't hold")
+
+    def lines(self) -> list[str]:
+        """Return the comment and the `#define`; a negative number stands in brackets."""
+        literal = LITERALS[self.literal].format(abs(self.value))
+        return [*self.comment(), f"#define {self.symbol} {f'(-{literal})' if self.value < 0 else literal}"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table(Constant):
+    """One table; the rows are start and change."""
+
+    value: tuple[tuple[int, int], ...]
+
+
 def c_comment(text: str) -> list[str]:
     """Return a comment of C, its lines no longer than `COLUMNS`.
 
@@ -113,6 +121,6 @@ def c_comment(text: str) -> list[str]:
     ]
 
 
-def defines(constants: Sequence[Constant]) -> list[str]:
+def defines(constants: Sequence[Define]) -> list[str]:
     """Return the lines of several `#define`s, each with its comment."""
     return [line for constant in constants for line in constant.lines()]

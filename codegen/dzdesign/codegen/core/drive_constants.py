@@ -1,6 +1,6 @@
-"""The numbers of the core's interface and of the amplifier around the law: `#define`s of dz_comp.h and dz_drive.c."""
+"""The numbers of the interface and of the drive functions: `#define`s of dz_comp.h, dz_drive.h and dz_drive.c."""
 
-from dzdesign.codegen.core.constants import Constant
+from dzdesign.codegen.core.constants import Define
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.drive import RAMP_UNIT
 
@@ -16,65 +16,65 @@ STATUS_BITS = {
 }
 
 
-def interface_constants(compensator: Compensator) -> list[Constant]:
+def interface_constants(compensator: Compensator) -> list[Define]:
     """Return the ends of inputs and output."""
     signals, limit = compensator.signals, compensator.amplifier.compare_limit
     u_max_V = float(compensator.u_max_V)
     share = limit / signals.compare_max
     return [
-        Constant(symbol="DZ_COMPARE_MAX", value=signals.compare_max, equation="Eq. (32), PWM compare value of u_max",
+        Define(symbol="DZ_COMPARE_MAX", value=signals.compare_max, equation="Eq. (32), PWM compare value of u_max",
                  engineering=f"{u_max_V:g} V, 100 % duty", data=("signals.compare_max", "u_max_V"), generator=SIGNALS),
-        Constant(symbol="DZ_COMPARE_LIMIT", value=limit, equation="largest compare value that is put out",
+        Define(symbol="DZ_COMPARE_LIMIT", value=limit, equation="largest compare value that is put out",
                  engineering=f"{share * u_max_V:.4g} V, {share:.1%} duty", rounding="rounded down",
                  data=("amplifier.compare_limit", "signals.compare_max", "u_max_V"), generator=OPTIONS),
-        Constant(symbol="DZ_ADC_CODE_MAX", value=signals.code_max, equation="largest code of the converter",
+        Define(symbol="DZ_ADC_CODE_MAX", value=signals.code_max, equation="largest code of the converter",
                  engineering="the top of its range, right-justified", data=("signals.code_max",), generator=SIGNALS),
     ]  # fmt: skip
 
 
-def status_constants() -> list[Constant]:
+def status_constants() -> list[Define]:
     """Return the bits of the status word: a convention, from no datum."""
     return [
-        Constant(symbol=f"DZ_STATUS_{name}", value=1 << place, equation=f"bit {place} of the status word",
+        Define(symbol=f"DZ_STATUS_{name}", value=1 << place, equation=f"bit {place} of the status word",
                  engineering=text, rounding="a convention", generator=HERE)
         for place, (name, text) in enumerate(STATUS_BITS.items())
     ]  # fmt: skip
 
 
-def drive_interface_constants(compensator: Compensator) -> list[Constant]:
+def drive_interface_constants(compensator: Compensator) -> list[Define]:
     """Return what a caller of the drive must know: `#define`s of dz_drive.h."""
     signals = compensator.signals
     return [
-        Constant(symbol="DZ_DRIVE_TICKS_PER_SAMPLE", value=signals.tick_Hz // signals.sample_Hz,
+        Define(symbol="DZ_DRIVE_TICKS_PER_SAMPLE", value=signals.tick_Hz // signals.sample_Hz,
                  equation="PWM periods from one sample to the next",
                  engineering=f"{signals.tick_Hz} periods and {signals.sample_Hz} samples a second",
                  data=("signals.tick_Hz", "signals.sample_Hz"), generator=HERE)
     ]  # fmt: skip
 
 
-def drive_constants(compensator: Compensator) -> list[Constant]:
-    """Return what the amplifier's options need; nothing where all are off."""
-    amplifier, bipolar = compensator.amplifier, compensator.negative is not None
+def drive_constants(compensator: Compensator) -> list[Define]:
+    """Return what the drive functions need; nothing where all are off."""
+    functions, bipolar = compensator.amplifier, compensator.negative is not None
     found = []
-    if bipolar or amplifier.has_ramp:
+    if bipolar or functions.has_ramp:
         found.append(
-            Constant(symbol="COMMAND_ZERO", value=compensator.signals.command.zero_code, literal="int32",
+            Define(symbol="COMMAND_ZERO", value=compensator.signals.command.zero_code, literal="int32",
                      equation="Eq. (29), code of zero command", engineering="0 V",
                      rounding="the converter's code, rounded down", data=("signals.command.zero_code",),
                      generator=SIGNALS)
         )  # fmt: skip
     if bipolar:
         found.append(_window(compensator))
-    if amplifier.has_ramp:
+    if functions.has_ramp:
         found += _ramps(compensator)
-    if amplifier.dither_counts:
+    if functions.dither_counts:
         found += _dither(compensator)
     return found
 
 
-def _window(compensator: Compensator) -> Constant:
+def _window(compensator: Compensator) -> Define:
     codes, span = compensator.amplifier.window_codes, compensator.signals.command.span(1)
-    return Constant(
+    return Define(
         symbol="WINDOW_CODES",
         value=codes,
         literal="int32",
@@ -86,19 +86,19 @@ def _window(compensator: Compensator) -> Constant:
     )
 
 
-def _ramps(compensator: Compensator) -> list[Constant]:
-    signals, amplifier = compensator.signals, compensator.amplifier
+def _ramps(compensator: Compensator) -> list[Define]:
+    signals, functions = compensator.signals, compensator.amplifier
     found = [
-        Constant(symbol="RAMP_UNIT", value=RAMP_UNIT, literal="int32", equation="unit of the ramped command",
+        Define(symbol="RAMP_UNIT", value=RAMP_UNIT, literal="int32", equation="unit of the ramped command",
                  engineering=f"1/{RAMP_UNIT} code of command", generator="design/dzdesign/design/drive.py")
     ]  # fmt: skip
-    for way, name, steps in (("up", "away from zero", amplifier.ramp_up), ("down", "to zero", amplifier.ramp_down)):
+    for way, name, steps in (("up", "away from zero", functions.ramp_up), ("down", "to zero", functions.ramp_down)):
         for place, sign in enumerate(signals.signs):
             side = "positive" if sign > 0 else "negative"
             step, span = steps[place], signals.command.span(sign)
             seconds = f"full command in {span * RAMP_UNIT / (step * signals.sample_Hz):.4g} s" if step else "no limit"
             found.append(
-                Constant(
+                Define(
                     symbol=f"RAMP_{way.upper()}_{side.upper()}",
                     value=step or INT32_MAX,
                     literal="int32",
@@ -112,19 +112,19 @@ def _ramps(compensator: Compensator) -> list[Constant]:
     return found
 
 
-def _dither(compensator: Compensator) -> list[Constant]:
-    signals, amplifier = compensator.signals, compensator.amplifier
-    ticks, counts = amplifier.dither_ticks, amplifier.dither_counts
+def _dither(compensator: Compensator) -> list[Define]:
+    signals, functions = compensator.signals, compensator.amplifier
+    ticks, counts = functions.dither_ticks, functions.dither_counts
     share = counts / signals.compare_max
     return [
-        Constant(symbol="DITHER_COUNTS", value=counts, equation="half the height of the dither's square wave",
+        Define(symbol="DITHER_COUNTS", value=counts, equation="half the height of the dither's square wave",
                  engineering=f"{share:.3%} of full drive, {share * float(compensator.u_max_V):.4g} V",
                  rounding="rounded to nearest", data=("amplifier.dither_counts", "signals.compare_max", "u_max_V"),
                  generator=OPTIONS),
-        Constant(symbol="DITHER_TICKS", value=ticks, equation="half the dither's period, PWM periods",
+        Define(symbol="DITHER_TICKS", value=ticks, equation="half the dither's period, PWM periods",
                  engineering=f"{1e3 * ticks / signals.tick_Hz:.4g} ms", rounding="rounded to nearest, 1 or more",
                  data=("amplifier.dither_ticks", "signals.tick_Hz"), generator=OPTIONS),
-        Constant(symbol="DITHER_PERIOD", value=2 * ticks, equation="the dither's period, PWM periods",
+        Define(symbol="DITHER_PERIOD", value=2 * ticks, equation="the dither's period, PWM periods",
                  engineering=f"{signals.tick_Hz / (2 * ticks):g} Hz",
                  data=("amplifier.dither_ticks", "signals.tick_Hz"), generator=HERE),
     ]  # fmt: skip

@@ -1,7 +1,7 @@
 """The law of one side of a `Compensator` lowered to integers that the firmware can multiply, shift and compare, proved.
 
 With beta = B / (D S), k x_max/u_max and u_min0/u_max over 2^16 and x = c / C, c being the codes of command from zero
-on, the law (18) in counts, lowered inside the edge of E codes, is
+on, the law (18) in counts, lowered inside the transition of E codes, is
 
     compare = B_law (p c + o) + l c - (B_law - B) e max(E - c, 0),
 
@@ -44,7 +44,8 @@ class Estimate:
 class IntegerForm:
     """Constants of the core; see the module's text for the algebra.
 
-    ``total = B_law * (slope * c + offset) + (linear * c << linear_shift) + half - (B_law - B) * edge * max(E - c, 0)``
+    ``total = B_law * (slope * c + offset) + (linear * c << linear_shift) + half
+    - (B_law - B) * transition * max(E - c, 0)``
     with B_law and B the tables interpolated without rounding;
     ``compare = min(total >> shift, largest) / divisor``, so that no compare value exceeds the limit; the division is
     ``(quotient * reciprocal) >> reciprocal_shift`` or the `estimate`.
@@ -54,13 +55,13 @@ class IntegerForm:
     table : tuple of int
         scale_beta times the numerators of the law's beta, then twice the smallest of them.
     zero_table : tuple of int
-        The same of the certified beta at zero command; empty without an edge.
+        The same of the certified beta at zero command; empty without a transition.
     scale_beta : int
         Factor of the tables.
     slope, offset : int
         32-bit signed.
-    edge : int
-        32 bits; 0 without an edge.
+    transition : int
+        32 bits; 0 without a transition.
     linear, linear_shift : int
         Command term that beta does not touch.
     half, shift, divisor : int
@@ -80,7 +81,7 @@ class IntegerForm:
     scale_beta: int
     slope: int
     offset: int
-    edge: int
+    transition: int
     linear: int
     linear_shift: int
     half: int
@@ -111,9 +112,9 @@ def integer_form(compensator: Compensator, sign: int = 1) -> IntegerForm:
     c, side = compensator, compensator.side(sign)
     terms = _terms(compensator, sign)
     divisor, shift, common = _denominator(terms)
-    slope, offset, linear, edge = (int(value * common) for value in terms)
+    slope, offset, linear, transition = (int(value * common) for value in terms)
     span = c.signals.command.span(sign)
-    scale_beta = _share((slope, offset, edge), (abs(slope) * span, abs(offset), edge * c.edge_codes))
+    scale_beta = _share((slope, offset, transition), (abs(slope) * span, abs(offset), transition * c.edge_codes))
     linear, linear_shift = _odd_part(linear)
     asked = _largest_quotient(compensator, sign, divisor)
     if asked > INT32_MAX:
@@ -126,7 +127,7 @@ def integer_form(compensator: Compensator, sign: int = 1) -> IntegerForm:
         scale_beta=scale_beta,
         slope=slope // scale_beta,
         offset=offset // scale_beta,
-        edge=edge // scale_beta,
+        transition=transition // scale_beta,
         linear=linear,
         linear_shift=linear_shift,
         half=common // 2,
@@ -148,7 +149,7 @@ class _Terms(NamedTuple):
     per_command: Fraction
     constant: Fraction
     plain: Fraction
-    per_edge_code: Fraction
+    per_transition_code: Fraction
 
 
 def _terms(compensator: Compensator, sign: int) -> _Terms:
@@ -167,8 +168,8 @@ def _terms(compensator: Compensator, sign: int) -> _Terms:
 
     without, whole = line(beta=0), line(beta=1)
     beta_unit = c.beta_denominator * c.beta_step_codes
-    per_edge_code = Fraction(0)
-    if c.edge_codes:  # what one unit of the gap lowers at zero command, over the edge's codes
+    per_transition_code = Fraction(0)
+    if c.edge_codes:  # what one unit of the gap lowers at zero command, over the transition's codes
         lowered = evaluate_edge(
             beta_opening=1,
             beta_closing=0,
@@ -176,12 +177,12 @@ def _terms(compensator: Compensator, sign: int) -> _Terms:
             share_of_edge=0,
             n_full=c.signals.compare_max,
         )
-        per_edge_code = lowered / beta_unit / c.edge_codes
+        per_transition_code = lowered / beta_unit / c.edge_codes
     return _Terms(
         per_command=(whole.slope - without.slope) / beta_unit,
         constant=(whole.start - without.start) / beta_unit,
         plain=without.slope,
-        per_edge_code=per_edge_code,
+        per_transition_code=per_transition_code,
     )
 
 
@@ -217,7 +218,7 @@ def _largest_quotient(compensator: Compensator, sign: int, divisor: int) -> int:
     # Every node that a code reaches, and the fallback's smallest beta: along dP the law is straight between them.
     codes = [index * c.beta_step_codes for index in range(c.nodes(sign) - 1)]
     codes += [c.signals.largest_difference(sign), -c.reverse_codes - 1]
-    # Along the command it is straight but for the edge's end.
+    # Along the command it is straight but for the transition's end.
     corners = {0, min(c.edge_codes, command.span(sign)), command.span(sign)}
     commands = [command.zero_code + command.direction(sign) * corner for corner in corners]
     values = [c.drive(code, dp_code, sign) for dp_code in codes for code in commands]
@@ -290,12 +291,13 @@ def _prove_widths(form: IntegerForm, compensator: Compensator, sign: int) -> Non
     gap = beta if form.zero_table else 0
     inner = max(abs(form.offset), abs(form.slope * span + form.offset))
     straight = form.linear * span << form.linear_shift
+    lowering = form.transition * compensator.edge_codes
     checks = {
         "the interpolated table": (beta, INT32_MAX),
         "slope times command": (abs(form.slope) * span, INT32_MAX),
         "the command-dependent factor": (inner, INT32_MAX),
-        "the edge's factor": (form.edge * compensator.edge_codes, INT32_MAX),
-        "the 64-bit sum": (beta * inner + straight + form.half + gap * form.edge * compensator.edge_codes, INT64_MAX),
+        "the transition's factor": (lowering, INT32_MAX),
+        "the 64-bit sum": (beta * inner + straight + form.half + gap * lowering, INT64_MAX),
         "the command's own term": (form.linear, 2**32 - 1),
     }
     for what, (value, limit) in checks.items():

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from dzdesign.codegen.core.constants import Constant
+from dzdesign.codegen.core.constants import Define, Table
 from dzdesign.codegen.core.integer_form import IntegerForm, segments_of
 from dzdesign.codegen.telemetry.frame import beta_factor
 from dzdesign.derivation.law import Law, law
@@ -70,20 +70,20 @@ class LawConstants:
     @property
     def uses_low_word(self) -> bool:
         """True if anything but the half is added to the lower 32 bits of beta's product."""
-        return bool(self.form.edge or (self.form.linear << self.form.linear_shift) % 2**32)
+        return bool(self.form.transition or (self.form.linear << self.form.linear_shift) % 2**32)
 
-    def table(self, at_zero: bool, rows: TableForm) -> Constant:
+    def table(self, at_zero: bool, rows: TableForm) -> Table:
         """Return the law's table, or the one of the certified beta at zero command."""
         c, form = self.compensator, self.form
         numerators = form.zero_table if at_zero else form.table
         turn = -1 if rows.falls else 1
         segments = segments_of(numerators, c.beta_step_codes)
         unit = form.scale_beta * c.beta_denominator
-        low, high = (edge(numerators[:-2]) / unit for edge in (min, max))
+        low, high = (end(numerators[:-2]) / unit for end in (min, max))
         key = "edge_beta" if form.zero_table and not at_zero else "beta"
         guard = c.side(self.sign).certificate.guard
         what = f"certified beta of the {guard} threshold" if at_zero else "beta of the law"
-        return Constant(
+        return Table(
             symbol="zero_segment" if at_zero else "law_segment",
             value=tuple((start % 2**32, turn * change) for start, change in segments),
             equation=f"Eq. (7), {what} times {self.unit}: start {rows.change_sign} change * dP modulo 2^32, dP in "
@@ -96,7 +96,7 @@ class LawConstants:
             generator=HERE,
         )
 
-    def arithmetic(self) -> list[Constant]:
+    def arithmetic(self) -> list[Define]:
         """Return the law's integers."""
         limit = [self._limit()] if self.form.exceeds else []
         division = self._estimate() if self.narrow else self._reciprocal()
@@ -104,10 +104,10 @@ class LawConstants:
 
     def _constant(
         self, symbol: str, value: int, equation: str, engineering: str, data: tuple[str, ...] = (), **how: str
-    ) -> Constant:
+    ) -> Define:
         how.setdefault("literal", "uint32")
         how.setdefault("generator", HERE)
-        return Constant(symbol=symbol, value=value, equation=equation, engineering=engineering, data=data, **how)
+        return Define(symbol=symbol, value=value, equation=equation, engineering=engineering, data=data, **how)
 
     def _per_volt(self, count: int) -> float:
         """Return u_O/u_i of a coefficient of the command in the sum."""
@@ -119,8 +119,8 @@ class LawConstants:
         form, c = self.form, self.compensator
         return count / (form.divisor << form.shift) / c.signals.compare_max * float(c.u_max_V)
 
-    def _factor(self) -> list[Constant]:
-        """Return what beta multiplies, by command and alone, and what the edge takes away."""
+    def _factor(self) -> list[Define]:
+        """Return what beta multiplies, by command and alone, and what the transition takes away."""
         c, form, side = self.compensator, self.form, self.compensator.side(self.sign)
         equation = equation_of(law(c.law_name))
         kappa, u_min0 = side.k_x_max_over_u_max, side.u_min0_over_u_max
@@ -151,20 +151,20 @@ class LawConstants:
                 literal="uint32" if self.narrow else "int32",
             )
         )
-        if form.edge:
+        if form.transition:
             found.append(
                 self._constant(
-                    "EDGE_FACTOR",
-                    form.edge,
-                    "edge, coefficient of (beta - beta_zero) in u_O, for each code of command missing to u_edge",
-                    f"u_min0/{c.edge_codes} = {self._volts(form.edge * self.unit):.6g} V",
+                    "TRANSITION_FACTOR",
+                    form.transition,
+                    "transition, coefficient of (beta - beta_zero) in u_O, for each code of command missing to its end",
+                    f"u_min0/{c.edge_codes} = {self._volts(form.transition * self.unit):.6g} V",
                     (u_min0_key, "edge_codes", "u_max_V", *SCALED),
                     rounding=f"exact from {u_min0_text}",
                 )
             )
         return found
 
-    def _straight(self) -> list[Constant]:
+    def _straight(self) -> list[Define]:
         """Return the coefficient of the command that beta does not touch."""
         c, form = self.compensator, self.form
         if not form.linear:
@@ -172,9 +172,8 @@ class LawConstants:
         total = form.linear << form.linear_shift
         equation = f"{equation_of(law(c.law_name))}, coefficient of u_i alone in u_O"
         engineering = f"{self._per_volt(total):.6f}"
-        data = SCALED
-        if c.law_name != "paper":
-            data = (f"{self.key}.k_x_max_over_u_max", *data)
+        kappa = () if c.law_name == "paper" else (f"{self.key}.k_x_max_over_u_max",)
+        data = (*kappa, *SCALED)
         high, low = divmod(total, 1 << 32)
         if low == 0:
             return [self._constant("COMMAND_HIGH_WORD", high, f"{equation}, over 2^32", engineering, data,
@@ -192,7 +191,7 @@ class LawConstants:
                                         literal="plain" if high < 1 << 16 else "uint32"))  # fmt: skip
         return found
 
-    def _half(self) -> list[Constant]:
+    def _half(self) -> list[Define]:
         """Return the half count that rounds to nearest, and the shift that drops the fraction."""
         form = self.form
         data = SCALED
@@ -218,7 +217,7 @@ class LawConstants:
             found.append(shifting)
         return found
 
-    def _limit(self) -> Constant:
+    def _limit(self) -> Define:
         form, c = self.form, self.compensator
         limit = c.amplifier.compare_limit
         return self._constant(
@@ -229,7 +228,7 @@ class LawConstants:
             ("amplifier.compare_limit", "signals.compare_max", "u_max_V"),
         )
 
-    def _reciprocal(self) -> list[Constant]:
+    def _reciprocal(self) -> list[Define]:
         form = self.form
         if form.divisor == 1:
             return []
@@ -243,7 +242,7 @@ class LawConstants:
             self._constant("RECIPROCAL_SHIFT", shift, "the power of two in RECIPROCAL", f"2^{shift}", literal="plain"),
         ]  # fmt: skip
 
-    def _estimate(self) -> list[Constant]:
+    def _estimate(self) -> list[Define]:
         form, estimate = self.form, self.form.estimate
         d = form.divisor
         if d == 1:
@@ -266,7 +265,7 @@ class LawConstants:
             ),
         ]  # fmt: skip
 
-    def _beta(self) -> list[Constant]:
+    def _beta(self) -> list[Define]:
         factor, shift = self.beta_scaling()
         rounding = "rounded up, and proved: dz_beta() is beta * 2^15 rounded down for the whole table"
         where = "codegen/dzdesign/codegen/telemetry/frame.py"

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from dzdesign.codegen.core.constants import EXACT, Constant
+from dzdesign.codegen.core.constants import EXACT, Define
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.signals import WEIGHT_SHIFT, PressureSignal
 
@@ -25,7 +25,7 @@ class SignalConstants:
         ends = (command.direction(self.sign) * (code - command.zero_code) for code in command.valid_codes)
         return max(ends) > command.span(self.sign)
 
-    def signals(self) -> list[Constant]:
+    def signals(self) -> list[Define]:
         """Return the codes of command and pressures."""
         c = self.compensator
         signals, command = c.signals, c.signals.command
@@ -49,7 +49,7 @@ class SignalConstants:
             *self._sensor("B", signals.pressure_b),
             *([] if signals.like_sensors else self._weights()),
             self._reverse(),
-            Constant(
+            Define(
                 symbol="WORD_TOP",
                 value=self.word_bits - 1,
                 equation="place of the top bit of a word, which is set after a subtraction below zero",
@@ -60,13 +60,13 @@ class SignalConstants:
 
     def _signal(
         self, symbol: str, value: int, equation: str, engineering: str, data: tuple[str, ...], rounding: str = EXACT
-    ) -> Constant:
-        return Constant(
+    ) -> Define:
+        return Define(
             symbol=symbol, value=value, equation=equation, engineering=engineering, rounding=rounding, data=data,
             generator=SIGNALS,
         )  # fmt: skip
 
-    def _sensor(self, name: str, sensor: PressureSignal) -> list[Constant]:
+    def _sensor(self, name: str, sensor: PressureSignal) -> list[Define]:
         key = f"signals.pressure_{name.lower()}"
         codes = (f"{key}.zero_code", f"{key}.full_code", f"{key}.span_MPa")
 
@@ -83,7 +83,7 @@ class SignalConstants:
             self._signal(f"PRESSURE_{name}_HIGH", high, what.format("largest valid code"), pressure(high), valid, DOWN),
         ]  # fmt: skip
 
-    def _weights(self) -> list[Constant]:
+    def _weights(self) -> list[Define]:
         signals = self.compensator.signals
         a, b = (float(each.per_code_MPa) for each in (signals.pressure_a, signals.pressure_b))
         keys = tuple(
@@ -100,7 +100,7 @@ class SignalConstants:
                          f"1/2^{WEIGHT_SHIFT}", (), "the difference is rounded down"),
         ]  # fmt: skip
 
-    def _reverse(self) -> Constant:
+    def _reverse(self) -> Define:
         c = self.compensator
         weighted = not c.signals.like_sensors
         return self._signal(
@@ -113,23 +113,24 @@ class SignalConstants:
             "a hundredth of the span, rounded down to a code",
         )
 
-    def steps(self) -> list[Constant]:
-        """Return what finds a segment of the tables, and the edge's length."""
+    def steps(self) -> list[Define]:
+        """Return what finds a segment of the tables, and the transition's length."""
         c = self.compensator
-        step, edge = c.beta_step_codes, c.edge_codes
+        step, transition = c.beta_step_codes, c.edge_codes
         width = f"{float(c.signals.dp_MPa(step)):.4f} MPa"
         data = ("beta_step_codes",)
         found = [
-            Constant(symbol="STEP_CODES", value=step, equation="width of a segment of beta, codes of sensor A",
+            Define(symbol="STEP_CODES", value=step, equation="width of a segment of beta, codes of sensor A",
                      engineering=width, data=data, generator="design/dzdesign/design/beta_table.py"),
-            Constant(symbol="STEP_SHIFT", value=step.bit_length() - 1, equation="from codes to segments",
+            Define(symbol="STEP_SHIFT", value=step.bit_length() - 1, equation="from codes to segments",
                      engineering=f"1/{step} segment a code", data=data, rounding="the segment is rounded down",
                      generator=HERE),
         ]  # fmt: skip
-        if edge:
-            share = edge / c.signals.command.span(self.sign)
+        if transition:
+            share = transition / c.signals.command.span(self.sign)
             found.append(
-                Constant(symbol="EDGE_CODES", value=edge, equation="codes of command that the edge takes, u_edge",
+                Define(symbol="TRANSITION_CODES", value=transition,
+                     equation="codes of command that the transition takes, u_transition",
                          engineering=f"{share:.2%} of command, {share * float(c.u_max_V):.4g} V", data=("edge_codes",),
                          rounding="the power of two below what was asked for",
                          generator="design/dzdesign/design/options.py")

@@ -102,7 +102,7 @@ class Frame:
     status: int
 
 
-def crc_of(octets: bytes) -> int:
+def crc_of(octets: bytes | bytearray) -> int:
     """Return the frame's CRC of some octets.
 
     Examples
@@ -213,6 +213,6 @@ def beta_factor(unit: int, largest: int) -> tuple[int, int]:
     raise InputError(f"no 32-bit factor brings beta from units of 1/{unit} to 2^-{BETA_BITS} exactly up to {largest}")
 
 
-def line_load(baud: Fraction, frame_Hz: Fraction) -> Fraction:
+def line_load(baud: Fraction, frame_Hz: Fraction | int) -> Fraction:
     """Return the share of the time in which the line is busy with frames."""
     return FRAME_BITS * frame_Hz / baud

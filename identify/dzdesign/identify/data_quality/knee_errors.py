@@ -11,7 +11,9 @@ import numpy as np
 
 from dzdesign.identify.knees.characteristic import BranchShape
 from dzdesign.identify.knees.prepared_tests import DescribedTest
-from dzdesign.identify.valve.model import SideModel, TestResult, Warning_
+from dzdesign.identify.valve.model import Warning_
+from dzdesign.identify.valve.ramp_result import TestResult
+from dzdesign.identify.valve.side_model import SideModel
 
 #: Standard error of a knee, over u_max, above which it decides what the compensator gives up.
 NOISY = 2.5e-3
@@ -82,7 +84,7 @@ def _noisy(test: TestResult, alone: bool) -> Warning_:
         code="noise",
         text=(
             f"a knee is known to {1e3 * test.u_knee_se_V:.0f} mV only (one standard error; noise "
-            f"{test.noise_L_min:.3g} L/min, {test.noise_colour:.0f} times as harmful as white noise): its "
+            f"{test.noise_L_min:.3g} L/min, {test.noise_variance_inflation:.0f} times as harmful as white noise): its "
             "bound lies several times that lower. Record slower ramps, or repeat them"
             + ("; one branch alone can't tell noise from a bend of the flow, see --plots" if alone else "")
         ),
@@ -91,11 +93,11 @@ def _noisy(test: TestResult, alone: bool) -> Warning_:
 
 
 def _bent(test: TestResult, left: float, said: tuple[float, float]) -> Warning_:
-    branches = [branch for branch in (test.rising, test.falling) if branch]
-    worst = max(branches, key=lambda branch: branch.knee_se_V)
-    (low, high), asked = ([100 * share for share in shares] for shares in (worst.straight, said))
+    of_rising = test.u_knee_rising_se_V == test.u_knee_se_V
+    straight = (test.straight_rising if of_rising else test.straight_falling) or said
+    (low, high), asked = ([100 * share for share in shares] for shares in (straight, said))
     widened = f" (--knee-window {asked[0]:.3g}-{asked[1]:.3g}, widened as far as a line goes)"
-    widened = widened if worst.straight != said else ""
+    widened = widened if straight != said else ""
     return Warning_(
         code="bend",
         text=(

@@ -9,7 +9,8 @@ from dzdesign.identify.ramps.pooling import SAME_PRESSURE
 from dzdesign.identify.ramps.splitting import SHUT, despiked
 from dzdesign.identify.reading.named_pressure import claimed_pressures, contradicts
 from dzdesign.identify.reading.ramp_files import RampTest
-from dzdesign.identify.valve.model import TestResult, Warning_
+from dzdesign.identify.valve.model import Warning_
+from dzdesign.identify.valve.ramp_result import TestResult
 
 MPA = 1e6
 L_MIN = 1e-3 / 60

@@ -9,7 +9,9 @@ from dzdesign.identify.data_quality.pressures import about_flow_gains
 from dzdesign.identify.data_quality.sweeps import about_sweeps
 from dzdesign.identify.knees.prepared_tests import L_MIN, DescribedTest, DescribedTests
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.valve.model import SideModel, TestResult, Warning_
+from dzdesign.identify.valve.model import Warning_
+from dzdesign.identify.valve.ramp_result import TestResult
+from dzdesign.identify.valve.side_model import SideModel
 
 #: A softer edge than this share of u_max between knee and the tail's zero is said.
 SOFT_EDGE = 5e-3
@@ -173,7 +175,7 @@ def _not_monotone(test: TestResult, gap: float) -> Warning_:
 
 
 def _about_pressure(side: SideModel, tests: tuple[DescribedTest, ...]) -> Iterator[Warning_]:
-    if side.reference_dp_MPa is None:
+    if side.reference.dp_MPa is None:
         yield Warning_(
             code="no-pressure",
             text=(
@@ -187,7 +189,7 @@ def _about_pressure(side: SideModel, tests: tuple[DescribedTest, ...]) -> Iterat
         yield Warning_(
             code="one-pressure",
             text=(
-                f"only {side.reference_dp_MPa:.3g} MPa was tested: whether the threshold moves with the pressure drop "
+                f"only {side.reference.dp_MPa:.3g} MPa was tested: whether the threshold moves with the pressure drop "
                 "can't be said, beta is 1 and nothing is certified at other pressure drops. Record two or more"
             ),
             source=side.tests[0].source,

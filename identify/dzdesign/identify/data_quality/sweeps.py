@@ -6,7 +6,9 @@ import numpy as np
 
 from dzdesign.identify.knees.characteristic import BranchShape
 from dzdesign.identify.knees.prepared_tests import L_MIN, DescribedTest
-from dzdesign.identify.valve.model import SideModel, TestResult, Warning_
+from dzdesign.identify.valve.model import Warning_
+from dzdesign.identify.valve.ramp_result import TestResult
+from dzdesign.identify.valve.side_model import SideModel
 
 #: A command that stays below this share of u_max is not full.
 FULL_COMMAND = 0.97
@@ -32,8 +34,8 @@ def about_sweeps(side: SideModel, tests: tuple[DescribedTest, ...], u_max: float
     """
     for test, item in zip(side.tests, tests, strict=True):
         yield from _about_branches(test)
-        yield from _about_holes(test, item, side.guard)
-        yield from _about_the_command(test, item, side.guard, u_max)
+        yield from _about_holes(test, item, side.certificate.guard)
+        yield from _about_the_command(test, item, side.certificate.guard, u_max)
         yield from _about_the_flow(test, item)
     if not any(test.saturates for test in side.tests):
         yield Warning_(

@@ -1,14 +1,16 @@
 """What may be certified of one threshold, and where the valve opens: curves over the pressure drop, for valve.json."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 
-from dzdesign.core.errors import InputError
+from dzdesign.core.artefact_types import RuleError, quantity
 from dzdesign.identify.fitting.bounds import staircase
+from dzdesign.identify.valve.quantity_types import PressureDrop, Ratio, Voltage, VoltageError
 
 #: Thresholds that a certificate may protect, from the safest on.
 GUARDS = ("closing", "mean", "opening")
@@ -20,19 +22,8 @@ ROUNDING_V = 1e-6
 class GuardCurve:
     """The law's offset beta(dP) u_min0 under the certified bound of one threshold; one entry a test, dP rising.
 
-    Attributes
-    ----------
-    u_min0_V : float
-        The largest offset at dP0 that the certificate allows, V.
-    beta_dp_MPa, beta : tuple of float
-        Nodes of the piecewise linear beta(dP), at the tests; empty where dP is unknown.
-    certified_steps_V : tuple of float
-        Staircase: lower bound of the threshold between neighbouring tests, V; one fewer than tests.
-    u_lower_V : tuple of float
-        Lower bounds of the threshold at the tests, V; all of one curve hold together with the side's confidence. Those
-        of two curves are not meant to hold together: a certificate protects one threshold.
-    u_threshold_V : tuple of float
-        The threshold itself, as the monotone fit has it, V.
+    Its bounds hold together with the side's confidence. Those of two curves are not meant to hold together: a
+    certificate protects one threshold.
 
     Raises
     ------
@@ -40,29 +31,35 @@ class GuardCurve:
         If the numbers do not fit together.
     """
 
-    u_min0_V: float
-    beta_dp_MPa: tuple[float, ...]
-    beta: tuple[float, ...]
-    certified_steps_V: tuple[float, ...]
-    u_lower_V: tuple[float, ...]
-    u_threshold_V: tuple[float, ...]
+    u_min0_V: Annotated[Voltage, Meta(description="The largest offset at dP0 that the certificate allows.")]
+    beta_dp_MPa: Annotated[
+        tuple[PressureDrop, ...],
+        quantity("MPa", "Nodes of beta, at the tests; empty where the pressure drop is unknown."),
+    ]
+    beta: Annotated[tuple[Ratio, ...], quantity("1", "beta at the nodes, straight between them.")]
+    certified_steps_V: Annotated[
+        tuple[Voltage, ...],
+        quantity("V", "Staircase: lower bound of the threshold between neighbouring tests, one fewer than tests."),
+    ]
+    u_lower_V: Annotated[tuple[Voltage, ...], quantity("V", "Lower bounds of the threshold at the tests.")]
+    u_threshold_V: Annotated[tuple[Voltage, ...], quantity("V", "The threshold itself, as the monotone fit has it.")]
 
     def __post_init__(self) -> None:
         if len(self.beta) != len(self.beta_dp_MPa) or not _rises(self.beta_dp_MPa):
-            raise InputError("the nodes of beta must be as many as their pressure drops, which must rise")
+            raise RuleError("the nodes of beta must be as many as their pressure drops, which must rise")
         count = len(self.u_lower_V)
         if len(self.u_threshold_V) != count:
-            raise InputError(
+            raise RuleError(
                 f"{count} lower bounds stand beside {len(self.u_threshold_V)} thresholds, expected one each"
             )
         if not count or (self.beta_dp_MPa and count != len(self.beta_dp_MPa)):
-            raise InputError(f"{count} tests stand beside {len(self.beta_dp_MPa)} nodes of beta, expected one each")
+            raise RuleError(f"{count} tests stand beside {len(self.beta_dp_MPa)} nodes of beta, expected one each")
         if len(self.certified_steps_V) != count - 1:
-            raise InputError(f"{len(self.certified_steps_V)} steps bound {count} tests, expected one fewer")
+            raise RuleError(f"{len(self.certified_steps_V)} steps bound {count} tests, expected one fewer")
         if any(low > high + ROUNDING_V for low, high in zip(self.u_lower_V, self.u_threshold_V, strict=True)):
-            raise InputError("a lower bound lies above the threshold that it bounds")
+            raise RuleError("a lower bound lies above the threshold that it bounds")
         if not self.u_min0_V > 0:
-            raise InputError(f"u_min0 is {self.u_min0_V} V, expected a positive threshold")
+            raise RuleError(f"u_min0 is {self.u_min0_V:g} V, expected a positive threshold")
 
     @property
     def u_offset_V(self) -> tuple[float, ...]:
@@ -79,11 +76,7 @@ class GuardCurve:
         """
         steps, _ = staircase(np.array(self.u_lower_V), trend)
         if any(abs(step - known) > ROUNDING_V for step, known in zip(steps, self.certified_steps_V, strict=True)):
-            raise InputError("the certified steps do not follow from the tests' lower bounds")
-
-    def to_document(self) -> dict[str, Any]:
-        """Return the entry of valve.json."""
-        return asdict(self)
+            raise RuleError("the certified steps do not follow from the tests' lower bounds")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,23 +88,19 @@ class OpeningCurve:
     knee has left the dead zone behind. What it overshoots the onset by is at commands above zero and opens nothing at
     zero command.
 
-    Attributes
-    ----------
-    dp_MPa : tuple of float
-        Pressure drops of the tests, rising.
-    u_V, u_se_V : tuple of float
-        The threshold, running the way of the side's trend ("flat": constant), and the standard error of that test's
-        knee, V. At every node it is at least the offset of every guard's curve, so that the drive of an edge rises from
-        the one to the other.
+    At every node it is at least the offset of every guard's curve, so that the drive of a transition rises from the one
+    to the other.
     """
 
-    dp_MPa: tuple[float, ...]
-    u_V: tuple[float, ...]
-    u_se_V: tuple[float, ...]
+    dp_MPa: Annotated[tuple[PressureDrop, ...], quantity("MPa", "Pressure drops of the tests.")]
+    u_V: Annotated[
+        tuple[Voltage, ...], quantity("V", "The threshold there, running the way of the trend (flat: constant).")
+    ]
+    u_se_V: Annotated[tuple[VoltageError, ...], quantity("V", "Standard error of that test's knee.")]
 
     def __post_init__(self) -> None:
         if not self.dp_MPa or not len(self.dp_MPa) == len(self.u_V) == len(self.u_se_V) or not _rises(self.dp_MPa):
-            raise InputError(
+            raise RuleError(
                 f"the opening curve has {len(self.u_V)} thresholds and {len(self.u_se_V)} errors at "
                 f"{len(self.dp_MPa)} pressure drops, expected as many, at least one, and rising pressure drops"
             )
@@ -127,19 +116,11 @@ class OpeningCurve:
         steps = np.diff(self.u_V)
         wrong_way = {"decreasing": steps, "increasing": -steps, "flat": np.abs(steps)}[trend]
         if np.any(wrong_way > ROUNDING_V):
-            raise InputError(f"the opening curve does not run one way, expected a {trend} one like the trend")
+            raise RuleError(f"the opening curve does not run one way, expected a {trend} one like the trend")
         for guard in guards:
             offset = np.array(guard.u_offset_V)
             if len(offset) != len(self.u_V) or np.any(np.array(self.u_V) < offset - ROUNDING_V * (1 + offset)):
-                raise InputError("the opening curve lies below the offset of a guard's curve")
-
-    def to_document(self) -> dict[str, Any]:
-        """Return the entry of valve.json."""
-        return asdict(self)
-
-
-#: Lists of a guard's curve in valve.json.
-CURVE_LISTS = tuple(field.name for field in fields(GuardCurve) if field.name != "u_min0_V")
+                raise RuleError("the opening curve lies below the offset of a guard's curve")
 
 
 def _rises(values: Sequence[float]) -> bool:

@@ -14,7 +14,9 @@ from dzdesign.identify.knees.characteristic import BranchShape
 from dzdesign.identify.knees.prepared_tests import L_MIN, DescribedTest
 from dzdesign.identify.plots.frame import finish, new_figure, plot_style, saved
 from dzdesign.identify.side import IdentifiedSide
-from dzdesign.identify.valve.model import SideModel, TestResult, ValveModel
+from dzdesign.identify.valve.model import ValveModel
+from dzdesign.identify.valve.ramp_result import TestResult
+from dzdesign.identify.valve.side_model import SideModel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -64,7 +66,7 @@ def draw_figures(found: Identified) -> Iterator[tuple[str, "Figure"]]:
         for row, flow in enumerate(_flow_names(side.model.tests)):
             yield prefix + flow, _flow_figure(found.model, side, row)
         yield f"{prefix}thresholds", _thresholds_figure(side.model)
-        if len(side.model.beta) > 1:
+        if len(side.model.beta.beta) > 1:
             yield f"{prefix}beta", _beta_figure(side.model)
 
 
@@ -107,8 +109,8 @@ def _flow_figure(valve: ValveModel, side: IdentifiedSide, row: int) -> "Figure":
             axes.plot(_onsets(test)[column], 0, MARKERS[column], ms=1.8 * size, mfc="none", mec=COLOURS[column],
                       mew=1.6, label=f"onset {NAMES[column]}", zorder=6)  # fmt: skip
         axes.axvline(test.u_guard_lower_V, color=BLACK, ls="-.", lw=1.2, label="certified bound")
-        if valve.meter_floor_L_min > 0:
-            axes.axhline(valve.meter_floor_L_min, color=GREY, ls=":", lw=1.5, label="meter's floor")
+        if valve.meter.floor_L_min > 0:
+            axes.axhline(valve.meter.floor_L_min, color=GREY, ls=":", lw=1.5, label="meter's floor")
     for column, shape, knee, slope in branches:
         _draw_residuals(residual, shape, column, knee, slope)
     at = "" if test.dp_MPa is None else f" at {test.dp_MPa:.3f} MPa"
@@ -132,13 +134,13 @@ def _flow_title(side: SideModel, test: TestResult) -> tuple[str, str, str]:
     return (
         f"{at}: {test.source}",
         f"knee {pair(_knees(test))} (s.e. {1e3 * test.u_knee_se_V:.1f} mV); onset {pair(_onsets(test))}",
-        f"{side.guard} threshold {test.u_guard_V:.3f} V, certified above {test.u_guard_lower_V:.3f} V "
+        f"{side.certificate.guard} threshold {test.u_guard_V:.3f} V, certified above {test.u_guard_lower_V:.3f} V "
         f"({_percent(side)} for all tests together); {test.outliers} outliers left out",
     )
 
 
 def _percent(side: SideModel) -> str:
-    return f"{100 * side.confidence:.6g} %"
+    return f"{100 * side.certificate.confidence:.6g} %"
 
 
 def _knees(test: TestResult) -> tuple[float | None, float | None]:
@@ -158,7 +160,7 @@ def _edge_limits(
     low, high = max(min(marks) - room, 0.0), max(marks) + room
     noise = max(shape.sigma for shape in item.shapes if shape) / L_MIN
     first_knee = min(u for u in _knees(test) if u is not None)
-    top = max(1.1 * test.slope_L_min_V * (high - first_knee), 2 * valve.meter_floor_L_min, 6 * noise)
+    top = max(1.1 * test.slope_L_min_V * (high - first_knee), 2 * valve.meter.floor_L_min, 6 * noise)
     return (low, high), (-0.15 * top, top)
 
 
@@ -224,8 +226,9 @@ def _thresholds_figure(side: SideModel) -> "Figure":
         5.4,
         f"Thresholds of {len(dp)} pressure drop{'s' if len(dp) > 1 else ''}: {side.tests[0].source}"
         + (f" to {side.tests[-1].source}" if len(dp) > 1 else ""),
-        f"{side.guard} threshold guarded ({_percent(side)} for all tests together){trend}",
-        f"u_min0 = {side.u_min0_V:.4f} V" + (f" at dP0 = {side.reference_dp_MPa:.3f} MPa" if side.beta else ""),
+        f"{side.certificate.guard} threshold guarded ({_percent(side)} for all tests together){trend}",
+        f"u_min0 = {side.reference.u_min_V:.4f} V"
+        + (f" at dP0 = {side.reference.dp_MPa:.3f} MPa" if side.beta.beta else ""),
     )
     axes = figure.subplots()
     for column, name in enumerate(NAMES):
@@ -238,8 +241,8 @@ def _thresholds_figure(side: SideModel) -> "Figure":
     axes.plot(dp, guard, "s", ms=8.5, mfc="none", mec=BLACK, mew=1.2, label="guarded threshold", zorder=5)
     axes.plot(dp, bound, "_", ms=12, mew=2, color=BLACK, label="lower bound, at the test", zorder=5)
     if len(dp) > 1:
-        axes.stairs(side.certified_steps_V, dp, baseline=None, color=GREEN, lw=2, label="certified staircase")
-    offset = side.u_min0_V * np.array(side.beta or (1.0,))
+        axes.stairs(side.curve.certified_steps_V, dp, baseline=None, color=GREEN, lw=2, label="certified staircase")
+    offset = side.reference.u_min_V * np.array(side.beta.beta or (1.0,))
     axes.plot(dp, offset, "D--", ms=4, lw=1.4, color=PURPLE, label="largest certified offset", zorder=6)
     axes.set_ylabel("command u (V)")
     _label_pressure(axes, side)
@@ -248,21 +251,21 @@ def _thresholds_figure(side: SideModel) -> "Figure":
 
 def _beta_figure(side: SideModel) -> "Figure":
     """Draw beta with its nodes under what the bounds allow: the staircase and the bounds themselves, over u_min0."""
-    dp, u_min0 = _pressures(side), side.u_min0_V
-    beta = np.array(side.beta)
-    steps = np.array(side.certified_steps_V) / u_min0
+    dp, u_min0 = _pressures(side), side.reference.u_min_V
+    beta = np.array(side.beta.beta)
+    steps = np.array(side.curve.certified_steps_V) / u_min0
     bound = np.array([test.u_guard_lower_V for test in side.tests]) / u_min0
     figure = new_figure(
         5.0,
         f"β over {dp[0]:.3f} to {dp[-1]:.3f} MPa: {side.tests[0].source} to {side.tests[-1].source}",
-        f"β = {beta[0]:.4f} to {beta[-1]:.4f}, 1 at dP0 = {side.reference_dp_MPa:.3f} MPa "
+        f"β = {beta[0]:.4f} to {beta[-1]:.4f}, 1 at dP0 = {side.reference.dp_MPa:.3f} MPa "
         f"(u_min0 = {u_min0:.4f} V); bounds: {_percent(side)} for all tests together",
     )
     axes = figure.subplots()
     axes.plot(dp, bound, "_", ms=14, mew=2, color=BLACK, label="lower bound / u_min0, at the test", zorder=5)
     axes.stairs(steps, dp, baseline=None, color=GREEN, lw=2, label="certified staircase / u_min0", zorder=3)
     axes.plot(dp, beta, "D--", ms=5, lw=1.6, color=PURPLE, label="β(dP), straight between its nodes", zorder=4)
-    axes.plot(side.reference_dp_MPa, 1, "o", ms=13, mfc="none", mec=BLACK, mew=1.2, label="dP0, where β = 1")
+    axes.plot(side.reference.dp_MPa, 1, "o", ms=13, mfc="none", mec=BLACK, mew=1.2, label="dP0, where β = 1")
     low = axes.get_ylim()[0]
     axes.stairs(steps, dp, baseline=low, fill=True, color=GREEN, alpha=0.12, label="allowed by all bounds together")
     axes.set(ylabel="β (no unit)", ylim=(low, None))

@@ -13,7 +13,7 @@ from dzdesign.report.lot.valve_names import by_name
 if TYPE_CHECKING:
     from dzdesign.design.compensator import Compensator
     from dzdesign.design.lot_setting import Designed
-    from dzdesign.identify.valve.model import SideModel
+    from dzdesign.identify.valve.side_model import SideModel
 
 SIGNS = {"positive": 1, "negative": -1}
 
@@ -70,22 +70,22 @@ def _figures(designed: "Designed | None", sign: int, lot_law: "Compensator | Non
     if designed is None or (sign < 0 and designed.own.negative is None):
         return SideFigures()
     own, side = designed.own, _side(designed, sign)
-    test = min(side.tests, key=lambda test: abs((test.dp_MPa or 0.0) - (side.reference_dp_MPa or 0.0)))
+    test = min(side.tests, key=lambda test: abs((test.dp_MPa or 0.0) - (side.reference.dp_MPa or 0.0)))
     left = {
         branch: round(100 * max(values), 5)
         for branch, values in _remaining(own, side, sign).items()
     }
     curve = side.guards[own.side(sign).certificate.guard]
-    code = round(own.signals.dp_code(Fraction(repr(side.reference_dp_MPa))))
+    code = round(own.signals.dp_code(Fraction(repr(side.reference.dp_MPa))))
     return SideFigures(
-        dp0_MPa=side.reference_dp_MPa,
+        dp0_MPa=side.reference.dp_MPa,
         knee_opening_V=test.u_knee_rising_V,
         knee_closing_V=test.u_knee_falling_V,
         knee_se_V=test.u_knee_se_V,
         bound_V=curve.u_lower_V[side.tests.index(test)],
         offset_V=round(float(own.beta(code, sign) * own.side(sign).u_min0_over_u_max * own.u_max_V), 7),
         trend=side.trend,
-        highest_dp_MPa=side.beta_dp_MPa[-1],
+        highest_dp_MPa=side.beta.dp_MPa[-1],
         beta_at_highest_dp=curve.beta[-1],
         k_x_max_over_u_max=side.k_x_max_over_u_max,
         dead_zone_opening_percent=left.get("opening"),
@@ -121,6 +121,6 @@ def extra_dead_zone(designed: "Designed", lot_law: "Compensator", sign: int) -> 
         Of the command.
     """
     side = _side(designed, sign)
-    branch = "opening" if side.tests[0].rising is not None else "closing"
+    branch = "opening" if side.tests[0].u_knee_rising_V is not None else "closing"
     with_lot, with_own = (_remaining(law, side, sign)[branch] for law in (lot_law, designed.own))
     return round(100 * max(lot - own for lot, own in zip(with_lot, with_own, strict=True)), 5)

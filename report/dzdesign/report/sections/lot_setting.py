@@ -7,6 +7,7 @@ from functools import cache
 from itertools import pairwise
 from typing import Any
 
+from dzdesign.core.verdicts import NOT_CHECKED
 from dzdesign.report.artefact_chain import Chain
 from dzdesign.report.figures.figure import csv_text
 from dzdesign.report.page import Section
@@ -130,7 +131,7 @@ def _worst(evidence: dict[str, Any] | None) -> Figure:
     found = [each["lot"] for each in evidence["inputs"] if each.get("lot")] if evidence else []
     if not found:
         return Figure(
-            label="Worst valve of the lot", value="NOT CHECKED", kind="open",
+            label="Worst valve of the lot", value=NOT_CHECKED, kind="open",
             note="no evidence here compares the C with the bounds of each valve",
         )  # fmt: skip
     worst = min(found, key=lambda each: each["smallest_margin_V"])

@@ -21,12 +21,12 @@ from typing import NamedTuple
 import numpy as np
 
 from dzdesign.core.errors import RequirementError
-from dzdesign.verify.checks import Check
+from dzdesign.verify.evidence import Check
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
+from dzdesign.verify.requirements import UNDEFINED_BEHAVIOUR
 from dzdesign.verify.toolchain.compiled_core import SOURCES
 from dzdesign.verify.toolchain.machines import programs_folder
 
-NAME = "no undefined behaviour with an int of 16 bits"
 PROGRAM = "frama-c"
 #: A shift of a negative number to the right is each compiler's own; overflow of unsigned words is the core's tool.
 OPTIONS = (
@@ -79,11 +79,11 @@ def proof_check(folder: Path) -> Check:
         Not checked, with the reason, where Frama-C is not installed or does not end.
     """
     if not shutil.which(PROGRAM):
-        return Check(name=NAME, holds=None, text=f"not run: {PROGRAM} not found; apt install frama-c-base")
+        return UNDEFINED_BEHAVIOUR.check(holds=None, text=f"not run: {PROGRAM} not found; apt install frama-c-base")
     try:
         proof = prove(folder)
     except RequirementError as error:
-        return Check(name=NAME, holds=None, text=f"not run: {error}")
+        return UNDEFINED_BEHAVIOUR.check(holds=None, text=f"not run: {error}")
     if proof.alarms:
         first = proof.alarms[0]
         where = f"{first.function}, {first.file}:{first.line}"
@@ -91,7 +91,7 @@ def proof_check(folder: Path) -> Check:
     else:
         text = f"{', '.join(proof.functions)}: none, for all 2^48 triples of codes"
         text += ", and one step of the drive from any state in its range"
-    return Check(name=NAME, holds=not proof.alarms, text=f"{text}; Frama-C {proof.version}, -machdep x86_16")
+    return UNDEFINED_BEHAVIOUR.check(holds=not proof.alarms, text=f"{text}; Frama-C {proof.version}, -machdep x86_16")
 
 
 def prove(folder: Path, rows: int | None = None) -> Proof:
@@ -156,8 +156,8 @@ def _pieces(law: ExactLaw, ending: str, tried: range) -> str:
     lines += [
         f"#define COMMAND_ENDS {_braces(ends)}",
         f"#define SOUND_B {b.start}u",
-        f"#define NOT_OF_A {_unsound(a)}",
-        f"#define NOT_OF_B {_unsound(b)}",
+        f"#define NOT_OF_A {_invalid(a)}",
+        f"#define NOT_OF_B {_invalid(b)}",
         f"#define RAMPED {furthest * CODES}L",
         f"#define PRESSURE_ENDS {{{', '.join(_braces(_kinds(law, a, code)) for code in tried)}}}",
     ]
@@ -169,7 +169,7 @@ def _ends_of(sound: range) -> tuple[int, int, int]:
     return sound.start, sound.stop, sound.start + CODES // 2
 
 
-def _unsound(sound: range) -> str:
+def _invalid(sound: range) -> str:
     """Return the pieces of the codes that a sensor can't give."""
     ends = sorted({0, CODES, *_ends_of(sound)})
     pieces = [(first, end) for first, end in pairwise(ends) if first not in sound]

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dzdesign.core.errors import RequirementError
-from dzdesign.verify.checks import Check
-from dzdesign.verify.exhaustive.all_inputs import InputCheck
+from dzdesign.verify.evidence import Check, InputCheck
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import SAMPLED_STRIDE, PreparedInputs
+from dzdesign.verify.requirements import MACHINE_CODE
 from dzdesign.verify.toolchain.compiled_core import CompiledCore, Findings
 from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4, Machine
 
@@ -73,14 +73,16 @@ def machine_code_checks(folder: Path, inputs: tuple[InputCheck, ...]) -> list[Ch
         name = f"machine code of the {machine.name}"
         missing = "the core was not checked on the host" if not inputs else machine.missing()
         if missing:
-            checks.append(Check(name=name, holds=None, text=f"not run: {missing}"))
+            checks.append(MACHINE_CODE.check(name=name, holds=None, text=f"not run: {missing}"))
             continue
         try:
             done = [check_on_machine(folder, machine, host) for host in inputs]
         except RequirementError as error:
-            checks.append(Check(name=name, holds=False, text=str(error)))
+            checks.append(MACHINE_CODE.check(name=name, holds=False, text=str(error)))
             continue
-        checks.append(Check(name=name, holds=all(each.holds for each in done), text="; ".join(map(_words, done))))
+        checks.append(
+            MACHINE_CODE.check(name=name, holds=all(each.holds for each in done), text="; ".join(map(_words, done)))
+        )
     return checks
 
 

@@ -9,10 +9,10 @@ what the original's return. Otherwise it survives.
 """
 
 import os
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +20,11 @@ from dzdesign.core.artefact_files import parse_document, read_bytes
 from dzdesign.core.errors import RequirementError
 from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.verify.analysis.c_mutants import Mutant, mutants_of
-from dzdesign.verify.checks import Check
+from dzdesign.verify.evidence import Check, MutantOutcome, MutationScore
 from dzdesign.verify.exhaustive.drive_check import CompiledDrive, PreparedDrive
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
+from dzdesign.verify.requirements import MUTATION
 from dzdesign.verify.toolchain.compiled_core import CompiledCore
 from dzdesign.verify.toolchain.machines import HOST, compile_object, link_program, programs_folder, run_program
 
@@ -31,17 +32,6 @@ KILLED, REFUSED, SAME_OBJECT, SAME_OUTPUTS, SURVIVED = (
     "killed", "refused by the compiler", "same object code", "same outputs", "survived",
 )  # fmt: skip
 RANDOM_TRIPLES = 2**24
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Outcome:
-    """What became of one mutant: its file, line and change, one of the five verdicts, and what killed it."""
-
-    file: str
-    line: int
-    change: str
-    verdict: str
-    killer: str = ""
 
 
 class MutationBench:
@@ -86,7 +76,7 @@ class MutationBench:
             if verdict:
                 raise RequirementError(f"the firmware itself fails ({verdict}), so its mutants can't be judged")
 
-    def judge(self, mutant: Mutant) -> Outcome:
+    def judge(self, mutant: Mutant) -> MutantOutcome:
         """Compile a mutant and try everything on it.
 
         Parameters
@@ -100,8 +90,10 @@ class MutationBench:
             sign: core.edited(mutant.file, text) for sign, core in self._cores.items() if mutant.file in core.sources
         }
 
-        def outcome(verdict: str, killer: str = "") -> Outcome:
-            return Outcome(file=mutant.file, line=mutant.line, change=mutant.change, verdict=verdict, killer=killer)
+        def outcome(verdict: str, killer: str = "") -> MutantOutcome:
+            return MutantOutcome(
+                file=mutant.file, line=mutant.line, change=mutant.change, verdict=verdict, killer=killer
+            )
 
         try:
             objects = drive.objects()
@@ -116,12 +108,16 @@ class MutationBench:
 
     def _tried(self, cores: dict[int, CompiledCore], drive: CompiledDrive) -> Iterable[str]:
         """Yield, check by check, what found a fault, or an empty text: first what is quick."""
-        runs: list[tuple[str, Callable[[], int]]] = []
-        for sign, core in cores.items():
-            runs.append(("sample of inputs", lambda c=core, s=sign: c.check(self._samples[s], sample=True).faults))
+
+        def sampled(sign: int) -> int:
+            return cores[sign].check(self._samples[sign], sample=True).faults
+
+        def all_of(sign: int) -> int:
+            return cores[sign].check(self._everything[sign]).faults
+
+        runs: list[tuple[str, Callable[[], int]]] = [("sample of inputs", partial(sampled, sign)) for sign in cores]
         runs.append(("drive", lambda: drive.check(self._drive_samples).wrong))
-        for sign, core in cores.items():
-            runs.append(("all inputs", lambda c=core, s=sign: c.check(self._everything[s]).faults))
+        runs += [("all inputs", partial(all_of, sign)) for sign in cores]
         for name, run in runs:
             try:
                 yield name if run() else ""
@@ -151,7 +147,7 @@ def all_mutants(bench: MutationBench) -> list[Mutant]:
 
 def judge_all(
     bench: MutationBench, mutants: Sequence[Mutant], bar: Callable[[Sequence[Any]], Iterable[Any]] = iter
-) -> list[Outcome]:
+) -> list[MutantOutcome]:
     """Judge mutants on all processors.
 
     Parameters
@@ -172,44 +168,40 @@ def judge_all(
             raise
 
 
-def mutation_document(outcomes: Sequence[Outcome]) -> dict[str, Any]:
+def mutation_score(outcomes: Sequence[MutantOutcome]) -> MutationScore:
     """Return the counts, and by name what was not killed and why.
 
     Parameters
     ----------
-    outcomes : sequence of Outcome
+    outcomes : sequence of MutantOutcome
         Of `judge_all`.
     """
-    kinds = {"killed": KILLED, "refused": REFUSED, "same_object": SAME_OBJECT, "same_outputs": SAME_OUTPUTS}
-    kinds |= {"survived": SURVIVED}
-    count = {key: sum(each.verdict == verdict for each in outcomes) for key, verdict in kinds.items()}
-    killers: dict[str, int] = {}
-    for each in outcomes:
-        if each.killer:
-            killers[each.killer] = killers.get(each.killer, 0) + 1
-    return {
-        "mutants": len(outcomes),
-        **count,
-        "killers": killers,
-        "equivalent_means": f"the object is the same; or the compare values at all inputs, the status words and betas "
+    count = Counter(each.verdict for each in outcomes)
+    return MutationScore(
+        mutants=len(outcomes),
+        killed=count[KILLED],
+        refused=count[REFUSED],
+        same_object=count[SAME_OBJECT],
+        same_outputs=count[SAME_OUTPUTS],
+        survived=count[SURVIVED],
+        killers=dict(Counter(each.killer for each in outcomes if each.killer)),
+        equivalent_means=f"the object is the same; or the compare values at all inputs, the status words and betas "
         f"are the law's, the drive follows its model, and {RANDOM_TRIPLES} random triples of codes give the same",
-        "not_killed": [asdict(each) for each in outcomes if each.verdict != KILLED],
-    }
+        not_killed=tuple(each for each in outcomes if each.verdict != KILLED),
+    )
 
 
-def mutation_check(document: dict[str, Any]) -> Check:
+def mutation_check(score: MutationScore) -> Check:
     """Return the requirement that no mutant survives that is not equivalent.
 
     Parameters
     ----------
-    document : dict
-        Of `mutation_document`.
+    score : MutationScore
+        Of `mutation_score`.
     """
-    equivalent = document["same_object"] + document["same_outputs"]
-    return Check(
-        name="wrong C is caught",
-        holds=document["survived"] == 0 and document["killed"] > 0,
-        text=f"{document['killed']} of {document['mutants']} mutants killed, {equivalent} equivalent "
-        f"({document['same_object']} of the same object code, {document['same_outputs']} of the same outputs), "
-        f"{document['refused']} refused by the compiler, {document['survived']} survived",
+    return MUTATION.check(
+        holds=score.survived == 0 and score.killed > 0,
+        text=f"{score.killed} of {score.mutants} mutants killed, {score.same_object + score.same_outputs} equivalent "
+        f"({score.same_object} of the same object code, {score.same_outputs} of the same outputs), "
+        f"{score.refused} refused by the compiler, {score.survived} survived",
     )

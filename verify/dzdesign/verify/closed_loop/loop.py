@@ -13,6 +13,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.drive import RAMP_UNIT
 from dzdesign.verify.closed_loop.motion import motion_header, numbers_of
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
+from dzdesign.verify.evidence import PressureResult, Side
 from dzdesign.verify.toolchain.host_compiler import load_library
 
 #: Periods of the PWM between two records: 100 a second, as in the paper's tests.
@@ -69,28 +70,6 @@ class LoopRun:
     q_mean_L_min: np.ndarray
     q_largest_L_min: np.ndarray
     position_mm: np.ndarray
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PressureResult:
-    """The closed loop at one pressure drop, as shares of u_max and L/min.
-
-    Dead zones are the commands at which the plant's own flow passes `FLOW_SHARE` of the largest (no meter between),
-    on the opening and on the closing branch, without compensator and with it; with a dither the mean over its wave.
-    Flow at zero command is taken at the end, after closing, with a dither at the wave's top; `without_beta` with the
-    pressures frozen at dP0.
-    """
-
-    side: str
-    dp_MPa: float
-    dead_zone_opening: float
-    dead_zone_closing: float
-    residual_opening: float
-    residual_closing: float
-    q_zero_L_min: float
-    q_zero_without_beta_L_min: float
-    q_max_direct_L_min: float
-    q_max_L_min: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -254,7 +233,7 @@ class ClosedLoop:
 
 
 def compare_at_pressure(
-    loop: ClosedLoop, dp_MPa: float, dp0_MPa: float, sequence: RampSequence, side: str = "positive"
+    loop: ClosedLoop, dp_MPa: float, dp0_MPa: float, sequence: RampSequence, side: Side = "positive"
 ) -> LoopComparison:
     """Run the ramp without and with the compensator at one pressure drop, and read dead zones and flows.
 

@@ -7,11 +7,11 @@ Where a stop or the edge is passed within the period, plant_period.h takes it ap
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from functools import cache
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
@@ -20,6 +20,8 @@ from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant, derivatives, 
 if TYPE_CHECKING:
     import casadi
 
+#: Position to acceleration, both expressions of CasADi.
+Acceleration = Callable[[Any], Any]
 #: Radians of the fastest motion in a step: what the Taylor series leaves out is below 1e-12 of it.
 STEP_RAD = 0.6
 ORDER = 12
@@ -67,7 +69,8 @@ def equations() -> Equations:
 
     names = [field.name for field in fields(Plant)]
     symbols = ca.SX.sym("plant", len(names))
-    plant = SimpleNamespace(**dict(zip(names, ca.vertsplit(symbols), strict=True)))
+    # Not a `Plant`, whose parameters are checked to be numbers, but with the same names.
+    plant = cast(Plant, SimpleNamespace(**dict(zip(names, ca.vertsplit(symbols), strict=True))))
     state, inputs, rates = derivatives(plant)
     nothing = [ca.SX.zeros(3), ca.SX.zeros(3)]
     jacobians = [ca.jacobian(rates, state), ca.jacobian(rates, inputs)]
@@ -203,10 +206,10 @@ def motion_header() -> str:
     )
     response, state = ca.SX.sym("response", 5), ca.SX.sym("state", 3)
 
-    def acting(position):
+    def acting(position: Any) -> Any:
         return equations().nonlinear(position, supply, *parts[2:])
 
-    def acceleration(position):
+    def acceleration(position: Any) -> Any:
         return acting(position)[0] + push
 
     whole, fixed = [i, x, v, response, acts, push], acts + push
@@ -224,7 +227,9 @@ def motion_header() -> str:
     return f"enum {{ {names} }};\n{sizes}{generator.dump()}"
 
 
-def _step(through, state, response, start, acceleration: Callable) -> list:
+def _step(
+    through: SimpleNamespace, state: tuple[Any, Any, Any], response: Any, start: Any, acceleration: Acceleration
+) -> list[Any]:
     """Return what `plant_step` does, accelerations with the play's."""
     i, x, v = state
     middle = through.mid_i * i + through.mid_x * x + through.mid_v * v + response[4]
@@ -245,7 +250,7 @@ def _step(through, state, response, start, acceleration: Callable) -> list:
     ]
 
 
-def _straight_path(named, state, voltage, h, acceleration) -> list:
+def _straight_path(named: SimpleNamespace, state: Any, voltage: Any, h: Any, acceleration: Any) -> list[Any]:
     """Return the path at a constant voltage and acceleration as powers of the share of h: Taylor's series."""
     import casadi as ca
 
@@ -253,7 +258,7 @@ def _straight_path(named, state, voltage, h, acceleration) -> list:
     return [ca.vertcat(*part) for part in zip(*terms, strict=True)]
 
 
-def _path(named, state, voltage, h, acceleration: Callable) -> list:
+def _path(named: SimpleNamespace, state: Any, voltage: Any, h: Any, acceleration: Acceleration) -> list[Any]:
     """Return the path at a constant voltage as powers of the share of h: the same step, its linear part by Taylor."""
     import casadi as ca
 
@@ -272,7 +277,9 @@ def _path(named, state, voltage, h, acceleration: Callable) -> list:
     return [ca.vertcat(*part) for part in zip(*terms, strict=True)]
 
 
-def _taylor(named, state, voltage, h, acceleration: tuple) -> Iterator[list]:
+def _taylor(
+    named: SimpleNamespace, state: Sequence[Any], voltage: Any, h: Any, acceleration: tuple[Any, ...]
+) -> Iterator[list[Any]]:
     """Yield the terms of current, position, speed and charge after h, under an acceleration sum a_j (s/h)^j."""
     term = [*state, 0]
     yield term

@@ -4,17 +4,19 @@ Added to the paper's equations, each of them off where its parameter is zero: pr
 that moves the threshold, flow force, a play in the magnetic force (hysteresis), droop of the supply.
 """
 
-import json
 import math
 import tomllib
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+from msgspec import Meta
 
 from dzdesign.core.artefact_files import read_bytes
+from dzdesign.core.artefact_types import quantity
 from dzdesign.core.errors import InputError, nearest, quoted
-from dzdesign.identify.valve.model import SideModel
+from dzdesign.identify.valve.side_model import SideModel
 
 if TYPE_CHECKING:
     import casadi
@@ -31,49 +33,34 @@ FASTEST_RAD_S = 1e6
 LARGEST_DP_MPA = 40.0
 
 
+def _parameter(unit: str, description: str) -> Meta:
+    """Return the annotation of a parameter of the plant."""
+    return quantity(unit, description, ge=0, le=LARGEST_PARAMETER)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plant:
-    """Parameters of the plant; the names are those of Eqs. (19)-(24), the units stand in them.
+    """Parameters of the plant; the names are those of Eqs. (19)-(24), the units stand in them."""
 
-    Attributes
-    ----------
-    u_max_V : float
-        Command at which the PWM is fully on; the amplifier of Eq. (19) sees u_max or 0.
-    K_a, K_fi_V_A, R_c_ohm, r_p_ohm, L_c_H : float
-        Amplifier gain (K_e of Eq. 19), current feedback, coil.
-    K_i_N_A, m_e_kg, B_e_N_s_m, K_et_N_m : float
-        Force per current, mass, damping, spring.
-    preload_N, pressure_force_N_MPa, flow_force_N_mm_MPa : float
-        Parts of the load force f_eL: at rest; falling with dP; growing with dP and opening.
-    overlap_mm, stroke_mm : float
-        Travel before the edge opens; travel to the stop.
-    hysteresis_V : float
-        Width of the play between current and force, in volts of command.
-    C_d_W_mm, rho_kg_m3 : float
-        Discharge coefficient times area gradient, and density, of Eq. (24).
-    droop_MPa_L_min2 : float
-        Loss of pressure drop per flow squared.
-    """
-
-    u_max_V: float = 10.0
-    K_a: float = 4.0
-    K_fi_V_A: float = 9.0
-    R_c_ohm: float = 3.5
-    r_p_ohm: float = 0.5
-    L_c_H: float = 0.04
-    K_i_N_A: float = 60.0
-    m_e_kg: float = 0.06
-    B_e_N_s_m: float = 45.0
-    K_et_N_m: float = 15000.0
-    preload_N: float = 27.6
-    pressure_force_N_MPa: float = 0.32
-    flow_force_N_mm_MPa: float = 1.5
-    overlap_mm: float = 0.3
-    stroke_mm: float = 2.2
-    hysteresis_V: float = 0.15
-    C_d_W_mm: float = 3.2
-    rho_kg_m3: float = 860.0
-    droop_MPa_L_min2: float = 4e-4
+    u_max_V: Annotated[float, _parameter("V", "Command at which the PWM is fully on (Eq. 19: u_max or 0).")] = 10.0
+    K_a: Annotated[float, _parameter("1", "Amplifier gain, K_e of Eq. (19).")] = 4.0
+    K_fi_V_A: Annotated[float, _parameter("V/A", "Current feedback.")] = 9.0
+    R_c_ohm: Annotated[float, _parameter("ohm", "Resistance of the coil.")] = 3.5
+    r_p_ohm: Annotated[float, _parameter("ohm", "Internal resistance of the amplifier.")] = 0.5
+    L_c_H: Annotated[float, _parameter("H", "Inductance of the coil.")] = 0.04
+    K_i_N_A: Annotated[float, _parameter("N/A", "Force of the solenoid per current.")] = 60.0
+    m_e_kg: Annotated[float, _parameter("kg", "Moving mass.")] = 0.06
+    B_e_N_s_m: Annotated[float, _parameter("N s/m", "Damping.")] = 45.0
+    K_et_N_m: Annotated[float, _parameter("N/m", "Spring.")] = 15000.0
+    preload_N: Annotated[float, _parameter("N", "Load force f_eL at rest.")] = 27.6
+    pressure_force_N_MPa: Annotated[float, _parameter("N/MPa", "By how much it falls with dP.")] = 0.32
+    flow_force_N_mm_MPa: Annotated[float, _parameter("N/(mm MPa)", "By how much it grows with dP and opening.")] = 1.5
+    overlap_mm: Annotated[float, _parameter("mm", "Travel before the edge opens.")] = 0.3
+    stroke_mm: Annotated[float, _parameter("mm", "Travel to the stop.")] = 2.2
+    hysteresis_V: Annotated[float, _parameter("V", "Play between current and force, as command.")] = 0.15
+    C_d_W_mm: Annotated[float, _parameter("mm", "Discharge coefficient times area gradient, Eq. (24).")] = 3.2
+    rho_kg_m3: Annotated[float, _parameter("kg/m3", "Density, Eq. (24).")] = 860.0
+    droop_MPa_L_min2: Annotated[float, _parameter("MPa/(L/min)^2", "Pressure drop lost per flow squared.")] = 4e-4
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -159,9 +146,11 @@ def plants_from_tests(side: SideModel, u_max_V: float) -> dict[float, Plant]:
     """
     plants = {}
     for test in side.tests:
+        if test.dp_MPa is None:
+            raise InputError(f"{test.source} has no pressure drop, so no plant can be made from it; give --plant")
         base = Plant(u_max_V=u_max_V, pressure_force_N_MPa=0, flow_force_N_mm_MPa=0, droop_MPa_L_min2=0, overlap_mm=0.3)
         opens = test.u_knee_rising_V if test.u_knee_rising_V is not None else test.u_guard_V
-        closes = test.u_guard_V if side.guard == "closing" else opens
+        closes = test.u_guard_V if side.certificate.guard == "closing" else opens
         middle, hysteresis = (opens + closes) / 2, max(opens - closes, 0.0)
         # A threshold below the spring force of the overlap is met with less overlap.
         overlap = min(base.overlap_mm, 0.5 * middle * base.force_per_volt / base.K_et_N_m * 1e3)
@@ -176,11 +165,6 @@ def plants_from_tests(side: SideModel, u_max_V: float) -> dict[float, Plant]:
             C_d_W_mm=test.slope_L_min_V * L_MIN / (travel_mm_V * 1e-3) / speed * 1e3,
         )
     return plants
-
-
-def plant_document(plant: Plant) -> dict[str, Any]:
-    """Return the parameters as they stand in a file."""
-    return json.loads(json.dumps(asdict(plant)))
 
 
 def derivatives(plant: Plant) -> tuple["casadi.SX", "casadi.SX", "casadi.SX"]:

@@ -1,12 +1,14 @@
 """What a machine does to a valve beside ramps: steps, load steps, failing sensors, noise, cold and hot oil."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
 from dzdesign.verify.closed_loop.loop import ClosedLoop, LoopRun
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
+from dzdesign.verify.evidence import ScenarioResult, Side
 
 #: Two periods a record: as often as the core samples, 1.25 kHz.
 PERIODS = 2
@@ -22,33 +24,9 @@ SEED = 1
 OILS = {"cold oil, 8 times the viscosity": (8.0, 1.03), "hot oil, a quarter of the viscosity": (0.25, 0.97)}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ScenarioResult:
-    """One scenario at one pressure drop.
-
-    Attributes
-    ----------
-    name, side : str
-        What happens, and on which side of the valve.
-    dp_MPa : float
-        Pressure drop before anything happens, at no flow.
-    q_zero_L_min : float
-        Flow at zero command at the end, after everything has settled.
-    q_peak_at_zero_L_min : float
-        Largest flow while the command was zero and the valve had closed before.
-    must_shut : bool
-        Whether flow at the end is a failure: not where no compensator could know better.
-    figures : dict of str to float
-        What else was measured, the unit in the name.
-    """
-
-    name: str
-    side: str
-    dp_MPa: float
-    q_zero_L_min: float
-    q_peak_at_zero_L_min: float
-    must_shut: bool
-    figures: dict[str, float]
+#: Lowest and highest tested pressure drop, MPa.
+Ends = tuple[float, float]
+NO_FIGURES: Mapping[str, float] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,7 +38,7 @@ class Scene:
     loop : ClosedLoop
         With the compensator, and the plant of this pressure drop.
     plant : Plant
-    side : str
+    side : {"positive", "negative"}
     dp_MPa, reference_MPa : float
         Pressure drop at no flow, and the law's dP0.
     tested_MPa : (float, float) or None
@@ -69,7 +47,7 @@ class Scene:
 
     loop: ClosedLoop
     plant: Plant
-    side: str
+    side: Side
     dp_MPa: float
     reference_MPa: float
     tested_MPa: tuple[float, float] | None
@@ -87,13 +65,21 @@ class Scene:
         """Return the command that leaves the spool as its hysteresis leaves it after use."""
         return np.concatenate([_ramp(0, 1), self.held(1), _ramp(1, 0), self.held(0, 2)])
 
-    def run(self, command: np.ndarray, **keywords) -> LoopRun:
+    def run(
+        self,
+        command: np.ndarray,
+        *,
+        supply_MPa: float | np.ndarray | None = None,
+        mode: str = "compensated",
+        seen_MPa: np.ndarray | None = None,
+    ) -> LoopRun:
         """Run the compensated loop at this pressure drop unless told otherwise."""
-        supply = keywords.pop("supply_MPa", self.dp_MPa)
-        mode = keywords.pop("mode", "compensated")
-        return self.loop.run(command, supply, mode, periods_per_record=PERIODS, **keywords)
+        supply = self.dp_MPa if supply_MPa is None else supply_MPa
+        return self.loop.run(command, supply, mode, seen_MPa=seen_MPa, periods_per_record=PERIODS)
 
-    def result(self, name: str, run: LoopRun, *, must_shut: bool = True, **figures: float) -> ScenarioResult:
+    def result(
+        self, name: str, run: LoopRun, *, must_shut: bool = True, figures: Mapping[str, float] = NO_FIGURES
+    ) -> ScenarioResult:
         """Return the result; zero command counts once the valve has had the time to come to rest."""
         shut = np.flatnonzero(_held_for(run.command <= 0, round(self.settle_s / STEP_S)))
         return ScenarioResult(
@@ -111,9 +97,9 @@ def run_scenarios(scene: Scene) -> Iterator[ScenarioResult]:
     """Run every scenario of one side at one pressure drop."""
     yield _steps(scene)
     if scene.tested_MPa:
-        yield _load_step_at_zero(scene)
-        yield _load_step_in_motion(scene)
-        yield _frozen_sensors(scene)
+        yield _load_step_at_zero(scene, scene.tested_MPa)
+        yield _load_step_in_motion(scene, scene.tested_MPa)
+        yield _frozen_sensors(scene, scene.tested_MPa)
     yield from _failing_sensors(scene)
     yield _noise_at_zero(scene)
     yield from _oils(scene)
@@ -144,7 +130,7 @@ def _steps(scene: Scene) -> ScenarioResult:
             figures[f"{name}_rise_ms"] = 1e3 * STEP_S * _rise(step / final)
             figures[f"{name}_settling_ms"] = 1e3 * STEP_S * _last(np.abs(step / final - 1) > SETTLED)
             figures[f"{name}_overshoot_percent"] = max(100 * float(step.max() / final - 1), 0.0)
-    return scene.result("step to half command and back", runs["compensated"], **figures)
+    return scene.result("step to half command and back", runs["compensated"], figures=figures)
 
 
 def _rise(response: np.ndarray) -> int:
@@ -156,32 +142,34 @@ def _last(condition: np.ndarray) -> int:
     return int(np.flatnonzero(condition)[-1]) + 1 if condition.any() else 0
 
 
-def _other_pressures(scene: Scene, length: int) -> np.ndarray:
+def _other_pressures(scene: Scene, tested_MPa: Ends, length: int) -> np.ndarray:
     """Return the supply: as before, then at both ends of the tested interval, then as before."""
     quarter = length // 4
-    parts = [scene.dp_MPa, *scene.tested_MPa[::-1], scene.dp_MPa]
+    parts = [scene.dp_MPa, *tested_MPa[::-1], scene.dp_MPa]
     return np.repeat(parts, [quarter, quarter, quarter, length - 3 * quarter])
 
 
-def _load_step_at_zero(scene: Scene) -> ScenarioResult:
+def _load_step_at_zero(scene: Scene, tested_MPa: Ends) -> ScenarioResult:
     """The pressure drop jumps to both ends of what was tested while the command is zero."""
     before, quiet = scene.opened_and_closed(), scene.held(0, 8)
-    supply = np.concatenate([np.full(before.size, scene.dp_MPa), _other_pressures(scene, quiet.size)])
+    supply = np.concatenate([np.full(before.size, scene.dp_MPa), _other_pressures(scene, tested_MPa, quiet.size)])
     run = scene.run(np.concatenate([before, quiet]), supply_MPa=supply)
     volume = run.q_mean_L_min[before.size :].sum() * STEP_S / 60 * 1e3
-    return scene.result("load steps at zero command", run, volume_mL=volume)
+    return scene.result("load steps at zero command", run, figures={"volume_mL": volume})
 
 
-def _load_step_in_motion(scene: Scene) -> ScenarioResult:
+def _load_step_in_motion(scene: Scene, tested_MPa: Ends) -> ScenarioResult:
     """The pressure drop jumps in the middle of a ramp of the command."""
     command = np.concatenate([scene.opened_and_closed(), _ramp(0, 0.6), _ramp(0.6, 0), scene.held(0, 2)])
     jump = scene.opened_and_closed().size + _ramp(0, 1).size // 2
     supply = np.full(command.size, scene.dp_MPa)
-    supply[jump:] = scene.tested_MPa[1] if scene.dp_MPa < sum(scene.tested_MPa) / 2 else scene.tested_MPa[0]
+    supply[jump:] = tested_MPa[1] if scene.dp_MPa < sum(tested_MPa) / 2 else tested_MPa[0]
     run = scene.run(command, supply_MPa=supply)
     change = run.q_L_min[jump + round(SETTLE_S / STEP_S)] - run.q_L_min[jump - 1]
     return scene.result(
-        "load step in the middle of a ramp", run, pressure_drop_then_MPa=supply[-1], flow_change_L_min=change
+        "load step in the middle of a ramp",
+        run,
+        figures={"pressure_drop_then_MPa": supply[-1], "flow_change_L_min": change},
     )
 
 
@@ -195,9 +183,9 @@ def _failing_sensors(scene: Scene) -> Iterator[ScenarioResult]:
         yield scene.result(name, _fail(scene, shown_MPa, scene.dp_MPa))
 
 
-def _frozen_sensors(scene: Scene) -> ScenarioResult:
+def _frozen_sensors(scene: Scene, tested_MPa: Ends) -> ScenarioResult:
     """The sensors freeze, then the pressure drop rises. The codes are sound: what it costs is stated, not required."""
-    low, high = scene.tested_MPa
+    low, high = tested_MPa
     name = f"sensors frozen at {low:.2f} MPa, then {high:.2f} MPa"
     return scene.result(name, _fail(scene, low, high), must_shut=False)
 
@@ -222,8 +210,10 @@ def _noise_at_zero(scene: Scene) -> ScenarioResult:
     return scene.result(
         f"noise of {100 * NOISE:g} % on a zero command",
         run,
-        mean_flow_L_min=run.q_mean_L_min[noisy].mean(),
-        peak_flow_L_min=run.q_largest_L_min[noisy].max(),
+        figures={
+            "mean_flow_L_min": run.q_mean_L_min[noisy].mean(),
+            "peak_flow_L_min": run.q_largest_L_min[noisy].max(),
+        },
     )
 
 
@@ -235,4 +225,4 @@ def _oils(scene: Scene) -> Iterator[ScenarioResult]:
         )
         warm = replace(scene, loop=scene.loop.with_plant(plant), plant=plant)
         run = warm.run(warm.opened_and_closed())
-        yield warm.result(name, run, largest_flow_L_min=run.q_mean_L_min.max())
+        yield warm.result(name, run, figures={"largest_flow_L_min": run.q_mean_L_min.max()})

@@ -15,7 +15,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.identify.reading.ramp_files import SIMULATED_MARK, ramp_file_bytes
 from dzdesign.verify.closed_loop.loop import RECORD_S, ClosedLoop, RampSequence
-from dzdesign.verify.closed_loop.plant import Plant, plant_document
+from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.firmware.folder import check_firmware_inside
 
 
@@ -106,7 +106,7 @@ def simulated_files(
         "schema": "dzdesign.simulation/1",
         "tool": TOOL,
         "simulated": True,
-        "plant": plant_document(plant),
+        "plant": asdict(plant),
         "bench": asdict(bench),
         **origin,
     }

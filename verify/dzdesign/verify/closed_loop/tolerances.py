@@ -2,9 +2,9 @@
 
 import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from dzdesign.core.artefact_files import read_bytes
 from dzdesign.core.errors import InputError, nearest, quoted
 from dzdesign.verify.closed_loop.loop import FLOW_SHARE, NO_FLOW_L_MIN, ClosedLoop, RampSequence, dead_zone
 from dzdesign.verify.closed_loop.plant import LONGEST_KEY, Plant
+from dzdesign.verify.evidence import MonteCarlo, Scatter, Side, Spread
 
 PARAMETERS = tuple(field.name for field in fields(Plant))
 #: Ramps quick enough for hundreds of plants; the lag of a spool is a thousandth of them.
@@ -100,33 +101,8 @@ def _spread(path: Path, name: str, value: Any) -> tuple[float, str]:
     return float(found[1]) / 100, "normal" if found[2] else "uniform"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Scatter:
-    """What a series of plants does at one pressure drop.
-
-    Attributes
-    ----------
-    side : str
-    dp_MPa : float
-    plants, leaking : int
-        How many there are; how many pass flow at zero command after closing.
-    quantiles : dict of str to dict of str to float
-        Quantity to quantile ("0.05") to value: dead zones with the compensator as shares of full command, flows in
-        L/min.
-    worst : dict of str to dict
-        Quantity to the parameters of the plant at its bad end that differ from the nominal one, and its value.
-    """
-
-    side: str
-    dp_MPa: float
-    plants: int
-    leaking: int
-    quantiles: dict[str, dict[str, float]]
-    worst: dict[str, dict[str, Any]]
-
-
 def scatter(
-    loop: ClosedLoop, nominal: Plant, tolerances: Tolerances, dp_MPa: float, side: str = "positive"
+    loop: ClosedLoop, nominal: Plant, tolerances: Tolerances, dp_MPa: float, side: Side = "positive"
 ) -> Scatter:
     """Run every plant through a ramp at one pressure drop.
 
@@ -139,7 +115,7 @@ def scatter(
     tolerances : Tolerances
     dp_MPa : float
         Pressure drop at no flow.
-    side : str
+    side : {"positive", "negative"}
         For the result.
     """
     plants = tolerances.draw(nominal)
@@ -156,34 +132,35 @@ def scatter(
         )
 
     with ThreadPoolExecutor(WORKERS) as pool:
-        found = np.array(list(pool.map(one, plants)))
-    names = ("residual_opening", "residual_closing", "q_zero_L_min", "q_max_L_min")
-    bad_end = (np.argmax, np.argmax, np.argmax, np.argmin)
-    worst = {
-        name: {
-            "value": float(column[(at := int(end(column)))]),
-            "plant": {key: getattr(plants[at], key) for key in tolerances.spreads},
-        }
-        for name, column, end in zip(names, found.T, bad_end, strict=True)
-    }
+        opening, closing, q_zero, q_max = np.array(list(pool.map(one, plants))).T
+    drawn = [{name: getattr(plant, name) for name in tolerances.spreads} for plant in plants]
     return Scatter(
         side=side,
         dp_MPa=dp_MPa,
         plants=len(plants),
-        leaking=int((found[:, 2] > NO_FLOW_L_MIN).sum()),
-        quantiles={
-            name: {f"{q:g}": float(value) for q, value in zip(QUANTILES, np.quantile(column, QUANTILES), strict=True)}
-            for name, column in zip(names, found.T, strict=True)
-        },
-        worst=worst,
+        leaking=int((q_zero > NO_FLOW_L_MIN).sum()),
+        residual_opening=_spread_of(opening, drawn, int(opening.argmax())),
+        residual_closing=_spread_of(closing, drawn, int(closing.argmax())),
+        q_zero_L_min=_spread_of(q_zero, drawn, int(q_zero.argmax())),
+        q_max_L_min=_spread_of(q_max, drawn, int(q_max.argmin())),
     )
 
 
-def scatter_document(tolerances: Tolerances, found: Sequence[Scatter]) -> dict[str, Any]:
-    """Return what verification.json says of the series."""
-    return {
-        "plants": tolerances.plants,
-        "seed": tolerances.seed,
-        "spreads": {name: f"{100 * spread:g} % {shape}" for name, (spread, shape) in tolerances.spreads.items()},
-        "pressures": [asdict(each) for each in found],
-    }
+def _spread_of(values: np.ndarray, drawn: Sequence[Mapping[str, float]], worst: int) -> Spread:
+    """Return the quantiles of one quantity, and the plant at its bad end."""
+    p01, p05, p50, p95, p99 = map(float, np.quantile(values, QUANTILES))
+    return Spread(p01=p01, p05=p05, p50=p50, p95=p95, p99=p99, worst=float(values[worst]), worst_plant=drawn[worst])
+
+
+def monte_carlo(tolerances: Tolerances, found: Sequence[Scatter]) -> MonteCarlo:
+    """Return what the evidence has of a series of plants.
+
+    Parameters
+    ----------
+    tolerances : Tolerances
+        Of the series.
+    found : sequence of Scatter
+        One a side and pressure drop.
+    """
+    spreads = {name: f"{100 * spread:g} % {shape}" for name, (spread, shape) in tolerances.spreads.items()}
+    return MonteCarlo(plants=tolerances.plants, seed=tolerances.seed, spreads=spreads, pressures=tuple(found))

@@ -1,95 +1,16 @@
 """Every input of the compiled core against the exactly rounded law, and the properties that make it safe."""
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from dzdesign.verify import requirements
+from dzdesign.verify.evidence import Check, InputCheck
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
-from dzdesign.verify.exhaustive.lot_check import LotCheck, check_lot
+from dzdesign.verify.exhaustive.lot_check import check_lot
 from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
 from dzdesign.verify.exhaustive.zero_command import zero_command_margins
 from dzdesign.verify.toolchain.compiled_core import CompiledCore, Findings
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class InputCheck:
-    """What checking every input of one side found; every count but `inputs` must be zero.
-
-    Attributes
-    ----------
-    sign : int
-        Of the commands that the side is for.
-    inputs : int
-        Pairs of command code and difference of pressure codes, each compared with the exact law.
-    wrong : int
-        Pairs whose compare value is not the exactly rounded law.
-    largest_error : int
-        Largest difference in counts.
-    out_of_range, not_monotone_in_u, not_monotone_in_dp : int
-        Compare values above the limit; falls with rising command; steps in dP against the law's own direction.
-    over_compensated : int
-        Pressure codes of the tested interval whose zero-command drive lies above the threshold's lower bound.
-    odd_pairs : int
-        Pairs of pressure codes that give another value than their difference does.
-    bad_fallbacks, bad_status : int
-        Codes that are not sound and do not fall back to the safe value; status words that say something else.
-    bad_betas : int
-        Pairs of pressure codes at which what is shown of beta is not the law's, rounded down.
-    smallest_margin_V : float
-        Smallest distance from the zero-command drive to the threshold's lower bound; negative if it is exceeded.
-    core_sha256, object_sha256 : str
-        Hashes of the C that was compiled and of the object that was tried.
-    outputs_hash : str
-        Hash of the compare values of all inputs, in their order.
-    calls : int
-        Calls of the core in all: the inputs, the pairs of pressures at zero command and what is not sound.
-    pressure_pairs : int
-        Pairs of sound pressure codes; each is tried, see `check_all_inputs`.
-    first_wrong : str or None
-        The first failure, in words.
-    lot : LotCheck or None
-        Of a common setting: every valve of its lot; None of a valve's own.
-    """
-
-    sign: int
-    inputs: int
-    wrong: int
-    largest_error: int
-    out_of_range: int
-    not_monotone_in_u: int
-    not_monotone_in_dp: int
-    over_compensated: int
-    odd_pairs: int
-    bad_fallbacks: int
-    bad_status: int
-    bad_betas: int
-    smallest_margin_V: float
-    core_sha256: str
-    object_sha256: str
-    outputs_hash: str
-    calls: int
-    pressure_pairs: int
-    first_wrong: str | None
-    lot: LotCheck | None = None
-
-    @property
-    def holds(self) -> bool:
-        """True if nothing was found."""
-        return not any(
-            (
-                self.wrong,
-                self.out_of_range,
-                self.not_monotone_in_u,
-                self.not_monotone_in_dp,
-                self.over_compensated,
-                self.odd_pairs,
-                self.bad_fallbacks,
-                self.bad_status,
-                self.bad_betas,
-                self.lot and self.lot.over_compensated,
-            )
-        )
 
 
 def check_all_inputs(folder: Path, sign: int = 1) -> InputCheck:
@@ -175,3 +96,52 @@ def first_wrong(prepared: PreparedInputs, found: Findings) -> str | None:
         f"{prepared.differences.values[found.first_row]}: compare value {found.first_found}, "
         f"expected {found.first_expected}"
     )
+
+
+def input_checks(inputs: InputCheck, *, both_signs: bool) -> list[Check]:
+    """Return one requirement for each property that was compared; where there are two sides each says which.
+
+    Parameters
+    ----------
+    inputs : InputCheck
+        Of one side.
+    both_signs : bool
+        Whether the firmware has two sides.
+    """
+    margin_mV = 1e3 * inputs.smallest_margin_V
+    found = (
+        (
+            requirements.EXACT_LAW,
+            inputs.wrong,
+            f"{inputs.inputs} inputs checked, {inputs.wrong} wrong"
+            + (f" ({inputs.first_wrong})" if inputs.first_wrong else "")
+            + f"; hash of all compare values {inputs.outputs_hash}, object {inputs.object_sha256}",
+        ),
+        (
+            requirements.MONOTONE,
+            inputs.out_of_range + inputs.not_monotone_in_u + inputs.not_monotone_in_dp,
+            f"{inputs.out_of_range} out of range, {inputs.not_monotone_in_u} falls with rising command, "
+            f"{inputs.not_monotone_in_dp} steps against the law in dP",
+        ),
+        (
+            requirements.ZERO_COMMAND,
+            inputs.over_compensated,
+            f"{inputs.over_compensated} pressure codes above the threshold's lower bound, smallest margin of the C's "
+            f"compare values {margin_mV:.3f} mV",
+        ),
+        (
+            requirements.PRESSURE_DIFFERENCE,
+            inputs.odd_pairs,
+            f"{inputs.odd_pairs} of {inputs.pressure_pairs} pairs of pressure codes differ (the commands of each "
+            "difference take its pairs in turn; at zero command all pairs that the law follows or that lie outside the "
+            "sensors' valid range)",
+        ),
+        (
+            requirements.FALLBACK,
+            inputs.bad_fallbacks + inputs.bad_status + inputs.bad_betas,
+            f"{inputs.bad_fallbacks} such codes without the safe value, {inputs.bad_status} status words that say "
+            f"otherwise, {inputs.bad_betas} values of dz_beta() that are not the law's",
+        ),
+    )
+    sign = f"{inputs.side} commands: " if both_signs else ""
+    return [each.check(name=sign + each.title, holds=faults == 0, text=text) for each, faults, text in found]

@@ -8,11 +8,15 @@ import numpy as np
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.design.compensator import Compensator
+from dzdesign.verify.evidence import Check
 from dzdesign.verify.exhaustive.exact_drive import STEP_UNIT, DriveModel
+from dzdesign.verify.requirements import DRIVE
 from dzdesign.verify.toolchain.machines import HOST, compile_object, link_program, programs_folder, run_program, stored
 
 SEED, SAMPLES = 11, 3000
 #: A ramp that is not put anywhere; share of the samples before which it is.
+#: Codes of command, pressure A and pressure B.
+Codes = tuple[int, int, int]
 STAYS, PUT_SHARE = -(2**31), 0.04
 FIELDS = ("compare_a", "compare_b", "status", "law", "side", "ticks", "ramped")
 
@@ -34,7 +38,7 @@ class DriveCheck:
     first_wrong: str | None
 
 
-def drive_samples(compensator: Compensator, seed: int, count: int) -> list[tuple[int, int, int]]:
+def drive_samples(compensator: Compensator, seed: int, count: int) -> list[Codes]:
     """Return random codes, corners, steps from end to end, and noise about zero, one after the other.
 
     Parameters
@@ -53,7 +57,7 @@ def drive_samples(compensator: Compensator, seed: int, count: int) -> list[tuple
     corners = [0, low, high, signals.code_max, signals.code_max + 1, 65535, zero, signals.command.full_code]
     corners += [max(zero + sign * (window + step), 0) for sign in (1, -1) for step in (-1, 0, 1)]
     sound_pressures = (signals.pressure_a.valid_codes, signals.pressure_b.valid_codes)
-    made = []
+    made: list[Codes] = []
     while len(made) < count:
         kind = int(rng.integers(7))
         length = int(rng.integers(1, 900 if kind == 5 else 60))
@@ -65,9 +69,10 @@ def drive_samples(compensator: Compensator, seed: int, count: int) -> list[tuple
             end = held if held % 2 else (low, high)[held // 2 % 2]
             command = (anything, int(rng.choice(corners)), held, about_zero, near, end, corner)[kind]
             sound = rng.random() < 0.9
-            pressures = [int(rng.integers(least, most + 1)) for least, most in sound_pressures]
-            pressures = pressures if sound else rng.choice([0, 700, 4014, 4095, 4096, 65535], 2)
-            made.append((command, *map(int, pressures)))
+            p_a, p_b = (int(rng.integers(least, most + 1)) for least, most in sound_pressures)
+            if not sound:
+                p_a, p_b = map(int, rng.choice([0, 700, 4014, 4095, 4096, 65535], 2))
+            made.append((command, p_a, p_b))
     return made[:count]
 
 
@@ -99,7 +104,7 @@ def ramp_places(compensator: Compensator, seed: int, count: int) -> list[int]:
     return [place() if rng.random() < PUT_SHARE else STAYS for _ in range(count)]
 
 
-def window_samples(compensator: Compensator) -> list[tuple[tuple[int, int, int], int]]:
+def window_samples(compensator: Compensator) -> list[tuple[Codes, int]]:
     """Return samples, each with the ramp's place: from either end to the window's edges, where the side changes.
 
     Parameters
@@ -109,7 +114,7 @@ def window_samples(compensator: Compensator) -> list[tuple[tuple[int, int, int],
     """
     amplifier, command = compensator.amplifier, compensator.signals.command
     sensors = (compensator.signals.pressure_a, compensator.signals.pressure_b)
-    pressures = [sum(sensor.valid_codes) // 2 for sensor in sensors]
+    p_a, p_b = (sum(sensor.valid_codes) // 2 for sensor in sensors)
     ramps = any(amplifier.ramp_up + amplifier.ramp_down)
     signs = compensator.signals.signs
     made = []
@@ -118,7 +123,7 @@ def window_samples(compensator: Compensator) -> list[tuple[tuple[int, int, int],
         for step in (-1, 0, 1):
             for away in (far, sign * max(amplifier.window_codes + step, 0)):
                 code = command.zero_code + command.direction(1) * away
-                made.append(((code, *pressures), away * STEP_UNIT if ramps else STAYS))
+                made.append(((code, p_a, p_b), away * STEP_UNIT if ramps else STAYS))
     return made
 
 
@@ -209,3 +214,24 @@ class CompiledDrive:
             when = f"sample {sample} with codes {prepared.samples[sample]}" if sample >= 0 else "before any sample"
             words = f"{FIELDS[field]} after {tick} PWM periods, {when}"
         return DriveCheck(ticks=ticks, wrong=wrong, first_wrong=words)
+
+
+def drive_follows(folder: Path, compensator: Compensator) -> Check:
+    """Tell whether the drive around the law does what its model in rational numbers does.
+
+    Parameters
+    ----------
+    folder : Path
+        Firmware folder.
+    compensator : Compensator
+        What it was made from.
+    """
+    prepared = PreparedDrive(compensator)
+    try:
+        found = CompiledDrive(folder).check(prepared)
+    except RequirementError as error:
+        return DRIVE.check(holds=False, text=str(error))
+    text = f"outputs and state after each of {found.ticks} PWM periods, {len(prepared.samples)} samples of corners, "
+    text += f"steps, noise and random codes (seed {SEED}): {found.wrong} wrong"
+    text += f" ({found.first_wrong})" if found.wrong else ""
+    return DRIVE.check(holds=found.wrong == 0, text=text)

@@ -78,10 +78,8 @@ class DriveModel:
 
     def _sound(self, p_a: int, p_b: int) -> tuple[bool, bool]:
         signals = self.compensator.signals
-        return tuple(
-            sensor.valid_codes[0] <= code <= sensor.valid_codes[1]
-            for sensor, code in ((signals.pressure_a, p_a), (signals.pressure_b, p_b))
-        )
+        (a_low, a_high), (b_low, b_high) = signals.pressure_a.valid_codes, signals.pressure_b.valid_codes
+        return a_low <= p_a <= a_high, b_low <= p_b <= b_high
 
     def _status(self, command: int, p_a: int, p_b: int, sign: int) -> int:
         signals = self.compensator.signals

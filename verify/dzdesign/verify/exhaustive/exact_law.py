@@ -28,6 +28,14 @@ class Betas(NamedTuple):
     zero: Fraction
 
 
+class BetaNumerators(NamedTuple):
+    """The two betas at many differences, as integers over a common denominator."""
+
+    law: np.ndarray
+    zero: np.ndarray
+    denominator: int
+
+
 class ExactLaw:
     """The law of one side of a compensator document on integer codes.
 
@@ -98,8 +106,8 @@ class ExactLaw:
         """Return both betas at a difference; None, and one below ``-reverse``: the signal can't be right."""
         return Betas(self._at(self._law_nodes, dp_code), self._at(self._zero_nodes, dp_code))
 
-    def beta_numerators(self, differences: np.ndarray) -> tuple[Betas, int]:
-        """Return both betas at many differences as integers, and what they are over."""
+    def beta_numerators(self, differences: np.ndarray) -> BetaNumerators:
+        """Return both betas at many differences of pressure codes."""
         left, past = np.divmod(np.maximum(differences, 0), self._step)
         failed = differences < -self.reverse
 
@@ -108,8 +116,8 @@ class ExactLaw:
             between = node[left] * self._step + (node[left + 1] - node[left]) * past
             return np.where(failed, min(nodes) * self._step, between)
 
-        both = Betas(interpolated(self._law_nodes), interpolated(self._zero_nodes))
-        return both, self._denominator * self._step
+        law, zero = interpolated(self._law_nodes), interpolated(self._zero_nodes)
+        return BetaNumerators(law, zero, self._denominator * self._step)
 
     def _at(self, nodes: list[int], dp_code: int | None) -> Fraction:
         if dp_code is None or dp_code < -self.reverse:

@@ -4,49 +4,22 @@ The input check need not be repeated for each valve: the integers that the core 
 a difference of pressure codes. Each valve has its staircase of bounds, argued from its ramp tests as in `zero_command`.
 """
 
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
-from dzdesign.core.errors import InputError
+from dzdesign.core.errors import InputError, and_more
+from dzdesign.verify.evidence import Check, InputCheck, LotCheck
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import Differences
 from dzdesign.verify.exhaustive.zero_command import best_bounds, pressure_drops
+from dzdesign.verify.requirements import LOT
 
 #: Over-compensated valves that a sentence names.
 NAMED = 5
 #: Whole numbers below this, and their differences, fit 64 bits with a sign.
 LARGEST = 2**62
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LotCheck:
-    """What one sign of command of a core leaves to the bounds of every valve of a lot.
-
-    Attributes
-    ----------
-    valves : int
-        How many were compared.
-    over_compensated : tuple of str
-        Names of those above whose bound the core drives at zero command, the worst first.
-    worst : str
-        Name of the valve with the smallest margin.
-    worst_dp_MPa : float
-        Where it has it.
-    smallest_margin_V : float
-        That margin; negative if the bound is exceeded.
-    confidence : tuple of float
-        The least and the largest with which a valve's bounds hold.
-    """
-
-    valves: int
-    over_compensated: tuple[str, ...]
-    worst: str
-    worst_dp_MPa: float
-    smallest_margin_V: float
-    confidence: tuple[float, float]
 
 
 def check_lot(document: dict[str, Any], exact: ExactLaw, found: Differences, at_zero: np.ndarray) -> LotCheck | None:
@@ -111,3 +84,34 @@ def check_lot(document: dict[str, Any], exact: ExactLaw, found: Differences, at_
         smallest_margin_V=float(worst_margin),
         confidence=(min(confidence), max(confidence)),
     )
+
+
+def lot_checked(inputs: tuple[InputCheck, ...], document: dict[str, Any]) -> list[Check]:
+    """Tell whether the core of a common setting over-compensates any valve of its lot; nothing of a valve's own.
+
+    Parameters
+    ----------
+    inputs : tuple of InputCheck
+        One a sign of command.
+    document : dict
+        compensator.json.
+    """
+    count = document.get("common_valves", 0)
+    if not count:
+        return []
+    found = [each.lot for each in inputs if each.lot is not None]
+    if not found:
+        text = f"compensator.json is of {count} valves and holds the bounds of one; run `dzdesign batch` again, and "
+        return [LOT.check(holds=None, text=f"{text}make the firmware from its common_compensator.json")]
+    worst = min(found, key=lambda each: each.smallest_margin_V)
+    least, most = (f"{100 * ends:.6g}" for ends in worst.confidence)
+    text = (
+        f"{min(each.valves for each in found)} of {count} valves, each at every difference of pressure codes that it "
+        f"was tested over, against its own bounds ({least if least == most else f'{least} to {most}'} % for each): "
+    )
+    over = list(dict.fromkeys(name for each in found for name in each.over_compensated))
+    text += f"{len(over)} over-compensated" + (f": {and_more(over, NAMED)}" if over else "")
+    text += f"; smallest margin of the C's compare values {1e3 * worst.smallest_margin_V:.3f} mV: {worst.worst}, "
+    text += f"{worst.worst_dp_MPa:.2f} MPa"
+    all_there = all(each.valves == count for each in found)
+    return [LOT.check(holds=not over and all_there, text=text)]

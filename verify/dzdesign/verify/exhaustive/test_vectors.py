@@ -102,7 +102,8 @@ class PreparedInputs:
     def __init__(self, exact: ExactLaw) -> None:
         self.exact = exact
         self.differences = differences(exact)
-        betas, self._unit = exact.beta_numerators(np.append(self.differences.values, -exact.reverse - 1))
+        betas = exact.beta_numerators(np.append(self.differences.values, -exact.reverse - 1))
+        self._unit = betas.denominator
         key, law_of = np.unique(betas.law * KEY + betas.zero, return_inverse=True)
         both = np.stack(np.divmod(key, KEY))
         self._shown_betas = both[0] * SHOWN_BETA // self._unit
@@ -164,11 +165,12 @@ class PreparedInputs:
         none = np.zeros_like(corners[0][1])
         (sound_from, sound_to), zero = (self._sound[0], self._sound[1] + 1), self._zero_place
         parts = [(sound_from, scale, none, none), (zero, scale, corners[0][1], none)]
-        for (first, start), (last, end) in pairwise(corners):
+        for (first, low), (last, high) in pairwise(corners):
             width = last - first
-            parts.append((zero + last + (last == corners[-1][0]), scale * width, start * width, end - start))
+            parts.append((zero + last + (last == corners[-1][0]), scale * width, low * width, high - low))
         parts += [(sound_to, scale, corners[-1][1], none), (self._codes, scale, none, none)]
-        kept, begin = [], 0
+        kept: list[Straight] = []
+        begin = 0
         for end, denominator, start, step in parts:
             if end > begin:
                 shared = int(np.gcd.reduce(np.concatenate([start, step, [denominator]])))

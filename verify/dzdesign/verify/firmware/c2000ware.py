@@ -6,23 +6,20 @@ TI's headers are C for a compiler with 16-bit `int` and words of its own. Their 
 
 import tempfile
 from collections.abc import Callable
-from dataclasses import asdict, replace
 from pathlib import Path
 from xml.etree import ElementTree
 
-from dzdesign.core.artefact_files import MANIFEST_NAME, read_bytes
+from dzdesign.core.artefact_files import read_bytes
 from dzdesign.core.errors import InputError, RequirementError
-from dzdesign.core.shape import check_shape
-from dzdesign.verify.checks import Check
+from dzdesign.verify.evidence import Check
 from dzdesign.verify.firmware.folder import read_firmware_manifest
+from dzdesign.verify.requirements import C2000WARE
 from dzdesign.verify.toolchain.host_compiler import check_strictly, host_compiler
-from dzdesign.verify.verification import Verification
 
 TARGET = "f28335"
 DEVICE = "device_support/f2833x"
 HEADERS = (f"{DEVICE}/headers/include", f"{DEVICE}/common/include")
 PROJECT, WARE_ROOT = f"{TARGET}/dzdesign.projectspec", "C2000WARE_ROOT/"
-NAME = "compiles against C2000Ware"
 #: RAM and FLASH build.
 BUILDS = ((), ("-D_FLASH",))
 #: Read before all else: what the C28x compiler knows by itself, and the widths of its types.
@@ -68,11 +65,9 @@ def check_against_c2000ware(folder: Path, ware: Path, say: Callable[[str], None]
     InputError
         If either folder is none of its kind, or there is no C compiler.
     """
-    _, manifest = read_firmware_manifest(folder)
-    remedy = "make it again with `dzdesign codegen`"
-    check_shape(manifest, {"target": str}, str(folder / MANIFEST_NAME), remedy)
-    if manifest["target"] != TARGET:
-        raise InputError(f"--c2000ware checks firmware for {TARGET}, and '{folder}' is for {manifest['target']}")
+    manifest = read_firmware_manifest(folder)
+    if manifest.target != TARGET:
+        raise InputError(f"--c2000ware checks firmware for {TARGET}, and '{folder}' is for {manifest.target}")
     for headers in HEADERS:
         if not (ware / headers).is_dir():
             raise InputError(
@@ -81,7 +76,7 @@ def check_against_c2000ware(folder: Path, ware: Path, say: Callable[[str], None]
             )
     compiler = host_compiler()
     say(f"compiling the firmware against {ware}")
-    sources = sorted(folder / name for name in manifest["files"] if name.endswith(".c"))
+    sources = sorted(folder / name for name in manifest.files if name.endswith(".c"))
     try:
         with tempfile.TemporaryDirectory(prefix="dzdesign-") as temporary:
             prelude = Path(temporary) / "prelude.h"
@@ -94,10 +89,10 @@ def check_against_c2000ware(folder: Path, ware: Path, say: Callable[[str], None]
                     check_strictly(source, compiler, (*options, *build))
         missing = [name for name in _linked_files(folder) if not (ware / name).is_file()]
     except RequirementError as error:
-        return Check(name=NAME, holds=False, text=str(error))
+        return C2000WARE.check(holds=False, text=str(error))
     if missing:
-        return Check(name=NAME, holds=False, text=f"{ware} lacks {', '.join(missing)}, which the project links")
-    return Check(name=NAME, holds=True, text=f"compiled {len(sources)} files against {ware}, as RAM and as FLASH build")
+        return C2000WARE.check(holds=False, text=f"{ware} lacks {', '.join(missing)}, which the project links")
+    return C2000WARE.check(holds=True, text=f"compiled {len(sources)} files against {ware}, as RAM and as FLASH build")
 
 
 def _linked_files(folder: Path) -> list[str]:
@@ -108,14 +103,3 @@ def _linked_files(folder: Path) -> list[str]:
         raise RequirementError(f"{PROJECT} is not XML: {error}") from error
     paths = [entry.get("path", "") for entry in files]
     return [path.removeprefix(WARE_ROOT) for path in paths if path.startswith(WARE_ROOT)]
-
-
-def with_check(verification: Verification, check: Check) -> Verification:
-    """Return a verification with one requirement more, in its document too."""
-    checks = (*verification.checks, check)
-    document = {
-        **verification.document,
-        "holds": all(one.holds for one in checks),
-        "checks": [asdict(one) for one in checks],
-    }
-    return replace(verification, checks=checks, document=document)

@@ -32,7 +32,7 @@ logger = logging.getLogger(__name__)
 
 
 @cache
-def _build_folder() -> tempfile.TemporaryDirectory:
+def _build_folder() -> tempfile.TemporaryDirectory[str]:
     return tempfile.TemporaryDirectory(prefix="dzdesign-", ignore_cleanup_errors=True)
 
 
@@ -156,14 +156,36 @@ def run_compiler(command: Sequence[str], folder: Path | None = None) -> subproce
     return done
 
 
-def _run(command: list[str], what: str) -> None:
+def first_error(messages: str) -> str:
+    """Return the first complaint in what a compiler or linker wrote."""
+    lines = messages.splitlines()
+    first = (line for line in lines if "error" in line or "undefined reference" in line)
+    return next(first, messages.strip()[:300])
+
+
+def build(command: Sequence[str], what: str, folder: Path | None = None) -> None:
+    """Compile or link.
+
+    Parameters
+    ----------
+    command : sequence of str
+        As `words_of` begins it.
+    what : str
+        For messages.
+    folder : Path, optional
+        To run in.
+
+    Raises
+    ------
+    RequirementError
+        With the compiler's first complaint.
+    """
     try:
-        done = run_compiler(command)
+        done = run_compiler(command, folder)
     except (OSError, subprocess.TimeoutExpired) as error:
         raise RequirementError(f"{what} could not be compiled: {error}") from error
     if done.returncode:
-        first = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr.strip()[:300])
-        raise RequirementError(f"{what} does not compile: {first}")
+        raise RequirementError(f"{what} does not compile: {first_error(done.stderr)}")
 
 
 def check_strictly(source: Path, compiler: str, options: Sequence[str] = ()) -> None:
@@ -176,7 +198,7 @@ def check_strictly(source: Path, compiler: str, options: Sequence[str] = ()) -> 
     """
     target = Path(_build_folder().name) / "strict.o"
     command = [*words_of(compiler), *STRICT, "-O2", *options, "-c", str(source), "-o", str(target)]
-    _run(command, f"{source.name} ({Path(compiler).name})")
+    build(command, f"{source.name} ({Path(compiler).name})")
 
 
 def load_library(sources: Mapping[str, str], what: str, options: Sequence[str] = ()) -> ctypes.CDLL:
@@ -210,7 +232,7 @@ def load_library(sources: Mapping[str, str], what: str, options: Sequence[str] =
         units = [str(folder / name) for name in sources if name.endswith(".c")]
         position = [] if sys.platform == "win32" else ["-fPIC"]
         command = [*words_of(compiler), "-std=c99", "-O2", *options, *position, "-shared", *units]
-        _run([*command, "-o", str(library), "-lm"], what)
+        build([*command, "-o", str(library), "-lm"], what)
     try:
         return ctypes.CDLL(str(library))
     except OSError as error:

@@ -18,7 +18,7 @@ from threading import Lock
 
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.errors import RequirementError
-from dzdesign.verify.toolchain.host_compiler import build_folder, host_compiler, run_compiler, words_of
+from dzdesign.verify.toolchain.host_compiler import build, build_folder, host_compiler, words_of
 
 logger = logging.getLogger(__name__)
 
@@ -159,7 +159,7 @@ def compile_object(
         for each, text in sources.items():
             (folder / each).write_bytes(text)
         command = [*words_of(compiler), *flags, "-c", name, "-o", f"{name}.new"]
-        _build(command, folder, f"{what} ({Path(compiler).name})")
+        build(command, f"{what} ({Path(compiler).name})", folder)
         (folder / f"{name}.new").replace(target)
     return target
 
@@ -179,7 +179,7 @@ def link_program(machine: Machine, objects: list[Path], what: str) -> Path:
             return program
         flags = [flag.replace("{programs}", str(programs_folder())) for flag in machine.link_flags]
         compiler = machine.compiler or host_compiler()
-        _build([*words_of(compiler), *map(str, objects), *flags, "-o", str(program)], build_folder(), what)
+        build([*words_of(compiler), *map(str, objects), *flags, "-o", str(program)], what, build_folder())
     return program
 
 
@@ -200,16 +200,6 @@ def _alone(file: Path) -> Lock:
     """Return the lock of a file: mutants are built side by side, and share what is the same."""
     with _guard:
         return _locks.setdefault(file, Lock())
-
-
-def _build(command: list[str], folder: Path, what: str) -> None:
-    try:
-        done = run_compiler(command, folder)
-    except (OSError, subprocess.TimeoutExpired) as error:
-        raise RequirementError(f"{what} could not be built: {error}") from error
-    if done.returncode:
-        said = [line for line in done.stderr.splitlines() if "error" in line or "undefined reference" in line]
-        raise RequirementError(f"{what} does not build: {said[0] if said else done.stderr.strip()[:300]}")
 
 
 def run_program(machine: Machine, program: Path, arguments: list[str], what: str) -> list[list[int]]:

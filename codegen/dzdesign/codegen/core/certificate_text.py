@@ -1,0 +1,59 @@
+"""What dz_comp.h says of zero command: its compare values, and what they are certified for."""
+
+from textwrap import wrap
+
+from dzdesign.codegen.core.constants import COLUMNS
+from dzdesign.codegen.lot_banner import lot_in_words
+from dzdesign.core.units import span_MPa
+from dzdesign.design.compensator import Compensator
+
+
+def zero_command(compensator: Compensator, sign: int) -> tuple[int, int]:
+    """Return the least and the largest compare value at zero command.
+
+    Parameters
+    ----------
+    compensator : Compensator
+        The law in rationals.
+    sign : {1, -1}
+        Sign of the command.
+    """
+    zero = compensator.signals.command.zero_code
+    nodes = [node * compensator.beta_step_codes for node in range(compensator.nodes(sign) - 1)]
+    values = [compensator.compare(zero, code, sign) for code in nodes]
+    return min(values), max(values)
+
+
+def certificate_lines(compensator: Compensator, sign: int) -> list[str]:
+    """Return comment lines that say what the offset is certified for.
+
+    Parameters
+    ----------
+    compensator : Compensator
+        With its certificate.
+    sign : {1, -1}
+        Sign of the command.
+    """
+    certificate = compensator.side(sign).certificate
+    low, high = certificate.dp_MPa
+    where = span_MPa(float(low), float(high)) + (", between the tests too" if low < high else "")
+    text = (
+        f"Certificate: {where}, that lies below the "
+        f"{100 * certificate.confidence:.6g}% lower bound of the {certificate.guard} threshold, by "
+        f"{1e3 * float(certificate.smallest_margin_V):.3g} mV at the least beyond {_counted(compensator)}"
+    )
+    if certificate.guard == "closing":
+        text += f", so that nothing flows; flow below {certificate.level_L_min:.2f} L/min counts as none."
+    else:
+        text += ". After closing, flow may remain: the closing threshold lies lower, and is not the one guarded."
+    lot = lot_in_words(compensator)
+    return wrap(f"{text} {lot.certificate}" if lot else text, COLUMNS - 3)
+
+
+def _counted(compensator: Compensator) -> str:
+    """Return what the certificate's margin is left of."""
+    rounding = "the converters' error and the rounding to counts"
+    if not compensator.amplifier.dither_counts:
+        return rounding
+    peak = compensator.amplifier.dither_counts / compensator.signals.compare_max * float(compensator.u_max_V)
+    return f"{rounding} and the dither's peak of {1e3 * peak:.4g} mV, which dz_drive adds to it"

@@ -1,0 +1,19 @@
+"""The words of a verdict, the same in the terminal, in the report and in every description of an artefact."""
+
+HOLDS, DOES_NOT_HOLD, NOT_CHECKED = "HOLDS", "DOES NOT HOLD", "NOT CHECKED"
+
+
+def verdict_words(holds: bool | None) -> str:
+    """Return what a verdict is called.
+
+    Parameters
+    ----------
+    holds : bool or None
+        Whether a requirement holds; None: it was not checked.
+
+    Examples
+    --------
+    >>> verdict_words(True), verdict_words(False), verdict_words(None)
+    ('HOLDS', 'DOES NOT HOLD', 'NOT CHECKED')
+    """
+    return NOT_CHECKED if holds is None else HOLDS if holds else DOES_NOT_HOLD

@@ -1,0 +1,122 @@
+"""Options in a TOML file: the names of the command line, one file for all commands."""
+
+import datetime
+import re
+import tomllib
+from collections.abc import Collection, Mapping
+from pathlib import Path
+
+from dzdesign.core.artefact_files import read_bytes
+from dzdesign.core.errors import InputError, nearest, quoted
+
+#: Characters of a key to which the nearest known one is looked for.
+LONGEST_KEY = 80
+#: Of an option in the file: text, a list of texts, or a table.
+Value = str | list[str] | dict[str, str]
+
+
+class _AsWritten(float):
+    """A number with a point that is text as it stands in the file: an oil of viscosity 46.10 stays one."""
+
+    text: str
+
+    def __new__(cls, text: str) -> "_AsWritten":
+        made = super().__new__(cls, text)
+        made.text = text.replace("_", "")
+        return made
+
+    def __str__(self) -> str:
+        return self.text
+
+
+def options_from_file(
+    path: str,
+    known: Collection[str],
+    repeatable: Collection[str],
+    tables: Collection[str] = (),
+    by_entry: Collection[str] = (),
+) -> dict[str, Value]:
+    """Read options; a key may be written ``meter-floor`` or ``meter_floor``, values as on the command line.
+
+    Parameters
+    ----------
+    path : str
+        TOML file.
+    known : collection of str
+        Options of all commands, so that one file serves every command.
+    repeatable : collection of str
+        Those of them that may be a list.
+    tables : collection of str
+        Those of them that may be a table of texts.
+    by_entry : collection of str
+        Those of them whose texts are for people: dates may stand there, and the table may be empty.
+
+    Raises
+    ------
+    InputError
+        If the file is not TOML, a key is no option of any command, or a value does not fit.
+    """
+    content = read_bytes(Path(path), "config file")
+    try:
+        document = tomllib.loads(content.decode("utf-8-sig"), parse_float=_AsWritten)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"'{path}' is not TOML: {error}; expected lines such as u-max = \"10 V\"") from error
+    options: dict[str, Value] = {}
+    for key, value in document.items():
+        name = key.replace("-", "_")
+        if name not in known:
+            hint = nearest(name[:LONGEST_KEY], known).replace("_", "-")
+            raise InputError(f"'{path}': there is no option {quoted(key)}{hint}; see `dzdesign COMMAND --help`")
+        if name in options:
+            raise InputError(f"'{path}': option '{key}' is given twice, with - and with _; keep one")
+        if name in by_entry and value == {}:
+            continue
+        options[name] = _texts(path, key, value, name in repeatable, name in tables, name in by_entry)
+    return options
+
+
+def _texts(path: str, key: str, value: object, repeatable: bool, table: bool, free: bool) -> Value:
+    """Return a value as text, or as the list or table of texts that it may be."""
+    if repeatable and isinstance(value, list):
+        items = value
+    else:
+        items = list(value.values()) if table and isinstance(value, dict) else [value]
+    if not items or not all(_is_text(item, free) for item in items):
+        raise InputError(f"'{path}': option '{key}' is {quoted(value)}, expected text such as \"1 MPa\" or a number")
+    if isinstance(value, dict):
+        return {name: str(item) for name, item in value.items()}
+    return [str(item) for item in items] if isinstance(value, list) else str(value)
+
+
+def _is_text(item: object, free: bool) -> bool:
+    """Tell whether an item is text, or a number (or a date) that is short enough to be written as text."""
+    if isinstance(item, int) and (isinstance(item, bool) or item.bit_length() > 64):
+        return False
+    return isinstance(item, str | int | float) or (free and isinstance(item, datetime.date | datetime.time))
+
+
+def in_words_of_the_file(message: str, path: str, values: Mapping[str, Value]) -> str:
+    """Return a message about an option as one about the line of the file where it stands; any other as it is.
+
+    Parameters
+    ----------
+    message : str
+        Of an error; about an option it begins with that.
+    path : str
+        The file.
+    values : mapping
+        Options that it says, by their names in words of Python.
+
+    Examples
+    --------
+    >>> in_words_of_the_file("--u-max is '10' without a unit; write for example '10 V'", "dz.toml", {"u_max": "10"})
+    '\'dz.toml\': u-max is \'10\' without a unit; write for example u-max = "10 V"'
+    """
+    for name, value in values.items():
+        key = name.replace("_", "-")
+        if re.match(rf"--{re.escape(key)}(?= |:)", message):
+            words = message.removeprefix("--") if isinstance(value, str) else message  # a table's lines are its own
+            if isinstance(value, str) and words.startswith(f"{key} is '{value}'"):  # not of a part of it
+                words = re.sub(r"(write for example|such as) '([^']*)'$", rf'\1 {key} = "\2"', words)
+            return f"'{path}': {words}"
+    return message

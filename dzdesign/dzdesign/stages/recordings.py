@@ -1,0 +1,220 @@
+"""How stages read recordings: patterns, columns, declared pressure drops, no copies."""
+
+import fnmatch
+import glob
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from dzdesign.core.artefact_files import MANIFEST_NAME, check_place_of_files
+from dzdesign.core.errors import InputError, nearest, neighbour
+from dzdesign.core.options import (
+    FIT,
+    METER,
+    RECORDINGS,
+    AnyPath,
+    Option,
+    Paths,
+    Table,
+    Text,
+    paths_of,
+    percent_range,
+    quantity,
+    whole_number,
+)
+from dzdesign.core.units import parse_quantity
+from dzdesign.terminal.progress import say, with_bar
+
+if TYPE_CHECKING:
+    from dzdesign.identify.reading.ramp_files import RampTest
+
+
+#: Reads --skip-rows.
+read_skip_rows = whole_number("how many rows stand above the header, such as 12 (0: none)")
+
+# fmt: off
+
+@dataclass(frozen=True, kw_only=True)
+class ColumnArguments:
+    """How the columns of recordings are found."""
+
+    columns: Annotated[Table, Option(
+        'Columns, such as "u=AO0:V, Q=Flow (L/min)": a quantity (time, u, dP, pA, pB, Q), its label in the file and, '
+        "after a colon, the unit that the label lacks. In the options file a table [columns].",
+        "MAP", RECORDINGS)] = None
+    dp: Annotated[Table, Option(
+        'Pressure drop of files without a column of it, such as "1 MPa". In the options file also a table [dp] from '
+        "file name or pattern to pressure.",
+        "P", RECORDINGS, example="1 MPa")] = None
+    skip_rows: Annotated[int | str | None, Option(
+        "Rows above the header of a text file, such as a logger's preamble (default: found).", "N", RECORDINGS,
+        read=read_skip_rows)] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class RampArguments(ColumnArguments):
+    """How ramp tests are read."""
+
+    u_max: Annotated[str, Option(
+        "Full command.", "U", RECORDINGS, example="10 V", read=quantity("voltage"))] = "10 V"
+    meter_floor: Annotated[Text, Option(
+        "Flow below which the meter reads zero (default: found).",
+        "Q", METER, example="0.6 L/min", read=quantity("flow"))] = None
+    meter_lag: Annotated[Text, Option(
+        "Lag of the flow meter (default: found from ramps of two rates).",
+        "T", METER, example="0.1 s", read=quantity("time"))] = None
+    knee_window: Annotated[str, Option(
+        "Flow range of the straight-line fit, in percent of maximum flow.",
+        "A-B", FIT, read=percent_range("the largest flow such as '12-50'"))] = "12-50"
+# fmt: on
+
+
+def read_recordings(
+    patterns: Paths,
+    *,
+    u_max: float,
+    columns: Table,
+    dp: Table,
+    skip_rows: int | str | None = None,
+    what: str = "reading recordings",
+) -> "list[RampTest]":
+    """Read the recordings that patterns name.
+
+    Parameters
+    ----------
+    patterns : path or iterable of paths
+        Names of files, or patterns such as ``ramps/*.csv``.
+    u_max : float
+        Command in V that 100 % means.
+    columns : str or mapping, optional
+        Of --columns, or of the table in the options file.
+    dp : str or mapping, optional
+        Pressure drop that --dp declares for all files, or that [dp] declares for each.
+    skip_rows : int or str, optional
+        Of --skip-rows.
+    what : str
+        For the progress bar.
+
+    Raises
+    ------
+    InputError
+        If a file can't be read, or has no pressure drop where [dp] names those of others.
+    """
+    from dzdesign.identify.reading.column_labels import parse_columns
+    from dzdesign.identify.reading.ramp_files import read_ramp_file
+
+    chosen, skipped = parse_columns(columns) if columns else {}, None
+    if skip_rows is not None:
+        skipped = read_skip_rows(skip_rows, "--skip-rows")
+    paths = expand(patterns)
+    names = distinct_names(paths)
+    tests = [
+        replace(read_ramp_file(path, u_max, columns=chosen, dp=_declared_dp(name, dp), skip_rows=skipped), source=name)
+        for path, name in with_bar(list(zip(paths, names, strict=True)), what)
+    ]
+    _refuse_unnamed(tests, dp)
+    return tests
+
+
+def expand(patterns: Paths) -> list[Path]:
+    """Return the files that one or several patterns name; cmd.exe leaves ``*.csv`` to the program."""
+    paths = []
+    for path in paths_of(patterns):
+        pattern = os.fspath(path)
+        magic = glob.has_magic(pattern) and "\0" not in pattern and not os.path.exists(pattern)
+        matches = sorted(glob.glob(pattern)) if magic else [pattern]
+        if not matches:
+            near = neighbour(os.path.dirname(pattern)) if not glob.has_magic(os.path.dirname(pattern)) else ""
+            raise InputError(f"no file matches '{pattern}'{near}; check the name and the folder")
+        paths += [Path(match) for match in matches]
+    return _without_manifests(paths)
+
+
+def _without_manifests(paths: list[Path]) -> list[Path]:
+    """Return the files without those that dzdesign itself puts into a folder of recordings; each is named."""
+    kept = [path for path in paths if path.name != MANIFEST_NAME]
+    for path in paths if kept else ():
+        if path.name == MANIFEST_NAME:
+            say(f"'{path}' is left out: a manifest that dzdesign writes beside recordings, and none itself")
+    return kept or paths
+
+
+def distinct_names(paths: list[Path]) -> list[str]:
+    """Return the files' names, with as many of their folders as tell those of one name apart.
+
+    Examples
+    --------
+    >>> distinct_names([Path("a/x/ramp.csv"), Path("b/x/ramp.csv"), Path("b/x/other.csv")])
+    ['a/x/ramp.csv', 'b/x/ramp.csv', 'other.csv']
+    """
+    of_one_name: dict[str, list[Path]] = {}
+    for path in paths:
+        of_one_name.setdefault(path.name, []).append(path)
+    names = []
+    for path in paths:
+        others = [other.parts for other in of_one_name[path.name] if other != path]
+        shown = next(
+            (count for count in range(1, len(path.parts)) if all(o[-count:] != path.parts[-count:] for o in others)),
+            len(path.parts),
+        )
+        names.append("/".join(path.parts[-shown:]).replace("//", "/").encode(errors="replace").decode())
+    return names
+
+
+def _declared_dp(name: str, declared: Table) -> float | None:
+    """Return the pressure drop that --dp or [dp] declares for a file, in Pa; a name goes before a pattern.
+
+    The name may have folders before it, where they tell two files apart; [dp] may leave them out.
+    """
+    if declared is None:
+        return None
+    if isinstance(declared, str):
+        return parse_quantity(declared, "pressure", "--dp")
+    last = name.rpartition("/")[2]
+    patterns = [known for known in (name, last) if known in declared]
+    patterns += [each for each in declared if fnmatch.fnmatchcase(name, each) or fnmatch.fnmatchcase(last, each)]
+    return parse_quantity(declared[patterns[0]], "pressure", f"[dp] '{patterns[0]}'") if patterns else None
+
+
+def _refuse_unnamed(tests: list["RampTest"], declared: Table) -> None:
+    """Refuse a file without a pressure drop where the table [dp] names others: a name was mistyped."""
+    for test in tests:
+        if isinstance(declared, Mapping) and test.dp is None:
+            raise InputError(
+                f"'{test.source}' has no column of dP, and no name in [dp] is its own{nearest(test.source, declared)}; "
+                f'add "{test.source}" = "1 MPa" to [dp], with its pressure drop'
+            )
+
+
+def refuse_copies(tests: list["RampTest"]) -> None:
+    """Refuse a recording that is given twice: counting a copy as a repeat would understate the uncertainty."""
+    known: dict[str, str] = {}
+    for test in tests:
+        if test.sha256 in known:
+            raise InputError(
+                f"'{test.source}' is byte for byte the same recording as '{known[test.sha256]}'; give it once "
+                "(a repeated ramp test is welcome, a copy is no repetition)"
+            )
+        known[test.sha256] = test.source
+
+
+def check_plots(folder: AnyPath | None, output: AnyPath | None) -> None:
+    """Refuse a folder for plots that can't be one, or in whose place the output goes.
+
+    Parameters
+    ----------
+    folder : path, optional
+        Of the plots.
+    output : path, optional
+        Of the result.
+    """
+    if folder is None:
+        return
+    if not os.fspath(folder):
+        raise InputError("--plots is empty, expected the name of a folder, such as plots")
+    place = Path(folder)
+    check_place_of_files(place, "--plots")
+    if output is not None and Path(output).absolute() in (place.absolute(), *place.absolute().parents):
+        raise InputError(f"--plots '{folder}' lies at '{output}', where -o puts a file; choose another --plots")

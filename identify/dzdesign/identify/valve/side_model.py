@@ -1,0 +1,145 @@
+"""`SideModel`: one side of a valve (one direction of flow), an entry of ``sides`` in valve.json."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from dzdesign.core.artefact_types import RuleError, quantity
+from dzdesign.identify.fitting.guard_curve import GUARDS, ROUNDING_V, GuardCurve, OpeningCurve
+from dzdesign.identify.valve.quantity_types import Flow, PressureDrop, Probability, Ratio, Voltage, VoltageError
+from dzdesign.identify.valve.ramp_result import TestResult
+
+TRENDS = ("decreasing", "flat", "increasing")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reference:
+    """The law's reference point."""
+
+    dp_MPa: Annotated[PressureDrop | None, Meta(description="dP0; null where the ramp test has no pressure.")]
+    u_min_V: Annotated[
+        Voltage, Meta(description="u_min0: the law's offset at dP0, the largest that the certificate allows.")
+    ]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BetaNodes:
+    """beta(dP) of the default guard, straight between the nodes; without nodes where dP is unknown."""
+
+    dp_MPa: Annotated[tuple[PressureDrop, ...], quantity("MPa", "Pressure drops of the nodes, those of the tests.")]
+    beta: Annotated[tuple[Ratio, ...], quantity("1", "beta there: u_min(dP) / u_min0.")]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Certificate:
+    """What the lower bounds rest on."""
+
+    confidence: Annotated[
+        float, quantity("1", "Confidence with which all bounds of a guard hold together.", ge=0.5, le=1)
+    ]
+    guard: Annotated[
+        Literal["closing", "mean", "opening"],
+        Meta(
+            description="The threshold that is protected unless `design --guard` asks for another: the safest that was "
+            "recorded."
+        ),
+    ]
+    level_L_min: Annotated[
+        Flow,
+        Meta(
+            description="Flow below which there is none: the largest of the meter's floor, its noise and 0.5 % of the "
+            "largest flow."
+        ),
+    ]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SideModel:
+    """One side of the valve, identified on its own; on the negative side commands and flows count from zero down."""
+
+    tests: Annotated[tuple[TestResult, ...], Meta(description="In the order of rising pressure drop.", min_length=1)]
+    reference: Annotated[Reference, Meta(description="The law's reference point.")]
+    k_x_max_over_u_max: Annotated[
+        float,
+        quantity(
+            "1",
+            "Command that full stroke takes beyond the knee, over full command (k x_max / u_max of Eq. 18).",
+            ge=1e-3,
+            le=1e3,
+        ),
+    ]
+    k_V_mm: Annotated[float, quantity("V/mm", "k of Eq. (11), where --x-max was given.", ge=0, le=1e9)] | None
+    trend: Annotated[
+        Literal["decreasing", "flat", "increasing"] | None,
+        Meta(description="How the threshold runs with the pressure drop; null where fewer than two were tested."),
+    ]
+    trend_change_V: Annotated[Voltage | None, Meta(description="Change of the threshold over the tested range.")]
+    trend_change_se_V: Annotated[VoltageError | None, Meta(description="Its standard error.")]
+    trend_p: Annotated[
+        Probability | None, Meta(description="Probability of so large a change if the threshold were flat.")
+    ]
+    beta: Annotated[BetaNodes, Meta(description="beta(dP) of the default guard.")] = field(init=False)
+    valid_dp_MPa: Annotated[
+        tuple[PressureDrop, PressureDrop] | None, quantity("MPa", "Tested interval; nothing is certified outside it.")
+    ] = field(init=False)
+    certificate: Annotated[Certificate, Meta(description="What the lower bounds rest on.")]
+    active_constraints: Annotated[
+        tuple[str, ...], Meta(description="Constraints of the fits that hold with equality, in words.")
+    ]
+    guards: Annotated[
+        Mapping[str, GuardCurve],
+        Meta(
+            description="One curve for each threshold that the recordings allow: closing, opening and the mean of "
+            "both, its error taken as large as their covariance could make it.",
+            extra_json_schema={"propertyNames": {"enum": list(GUARDS)}},
+        ),
+    ]
+    opening_curve: Annotated[
+        OpeningCurve | None,
+        Meta(description="Where useful flow begins on opening; null without a rising branch or without pressure."),
+    ]
+
+    def __post_init__(self) -> None:
+        if self.trend is None and len(self.tests) != 1:
+            raise RuleError(f"trend is missing beside {len(self.tests)} tests, expected one of {', '.join(TRENDS)}")
+        if self.certificate.guard not in self.guards or not set(self.guards) <= set(GUARDS):
+            raise RuleError(
+                f"the guard is '{self.certificate.guard}' and there are curves of {', '.join(self.guards) or 'none'}, "
+                f"expected the guard among them, and no others than {', '.join(GUARDS)}"
+            )
+        dp = self.curve.beta_dp_MPa
+        if dp and (self.reference.dp_MPa is None or any(test.dp_MPa is None for test in self.tests)):
+            raise RuleError("a pressure drop is missing beside the nodes of beta; expected one per test and dP0")
+        for guard in self.guards.values():
+            self._check_nodes(guard.beta_dp_MPa, len(guard.u_lower_V))
+            guard.check_staircase(self.trend or "flat")
+        self._check_guarded()
+        if self.opening_curve is not None:
+            self._check_nodes(self.opening_curve.dp_MPa, len(self.opening_curve.u_V))
+            self.opening_curve.check_order(self.trend or "flat", tuple(self.guards.values()))
+        object.__setattr__(self, "beta", BetaNodes(dp_MPa=dp, beta=self.curve.beta))
+        object.__setattr__(self, "valid_dp_MPa", (dp[0], dp[-1]) if dp else None)
+
+    def _check_nodes(self, nodes: tuple[float, ...], count: int) -> None:
+        """Check that a curve has one node a test, at its pressure drop; where that is unknown, none."""
+        if count != len(self.tests) or len(nodes) != len(self.curve.beta_dp_MPa):
+            raise RuleError(f"a curve has {count} thresholds for {len(self.tests)} tests, expected one each")
+        for test, node in zip(self.tests if nodes else (), nodes, strict=True):
+            if test.dp_MPa is None or abs(test.dp_MPa - node) > ROUNDING_V:
+                raise RuleError("the nodes of beta must stand at the tests' pressure drops")
+
+    def _check_guarded(self) -> None:
+        """Check that reference and tests repeat the guard's curve."""
+        guard, curve = self.certificate.guard, self.curve
+        if abs(self.reference.u_min_V - curve.u_min0_V) > ROUNDING_V:
+            raise RuleError(f"the reference's u_min_V is {self.reference.u_min_V:g} V, not that of the {guard} curve")
+        for test, threshold, bound in zip(self.tests, curve.u_threshold_V, curve.u_lower_V, strict=True):
+            if abs(test.u_guard_V - threshold) > ROUNDING_V or abs(test.u_guard_lower_V - bound) > ROUNDING_V:
+                raise RuleError(f"the tests' guarded thresholds and bounds are not those of the {guard} curve")
+
+    @property
+    def curve(self) -> GuardCurve:
+        """The curve of the guard that is protected by default."""
+        return self.guards[self.certificate.guard]

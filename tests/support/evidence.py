@@ -1,0 +1,26 @@
+"""Evidence as small as it may be, for tests of what reads it."""
+
+from dataclasses import replace
+from typing import Any
+
+from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.artefact_types import THIS_TOOL
+from dzdesign.verify.evidence import Check, ClosedLoopResult, Evidence
+
+LOOP = ClosedLoopResult(plant=None, plant_source="none", plant_sha256=None, plants=(), pressures=())
+EVIDENCE = Evidence(
+    tool=THIS_TOOL, made_from=(), target="f28335", changed_board_files=(), user_files=(), board_not_compiled="",
+    checks=(Check(id="compiles", name="compiles", holds=True, text="yes"),), inputs=(), closed_loop=LOOP, scenarios=(),
+    monte_carlo=None, mutants=None,
+)  # fmt: skip
+
+
+def evidence_with(**changes: Any) -> Evidence:
+    """Return evidence of one requirement that holds, with other fields."""
+    return replace(EVIDENCE, **changes)
+
+
+def read_evidence(path: Any) -> Evidence:
+    """Return the evidence of a folder or file."""
+    path = path / Evidence.FILE_NAME if path.is_dir() else path
+    return read_artefact(path.read_bytes(), Evidence, str(path))

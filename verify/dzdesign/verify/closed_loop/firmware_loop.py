@@ -1,0 +1,154 @@
+"""A firmware in closed loop: ramps, scenarios and a series of plants at every tested pressure drop, and the checks."""
+
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from dzdesign.design.compensator import Compensator
+from dzdesign.identify.valve.model import ValveModel
+from dzdesign.verify.closed_loop.loop import ClosedLoop, LoopComparison, RampSequence, compare_at_pressure
+from dzdesign.verify.closed_loop.loop_checks import (
+    no_flow_at_zero,
+    plant_is_the_valve,
+    plant_opens,
+    shut_after_scenarios,
+)
+from dzdesign.verify.closed_loop.plant import Plant, plants_from_tests
+from dzdesign.verify.closed_loop.scenarios import Scene, run_scenarios
+from dzdesign.verify.closed_loop.tolerances import Tolerances, monte_carlo, scatter
+from dzdesign.verify.evidence import Check, IdentifiedPlant, MonteCarlo, PressureResult, ScenarioResult, Side
+
+#: Shows how far a stage is: pieces and their number in, the pieces out.
+Watch = Callable[[Iterable[Any], int], Iterable[Any]]
+#: Runs side by side.
+WORKERS = 2
+SIGNS: dict[Side, int] = {"positive": 1, "negative": -1}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FirmwareLoop:
+    """What the closed loop showed; nothing of it where there was no core to close it with.
+
+    Attributes
+    ----------
+    checks : tuple of Check
+    plants : tuple of IdentifiedPlant
+        Of each pressure drop.
+    loops : tuple of LoopComparison
+        Ramps without and with the compensator.
+    scenarios : tuple of ScenarioResult
+    monte_carlo : MonteCarlo or None
+        The series of plants, where tolerances were given.
+    """
+
+    checks: tuple[Check, ...] = ()
+    plants: tuple[IdentifiedPlant, ...] = ()
+    loops: tuple[LoopComparison, ...] = ()
+    scenarios: tuple[ScenarioResult, ...] = ()
+    monte_carlo: MonteCarlo | None = None
+
+    @property
+    def ramps(self) -> tuple[PressureResult, ...]:
+        """What was read from the ramps, one entry a side and pressure drop."""
+        return tuple(loop.result for loop in self.loops)
+
+
+def scenes_of(
+    folder: Path, compensator: Compensator, document: dict[str, Any], valve: ValveModel, plant: Plant | None
+) -> tuple[Scene, ...]:
+    """Return the compensated loop of each side at every tested pressure drop.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the firmware.
+    compensator : Compensator
+        What it was made from.
+    document : dict
+        Its file.
+    valve : ValveModel
+        What that was made from.
+    plant : Plant or None
+        None: plants are made from the identified thresholds.
+    """
+    scenes: list[Scene] = []
+    for name, sign in SIGNS.items():
+        if sign not in compensator.signals.signs:
+            continue
+        side = valve.sides[name]
+        # One that stands in for the valve at one pressure drop says nothing of another.
+        plants = dict.fromkeys(side.beta.dp_MPa, plant) if plant else plants_from_tests(side, valve.u_max_V)
+        tested = (min(plants), max(plants)) if plant else None
+        first = ClosedLoop(next(iter(plants.values())), folder, document, sign)
+        scenes += [
+            Scene(
+                loop=first.with_plant(one), plant=one, side=name, dp_MPa=dp_MPa,
+                reference_MPa=side.reference.dp_MPa, tested_MPa=tested,
+            )
+            for dp_MPa, one in plants.items()
+        ]  # fmt: skip
+    return tuple(scenes)
+
+
+def close_the_loop(
+    scenes: tuple[Scene, ...],
+    compensator: Compensator,
+    valve: ValveModel,
+    plant: Plant | None,
+    sequence: RampSequence,
+    tolerances: Tolerances | None,
+    say: Callable[[str], None],
+    watch: Watch,
+) -> FirmwareLoop:
+    """Run the ramps, the scenarios and, where tolerances are given, the series of plants.
+
+    Parameters
+    ----------
+    scenes : tuple of Scene
+        Of `scenes_of`.
+    compensator : Compensator
+        What the firmware was made from.
+    valve : ValveModel
+        What that was made from.
+    plant : Plant or None
+        The one that was given.
+    sequence : RampSequence
+        The command over time.
+    tolerances : Tolerances or None
+        About the plant that was given.
+    say, watch : callable
+        As `dzdesign.verify.verification.verify` takes them.
+    """
+    given = plant is not None
+    say("running the closed loop")
+    with ThreadPoolExecutor(WORKERS) as pool:
+        ramps = pool.map(
+            lambda scene: compare_at_pressure(scene.loop, scene.dp_MPa, scene.reference_MPa, sequence, scene.side),
+            scenes,
+        )
+        loops = tuple(watch(ramps, len(scenes)))
+    say("running the scenarios")
+    with ThreadPoolExecutor(WORKERS) as pool:
+        done = pool.map(lambda scene: tuple(run_scenarios(scene)), scenes)
+        scenarios = tuple(result for results in watch(done, len(scenes)) for result in results)
+    series = None
+    if tolerances and plant:
+        say(f"running {tolerances.plants} plants at {len(scenes)} pressure drops")
+        pieces = watch(scenes, len(scenes))
+        series = monte_carlo(tolerances, [scatter(s.loop, plant, tolerances, s.dp_MPa, s.side) for s in pieces])
+    results = [loop.result for loop in loops]
+    zero_flow = no_flow_at_zero(results, compensator, valve, plant_given=given)
+    return FirmwareLoop(
+        checks=(
+            plant_opens(results),
+            plant_is_the_valve(results, valve),
+            zero_flow,
+            shut_after_scenarios(scenarios, zero_flow, plant_given=given),
+        ),
+        plants=tuple(IdentifiedPlant(side=scene.side, dp_MPa=scene.dp_MPa, parameters=scene.plant) for scene in scenes),
+        loops=loops,
+        scenarios=scenarios,
+        monte_carlo=series,
+    )

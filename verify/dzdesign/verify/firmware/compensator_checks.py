@@ -1,0 +1,124 @@
+"""Whether the compensator of a firmware follows: its certificate and its law from its valve, its valve from a file."""
+
+import contextlib
+from collections.abc import Iterator
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from dzdesign.core.artefact_files import TOOL, parse_document, sha256_of, to_json
+from dzdesign.core.errors import InputError
+from dzdesign.core.units import span_MPa
+from dzdesign.design.certificate import prove_certificates
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.redesign_check import prove_derived
+from dzdesign.identify.valve.model import SCHEMA
+from dzdesign.verify.evidence import Check
+from dzdesign.verify.requirements import CERTIFICATE, LAW, VALVE
+
+#: The schema stands in the first bytes of an artefact; a valve.json is far smaller than the limit.
+HEAD, LARGEST_FILE = 512, 32 * 2**20
+#: So many folders beside the firmware, and files in each, are looked at.
+MOST = 500
+
+
+def certificate_follows(compensator: Compensator) -> Check:
+    """Tell whether what the header promises follows from the valve that the compensator was made from."""
+    try:
+        prove_certificates(compensator)
+    except InputError as error:
+        return CERTIFICATE.check(holds=False, text=str(error))
+    certificate = compensator.positive.certificate
+    common = f"of {compensator.common_valves} valves the one in compensator.json: " if compensator.common_valves else ""
+    text = f"{common}the {certificate.guard} threshold's {100 * certificate.confidence:.6g}% lower bound, "
+    low, high = map(float, certificate.dp_MPa)
+    text += f"{span_MPa(low, high)}, proved again at every difference of pressure codes"
+    return CERTIFICATE.check(holds=True, text=text)
+
+
+def law_follows(compensator: Compensator, document: dict[str, Any]) -> Check:
+    """Tell whether designing again gives the same numbers, which a file without its options does not let anyone do.
+
+    Parameters
+    ----------
+    compensator : Compensator
+    document : dict
+        Its file. Another version of dzdesign may have chosen other tables, and none the worse.
+    """
+    if compensator.request is None:
+        text = "compensator.json does not say for which target and with which options it was designed, so no number of "
+        return LAW.check(holds=None, text=f"{text}it can be derived again; make it again with `dzdesign design`")
+    try:
+        prove_derived(compensator)
+    except InputError as error:
+        version = document.get("tool", {}).get("version")
+        known = version == TOOL["version"]
+        text = str(error) if known else f"designed by dzdesign {version}, and this is {TOOL['version']}: {error}"
+        return LAW.check(holds=False if known else None, text=text)
+    target = compensator.request.target.name
+    text = f"designed again from the valve and the options in compensator.json, for {target}: every number the same"
+    return LAW.check(holds=True, text=text)
+
+
+def valve_follows(folder: Path, document: dict[str, Any]) -> list[Check]:
+    """Tell whether the valve in a compensator is that of the file it names; nothing where that file is not at hand.
+
+    The name alone says nothing: a valve.json of another hash and another content is a stranger's.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the firmware; valve.json is looked for in it, beside it and in the folders beside it.
+    document : dict
+        compensator.json.
+    """
+    source, valve = document["made_from"][0], document["valve"]
+    stated = source["sha256"]
+    around = tuple(_valves_around(folder))
+    named = (each for each in around if each.name == source["source"] and each.sha256 != stated)
+    other = "".join(
+        f"{each.name} beside the firmware is ANOTHER valve, SHA-256 {each.sha256}, and not used; "
+        for each in named
+        if each.valve != valve
+    )
+    if stated == sha256_of(to_json(valve).encode()):  # as `identify` writes it: no file is needed
+        text = f"the valve that compensator.json holds has, as `identify` writes it, the SHA-256 {stated} in made_from"
+        return [VALVE.check(holds=True, text=other + text)]
+    for each in around:
+        if each.sha256 == stated:
+            same = each.valve == valve
+            text = f"compared with {each.name}, which has the SHA-256 {stated} in made_from"
+            text += "" if same else ", but is another valve; make the compensator again with `dzdesign design`"
+            return [VALVE.check(holds=same, text=other + text)]
+        if each.valve == valve:
+            text = f"{each.name} is that valve, but its SHA-256 is {each.sha256} and compensator.json names {stated}; "
+            return [VALVE.check(holds=False, text=f"{text}make the compensator again with `dzdesign design`")]
+    return []
+
+
+class _ValveFile:
+    """A valve.json near the firmware, whatever its name is; read only where its hash does not decide."""
+
+    def __init__(self, name: str, content: bytes) -> None:
+        self.name, self.sha256, self._content = name, sha256_of(content), content
+
+    @cached_property
+    def valve(self) -> dict[str, Any] | None:
+        """The valve, or None if it can't be read."""
+        with contextlib.suppress(InputError):
+            return parse_document(self._content, self.name, (SCHEMA,))
+        return None
+
+
+def _valves_around(folder: Path) -> Iterator[_ValveFile]:
+    """Yield each valve.json of the firmware's folder, the one around it and those in that; none that can't be read."""
+    folder = folder.resolve()
+    root = folder.parent
+    with contextlib.suppress(OSError):
+        within = sorted(place for place in root.iterdir() if place.is_dir() and not place.name.startswith("."))
+        for place in dict.fromkeys((root, *within[:MOST], folder)):
+            with contextlib.suppress(OSError):
+                for path in sorted(place.glob("*.json"))[:MOST]:
+                    content = path.read_bytes() if path.is_file() and path.stat().st_size <= LARGEST_FILE else b""
+                    if f'"{SCHEMA}"'.encode() in content[:HEAD]:
+                        yield _ValveFile(path.relative_to(root).as_posix(), content)

@@ -1,0 +1,144 @@
+"""Whether the firmware's C compiles: the core strictly, and the files that its user filled in."""
+
+import re
+import shutil
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.design.firmware_manifest import FirmwareManifest
+from dzdesign.verify import requirements
+from dzdesign.verify.evidence import Check
+from dzdesign.verify.firmware.unchanged_files import USER_FOLDER, changed_files, user_files
+from dzdesign.verify.toolchain.host_compiler import (
+    STRICT,
+    build_folder,
+    check_strictly,
+    find_compilers,
+    first_error,
+    run_compiler,
+)  # fmt: skip
+from dzdesign.verify.toolchain.machines import CORTEX_M4
+
+#: Compiler and options of a target whose board files can be compiled without a vendor's library.
+COMPILERS = {"cortex-m4": (CORTEX_M4.compiler, *CORTEX_M4.core_flags)}
+#: How a compiler says that a header lies elsewhere: where, only its user knows.
+ELSEWHERE = re.compile(r"error: (\S+): No such file or directory")
+
+
+def compiles_strictly(folder: Path, manifest: FirmwareManifest) -> Check:
+    """Tell whether every compiler on this machine takes the core with every warning an error.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the firmware.
+    manifest : FirmwareManifest
+        Of `read_firmware_manifest`.
+    """
+    compilers = find_compilers()
+    try:
+        for compiler in compilers:
+            for name in manifest.core:
+                if name.endswith(".c"):
+                    check_strictly(folder / name, compiler)
+    except RequirementError as error:
+        return requirements.COMPILES.check(holds=False, text=str(error))
+    names = ", ".join(sorted({Path(compiler).name for compiler in compilers}))
+    return requirements.COMPILES.check(holds=True, text=f"{' '.join(STRICT)}: {names}")
+
+
+def changed_board_files(folder: Path, manifest: FirmwareManifest) -> list[str]:
+    """Return the files of the target that the user fills in and that are no longer as generated.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the firmware.
+    manifest : FirmwareManifest
+        Of `read_firmware_manifest`.
+    """
+    return sorted(name for name in changed_files(folder, manifest) if name in manifest.board)
+
+
+def check_include(include: Sequence[Path], manifest: FirmwareManifest) -> None:
+    """Refuse folders of headers that are none, or of a target whose board files are not compiled here.
+
+    Parameters
+    ----------
+    include : sequence of Path
+        As given.
+    manifest : FirmwareManifest
+        Of `read_firmware_manifest`.
+
+    Raises
+    ------
+    InputError
+        Naming the first that is none.
+    """
+    for place in include:
+        if not place.is_dir():
+            raise InputError(f"'{place}' is no folder, expected one with headers after --include; check the name")
+    if include and manifest.target not in COMPILERS:
+        raise InputError(
+            f"--include is for the board files of {', '.join(COMPILERS)}, and this firmware is for "
+            f"{manifest.target}, whose board files are not compiled here; leave it out"
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoardCompiled:
+    """Whether the user's board files compile: a check, or why it was not tried; neither where nothing was changed."""
+
+    checks: tuple[Check, ...] = ()
+    not_compiled: str = ""
+
+
+def board_compiles(folder: Path, manifest: FirmwareManifest, include: Sequence[Path] = ()) -> BoardCompiled:
+    """Compile the target's C together with the board files that were changed, and the user's own; nothing is linked.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the firmware.
+    manifest : FirmwareManifest
+        Of `read_firmware_manifest`.
+    include : sequence of Path
+        Where headers of the user's chip lie.
+    """
+    compiler, *options = COMPILERS.get(manifest.target, ("",))
+    changed = changed_board_files(folder, manifest)
+    if not changed or not compiler:
+        return BoardCompiled()
+    if not shutil.which(compiler):
+        return BoardCompiled(not_compiled=f"{compiler} is not on the path; install it, then `verify`")
+    place = (folder / changed[0]).parent
+    sources = sorted(name for name in manifest.files if (folder / name).parent == place and name.endswith(".c"))
+    own = [name for name in user_files(folder, manifest) if name.endswith(".c")]
+    sources += own
+    # Warnings in headers of a vendor are no concern here: -isystem.
+    folders = [f"-I{folder / 'core'}", f"-I{place}", "-iquote", str(folder / USER_FOLDER)]
+    folders += [word for path in include for word in ("-isystem", str(path))]
+    for source in (name for name in sources if (folder / name).is_file()):
+        command = [compiler, *options, *folders, "-c", str(folder / source), "-o", str(build_folder() / "board.o")]
+        try:
+            done = run_compiler(command)
+        except (OSError, subprocess.TimeoutExpired) as error:
+            return BoardCompiled(
+                not_compiled=f"{compiler} did not run on {source} ({type(error).__name__}); then `verify`"
+            )
+        if done.returncode and (lost := ELSEWHERE.search(done.stderr)):
+            given = f" nor in {', '.join(map(str, include))}" if include else ""
+            return BoardCompiled(
+                not_compiled=f"{lost[1]}, which {source} includes, was not found in the firmware{given}; "
+                "`verify --include DIR` with the folder in which it lies"
+            )
+        if done.returncode:
+            text = f"{first_error(done.stderr)} ({Path(compiler).name})"
+            return BoardCompiled(checks=(requirements.BOARD_FILES.check(holds=False, text=text),))
+    added = f" and {', '.join(own)}" if own else ""
+    text = f"one by one, with {', '.join(changed)} as you changed them{added} ({Path(compiler).name}); not linked, and "
+    text += "what they do is not checked"
+    return BoardCompiled(checks=(requirements.BOARD_FILES.check(holds=True, text=text),))
