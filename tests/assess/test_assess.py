@@ -19,7 +19,8 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import RuleError, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.reading.ramp_files import RampTest, read_ramp_file
+from dzdesign.identify.reading.ramp_files import read_ramp_file
+from dzdesign.identify.reading.ramp_test import RampTest
 from tests.support.bench_recordings import AFTER, BEFORE, L_MIN, Valve, record, write
 from tests.support.paths import ROOT
 from tests.support.synthetic import SHARED, needs_compiler
@@ -344,11 +345,10 @@ def test_one_recording_of_both_signs_reads_each_sides_own_hold():
 @needs_compiler
 def test_the_dead_zones_of_the_closed_loop_are_found_in_its_records(example_compensator, firmware_folder):
     """The loop reads its records at 0.1 % of the largest flow; read at that, they must agree to 0.1 % of command."""
-    from dzdesign.design.compensator_file import compensator_document
     from dzdesign.verify.closed_loop.loop import FLOW_SHARE, ClosedLoop, RampSequence, compare_at_pressure
     from dzdesign.verify.closed_loop.plant import Plant
 
-    loop = ClosedLoop(Plant(), firmware_folder, compensator_document(example_compensator))
+    loop = ClosedLoop(Plant(), firmware_folder, example_compensator)
     for dp_MPa in (1.0, 5.0):
         compared = compare_at_pressure(loop, dp_MPa, 1.0, RampSequence(ramp=50.0))
 

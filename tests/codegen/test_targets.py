@@ -142,7 +142,8 @@ def test_design_and_codegen_fit_the_target(name, tmp_path, capsys):
     assert main(["codegen", str(compensator), "--target", name, "-o", str(one)]) == 0
     assert main(["codegen", str(VALVE), "--target", name, "-o", str(two)]) == 0
     files = {path.relative_to(one): path.read_bytes() for path in one.rglob("*") if path.is_file()}
-    assert len(files) > 5 and files == {path.relative_to(two): path.read_bytes() for path in two.rglob("*") if path.is_file()}
+    assert len(files) > 5
+    assert files == {path.relative_to(two): path.read_bytes() for path in two.rglob("*") if path.is_file()}
     assert json.loads((one / "manifest.json").read_text())["target"] == name
 
 

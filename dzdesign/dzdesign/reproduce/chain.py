@@ -6,15 +6,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dzdesign.codegen.project import generate
-from dzdesign.core.artefact_files import parse_document, sha256_of, to_json, write_folder
+from dzdesign.core.artefact_files import sha256_of, to_json, write_folder
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.derivation.account.published import DP0_MPA, RAMP_S, RECORDS_HZ, U_MAX_V
-from dzdesign.design.compensator_file import SCHEMA as COMPENSATOR_SCHEMA
 from dzdesign.design.compensator_file import compensator_document
 from dzdesign.design.designing import design
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.reading.ramp_files import SIMULATED_MARK, RampTest, ramp_file_bytes, read_ramp_file
+from dzdesign.identify.reading.ramp_files import SIMULATED_MARK, ramp_file_bytes, read_ramp_file
+from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.report.reproduction import Hashes, ReproducedValve
 from dzdesign.reproduce.recovered_valves import RecoveredValve
 from dzdesign.reproduce.valve_runs import ValveRuns, run_valve
@@ -58,10 +58,9 @@ def run_chain(valve: RecoveredValve, say: Callable[[str], None] = lambda _: None
         compensator_json = to_json(compensator_document(compensator))
         firmware = generate(compensator, "host", compensator_json.encode())
         write_folder(Path(scratch) / "firmware", firmware.files, firmware.manifest)
-        design_document = parse_document(compensator_json.encode(), "compensator.json", (COMPENSATOR_SCHEMA,))
         say(f"{name}: closed loop")
-        loop = ClosedLoop(valve.plant, Path(scratch) / "firmware", design_document)
-        runs = run_valve(valve, loop, design_document)
+        loop = ClosedLoop(valve.plant, Path(scratch) / "firmware", compensator)
+        runs = run_valve(valve, loop, compensator)
     place = name.replace(" ", "_")
     return Chain(
         files={
