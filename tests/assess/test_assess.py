@@ -487,7 +487,7 @@ def test_over_compensation_is_printed_beside_a_dead_zone_of_none(bench, capsys):
     status, out, _ = run(capsys, *SETS, "--limits", "dead_zone_opening = 9 %, flow_at_zero = 0.1 L/min")
     assert status == 1
     assert "dead zone, opening, AFTER at positive commands, 4.00 MPa: the flow lies above the level at every" in out
-    assert "holds  dead zone, opening, positive commands, 4.00 MPa: 0 %" in out
+    assert "HOLDS  dead zone, opening, positive commands, 4.00 MPa: 0 %" in out
     assert "DOES NOT HOLD  flow at zero, positive commands, 4.00 MPa" in out
 
 
