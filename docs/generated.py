@@ -2,18 +2,17 @@
 
 import importlib
 import inspect
-from argparse import ArgumentParser
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from dzdesign.command_line.command_spec import COMMANDS, EXAMPLES, language
-from dzdesign.command_line.parsing import COMMON, build_parser
+from dzdesign.command_line.command_table import COMMANDS
+from dzdesign.command_line.parser import arguments_of_command, command_module, help_of, usage_of
 from dzdesign.commands.schema import SCHEMAS, schema_document
 
 #: What a caller of the rooms needs; of a module without names all that is its own.
 API = (
     ("dzdesign.api", ("identify", "design", "generate", "verify", "init", "simulate", "assess", "report", "batch")),
-    ("dzdesign.commands.init", ("Proposal",)),
+    ("dzdesign.initial_options.look", ("Proposal",)),
     ("dzdesign.assess.assessment", ("Assessment",)),
     ("dzdesign.report.valve_report", ("Report",)),
     ("dzdesign.identify.reading.ramp_files", ("RampTest", "read_ramp_file")),
@@ -31,30 +30,21 @@ API = (
 
 
 def commands() -> str:
-    """Return a section for each command: its usage, arguments, options and defaults, as argparse has them."""
-    parsers = build_parser(language())[1]
-    return "\n\n".join(_command(name, parsers[name]) for name in COMMANDS)
+    """Return a section for each command: its usage, arguments, options and defaults, as they are declared."""
+    return "\n\n".join(map(_command, COMMANDS))
 
 
-def _command(name: str, parser: ArgumentParser) -> str:
-    lines = [f"({name})=", f"## {name}", "", parser.description or "", ""]
-    arguments = [action for action in parser._actions if not action.option_strings]
-    common = {"--help", *(name for names, _ in COMMON for name in names)}
-    options = [
-        action for action in parser._actions if action.option_strings and not common & set(action.option_strings)
-    ]
-    shown = " ".join(
-        (f"[{a.metavar}]" if a.nargs == "?" else a.metavar + (" ..." if a.nargs == "+" else "")) for a in arguments
-    )
-    usage = " ".join(part for part in ("dzdesign", name, shown, "[options]" if options else "") if part)
-    lines += ["```text", usage, "```", ""]
-    for action in (*arguments, *options):
-        value = "" if not action.option_strings or action.nargs == 0 else f" {action.metavar}"
-        names = ", ".join(f"`{each}{value}`" for each in action.option_strings) or f"`{action.metavar}`"
-        required = " Required." if action.required and action.option_strings else ""
-        text = parser._get_formatter()._expand_help(action)
-        lines += [names, f": {_sentence(text)}{required}", ""]
-    return "\n".join([*lines, "```text", *EXAMPLES[name], "```"])
+def _command(name: str) -> str:
+    help_line, arguments = COMMANDS[name].help, arguments_of_command(name)
+    lines = [f"({name})=", f"## {name}", "", f"{help_line[0].upper()}{help_line[1:]}.", ""]
+    lines += ["```text", usage_of(name, arguments), "```", ""]
+    for argument in arguments:
+        value = "" if bool in argument.kinds else f" {argument.option.metavar}"
+        names = [f"`{each}{value}`" for each in (argument.option.short, argument.flag) if each]
+        required = " Required." if argument.required and not argument.is_positional else ""
+        lines += [f"`{argument.option.metavar}`" if argument.is_positional else ", ".join(names)]
+        lines += [f": {_sentence(help_of(argument))}{required}", ""]
+    return "\n".join([*lines, "```text", *command_module(name).EXAMPLES, "```"])
 
 
 def _sentence(text: str) -> str:

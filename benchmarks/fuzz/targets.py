@@ -9,7 +9,7 @@ from pathlib import Path
 
 from dzdesign.assess.limits import parse_limits
 from dzdesign.codegen.telemetry.frame import FRAME_OCTETS, FrameReader
-from dzdesign.command_line.toml_options import options_from_file
+from dzdesign.command_line.options_file import options_from_file
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
 from dzdesign.core.units import SI_UNIT, parse_quantity

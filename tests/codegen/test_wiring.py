@@ -12,8 +12,9 @@ import pytest
 
 from dzdesign.codegen.project import target_named
 from dzdesign.command_line.cli import main
-from dzdesign.command_line.command_spec import COMMANDS
+from dzdesign.core.options import arguments_of
 from dzdesign.design.compensator_file import compensator_from_document
+from dzdesign.design.request import DesignChoices
 from dzdesign.design.signal_text import Converter, command_signal, parse_signal
 from tests.support.golden_firmware import FULL, GOLDENS
 
@@ -245,6 +246,7 @@ def test_the_cortex_m4_says_what_its_numbers_are_made_for(firmware):
 
 
 def test_the_help_of_design_states_no_default_that_a_target_changes():
-    said = {names[0]: keywords["help"] for names, keywords in COMMANDS["design"][2]}
-    for name in ("--command-signal", "--pressure-a", "--pressure-b"):
-        assert "the converter's whole range)" in said[name] and not re.search(r"0\.\.3 V|x 0\.3\b", said[name])
+    helps = {argument.name: argument.option.help for argument in arguments_of(DesignChoices)}
+    for name in ("command_signal", "pressure_a", "pressure_b"):
+        assert "the whole range of the converter)" in helps[name] or "the converter's whole range)" in helps[name]
+        assert not re.search(r"0\.\.3 V|x 0\.3\b", helps[name])

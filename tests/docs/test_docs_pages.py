@@ -5,8 +5,7 @@ import shutil
 
 import pytest
 
-from dzdesign.command_line.command_spec import language
-from dzdesign.command_line.parsing import build_parser
+from dzdesign.command_line.parser import build_parser
 from tests.support.page_runner import agrees, commands_of, leaves_out, run, with_outputs
 from tests.support.paths import ROOT
 from tests.support.synthetic import needs_compiler
@@ -62,7 +61,7 @@ def test_a_how_to_page_prints_what_it_shows(after_tutorial, page, tmp_path, requ
 
 def test_every_command_of_every_page_and_of_the_readme_is_one_that_dzdesign_knows():
     """Those that are not run, too: in code blocks of any kind, options and all."""
-    tried, parser = 0, build_parser(language())[0]
+    tried, parser = 0, build_parser()[0]
     for page in (ROOT / "README.md", *DOCS.rglob("*.md")):
         text = page.read_text(encoding="utf-8").replace("\\\n", " ")
         for line in re.findall(r"^ *(?:\$ |\.venv\\Scripts\\|uv run )?(dzdesign [a-z].*)$", text, re.MULTILINE):

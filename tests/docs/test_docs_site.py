@@ -11,7 +11,8 @@ from urllib.parse import unquote
 
 import pytest
 
-from dzdesign.command_line.command_spec import COMMANDS
+from dzdesign.command_line.command_table import COMMANDS
+from dzdesign.command_line.parser import arguments_of_command
 from dzdesign.commands.schema import SCHEMAS, schema_document, schema_text
 from dzdesign.core.version import __version__
 from tests.support.paths import ROOMS, ROOT
@@ -114,12 +115,12 @@ def test_make_docs_builds_the_account_that_the_pages_link_to():
 
 def test_the_reference_has_every_command_with_every_option(site):
     page = (site / "reference" / "commands.html").read_text(encoding="utf-8")
-    for name, (_, _, options) in COMMANDS.items():
+    for name in COMMANDS:
         section = page.partition(f'<section id="{name}">')[2].partition("</section>")[0]
         assert section, name
-        for names, keywords in options:
-            shown = names[-1] if names[0].startswith("-") else keywords["metavar"]
-            assert shown in section, f"{name} {shown}"
+        for argument in arguments_of_command(name):
+            word = argument.option.metavar if argument.is_positional else argument.flag
+            assert word in section, f"{name} {word}"
 
 
 def test_the_schemas_are_published_and_every_key_is_in_the_reference(site):

@@ -5,9 +5,10 @@ from collections.abc import Mapping
 from fractions import Fraction
 
 from dzdesign.core.errors import InputError, nearest
+from dzdesign.core.options import flag_of
 from dzdesign.core.units import parse_quantity
 from dzdesign.design.options import DesignOptions
-from dzdesign.design.request import CHOICES, DEFAULTS, DesignRequest, TargetInputs, option_name
+from dzdesign.design.request import DEFAULTS, NEGATIVE_DP, POLARITIES, DesignRequest, TargetInputs
 from dzdesign.design.signal_text import command_signal, parse_signal, pressure_signal
 from dzdesign.design.signals import Signals
 
@@ -28,10 +29,11 @@ def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
         If an option can't be read; it is named.
     """
     text = {name: texts.get(name) or default for name, default in DEFAULTS.items()}
-    for name, known in CHOICES.items():
+    for name, known in (("negative_dp", NEGATIVE_DP), ("polarity", POLARITIES)):
         if text[name] not in known:
-            option = option_name(name)
-            raise InputError(f"{option} is '{text[name]}'{nearest(text[name], known)}, expected {' or '.join(known)}")
+            raise InputError(
+                f"{flag_of(name)} is '{text[name]}'{nearest(text[name], known)}, expected {' or '.join(known)}"
+            )
     converter = target.converter
     full_V = float(converter.full_V)
     text["command_signal"] = text["command_signal"] or f"0..10 V x {full_V / 10:.12g}"
@@ -41,7 +43,7 @@ def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
     if span <= 0:
         raise InputError(f"--pressure-span is '{text['pressure_span']}', expected more than zero")
     sensors = {
-        name: pressure_signal(parse_signal(text[name], option_name(name)), converter, span)
+        name: pressure_signal(parse_signal(text[name], flag_of(name)), converter, span)
         for name in ("pressure_a", "pressure_b")
     }
     command = command_signal(
@@ -61,7 +63,7 @@ def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
         ),
         guard=text["guard"],
         below_reference=text["below_dp0"],
-        edge=_share(text["edge"], "--edge"),
+        edge=_share(text["transition"], "--transition"),
         window=_share(text["zero_window"], "--zero-window"),
         ramp_up_s=_seconds(text["ramp_up"], "--ramp-up"),
         ramp_down_s=_seconds(text["ramp_down"], "--ramp-down"),

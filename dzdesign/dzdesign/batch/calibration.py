@@ -128,13 +128,18 @@ def calibrate(task: Task) -> Outcome:
 
 def _run(task: Task, folder: Path) -> tuple[Status, str]:
     """Run the stages into ``folder/out`` and return status and reason."""
-    from dzdesign import api
     from dzdesign.codegen.project import generate
+    from dzdesign.stages.design import DesignArguments, design
+    from dzdesign.stages.identify import IdentifyArguments, identify
+    from dzdesign.stages.verify import VerifyArguments, verify
 
     out = folder / "out"
     out.mkdir()
-    valve = api.identify(_write_recordings(task, folder), **task.identify, output=out / "valve.json")
-    compensator = api.design(valve, target=task.target, **task.design, output=out / "compensator.json")
+    recordings = _write_recordings(task, folder)
+    valve = identify(IdentifyArguments(recordings, **task.identify, output=out / "valve.json"))
+    compensator = design(
+        DesignArguments(valve, target=task.target, **task.design, output=out / "compensator.json")
+    )
     firmware = generate(compensator, task.target)  # proved by the design, a line above
     write_folder(out / FIRMWARE, firmware.files, firmware.manifest)
     if not task.verify:
@@ -143,7 +148,7 @@ def _run(task: Task, folder: Path) -> tuple[Status, str]:
     if task.plant:
         plant = folder / task.plant[0]
         plant.write_bytes(task.plant[1])
-    verification = api.verify(out / FIRMWARE, plant=plant, output=out / "evidence")
+    verification = verify(VerifyArguments(out / FIRMWARE, plant=plant, output=out / "evidence"))
     if verification.holds:
         return OK, ""
     check = next(check for check in verification.evidence.checks if not check.holds)

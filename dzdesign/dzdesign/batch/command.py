@@ -1,16 +1,14 @@
 """`dzdesign batch`: calibrate many valves, in one table with the reasons of those that could not be."""
 
-import argparse
 import contextlib
 import errno
 import os
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from dzdesign.batch.anomalies import anomalies_of
+from dzdesign.batch.arguments import BatchArguments
 from dzdesign.batch.calibration import Outcome, Task
-from dzdesign.batch.printing import print_lot
 from dzdesign.batch.results import Results
 from dzdesign.batch.runners import run_local, run_on_cluster
 from dzdesign.batch.summary import (
@@ -22,19 +20,18 @@ from dzdesign.batch.summary import (
     summary_of,
 )
 from dzdesign.batch.valves import Valve, valves_of
-from dzdesign.command_line.design_options import design_options
-from dzdesign.command_line.identify_options import IDENTIFY_NAMES, identify_options, record_of
-from dzdesign.core.artefact_files import MANIFEST_NAME, read_bytes, to_json, write_file, write_files
-from dzdesign.core.artefact_types import as_document
-from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.artefact_files import MANIFEST_NAME, read_bytes, write_file, write_files
+from dzdesign.core.errors import InputError
 from dzdesign.core.folder_swap import alone_in
+from dzdesign.core.options import arguments_of, read_options
 from dzdesign.design.request import DEFAULTS
-from dzdesign.recordings import rows_to_skip
 from dzdesign.report.lot.report import report_of_lot
 from dzdesign.report.lot.summary import LotSummary
 from dzdesign.report.lot.table import table_files
 from dzdesign.report.lot.table_rows import table_rows
 from dzdesign.report.valve_report import REPORT_NAME
+from dzdesign.stages.design import design_options
+from dzdesign.stages.identify import IdentifyChoices, identify_options, record_of
 from dzdesign.terminal.progress import say, with_bar
 
 #: Of a disk, and of what a user may take of it; Windows knows no such limit.
@@ -42,31 +39,15 @@ FULL = (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC))
 #: Processes for each processor: more only take memory.
 MOST_A_PROCESSOR = 4
 #: Options of `identify` that a valve may have of its own, beside those of `design` and the target.
-IDENTIFY = (*IDENTIFY_NAMES, "columns", "dp", "skip_rows")
+IDENTIFY = tuple(argument.name for argument in arguments_of(IdentifyChoices) if argument.name != "record")
 
 
-def run_batch(args: argparse.Namespace) -> int:
-    """Calibrate the valves of a folder or a list; raise at the end if any could not be."""
-    output = Path(args.output)
-    summary, report = calibrate_lot(args)
-    if args.json:
-        print(to_json({**as_document(summary), "report": report and str(report)}), end="")
-    else:
-        print_lot(summary, output, report)
-    if summary.failed:
-        raise RequirementError(
-            f"{len(summary.failed)} of {summary.valves} valves are not calibrated; their reasons are in "
-            f"'{output / 'valves.csv'}'"
-        )
-    return 0
-
-
-def calibrate_lot(args: argparse.Namespace) -> tuple[LotSummary, Path | None]:
+def calibrate_lot(args: BatchArguments) -> tuple[LotSummary, Path | None]:
     """Calibrate the valves of a folder or a list; return batch.json, and where the report is if there is one.
 
     Parameters
     ----------
-    args : argparse.Namespace
+    args : BatchArguments
         Of the command.
 
     Raises
@@ -75,7 +56,7 @@ def calibrate_lot(args: argparse.Namespace) -> tuple[LotSummary, Path | None]:
         If no valve could be calibrated so: a wrong option, list or folder. A valve that can't is no error.
     """
     source, output = Path(args.source), Path(args.output)
-    jobs = _jobs(args.jobs, args.dask)
+    jobs = _jobs(args)
     _check_options(args)
     if source.is_dir() and output.resolve().is_relative_to(source.resolve()):
         raise InputError(f"'{output}' lies in '{source}', whose subfolders are the valves; choose another with -o")
@@ -118,7 +99,7 @@ def _is_full(error: InputError) -> bool:
 
 
 def _calibrate(
-    args: argparse.Namespace, valves: list[Valve], plant: tuple[str, bytes] | None, results: Results, jobs: int
+    args: BatchArguments, valves: list[Valve], plant: tuple[str, bytes] | None, results: Results, jobs: int
 ) -> tuple[LotSummary, Path | None]:
     results.begin([valve.name for valve in valves])
     waiting = [valve for valve in with_bar(valves, "reading") if not _is_done(results, _task(valve, args, plant))]
@@ -131,7 +112,7 @@ def _calibrate(
 
 
 def _finished(
-    args: argparse.Namespace, valves: Sequence[Valve], results: Results, unwritten: Mapping[str, str]
+    args: BatchArguments, valves: Sequence[Valve], results: Results, unwritten: Mapping[str, str]
 ) -> LotSummary:
     """Write table, lot setting and batch.json, from the valves' folders alone; return the last."""
     output = results.folder
@@ -174,15 +155,12 @@ def _write_report(output: Path) -> Path | None:
     return path
 
 
-def _jobs(text: str | None, dask: str | None) -> int:
+def _jobs(args: BatchArguments) -> int:
     """Return how many processes --jobs asks for."""
-    if text is None:
-        return os.cpu_count() or 1
-    if dask:
+    if args.jobs is not None and args.dask:
         raise InputError("--jobs is for this machine; with --dask its workers decide, so leave it out")
-    if not re.fullmatch(r"[1-9]\d{0,3}", text, re.ASCII):
-        raise InputError(f"--jobs is '{text}', expected a number of processes such as 4")
-    return int(text)
+    jobs: int | None = read_options(args, ["jobs"])["jobs"]
+    return jobs or os.cpu_count() or 1
 
 
 def useful_jobs(jobs: int, waiting: int) -> int:
@@ -201,20 +179,19 @@ def useful_jobs(jobs: int, waiting: int) -> int:
     return min(jobs, max(min(most, waiting), 2))  # two, so that a valve that kills its process does not end this one
 
 
-def _check_options(args: argparse.Namespace) -> None:
+def _check_options(args: BatchArguments) -> None:
     """Refuse what no valve could be calibrated with, before any is; a valve's own options are its own affair."""
-    from dzdesign.codegen.project import target_named
     from dzdesign.identify.reading.column_labels import parse_columns
 
     identify_options(args)
     record_of(args.record)
-    design_options(args, target_named(args.target).inputs())
-    rows_to_skip(args.skip_rows)
+    design_options(args, args.target)
+    read_options(args, ["skip_rows"])
     if args.columns:
         parse_columns(args.columns)
 
 
-def _plant(args: argparse.Namespace) -> tuple[str, bytes] | None:
+def _plant(args: BatchArguments) -> tuple[str, bytes] | None:
     """Return name and content of the plant's file, which must be one."""
     if args.plant is None:
         return None
@@ -226,7 +203,7 @@ def _plant(args: argparse.Namespace) -> tuple[str, bytes] | None:
     return Path(args.plant).name, read_bytes(Path(args.plant), "plant")
 
 
-def _task(valve: Valve, args: argparse.Namespace, plant: tuple[str, bytes] | None) -> Task:
+def _task(valve: Valve, args: BatchArguments, plant: tuple[str, bytes] | None) -> Task:
     """Read a valve's recordings; where they can't be read the task says why."""
     options = {**vars(args), **valve.overrides}
     record = _record(valve, args)
@@ -247,7 +224,7 @@ def _task(valve: Valve, args: argparse.Namespace, plant: tuple[str, bytes] | Non
     )
 
 
-def _record(valve: Valve, args: argparse.Namespace) -> dict[str, str]:
+def _record(valve: Valve, args: BatchArguments) -> dict[str, str]:
     return {**record_of(args.record), **valve.record}
 
 

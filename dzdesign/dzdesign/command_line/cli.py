@@ -1,31 +1,15 @@
-"""The command line: what an error or a failed requirement becomes; what can be said stands in `command_spec`.
+"""The program: what an error or a failed requirement becomes; what can be asked for stands in `command_table`.
 
-Exit status: 0 holds, 1 a requirement does not hold (said which), 2 bad input or usage. Every heavy import happens
-inside the command that needs it (`dzdesign.commands.pipeline`), and argparse only once there is something to parse
-(`dzdesign.command_line.parsing`), so that `--help` costs next to nothing.
+Exit status: 0 holds, 1 a requirement does not hold (the message says which), 2 bad input or usage. Every heavy import
+happens inside the stage that needs it.
 """
 
 import os
 import sys
 
-from dzdesign.command_line.command_spec import COMMAND_GROUPS, COMMANDS, EXAMPLES, language
-from dzdesign.command_line.front_page import front_page
 from dzdesign.core.errors import DzdesignError, RequirementError, clear_line
 
 DOES_NOT_HOLD, BAD_INPUT, INTERRUPTED, PIPE_CLOSED = 1, 2, 130, 141
-
-
-def parse(argv: list[str]) -> "argparse.Namespace":  # noqa: F821
-    """Parse the command line; what a TOML file says stands in for the defaults.
-
-    Raises
-    ------
-    InputError
-        If the command line is wrong, or the file can't be read or names no option.
-    """
-    from dzdesign.command_line import parsing
-
-    return parsing.parse(argv, language())
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -35,25 +19,32 @@ def main(argv: list[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # a console that can't print a character prints a ? instead
             stream.reconfigure(errors="replace")
-    args = None
+    call = None
     try:
         argv = sys.argv[1:] if argv is None else argv
         if argv in (["--help"], ["-h"]):
-            print(front_page(COMMANDS, COMMAND_GROUPS, EXAMPLES[""]), end="")
-            return 0
-        args = parse(argv)
-        from importlib import import_module
+            from dzdesign.command_line.parser import build_parser
 
+            print(build_parser(only="")[0].format_help(), end="")
+            return 0
+        from dzdesign.command_line.invocation import parse
+        from dzdesign.command_line.parser import command_module
         from dzdesign.terminal.progress import talking
 
-        module, function = args.run.split(":")
-        with talking(quiet=args.quiet, verbose=args.verbose):
-            return getattr(import_module(module), function)(args)
+        call = parse(argv)
+        with talking(quiet=call.quiet, verbose=call.verbose):
+            status: int = command_module(call.command).run(call.arguments, call.json)
+            return status
     except RequirementError as error:
         print(f"dzdesign: does not hold: {clear_line(str(error))}", file=sys.stderr)
         return DOES_NOT_HOLD
     except DzdesignError as error:
-        print(f"dzdesign: {clear_line(_said(error, args))}", file=sys.stderr)
+        text = str(error)
+        if call is not None and call.from_file:
+            from dzdesign.command_line.options_file import in_words_of_the_file
+
+            text = in_words_of_the_file(text, call.options_file, call.from_file)
+        print(f"dzdesign: {clear_line(text)}", file=sys.stderr)
         return BAD_INPUT
     except KeyboardInterrupt:
         print("dzdesign: interrupted; nothing half-written was left", file=sys.stderr)
@@ -61,13 +52,3 @@ def main(argv: list[str] | None = None) -> int:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return PIPE_CLOSED
-
-
-def _said(error: DzdesignError, args: "argparse.Namespace | None") -> str:  # noqa: F821
-    """Return what an error says; an option that stands in the TOML file is named as it stands there."""
-    values = getattr(args, "from_file", None)
-    if not values:
-        return str(error)
-    from dzdesign.command_line.toml_options import in_words_of_the_file
-
-    return in_words_of_the_file(str(error), args.config, values)

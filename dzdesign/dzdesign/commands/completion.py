@@ -1,60 +1,69 @@
 """`dzdesign completion SHELL`: the script by which a shell completes commands, options, targets and files, by shtab."""
 
 import argparse
+from collections.abc import Iterable
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Annotated
 
 from dzdesign.core.errors import InputError, nearest
+from dzdesign.core.options import Option
 
-#: How the help calls a value that is a file.
-FILES = ("FILE", "AFTER", "TOML", "PLANT.toml", "TOL.toml")
+EXAMPLES = (
+    'eval "$(dzdesign completion bash)"                       # in ~/.bashrc',
+    "dzdesign completion zsh > ~/.zfunc/_dzdesign             # a folder of fpath",
+    "dzdesign completion fish > ~/.config/fish/completions/dzdesign.fish",
+    "dzdesign completion powershell | Out-String | Invoke-Expression   # in $PROFILE",
+)
+#: Where shtab looks for what a value completes to.
+COMPLETE = "complete"
 
 
-def run_completion(args: argparse.Namespace) -> int:
+@dataclass(frozen=True)
+class Arguments:
+    """Arguments of `completion`."""
+
+    shell: Annotated[str, Option("bash, zsh, fish, powershell or tcsh.", "SHELL", choices="shtab:SUPPORTED_SHELLS")]
+
+
+def run(arguments: Arguments, json: bool) -> int:
     """Print the script of a shell."""
     import shtab
 
     shells = shtab.SUPPORTED_SHELLS
-    if args.shell not in shells:
+    if arguments.shell not in shells:
         raise InputError(
-            f"there is no completion for '{args.shell}'{nearest(args.shell, shells)}; known: {', '.join(shells)}"
+            f"there is no completion for '{arguments.shell}'{nearest(arguments.shell, shells)}; known: "
+            f"{', '.join(shells)}"
         )
-    print(shtab.complete(_parser(), args.shell), end="")
+    print(shtab.complete(parser_with_values(), arguments.shell), end="")
     return 0
 
 
-def _parser() -> argparse.ArgumentParser:
+def parser_with_values() -> argparse.ArgumentParser:
     """Return the parser of the command line, each option with the words or files that it takes."""
     import shtab
 
-    from dzdesign.codegen.project import TARGET_NAMES
-    from dzdesign.command_line.command_spec import language
-    from dzdesign.command_line.parsing import build_parser
-    from dzdesign.commands.schema import SCHEMAS
-    from dzdesign.derivation.law import LAW_NAMES
-    from dzdesign.derivation.presentation.report import FORMATS
-    from dzdesign.design.options import ACCEPTABLE, GUARDS
-    from dzdesign.design.request import CHOICES
+    from dzdesign.command_line.parser import arguments_of_command, build_parser
 
-    words = {
-        "--target": TARGET_NAMES,
-        "--law": LAW_NAMES,
-        "--guard": GUARDS,
-        "--accept": ACCEPTABLE,
-        "--format": FORMATS,
-        "--below-dp0": ("hold", "extend"),
-        "shell": shtab.SUPPORTED_SHELLS,
-        "name": SCHEMAS,
-        **{f"--{name.replace('_', '-')}": known for name, known in CHOICES.items()},
-    }
-    parser, commands = build_parser(language())
-    for command in commands.values():
+    parser, commands = build_parser()
+    for name, command in commands.items():
+        declared = {argument.name: argument for argument in arguments_of_command(name)}
         for action in command._actions:
-            name = action.option_strings[-1] if action.option_strings else action.dest
-            if action.nargs == 0:
-                continue
-            if name in words:
-                action.choices = tuple(words[name])
+            argument = declared.get(action.dest)
+            if argument is not None and argument.option.choices:
+                action.choices = tuple(_words(argument.option.choices))
             elif action.metavar == "DIR":
-                action.complete = shtab.DIRECTORY
-            elif not action.option_strings or action.metavar in FILES:
-                action.complete = shtab.FILE
+                setattr(action, COMPLETE, shtab.DIRECTORY)
+            elif action.dest == "config" or (argument is not None and argument.is_path):
+                setattr(action, COMPLETE, shtab.FILE)
     return parser
+
+
+def _words(choices: tuple[str, ...] | str) -> Iterable[str]:
+    """Return the words of an option; ``module:NAME`` says where they stand."""
+    if isinstance(choices, tuple):
+        return choices
+    module, _, name = choices.partition(":")
+    words: Iterable[str] = getattr(import_module(module), name)
+    return words

@@ -1,12 +1,12 @@
 """`dzdesign doctor`: which compilers, simulators and packages are there, what each is for, and how to get the rest."""
 
-import argparse
 import platform
 import re
 import shutil
 import subprocess
 import sys
 from dataclasses import asdict, dataclass
+from typing import Any
 
 from dzdesign.core.artefact_files import to_json
 from dzdesign.core.errors import DzdesignError
@@ -58,8 +58,16 @@ OPTIONAL = (
 SYSTEMS = {"debian": "Debian, Ubuntu", "macos": "macOS", "windows": "Windows"}
 
 
-def run_doctor(args: argparse.Namespace) -> int:
-    """Say what is there; 1 if no C compiler works, for then nothing can be verified."""
+EXAMPLES = ("dzdesign doctor", "dzdesign doctor --json")
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """Arguments of `doctor`: none."""
+
+
+def run(arguments: Arguments, json: bool) -> int:
+    """Print what is there; 1 if no C compiler works, for then nothing can be verified."""
     programs = {tool.name: _found(tool) for tool in (*COMPILERS, *OPTIONAL)}
     packages = _packages()
     works, text = _compiles()
@@ -75,7 +83,7 @@ def run_doctor(args: argparse.Namespace) -> int:
         "to_get": [asdict(tool) for tool in _lacking(programs)],
         "holds": works and not missing,
     }
-    if args.json:
+    if json:
         print(to_json(document), end="")
     else:
         _print(document, programs, missing)
@@ -141,7 +149,7 @@ def _lacking(programs: dict[str, dict[str, str] | None]) -> list[Tool]:
     ]
 
 
-def _print(document: dict, programs: dict[str, dict[str, str] | None], missing: list[str]) -> None:
+def _print(document: dict[str, Any], programs: dict[str, dict[str, str] | None], missing: list[str]) -> None:
     from dzdesign.terminal.page import new_console, new_table, put_line
 
     console = new_console()

@@ -1,17 +1,19 @@
 """`dzdesign monitor`: what a firmware sends over its serial line becomes a ramp file, whole or not at all."""
 
-import argparse
 import contextlib
+import os
 import signal
 import sys
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any
 
 from dzdesign.core.artefact_files import check_file_may_be_written, to_json, write_file
 from dzdesign.core.errors import InputError, one_line
+from dzdesign.core.options import AnyPath, Option, Text, number, read_options
 from dzdesign.terminal.progress import say
 
 if TYPE_CHECKING:
@@ -26,37 +28,52 @@ FIRST_FRAME_S = 3.0
 LOOK_S = 0.1
 
 
-def run_monitor(args: argparse.Namespace) -> int:
+EXAMPLES = ("dzdesign monitor COM5 --firmware firmware --seconds 100 -o ramp.csv",)
+# fmt: off
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """Arguments of `monitor`."""
+
+    port: Annotated[str, Option("Serial port, such as COM5 or /dev/ttyUSB0.", "PORT")]
+    _: KW_ONLY
+    output: Annotated[AnyPath, Option("File to write.", "FILE", short="-o")] = "ramp.csv"
+    firmware: Annotated[AnyPath, Option("Folder made by `dzdesign codegen`, with the scalings.", "DIR")] = "firmware"
+    baud: Annotated[Text, Option(
+        "Bits per second (default: what the firmware sends).",
+        "N", read=number("a positive number such as 115200", between=(0, 1e9)))] = None
+    seconds: Annotated[Text, Option(
+        "Time to record from the first frame on (default: until Ctrl-C).",
+        "S", read=number("a positive number such as 60", between=(0, 1e9)))] = None
+# fmt: on
+
+
+def run(arguments: Arguments, json: bool) -> int:
     """Record the telemetry of a firmware; 1 if the line broke before the time that was asked for."""
     from dzdesign.codegen.telemetry.frame import FrameReader
     from dzdesign.codegen.telemetry.recording import Recording, scalings_of
 
-    output, seconds = Path(args.output), _positive(args.seconds, "--seconds", "60")
+    output, read = Path(arguments.output), read_options(arguments, ["seconds", "baud"])
     check_file_may_be_written(output)
     if output.exists() and output.stat().st_size:
         raise InputError(f"'{output}' exists, and a recording is not to be had again; choose another name with -o")
-    scalings = scalings_of(Path(args.firmware))
-    baud = _positive(args.baud, "--baud", "115200") or scalings.link.baud
+    scalings = scalings_of(Path(arguments.firmware))
+    baud = read["baud"] or scalings.link.baud
     recording, reader = Recording(scalings), FrameReader()
-    with _open_port(args.port, baud) as port, _until_interrupted() as stop:
-        say(f"listening to {args.port} at {baud:g} bit/s; Ctrl-C ends the recording")
-        broken = _record(port, recording, reader, stop, seconds)
+    with _open_port(arguments.port, baud) as port, _until_interrupted() as stop:
+        say(f"listening to {arguments.port} at {baud:g} bit/s; Ctrl-C ends the recording")
+        broken = _record(port, recording, reader, stop, read["seconds"])
     if not recording:
-        raise _nothing(args.port, baud, reader)
+        raise _nothing(arguments.port, baud, reader)
     write_file(output, recording.to_csv(reader))
-    _report(args, recording, reader)
+    if json:
+        print(to_json(_document(arguments, recording, reader)), end="")
+    else:
+        _print(arguments, recording, reader)
     if broken:
         say(f"the recording ended because {broken}; what came until then is written")
     return 1 if broken else 0
-
-
-def _positive(text: str | None, option: str, example: str) -> float | None:
-    if text is None:
-        return None
-    with contextlib.suppress(ValueError):
-        if 0 < (value := float(text)) < 1e9:
-            return value
-    raise InputError(f"{option} is '{text}', expected a positive number such as {example}")
 
 
 @contextlib.contextmanager
@@ -133,24 +150,23 @@ def _nothing(port: str, baud: float, reader: "FrameReader") -> InputError:
     return InputError(f"no frame came from '{port}' at {baud:g} bit/s, but {seen}; nothing was written; {why}")
 
 
-def _report(args: argparse.Namespace, recording: "Recording", reader: "FrameReader") -> None:
-    faults = recording.faults
-    if args.json:
-        document = {
-            "file": args.output,
-            "frames": len(recording),
-            "seconds": recording.duration_s,
-            "lost": recording.lost,
-            "bad_crc": reader.bad_crc,
-            "octets_skipped": reader.skipped,
-            "restarts": recording.restarts,
-            "faults": faults,
-        }
-        print(to_json(document), end="")
-        return
+def _document(arguments: Arguments, recording: "Recording", reader: "FrameReader") -> dict[str, Any]:
+    return {
+        "file": os.fspath(arguments.output),
+        "frames": len(recording),
+        "seconds": recording.duration_s,
+        "lost": recording.lost,
+        "bad_crc": reader.bad_crc,
+        "octets_skipped": reader.skipped,
+        "restarts": recording.restarts,
+        "faults": recording.faults,
+    }
+
+
+def _print(arguments: Arguments, recording: "Recording", reader: "FrameReader") -> None:
     print(
         f"{len(recording)} frames in {recording.duration_s:.2f} s: {recording.lost} lost, {reader.bad_crc} with a "
         f"wrong CRC, {reader.skipped} octets skipped, {recording.restarts} restarts of the firmware"
     )
-    print(f"Faults: {', '.join(faults) if faults else 'none'}")
-    print(one_line(f"Written: {args.output}; add a column Q_Lmin from your flow meter for `dzdesign identify`"))
+    print(f"Faults: {', '.join(recording.faults) or 'none'}")
+    print(one_line(f"Written: {arguments.output}; add a column Q_Lmin from your flow meter for `dzdesign identify`"))

@@ -1,16 +1,17 @@
 """`dzdesign schema`: the JSON Schemas of the artefacts, as their types state them."""
 
-import argparse
-import json
+import json as json_module
 from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib import import_module
 from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Annotated, Any
 
 from dzdesign.core.documents import to_json
 from dzdesign.core.errors import InputError, nearest
+from dzdesign.core.options import Option, Text
 
 #: Name -> (module and type, or the package that keeps a file of it; the artefact; the command that writes it), in the
 #: order of the pipeline.
@@ -70,16 +71,29 @@ def schema_document(name: str) -> dict[str, Any]:
     name : str
         One of `SCHEMAS`.
     """
-    return json.loads(schema_text(name))
+    document: dict[str, Any] = json_module.loads(schema_text(name))
+    return document
 
 
-def run_schema(args: argparse.Namespace) -> int:
+EXAMPLES = ("dzdesign schema", "dzdesign schema valve > valve.schema.json")
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """Arguments of `schema`."""
+
+    name: Annotated[
+        Text, Option("valve, compensator, firmware, ... (default: list them).", "NAME", choices=tuple(SCHEMAS))
+    ] = None
+
+
+def run(arguments: Arguments, json: bool) -> int:
     """Print one schema, or which there are."""
-    if args.name is not None:
-        print(schema_text(args.name), end="")
-    elif args.json:
+    if arguments.name is not None:
+        print(schema_text(arguments.name), end="")
+    elif json:
         listing = [{"name": name, "artefact": artefact} for name, (_, artefact, _) in SCHEMAS.items()]
-        print(json.dumps({"schemas": listing}, indent=2))
+        print(json_module.dumps({"schemas": listing}, indent=2))
     else:
         width = max(map(len, SCHEMAS))
         for name, (_, artefact, command) in SCHEMAS.items():

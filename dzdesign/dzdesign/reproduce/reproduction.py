@@ -1,6 +1,5 @@
 """`dzdesign reproduce`: the paper's valves through the whole product, and every number of the paper beside ours."""
 
-import argparse
 import tempfile
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -8,10 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dzdesign.core.artefact_files import TOOL, check_folder_may_be_written, sha256_of, to_json, write_folder
-from dzdesign.core.errors import InputError
-from dzdesign.terminal.progress import stages
+from dzdesign.terminal.progress import stage_progress
 
 if TYPE_CHECKING:
+    from dzdesign.reproduce.row import Row
     from dzdesign.reproduce.runs import ValveRuns
     from dzdesign.reproduce.valves import RecoveredValve
     from dzdesign.verify.closed_loop.simulation import Bench
@@ -32,20 +31,31 @@ class Chain:
     runs: "ValveRuns"
 
 
-def run_reproduce(args: argparse.Namespace) -> int:
-    """Reproduce the paper's numbers and figures; 1 if a number that must agree does not."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reproduction:
+    """The paper's numbers beside ours: reproduction.json, and what its tables are printed from."""
+
+    document: dict[str, Any]
+    rows: "list[Row]"
+    valves: "list[RecoveredValve]"
+
+
+def reproduce(folder: Path) -> Reproduction:
+    """Reproduce the paper's numbers and figures.
+
+    Parameters
+    ----------
+    folder : Path
+        To write.
+    """
     from dzdesign.reproduce.figures import figure_files
     from dzdesign.reproduce.rows import rows_of
     from dzdesign.reproduce.valves import recover_valves
-    from dzdesign.terminal.reproduction_tables import print_reproduction
     from dzdesign.verify.toolchain.host_compiler import host_compiler
 
-    folder = Path(args.output)
-    if not args.output:
-        raise InputError("-o is empty, expected the name of a folder, such as reproduction")
     check_folder_may_be_written(folder, SCHEMA)
     host_compiler()
-    with stages() as stage:
+    with stage_progress() as stage:
         stage("recovering the valves' parameters from the printed figures")
         chains = [run_chain(valve, say=stage) for valve in recover_valves()]
         rows = rows_of([chain.runs for chain in chains])
@@ -64,12 +74,7 @@ def run_reproduce(args: argparse.Namespace) -> int:
     for chain in chains:
         files |= chain.files
     write_folder(folder, files, {"schema": SCHEMA, "tool": TOOL})
-    if args.json:
-        print(to_json(document), end="")
-    else:
-        print_reproduction(rows, [chain.runs.valve for chain in chains])
-        print(f"Figures, parameters and artefacts: {folder}")
-    return 0 if document["holds"] else 1
+    return Reproduction(document=document, rows=rows, valves=[chain.runs.valve for chain in chains])
 
 
 def run_chain(valve: "RecoveredValve", say: Callable[[str], None] = lambda _: None) -> Chain:

@@ -34,6 +34,7 @@ def talking(*, quiet: bool, verbose: bool) -> Iterator[None]:
         Also what the rooms log: files read and written, the solver's and the compilers' words; each with the time
         since the beginning.
     """
+    before = (_Talk.quiet, _Talk.verbose, _Talk.begin)
     _Talk.quiet, _Talk.verbose, _Talk.begin = quiet, verbose, time.perf_counter()
     try:
         with _logging() if verbose else contextlib.nullcontext():
@@ -41,7 +42,7 @@ def talking(*, quiet: bool, verbose: bool) -> Iterator[None]:
             if verbose:
                 say("end")
     finally:
-        _Talk.quiet = _Talk.verbose = False
+        _Talk.quiet, _Talk.verbose, _Talk.begin = before
 
 
 @contextlib.contextmanager
@@ -83,16 +84,16 @@ def is_watched() -> bool:
 
 
 @contextlib.contextmanager
-def stages() -> "Iterator[Stages]":
+def stage_progress() -> "Iterator[StageProgress]":
     """Give a `say` after which, once a stage has taken `PATIENCE`, a bar moves until the next stage, with the time."""
-    stage = Stages()
+    stage = StageProgress()
     try:
         yield stage
     finally:
         stage.end()
 
 
-class Stages:
+class StageProgress:
     """A `say` for the stages of long work; rich is driven by a thread of its own, as the work may be one call of C."""
 
     def __init__(self) -> None:

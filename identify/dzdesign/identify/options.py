@@ -28,7 +28,7 @@ class IdentifyOptions:
     knee_window : tuple of float
         Shares of the largest flow between which the characteristic is taken as straight. The lower edge is 12 %: on a
         bent characteristic the knee moves with it, on a straight one it does not matter.
-    flat_change : float
+    flat_below : float
         Change of the threshold over the tested range, as a share of u_max, that systematic errors may make: a smaller
         one is no trend, however significant.
     """
@@ -41,7 +41,7 @@ class IdentifyOptions:
     x_max: float | None = None
     confidence: float = 0.99
     knee_window: tuple[float, float] = (0.12, 0.5)
-    flat_change: float = 1e-3
+    flat_below: float = 1e-3
 
     def __post_init__(self) -> None:
         if not self.u_max > 0:
@@ -50,8 +50,8 @@ class IdentifyOptions:
             raise InputError(f"the confidence is {self.confidence}, expected 0.5 to below 1, such as 0.99")
         if not 0 < self.knee_window[0] < self.knee_window[1] <= 1:
             raise InputError(f"the knee window is {self.knee_window}, expected two rising shares such as '12-50 %'")
-        if not 0 <= self.flat_change < 1:
-            raise InputError(f"the change that counts as flat is {self.flat_change}, expected a share of u_max")
+        if not 0 <= self.flat_below < 1:
+            raise InputError(f"the change that counts as flat is {self.flat_below}, expected a share of u_max")
         for name in ("meter_floor", "meter_lag", "meter_zero"):
             if (getattr(self, name) or 0) < 0:
                 raise InputError(f"{name} is negative, expected zero or more")

@@ -77,7 +77,7 @@ def _fit_with_trend(group: DescribedTests, options: IdentifyOptions) -> tuple[Tr
     free = fit_knees([item.shapes for item in group.tests], floor=group.floor, u_max=options.u_max, trend="flat")
     dp = np.array([item.dp or math.nan for item in group.tests])
     column = _guarded_column(group.tests)
-    budget = options.flat_change * options.u_max
+    budget = options.flat_below * options.u_max
     trend = find_trend(dp, free.knee[:, column], free.knee_se[:, column], options.u_max, budget)
     return trend, free, order_knees(group, free, trend.direction, column, options)
 

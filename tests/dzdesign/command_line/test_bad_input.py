@@ -261,7 +261,7 @@ def test_what_the_command_line_says_is_not_blamed_on_the_file(refusal, bench):
 
 
 def test_an_example_for_a_part_of_a_value_is_none_for_the_whole():
-    from dzdesign.command_line.toml_options import in_words_of_the_file
+    from dzdesign.command_line.options_file import in_words_of_the_file
 
     values = {"ramp_up": "0.5 s / 0.8", "ramp": "1"}
     said = in_words_of_the_file("--ramp-up is '0.8' without a unit; write for example '0.8 s'", "dz.toml", values)
@@ -289,14 +289,14 @@ def test_options_from_a_file_stand_in_for_the_defaults(bench, capsys):
         ("dp = '2 MPa'", [], ["2 MPa"]),
         ("dp = ['2 MPa', '3 MPa']", [], ["2 MPa", "3 MPa"]),
         ("dp = ['2 MPa', '3 MPa']", ["--dp", "1 MPa"], ["1 MPa"]),
-        ("seed = 3", [], None),
+        ("seed = 3", [], ()),
     ],
 )
 def test_an_option_given_several_times_replaces_the_file(bench, text, argv, expected):
-    from dzdesign.command_line.cli import parse
+    from dzdesign.command_line.invocation import parse
 
     (bench / "options.toml").write_text(text)
-    assert parse(["simulate", *argv, "--config", "options.toml"]).dp == expected
+    assert parse(["simulate", *argv, "--config", "options.toml"]).arguments.dp == expected
 
 
 # artefacts

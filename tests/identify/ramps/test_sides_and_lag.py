@@ -199,7 +199,7 @@ class TestQualityGate:
     def test_flat_is_what_the_engineer_says(self):
         tests = [synthetic_ramp(dp, Truth(knee_rising=5.4 - 0.01 * dp, noise=0.02)) for dp in PRESSURES]
         assert identify(tests).positive.trend == "decreasing"
-        flat = identify(tests, IdentifyOptions(flat_change=5e-3)).positive
+        flat = identify(tests, IdentifyOptions(flat_below=5e-3)).positive
         assert flat.trend == "flat" and set(flat.beta.beta) == {1.0} and flat.trend_p < 0.01
         assert max(flat.curve.certified_steps_V) <= min(test.u_guard_lower_V for test in flat.tests)
 

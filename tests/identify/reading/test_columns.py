@@ -131,9 +131,9 @@ def test_pressure_drops_that_cannot_be_taken(bench, capsys, argv, config, words)
 
 
 def test_a_list_of_pressure_drops_is_for_simulate_a_table_for_identify(bench):
-    from dzdesign.command_line.cli import parse
+    from dzdesign.command_line.invocation import parse
 
     Path("options.toml").write_text("dp = ['1 MPa', '2 MPa']")
-    assert parse(["identify", "plain.csv", "--config", "options.toml"]).dp is None
+    assert parse(["identify", "plain.csv", "--config", "options.toml"]).arguments.dp is None
     Path("options.toml").write_text("[dp]\n'a.csv' = '1 MPa'")
-    assert parse(["simulate", "--config", "options.toml"]).dp is None
+    assert parse(["simulate", "--config", "options.toml"]).arguments.dp == ()

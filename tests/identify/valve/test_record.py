@@ -2,14 +2,13 @@
 
 import json
 import tomllib
-from argparse import Namespace
 from pathlib import Path
 
 import pytest
 
 from dzdesign import api
 from dzdesign.command_line.cli import main
-from dzdesign.command_line.identify_options import record_of
+from dzdesign.command_line.invocation import merged_entries
 from dzdesign.core.artefact_files import sha256_of, to_json
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import as_document, to_json_bytes
@@ -17,6 +16,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.identify.identification import identify
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.test_record import LONGEST_NAME, LONGEST_TEXT, MOST_ENTRIES, checked_record
+from dzdesign.stages.identify import record_of
 from tests.support.page_reader import Page
 from tests.support.schema_checks import problems
 from tests.support.synthetic import Truth, synthetic_ramp
@@ -96,7 +96,6 @@ def test_none_of_it_reaches_the_c(here):
         (["serial = "], "--record: serial is empty"),
         (["serial = 1", "serial = 1"], "--record has 'serial' twice"),
         (["serial = 1", "Serial = 2"], "--record has 'serial' and 'Serial' twice"),
-        ([{"Serial": "1"}, "serial = 2"], "the record has 'Serial' and 'serial' twice"),
         (["a = b\nc"], "expected one line of characters that are printed"),
         (["a = \x1b[2J"], "expected one line of characters that are printed"),
         (["a = \u202egnp"], "expected one line of characters that are printed"),
@@ -110,8 +109,13 @@ def test_none_of_it_reaches_the_c(here):
 )
 def test_what_is_no_record_is_refused(entries, words):
     with pytest.raises(InputError) as error:
-        record_of(entries)
+        record_of(entries) if isinstance(entries, dict) else merged_entries("--record", None, entries)
     assert words in str(error.value)
+
+
+def test_a_name_of_the_file_and_of_the_command_line_that_differ_in_a_capital_are_refused():
+    with pytest.raises(InputError, match="the record has 'Serial' and 'serial' twice"):
+        merged_entries("--record", {"Serial": "1"}, ["serial = 2"])
 
 
 def test_the_largest_record_is_one():
@@ -149,11 +153,10 @@ def test_the_file_that_init_writes_has_a_record_to_fill_in(here):
 def test_each_valve_of_a_list_has_its_own_beside_that_of_all(here):
     from dzdesign.batch.command import _task
     from dzdesign.batch.valves import valves_of
-    from dzdesign.command_line.command_spec import language
-    from dzdesign.command_line.parsing import parse
+    from dzdesign.command_line.invocation import parse
 
     Path("lot.csv").write_text("name,files,record.serial,record.oil-type\na,ramp.csv,4711,\nb,ramp.csv,4712,HLP 32\n")
-    args: Namespace = parse(["batch", "lot.csv", "--record", "bench = 2", "--record", "oil-type = HLP 46"], language())
+    args = parse(["batch", "lot.csv", "--record", "bench = 2", "--record", "oil-type = HLP 46"]).arguments
     tasks = [_task(valve, args, None) for valve in valves_of(Path("lot.csv"), None, ())]
     assert [task.identify["record"] for task in tasks] == [
         {"bench": "2", "oil-type": "HLP 46", "serial": "4711"},

@@ -92,7 +92,7 @@ def order_knees(
     if len(group.tests) < 2:
         return OrderedKnees(column=column, fit=free, departure=np.zeros(1))
     knee, knee_se = free.knee[:, column], free.knee_se[:, column]
-    budget = options.flat_change * options.u_max
+    budget = options.flat_below * options.u_max
     if direction == "flat":
         departure = excess_departure(np.abs(knee - knee.mean()), knee_se, budget)
         return OrderedKnees(column=column, fit=free, departure=departure)

@@ -1,15 +1,29 @@
-"""Reading recordings as the command line names them: patterns, columns, declared pressure drops, no copies."""
+"""How stages read recordings: patterns, columns, declared pressure drops, no copies."""
 
 import fnmatch
 import glob
 import os
-import re
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, check_place_of_files
-from dzdesign.core.errors import InputError, nearest, neighbour, quoted
+from dzdesign.core.errors import InputError, nearest, neighbour
+from dzdesign.core.options import (
+    FIT,
+    METER,
+    RECORDINGS,
+    AnyPath,
+    Option,
+    Paths,
+    Table,
+    Text,
+    paths_of,
+    percent_range,
+    quantity,
+    whole_number,
+)
 from dzdesign.core.units import parse_quantity
 from dzdesign.terminal.progress import say, with_bar
 
@@ -17,31 +31,71 @@ if TYPE_CHECKING:
     from dzdesign.identify.reading.ramp_files import RampTest
 
 
+#: Reads --skip-rows.
+read_skip_rows = whole_number("how many rows stand above the header, such as 12 (0: none)")
+
+# fmt: off
+
+@dataclass(frozen=True, kw_only=True)
+class ColumnArguments:
+    """How the columns of recordings are found."""
+
+    columns: Annotated[Table, Option(
+        'Columns, such as "u=AO0:V, Q=Flow (L/min)": a quantity (time, u, dP, pA, pB, Q), its label in the file and, '
+        "after a colon, the unit that the label lacks. In the options file a table [columns].",
+        "MAP", RECORDINGS)] = None
+    dp: Annotated[Table, Option(
+        'Pressure drop of files without a column of it, such as "1 MPa". In the options file also a table [dp] from '
+        "file name or pattern to pressure.",
+        "P", RECORDINGS, example="1 MPa")] = None
+    skip_rows: Annotated[int | str | None, Option(
+        "Rows above the header of a text file, such as a logger's preamble (default: found).", "N", RECORDINGS,
+        read=read_skip_rows)] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class RampArguments(ColumnArguments):
+    """How ramp tests are read."""
+
+    u_max: Annotated[str, Option(
+        "Full command.", "U", RECORDINGS, example="10 V", read=quantity("voltage"))] = "10 V"
+    meter_floor: Annotated[Text, Option(
+        "Flow below which the meter reads zero (default: found).",
+        "Q", METER, example="0.6 L/min", read=quantity("flow"))] = None
+    meter_lag: Annotated[Text, Option(
+        "Lag of the flow meter (default: found from ramps of two rates).",
+        "T", METER, example="0.1 s", read=quantity("time"))] = None
+    knee_window: Annotated[str, Option(
+        "Flow range of the straight-line fit, in percent of maximum flow.",
+        "A-B", FIT, read=percent_range("the largest flow such as '12-50'"))] = "12-50"
+# fmt: on
+
+
 def read_recordings(
-    patterns: list[str],
+    patterns: Paths,
     *,
     u_max: float,
-    columns: str | dict[str, str] | None,
-    dp: str | dict[str, str] | None,
-    skip_rows: str | int | None = None,
+    columns: Table,
+    dp: Table,
+    skip_rows: int | str | None = None,
     what: str = "reading recordings",
 ) -> "list[RampTest]":
     """Read the recordings that patterns name.
 
     Parameters
     ----------
-    patterns : list of str
+    patterns : path or iterable of paths
         Names of files, or patterns such as ``ramps/*.csv``.
     u_max : float
         Command in V that 100 % means.
-    columns : str or dict, optional
-        Of --columns, or of the table in the file of options.
-    dp : str or dict, optional
+    columns : str or mapping, optional
+        Of --columns, or of the table in the options file.
+    dp : str or mapping, optional
         Pressure drop that --dp declares for all files, or that [dp] declares for each.
-    skip_rows : str or int, optional
+    skip_rows : int or str, optional
         Of --skip-rows.
     what : str
-        For the bar of progress.
+        For the progress bar.
 
     Raises
     ------
@@ -51,32 +105,24 @@ def read_recordings(
     from dzdesign.identify.reading.column_labels import parse_columns
     from dzdesign.identify.reading.ramp_files import read_ramp_file
 
-    chosen, skip = parse_columns(columns) if columns else {}, rows_to_skip(skip_rows)
+    chosen, skipped = parse_columns(columns) if columns else {}, None
+    if skip_rows is not None:
+        skipped = read_skip_rows(skip_rows, "--skip-rows")
     paths = expand(patterns)
-    names = told_apart(paths)
+    names = distinct_names(paths)
     tests = [
-        replace(read_ramp_file(path, u_max, columns=chosen, dp=_declared_dp(name, dp), skip_rows=skip), source=name)
+        replace(read_ramp_file(path, u_max, columns=chosen, dp=_declared_dp(name, dp), skip_rows=skipped), source=name)
         for path, name in with_bar(list(zip(paths, names, strict=True)), what)
     ]
     _refuse_unnamed(tests, dp)
     return tests
 
 
-def rows_to_skip(text: str | int | None) -> int | None:
-    """Return the number that --skip-rows says, or None if it is not given."""
-    if text is None:
-        return None
-    if not re.fullmatch(r"\d{1,6}", str(text), re.ASCII):
-        raise InputError(
-            f"--skip-rows is {quoted(text)}, expected how many rows stand above the header, such as 12 (0: none)"
-        )
-    return int(text)
-
-
-def expand(patterns: list[str]) -> list[Path]:
-    """Return the files that the patterns name; cmd.exe leaves ``*.csv`` to the program."""
+def expand(patterns: Paths) -> list[Path]:
+    """Return the files that one or several patterns name; cmd.exe leaves ``*.csv`` to the program."""
     paths = []
-    for pattern in patterns:
+    for path in paths_of(patterns):
+        pattern = os.fspath(path)
         magic = glob.has_magic(pattern) and "\0" not in pattern and not os.path.exists(pattern)
         matches = sorted(glob.glob(pattern)) if magic else [pattern]
         if not matches:
@@ -95,12 +141,12 @@ def _without_manifests(paths: list[Path]) -> list[Path]:
     return kept or paths
 
 
-def told_apart(paths: list[Path]) -> list[str]:
+def distinct_names(paths: list[Path]) -> list[str]:
     """Return the files' names, with as many of their folders as tell those of one name apart.
 
     Examples
     --------
-    >>> told_apart([Path("a/x/ramp.csv"), Path("b/x/ramp.csv"), Path("b/x/other.csv")])
+    >>> distinct_names([Path("a/x/ramp.csv"), Path("b/x/ramp.csv"), Path("b/x/other.csv")])
     ['a/x/ramp.csv', 'b/x/ramp.csv', 'other.csv']
     """
     of_one_name: dict[str, list[Path]] = {}
@@ -117,51 +163,25 @@ def told_apart(paths: list[Path]) -> list[str]:
     return names
 
 
-def knee_window(text: str) -> tuple[float, float]:
-    """Return the two shares of the largest flow that --knee-window names."""
-    return two_per_cents(text, "--knee-window", "the largest flow such as '12-50'")
-
-
-def two_per_cents(text: str, option: str, example: str) -> tuple[float, float]:
-    """Return two per cents such as ``12-50`` as shares.
-
-    Parameters
-    ----------
-    text : str
-        As given.
-    option, example : str
-        Where, and what they are of; for the message.
-    """
-    # Digits and blanks without an end would be matched in the square of their number.
-    digits = r"\s{0,9}(\d{1,9}(?:\.\d{0,15})?)\s{0,9}%?\s{0,9}"
-    ends = re.fullmatch(f"{digits}-{digits}", text, re.ASCII)
-    if ends is None:
-        raise InputError(f"{option} is {quoted(text)}, expected two per cents of {example}")
-    return float(ends[1]) / 100, float(ends[2]) / 100
-
-
-def optional_quantity(text: str | None, quantity: str, option: str) -> float | None:
-    """Return what an option says, in SI, or None if it is not given."""
-    return None if text is None else parse_quantity(text, quantity, option)
-
-
-def _declared_dp(name: str, declared: str | dict[str, str] | None) -> float | None:
+def _declared_dp(name: str, declared: Table) -> float | None:
     """Return the pressure drop that --dp or [dp] declares for a file, in Pa; a name goes before a pattern.
 
     The name may have folders before it, where they tell two files apart; [dp] may leave them out.
     """
-    if declared is None or isinstance(declared, str):
-        return optional_quantity(declared, "pressure", "--dp")
+    if declared is None:
+        return None
+    if isinstance(declared, str):
+        return parse_quantity(declared, "pressure", "--dp")
     last = name.rpartition("/")[2]
     patterns = [known for known in (name, last) if known in declared]
     patterns += [each for each in declared if fnmatch.fnmatchcase(name, each) or fnmatch.fnmatchcase(last, each)]
     return parse_quantity(declared[patterns[0]], "pressure", f"[dp] '{patterns[0]}'") if patterns else None
 
 
-def _refuse_unnamed(tests: list["RampTest"], declared: str | dict[str, str] | None) -> None:
+def _refuse_unnamed(tests: list["RampTest"], declared: Table) -> None:
     """Refuse a file without a pressure drop where the table [dp] names others: a name was mistyped."""
     for test in tests:
-        if isinstance(declared, dict) and test.dp is None:
+        if isinstance(declared, Mapping) and test.dp is None:
             raise InputError(
                 f"'{test.source}' has no column of dP, and no name in [dp] is its own{nearest(test.source, declared)}; "
                 f'add "{test.source}" = "1 MPa" to [dp], with its pressure drop'
@@ -169,7 +189,7 @@ def _refuse_unnamed(tests: list["RampTest"], declared: str | dict[str, str] | No
 
 
 def refuse_copies(tests: list["RampTest"]) -> None:
-    """Refuse a recording that is given twice: counted as a repetition it would feign certainty."""
+    """Refuse a recording that is given twice: counting a copy as a repeat would understate the uncertainty."""
     known: dict[str, str] = {}
     for test in tests:
         if test.sha256 in known:
@@ -180,12 +200,21 @@ def refuse_copies(tests: list["RampTest"]) -> None:
         known[test.sha256] = test.source
 
 
-def check_plots(folder: str | None, output: Path) -> None:
-    """Refuse a folder for plots that can't be one, or in whose place the output goes."""
+def check_plots(folder: AnyPath | None, output: AnyPath | None) -> None:
+    """Refuse a folder for plots that can't be one, or in whose place the output goes.
+
+    Parameters
+    ----------
+    folder : path, optional
+        Of the plots.
+    output : path, optional
+        Of the result.
+    """
     if folder is None:
         return
-    if not folder:
+    if not os.fspath(folder):
         raise InputError("--plots is empty, expected the name of a folder, such as plots")
-    check_place_of_files(Path(folder), "--plots")
-    if output.absolute() in (Path(folder).absolute(), *Path(folder).absolute().parents):
+    place = Path(folder)
+    check_place_of_files(place, "--plots")
+    if output is not None and Path(output).absolute() in (place.absolute(), *place.absolute().parents):
         raise InputError(f"--plots '{folder}' lies at '{output}', where -o puts a file; choose another --plots")

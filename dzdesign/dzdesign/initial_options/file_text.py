@@ -7,8 +7,8 @@ from dzdesign.core.errors import one_line
 from dzdesign.core.units import SPELLINGS
 
 if TYPE_CHECKING:
-    from dzdesign.commands.init import Look
     from dzdesign.identify.first_look import GuessedColumns
+    from dzdesign.initial_options.look import Look
 
 #: Who and what; last in the file, for in TOML a table ends where the next one begins.
 RECORD_LINES = (
@@ -80,8 +80,8 @@ def _command_lines(look: "Look") -> list[str]:
 def _skip_lines(look: "Look") -> list[str]:
     if look.skip_rows is None:
         return []
-    said = "# Rows above the header of a file of text; without this line it is found."
-    return [said, f"skip-rows = {look.skip_rows}", ""]
+    note = "# Rows above the header of a file of text; without this line it is found."
+    return [note, f"skip-rows = {look.skip_rows}", ""]
 
 
 def _meter_lines(look: "Look") -> list[str]:

@@ -18,6 +18,8 @@ Value = str | list[str] | dict[str, str]
 class _AsWritten(float):
     """A number with a point that is text as it stands in the file: an oil of viscosity 46.10 stays one."""
 
+    text: str
+
     def __new__(cls, text: str) -> "_AsWritten":
         made = super().__new__(cls, text)
         made.text = text.replace("_", "")

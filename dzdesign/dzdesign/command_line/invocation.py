@@ -1,0 +1,144 @@
+"""What the user asked for: the command line, with an options file behind it, as a command's arguments."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from dzdesign.command_line.command_table import COMMANDS
+from dzdesign.command_line.options_file import Value, options_from_file
+from dzdesign.command_line.parser import arguments_of_command, build_parser, command_module, unknown_words
+from dzdesign.core.errors import InputError, nearest, quoted
+from dzdesign.core.options import Argument
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Invocation:
+    """One call of the command line.
+
+    Attributes
+    ----------
+    command : str
+        Its name.
+    arguments : object
+        Of the command's class ``Arguments``.
+    json, quiet, verbose : bool
+        How the result is printed, and how much is logged.
+    options_file : str
+        Of --config; empty if none was given.
+    from_file : dict
+        Options whose value is that of the file.
+    """
+
+    command: str
+    arguments: Any
+    json: bool = False
+    quiet: bool = False
+    verbose: bool = False
+    options_file: str = ""
+    from_file: dict[str, Value]
+
+
+def parse(argv: list[str]) -> Invocation:
+    """Parse a command line; what an options file says stands in for the defaults.
+
+    Parameters
+    ----------
+    argv : list of str
+        Without the program's name.
+
+    Raises
+    ------
+    InputError
+        If the command line is wrong, or the file can't be read or names no option.
+    """
+    word = _command_in(argv)
+    if word and word not in COMMANDS:
+        raise InputError(f"there is no command '{word}'{nearest(word, COMMANDS)}; see `dzdesign --help`")
+    parser, commands = build_parser(only=word or "")
+    namespace, unknown = parser.parse_known_args(argv)
+    given = vars(namespace)
+    name = given.pop("command")
+    if unknown:
+        raise unknown_words(unknown, name, commands[name])
+    json, quiet, verbose = (given.pop(key, False) for key in ("json", "quiet", "verbose"))
+    if quiet and verbose:
+        raise InputError("--quiet and --verbose contradict each other; give one of them")
+    declared, options_file = arguments_of_command(name), given.pop("config", "")
+    values = _meant_values(options_file, declared) if options_file else {}
+    from_file = {key: value for key, value in values.items() if key not in given}
+    for argument in declared:
+        key = argument.name
+        if argument.option.by_entry and (key in given or key in values):
+            given[key] = merged_entries(argument.flag, values.get(key), given.get(key, []))
+        elif key in from_file:
+            value = values[key]
+            given[key] = [value] if argument.is_repeatable and isinstance(value, str) else value
+        elif key not in given and argument.option.command_default:
+            given[key] = argument.option.command_default
+    return Invocation(
+        command=name, arguments=command_module(name).Arguments(**given), json=json, quiet=quiet, verbose=verbose,
+        options_file=options_file, from_file=from_file,
+    )  # fmt: skip
+
+
+def _command_in(argv: list[str]) -> str | None:
+    """Return the first word that is neither an option nor the file that --config names."""
+    before = ""
+    for word in argv:
+        if before != "--config" and not (word.startswith("-") and len(word) > 1):
+            return word
+        before = word
+    return None
+
+
+def _meant_values(path: str, declared: tuple[Argument, ...]) -> dict[str, Value]:
+    """Return the options of a file that are for a command; the file may have those of every command."""
+    every = [argument for name in COMMANDS for argument in arguments_of_command(name)]
+    named = [argument for argument in every if not argument.is_positional and bool not in argument.kinds]
+    values = options_from_file(
+        path,
+        known={argument.name for argument in named},
+        repeatable={argument.name for argument in named if argument.is_repeatable},
+        tables={argument.name for argument in named if argument.is_table},
+        by_entry={argument.name for argument in named if argument.option.by_entry},
+    )
+    own = {argument.name: argument for argument in declared if argument in named}
+    return {key: value for key, value in values.items() if key in own and _is_meant(value, own[key])}
+
+
+def _is_meant(value: Value, argument: Argument) -> bool:
+    """Tell whether a value of the file is for this command: `dp` is a list for simulate, a table for identify."""
+    if isinstance(value, dict):
+        return argument.is_table
+    return argument.is_repeatable or not isinstance(value, list)
+
+
+def merged_entries(flag: str, value: Value | None, entries: list[str]) -> dict[str, str]:
+    """Return entries of the command line, ``name = text``, on top of those of the options file.
+
+    Parameters
+    ----------
+    flag : str
+        Option that they are of.
+    value : str, list of str or mapping, optional
+        Of the options file.
+    entries : list of str
+        Of the command line.
+
+    Raises
+    ------
+    InputError
+        If an entry is none, or a name is given twice.
+    """
+    from dzdesign.identify.valve.test_record import checked_record
+
+    table = checked_record(value.items(), "the record") if isinstance(value, dict) else {}
+    texts = [value] if isinstance(value, str) else value if isinstance(value, list) else []
+    later = checked_record([_entry(flag, text) for text in (*texts, *entries)], flag)
+    return checked_record((table | later).items(), "the record")
+
+
+def _entry(flag: str, text: str) -> tuple[str, str]:
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise InputError(f'{flag} is {quoted(text)}, expected a name and a text such as "serial = 4711"')
+    return name.strip(), value.strip()

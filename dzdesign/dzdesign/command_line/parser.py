@@ -1,0 +1,217 @@
+"""The command line as argparse reads it, made of what the commands declare: help in groups, errors of one line."""
+
+import argparse
+import shutil
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from types import ModuleType
+from typing import Annotated, NoReturn
+
+from dzdesign.command_line.command_table import COMMANDS, EXAMPLES
+from dzdesign.core.errors import InputError, nearest
+from dzdesign.core.options import GROUPS, Argument, Option, arguments_of
+from dzdesign.core.version import __version__
+
+#: The widest that help is set, in columns: longer lines are hard to read.
+WIDEST = 100
+ABOUT = "Dead-zone compensators for proportional valves without a spool sensor: from ramp tests to checked C."
+EXIT_STATUS = """exit status:
+  0    every requirement holds
+  1    a requirement does not hold, or could not be checked; the message says which
+  2    bad input or usage
+  130  interrupted"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CommonArguments:
+    """Options of every command, before it or after it."""
+
+    config: Annotated[str, Option("File with options of the same names; dzdesign init writes one.", "TOML")] = ""
+    json: Annotated[bool, Option("Print the result as JSON.")] = False
+    quiet: Annotated[bool, Option("Print results and errors only.", short="-q")] = False
+    verbose: Annotated[bool, Option("Log the work with times, files and the solver's output.", short="-v")] = False
+
+
+class HelpFormatter(argparse.RawDescriptionHelpFormatter):
+    """Help as wide as the terminal, or as COLUMNS says, but no wider than can be read."""
+
+    def __init__(self, prog: str) -> None:
+        super().__init__(prog, max_help_position=26, width=min(shutil.get_terminal_size().columns - 2, WIDEST))
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        """Wrap what is one line, and leave alone what has lines of its own: examples."""
+        fill = argparse.RawDescriptionHelpFormatter if "\n" in text else argparse.HelpFormatter
+        return fill._fill_text(self, text, width, indent)
+
+    def _format_action_invocation(self, action: argparse.Action) -> str:
+        """Return ``-o, --output FILE``, not ``-o FILE, --output FILE``."""
+        if not action.option_strings or action.nargs == 0:
+            return super()._format_action_invocation(action)
+        return f"{', '.join(action.option_strings)} {self._format_args(action, action.dest.upper())}"
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose errors are one line, as every other error."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raise instead of printing the usage."""
+        raise InputError(f"{message}; see `{self.prog} --help`")
+
+
+class FrontParser(Parser):
+    """The parser of `dzdesign` itself, whose help has the commands in groups."""
+
+    commands: "argparse._SubParsersAction[Parser]"
+
+    def format_help(self) -> str:
+        """Return the help."""
+        page = self._get_formatter()
+        page.add_text("usage: dzdesign COMMAND [OPTIONS]")
+        page.add_text(self.description)
+        commands = {action.dest: action for action in self.commands._choices_actions}
+        for group in dict.fromkeys(command.group for command in COMMANDS.values()):
+            page.start_section(group)
+            page.add_arguments([commands[name] for name, command in COMMANDS.items() if command.group == group])
+            page.end_section()
+        page.start_section("options")
+        page.add_arguments(self._optionals._group_actions)
+        page.end_section()
+        for text in (_lines("examples", EXAMPLES), EXIT_STATUS, "`dzdesign COMMAND --help` explains each command."):
+            page.add_text(text)
+        return page.format_help()
+
+
+@cache
+def command_module(name: str) -> ModuleType:
+    """Return the module that has a command's ``Arguments``, ``EXAMPLES`` and ``run``."""
+    return import_module(COMMANDS[name].module)
+
+
+def arguments_of_command(name: str) -> tuple[Argument, ...]:
+    """Return what a command takes."""
+    return arguments_of(command_module(name).Arguments)
+
+
+def build_parser(only: str | None = None) -> tuple[Parser, dict[str, Parser]]:
+    """Return the parser and those of its commands.
+
+    Parameters
+    ----------
+    only : str, optional
+        The one command whose options are wanted: the others' modules are not imported. None: all of them.
+    """
+    parser = FrontParser(prog="dzdesign", description=ABOUT, formatter_class=HelpFormatter, add_help=False)
+    parser.add_argument("-h", "--help", action="help", help="Show this page and exit.")
+    parser.add_argument("--version", action="version", version=f"dzdesign {__version__}", help="Print the version.")
+    for argument in arguments_of(CommonArguments):
+        _add_option(parser, argument)
+    parser.commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=Parser)
+    commands = {}
+    for name, command in COMMANDS.items():
+        wanted = only in (None, name)
+        arguments = arguments_of_command(name) if wanted else ()
+        commands[name] = parser.commands.add_parser(
+            name,
+            help=command.help,
+            description=f"{command.help[0].upper()}{command.help[1:]}.",
+            epilog=_lines("examples", command_module(name).EXAMPLES) if wanted else None,
+            usage=usage_of(name, arguments),
+            formatter_class=HelpFormatter,
+            add_help=False,
+        )
+        if wanted:
+            _add_options(commands[name], arguments)
+    return parser, commands
+
+
+def usage_of(name: str, arguments: Iterable[Argument]) -> str:
+    """Return a command with the words that it must or may be given; options are listed below it, in groups.
+
+    Parameters
+    ----------
+    name : str
+        Of the command.
+    arguments : iterable of Argument
+        That it takes.
+    """
+    words = [f"dzdesign {name}"]
+    for argument in arguments:
+        word = argument.option.metavar + (" ..." if argument.is_repeatable else "")
+        if argument.is_positional:
+            words.append(word if argument.required else f"[{word}]")
+        elif argument.required:
+            words.append(f"{argument.flag} {word}")
+    return " ".join([*words, "[OPTIONS]"])
+
+
+def _lines(heading: str, lines: tuple[str, ...]) -> str:
+    return "\n  ".join((f"{heading}:", *lines))
+
+
+def _add_options(command: Parser, arguments: tuple[Argument, ...]) -> None:
+    """Add a command's options in their groups, the common ones last."""
+    command._positionals.title = "arguments"
+    used = [group for group in GROUPS if any(argument.option.group == group for argument in arguments)]
+    groups = {group: command.add_argument_group(group) for group in used}
+    for argument in arguments:
+        _add_option(groups.get(argument.option.group, command), argument)
+    common = command.add_argument_group("options of every command")
+    for argument in arguments_of(CommonArguments):
+        _add_option(common, argument)
+    common.add_argument("-h", "--help", action="help", help="Show this help and exit.")
+
+
+def _add_option(place: argparse._ActionsContainer, argument: Argument) -> None:
+    """Add an option, without a default: what was given is told from what was not, and what stands before stays."""
+    option, text = argument.option, help_of(argument).replace("%", "%%")
+    names = [name for name in (option.short, argument.flag) if name]
+    nargs = None
+    if argument.by_position and argument.is_repeatable:
+        nargs = "+" if argument.required else "*"
+    if bool in argument.kinds:
+        place.add_argument(*names, action="store_true", default=argparse.SUPPRESS, help=text)
+    elif argument.is_positional:
+        nargs = nargs or (None if argument.required else "?")
+        place.add_argument(argument.name, nargs=nargs, default=argparse.SUPPRESS, metavar=option.metavar, help=text)
+    else:
+        action = "append" if argument.is_repeatable and nargs is None else "store"
+        place.add_argument(
+            *names, action=action, nargs=nargs, required=argument.required, default=argparse.SUPPRESS,
+            metavar=option.metavar, help=text,
+        )  # fmt: skip
+
+
+def help_of(argument: Argument) -> str:
+    """Return the help of an option, with its default.
+
+    Parameters
+    ----------
+    argument : Argument
+        As a command declares it.
+    """
+    default = argument.default_text
+    return f"{argument.option.help.removesuffix('.')} (default: {default})." if default else argument.option.help
+
+
+def unknown_words(words: list[str], name: str, command: Parser) -> InputError:
+    """Return the error for words that are no option of a command: the nearest that is one, or whose option it is.
+
+    Parameters
+    ----------
+    words : list of str
+        That argparse left over.
+    name : str
+        Of the command.
+    command : Parser
+        Of the command.
+    """
+    wrong = next((word for word in words if word.startswith("-")), words[0]).partition("=")[0]
+    if not wrong.startswith("-"):
+        return InputError(f"'{wrong}' is one word too many; see `{command.prog} --help`")
+    hint = nearest(wrong, command._option_string_actions)
+    owners = (other for other in COMMANDS if any(wrong == each.flag for each in arguments_of_command(other)))
+    if owner := next(owners, None):
+        hint = f" (it is an option of `dzdesign {owner}`)"
+    return InputError(f"`dzdesign {name}` has no option {wrong}{hint}; see `{command.prog} --help`")

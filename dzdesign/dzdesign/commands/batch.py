@@ -1,0 +1,33 @@
+"""`dzdesign batch FOLDER`."""
+
+from pathlib import Path
+
+from dzdesign.batch.arguments import BatchArguments
+from dzdesign.core.artefact_files import to_json
+from dzdesign.core.errors import RequirementError
+
+Arguments = BatchArguments
+EXAMPLES = (
+    'dzdesign batch lot -o calibrated --jobs 4 --meter-lag "0.1 s"',
+    "dzdesign batch lot.csv -o calibrated --verify --dask tcp://10.0.0.5:8786",
+)
+
+
+def run(arguments: Arguments, json: bool) -> int:
+    """Calibrate the valves of a folder or a list; raise at the end if any could not be."""
+    from dzdesign.batch.command import calibrate_lot
+    from dzdesign.batch.printing import print_lot
+    from dzdesign.core.artefact_types import as_document
+
+    output = Path(arguments.output)
+    summary, report = calibrate_lot(arguments)
+    if json:
+        print(to_json({**as_document(summary), "report": report and str(report)}), end="")
+    else:
+        print_lot(summary, output, report)
+    if summary.failed:
+        raise RequirementError(
+            f"{len(summary.failed)} of {summary.valves} valves are not calibrated; their reasons are in "
+            f"'{output / 'valves.csv'}'"
+        )
+    return 0

@@ -1,0 +1,62 @@
+"""`dzdesign codegen COMPENSATOR.json`, or VALVE.json."""
+
+import os
+from dataclasses import KW_ONLY, dataclass
+from typing import Annotated
+
+from dzdesign.core.artefact_files import to_json
+from dzdesign.core.errors import InputError
+from dzdesign.core.options import AnyPath, Option
+from dzdesign.stages.generate import GenerateArguments, generate
+from dzdesign.terminal.progress import say
+
+EXAMPLES = (
+    "dzdesign codegen compensator.json -o firmware",
+    "dzdesign codegen valve.json --target host",
+    "dzdesign codegen --list-targets",
+)
+
+
+@dataclass(frozen=True)
+class Arguments(GenerateArguments):
+    """Arguments of the stage, and what prints the targets instead."""
+
+    compensator: Annotated[
+        AnyPath | None,
+        Option("compensator.json; or a valve.json, designed first with the options below.", "COMPENSATOR.json"),
+    ] = None  # type: ignore[assignment]  # with --list-targets there is none
+    _: KW_ONLY
+    list_targets: Annotated[bool, Option("Print name and description of every target.")] = False
+
+
+def run(arguments: Arguments, json: bool) -> int:
+    """Generate a firmware and print its files, or print the targets."""
+    if arguments.list_targets:
+        return _list_targets(json)
+    if arguments.compensator is None:
+        raise InputError("codegen needs a COMPENSATOR.json or a VALVE.json; see `dzdesign codegen --help`")
+    firmware = generate(arguments)
+    if firmware.note:
+        say(firmware.note)
+    if json:
+        from dzdesign.core.artefact_types import as_document
+
+        print(to_json(as_document(firmware.manifest)), end="")
+        return 0
+    from dzdesign.terminal.tables import print_firmware
+
+    print_firmware(firmware, os.fspath(arguments.output or ""))
+    return 0
+
+
+def _list_targets(json: bool) -> int:
+    from dzdesign.codegen.project import targets
+
+    if json:
+        listing = [{"name": target.name, "description": target.description} for target in targets()]
+        print(to_json({"targets": listing}), end="")
+        return 0
+    width = max(len(target.name) for target in targets())
+    for target in targets():
+        print(f"{target.name:{width}}  {target.description}")
+    return 0

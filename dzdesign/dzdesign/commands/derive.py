@@ -1,0 +1,71 @@
+"""`dzdesign derive`: the paper's equations, re-derived."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from dzdesign.core.artefact_files import check_file_may_be_written, to_json, write_file
+from dzdesign.core.errors import InputError
+from dzdesign.core.options import AnyPath, Option, Texts, texts_of
+from dzdesign.terminal.progress import stage_progress
+
+EXAMPLES = ("dzdesign derive --equation 18", "dzdesign derive --format html -o derivation.html")
+
+# fmt: off
+
+
+@dataclass(frozen=True, kw_only=True)
+class Arguments:
+    """Arguments of `derive`."""
+
+    format: Annotated[str, Option(
+        "Format: text, json, latex or html.", "F",
+        choices="dzdesign.derivation.presentation.report:FORMATS")] = "text"
+    equation: Annotated[Texts, Option(
+        "Number of an equation, such as 18 or T3b: print this one and what it rests on. Repeatable.", "N")] = ()
+    mutate: Annotated[bool, Option("Instead, make every equation wrong, and count what is caught.")] = False
+    output: Annotated[AnyPath | None, Option("File to write (default: standard output).", "FILE", short="-o")] = None
+# fmt: on
+
+
+def run(arguments: Arguments, json: bool) -> int:
+    """Re-derive the paper's equations; 1 if one of those printed is not found as a correct account finds it."""
+    from dzdesign.derivation.account.account import STATEMENTS, verify_statements
+    from dzdesign.derivation.presentation.report import check_format, closure, render
+
+    check_format(arguments.format)
+    if arguments.output:
+        check_file_may_be_written(Path(arguments.output))
+    if arguments.mutate:
+        if arguments.equation:
+            raise InputError("--mutate counts over all equations; leave out --equation")
+        return _run_mutations(arguments, json)
+    chosen = closure(STATEMENTS, texts_of(arguments.equation)) if arguments.equation else None
+    with stage_progress() as stage:
+        stage("re-deriving the paper's equations")
+        verdicts = verify_statements()
+    text = render(verdicts, "json" if json else arguments.format, chosen)
+    if arguments.output:
+        write_file(Path(arguments.output), text)
+    else:
+        print(text, end="")
+    wrong = (verdict for verdict in verdicts if not verdict.as_expected)
+    return 1 if any(chosen is None or verdict.number in chosen for verdict in wrong) else 0
+
+
+def _run_mutations(arguments: Arguments, json: bool) -> int:
+    """Count the wrong equations that the account catches; 1 if one of them is not caught."""
+    from dzdesign.derivation.account.account import verify_statements
+    from dzdesign.derivation.account.mutation import mutation_document, score_mutations
+    from dzdesign.terminal.tables import print_mutations
+
+    with stage_progress() as stage:
+        stage("making every equation wrong in every small way")
+        document = mutation_document(score_mutations(verify_statements()))
+    if arguments.output:
+        write_file(Path(arguments.output), to_json(document))
+    elif json:
+        print(to_json(document), end="")
+    else:
+        print_mutations(document)
+    return 0 if document["caught"] == document["mutants"] else 1

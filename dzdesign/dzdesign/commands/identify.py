@@ -1,0 +1,27 @@
+"""`dzdesign identify RAMP...`."""
+
+from dzdesign.core.errors import one_line
+from dzdesign.stages.identify import IdentifyArguments, identify
+
+Arguments = IdentifyArguments
+EXAMPLES = (
+    'dzdesign identify ramps/*.csv --meter-lag "0.1 s"',
+    "dzdesign identify ramps/*.csv --config dzdesign.toml --plots plots",
+    'dzdesign identify ramp.csv --dp "1 MPa" --columns "u=AO0:V, Q=Flow (L/min)"',
+)
+
+
+def run(arguments: Arguments, json: bool) -> int:
+    """Identify a valve and print its thresholds."""
+    valve = identify(arguments)
+    if json:
+        from dzdesign.core.artefact_types import to_json_bytes
+
+        print(to_json_bytes(valve).decode(), end="")
+        return 0
+    from dzdesign.terminal.tables import print_valve
+
+    print_valve(valve)
+    plots = f", plots in {arguments.plots}" if arguments.plots else ""
+    print(one_line(f"Written: {arguments.output}{plots}"))
+    return 0

@@ -1,0 +1,1 @@
+"""What `dzdesign init` proposes: recordings are looked at, and the options file is written with reasons."""

@@ -1,0 +1,67 @@
+"""What a look at recordings found, and the file of options that it proposes."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from dzdesign.identify.first_look import GuessedColumns, SeenSide
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Look:
+    """What was seen of all recordings; the maps are None or empty where the files need none.
+
+    Attributes
+    ----------
+    paths : list of Path
+        The recordings.
+    guesses : list of GuessedColumns
+        One per recording.
+    columns, dp : dict
+        Of the tables [columns] and [dp] to write.
+    u_max, u_seen : float
+        Full command to declare and the largest seen, V.
+    in_per_cent : bool
+        True if the command is, so that full command can't be seen.
+    sides, refused : dict
+        As `look_at_sides` gives them.
+    notes : tuple of str
+        What was seen and is not used, or comes from elsewhere than a column.
+    skip_rows : int or None
+        As declared.
+    """
+
+    paths: "list[Path]"
+    guesses: "list[GuessedColumns]"
+    columns: dict[str, str]
+    dp: dict[str, str]
+    u_max: float = 10.0
+    u_seen: float | None = None
+    in_per_cent: bool = False
+    sides: "dict[str, SeenSide]"
+    refused: dict[str, str]
+    notes: tuple[str, ...] = ()
+    skip_rows: int | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Proposal:
+    """What a look at recordings proposes.
+
+    Attributes
+    ----------
+    text : str
+        Of the file of options.
+    seen : tuple of str
+        What was seen, for a person.
+    opens : tuple of str
+        What is open: without it `identify` can't run.
+    look : Look
+        What was seen.
+    """
+
+    text: str
+    seen: tuple[str, ...]
+    opens: tuple[str, ...]
+    look: Look

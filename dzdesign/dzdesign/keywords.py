@@ -1,0 +1,128 @@
+"""A stage as a function with keywords: typed and documented by the dataclass of its arguments.
+
+By hand, and not by pydantic or typeguard: both end in a NameError at the annotations of classes that are imported only
+when they are needed ("ValveModel | AnyPath"), and their messages have several lines and no example.
+"""
+
+import inspect
+import os
+import re
+from collections.abc import Callable, Iterable, Mapping
+from functools import wraps
+from typing import Any, ForwardRef, ParamSpec, TypeVar, get_args
+
+from dzdesign.core.errors import InputError, nearest, quoted
+from dzdesign.core.options import Argument, arguments_of
+from dzdesign.terminal.progress import talking
+
+P = ParamSpec("P")
+A = TypeVar("A")
+R = TypeVar("R")
+
+#: The section of a docstring that names the dataclass, in whose place its fields are put.
+PARAMETERS = re.compile(r"( *)Parameters\n *-+\n.*?(?=\n *\w+\n *-+\n|\s*\Z)", re.DOTALL)
+
+
+def with_keywords(declaration: Callable[P, A], stage: Callable[[A], R]) -> Callable[P, R]:
+    """Return a stage as a function of the fields of its arguments, which reports no progress.
+
+    Parameters
+    ----------
+    declaration : type
+        Dataclass of the stage's arguments.
+    stage : callable
+        Takes an instance of it.
+
+    Returns
+    -------
+    callable
+        Refuses, in one sentence, an option that the stage lacks, and a value of another kind than is declared.
+
+    Examples
+    --------
+    >>> from dzdesign.stages.simulate import SimulateArguments, simulate
+    >>> with_keywords(SimulateArguments, simulate)(ramp_time=5)
+    Traceback (most recent call last):
+    dzdesign.core.errors.InputError: ramp_time: expected text with a unit such as '100 s', got 5
+    """
+    signature, name = inspect.signature(declaration), stage.__name__
+    declared = {argument.name: argument for argument in arguments_of(declaration)}
+
+    @wraps(stage)
+    def call(*args: P.args, **kwargs: P.kwargs) -> R:
+        for key in kwargs:
+            if key not in declared:
+                raise InputError(f"{name} has no option {quoted(key)}{nearest(key, declared)}; see help({name})")
+        bound = signature.bind(*args, **kwargs)
+        for key, value in bound.arguments.items():
+            bound.arguments[key] = _checked(declared[key], value)
+        with talking(quiet=True, verbose=False):
+            return stage(declaration(*bound.args, **bound.kwargs))
+
+    plain = [each.replace(annotation=_plain(each.annotation)) for each in signature.parameters.values()]
+    result = inspect.signature(stage).return_annotation
+    call.__signature__ = inspect.Signature(plain, return_annotation=result)  # type: ignore[attr-defined]
+    call.__doc__ = PARAMETERS.sub(lambda found: _parameters(declared, found[1]), stage.__doc__ or "", count=1)
+    return call
+
+
+def _plain(annotation: Any) -> Any:
+    """Return the type of an annotation without its option."""
+    kind = get_args(annotation)[0]
+    return kind.__forward_arg__ if isinstance(kind, ForwardRef) else kind
+
+
+def _parameters(declared: Mapping[str, Argument], indent: str) -> str:
+    """Return the section of a docstring that documents the options."""
+    lines = ["Parameters", "----------"]
+    for argument in declared.values():
+        optional = "" if argument.required else ", optional"
+        default = argument.option.default or (argument.default if isinstance(argument.default, str) else "")
+        lines += [f"{argument.name} : {_kind(argument)}{optional}", f"    {argument.option.help}"]
+        lines += [f"    Default: {default}."] if default else []
+    return "\n".join(f"{indent}{line}" for line in lines) + "\n"
+
+
+def _kind(argument: Argument) -> str:
+    """Return what a value may be, in words."""
+    if bool in argument.kinds:
+        return "bool"
+    words = [argument.result_class] if argument.result_class else []
+    words += ["path" if argument.is_path else "str"] if str in argument.kinds else []
+    words += [kind.__name__ for kind in (int, float) if kind in argument.kinds]
+    words += ["mapping"] if Mapping in argument.kinds else []
+    words += ["iterable of them"] if Iterable in argument.kinds else []
+    return " or ".join(words)
+
+
+def _checked(argument: Argument, value: Any) -> Any:
+    """Return a value, an iterable as a list; refuse one that does not fit."""
+    kinds, name = argument.kinds, argument.name
+    if {int, float} & kinds:  # read by what it is for, which refuses what can't be a number
+        return value
+    if argument.result_class in (one.__name__ for one in type(value).__mro__):
+        return value
+    if isinstance(value, Mapping) and argument.is_table:
+        for key, item in value.items():
+            if not argument.option.by_entry and not isinstance(item, str):
+                raise _of_another_kind(f"{name}[{key!r}]", item, argument)
+        return value
+    if isinstance(value, tuple(kinds - {Mapping, Iterable})):
+        return value
+    if Iterable not in kinds or not isinstance(value, Iterable) or isinstance(value, bytes | bytearray | Mapping):
+        raise _of_another_kind(name, value, argument)
+    items = list(value)
+    for index, item in enumerate(items):
+        if not isinstance(item, str | os.PathLike):
+            raise _of_another_kind(f"{name}[{index}]", item, argument)
+    return items
+
+
+def _of_another_kind(place: str, value: object, argument: Argument) -> InputError:
+    if argument.is_path:
+        words = "a path"
+    elif argument.option.example:
+        words = f"text with a unit such as '{argument.option.example}'"
+    else:
+        words = "text" if str in argument.kinds else "a mapping of names to values"
+    return InputError(f"{place}: expected {words}, got {quoted(value)}")

@@ -1,0 +1,156 @@
+"""`assess`: recordings without and with the compensator -> Assessment."""
+
+from dataclasses import KW_ONLY, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from dzdesign.core.artefact_files import check_file_may_be_written, to_json, write_file, write_files
+from dzdesign.core.errors import InputError
+from dzdesign.core.options import (
+    FIT,
+    RECORDINGS,
+    AnyPath,
+    Option,
+    Paths,
+    Table,
+    Text,
+    percent_range,
+    quantity,
+    read_options,
+)
+from dzdesign.core.units import parse_quantity
+from dzdesign.stages.recordings import RampArguments, check_plots, read_recordings, refuse_copies
+from dzdesign.terminal.progress import say, stage_progress
+
+if TYPE_CHECKING:
+    from dzdesign.assess.assessment import Assessment, AssessOptions
+    from dzdesign.identify.reading.ramp_files import RampTest
+
+
+def _flow_or_share(text: str, option: str) -> tuple[float | None, float | None]:
+    """Read a flow (m³/s) or a share of the largest flow; None for what it is not."""
+    if text.rstrip().endswith("%"):
+        return None, parse_quantity(text, "ratio", option)
+    return parse_quantity(text, "flow", option), None
+
+
+# fmt: off
+
+
+@dataclass(frozen=True)
+class AssessArguments(RampArguments):
+    """Arguments of `assess`."""
+
+    before: Annotated[Paths, Option("Recordings without the compensator, as for identify.", "BEFORE")]
+    after: Annotated[Paths, Option(
+        "Recordings with it; their command is the compensator's input.", "AFTER", named=True)]
+    _: KW_ONLY
+    output: Annotated[AnyPath | None, Option(
+        "File to write.", "FILE", command_default="assessment.json", short="-o")] = None
+    limits: Annotated[Table, Option(
+        'Largest values AFTER, such as "dead_zone_opening = 5 %, flow_at_zero = 0.1 L/min", also of dead_zone_closing, '
+        "knee_opening, knee_closing, hysteresis, linearity, symmetry, largest_flow_loss. In the options file a table "
+        "[limits].", "L", example="5 %")] = None
+    level: Annotated[Text, Option(
+        'Flow that ends the dead zone, such as "0.6 L/min", or "1 %" of the largest flow before (default: what counts '
+        "as flow, which is the meter's floor, its noise or 0.5 % of the largest flow).",
+        "Q", example="0.6 L/min", read=_flow_or_share)] = None
+    linearity_window: Annotated[str, Option(
+        "Range of the linearity, in percent of full command.",
+        "A-B", FIT, read=percent_range("full command such as '10-90'"))] = "10-90"
+    after_columns: Annotated[Table, Option(
+        "Columns of the recordings after, where u is the compensator's input (default: as --columns or [columns]).",
+        "MAP", RECORDINGS)] = None
+    after_u_max: Annotated[Text, Option(
+        "Full command of the recordings after (default: as --u-max).",
+        "U", RECORDINGS, example="10 V", read=quantity("voltage"))] = None
+    plots: Annotated[AnyPath | None, Option("Folder for plots in SVG: flow over command.", "DIR")] = None
+# fmt: on
+
+
+def assess(arguments: AssessArguments) -> "Assessment":
+    """Compare ramp tests without and with the compensator.
+
+    Parameters
+    ----------
+    arguments : AssessArguments
+        Of the stage.
+
+    Raises
+    ------
+    InputError
+        If a file or an option can't be read. A limit that is missed is no error: see ``holds``.
+    """
+    from dzdesign.assess.assessment import assess as compare
+    from dzdesign.assess.assessment_file import SCHEMA, assessment_document
+
+    options = assess_options(arguments)
+    if arguments.output is not None:
+        check_file_may_be_written(Path(arguments.output), SCHEMA)
+    check_plots(arguments.plots, arguments.output)
+    before = _read_set("before", arguments.before, arguments.columns, arguments, options.of_set("before").u_max)
+    columns = arguments.after_columns or arguments.columns
+    after = _read_set("after", arguments.after, columns, arguments, options.of_set("after").u_max)
+    refuse_copies([*before, *after])
+    with stage_progress() as stage:
+        stage(f"comparing {len(before)} recordings before with {len(after)} after")
+        found = compare(before, after, options)
+    if arguments.output is not None:
+        write_file(Path(arguments.output), to_json(assessment_document(found)), SCHEMA)
+    if arguments.plots is not None:
+        from dzdesign.assess.plots import plot_files
+
+        with stage_progress() as stage:
+            stage("drawing")
+            write_files(Path(arguments.plots), plot_files(found), "--plots")
+    return found
+
+
+def _read_set(name: str, patterns: Paths, columns: Table, arguments: AssessArguments, u_max: float) -> "list[RampTest]":
+    """Read the recordings before or after; what is wrong with the columns of those after is said of --after-columns."""
+    inherited = name == "after" and columns and not arguments.after_columns
+    if inherited:
+        say("recordings after: columns as those before, by --columns or [columns]; --after-columns says others")
+    try:
+        return read_recordings(
+            patterns, u_max=u_max, columns=columns, dp=arguments.dp, skip_rows=arguments.skip_rows,
+            what=f"reading recordings {name}",
+        )  # fmt: skip
+    except InputError as error:
+        if name == "before" or "--columns" not in str(error):
+            raise
+        if inherited:
+            raise InputError(
+                f"{error}; the recordings after are read by the same --columns, or [columns], as those before: say "
+                "theirs by --after-columns"
+            ) from error
+        raise InputError(str(error).replace("--columns", "--after-columns")) from error
+
+
+def assess_options(arguments: AssessArguments) -> "AssessOptions":
+    """Return the engineer's choices, SI.
+
+    Parameters
+    ----------
+    arguments : AssessArguments
+        As written.
+    """
+    from dzdesign.assess.assessment import AssessOptions
+    from dzdesign.assess.limits import parse_limits
+    from dzdesign.identify.options import IdentifyOptions
+
+    reading = IdentifyOptions(**read_options(arguments, ["u_max", "meter_floor", "meter_lag", "knee_window"]))
+    read = read_options(arguments, ["after_u_max", "level", "linearity_window"])
+    after_u_max = read["after_u_max"]
+    if after_u_max is not None and not after_u_max > 0:
+        raise InputError(f"--after-u-max is '{arguments.after_u_max}', expected a positive command")
+    level, share = read["level"] or (None, None)
+    limits = arguments.limits
+    return AssessOptions(
+        reading=reading,
+        after_u_max=after_u_max,
+        level=level,
+        level_share=share,
+        window=read["linearity_window"],
+        limits=parse_limits(limits, after_u_max or reading.u_max) if limits is not None else {},
+    )

@@ -1,0 +1,31 @@
+"""`batch`: recordings of many valves -> a calibration of each, in one table."""
+
+from typing import TYPE_CHECKING
+
+from dzdesign.batch.arguments import BatchArguments
+
+if TYPE_CHECKING:
+    from dzdesign.report.lot.summary import LotSummary
+
+
+def batch(arguments: BatchArguments) -> "LotSummary":
+    """Calibrate many valves; an earlier run in the folder is continued.
+
+    Parameters
+    ----------
+    arguments : BatchArguments
+        Of the stage.
+
+    Returns
+    -------
+    LotSummary
+        Content of batch.json: counts, reasons, quantiles, the common setting.
+
+    Raises
+    ------
+    InputError
+        If the list, the folder or an option is wrong. A valve that can't be calibrated is no error: see ``failed``.
+    """
+    from dzdesign.batch.command import calibrate_lot
+
+    return calibrate_lot(arguments)[0]

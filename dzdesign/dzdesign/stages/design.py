@@ -1,0 +1,106 @@
+"""`design`: ValveModel + choices -> Compensator."""
+
+import os
+from dataclasses import KW_ONLY, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from dzdesign.core.artefact_files import check_file_may_be_written, read_bytes, to_json, write_file
+from dzdesign.core.errors import InputError
+from dzdesign.core.options import AnyPath, Option, flag_of
+from dzdesign.design.request import DEFAULTS, DesignChoices
+
+if TYPE_CHECKING:
+    from dzdesign.design.compensator import Compensator
+    from dzdesign.design.options import DesignOptions
+    from dzdesign.identify.valve.model import ValveModel
+
+#: Where the names of the targets stand.
+TARGETS = "dzdesign.codegen.project:TARGET_NAMES"
+#: Options that only a command of both signs has a use for.
+OF_BOTH_SIGNS = ("negative_dp", "zero_window")
+
+# fmt: off
+
+
+@dataclass(frozen=True)
+class DesignArguments(DesignChoices):
+    """Arguments of `design`."""
+
+    valve: Annotated["ValveModel | AnyPath", Option("valve.json, made by `dzdesign identify`.", "VALVE.json")]
+    _: KW_ONLY
+    output: Annotated[AnyPath | None, Option(
+        "File to write.", "FILE", command_default="compensator.json", short="-o")] = None
+    target: Annotated[str, Option(
+        "Microcontroller whose converter and timer the law is for; `codegen --list-targets` lists them.",
+        "NAME", choices=TARGETS)] = "f28335"
+# fmt: on
+
+
+def design_options(choices: DesignChoices, target: str) -> "DesignOptions":
+    """Return the engineer's choices for `design`.
+
+    Parameters
+    ----------
+    choices : DesignChoices
+        As written.
+    target : str
+        Microcontroller that is designed for.
+
+    Raises
+    ------
+    InputError
+        If one can't be read, or is for negative commands and there are none.
+    """
+    from dzdesign.codegen.project import target_named
+    from dzdesign.design.option_texts import options_of
+
+    options = options_of({name: getattr(choices, name) or "" for name in DEFAULTS}, target_named(target).inputs())
+    if options.signals.command.negative_full_code is not None:
+        return options
+    useless = [flag_of(name) for name in OF_BOTH_SIGNS if getattr(choices, name) is not None]
+    useless += [
+        f"the second time of {flag_of(name)}"
+        for name in ("ramp_up", "ramp_down")
+        if "/" in (getattr(choices, name) or "")
+    ]
+    if useless:
+        command = dict(options.request.options)["command_signal"] if options.request else ""
+        raise InputError(
+            f"{useless[0]} is for a command of both signs, but {command!r} has one; leave it out, or give "
+            "a --command-signal such as '-10..10 V x 0.15 + 1.5 V'"
+        )
+    return options
+
+
+def design(arguments: DesignArguments) -> "Compensator":
+    """Design the compensator of a valve, certified.
+
+    Parameters
+    ----------
+    arguments : DesignArguments
+        Of the stage.
+
+    Raises
+    ------
+    InputError
+        If the file or an option can't be read, or the law can't be used for this valve.
+    RequirementError
+        If a proof fails.
+    """
+    from dzdesign.core.artefact_reading import read_artefact
+    from dzdesign.design.compensator_file import SCHEMA, compensator_document
+    from dzdesign.design.designing import design as design_valve
+    from dzdesign.identify.valve.model import ValveModel
+
+    options = design_options(arguments, arguments.target)
+    if arguments.output is not None:
+        check_file_may_be_written(Path(arguments.output), SCHEMA)
+    if isinstance(arguments.valve, ValveModel):
+        compensator = design_valve(arguments.valve, options)
+    else:
+        content = read_bytes(Path(arguments.valve), "valve file")
+        compensator = design_valve(read_artefact(content, ValveModel, os.fspath(arguments.valve)), options, content)
+    if arguments.output is not None:
+        write_file(Path(arguments.output), to_json(compensator_document(compensator)), SCHEMA)
+    return compensator

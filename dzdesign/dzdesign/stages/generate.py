@@ -1,0 +1,98 @@
+"""`codegen`, in Python `generate`: Compensator + target -> Firmware."""
+
+import os
+from dataclasses import KW_ONLY, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from dzdesign.core.artefact_files import check_folder_may_be_written, parse_document, read_bytes
+from dzdesign.core.errors import InputError
+from dzdesign.core.options import AnyPath, Option, Text, flag_of
+from dzdesign.design.request import DEFAULTS, DesignChoices
+from dzdesign.stages.design import TARGETS, design_options
+
+if TYPE_CHECKING:
+    from dzdesign.codegen.project import Firmware
+    from dzdesign.design.compensator import Compensator
+
+# fmt: off
+
+
+@dataclass(frozen=True)
+class GenerateArguments(DesignChoices):
+    """Arguments of `codegen`, in Python `generate`."""
+
+    compensator: Annotated["Compensator | AnyPath", Option(
+        "compensator.json, or a valve.json, which is designed first with the options of `design`.",
+        "COMPENSATOR.json")]
+    _: KW_ONLY
+    output: Annotated[AnyPath | None, Option(
+        "Folder to write, with the C project.", "DIR", command_default="firmware", short="-o")] = None
+    target: Annotated[Text, Option(
+        "Microcontroller (default: that of the design; of a VALVE.json f28335).", "NAME", choices=TARGETS)] = None
+# fmt: on
+
+
+def generate(arguments: GenerateArguments) -> "Firmware":
+    """Generate the C project of a compensator, whose numbers are derived again first.
+
+    Parameters
+    ----------
+    arguments : GenerateArguments
+        Of the stage.
+
+    Raises
+    ------
+    InputError
+        If the file can't be read, a number in it does not follow, or the target counts otherwise.
+    """
+    from dzdesign.codegen.project import DEFAULT_TARGET, target_named, write_firmware
+    from dzdesign.codegen.project import generate as generate_project
+    from dzdesign.core.artefact_reading import read_artefact
+    from dzdesign.core.artefact_types import schema_of
+    from dzdesign.design.compensator import Compensator
+    from dzdesign.design.compensator_file import SCHEMA as COMPENSATOR_SCHEMA
+    from dzdesign.design.designing import design as design_valve
+    from dzdesign.design.firmware_manifest import FirmwareManifest
+    from dzdesign.identify.valve.model import SCHEMA as VALVE_SCHEMA
+    from dzdesign.identify.valve.model import ValveModel
+
+    target = arguments.target or DEFAULT_TARGET
+    target_named(target)
+    if arguments.output is not None:
+        check_folder_may_be_written(Path(arguments.output), schema_of(FirmwareManifest))
+    given = arguments.compensator
+    if isinstance(given, Compensator):
+        firmware = generate_project(_proven(given, "the compensator", arguments), arguments.target)
+    else:
+        source, content = os.fspath(given), read_bytes(Path(given), "compensator file")
+        document = parse_document(content, source, (COMPENSATOR_SCHEMA, VALVE_SCHEMA))
+        if document["schema"] == VALVE_SCHEMA:
+            options = design_options(arguments, target)
+            valve = read_artefact(content, ValveModel, source)
+            firmware = generate_project(design_valve(valve, options, content), target)
+        else:
+            firmware = generate_project(_read_compensator(content, source, arguments), arguments.target, content)
+    return firmware if arguments.output is None else write_firmware(firmware, Path(arguments.output))
+
+
+def _read_compensator(content: bytes, source: str, choices: DesignChoices) -> "Compensator":
+    from dzdesign.design.compensator_file import compensator_from_document
+    from dzdesign.design.redesign_check import refuse_unsaid
+
+    compensator = compensator_from_document(content, source)
+    refuse_unsaid(compensator, source)
+    return _proven(compensator, f"'{source}'", choices)
+
+
+def _proven(compensator: "Compensator", source: str, choices: DesignChoices) -> "Compensator":
+    """Return a compensator whose numbers follow from its valve and options; refuse other options for it."""
+    from dzdesign.design.redesign_check import prove_derived
+
+    for option in (flag_of(name) for name in DEFAULTS if getattr(choices, name) is not None):
+        raise InputError(f"{option} is an option of the design, and {source} is designed; use `dzdesign design`")
+    try:
+        prove_derived(compensator)
+    except InputError as error:
+        raise InputError(f"{source}: {error}") from error
+    return compensator

@@ -1,0 +1,136 @@
+"""`identify`: ramp tests -> ValveModel."""
+
+import datetime
+from collections.abc import Mapping
+from dataclasses import KW_ONLY, dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from dzdesign.core.artefact_files import check_file_may_be_written, write_file, write_files
+from dzdesign.core.options import FIT, METER, RECORDINGS, AnyPath, Option, Paths, Text, number, quantity, read_options
+from dzdesign.stages.recordings import RampArguments, check_plots, read_recordings, refuse_copies
+from dzdesign.terminal.progress import stage_progress
+
+if TYPE_CHECKING:
+    from dzdesign.identify.options import IdentifyOptions
+    from dzdesign.identify.valve.model import ValveModel
+
+# fmt: off
+
+
+@dataclass(frozen=True, kw_only=True)
+class IdentifyChoices(RampArguments):
+    """Options of `identify`, of each valve of `batch` too."""
+
+    meter_zero: Annotated[str, Option(
+        "Bound of the flow meter's zero error.", "Q", METER, example="0.1 L/min", read=quantity("flow"))] = "0 L/min"
+    dp0: Annotated[Text, Option(
+        'Reference pressure drop (default: the test nearest to "1 MPa").',
+        "P", FIT, example="1 MPa", read=quantity("pressure"))] = None
+    x_max: Annotated[Text, Option(
+        'Stroke of the spool, such as "1.8 mm": gives k in V/mm.',
+        "X", FIT, example="1.8 mm", read=quantity("length"))] = None
+    confidence: Annotated[float | str, Option(
+        "Joint confidence level of all lower bounds.", "C", FIT, read=number("a number such as 0.99"))] = "0.99"
+    flat_below: Annotated[float | str, Option(
+        "Percent of full command: a threshold that changes by less over the tests counts as flat, and beta is 1.",
+        "C", FIT, read=lambda text, option: number("a number such as 0.1")(text, option) / 100)] = "0.1"
+    record: Annotated[Mapping[str, object] | None, Option(
+        'Entry of the test record, such as "serial = 4711": kept in valve.json and printed in the report, nothing is '
+        "computed from it. Repeatable. In the options file a table [record].",
+        "ENTRY", RECORDINGS, by_entry=True)] = None
+
+
+@dataclass(frozen=True)
+class IdentifyArguments(IdentifyChoices):
+    """Arguments of `identify`."""
+
+    ramps: Annotated[Paths, Option(
+        "Recordings, or patterns such as ramps/*.csv: CSV, TDMS, MAT, HDF5, Parquet or Feather, with columns time_s, "
+        "u_V, dP_MPa, Q_Lmin.", "RAMP")]
+    _: KW_ONLY
+    output: Annotated[AnyPath | None, Option(
+        "File to write.", "FILE", command_default="valve.json", short="-o")] = None
+    plots: Annotated[AnyPath | None, Option(
+        "Folder for plots in SVG and PNG: flow of each pressure drop with its knees, onsets and residuals; thresholds, "
+        "bounds and beta over dP.", "DIR")] = None
+# fmt: on
+
+
+def identify_options(choices: IdentifyChoices) -> "IdentifyOptions":
+    """Return the engineer's choices for `identify`, SI.
+
+    Parameters
+    ----------
+    choices : IdentifyChoices
+        As written.
+    """
+    from dzdesign.identify.options import IdentifyOptions
+
+    return IdentifyOptions(**read_options(choices, [field.name for field in fields(IdentifyOptions)]))
+
+
+def record_of(given: Mapping[str, object] | None) -> dict[str, str]:
+    """Return the record of a test, its numbers and dates as text.
+
+    Parameters
+    ----------
+    given : mapping, optional
+        Name to text, number or date.
+
+    Raises
+    ------
+    InputError
+        If an entry is none.
+    """
+    from dzdesign.identify.valve.test_record import checked_record
+
+    texts = {name: str(value) if _is_plain(value) else value for name, value in (given or {}).items()}
+    return checked_record(texts.items(), "the record")
+
+
+def _is_plain(value: object) -> bool:
+    return isinstance(value, int | float | datetime.date | datetime.time) and not isinstance(value, bool)
+
+
+def identify(arguments: IdentifyArguments) -> "ValveModel":
+    """Identify a valve from ramp tests.
+
+    Parameters
+    ----------
+    arguments : IdentifyArguments
+        Of the stage.
+
+    Raises
+    ------
+    InputError
+        If a file or an option can't be read, or no threshold can be given; the reason.
+    """
+    from dzdesign.core.artefact_types import to_json_bytes
+    from dzdesign.identify.identification import identify_sides
+    from dzdesign.identify.valve.model import SCHEMA
+
+    options, record = identify_options(arguments), record_of(arguments.record)
+    if arguments.output is not None:
+        check_file_may_be_written(Path(arguments.output), SCHEMA)
+    check_plots(arguments.plots, arguments.output)
+    tests = read_recordings(
+        arguments.ramps,
+        u_max=options.u_max,
+        columns=arguments.columns,
+        dp=arguments.dp,
+        skip_rows=arguments.skip_rows,
+    )
+    refuse_copies(tests)
+    with stage_progress() as stage:
+        stage(f"fitting {len(tests)} recording{'s' if len(tests) > 1 else ''}")
+        found = identify_sides(tests, options, record)
+    if arguments.output is not None:
+        write_file(Path(arguments.output), to_json_bytes(found.model), SCHEMA)
+    if arguments.plots is not None:
+        from dzdesign.identify.plots.valve_plots import plot_files
+
+        with stage_progress() as stage:
+            stage("drawing")
+            write_files(Path(arguments.plots), plot_files(found), "--plots")
+    return found.model

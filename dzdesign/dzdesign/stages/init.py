@@ -1,0 +1,62 @@
+"""`init`: recordings -> a proposal of the options file."""
+
+import os
+from dataclasses import KW_ONLY, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from dzdesign.core.artefact_files import check_file_may_be_written, write_file
+from dzdesign.core.errors import InputError
+from dzdesign.core.options import AnyPath, Option, Paths, read_options
+from dzdesign.stages.recordings import ColumnArguments
+
+if TYPE_CHECKING:
+    from dzdesign.initial_options.look import Proposal
+
+# fmt: off
+
+
+@dataclass(frozen=True)
+class InitArguments(ColumnArguments):
+    """Arguments of `init`."""
+
+    ramps: Annotated[Paths, Option("Recordings, as for identify (default: ramps/*, or *.csv).", "RAMP")] = ()
+    _: KW_ONLY
+    output: Annotated[AnyPath | None, Option(
+        "File to write; one that exists is never overwritten.",
+        "FILE", command_default="dzdesign.toml", short="-o")] = None
+# fmt: on
+
+
+def init(arguments: InitArguments) -> "Proposal":
+    """Look at recordings and propose the options file.
+
+    Parameters
+    ----------
+    arguments : InitArguments
+        Of the stage.
+
+    Returns
+    -------
+    Proposal
+        Its text, what was seen, and what is open: while something is, `identify` can't run.
+
+    Raises
+    ------
+    InputError
+        If a recording can't be read, or the file exists.
+    """
+    from dzdesign.initial_options.proposal import propose
+
+    output = arguments.output
+    if output is not None:
+        if os.path.lexists(output):
+            raise InputError(
+                f"'{output}' exists, and init never writes over a file; give another name with -o, or move it away"
+            )
+        check_file_may_be_written(Path(output))
+    skip_rows = read_options(arguments, ["skip_rows"])["skip_rows"]
+    proposal = propose(arguments.ramps, columns=arguments.columns, dp=arguments.dp, skip_rows=skip_rows)
+    if output is not None:
+        write_file(Path(output), proposal.text)
+    return proposal

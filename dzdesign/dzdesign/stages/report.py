@@ -1,0 +1,78 @@
+"""`report`: a folder of artefacts, of a valve or of a lot -> one HTML page."""
+
+from dataclasses import KW_ONLY, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from dzdesign.core.artefact_files import MANIFEST_NAME, parse_document, read_bytes, write_file, write_folder
+from dzdesign.core.errors import InputError
+from dzdesign.core.options import AnyPath, Option
+
+if TYPE_CHECKING:
+    from dzdesign.report.valve_report import Report
+
+# fmt: off
+
+
+@dataclass(frozen=True)
+class ReportArguments:
+    """Arguments of `report`."""
+
+    folder: Annotated[AnyPath, Option(
+        "Folder of demo, verify, codegen or batch, or with valve.json or compensator.json.", "DIR")]
+    _: KW_ONLY
+    output: Annotated[AnyPath | None, Option(
+        "File to write (default of the command: report.html with the evidence, or in the folder).",
+        "FILE", short="-o")] = None
+# fmt: on
+
+
+def report(arguments: ReportArguments) -> "Report":
+    """Make the report of a folder of artefacts, or of a lot.
+
+    Parameters
+    ----------
+    arguments : ReportArguments
+        Of the stage.
+
+    Returns
+    -------
+    Report
+        ``html``, and ``holds``: None where something was not checked.
+
+    Raises
+    ------
+    InputError
+        If there is nothing to report, or an artefact is none. A requirement that does not hold is no error.
+    """
+    from dzdesign.report.lot.folder import is_lot, refuse_uncalibrated
+    from dzdesign.report.lot.report import report_of_lot
+    from dzdesign.report.valve_report import report_of_folder
+
+    folder = Path(arguments.folder)
+    if is_lot(folder):
+        made = report_of_lot(folder)
+    else:
+        refuse_uncalibrated(folder)
+        made = report_of_folder(folder)
+    if arguments.output is not None:
+        _write_report(Path(arguments.output), made.html)
+    return made
+
+
+def _write_report(output: Path, html: str) -> None:
+    """Write the report; in a folder whose manifest lists it the manifest follows, both or neither."""
+    manifest_path = output.parent / MANIFEST_NAME
+    if not manifest_path.is_file():
+        write_file(output, html)
+        return
+    try:
+        manifest = parse_document(read_bytes(manifest_path, "manifest"), str(manifest_path), ("dzdesign.evidence/1",))
+        listed = manifest["files"] if isinstance(manifest.get("files"), dict) else {}
+    except InputError:
+        listed = {}
+    if output.name not in listed:
+        write_file(output, html)
+        return
+    files: dict[str, str | bytes] = {name: read_bytes(output.parent / name, "evidence") for name in listed}
+    write_folder(output.parent, {**files, output.name: html}, manifest)

@@ -1,0 +1,78 @@
+"""`simulate`: plant -> ramp tests, marked as simulated."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from dzdesign.core.artefact_files import check_folder_may_be_written, write_folder
+from dzdesign.core.errors import InputError
+from dzdesign.core.options import AnyPath, Option, Texts, quantity, read_options, texts_of, whole_number
+from dzdesign.core.units import parse_quantity
+from dzdesign.terminal.progress import say, stage_progress
+
+PRESSURE_DROPS = ("0.5 MPa", "1 MPa", "2 MPa", "3 MPa", "4 MPa", "5 MPa")
+
+# fmt: off
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimulateArguments:
+    """Arguments of `simulate`."""
+
+    output: Annotated[AnyPath | None, Option(
+        "Folder to write, with the recordings.", "DIR", command_default="ramps", short="-o")] = None
+    plant: Annotated[AnyPath | None, Option(
+        "File with the plant (default: that of the paper's valve).", "PLANT.toml")] = None
+    firmware: Annotated[AnyPath | None, Option(
+        "Folder made by `dzdesign codegen`, whose compensator then drives the valve.", "DIR")] = None
+    dp: Annotated[Texts, Option(
+        "Pressure drop of a ramp test; repeatable (default: 0.5, 1, 2, 3, 4 and 5 MPa).", "P", example="1 MPa")] = ()
+    ramp_time: Annotated[str, Option(
+        "Time from zero to full command.", "T", example="100 s", read=quantity("time"))] = "100 s"
+    seed: Annotated[int | str, Option(
+        "Random seed of the measurement noise.", "N",
+        read=whole_number("a whole number of zero or more, such as 1", digits=18))] = "1"
+# fmt: on
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SimulatedRamps:
+    """Ramp tests of a simulated valve: name of each file to its bytes, and the manifest of their folder."""
+
+    files: Mapping[str, bytes]
+    manifest: Mapping[str, Any]
+
+
+def simulate(arguments: SimulateArguments) -> SimulatedRamps:
+    """Simulate ramp tests of a valve, marked as simulated.
+
+    Parameters
+    ----------
+    arguments : SimulateArguments
+        Of the stage.
+
+    Raises
+    ------
+    InputError
+        If a file or an option can't be read.
+    """
+    from dzdesign.verify.closed_loop.plant import Plant, read_plant
+    from dzdesign.verify.closed_loop.simulation import Bench, simulated_files
+
+    if arguments.output is not None:
+        check_folder_may_be_written(Path(arguments.output))
+    plant = read_plant(Path(arguments.plant), say) if arguments.plant is not None else Plant()
+    texts = texts_of(arguments.dp) or list(PRESSURE_DROPS)
+    pressures = [parse_quantity(text, "pressure", "--dp") / 1e6 for text in texts]
+    if len({f"{dp_MPa:g}" for dp_MPa in pressures}) < len(pressures):  # one file each, named by it
+        raise InputError(f"--dp repeats a pressure drop ({', '.join(texts)}); give each of them once")
+    read = read_options(arguments, ["ramp_time", "seed"])
+    firmware = Path(arguments.firmware) if arguments.firmware is not None else None
+    with stage_progress() as stage:
+        files, manifest = simulated_files(
+            plant, pressures, read["ramp_time"], Bench(seed=read["seed"]), say=stage, firmware=firmware
+        )
+    if arguments.output is not None:
+        write_folder(Path(arguments.output), files, manifest)
+    return SimulatedRamps(files=files, manifest=manifest)

@@ -1,0 +1,145 @@
+"""`verify`: firmware -> evidence."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import KW_ONLY, dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Annotated
+
+from dzdesign.core.artefact_files import check_folder_may_be_written, read_bytes, sha256_of, write_folder
+from dzdesign.core.options import CHECKS, AnyPath, Option, Paths, paths_of
+from dzdesign.regeneration import with_regenerated
+from dzdesign.terminal.progress import say, stage_progress, with_bar
+
+if TYPE_CHECKING:
+    from dzdesign.codegen.project import Firmware
+    from dzdesign.verify.evidence import Check, MutationScore
+    from dzdesign.verify.verification import Verification
+
+# fmt: off
+
+
+@dataclass(frozen=True)
+class VerifyArguments:
+    """Arguments of `verify`."""
+
+    firmware: Annotated["Firmware | AnyPath", Option("Folder made by `dzdesign codegen`.", "DIR")]
+    _: KW_ONLY
+    output: Annotated[AnyPath | None, Option(
+        "Folder to write, with the evidence.", "DIR", command_default="evidence", short="-o")] = None
+    plant: Annotated[AnyPath | None, Option(
+        "File with the plant of the closed loop, like examples/paper_valve/plant.toml (default: made of the identified "
+        "thresholds).", "PLANT.toml")] = None
+    tolerances: Annotated[AnyPath | None, Option(
+        "File with a series of plants to run too, like examples/paper_valve/tolerances.toml; needs a plant.",
+        "TOL.toml", CHECKS)] = None
+    include: Annotated[Paths, Option(
+        "Folder of headers that your board files include, such as your chip's. Repeatable.", "DIR", CHECKS)] = ()
+    c2000ware: Annotated[AnyPath | None, Option(
+        "Folder of your C2000Ware: also compile f28335 firmware against its headers.", "DIR", CHECKS)] = None
+    mutate: Annotated[bool, Option(
+        "Also make the C wrong in every place, and count what is caught.", group=CHECKS)] = False
+    machine_code: Annotated[bool, Option(
+        "Also check machine code: every input on a Cortex-M4 in QEMU, a sample on an AVR in simavr.",
+        group=CHECKS)] = False
+    proof: Annotated[bool, Option(
+        "Also prove by Frama-C that nothing overflows a 16-bit int.", group=CHECKS)] = False
+# fmt: on
+
+
+def verify(arguments: VerifyArguments, plant_source: str = "") -> "Verification":
+    """Verify a firmware: every input against the exact law, then the closed loop; needs a C compiler.
+
+    Parameters
+    ----------
+    arguments : VerifyArguments
+        Of the stage.
+    plant_source : str
+        How the evidence calls the plant; by default the name of its file.
+
+    Raises
+    ------
+    InputError
+        If a file can't be read, or there is no C compiler. A requirement that does not hold is no error: see ``holds``.
+    """
+    from dzdesign.report.valve_report import with_report
+    from dzdesign.verify.closed_loop.plant import read_plant
+    from dzdesign.verify.closed_loop.tolerances import read_tolerances
+    from dzdesign.verify.firmware.c2000ware import check_against_c2000ware
+    from dzdesign.verify.verification import SCHEMA, evidence_files, evidence_manifest
+    from dzdesign.verify.verification import verify as verify_folder
+
+    if arguments.output is not None:
+        check_folder_may_be_written(Path(arguments.output), SCHEMA)
+    plant_path = None if arguments.plant is None else Path(arguments.plant)
+    plant = read_plant(plant_path, say) if plant_path else None
+    digest = sha256_of(read_bytes(plant_path, "plant file")) if plant_path else None
+    tolerances = read_tolerances(Path(arguments.tolerances)) if arguments.tolerances is not None else None
+    with _firmware_folder(arguments.firmware) as folder:
+        ware = arguments.c2000ware
+        added = [check_against_c2000ware(folder, Path(ware), say)] if ware is not None else []
+        with stage_progress() as stage:
+            verification = verify_folder(
+                folder, plant, plant_source or (plant_path.name if plant_path else ""), digest, tolerances=tolerances,
+                include=[Path(place) for place in paths_of(arguments.include)], say=stage, watch=stage.each,
+            )  # fmt: skip
+        verification = with_regenerated(verification, folder)
+        more, mutants = _further_checks(arguments, folder, verification)
+        verification = verification.with_checks(*added, *more)
+        if mutants:
+            verification = replace(verification, evidence=replace(verification.evidence, mutants=mutants))
+        if arguments.output is not None:
+            output = Path(arguments.output)
+            files = with_report(evidence_files(verification), folder, output)
+            write_folder(output, files, evidence_manifest(verification.evidence))
+    return verification
+
+
+@contextmanager
+def _firmware_folder(firmware: "Firmware | AnyPath") -> Iterator[Path]:
+    """Give the folder of a firmware; of one that was only generated a temporary one."""
+    from dzdesign.codegen.project import Firmware
+
+    if not isinstance(firmware, Firmware):
+        yield Path(firmware)
+        return
+    with TemporaryDirectory() as temporary:
+        folder = Path(temporary) / "firmware"
+        write_folder(folder, firmware.files, firmware.manifest)
+        yield folder
+
+
+def _further_checks(
+    arguments: VerifyArguments, folder: Path, verification: "Verification"
+) -> tuple[list["Check"], "MutationScore | None"]:
+    """Return the checks that were asked for beside those of every verification, and what came of the mutants."""
+    checks: list[Check] = []
+    if arguments.machine_code:
+        from dzdesign.verify.analysis.machine_code import machine_code_checks
+
+        with stage_progress() as stage:
+            stage("comparing the machine code of other processors with the exact law, in simulators")
+            checks += machine_code_checks(folder, verification.evidence.inputs)
+    if arguments.proof:
+        from dzdesign.verify.analysis.frama_c import proof_check
+
+        with stage_progress() as stage:
+            stage("reading the core's C for all inputs, with Frama-C: some minutes")
+            checks.append(proof_check(folder))
+    if not arguments.mutate:
+        return checks, None
+    from dzdesign.verify.analysis.mutation import (
+        MutationBench,
+        all_mutants,
+        judge_all,
+        mutation_check,
+        mutation_score,
+    )
+
+    bench = MutationBench(folder)
+    mutants = all_mutants(bench)
+    say(f"checking the core with {len(mutants)} faults, one at a time")
+    bench.check_original()
+    found = mutation_score(judge_all(bench, mutants, lambda work: with_bar(work, "mutants")))
+    return [*checks, mutation_check(found)], found
