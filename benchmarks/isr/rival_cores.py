@@ -35,7 +35,7 @@ def _line_terms(compensator: Compensator) -> tuple[Fraction, Fraction, Fraction]
     """Return p, q, r of ``counts = beta (p u + r) + q u``: Eq. (18) in counts, exactly."""
     lines = [
         evaluate_line(
-            law(compensator.law_name),
+            law(compensator.law),
             beta=beta,
             kappa=compensator.positive.k_x_max_over_u_max,
             u_min0_over_u_max=compensator.positive.u_min0_over_u_max,
@@ -48,7 +48,7 @@ def _line_terms(compensator: Compensator) -> tuple[Fraction, Fraction, Fraction]
 
 
 def _betas(compensator: Compensator) -> list[Fraction]:
-    return [Fraction(value, compensator.beta_denominator) for value in compensator.positive.beta_numerators]
+    return [Fraction(value, compensator.beta_denominator) for value in compensator.positive.beta]
 
 
 def _double(value: Fraction) -> str:
@@ -126,7 +126,7 @@ def _naive_law(c: Compensator) -> str:
     return {
         "paper": f"(beta * ({kappa} - 1.0) + 1.0) * u_i + beta * {u_min0}",
         "target": f"{kappa} * u_i + beta * {u_min0}",
-    }[c.law_name]
+    }[c.law]
 
 
 def _slope_table(c: Compensator, *, checked: bool) -> Contender:

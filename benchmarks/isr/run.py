@@ -51,9 +51,9 @@ def main(arguments: list[str] | None = None) -> int:
         for index, contender in enumerate(contenders):
             say(f"{contender.name} ...")
             results.append(measure(contender, compensator, inputs, expected, Path(folder) / str(index)))
-    nodes, compare_max = len(compensator.positive.beta_numerators), compensator.signals.compare_max
+    nodes, compare_max = len(compensator.positive.beta), compensator.signals.compare_max
     print(
-        f"\nLaw `{compensator.law_name}`, {nodes} nodes of beta, compare 0..{compare_max}. Counts from its first "
+        f"\nLaw `{compensator.law}`, {nodes} nodes of beta, compare 0..{compare_max}. Counts from its first "
         f"instruction to its return, least-most over {len(inputs)} inputs: corners, edges of nodes, impossible codes, "
         f"{RANDOM_INPUTS} random (seed {SEED}). All compiled with -std=c99 -O2.\n"
     )

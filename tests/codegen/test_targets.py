@@ -90,7 +90,7 @@ def test_the_wheel_generates_for_every_target(tmp_path):
         "from dataclasses import replace;"
         "c = read(open(sys.argv[1], 'rb').read(), 'c');"
         "fit = lambda m: replace(c, signals=replace(c.signals, compare_max=m),"
-        " amplifier=replace(c.amplifier, compare_limit=m));"
+        " drive_functions=replace(c.drive_functions, compare_limit=m));"
         "print(json.dumps([dzdesign.__path__[0]] + [sorted(generate(fit(t.compare_max), t.name).files)"
         " for t in targets()]))"
     )

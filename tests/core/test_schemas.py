@@ -135,7 +135,7 @@ def test_other_valves_fit(case):
 
 def test_a_compensator_with_every_option_fits():
     document = json.loads((GOLDENS / "compensator.json").read_text())
-    assert document["sides"]["negative"] and document["edge_codes"]
+    assert document["sides"]["negative"] and document["transition_codes"]
     assert problems("compensator", document) == [] and problems("valve", document["valve"]) == []
 
 

@@ -64,7 +64,7 @@ def test_the_drives_end_is_said_in_commands(valve_file, run):
 def test_the_peak_of_the_dither_is_said_to_be_in_the_tables_loss(valve_file, run):
     status, said, document = run(valve_file, "--dither", "300 Hz 1%")
     assert status == 0 and "of which 100.00 mV are the dither's peak" in said
-    assert 100 <= 2500 / 2 / document["amplifier"]["dither_ticks"] <= 300
+    assert 100 <= 2500 / 2 / document["drive_functions"]["dither_ticks"] <= 300
 
 
 @pytest.mark.parametrize(
@@ -152,7 +152,7 @@ class TestEditedCompensators:
 
     def test_a_dither_that_the_certificate_did_not_count(self, refused):
         def edit(document):
-            document["amplifier"]["dither_counts"] = 600
+            document["drive_functions"]["dither_counts"] = 600
 
         assert "certificate does not hold" in refused(edit)
 

@@ -12,7 +12,7 @@ from dzdesign.core.artefact_files import MANIFEST_NAME, to_json, write_folder
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator_file import LATER, compensator_document, compensator_from_document
 from dzdesign.design.designing import design
-from dzdesign.design.lot_setting import Designed, common_setting
+from dzdesign.design.lot_setting import Designed, lot_setting
 from dzdesign.design.option_texts import options_of
 from dzdesign.design.redesign_check import prove_derived
 from dzdesign.identify.identification import identify
@@ -76,7 +76,7 @@ def test_what_design_wrote_follows(document):
         (("signals", "command", "full_code"), 3000, "'signals.command.full_code' is 3000, but 4095 follows"),
         (("signals", "pressure_a", "span_MPa"), [25, 1], "certificate"),
         (("valve", "meter", "floor_L_min"), 0.1, "'valve' was changed since the compensator was designed from it"),
-        (("options", "output_max"), "90 %", "'amplifier.compare_limit' is 60000, but 54000 follows"),
+        (("options", "output_max"), "90 %", "'drive_functions.compare_limit' is 60000, but 54000 follows"),
         (("options", "polarity"), "upside down", "--polarity is 'upside down'"),
         (("options", "colour"), "red", "'options.colour' is 'red', but nothing follows"),
         (("target", "converter_V"), [33, 10], "follows from its valve and its options"),
@@ -221,7 +221,7 @@ def common():
         ramps = [synthetic_ramp(dp, Truth(knee_rising=knee - 0.05 * dp), rate_Hz=10.0) for dp in (1.0, 3.0, 5.0)]
         return designed_for(identify(ramps), "f28335")
 
-    return common_setting({"low": Designed.of(valve(5.2)), "high": Designed.of(valve(5.4))}).compensator
+    return lot_setting({"low": Designed.of(valve(5.2)), "high": Designed.of(valve(5.4))}).compensator
 
 
 def test_a_common_setting_is_bounded_by_its_valve(common):

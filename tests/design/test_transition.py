@@ -27,7 +27,7 @@ def edged(example_valve):
 
 def test_the_edge_runs_from_the_certified_offset_to_the_opening_law_without_a_step(edged, example_valve):
     plain = design(example_valve)
-    codes = edged.edge_codes
+    codes = edged.transition_codes
     u_max = float(edged.u_max_V)
     for dp_code in range(0, 1100, 50):
         drives = [edged.drive(command, dp_code) for command in range(codes + 3)]
@@ -46,7 +46,7 @@ def test_the_edge_ends_at_or_above_the_opening_threshold_at_every_test(edged, ex
     signals = edged.signals
     for test in example_valve.positive.tests:
         code = round(signals.dp_code(Fraction(repr(test.dp_MPa))))
-        assert float(edged.drive(edged.edge_codes, code)) * 10 > test.u_knee_rising_V
+        assert float(edged.drive(edged.transition_codes, code)) * 10 > test.u_knee_rising_V
 
 
 @needs_compiler
@@ -88,7 +88,7 @@ def test_an_edge_needs_the_opening_branch(example_valve):
 
 
 def test_below_the_reference_beta_is_held_or_extended(example_valve):
-    held, extended = design(example_valve), design(example_valve, DesignOptions(below_reference="extend"))
+    held, extended = design(example_valve), design(example_valve, DesignOptions(below_dp0="extend"))
     below, above = (round(held.signals.dp_code(Fraction(dp))) for dp in (Fraction(6, 10), Fraction(3)))
     assert held.beta(below) <= 1 < extended.beta(below)
     assert held.compare(0, above) == pytest.approx(extended.compare(0, above), abs=2)
@@ -97,7 +97,7 @@ def test_below_the_reference_beta_is_held_or_extended(example_valve):
 def test_a_dither_stands_under_the_certified_bound_at_its_top(example_valve):
     plain = design(example_valve)
     dithered = design(example_valve, DesignOptions(dither_Hz=150.0, dither_peak=Fraction(1, 100)))
-    peak = dithered.amplifier.dither_counts
+    peak = dithered.drive_functions.dither_counts
     assert peak == 600
     for dp_code in range(150, 1000, 10):
         assert dithered.compare(0, dp_code) + peak <= plain.compare(0, dp_code) + 2

@@ -46,9 +46,9 @@ AMPLIFIER = {
 #: Name to the options of `design`; "signals" are those that differ from the target's own.
 VARIANTS = {
     "plain": {},
-    "target law": {"law_name": "target"},
+    "target law": {"law": "target"},
     "edge": {"edge": Fraction(1, 100)},
-    "target law, edge": {"law_name": "target", "edge": Fraction(1, 100)},
+    "target law, edge": {"law": "target", "edge": Fraction(1, 100)},
     "live zero": {"signals": UNLIKE | {"command": _command("4..20 mA on 149 ohm")}},
     "inverted": {"signals": {"command": _command("0..10 V x 0.3", inverted=True)}, **AMPLIFIER},
     "bipolar": {"signals": {"command": BOTH}},

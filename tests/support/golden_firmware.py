@@ -67,7 +67,7 @@ def golden_compensator(target_name: str, root: Path = GOLDENS) -> Compensator:
     return replace(
         compensator,
         signals=replace(compensator.signals, compare_max=target.compare_max),
-        amplifier=replace(compensator.amplifier, compare_limit=target.compare_max),
+        drive_functions=replace(compensator.drive_functions, compare_limit=target.compare_max),
     )
 
 

@@ -97,8 +97,8 @@ def test_an_offset_above_the_bound_is_over_compensation(example_compensator, tmp
     """A wrong design, rightly coded: the C equals its law, and the law is refused."""
     from dzdesign.codegen.project import generate
 
-    raised = tuple(min(numerator + 60, 32768) for numerator in example_compensator.positive.beta_numerators)
-    greedy = with_side(example_compensator, beta_numerators=raised)
+    raised = tuple(min(numerator + 60, 32768) for numerator in example_compensator.positive.beta)
+    greedy = with_side(example_compensator, beta=raised)
     firmware = generate(greedy, "f28335")
     write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
     result = check_all_inputs(tmp_path / "fw")

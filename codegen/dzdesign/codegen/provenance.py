@@ -56,11 +56,11 @@ def _valve_keys(compensator: Compensator, valve: Mapping[str, Any]) -> dict[str,
         offset = f"{curve}.u_min0_V" if curve else f"{side}.reference.u_min_V"
         bounds = (f"{curve}.beta", f"{curve}.certified_steps_V") if curve else (f"{side}.beta", f"{side}.certificate")
         # With an edge the law's offset is that of the opening threshold.
-        opening = (f"{side}.opening_curve",) if compensator.edge_codes else ()
+        opening = (f"{side}.opening_curve",) if compensator.transition_codes else ()
         found |= {
             f"{side}.u_min0_over_u_max": opening or (offset,),
             f"{side}.k_x_max_over_u_max": (f"{side}.k_x_max_over_u_max", f"{side}.tests", *(opening or (offset,))),
             f"{side}.beta": (offset, *bounds, f"{side}.trend"),
-            f"{side}.edge_beta": (*opening, f"{side}.trend"),
+            f"{side}.transition_beta": (*opening, f"{side}.trend"),
         }
     return found

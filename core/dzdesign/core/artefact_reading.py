@@ -57,7 +57,7 @@ def read_artefact(
     document = parse_document(content, source, tuple(kinds))
     found = kinds[document["schema"]]
     command = written_by(document["schema"])
-    remedy = remedy or (f"make it again with `{command}`" if command else "make it again")
+    remedy = remedy or found.REMEDY or (f"make it again with `{command}`" if command else "make it again")
     try:
         artefact = convert(document, found, dec_hook=_decoded)
     except ValidationError as error:

@@ -62,6 +62,8 @@ class Artefact:
     """Header of every artefact; a subclass gives `FILE_NAME`, and `schema` as a ``Literal`` with its default."""
 
     FILE_NAME: ClassVar[str]
+    #: What to do about a bad file; by default to run the command again that writes it.
+    REMEDY: ClassVar[str] = ""
     schema: Annotated[str, Meta(description="Name and version of this schema.")]
     tool: Annotated[Tool, Meta(description="The program that wrote the file.")]
     made_from: Annotated[tuple[SourceFile, ...], Meta(description="The files that it was made from.")]

@@ -4,7 +4,7 @@ from fractions import Fraction
 
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.drive import RAMP_UNIT
+from dzdesign.design.drive_functions import RAMP_UNIT
 from dzdesign.design.signal_descriptions import unseen_failures
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.ramp_result import TestResult
@@ -71,7 +71,7 @@ def _cost_of_test(compensator: Compensator, test: TestResult, sign: int) -> str:
     if edge and test.u_knee_falling_V is not None:
         flow = test.slope_L_min_V * max(at_edge * u_max - test.u_knee_falling_V, 0.0)
         parts.append(f"flow on closing at the edge's end {flow:.2f} L/min")
-    limit = compensator.amplifier.compare_limit / signals.compare_max
+    limit = compensator.drive_functions.compare_limit / signals.compare_max
     if limit <= offset or limit <= (test.u_knee_rising_V or 0.0) / u_max:
         raise InputError(
             f"the largest output is {limit:.1%} of full drive, but the valve opens at "
@@ -113,7 +113,7 @@ def remaining_dead_zone(compensator: Compensator, test: TestResult, sign: int = 
 def _corners(compensator: Compensator, dp_code: int, sign: int) -> tuple[float, float, float, float]:
     """Return the drive at zero command, at the edge's end and at full command, over full, and the edge's share."""
     command = compensator.signals.command
-    span, edge = command.span(sign), compensator.edge_codes
+    span, edge = command.span(sign), compensator.transition_codes
     at = (command.zero_code + command.direction(sign) * from_zero for from_zero in (0, edge, span))
     offset, at_edge, full = (float(compensator.drive(code, dp_code, sign)) for code in at)
     return offset, at_edge, full, edge / span
@@ -149,24 +149,24 @@ def _cost_of_side(compensator: Compensator, side: SideModel, sign: int) -> list[
 
 
 def _cost_of_options(compensator: Compensator) -> list[str]:
-    signals, amplifier = compensator.signals, compensator.amplifier
+    signals, functions = compensator.signals, compensator.drive_functions
     lines = []
-    if amplifier.dither_counts:
-        peak = amplifier.dither_counts / signals.compare_max
-        frequency = signals.tick_Hz / (2 * amplifier.dither_ticks)
+    if functions.dither_counts:
+        peak = functions.dither_counts / signals.compare_max
+        frequency = signals.tick_Hz / (2 * functions.dither_ticks)
         lines.append(
             f"dither of {frequency:.4g} Hz (half a wave is a whole number of PWM periods) and ±{peak:.2%} of full "
             "drive: the offset stands lower by that much, so that zero command stays shut at the wave's top"
         )
-    if compensator.edge_codes:
-        lines.append(f"the edge is a power of two in codes of command: {compensator.edge_codes}")
-    if amplifier.has_ramp:
+    if compensator.transition_codes:
+        lines.append(f"the edge is a power of two in codes of command: {compensator.transition_codes}")
+    if functions.has_ramp:
         lines.append(
             f"ramps: {_ramp_text(compensator)}; they hold for zero command too: the valve closes no faster than they "
             "let it"
         )
-    if amplifier.window_codes:
-        share = amplifier.window_codes / signals.command.span(1)
+    if functions.window_codes:
+        share = functions.window_codes / signals.command.span(1)
         lines.append(
             f"coming from the other sign a command must pass zero by {share:.2%} before its solenoid is driven: that "
             "much dead zone remains then, if the lines above say less"
@@ -175,7 +175,7 @@ def _cost_of_options(compensator: Compensator) -> list[str]:
 
 
 def _of_which_dither(compensator: Compensator) -> str:
-    counts = compensator.amplifier.dither_counts
+    counts = compensator.drive_functions.dither_counts
     if not counts:
         return ""
     peak = counts / compensator.signals.compare_max * float(compensator.u_max_V)
@@ -184,10 +184,10 @@ def _of_which_dither(compensator: Compensator) -> str:
 
 def _ramp_text(compensator: Compensator) -> str:
     """Say how long a command takes from zero to full and back, of each sign."""
-    signals, amplifier = compensator.signals, compensator.amplifier
+    signals, functions = compensator.signals, compensator.drive_functions
     parts = []
     for place, sign in enumerate(signals.signs):
-        for way, steps in (("up", amplifier.ramp_up), ("down", amplifier.ramp_down)):
+        for way, steps in (("up", functions.ramp_up), ("down", functions.ramp_down)):
             name = f"{'positive ' if sign > 0 else 'negative '}{way}" if compensator.negative is not None else way
             seconds = signals.command.span(sign) * RAMP_UNIT / (steps[place] * signals.sample_Hz) if steps[place] else 0
             parts.append(f"{name} {seconds:.4g} s" if seconds else f"{name} at once")

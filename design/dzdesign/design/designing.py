@@ -35,7 +35,7 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
     options : DesignOptions, optional
         Choices of the engineer.
     valve_bytes : bytes, optional
-        The file the valve was read from, for its hash; without it the hash is of the document as it would be written.
+        The file that the valve was read from, for its hash; without it the hash is of what `identify` would write.
 
     Raises
     ------
@@ -45,14 +45,11 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
         If a proof fails.
     """
     options = options or DesignOptions()
-    document = valve_bytes.decode() if valve_bytes is not None else to_json_bytes(valve).decode()
-    # The file's rounded numbers, so that the same valve gives the same firmware by whichever way it comes here.
-    valve = read_artefact(document.encode(), ValveModel, "valve.json")
     signals = options.signals
-    law(options.law_name)
+    law(options.law)
     u_max = Fraction(repr(valve.u_max_V))
-    edge_codes = options.edge_codes()
-    units = finest_units(signals, edge_codes)
+    transition_codes = options.transition_codes()
+    units = finest_units(signals, transition_codes)
     if len(signals.signs) == 2:
         _refuse_two_signs(valve, options.guard)
     laws = {}
@@ -60,26 +57,29 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
         name = "positive" if sign > 0 else "negative"
         side = valve.positive if sign > 0 else valve.sides[name]
         laws[name] = _side_law(side, options, u_max, sign, units)
+    digest = sha256_of(to_json_bytes(valve) if valve_bytes is None else valve_bytes)
+    request = options.request
     compensator = Compensator(
-        law_name=options.law_name,
-        below_reference=options.below_reference,
+        tool=THIS_TOOL,
+        made_from=(SourceFile(source=ValveModel.FILE_NAME, sha256=digest),),
+        target=request.target if request else None,
+        options=request.options if request else None,
+        law=options.law,
+        below_dp0=options.below_dp0,
         signals=signals,
         u_max_V=u_max,
-        positive=laws["positive"],
-        negative=laws.get("negative"),
+        sides=Sides(positive=laws["positive"], negative=laws.get("negative")),
         beta_denominator=units.beta,
         beta_step_codes=STEP_CODES,
         reverse_codes=int(REVERSE_SHARE * (signals.pressure_a.full_code - signals.pressure_a.zero_code)),
-        edge_codes=edge_codes,
-        amplifier=options.amplifier(),
+        transition_codes=transition_codes,
+        drive_functions=options.drive_functions(),
         costs=(),
-        valve_document=document,
-        valve_sha256=sha256_of(document.encode()),
-        request=options.request,
+        valve=valve,
     )
     for sign in signals.signs:
         prove_monotone(compensator, sign)
-    return replace(compensator, costs=costs_of(compensator, valve))
+    return replace(compensator, costs=costs_of(compensator))
 
 
 def _side_law(side: SideModel, options: DesignOptions, u_max: Fraction, sign: int, units: Units) -> SideLaw:
@@ -87,7 +87,7 @@ def _side_law(side: SideModel, options: DesignOptions, u_max: Fraction, sign: in
     signals = options.signals
     if "branch-order" not in options.accept:
         _refuse_crossed_branches(side)
-    certified = guarded_curve(side, options.guard, options.below_reference)
+    certified = guarded_curve(side, options.guard, options.below_dp0)
     opening = _opening_curve(side, options) if options.edge else None
     reference = Fraction(repr(side.reference.dp_MPa))
     top = (opening or certified).at(reference)
@@ -95,8 +95,8 @@ def _side_law(side: SideModel, options: DesignOptions, u_max: Fraction, sign: in
     u_min0 = over(top / u_max - Fraction(1, 2 * signals.compare_max), "down", units.coefficient)
     if u_min0 <= 0:
         raise InputError(f"u_min0 is {float(top):.4f} V, less than one count of the PWM: no dead zone")
-    above_one = side.trend == "increasing" or options.below_reference == "extend"
-    dither = Fraction(options.amplifier().dither_counts, signals.compare_max)
+    above_one = side.trend == "increasing" or options.below_dp0 == "extend"
+    dither = Fraction(options.drive_functions().dither_counts, signals.compare_max)
     ceiling = offset_ceiling(certified, signals, u_max, sign=sign, reserve=dither)
     if min(ceiling.limit) <= 0:
         raise InputError("the dither's peak leaves no offset under the certified one; make it smaller")
@@ -105,15 +105,15 @@ def _side_law(side: SideModel, options: DesignOptions, u_max: Fraction, sign: in
         return choose_beta_table(under, u_min0, side.trend, denominator=units.beta, above_one=above_one)
 
     beta = table(ceiling)
-    edge_beta = None
+    transition_beta = None
     if opening is not None:
         upper = table(_opening_ceiling(opening, signals, u_max, sign))
-        edge_beta = tuple(map(max, upper, beta))
+        transition_beta = tuple(map(max, upper, beta))
     return SideLaw(
-        k_x_max_over_u_max=over(travel(side, u_max, top), "nearest", units.coefficient),
+        drive_range_over_u_max=over(travel(side, u_max, top), "nearest", units.coefficient),
         u_min0_over_u_max=u_min0,
-        beta_numerators=beta,
-        edge_numerators=edge_beta,
+        beta=beta,
+        transition_beta=transition_beta,
         certificate=certify(
             side,
             certified,
@@ -178,7 +178,7 @@ def _opening_curve(side: SideModel, options: DesignOptions) -> OffsetCurve:
         offset_V=tuple(offset),
         steps_V=(),
         lowest_V=min(offset),
-        hold_below_MPa=hold_below(side, options.below_reference),
+        hold_below_MPa=hold_below(side, options.below_dp0),
     )
 
 
@@ -213,11 +213,11 @@ def prove_monotone(compensator: Compensator, sign: int) -> None:
 
     Inside the edge the drive rises faster still: what the edge takes away falls with the command.
     """
-    chosen, side = law(compensator.law_name), compensator.side(sign)
-    numerators = side.law_numerators
+    chosen, side = law(compensator.law), compensator.side(sign)
+    numerators = side.law_beta
     betas = [Fraction(end, compensator.beta_denominator) for end in (min(numerators), max(numerators))]
-    if min(chosen.evaluate_gain(beta, side.k_x_max_over_u_max) for beta in betas) <= 0:
+    if min(chosen.evaluate_gain(beta, side.drive_range_over_u_max) for beta in betas) <= 0:
         raise InputError(
             f"law '{chosen.name}' would fall with rising command: beta (1 - k x_max/u_max) must stay below 1, but "
-            f"k x_max/u_max = {float(side.k_x_max_over_u_max):.3f}; use --law target"
+            f"k x_max/u_max = {float(side.drive_range_over_u_max):.3f}; use --law target"
         )

@@ -34,7 +34,7 @@ CLEAR = 1e-6
 #: Pressure drops closer than this are one, MPa: where a double may fall on either side of a tested pressure drop.
 NEAR_MPa = 1e-9
 #: What all compensators of a batch must have in common.
-SHARED = ("law_name", "below_reference", "signals", "u_max_V", "beta_denominator", "edge_codes", "amplifier")
+SHARED = ("law", "below_dp0", "signals", "u_max_V", "beta_denominator", "transition_codes", "drive_functions")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,7 +51,7 @@ class Designed:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CommonSetting:
+class LotSetting:
     """One compensator for all valves.
 
     Attributes
@@ -95,7 +95,7 @@ class _Side:
     nearness: Mapping[str, float]
 
 
-def common_setting(batch: Mapping[str, Designed]) -> CommonSetting:
+def lot_setting(batch: Mapping[str, Designed]) -> LotSetting:
     """Return the largest setting, under one direction of the threshold, that is certified for every valve.
 
     Parameters
@@ -119,7 +119,7 @@ def common_setting(batch: Mapping[str, Designed]) -> CommonSetting:
             laws = {side.sign: _law(side, carrier, first) for side in sides}
         except RequirementError:  # no table of that carrier's direction lies under the least ceiling
             continue
-        gain = sum(float(law.u_min0_over_u_max * sum(law.beta_numerators)) for law in laws.values())
+        gain = sum(float(law.u_min0_over_u_max * sum(law.beta)) for law in laws.values())
         if best is None or gain > best[0]:
             best = gain, carrier, laws
     if best is None:
@@ -147,7 +147,7 @@ def common_setting(batch: Mapping[str, Designed]) -> CommonSetting:
         f"holds the valve {carrier}, for which the lines above are"
     )
     compensator = replace(compensator, costs=(*costs_of(compensator, batch[carrier].valve), line))
-    return CommonSetting(
+    return LotSetting(
         compensator=compensator,
         carrier=carrier,
         dp_MPa=_common_interval(side.curves for side in sides),
@@ -177,7 +177,7 @@ def _shared_design(batch: Mapping[str, Designed]) -> Compensator:
             unlike.append("guard")
         if unlike:
             raise InputError(f"{other} and {name} are designed with another {unlike[0]}, so no setting serves both")
-    if first.edge_codes:
+    if first.transition_codes:
         raise InputError("with --edge the law follows each valve's opening threshold, so no setting serves all")
     return first
 
@@ -199,10 +199,10 @@ def _side(batch: Mapping[str, Designed], first: Compensator, sign: int) -> _Side
     """Find the least ceiling of one sign of command: in doubles over all valves, exactly over those near it."""
     label = "positive" if sign > 0 else "negative"
     signals, u_max = first.signals, first.u_max_V
-    reserve = Fraction(first.amplifier.dither_counts, signals.compare_max)
+    reserve = Fraction(first.drive_functions.dither_counts, signals.compare_max)
     models = {name: each.valve.sides[label] for name, each in batch.items()}
     guard = first.side(sign).certificate.guard
-    curves = {name: guarded_curve(model, guard, first.below_reference) for name, model in models.items()}
+    curves = {name: guarded_curve(model, guard, first.below_dp0) for name, model in models.items()}
     low, high = _common_interval([curves])
     least, near = _near_the_least(curves, signals, float(u_max), sign)
     exact = {
@@ -263,7 +263,7 @@ def _law(side: _Side, carrier: str, first: Compensator) -> SideLaw:
     model, u_max = side.models[carrier], first.u_max_V
     reference = Fraction(repr(model.reference.dp_MPa))
     top = min(curve.at(reference) for curve in side.curves.values())
-    scale = finest_units(first.signals, edge_codes=0).coefficient
+    scale = finest_units(first.signals, transition_codes=0).coefficient
     u_min0 = over(top / u_max - Fraction(1, 2 * first.signals.compare_max), "down", scale)
     if u_min0 <= 0:
         raise InputError("the least offset of all valves is less than one count of the PWM")
@@ -272,14 +272,14 @@ def _law(side: _Side, carrier: str, first: Compensator) -> SideLaw:
         u_min0,
         model.trend,
         denominator=first.beta_denominator,
-        above_one=model.trend == "increasing" or first.below_reference == "extend",
+        above_one=model.trend == "increasing" or first.below_dp0 == "extend",
     )
     # The longest travel: full command fully opens every valve.
     longest = max(travel(each, u_max, top) for each in side.models.values())
     law = SideLaw(
         k_x_max_over_u_max=over(longest, "nearest", scale),
         u_min0_over_u_max=u_min0,
-        beta_numerators=table,
+        beta=table,
         certificate=first.side(side.sign).certificate,
     )
     return replace(law, certificate=_certified(side, carrier, law, first))
@@ -287,7 +287,7 @@ def _law(side: _Side, carrier: str, first: Compensator) -> SideLaw:
 
 def _certified(side: _Side, name: str, law: SideLaw, first: Compensator) -> Certificate:
     """Prove the common law for one valve, on the whole interval that it was tested over."""
-    reserve = Fraction(first.amplifier.dither_counts, first.signals.compare_max)
+    reserve = Fraction(first.drive_functions.dither_counts, first.signals.compare_max)
     curve = side.curves[name]
     own = side.exact.get(name) or offset_ceiling(curve, first.signals, first.u_max_V, sign=side.sign, reserve=reserve)
     return certify(
@@ -298,6 +298,6 @@ def _certified(side: _Side, name: str, law: SideLaw, first: Compensator) -> Cert
         signals=first.signals,
         u_max_V=first.u_max_V,
         u_min0=law.u_min0_over_u_max,
-        table=law.beta_numerators,
+        table=law.beta,
         denominator=first.beta_denominator,
     )

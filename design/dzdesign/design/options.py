@@ -6,7 +6,7 @@ from math import ceil, floor
 
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.design.compensator import BELOW_REFERENCE
-from dzdesign.design.drive import RAMP_UNIT, Amplifier
+from dzdesign.design.drive_functions import RAMP_UNIT, DriveFunctions
 from dzdesign.design.request import DesignRequest
 from dzdesign.design.signals import Signals
 from dzdesign.identify.fitting.guard_curve import GUARDS
@@ -28,14 +28,14 @@ class DesignOptions:
 
     Attributes
     ----------
-    law_name : str
+    law : str
         ``paper`` (Eq. 18) or ``target`` (meets Eq. 16).
     signals : Signals
         Scalings of the converter and the PWM.
     guard : {"closing", "mean", "opening"}
         The threshold that the certificate must protect. Zero command comes after closing, so a valve of which no
         falling branch was recorded is refused unless "opening" is asked for.
-    below_reference : {"hold", "extend"}
+    below_dp0 : {"hold", "extend"}
         For dP <= dP0 hold beta = 1 (the paper, Eq. 7), or follow the tests there, beta above 1.
     edge : Fraction
         Share of full command over which the drive runs from the closing to the opening threshold; 0: none.
@@ -53,10 +53,10 @@ class DesignOptions:
         The target and the texts that these were read from, to be kept in compensator.json.
     """
 
-    law_name: str = "paper"
+    law: str = "paper"
     signals: Signals = field(default_factory=Signals)
     guard: str = "closing"
-    below_reference: str = "hold"
+    below_dp0: str = "hold"
     edge: Fraction = Fraction(0)
     window: Fraction = Fraction(1, 100)
     ramp_up_s: tuple[float, float] = (0.0, 0.0)
@@ -70,7 +70,7 @@ class DesignOptions:
     def __post_init__(self) -> None:
         for what, given, known in (
             ("guard", self.guard, GUARDS),
-            ("choice below dP0", self.below_reference, BELOW_REFERENCE),
+            ("choice below dP0", self.below_dp0, BELOW_REFERENCE),
         ):
             if given not in known:
                 raise InputError(
@@ -104,7 +104,7 @@ class DesignOptions:
                     f"{1 / self.signals.sample_Hz:g} s, to {LONGEST_RAMP_S:g} s"
                 )
 
-    def edge_codes(self) -> int:
+    def transition_codes(self) -> int:
         """Return the codes of the edge: the largest power of two within its share of the shorter command."""
         if not self.edge:
             return 0
@@ -116,12 +116,12 @@ class DesignOptions:
             )
         return 1 << (codes.bit_length() - 1)
 
-    def amplifier(self) -> Amplifier:
+    def amplifier(self) -> DriveFunctions:
         """Return the amplifier's options in the firmware's integers."""
         signals, command = self.signals, self.signals.command
         spans = tuple(command.span(sign) if sign in signals.signs else 0 for sign in (1, -1))
         both = len(signals.signs) == 2
-        return Amplifier(
+        return DriveFunctions(
             window_codes=round(self.window * min(spans)) if both else 0,
             ramp_up=self._ramp(self.ramp_up_s, spans),
             ramp_down=self._ramp(self.ramp_down_s, spans),

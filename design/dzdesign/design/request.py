@@ -3,13 +3,14 @@
 Light on imports: the command line reads the options here.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.core.options import AMPLIFIER, CONNECTIONS, LAW, Option, Text, arguments_of
 
 if TYPE_CHECKING:
-    from dzdesign.design.signal_text import Converter
+    from dzdesign.design.target_inputs import TargetInputs
 
 POLARITIES, NEGATIVE_DP = ("normal", "inverted"), ("same", "swapped")
 
@@ -72,19 +73,8 @@ DEFAULTS = {argument.name: argument.option.default for argument in arguments_of(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TargetInputs:
-    """What `design` needs to know of a target: its converter, its timer's counts, samples and PWM periods a second."""
-
-    name: str
-    converter: "Converter"
-    compare_max: int
-    sample_Hz: int
-    tick_Hz: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class DesignRequest:
     """The target that was designed for, and name and text of every option, a default where none was given."""
 
-    target: TargetInputs
-    options: tuple[tuple[str, str], ...]
+    target: "TargetInputs"
+    options: Mapping[str, str]

@@ -20,17 +20,17 @@ from dzdesign.report.lot.table_rows import SIGNS, extra_dead_zone
 from dzdesign.report.lot.valve_folder import VALVES, ValveFolder
 
 if TYPE_CHECKING:
-    from dzdesign.design.lot_setting import CommonSetting, Designed
+    from dzdesign.design.lot_setting import LotSetting, Designed
 
 SETTING_NAME = "lot_compensator.json"
 
 
-def lot_setting_of(designed: "Mapping[str, Designed]") -> "tuple[CommonSetting | None, str | None]":
+def lot_setting_of(designed: "Mapping[str, Designed]") -> "tuple[LotSetting | None, str | None]":
     """Return the lot setting of the calibrated valves, by name; or why there is none."""
-    from dzdesign.design.lot_setting import common_setting
+    from dzdesign.design.lot_setting import lot_setting
 
     try:
-        return common_setting(designed), None
+        return lot_setting(designed), None
     except (InputError, RequirementError) as error:
         return None, str(error)
 
@@ -40,7 +40,7 @@ def designed_valves(valves: Sequence[ValveFolder]) -> "dict[str, Designed]":
     return {each.name: each.designed for each in valves if each.designed is not None}
 
 
-def setting_files(setting: "CommonSetting") -> dict[str, bytes]:
+def setting_files(setting: "LotSetting") -> dict[str, bytes]:
     """Return the file of the lot setting."""
     from dzdesign.design.compensator_file import compensator_document
 
@@ -99,12 +99,12 @@ def summary_of(
     )
 
 
-def setting_summary(setting: "CommonSetting", designed: "Mapping[str, Designed]") -> LotSettingSummary:
+def setting_summary(setting: "LotSetting", designed: "Mapping[str, Designed]") -> LotSettingSummary:
     """Return what batch.json says of the lot setting.
 
     Parameters
     ----------
-    setting : CommonSetting
+    setting : LotSetting
     designed : mapping of str to Designed
         The calibrated valves that it is of.
     """
@@ -149,7 +149,7 @@ def setting_summary(setting: "CommonSetting", designed: "Mapping[str, Designed]"
     )
 
 
-def _without_binding(setting: "CommonSetting", designed: "Mapping[str, Designed]") -> SettingOfOthers | None:
+def _without_binding(setting: "LotSetting", designed: "Mapping[str, Designed]") -> SettingOfOthers | None:
     """Return what a lot setting costs if the valves that hold it down keep settings of their own.
 
     That setting is designed and proved like the other one. Leaving out other valves would change nothing: what holds

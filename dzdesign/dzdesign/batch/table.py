@@ -17,7 +17,7 @@ from dzdesign.core.errors import InputError, quoted
 from dzdesign.identify.valve.test_record import checked_record
 
 if TYPE_CHECKING:
-    from dzdesign.design.lot_setting import CommonSetting, Designed
+    from dzdesign.design.lot_setting import LotSetting, Designed
     from dzdesign.identify.valve.side_model import SideModel
 
 #: Columns of either side, after its name; a valve that was not calibrated has blanks.
@@ -80,7 +80,7 @@ def read_back(results: Results, name: str, unwritten: Mapping[str, str]) -> Cali
 
 def rows_of(
     found: Mapping[str, Calibrated],
-    common: "CommonSetting | None",
+    common: "LotSetting | None",
     records: Mapping[str, Mapping[str, str]] | None = None,
 ) -> list[dict[str, Any]]:
     """Return the rows, in the order of the names; see `SIDE_COLUMNS`.
@@ -89,7 +89,7 @@ def rows_of(
     ----------
     found : mapping
         Name to what was read back.
-    common : CommonSetting or None
+    common : LotSetting or None
         For the cost of it at each valve.
     records : mapping, optional
         Name to the record that the valve was given, for those without a valve.json that has it.
@@ -131,7 +131,7 @@ def _add_records(rows: Sequence[dict[str, Any]], records: Sequence[Mapping[str, 
         row.update({RECORD + name: record.get(name) for name in names})
 
 
-def _side_values(designed: "Designed", sign: int, common: "CommonSetting | None") -> dict[str, Any]:
+def _side_values(designed: "Designed", sign: int, common: "LotSetting | None") -> dict[str, Any]:
     """Return what the table says of one side; numbers as valve.json has them."""
     own, side = designed.own, designed.valve.sides["positive" if sign > 0 else "negative"]
     test = _reference_test(side)
@@ -168,7 +168,7 @@ def _remaining(designed: "Designed", sign: int, law: Any) -> dict[str, float]:
     return {name: round(100 * max(one[name] for one in each), 5) for name in each[0]}
 
 
-def extra_dead_zone(designed: "Designed", common: "CommonSetting", sign: int) -> float:
+def extra_dead_zone(designed: "Designed", common: "LotSetting", sign: int) -> float:
     """Return how much more dead zone the common setting leaves than a valve's own, in per cent of command.
 
     At the pressure drop of its tests where that is most, on opening; on closing where no opening was recorded.
@@ -177,7 +177,7 @@ def extra_dead_zone(designed: "Designed", common: "CommonSetting", sign: int) ->
     ----------
     designed : Designed
         The valve and its own compensator.
-    common : CommonSetting
+    common : LotSetting
         The setting of all.
     sign : {1, -1}
         Of the command.

@@ -83,7 +83,7 @@ def compensator_html(compensator: "Compensator") -> str:
     """Return the law, the certificate of each side and the costs of a design."""
     from dzdesign.derivation.law import law
 
-    chosen = law(compensator.law_name)
+    chosen = law(compensator.law)
     rows = []
     for sign in compensator.signals.signs:
         side = compensator.side(sign)

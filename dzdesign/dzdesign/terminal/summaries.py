@@ -44,7 +44,7 @@ def valve_summary(valve: "ValveModel") -> str:
 def compensator_summary(compensator: "Compensator") -> str:
     """Return target and law, the offset and certificate of each side, and the costs."""
     target = f" for {compensator.request.target.name}" if compensator.request else ""
-    lines = [f"Compensator{target}, law {compensator.law_name}, of a valve of {float(compensator.u_max_V):g} V"]
+    lines = [f"Compensator{target}, law {compensator.law}, of a valve of {float(compensator.u_max_V):g} V"]
     for sign in compensator.signals.signs:
         side = compensator.side(sign)
         low, high = (float(end) for end in side.certificate.dp_MPa)

@@ -136,9 +136,9 @@ def test_a_datum_is_the_constants_value():
     signals = document["signals"]
     assert values["core/dz_comp_negative.c", "COMMAND_ZERO"] == signals["command"]["zero_code"]
     assert values["core/dz_comp.c", "PRESSURE_B_HIGH"] == signals["pressure_b"]["valid_codes"][1]
-    assert values["core/dz_comp.h", "DZ_COMPARE_LIMIT"] == document["amplifier"]["compare_limit"]
-    assert values["core/dz_drive.c", "DITHER_COUNTS"] == document["amplifier"]["dither_counts"]
-    assert values["core/dz_drive.c", "RAMP_UP_NEGATIVE"] == document["amplifier"]["ramp_up"][1]
+    assert values["core/dz_comp.h", "DZ_COMPARE_LIMIT"] == document["drive_functions"]["compare_limit"]
+    assert values["core/dz_drive.c", "DITHER_COUNTS"] == document["drive_functions"]["dither_counts"]
+    assert values["core/dz_drive.c", "RAMP_UP_NEGATIVE"] == document["drive_functions"]["ramp_up"][1]
 
 
 def test_the_engineering_values_are_those_of_the_constants():
@@ -153,4 +153,4 @@ def test_the_engineering_values_are_those_of_the_constants():
     assert said[core, "FACTOR_OFFSET"] == f"u_min0 = {10 * float(side.u_min0_over_u_max):.6f} V"
     assert said[core, "FACTOR_SLOPE"] == f"k x_max/u_max - 1 = {float(side.k_x_max_over_u_max) - 1:.6f}"
     assert said[core, "COMMAND_HIGH_WORD"] == "1.000000"
-    assert said[core, "law_segment"] == f"beta {min(side.beta_numerators) / 32768:.6f} to 1.000000"
+    assert said[core, "law_segment"] == f"beta {min(side.beta) / 32768:.6f} to 1.000000"

@@ -27,7 +27,7 @@ from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.errors import InputError
 from dzdesign.design.beta_table import DECIMALS
 from dzdesign.design.compensator_file import compensator_from_document
-from dzdesign.design.lot_setting import common_setting
+from dzdesign.design.lot_setting import lot_setting
 from dzdesign.report.artefact_chain import chain_of
 from dzdesign.report.artefact_folder import shelf_of
 from tests.support.dying_work import die_over_bad
@@ -236,8 +236,8 @@ def test_a_setting_without_the_lowest_valve_over_compensates_it(made):
     results = Results(made)
     names = [row["name"] for row in rows(made) if row["status"] == "ok"]
     batch = {name: read_back(results, name, {}).designed for name in names}
-    binding = common_setting(batch).binding
-    higher = common_setting({name: each for name, each in batch.items() if name not in binding}).compensator
+    binding = lot_setting(batch).binding
+    higher = lot_setting({name: each for name, each in batch.items() if name not in binding}).compensator
     assert set(offsets_above_their_bounds(higher, made, names)) & set(binding)
 
 

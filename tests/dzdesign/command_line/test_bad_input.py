@@ -379,8 +379,8 @@ COMPENSATORS = [
     ((*POSITIVE, "beta"), [1, 2], "beta has 2 nodes, expected 65"),
     ((*POSITIVE, "beta", 3), 0, "'sides.positive.beta[3]' is 0"),
     ((*POSITIVE, "beta", 3), 1.5, "'sides.positive.beta[3]' is 1.5, expected a whole number"),
-    ((*POSITIVE, "edge_beta"), [1, 2], "the edge's beta must have as many nodes"),
-    (("edge_codes",), 32, "an edge needs the opening threshold's beta"),
+    ((*POSITIVE, "transition_beta"), [1, 2], "the edge's beta must have as many nodes"),
+    (("transition_codes",), 32, "an edge needs the opening threshold's beta"),
     (("beta_denominator",), 3, "beta_denominator is 3, expected a power of two"),
     (("beta_step_codes",), 0, "'beta_step_codes' is 0"),
     (("below_dp0",), "held", "below_dp0 is 'held', expected hold or extend"),
@@ -393,7 +393,7 @@ COMPENSATORS = [
     (("signals", "command", "full_code"), 0, "zero and full command have the same code, 0"),
     (("signals", "command", "negative_full_code"), 9, "expected the other side of zero"),
     (("signals", "command", "valid_codes"), [0, 9], "full_code is 4095, outside the valid codes 0 to 9"),
-    (("amplifier", "dither_ticks"), 0, "'amplifier.dither_ticks' is 0"),
+    (("drive_functions", "dither_ticks"), 0, "'drive_functions.dither_ticks' is 0"),
     ((*POSITIVE, "certificate", "dp_MPa"), [[1, 1]], "'sides.positive.certificate.dp_MPa' has 1 items, expected 2"),
 ]
 

@@ -17,7 +17,7 @@ from dzdesign.design.compensator_file import compensator_document, compensator_f
 from dzdesign.design.designing import design
 from dzdesign.design.lot import LotSide, lot_margins, prove_lot
 from dzdesign.design.lot_pressures import Lacking, common_interval, lacking_in, without_narrow
-from dzdesign.design.lot_setting import Designed, common_setting
+from dzdesign.design.lot_setting import Designed, lot_setting
 from dzdesign.design.option_texts import options_of
 from dzdesign.design.redesign_check import prove_derived
 from dzdesign.identify.identification import identify
@@ -48,7 +48,7 @@ def batch():
 
 @pytest.fixture(scope="module")
 def common(batch):
-    return common_setting(batch)
+    return lot_setting(batch)
 
 
 def with_bound(compensator, name, place, change):

@@ -25,7 +25,7 @@ from dzdesign.codegen.core.misra import misra_lines
 from dzdesign.codegen.core.signal_constants import SignalConstants
 from dzdesign.derivation.law import law
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.drive import RAMP_UNIT
+from dzdesign.design.drive_functions import RAMP_UNIT
 from dzdesign.design.signals import WEIGHT_SHIFT
 
 #: One file a sign of command, all from one template.
@@ -84,7 +84,7 @@ def _law_source(compensator: Compensator, sign: int, arithmetic: str) -> CoreFil
     signals, steps, integers = of_signals.signals(), of_signals.steps(), of_law.arithmetic()
     rows = table_form(form, step, arithmetic)
     tables = [of_law.table(False, rows)] + ([of_law.table(True, rows)] if form.zero_table else [])
-    side, transition = compensator.side(sign), compensator.edge_codes
+    side, transition = compensator.side(sign), compensator.transition_codes
     suffix = "" if sign > 0 else "_negative"
     values = {
         **_law_words(compensator),
@@ -150,20 +150,20 @@ def _drive_header(compensator: Compensator) -> CoreFile:
 
 def _law_words(compensator: Compensator) -> dict[str, object]:
     """Return what source and header print of the law."""
-    chosen = law(compensator.law_name)
+    chosen = law(compensator.law)
     return {
         "signals": compensator.signals,
         "u_max_V": f"{float(compensator.u_max_V):g}",
         "bipolar": compensator.negative is not None,
         "law_text": str(chosen.output).replace("**", "^"),
         "law_equation": equation_of(chosen),
-        "transition_codes": compensator.edge_codes,
+        "transition_codes": compensator.transition_codes,
     }
 
 
 def _drive_words(compensator: Compensator) -> dict[str, object]:
     """Return what source and header print of the drive functions."""
-    functions, signals = compensator.amplifier, compensator.signals
+    functions, signals = compensator.drive_functions, compensator.signals
     return {
         "bipolar": compensator.negative is not None,
         "ramp": functions.has_ramp,

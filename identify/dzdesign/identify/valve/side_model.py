@@ -33,7 +33,7 @@ class BetaNodes:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Certificate:
+class BoundsBasis:
     """What the lower bounds rest on."""
 
     confidence: Annotated[
@@ -84,7 +84,7 @@ class SideModel:
     valid_dp_MPa: Annotated[
         tuple[PressureDrop, PressureDrop] | None, quantity("MPa", "Tested interval; nothing is certified outside it.")
     ] = field(init=False)
-    certificate: Annotated[Certificate, Meta(description="What the lower bounds rest on.")]
+    certificate: Annotated[BoundsBasis, Meta(description="What the lower bounds rest on.")]
     active_constraints: Annotated[
         tuple[str, ...], Meta(description="Constraints of the fits that hold with equality, in words.")
     ]

@@ -127,7 +127,7 @@ def rounding_table(compensator: dict[str, Any]) -> Table:
         offset = Fraction(*side["u_min0_over_u_max"]) * u_max
         node = offset / compensator["beta_denominator"]
         of = f" ({name})" if compensator["sides"]["negative"] else ""
-        if not compensator["edge_codes"]:  # an edge counts from the opening threshold, the valve's curve does not
+        if not compensator["transition_codes"]:  # an edge counts from the opening threshold, the valve's curve does not
             wanted = Fraction(repr(_wanted_offset(valve, certificate["guard"])))
             volts = (f"{float(offset):.6f} V", f"{float(wanted):.6f} V")
             rows.append(("u_min0" + of, *volts, 1e3 * float(offset - wanted)))

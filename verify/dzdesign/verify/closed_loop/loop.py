@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.design.drive import RAMP_UNIT
+from dzdesign.design.drive_functions import RAMP_UNIT
 from dzdesign.verify.closed_loop.motion import motion_header, numbers_of
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
 from dzdesign.verify.evidence import PressureResult, Side
@@ -120,7 +120,7 @@ def _scalings(document: dict[str, Any], sign: int) -> Scalings:
 
 
 def _slowest_ramp_s(document: dict[str, Any], sign: int) -> float:
-    amplifier, command = document["amplifier"], document["signals"]["command"]
+    amplifier, command = document["drive_functions"], document["signals"]["command"]
     full = command["full_code" if sign > 0 else "negative_full_code"]
     units = abs(full - command["zero_code"]) * RAMP_UNIT
     side = 0 if sign > 0 else 1

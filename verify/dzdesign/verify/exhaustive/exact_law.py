@@ -54,7 +54,7 @@ class ExactLaw:
         command = signals["command"]
         self.code_max: int = signals["code_max"]
         self.compare_max: int = signals["compare_max"]
-        self.compare_limit: int = document["amplifier"]["compare_limit"]
+        self.compare_limit: int = document["drive_functions"]["compare_limit"]
         self.zero: int = command["zero_code"]
         self.full: int = command["full_code" if sign > 0 else "negative_full_code"]
         self.sound_commands = range(command["valid_codes"][0], command["valid_codes"][1] + 1)
@@ -65,10 +65,10 @@ class ExactLaw:
         self._kappa = Fraction(*side["k_x_max_over_u_max"])
         self._u_min0 = Fraction(*side["u_min0_over_u_max"])
         self._zero_nodes: list[int] = side["beta"]
-        self._law_nodes: list[int] = side["edge_beta"] or side["beta"]
+        self._law_nodes: list[int] = side["transition_beta"] or side["beta"]
         self._denominator: int = document["beta_denominator"]
         self._step: int = document["beta_step_codes"]
-        self.edge_codes: int = document["edge_codes"]
+        self.transition_codes: int = document["transition_codes"]
 
     @property
     def span(self) -> int:
@@ -137,8 +137,8 @@ class ExactLaw:
             n_full=self.compare_max,
         )
         corners = [(0, betas.zero * self._u_min0 * self.compare_max)]
-        if self.edge_codes:
-            corners.append((self.edge_codes, line.slope * self.edge_codes + line.start))
+        if self.transition_codes:
+            corners.append((self.transition_codes, line.slope * self.transition_codes + line.start))
         return [*corners, (self.span, line.slope * self.span + line.start)]
 
     def lines_in_beta(self) -> list[tuple[int, Fraction, Fraction]]:

@@ -93,7 +93,7 @@ def map_inputs(folder: Path, document: dict[str, Any], sign: int = 1) -> InputMa
     compare = np.array(values)
     a_MPa = float(Fraction(*exact.a["span_MPa"])) / (exact.a["full_code"] - exact.a["zero_code"])
     volt = float(Fraction(*document["u_max_V"])) / exact.compare_max
-    peak = document["amplifier"]["dither_counts"]
+    peak = document["drive_functions"]["dither_counts"]
     return InputMap(
         side=exact.side,
         command_codes=tuple(commands),

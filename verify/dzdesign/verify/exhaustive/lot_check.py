@@ -55,7 +55,7 @@ def check_lot(document: dict[str, Any], exact: ExactLaw, found: Differences, at_
     kind = np.int64 if fits else object
     low, high = np.array(lowest, dtype=kind), np.array(highest, dtype=kind)
     drive = np.where(found.made, at_zero, -1)
-    unit_V, peak = Fraction(*document["u_max_V"]) / exact.compare_max, document["amplifier"]["dither_counts"]
+    unit_V, peak = Fraction(*document["u_max_V"]) / exact.compare_max, document["drive_functions"]["dither_counts"]
     margins: list[tuple[Fraction, str, int]] = []
     for name, side in sides.items():
         nodes = np.array([ends[dp] for dp in side["dp_MPa"]], dtype=kind)

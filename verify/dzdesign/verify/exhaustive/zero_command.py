@@ -40,7 +40,7 @@ def zero_command_margins(
         if bound is not None:
             largest[bound] = max(largest.get(bound, 0), compare)
             counts.setdefault(bound, []).append(compare)
-    u_max, peak = Fraction(*document["u_max_V"]), document["amplifier"]["dither_counts"]
+    u_max, peak = Fraction(*document["u_max_V"]), document["drive_functions"]["dither_counts"]
     margins = {bound: bound - u_max * (compare + peak) / exact.compare_max for bound, compare in largest.items()}
     above = 0
     for bound in (bound for bound, margin in margins.items() if margin < 0):

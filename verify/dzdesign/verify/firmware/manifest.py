@@ -51,8 +51,8 @@ def _faults_of_origin(
 ) -> Iterator[str]:
     """Yield what the manifest says of the compensator and the valve, and is otherwise."""
     digest = sha256_of((folder / "compensator.json").read_bytes())
-    if manifest.law != compensator.law_name:
-        yield f"the manifest's law is {manifest.law}, the compensator's {compensator.law_name}"
+    if manifest.law != compensator.law:
+        yield f"the manifest's law is {manifest.law}, the compensator's {compensator.law}"
     targets = {name.partition("/")[0].replace("_", "-") for name in manifest.files if "/" in name} - {"core"}
     if targets != {manifest.target}:
         there = " and ".join(sorted(targets)) or "no target"
