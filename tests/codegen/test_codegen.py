@@ -35,7 +35,7 @@ def evaluate(form, compensator, command: int, dp_code: int) -> int:
     total = between(form.table) * (form.slope * command + form.offset)
     total += (form.linear * command << form.linear_shift) + form.half
     if codes:
-        total -= (between(form.table) - between(form.zero_table)) * form.edge * max(codes - command, 0)
+        total -= (between(form.table) - between(form.zero_table)) * form.transition * max(codes - command, 0)
     assert total >= 0
     quotient = min(total >> form.shift, form.largest)
     estimate = ((quotient >> form.estimate.shift) * form.estimate.factor) >> 16

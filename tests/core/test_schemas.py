@@ -82,13 +82,13 @@ def evidence(written_firmware, example_folder):
 
 @pytest.fixture(scope="module")
 def assessment():
-    from dzdesign.assess.assessment import AssessOptions, assess
-    from dzdesign.assess.assessment_file import assessment_document
+    from dzdesign.assess.assessing import assess
+    from dzdesign.assess.options import AssessOptions
 
     before = [synthetic_ramp(dp, Truth(), source=f"before_{dp:g}.csv") for dp in (1.0, 5.0)]
     after = [synthetic_ramp(1.0, Truth(knee_rising=0.5), seed=1, source="after.csv")]
     options = AssessOptions(reading=IdentifyOptions(), limits={"dead_zone_opening": 0.01, "symmetry": 0.01})
-    document = json.loads(to_json(assessment_document(assess(before, after, options))))
+    document = json.loads(to_json_bytes(assess(before, after, options)))
     assert {limit["holds"] for limit in document["limits"]} == {False, None}  # one missed, one that can't be checked
     assert any(item["after"] is None for item in document["pressures"])
     return document

@@ -1,10 +1,13 @@
 """What the outputs say, in words that an engineer has, each of them in the glossary."""
 
 import re
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
+from dzdesign.core.artefact_types import THIS_TOOL
+from dzdesign.report.lot.summary import FailedValve, LotSummary
 from dzdesign.terminal.notebook import valve_html
 from dzdesign.terminal.tables import print_compensator, print_scenarios, print_valve
 from tests.support.paths import ROOT
@@ -87,12 +90,22 @@ def test_every_word_of_the_outputs_is_in_the_glossary():
 
 
 def test_the_headline_of_a_batch_counts_calibrated_valves(capsys):
-    from dzdesign.batch.summary import print_batch
+    from dzdesign.batch.printing import print_lot
 
-    document = {"valves": 4, "calibrated": 3, "failed": [], "quantiles": {}, "common_setting": {"why_not": "none"}}
-    document["oddities"] = ["two share a recording"]
-    document["warnings"] = {"onset-hidden": ["V1", "V2", "V3", "V4"], "pressure-stuck": ["V3"]}
-    print_batch(document, "out")
+    summary = LotSummary(
+        tool=THIS_TOOL,
+        made_from=(),
+        valves=4,
+        failed=(FailedValve(name="V4", status="failed", reason="no flow"),),
+        verified=False,
+        quantiles={},
+        files={},
+        lot_setting=None,
+        why_no_lot_setting="none",
+        anomalies=("two share a recording",),
+        warnings={"onset-hidden": ("V1", "V2", "V3", "V4"), "pressure-stuck": ("V3",)},
+    )
+    print_lot(summary, Path("out"), None)
     said = capsys.readouterr().out
     assert "3 calibrated valves of 4" in said and "odd: two share a recording" in said
     assert "warnings: pressure-stuck 1 (V3), onset-hidden 4" in said

@@ -10,4 +10,4 @@ def die_over_bad(task: Task) -> Outcome:
     """Kill the own process over a valve named bad..., else do nothing."""
     if task.name.startswith("bad"):
         os.kill(os.getpid(), signal.SIGKILL)
-    return Outcome(name=task.name, status="ok", digest=task.digest)
+    return task.outcome("ok")

@@ -175,14 +175,14 @@ def _read(branch: Branch, item: PooledTest, u_max: float, floor: float) -> ReadB
 
 def _curves(reads: Sequence[ReadBranch | None], options: IdentifyOptions) -> list[FlowCurve | None]:
     """Return a curve for each branch; straight parts are those of all together, or of each that has one by itself."""
+    branches = {index: read for index, read in enumerate(reads) if read is not None}
     reasons: dict[int, str] = {}
-    for index, read in enumerate(reads):
-        if read is not None:
-            try:
-                refuse_a_jump(read, options.u_max)
-            except InputError as error:
-                reasons[index] = str(error)
-    known = [index for index, read in enumerate(reads) if read is not None and index not in reasons]
+    for index, read in branches.items():
+        try:
+            refuse_a_jump(read, options.u_max)
+        except InputError as error:
+            reasons[index] = str(error)
+    known = [index for index in branches if index not in reasons]
     found: dict[int, tuple[GatedLine, float]] = {}
     # One meter has read all branches, and one valve has made them: together they tell more of noise and of bends.
     for group in (known, *([index] for index in known)):
@@ -190,20 +190,21 @@ def _curves(reads: Sequence[ReadBranch | None], options: IdentifyOptions) -> lis
         if not missing:
             continue
         try:
-            mine = [reads[index] for index in missing]
-            parts = find_straight_parts(mine, u_max=options.u_max, window=options.knee_window)
+            group_reads = [branches[index] for index in missing]
+            parts = find_straight_parts(group_reads, u_max=options.u_max, window=options.knee_window)
         except InputError as error:
             reasons |= {index: str(error) for index in missing}
             continue
         found |= dict(zip(missing, zip(parts.lines, parts.levels, strict=True), strict=True))
-    return [
-        read and _curve(read, *found.get(index, (None, None)), reasons.get(index, ""), options.u_max)
-        for index, read in enumerate(reads)
-    ]
+    curves = {
+        index: _curve(read, found.get(index), reasons.get(index, ""), options.u_max) for index, read in branches.items()
+    }
+    return [curves.get(index) for index in range(len(reads))]
 
 
-def _curve(read: ReadBranch, line: GatedLine | None, level: float | None, reason: str, u_max: float) -> FlowCurve:
+def _curve(read: ReadBranch, straight: tuple[GatedLine, float] | None, reason: str, u_max: float) -> FlowCurve:
     """Average a branch over cells of the command, samples far off its smoothed course left out."""
+    line, level = straight or (None, max(read.floor, USEFUL_FLOW * read.y_max))
     u, y = read.branch.u, read.y
     about = y - np.interp(u, *read.profile)
     kept = np.abs(about) <= max(GATE * robust_sigma(about), LEAST_GATE * read.y_max)
@@ -224,7 +225,7 @@ def _curve(read: ReadBranch, line: GatedLine | None, level: float | None, reason
         q_se=np.where(n < FEWEST_IN_CELL, np.nan, np.sqrt(mean(about**2) * np.minimum(colour, n) / n)),
         sigma=robust_sigma(about[small] if small.sum() >= 20 else about),
         colour=colour,
-        level=max(read.floor, USEFUL_FLOW * read.y_max) if level is None else level,
+        level=level,
         line=line,
         no_line="" if line else reason,
     )
@@ -277,4 +278,3 @@ def _hold_after_closing(ramp: Ramp, u_max: float) -> np.ndarray:
         return np.empty(0)
     hold = q[held]
     return hold[hold.size // 2 :] if hold.size >= HOLD_SAMPLES else np.empty(0)
-

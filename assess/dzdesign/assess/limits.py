@@ -2,48 +2,45 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Annotated
 
-from dzdesign.assess.valve_quantities import IN_UNIT, QUANTITIES, Quantity, Reading
+from msgspec import Meta
+
+from dzdesign.assess.quantities import (
+    IN_UNIT,
+    LOSS,
+    LOSS_OF_FLOW,
+    QUANTITIES,
+    Quantity,
+    Reading,
+    Value,
+    hidden,
+    observed,
+)
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.units import parse_quantity
 
-#: A limit that compares both sets, beside those of `QUANTITIES`.
-LOSS = "largest_flow_loss"
-LIMITED: dict[str, Quantity] = {key: quantity for key, quantity in QUANTITIES.items() if quantity.limit} | {
-    LOSS: Quantity(
-        name="loss of largest flow",
-        unit="%",
-        formula="1 - largest flow AFTER / largest flow BEFORE",
-        limit="ratio",
-    )
+#: Quantities for which there is a largest value; a gain and a flow at full command have none.
+LIMITED: dict[str, Quantity] = {
+    **{key: quantity for key, quantity in QUANTITIES.items() if key not in ("gain", "largest_flow")},
+    LOSS: LOSS_OF_FLOW,
 }
+#: Unit of a quantity -> what `parse_quantity` calls the quantity of its limit.
+KINDS = {"%": "ratio", "L/min": "flow"}
 #: Of these a limit may also be a command in volts.
 OF_COMMAND = ("dead_zone_opening", "dead_zone_closing", "knee_opening", "knee_closing", "hysteresis")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LimitResult:
-    """Whether one recording meets one limit.
+    """Whether the recordings at one pressure drop meet one limit."""
 
-    Attributes
-    ----------
-    key : str
-        Of `LIMITED`.
-    place : str
-        Side and pressure drop, in words.
-    limit : float
-        Share or SI.
-    holds : bool or None
-        None: it could not be checked.
-    text : str
-        What was found, and by how much a limit is missed.
-    """
-
-    key: str
-    place: str
-    limit: float
-    holds: bool | None
-    text: str
+    quantity: Annotated[str, Meta(description="Key of the quantity.")]
+    place: Annotated[str, Meta(description="Side and pressure drop, in words.")]
+    limit: Annotated[Value, Meta(description="Largest value, in `unit`.")]
+    unit: Annotated[str, Meta(description="Of the limit.")]
+    holds: Annotated[bool | None, Meta(description="Whether it holds; null: could not be checked.")]
+    text: Annotated[str, Meta(description="What was found, and by how much a limit is missed.")]
 
 
 def parse_limits(text: str | Mapping[str, str], u_max: float) -> dict[str, float]:
@@ -87,7 +84,7 @@ def parse_limits(text: str | Mapping[str, str], u_max: float) -> dict[str, float
 
 def _limit(key: str, text: str, u_max: float) -> float:
     option = f"the limit {key}"
-    kind = LIMITED[key].limit
+    kind = KINDS[LIMITED[key].unit]
     in_volts = key in OF_COMMAND and text.rstrip().endswith("V")
     value = parse_quantity(text, "voltage", option) / u_max if in_volts else parse_quantity(text, kind, option)
     if value < 0:
@@ -107,41 +104,45 @@ def check_limits(
     place : str
         Side and pressure drop, in words.
     before, after : mapping
-        Readings of `QUANTITIES`; None where there is no recording without the compensator.
+        Readings of `QUANTITIES` in their units; None where there is no recording without the compensator.
     """
     results = []
     for key, limit in limits.items():
         reading = _loss(before, after) if key == LOSS else after.get(key)
         if reading is not None:
-            results.append(_check(key, place, limit, reading))
+            results.append(_check(key, place, IN_UNIT[LIMITED[key].unit] * limit, reading))
     return results
 
 
 def _loss(before: Mapping[str, Reading] | None, after: Mapping[str, Reading]) -> Reading:
     if before is None:
-        return Reading(not_observable="there is no recording without the compensator at this pressure drop")
-    return Reading(value=1 - after["largest_flow"].value / before["largest_flow"].value)
+        return hidden("there is no recording without the compensator at this pressure drop")
+    largest, largest_before = after["largest_flow"].value, before["largest_flow"].value
+    if largest is None or not largest_before:
+        return hidden("there is no largest flow at this pressure drop")
+    return observed(100 * (1 - largest / largest_before))
 
 
 def _check(key: str, place: str, limit: float, reading: Reading) -> LimitResult:
     """Compare a reading with its limit; what is not observable holds only where a bound of it does."""
-    quantity = LIMITED[key]
+    unit = LIMITED[key].unit
 
-    def said(value: float) -> str:
-        return f"{IN_UNIT[quantity.unit] * value:.3g} {quantity.unit}"
+    def number(value: float) -> str:
+        return f"{value:.3g} {unit}"
 
-    value = reading.value
-    if value is None:
-        known = reading.at_most is not None
-        holds = True if known and reading.at_most <= limit else None
-        bound = f"at most {said(reading.at_most)}; " if known else ""
-        hope = f"; only a limit of {said(reading.at_most)} or more could be checked" if known and not holds else ""
-        text = f"{bound}not observable, because {reading.not_observable}{hope}"
-    else:
+    value, bound = reading.value, reading.at_most
+    holds: bool | None
+    if value is not None:
         # A symmetry has a sign, and a meter's zero error gives one to the flow at zero command.
         size = abs(value) if key in ("symmetry", "flow_at_zero") else value
         holds = size <= limit
-        error = f" ± {said(reading.se)}" if reading.se is not None else ""
-        missed = f", {said(size - limit)} more than the limit of {said(limit)}"
-        text = f"{said(value)}{error}" + ("" if holds else missed)
-    return LimitResult(key=key, place=place, limit=limit, holds=holds, text=text)
+        error = f" ± {number(reading.se)}" if reading.se is not None else ""
+        missed = f", {number(size - limit)} more than the limit of {number(limit)}"
+        text = f"{number(value)}{error}" + ("" if holds else missed)
+    elif bound is not None:
+        holds = True if bound <= limit else None
+        hope = "" if holds else f"; only a limit of {number(bound)} or more could be checked"
+        text = f"at most {number(bound)}; not observable, because {reading.not_observable}{hope}"
+    else:
+        holds, text = None, f"not observable, because {reading.not_observable}"
+    return LimitResult(quantity=key, place=place, limit=limit, unit=unit, holds=holds, text=text)

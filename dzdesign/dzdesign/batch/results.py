@@ -9,7 +9,7 @@ from pathlib import Path
 
 from dzdesign.batch.calibration import Outcome
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of, write_file, write_folder
-from dzdesign.core.artefact_types import THIS_TOOL, Artefact, as_document, to_json_bytes
+from dzdesign.core.artefact_types import THIS_TOOL, Artefact, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.report.lot.folder import is_lot
 from dzdesign.report.lot.summary import FAILED, SUMMARY_NAME, LotSummary, UnfinishedLot
@@ -76,9 +76,7 @@ class Results:
         files = dict(outcome.files)
         if outcome.manifest.reason:
             files["reason.txt"] = f"{outcome.manifest.reason}\n".encode()
-        write_folder(
-            self.of(outcome.name), files, as_document(replace(outcome.manifest, board=_board_files(files)))
-        )
+        write_folder(self.of(outcome.name), files, replace(outcome.manifest, board=_board_files(files)))
 
     def read(self, name: str, unwritten: Mapping[str, str]) -> ValveFolder:
         """Read a valve's folder; one that could not be written has failed, whatever an earlier run left there.

@@ -221,7 +221,8 @@ def _client(address: str) -> "Client":
 
 def _ahead(client: "Client") -> int:
     """Return how many tasks are handed over at first; workers that come later take from the same heap."""
-    return AHEAD * max(sum(client.nthreads().values()), 8)
+    threads: dict[str, int] = client.nthreads()
+    return AHEAD * max(sum(threads.values()), 8)
 
 
 def _outcome(future: "Future", task: Task) -> Outcome:

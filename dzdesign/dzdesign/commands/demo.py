@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 from dzdesign.core.artefact_files import check_folder_may_be_written, to_json
+from dzdesign.core.artefact_types import as_document
 from dzdesign.core.errors import InputError
 from dzdesign.core.options import AnyPath, Option
 from dzdesign.example import example_folder
@@ -30,7 +31,6 @@ class Arguments:
 
 def run(arguments: Arguments, json: bool) -> int:
     """Run the pipeline on the bundled ramp tests and print the closing table."""
-    from dzdesign.core.artefact_types import as_document
     from dzdesign.derivation.account.account import verify_statements
     from dzdesign.terminal.tables import print_demo
 

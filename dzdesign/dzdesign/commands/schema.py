@@ -21,8 +21,8 @@ SCHEMAS: Mapping[str, tuple[str, str, str]] = MappingProxyType(
         "compensator": ("dzdesign.design", "compensator.json", "design"),
         "firmware": ("dzdesign.design.firmware_manifest:FirmwareManifest", "manifest.json of a firmware", "codegen"),
         "evidence": ("dzdesign.verify.evidence:Evidence", "verification.json", "verify"),
-        "assessment": ("dzdesign.assess", "assessment.json", "assess"),
-        "batch": ("dzdesign.batch", "batch.json", "batch"),
+        "assessment": ("dzdesign.assess.assessment:Assessment", "assessment.json", "assess"),
+        "batch": ("dzdesign.report.lot.summary:LotSummary", "batch.json", "batch"),
         "reproduction": ("dzdesign.reproduce", "reproduction.json", "reproduce"),
         "derivation": (
             "dzdesign.derivation.presentation.derivation_file:DerivationFile",

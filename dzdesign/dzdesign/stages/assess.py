@@ -4,7 +4,7 @@ from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from dzdesign.core.artefact_files import check_file_may_be_written, to_json, write_file, write_files
+from dzdesign.core.artefact_files import check_file_may_be_written, write_file, write_files
 from dzdesign.core.errors import InputError
 from dzdesign.core.options import (
     FIT,
@@ -23,7 +23,8 @@ from dzdesign.stages.recordings import RampArguments, check_plots, read_recordin
 from dzdesign.terminal.progress import say, stage_progress
 
 if TYPE_CHECKING:
-    from dzdesign.assess.assessment import Assessment, AssessOptions
+    from dzdesign.assess.assessment import Assessment
+    from dzdesign.assess.options import AssessOptions
     from dzdesign.identify.reading.ramp_files import RampTest
 
 
@@ -81,12 +82,14 @@ def assess(arguments: AssessArguments) -> "Assessment":
     InputError
         If a file or an option can't be read. A limit that is missed is no error: see ``holds``.
     """
-    from dzdesign.assess.assessment import assess as compare
-    from dzdesign.assess.assessment_file import SCHEMA, assessment_document
+    from dzdesign.assess.assessing import assess_curves
+    from dzdesign.assess.assessment import Assessment
+    from dzdesign.assess.curve_pairs import compare_curves
+    from dzdesign.core.artefact_types import schema_of, to_json_bytes
 
     options = assess_options(arguments)
     if arguments.output is not None:
-        check_file_may_be_written(Path(arguments.output), SCHEMA)
+        check_file_may_be_written(Path(arguments.output), schema_of(Assessment))
     check_plots(arguments.plots, arguments.output)
     before = _read_set("before", arguments.before, arguments.columns, arguments, options.of_set("before").u_max)
     columns = arguments.after_columns or arguments.columns
@@ -94,15 +97,16 @@ def assess(arguments: AssessArguments) -> "Assessment":
     refuse_copies([*before, *after])
     with stage_progress() as stage:
         stage(f"comparing {len(before)} recordings before with {len(after)} after")
-        found = compare(before, after, options)
+        comparison = compare_curves(before, after, options)
+    found = assess_curves(comparison)
     if arguments.output is not None:
-        write_file(Path(arguments.output), to_json(assessment_document(found)), SCHEMA)
+        write_file(Path(arguments.output), to_json_bytes(found), schema_of(Assessment))
     if arguments.plots is not None:
         from dzdesign.assess.plots import plot_files
 
         with stage_progress() as stage:
             stage("drawing")
-            write_files(Path(arguments.plots), plot_files(found), "--plots")
+            write_files(Path(arguments.plots), plot_files(comparison, found), "--plots")
     return found
 
 
@@ -135,8 +139,8 @@ def assess_options(arguments: AssessArguments) -> "AssessOptions":
     arguments : AssessArguments
         As written.
     """
-    from dzdesign.assess.assessment import AssessOptions
     from dzdesign.assess.limits import parse_limits
+    from dzdesign.assess.options import AssessOptions
     from dzdesign.identify.options import IdentifyOptions
 
     reading = IdentifyOptions(**read_options(arguments, ["u_max", "meter_floor", "meter_lag", "knee_window"]))

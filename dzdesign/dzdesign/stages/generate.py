@@ -68,9 +68,9 @@ def generate(arguments: GenerateArguments) -> "Firmware":
         source, content = os.fspath(given), read_bytes(Path(given), "compensator file")
         document = parse_document(content, source, (COMPENSATOR_SCHEMA, VALVE_SCHEMA))
         if document["schema"] == VALVE_SCHEMA:
-            options = design_options(arguments, target)
             valve = read_artefact(content, ValveModel, source)
-            firmware = generate_project(design_valve(valve, options, content), target)
+            compensator = design_valve(valve, design_options(arguments, target), content)
+            firmware = generate_project(compensator, target)
         else:
             firmware = generate_project(_read_compensator(content, source, arguments), arguments.target, content)
     return firmware if arguments.output is None else write_firmware(firmware, Path(arguments.output))

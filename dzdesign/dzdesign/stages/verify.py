@@ -91,8 +91,8 @@ def verify(arguments: VerifyArguments, plant_source: str = "") -> "Verification"
             verification = replace(verification, evidence=replace(verification.evidence, mutants=mutants))
         if arguments.output is not None:
             output = Path(arguments.output)
-            files = with_report(evidence_files(verification), folder, output)
-            write_folder(output, files, evidence_manifest(verification.evidence))
+            manifest = evidence_manifest(verification.evidence)
+            write_folder(output, with_report(evidence_files(verification), folder, output), manifest)
     return verification
 
 

@@ -7,7 +7,7 @@ from dzdesign.terminal.page import new_console, new_table, put_line
 
 if TYPE_CHECKING:
     from dzdesign.assess.assessment import Assessment, PressureAssessment
-    from dzdesign.assess.valve_quantities import Reading
+    from dzdesign.assess.quantities import Reading
     from dzdesign.terminal.page import Grid
 
 #: Decimals in the unit of a quantity.
@@ -16,8 +16,6 @@ DECIMALS = {"%": 2, "L/min": 3, "L/min/V": 4}
 
 def print_assessment(assessment: "Assessment") -> None:
     """Print each pressure drop, the reasons of what is not observable, formulas, notes and limits."""
-    from dzdesign.assess.assessment_file import TERMS
-
     page = new_console()
 
     def say(text: str) -> None:
@@ -27,13 +25,13 @@ def print_assessment(assessment: "Assessment") -> None:
         page.print(_table_of(item))
     for text in (*_not_observable(assessment), *_remarks(assessment)):
         say(text)
-    say(f"{TERMS[0].upper()}{TERMS[1:]}:")
+    say(f"{assessment.terms[0].upper()}{assessment.terms[1:]}:")
     for text in _formulas(assessment):
         say(f"  {text}")
     how = {"declared": "declared", "identified": "from ramps of two rates", "unknown": "none declared"}
     say(
-        f"meter floor: {assessment.floor * 6e4:.2f} L/min; lag taken as {assessment.lag.seconds:.3g} s "
-        f"({how[assessment.lag.origin]})"
+        f"meter floor: {assessment.meter.floor_L_min:.2f} L/min; lag taken as {assessment.meter.lag_s:.3g} s "
+        f"({how[assessment.meter.lag_is]})"
     )
     for note in assessment.notes:
         say(f"note [{note.code}] {f'{note.source}: ' if note.source else ''}{note.text}")
@@ -42,32 +40,29 @@ def print_assessment(assessment: "Assessment") -> None:
 
 
 def _table_of(item: "PressureAssessment") -> "Grid":
-    from dzdesign.assess.valve_quantities import QUANTITIES
+    from dzdesign.assess.quantities import QUANTITIES
 
-    where = "pressure drop unknown" if item.dp is None else f"{item.dp / 1e6:.2f} MPa"
-    flows = f"level {item.level * 6e4:.3g} L/min, rated flow {item.rated * 6e4:.3g} L/min"
+    where = "pressure drop unknown" if item.dp_MPa is None else f"{item.dp_MPa:.2f} MPa"
+    flows = f"level {item.level_L_min:.3g} L/min, rated flow {item.rated_flow_L_min:.3g} L/min"
     title = f"{where}, {item.side} commands; {flows}"
     rows = new_table(title, "quantity", "unit", "before", "after", "change", "± s.e.")
-    for key in next(iter(item.readings.values())):
-        quantity = QUANTITIES[key]
-        both = [item.readings.get(name, {}).get(key) for name in ("before", "after")]
+    for key, found in item.quantities.items():
+        quantity, change = QUANTITIES[key], found.change
+        both = (found.before, found.after)
         if key == "symmetry" and all(reading is None or reading.value is None for reading in both):
-            continue  # of a valve with one side: said below where a limit asks for it
-        change, se = item.changes.get(key, (None, None))
+            continue  # of a valve with one side: printed below where a limit asks for it
         rows.add_row(
             quantity.name,
             quantity.unit,
             *(_shown(reading, quantity.unit) for reading in both),
-            "-" if change is None else _number(change, quantity.unit, "+"),
-            "-" if se is None else _number(se, quantity.unit),
+            "-" if change is None else _number(change.value, quantity.unit, "+"),
+            "-" if change is None or change.se is None else _number(change.se, quantity.unit),
         )
     return rows
 
 
 def _number(value: float, unit: str, sign: str = "") -> str:
-    from dzdesign.assess.valve_quantities import IN_UNIT
-
-    text = f"{IN_UNIT[unit] * value:{sign}.{DECIMALS[unit]}f}"
+    text = f"{value:{sign}.{DECIMALS[unit]}f}"
     return text if float(text) else f"{0:{sign}.{DECIMALS[unit]}f}"  # no -0.00
 
 
@@ -82,15 +77,16 @@ def _shown(reading: "Reading | None", unit: str) -> str:
 
 def _not_observable(assessment: "Assessment") -> list[str]:
     """Return a sentence for each reason why something is not observable, with all pressure drops that it holds for."""
-    from dzdesign.assess.valve_quantities import QUANTITIES
+    from dzdesign.assess.options import SETS
+    from dzdesign.assess.quantities import QUANTITIES
 
     reasons: dict[tuple[str, str], dict[str, list[str]]] = {}
     for item in _shown_pressures(assessment):
-        for name, readings in item.readings.items():
-            for key, reading in readings.items():
+        for name in SETS:
+            for key, reading in item.readings(name).items():
                 if reading.value is None and not (key == "symmetry" and _one_sided(assessment)):
-                    places = reasons.setdefault((QUANTITIES[key].name, reading.not_observable), {})
-                    where = "unknown" if item.dp is None else f"{item.dp / 1e6:.2f}"
+                    places = reasons.setdefault((QUANTITIES[key].name, reading.not_observable or ""), {})
+                    where = "unknown" if item.dp_MPa is None else f"{item.dp_MPa:.2f}"
                     side = "" if _one_sided(assessment) else f", {item.side} commands"
                     places.setdefault(name.upper() + side, []).append(where)
     together: dict[tuple[str, str], list[str]] = {}
@@ -105,13 +101,14 @@ def _not_observable(assessment: "Assessment") -> list[str]:
 
 def _remarks(assessment: "Assessment") -> list[str]:
     """Return what must be known beside the values."""
-    from dzdesign.assess.valve_quantities import QUANTITIES
+    from dzdesign.assess.options import SETS
+    from dzdesign.assess.quantities import QUANTITIES
 
     return [
         f"{QUANTITIES[key].name}, {name.upper()} at {item.place}: {reading.note}"
         for item in _shown_pressures(assessment)
-        for name, readings in item.readings.items()
-        for key, reading in readings.items()
+        for name in SETS
+        for key, reading in item.readings(name).items()
         if reading.note
     ]
 
@@ -126,10 +123,10 @@ def _one_sided(assessment: "Assessment") -> bool:
 
 
 def _formulas(assessment: "Assessment") -> list[str]:
-    from dzdesign.assess.valve_quantities import QUANTITIES
+    from dzdesign.assess.quantities import QUANTITIES
 
-    low, high = assessment.options.window
-    knee = "-".join(f"{share:.0%}" for share in assessment.options.reading.knee_window).replace("%-", "-")
+    low, high = assessment.options.linearity_window
+    knee = "-".join(f"{share:.0%}" for share in assessment.options.knee_window).replace("%-", "-")
     lines = [
         f"{quantity.name} = {quantity.formula}"
         for key, quantity in QUANTITIES.items()
@@ -148,10 +145,10 @@ def _limits(assessment: "Assessment") -> list[str]:
     """Return a line for each limit and recording, the verdict first."""
     from dzdesign.assess.limits import LIMITED
 
-    if not assessment.options.limits:
+    if not assessment.limits:
         return ["No limits were given (--limits, or [limits] in the file of options): nothing was required."]
     lines = [
-        f"{verdict_words(result.holds)}  {LIMITED[result.key].name}, {result.place}: {result.text}"
+        f"{verdict_words(result.holds)}  {LIMITED[result.quantity].name}, {result.place}: {result.text}"
         for result in assessment.limits
     ]
     bad = sum(not result.holds for result in assessment.limits)

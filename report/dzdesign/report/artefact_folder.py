@@ -4,19 +4,20 @@ import contextlib
 from pathlib import Path
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, parse_document, sha256_of
+from dzdesign.core.artefact_types import schema_of
 from dzdesign.core.errors import InputError
+from dzdesign.design.firmware_manifest import FirmwareManifest
+from dzdesign.report.lot.valve_folder import ValveManifest
+from dzdesign.verify.evidence import Evidence
 
-EVIDENCE_SCHEMA, FIRMWARE_SCHEMA = "dzdesign.evidence/1", "dzdesign.firmware/1"
-#: Of a folder around evidence and firmware, beside those of other valves.
-BATCH_VALVE_SCHEMA = "dzdesign.batch-valve/1"
-VERIFICATION_NAME = "verification.json"
+VERIFICATION_NAME = Evidence.FILE_NAME
 #: No larger file is read, and no more of them in a folder: an artefact is far smaller.
 LARGEST, MOST = 32 * 2**20, 500
 #: The schema stands in the first bytes of an artefact.
 HEAD = 512
 
 
-def shelf_of(folder: Path) -> dict[str, bytes]:
+def read_artefact_folder(folder: Path) -> dict[str, bytes]:
     """Return what dzdesign made in a folder and in the folders in it, by name below it.
 
     Of an evidence or firmware folder the folder around it is looked at too: what it was made from lies there.
@@ -43,28 +44,28 @@ def shelf_of(folder: Path) -> dict[str, bytes]:
         raise InputError(f"'{folder}' can't be read: {error.strerror or error}") from error
     evidence = (folder / VERIFICATION_NAME).is_file()
     others = _evidence_of_others(folder, within)
-    shelf: dict[str, bytes] = {}
+    files: dict[str, bytes] = {}
     for place in dict.fromkeys((root, *within[:MOST], folder)):  # in one order whichever was named: same bytes
         if place == folder:
-            shelf |= named
+            files |= named
         elif place not in others and not (evidence and (place / VERIFICATION_NAME).is_file()):  # only the one named
             with contextlib.suppress(OSError):  # a neighbour that is not ours to read
-                shelf |= _files_in(place, root)
-    if not any(name.endswith(".json") for name in shelf):
+                files |= _files_in(place, root)
+    if not any(name.endswith(".json") for name in files):
         raise InputError(
             f"'{folder}' has no artefact of dzdesign, expected verification.json, firmware, compensator.json or "
             "valve.json; give the folder that `dzdesign demo`, `verify` or `codegen` wrote"
         )
-    return shelf
+    return files
 
 
-def places_of(folder: Path) -> tuple[str, ...]:
-    """Return how the names of a folder's own files begin on its shelf; what else lies there was only looked around for.
+def asked_prefixes(folder: Path) -> tuple[str, ...]:
+    """Return how the names of a folder's own files begin among these; what else lies there was only looked around for.
 
     Parameters
     ----------
     folder : Path
-        As `shelf_of` takes it.
+        As `read_artefact_folder` takes it.
     """
     return (f"{folder.resolve().name}/",) if _is_one_stage(folder) else ("",)
 
@@ -94,7 +95,7 @@ def _is_one_stage(folder: Path) -> bool:
     if not path.is_file():
         return False
     try:
-        parse_document(path.read_bytes(), MANIFEST_NAME, (BATCH_VALVE_SCHEMA,))
+        parse_document(path.read_bytes(), MANIFEST_NAME, (schema_of(ValveManifest),))
     except InputError:
         return True
     return False
@@ -111,7 +112,7 @@ def _files_in(place: Path, root: Path) -> dict[str, bytes]:
             content = path.read_bytes()
             if path.suffix == ".csv" or b'"dzdesign.' in content[:HEAD]:
                 files[path.relative_to(root).as_posix()] = content
-    listed = listing(files.get((place / MANIFEST_NAME).relative_to(root).as_posix()))
+    listed = listed_files(files.get((place / MANIFEST_NAME).relative_to(root).as_posix()))
     for name in list(listed)[:MOST]:
         path = place / name
         inside = path.resolve().is_relative_to(place)  # a name in a manifest is somebody's text
@@ -121,19 +122,11 @@ def _files_in(place: Path, root: Path) -> dict[str, bytes]:
 
 
 def is_of(content: bytes, schema: str) -> bool:
-    """Tell whether a file's first bytes name a schema.
-
-    Parameters
-    ----------
-    content : bytes
-        Of the file.
-    schema : str
-        Such as ``dzdesign.valve/1``.
-    """
+    """Tell whether a file's first bytes name a schema, such as ``dzdesign.valve/1``."""
     return f'"{schema}"'.encode() in content[:HEAD]
 
 
-def listing(manifest: bytes | None) -> dict[str, str]:
+def listed_files(manifest: bytes | None) -> dict[str, str]:
     """Return the files that a manifest lists, with their hashes; none of what is no manifest.
 
     Parameters
@@ -144,7 +137,7 @@ def listing(manifest: bytes | None) -> dict[str, str]:
     if manifest is None:
         return {}
     try:
-        files = parse_document(manifest, MANIFEST_NAME, (EVIDENCE_SCHEMA, FIRMWARE_SCHEMA)).get("files")
+        files = parse_document(manifest, MANIFEST_NAME, (schema_of(Evidence), schema_of(FirmwareManifest))).get("files")
     except InputError:
         return {}
     listed = files.items() if isinstance(files, dict) else ()

@@ -17,19 +17,19 @@ import polars
 import pytest
 from many_valves import PRESSURES_MPa, lot_bench, write_lot
 
-from dzdesign.batch.calibration import Outcome, Task
+from dzdesign.batch.calibration import Task
 from dzdesign.batch.command import useful_jobs
 from dzdesign.batch.results import Results
 from dzdesign.batch.runners import run_local
-from dzdesign.batch.table import read_back
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.errors import InputError
 from dzdesign.design.beta_table import DECIMALS
 from dzdesign.design.compensator_file import compensator_from_document
-from dzdesign.design.lot_setting import lot_setting
+from dzdesign.design.lot_setting import common_setting
 from dzdesign.report.artefact_chain import chain_of
 from dzdesign.report.artefact_folder import shelf_of
+from dzdesign.report.lot.valve_folder import read_manifest
 from tests.support.dying_work import die_over_bad
 from tests.support.synthetic import needs_compiler
 
@@ -161,14 +161,14 @@ def test_options_are_inputs_too(lot, copy, monkeypatch):
     def nothing(tasks, jobs):
         for task in tasks:
             seen.append(task.name)
-            yield Outcome(name=task.name, status="failed", reason="not tried")
+            yield task.outcome("failed", "not tried", again=True)
 
     monkeypatch.setattr("dzdesign.batch.command.run_local", nothing)
     assert main(["batch", str(lot[0]), "-o", str(copy), "--guard", "mean", *OPTIONS]) == 1
     assert len(seen) == COUNT
     assert {row["status"] for row in rows(copy)} == {"failed"}
-    assert not (copy / "common_compensator.json").exists()  # of no valve now
-    seen.clear()  # an outcome without digest is no last word: it is tried again
+    assert not (copy / "lot_compensator.json").exists()  # of no valve now
+    seen.clear()  # such an outcome is no last word: it is tried again
     assert main(["batch", str(lot[0]), "-o", str(copy), "--guard", "mean", *OPTIONS]) == 1
     assert len(seen) == COUNT
 
@@ -184,9 +184,9 @@ def test_a_killed_run_leaves_whole_folders_and_is_taken_up_by_more_jobs(lot, mad
             time.sleep(0.02)
         process.send_signal(signal.SIGKILL)
     found = sorted(path.name for path in (output / "valves").iterdir() if not path.name.startswith("."))
-    assert 3 <= len(found) < COUNT and json.loads((output / "batch.json").read_text())["complete"] is False
+    assert 3 <= len(found) < COUNT and "unfinished" in json.loads((output / "batch.json").read_text())["schema"]
     results = Results(output)
-    assert all(results.is_done(name, results.manifest(name)["inputs_sha256"]) for name in found)
+    assert all(results.is_done(name, read_manifest(results.of(name)).inputs_sha256) for name in found)
     torn = output / "valves" / ".V0001.abcd1234"  # as a kill in the middle of a write leaves it
     torn.mkdir()
     assert main([*command, "2"]) == 1
@@ -220,7 +220,7 @@ def offsets_above_their_bounds(common, made: Path, names) -> list[str]:
 
 def test_the_common_setting_over_compensates_no_valve(lot, made, tmp_path, capsys):
     names = [row["name"] for row in rows(made) if row["status"] == "ok"]
-    path = made / "common_compensator.json"
+    path = made / "lot_compensator.json"
     common = compensator_from_document(path.read_bytes(), str(path))
     assert offsets_above_their_bounds(common, made, names) == []
     for name in names:  # nor where the truth is known
@@ -235,16 +235,16 @@ def test_a_setting_without_the_lowest_valve_over_compensates_it(made):
     """The check above sees what it must see: the valve that holds the setting down is the one that is hurt."""
     results = Results(made)
     names = [row["name"] for row in rows(made) if row["status"] == "ok"]
-    batch = {name: read_back(results, name, {}).designed for name in names}
-    binding = lot_setting(batch).binding
-    higher = lot_setting({name: each for name, each in batch.items() if name not in binding}).compensator
+    batch = {name: results.read(name, {}).designed for name in names}
+    binding = common_setting(batch).binding
+    higher = common_setting({name: each for name, each in batch.items() if name not in binding}).compensator
     assert set(offsets_above_their_bounds(higher, made, names)) & set(binding)
 
 
 def test_what_one_setting_costs(made):
     table = [row for row in rows(made) if row["status"] == "ok"]
-    extra = {row["name"]: float(row["common_extra_dead_zone_percent"]) for row in table}
-    common = json.loads((made / "batch.json").read_text())["common_setting"]
+    extra = {row["name"]: float(row["lot_extra_dead_zone_percent"]) for row in table}
+    common = json.loads((made / "batch.json").read_text())["lot_setting"]
     assert min(extra, key=extra.get) in common["binding"]
     lowest = min(float(row["offset_V"]) for row in table)
     for row in table:  # in per cent of command: what the offset lies lower, over the gain that is left, about 0.46
@@ -259,7 +259,7 @@ def test_valves_without_one_setting_are_told_why(lot, made, tmp_path, capsys):
     listing.write_text("name,files,guard\n" + "\n".join(lines) + "\n")
     assert main(["batch", str(listing), "-o", str(tmp_path / "out"), "--jobs", "1", *OPTIONS, "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
-    assert "another guard, so no setting serves both" in document["common_setting"]["why_not"]
+    assert "another guard, so no setting serves both" in document["why_no_lot_setting"]
 
 
 def test_a_list_names_valves_with_options_of_their_own(lot, tmp_path, capsys):
@@ -336,9 +336,9 @@ def test_a_valve_that_kills_its_process_is_named_and_no_other_is_lost():
     names = ["a", "b", "bad1", "c", "d", "bad2", "e"]
     outcomes = list(run_local((Task(name=name, **NOTHING) for name in names), 2, die_over_bad))
     assert sorted(outcome.name for outcome in outcomes) == sorted(names)
-    dead = {outcome.name: outcome for outcome in outcomes if outcome.status != "ok"}
+    dead = {outcome.name: outcome.manifest for outcome in outcomes if outcome.manifest.status != "ok"}
     assert set(dead) == {"bad1", "bad2"}
-    assert all("ended without a word" in each.reason and each.digest == "" for each in dead.values())
+    assert all("ended without a word" in each.reason and each.inputs_sha256 is None for each in dead.values())
 
 
 def test_an_unexpected_fault_is_a_reason_and_is_tried_again(lot, tmp_path, monkeypatch):
@@ -396,15 +396,15 @@ def test_a_valve_that_lacks_a_pressure_is_named_with_the_range_without_it(lot, t
     assert main(["batch", str(listing), "-o", str(out), "--jobs", "1", *OPTIONS]) == 0
     said = " ".join(capsys.readouterr().out.split())
     words = (
-        "short was not tested at 5 MPa, as the lot was: so the common setting holds for all from 1 to 2.5 MPa, and "
+        "short was not tested at 5 MPa, as the lot was: so the lot setting holds for all from 1 to 2.5 MPa, and "
         "without it from 1 to 5 MPa; record what is missing, or calibrate it apart",
         "coarse was not tested at 2.5 MPa, as the lot was: between the tests beside it only the lower",
         "it lies under the bounds of each of the 5 valves, at every pressure code of its tests; nearest is ",
     )
     report = " ".join((out / "report.html").read_text(encoding="utf-8").split())
     assert all(each in said for each in words) and all(each in report for each in words[:2])
-    common = json.loads((out / "batch.json").read_text(encoding="utf-8"))["common_setting"]
-    assert [(each["name"], each["dp_MPa"], each["narrows"]) for each in common["lacking"]] == [
+    common = json.loads((out / "batch.json").read_text(encoding="utf-8"))["lot_setting"]
+    assert [(each["name"], each["dp_MPa"], each["narrows"]) for each in common["untested"]] == [
         ("coarse", [2.5], False), ("short", [5.0], True),
     ]  # fmt: skip
     assert (common["dp_MPa"], common["dp_without_MPa"]) == ([1.0, 2.5], [1.0, 5.0])
@@ -463,10 +463,10 @@ def test_a_board_file_that_was_filled_in_stays_and_its_valve_with_it(tmp_path, c
     assert main(command) == 0
     board = out / "valves" / "V0001" / "firmware" / "cortex_m4" / "dz_board.c"
     board.write_text(filled := board.read_text() + "/* mine */\n")
-    common = (out / "common_compensator.json").read_bytes()
+    common = (out / "lot_compensator.json").read_bytes()
     assert main(command) == 0
     assert "2 of them done before" in capsys.readouterr().err
     assert main([*command, "--guard", "mean"]) == 0  # designed anew
     assert board.read_text() == filled
     assert main(command) == 0
-    assert board.read_text() == filled and (out / "common_compensator.json").read_bytes() == common
+    assert board.read_text() == filled and (out / "lot_compensator.json").read_bytes() == common

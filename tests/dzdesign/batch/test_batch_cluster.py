@@ -146,7 +146,7 @@ def test_a_lot_that_waits_for_a_worker_says_so_once_and_goes_on(cluster, monkeyp
     starter = threading.Timer(2, worker, ["late"])
     starter.start()
     (outcome,) = run_on_cluster(iter([Task(name="a", **NOTHING)]), address, die_over_bad)
-    assert outcome.status == "ok"
+    assert outcome.manifest.status == "ok"
     said = capsys.readouterr().err
     assert said.count("no worker is connected") == 1 and f"such as `dask worker {address} --nthreads 1`" in said
 
@@ -169,10 +169,10 @@ def test_a_valve_that_kills_every_worker_is_named(cluster):
         worker(f"w{number}")
     names = ["a", "bad", "b", "c"]
     tasks = (Task(name=name, **NOTHING) for name in names)
-    outcomes = {each.name: each for each in run_on_cluster(tasks, address, die_over_bad)}
+    outcomes = {each.name: each.manifest for each in run_on_cluster(tasks, address, die_over_bad)}
     assert set(outcomes) == set(names)
     assert {name for name, each in outcomes.items() if each.status != "ok"} == {"bad"}
-    assert "ended without a word" in outcomes["bad"].reason and outcomes["bad"].digest == ""
+    assert "ended without a word" in outcomes["bad"].reason and outcomes["bad"].inputs_sha256 is None
 
 
 def test_no_scheduler_is_one_sentence(tmp_path, monkeypatch, capsys):

@@ -4,17 +4,18 @@ import csv
 import io
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import polars
 import pytest
 from many_valves import write_lot
 
-from dzdesign.batch.table import rows_from, safe_cell, table_files
-from dzdesign.batch.valves import by_name, valves_of
+from dzdesign.batch.valves import valves_of
 from dzdesign.command_line.cli import main
-from dzdesign.report.lot.folder import lot_of
 from dzdesign.report.lot.report import report_of_lot
+from dzdesign.report.lot.table import read_table, safe_cell, table_files
+from dzdesign.report.lot.valve_names import by_name
 from tests.support.page_reader import Page
 from tests.support.synthetic_lots import lot_rows, write_lot_folder
 
@@ -24,7 +25,7 @@ COUNTED = ["V1", "V2", "V9", "V10", "V11"]
 HOSTILE = ["=cmd|'/c calc'!A0", "'=1", "''", "-1", "@SUM(A1)", "+49 89 1", 'a,"b"; c', "<b>x</b>", "0815", "ü"]
 
 
-def read_table(folder: Path) -> list[dict[str, str]]:
+def csv_rows(folder: Path) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO((folder / "valves.csv").read_text(encoding="utf-8"))))
 
 
@@ -57,47 +58,29 @@ def counted(tmp_path_factory):
 
 
 def test_all_that_batch_writes_is_in_that_order_and_has_the_records(counted):
-    table = read_table(counted / "out")
+    table = csv_rows(counted / "out")
     assert [row["name"] for row in table] == COUNTED and {row["status"] for row in table} == {"ok", "failed"}
     assert {(row["record.serial"], row["record.oil"]) for row in table} == {("0815", '\'=HLP 46, "40"')}
     frame = polars.read_parquet(counted / "out" / "valves.parquet")
     assert frame["name"].to_list() == COUNTED and set(frame["record.oil"]) == {'=HLP 46, "40"'}
     document = json.loads((counted / "out" / "batch.json").read_text(encoding="utf-8"))
-    assert [each["source"] for each in document["made_from"]] == COUNTED
+    assert [each["source"] for each in document["made_from"]] == [f"valves/{name}/manifest.json" for name in COUNTED]
     assert document["warnings"]["simulated"] == [row["name"] for row in table if row["status"] == "ok"]
-    lot = json.loads((counted / "out" / "common_compensator.json").read_text(encoding="utf-8"))["lot"]
+    lot = json.loads((counted / "out" / "lot_compensator.json").read_text(encoding="utf-8"))["lot"]
     assert [each["name"] for each in lot] == document["warnings"]["simulated"]
     text = Page((counted / "out" / "report.html").read_text(encoding="utf-8")).text
     assert "0815" in text and "serial" in text
 
 
-def test_an_output_in_the_old_order_is_taken_up_and_shown_in_the_new_one(counted, tmp_path, capsys):
-    out = shutil.copytree(counted / "out", tmp_path / "out")
-    rows = sorted(rows_from((out / "valves.csv").read_bytes(), "valves.csv"), key=lambda row: row["name"])
-    old = write_lot_folder(tmp_path / "old", [{k: v for k, v in row.items() if "record" not in k} for row in rows])
-    assert [row["name"] for row in rows] == ["V1", "V10", "V11", "V2", "V9"]
-    assert [row["name"] for row in lot_of(old).rows] == COUNTED and not report_of_lot(old).faults
-    for name in ("batch.json", "valves.csv", "valves.parquet"):
-        shutil.copy(old / name, out / name)
-    records = ["--record", "serial = 0815", "--record", 'oil = =HLP 46, "40"']
-    assert main(["batch", str(counted / "lot"), "-o", str(out), "--jobs", "1", *OPTIONS, *records]) == 1
-    assert "5 valves, 5 of them done before" in capsys.readouterr().err
-    for name in ("batch.json", "valves.csv", "valves.parquet", "common_compensator.json", "report.html"):
-        assert (out / name).read_bytes() == (counted / "out" / name).read_bytes(), name
-
-
 def test_no_cell_is_a_formula_and_every_text_comes_back(tmp_path):
-    rows = lot_rows(4, failed=[2])
-    for row in rows:
-        row |= {f"record.{text}": text for text in HOSTILE} | {"record.serial": HOSTILE[0] if row["reason"] else None}
-    rows[2]["reason"] = "--meter-lag is '0.3 V'"
+    record = {text: text for text in HOSTILE}
+    rows = [replace(row, record=record) for row in lot_rows(4, failed=[2])]
+    rows[0] = replace(rows[0], record={**record, "serial": HOSTILE[0]})
+    rows[2] = replace(rows[2], reason="--meter-lag is '0.3 V'")
     content = table_files(rows)["valves.csv"]
     for line in csv.reader(io.StringIO(content.decode())):
         assert not any(cell.startswith(("=", "+", "-", "@")) for cell in line)
-    words = [{name: cell for name, cell in row.items() if not isinstance(cell, float)} for row in rows]
-    back = rows_from(content, "valves.csv")
-    for row, found in zip(words, back, strict=True):
-        assert {name: found[name] or None for name in row} == {name: cell or None for name, cell in row.items()}
+    assert read_table(content, "valves.csv") == rows
     assert safe_cell("-1") == "'-1" and safe_cell("'-1") == "''-1" and safe_cell("'a") == "'a"
     html = report_of_lot(write_lot_folder(tmp_path / "out", rows)).html
     assert "=cmd|" in html and "<b>x</b>" not in html
@@ -106,10 +89,10 @@ def test_no_cell_is_a_formula_and_every_text_comes_back(tmp_path):
 def test_a_record_that_can_be_none_is_not_in_the_table(counted, tmp_path):
     """The valve fails, and says why; the other has its own serial number."""
     listing = tmp_path / "list.csv"
-    good = next(row["name"] for row in read_table(counted / "out") if row["status"] == "ok")
+    good = next(row["name"] for row in csv_rows(counted / "out") if row["status"] == "ok")
     files = f"{counted}/lot/{good}/*.csv"
     listing.write_text(f'name,files,record.serial\nbad,{files},"{"x" * 300}"\ngood,{files},4711\nnone,{files},\n')
     assert main(["batch", str(listing), "-o", str(tmp_path / "out"), "--jobs", "1", *OPTIONS]) == 1
-    table = {row["name"]: row for row in read_table(tmp_path / "out")}
+    table = {row["name"]: row for row in csv_rows(tmp_path / "out")}
     assert {name: row["record.serial"] for name, row in table.items()} == {"bad": "", "good": "4711", "none": ""}
     assert "300 characters" in table["bad"]["reason"]

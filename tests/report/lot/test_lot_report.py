@@ -5,25 +5,26 @@ import io
 import json
 import re
 import shutil
+from dataclasses import astuple, replace
 from urllib.parse import unquote
 
 import numpy as np
 import pytest
 from many_valves import recordings, write_lot
 
-from dzdesign.batch.reasons import reason_groups
 from dzdesign.batch.results import Results
-from dzdesign.batch.table import SIDE_COLUMNS
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import sha256_of, to_json
 from dzdesign.core.errors import InputError
-from dzdesign.report.lot.folder import lot_of
+from dzdesign.report.lot.folder import read_lot
+from dzdesign.report.lot.reasons import reason_groups
 from dzdesign.report.lot.report import report_of_lot
 from dzdesign.report.lot.sections import HEADINGS
-from dzdesign.report.lot.spread import FAR, quantiles, spread_of
+from dzdesign.report.lot.spread import FAR, LEVELS, quantiles, spread_of
+from dzdesign.report.lot.table import SideFigures
 from tests.support.page_reader import HOSTILE, Page
 from tests.support.schema_checks import overlooked, problems
-from tests.support.synthetic_lots import lot_rows, write_lot_folder
+from tests.support.synthetic_lots import lot_rows, with_figures, write_lot_folder
 
 OPTIONS = ["--meter-lag", "0.1 s", "--target", "host", "--jobs", "1"]
 
@@ -69,14 +70,14 @@ def test_the_batch_writes_the_report_and_it_leads_with_the_verdict(made):
     assert "4 of 6 valves calibrated, 2 NOT" in top and "2 failed: V0001, V0004" in top
     assert "SIMULATED recordings, not of measured valves: V0000" in top
     assert document["warnings"]["simulated"] == [f"V000{at}" for at in (0, 2, 3, 5)]
-    for column in ("dead_zone_opening_percent", "dead_zone_closing_percent", "common_extra_dead_zone_percent"):
+    for column in ("dead_zone_opening_percent", "dead_zone_closing_percent", "lot_extra_dead_zone_percent"):
         at = document["quantiles"][column]
-        assert f"{at['0.5']:.2f} %" in top and f"all from {at['0']:.2f} to {at['1']:.2f} %" in top
+        assert f"{at['median']:.2f} %" in top and f"all from {at['least']:.2f} to {at['largest']:.2f} %" in top
     ids = [attributes["id"] for _, attributes in Page(html).tags if "id" in attributes]
     assert [name for name, _ in HEADINGS] == [name for name in ids if name in dict(HEADINGS)]
     assert len(ids) == len(set(ids))
     assert {link["href"][1:] for link in Page(html).of("a") if link["href"].startswith("#")} <= set(ids)
-    hashes = [document["files"]["valves.csv"], document["common_setting"]["sha256"]]
+    hashes = [document["files"]["valves.csv"], document["lot_setting"]["sha256"]]
     assert all(digest in html for digest in (*hashes, sha256_of((made / "batch.json").read_bytes())))
 
 
@@ -103,7 +104,7 @@ def test_a_lot_without_a_report_has_its_table(made, tmp_path, monkeypatch, capsy
     def too_large(_folder):
         raise InputError("valves.csv is larger than 16 MiB")
 
-    monkeypatch.setattr("dzdesign.report.lot.report.report_of_lot", too_large)
+    monkeypatch.setattr("dzdesign.batch.command.report_of_lot", too_large)
     out = shutil.copytree(made, tmp_path / "out")
     assert main(["batch", str(made.parent / "lot"), "-o", str(out), *OPTIONS, "--json"]) == 1
     said = capsys.readouterr()
@@ -128,37 +129,47 @@ def test_a_table_too_large_for_a_page_is_one_sentence_and_leaves_no_page_of_an_e
 
 def test_what_is_odd_is_in_the_verdict_and_all_of_it_below(copied, tmp_path):
     document = json.loads((copied / "batch.json").read_bytes())
-    assert document["oddities"] == [] and "odd:" not in head(report_of_lot(copied).html)
-    document["oddities"] = [f"V{at}, <b>V{at + 1}</b> share a recording" for at in range(5)]
+    assert document["anomalies"] == [] and "odd:" not in head(report_of_lot(copied).html)
+    document["anomalies"] = [f"V{at}, <b>V{at + 1}</b> share a recording" for at in range(5)]
     (copied / "batch.json").write_text(json.dumps(document))
     html = report_of_lot(copied).html
     assert head(html).count("share a recording") == 3 and "odd: 2 more" in head(html)
     assert html.count("share a recording.") == 5 and "<b>V1</b>" not in html
-    document["oddities"] = "two"
+    document["anomalies"] = "two"
     (copied / "batch.json").write_text(json.dumps(document))
-    with pytest.raises(InputError, match="'oddities'"):
+    with pytest.raises(InputError, match="'anomalies'"):
         report_of_lot(copied)
-    del document["oddities"]  # of an older version
-    (copied / "batch.json").write_text(json.dumps(document))
-    assert not report_of_lot(copied).faults
 
 
 def test_batch_json_fits_its_schema_and_every_fault_in_it_is_seen(made):
     document = json.loads((made / "batch.json").read_bytes())
     assert problems("batch", document) == []
     assert overlooked("batch", document) == []
-    for key in set(document) - {"schema", "tool", "complete"}:
+    for key in document:
         assert problems("batch", {name: value for name, value in document.items() if name != key}), key
-    setting = document["common_setting"]
+    setting = document["lot_setting"]
     assert setting["without_binding"]["left_out"]
     for key in setting:
         lacking = {name: value for name, value in setting.items() if name != key}
-        assert problems("batch", {**document, "common_setting": lacking}), key
-    for other in ({"why_not": "one valve only"}, {**setting, "without_binding": None}):
-        assert problems("batch", {**document, "common_setting": other}) == []
-    assert problems("batch", {**document, "common_setting": {**setting, "why_not": "both"}})
-    stopped = {key: document[key] for key in ("schema", "tool")} | {"complete": False}
-    assert problems("batch", {**stopped, "names": ["V1"]}) == [] and problems("batch", stopped)
+        assert problems("batch", {**document, "lot_setting": lacking}), key
+    assert problems("batch", {**document, "lot_setting": {**setting, "without_binding": None}}) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"calibrated": 5}, "'calibrated' is 5, but 4 follows"),
+        ({"valves": 1}, "'failed' names 2 valves"),
+        ({"why_no_lot_setting": "both"}, "expected one of them"),
+        ({"lot_setting": None}, "expected one of them"),
+        ({"quantiles": {"offset_V": {"least": 1.0}}}, "'quantiles.offset_V"),
+    ],
+)
+def test_a_batch_json_that_contradicts_itself_is_refused(change, said, copied):
+    document = json.loads((copied / "batch.json").read_bytes())
+    (copied / "batch.json").write_text(to_json({**document, **change}))
+    with pytest.raises(InputError, match=re.escape(said)):
+        report_of_lot(copied)
 
 
 def test_every_valve_not_calibrated_has_its_reason_and_what_to_do(made):
@@ -168,14 +179,14 @@ def test_every_valve_not_calibrated_has_its_reason_and_what_to_do(made):
 
 
 def test_what_the_setting_would_cost_without_those_that_hold_it_down(made):
-    common = json.loads((made / "batch.json").read_bytes())["common_setting"]
+    common = json.loads((made / "batch.json").read_bytes())["lot_setting"]
     without = common["without_binding"]
     assert without["left_out"] == common["binding"] == ["V0003"]
-    with_all = json.loads((made / "batch.json").read_bytes())["quantiles"]["common_extra_dead_zone_percent"]
+    with_all = json.loads((made / "batch.json").read_bytes())["quantiles"]["lot_extra_dead_zone_percent"]
     (at,) = without["quantiles"].values()
-    assert at["1"] < with_all["1"] and at["0.5"] < with_all["0.5"]
+    assert at["largest"] < with_all["largest"] and at["median"] < with_all["median"]
     html = (made / "report.html").read_text(encoding="utf-8")
-    assert f"would cost {at['0.5']:.2f} % of command at the median valve" in html
+    assert f"would cost {at['median']:.2f} % of command at the median valve" in html
 
 
 def test_one_valve_of_the_lot_has_its_own_report_and_one_without_calibration_its_reason(made, tmp_path, capsys):
@@ -196,7 +207,7 @@ def test_the_tables_in_the_page_are_the_files(made):
     shown = list(csv.DictReader(io.StringIO(tables["thresholds.csv"])))
     opening = {row["valve"]: row["value"] for row in shown if row["quantity"] == "knee_opening_V"}
     assert opening == {row["name"]: row["knee_opening_V"] for row in rows if row["status"] == "ok"}
-    assert {"law.csv", "order.csv", "left.csv", "common.csv", "spread.csv", "not-calibrated.csv"} <= set(tables)
+    assert {"law.csv", "order.csv", "left.csv", "lot-setting.csv", "spread.csv", "not-calibrated.csv"} <= set(tables)
 
 
 # --- files that do not fit -------------------------------------------------------------------------------------------
@@ -207,7 +218,7 @@ def test_the_tables_in_the_page_are_the_files(made):
     [
         ("valves.csv", "valves.csv was changed since `dzdesign batch` wrote it"),
         ("valves.parquet", "valves.parquet was changed since"),
-        ("common_compensator.json", "common_compensator.json was changed since"),
+        ("lot_compensator.json", "lot_compensator.json was changed since"),
         ("valves/V0002/valve.json", "not those that the table was made from (1): V0002/valve.json"),
         ("valves/V0003/firmware/manifest.json", "V0003/firmware/manifest.json"),
     ],
@@ -229,17 +240,17 @@ def test_a_table_that_was_changed_is_not_shown(copied):
 
 def test_counts_that_the_table_does_not_have(copied):
     document = json.loads((copied / "batch.json").read_bytes())
-    (copied / "batch.json").write_text(to_json({**document, "calibrated": 6}))
+    (copied / "batch.json").write_text(to_json({**document, "calibrated": 6, "failed": []}))
     assert any("the table has 4" in fault for fault in report_of_lot(copied).faults)
 
 
 def test_files_that_are_gone_are_missing(copied):
     shutil.rmtree(copied / "valves")
-    (copied / "common_compensator.json").unlink()
+    (copied / "lot_compensator.json").unlink()
     report = report_of_lot(copied)
     assert not report.faults and "4 of 6 valves" in report.verdict
     assert [line.partition(":")[0] for line in report.missing] == [
-        "common_compensator.json", "the folders of the valves", "the evidence of each valve"
+        "lot_compensator.json", "the folders of the valves", "the evidence of each valve"
     ]  # fmt: skip
     (copied / "valves.csv").unlink()
     assert "the table is not here" in report_of_lot(copied).verdict
@@ -255,6 +266,7 @@ def test_files_that_are_gone_are_missing(copied):
         (lambda text: text + "V9,ok\n", "has 2 cells, expected"),
         (lambda text: text.partition("\n")[0] + "\n", "has no valve"),
         (lambda text: "", "lacks the column 'name'"),
+        (lambda text: text.replace(",ok,", ",fine,", 1), "'status' is 'fine', expected a status"),
         (lambda text: text.replace("ok", "\ud800"), "no table in UTF-8"),
     ],
 )
@@ -270,7 +282,7 @@ def test_a_table_that_is_none_is_named(change, said, copied, capsys):
     assert main(["report", str(copied)]) == 2 and "Traceback" not in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("key", ["files", "valves", "verified", "common_setting"])
+@pytest.mark.parametrize("key", ["files", "valves", "verified", "lot_setting"])
 def test_a_batch_json_without_a_key_is_refused(key, copied):
     document = json.loads((copied / "batch.json").read_bytes())
     del document[key]
@@ -287,7 +299,7 @@ def test_a_batch_that_was_stopped_says_what_is_there(copied):
     shutil.rmtree(copied / "valves" / "V0005")
     report = report_of_lot(copied)
     assert report.verdict == "NOT FINISHED: 5 of 9 valves tried, 3 calibrated" and report.holds is False
-    assert any(line.startswith("4 of 9 valves, the table and the common setting") for line in report.missing)
+    assert any(line.startswith("4 of 9 valves, the table and the lot setting") for line in report.missing)
     assert report.html.count("<figure") == 4 and "made at the end of a batch" in report.html
     assert "no-saturation" in report.html and "is a lower bound of the stroke" in report.html
     shutil.rmtree(copied / "valves")
@@ -301,7 +313,7 @@ def test_good_is_only_a_lot_that_is_calibrated_and_verified(on_paper):
     report = report_of_lot(on_paper(lot_rows(8)))
     assert (report.kind, report.holds) == ("open", None) and "NOT VERIFIED" in report.verdict
     rows = lot_rows(8)
-    rows[3] |= {"status": "does not hold", "reason": "no flow at zero command: 0.2 L/min at 1 MPa"}
+    rows[3] = replace(rows[3], status="does not hold", reason="no flow at zero command: 0.2 L/min at 1 MPa")
     report = report_of_lot(on_paper(rows, verified=True))
     assert (report.kind, report.holds) == ("bad", False) and "1 does not hold: V0003" in head(report.html)
 
@@ -309,7 +321,7 @@ def test_good_is_only_a_lot_that_is_calibrated_and_verified(on_paper):
 def test_a_lot_of_nothing_but_failures(on_paper):
     report = report_of_lot(on_paper(lot_rows(5, failed=range(5))))
     assert report.verdict == "NONE of 5 valves calibrated" and report.kind == "bad"
-    assert "<figure" not in report.html and "There is no common setting" in report.html
+    assert "<figure" not in report.html and "There is no lot setting" in report.html
 
 
 def test_a_lot_of_one_valve(on_paper):
@@ -320,8 +332,8 @@ def test_a_lot_of_one_valve(on_paper):
 
 def test_a_bipolar_lot_shows_both_sides(on_paper):
     rows = lot_rows(12, bipolar=True)
-    for column in SIDE_COLUMNS:
-        rows[4][f"negative_{column}"] = None  # a side that was refused
+    refused = {**rows[4].sides, "negative": SideFigures()}
+    rows[4] = replace(rows[4], sides=refused)
     html = report_of_lot(on_paper(rows)).html
     names = ("thresholds", "law", "order", "left")
     assert all(f'id="figure-{name}-{side}"' in html for name in names for side in ("positive", "negative"))
@@ -351,7 +363,7 @@ def test_bipolar_valves_through_the_command(tmp_path, capsys):
     assert main(["batch", str(tmp_path / "lot"), "-o", str(tmp_path / "out"), *OPTIONS, *signal]) == 0
     html = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "2 of 2 valves calibrated" in head(html) and "Negative side: it leaves" in html
-    assert 'id="figure-common"' in html and 'id="figure-left-negative"' in html
+    assert 'id="figure-lot-setting"' in html and 'id="figure-left-negative"' in html
     assert "positive: all from " in head(html) and "negative: all from " in head(html)
 
 
@@ -368,7 +380,7 @@ def test_a_thousand_valves_fit_a_page(on_paper):
 
 def test_a_valve_far_from_the_rest_is_named_and_no_other(on_paper):
     rows = lot_rows(60, seed=5)
-    rows[7]["offset_V"] = 4.2
+    rows[7] = with_figures(rows[7], offset_V=4.2)
     html = report_of_lot(on_paper(rows)).html
     (found,) = csv.DictReader(io.StringIO(downloads(html)["far-from-the-rest.csv"]))
     assert (found["valve"], found["quantity"]) == ("V0007", "offset_V") and float(found["robust_sd_from_median"]) < -FAR
@@ -381,27 +393,26 @@ def test_a_valve_far_from_the_rest_is_named_and_no_other(on_paper):
 def test_the_rule_is_blind_to_what_a_few_valves_do(on_paper):
     """Of 40 valves nine may be anywhere: mean and standard deviation would hide them, median and MAD do not."""
     rows = lot_rows(40)
-    for row in rows[:9]:
-        row["knee_opening_V"] = 9.0
+    rows[:9] = (with_figures(row, knee_opening_V=9.0) for row in rows[:9])
     spread = spread_of(rows, "knee_opening_V", "")
-    assert {name for name, _ in spread.far()} == {row["name"] for row in rows[:9]}
+    assert {name for name, _ in spread.far()} == {row.name for row in rows[:9]}
     assert 0.06 < spread.deviation < 0.3  # of the others: 0.12
 
 
 def test_a_quantity_without_spread_makes_no_valve_far():
-    rows = [{**row, "beta_at_highest_dp": 1.0} for row in lot_rows(20)]
-    rows[3]["beta_at_highest_dp"] = 0.9
+    rows = [with_figures(row, beta_at_highest_dp=1.0) for row in lot_rows(20)]
+    rows[3] = with_figures(rows[3], beta_at_highest_dp=0.9)
     spread = spread_of(rows, "beta_at_highest_dp", "")
     assert spread.limits is None and spread.far() == ()
 
 
 def test_reasons_of_one_kind_stand_together():
     rows = lot_rows(20, failed=range(2, 20, 2))
-    rows[3] |= {"status": "failed", "reason": "unexpected ZeroDivisionError: of ours"}
-    rows[5] |= {"status": "does not hold", "reason": "every input: 7 wrong; see there"}
-    groups = reason_groups([row for row in rows if row["status"] != "ok"])
-    rows[7] |= {"status": "failed", "reason": "'a.csv' has 13 complete rows, expected at least 20 of a ramp test"}
-    (short,) = reason_groups([rows[7]])
+    rows[3] = replace(rows[3], status="failed", reason="unexpected ZeroDivisionError: of ours")
+    rows[5] = replace(rows[5], status="does not hold", reason="every input: 7 wrong; see there")
+    groups = reason_groups([row for row in rows if not row.calibrated])
+    few = "'a.csv' has 13 complete rows, expected at least 20 of a ramp test"
+    (short,) = reason_groups([replace(rows[7], status="failed", reason=few)])
     assert (short.what, short.advice) == ("'a.csv' has 13 complete rows", "expected at least 20 of a ramp test")
     assert [len(group.valves) for group in groups] == [9, 1, 1]
     assert groups[0].what == "'ramp_dP1.csv' row …, column 'u_V': 'overload' is not a number"
@@ -417,10 +428,10 @@ def test_nobodys_text_becomes_markup(on_paper):
     rows = lot_rows(20, failed=(3, 4))
     clean = Page(report_of_lot(on_paper(rows)).html)
     for place, name in enumerate(HOSTILE):
-        rows[10 + place]["name"] = name + "x" * 300 * (place == 2)
-        rows[10 + place]["offset_V"] = 1.0 + place / 10
-        rows[10 + place]["warnings"] = "<b>x</b> no-saturation"
-    rows[3] |= {"name": HOSTILE[0] + "y", "reason": " ".join(HOSTILE)}
+        row = with_figures(rows[10 + place], offset_V=1.0 + place / 10)
+        warnings = ("<b>x</b>", "no-saturation")
+        rows[10 + place] = replace(row, name=name + "x" * 300 * (place == 2), warnings=warnings)
+    rows[3] = replace(rows[3], name=HOSTILE[0] + "y", reason=" ".join(HOSTILE))
     html = report_of_lot(on_paper(rows)).html
     page = Page(html)
     kinds = {tag for tag, _ in page.tags}
@@ -443,10 +454,10 @@ def test_names_reach_no_file_outside_of_the_valves(on_paper, tmp_path):
     rows = lot_rows(9)
     (tmp_path / "secret").mkdir()
     (tmp_path / "secret" / "valve.json").write_text("{}")
-    rows[0] |= {"name": "../../secret", "valve_json_sha256": sha256_of(b"{}")}
+    rows[0] = replace(rows[0], name="../../secret", hashes={"valve_json_sha256": sha256_of(b"{}")})
     folder = on_paper(rows)
     (folder / "valves").mkdir()
-    assert any("../../secret" in fault for fault in lot_of(folder).faults)
+    assert any("../../secret" in fault for fault in read_lot(folder).faults)
 
 
 @pytest.mark.parametrize(("count", "strip"), [(2, True), (10, True), (11, False), (60, False)])
@@ -461,16 +472,15 @@ def test_of_few_valves_each_is_a_dot_with_its_name_and_of_many_there_are_bars(co
 
 def test_valves_without_spread_have_a_figure(tmp_path):
     row, *_ = lot_rows(1)
-    html = report_of_lot(write_lot_folder(tmp_path / "lot", [{**row, "name": name} for name in ("a", "b", "c")])).html
+    html = report_of_lot(write_lot_folder(tmp_path / "lot", [replace(row, name=name) for name in "abc"])).html
     figure = re.search('id="figure-law".*?</figure>', html, re.DOTALL)[0]
     assert ">all 3</text>" in figure and ">valves</text>" not in figure
 
 
 def test_the_median_of_an_even_lot_is_the_mean_of_the_two_middle_ones():
-    assert quantiles([4.0, 1.0, 2.0, 9.0])["0.5"] == 3.0 and quantiles([4.0, 1.0, 2.0])["0.5"] == 2.0
+    assert quantiles([4.0, 1.0, 2.0, 9.0]).median == 3.0 and quantiles([4.0, 1.0, 2.0]).median == 2.0
     values = list(np.random.default_rng(5).normal(5, 1, 61).round(7))
     for count in range(1, len(values)):
         at = quantiles(values[:count])
-        assert (at["0"], at["1"]) == (min(values[:count]), max(values[:count]))  # of valves, that can be named
-        wanted = np.quantile(values[:count], [float(q) for q in at])
-        np.testing.assert_allclose(list(at.values()), wanted, atol=1e-7)
+        assert (at.least, at.largest) == (min(values[:count]), max(values[:count]))  # of valves, that can be named
+        np.testing.assert_allclose(astuple(at), np.quantile(values[:count], LEVELS), atol=1e-7)

@@ -7,6 +7,7 @@ one ramp rate that can't be told from hysteresis; a second rate moves the knees 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -36,7 +37,7 @@ class MeterLag:
 
     seconds: float
     se: float
-    origin: str
+    origin: Literal["declared", "identified", "unknown"]
 
 
 def find_lag(ramps: Sequence[Ramp], options: IdentifyOptions) -> MeterLag:

@@ -135,7 +135,7 @@ class _LotFiles:
 
     def lot(self, own_hash: tuple[str, str]) -> Lot:
         table = self._table()
-        rows = read_table(table, str(self.folder / TABLE)) if table else []
+        rows = [] if table is None else read_table(table, str(self.folder / TABLE))
         counted = {
             "valves": (self.summary.valves, len(rows)),
             "calibrated": (self.summary.calibrated, sum(row.calibrated for row in rows)),
@@ -143,7 +143,7 @@ class _LotFiles:
         self.faults += [
             f"{SUMMARY_NAME} was changed: it counts {stated} valves as '{key}', the table has {count}"
             for key, (stated, count) in counted.items()
-            if table and stated != count
+            if table is not None and stated != count
         ]
         if setting := self.summary.lot_setting:
             self._fitting(setting.file, setting.sha256)
@@ -152,7 +152,7 @@ class _LotFiles:
             tool=self.summary.tool,
             summary=self.summary,
             rows=tuple(rows),
-            table=table.decode("utf-8"),
+            table="" if table is None else table.decode("utf-8"),
             expected=self.summary.valves,
             hashes=(own_hash, *((name, digest) for name, digest in self.hashes if name != "valves.parquet")),
             compared=(self.folder / VALVES).is_dir(),
@@ -161,7 +161,7 @@ class _LotFiles:
             missing=tuple(self.missing),
         )
 
-    def _table(self) -> bytes:
+    def _table(self) -> bytes | None:
         """Return valves.csv if it is as it was written, and compare the other files of the table."""
         path = self.folder / TABLE
         if path.is_file() and path.stat().st_size > MOST_TABLE:
@@ -175,7 +175,7 @@ class _LotFiles:
         found = {
             name: self._fitting(name, stated) for name, stated in self.summary.files.items() if NAME.fullmatch(name)
         }
-        return found[TABLE] or b""
+        return found[TABLE]
 
     def _fitting(self, name: str, stated: str) -> bytes | None:
         """Return a file's content; where it is gone or its hash is another, say so and return None."""

@@ -1,138 +1,109 @@
-"""Acceptance tables of the report: the paper's numbers beside ours, and the user's limits on recordings."""
+"""Section on acceptance: the paper's numbers beside ours, and the user's limits on recordings."""
 
-from typing import Any
+from collections.abc import Sequence
 
-from dzdesign.report.sections.cells import Cell, Table, number, verdict
+from dzdesign.assess.assessment import Assessment
+from dzdesign.assess.quantities import Reading
+from dzdesign.report.page import Section
+from dzdesign.report.reproduction import Outcome, PaperNumber, Reproduction
+from dzdesign.report.sections.cells import Cell, Table, in_number_font, number, table_of, verdict
 
 #: Decimals in the unit of a quantity.
 DECIMALS = {"%": 2, "L/min": 3, "L/min/V": 4}
 
 
-def paper_tables(document: dict[str, Any]) -> tuple[Table, ...]:
-    """Return the paper's numbers beside ours, one table a valve.
+def acceptance_section(assessment: Assessment | None, reproduction: Reproduction | None) -> Section:
+    """Return the section on acceptance."""
+    tables: list[Table] = []
+    if assessment:
+        tables += [_limits_table(assessment)] if assessment.limits else []
+        tables.append(_before_after_table(assessment))
+    if reproduction:
+        for valve in dict.fromkeys(row.valve for row in reproduction.numbers):
+            tables.append(_paper_table(valve, [row for row in reproduction.numbers if row.valve == valve]))
+    missing = (
+        "No acceptance table is here: `dzdesign assess` compares recordings with limits, `dzdesign reproduce` the "
+        "paper's numbers."
+    )
+    return Section(tables=tuple(tables), missing="" if tables else missing, optional=True)
 
-    Parameters
-    ----------
-    document : dict
-        reproduction.json.
-    """
-    valves = dict.fromkeys(row["valve"] for row in document["rows"])
-    return tuple(_paper_table(valve, [row for row in document["rows"] if row["valve"] == valve]) for valve in valves)
 
-
-def _paper_table(valve: str, rows: list[dict[str, Any]]) -> Table:
+def _paper_table(valve: str, rows: Sequence[PaperNumber]) -> Table:
     """Return the numbers of one valve; why each may differ stands below, once."""
-    notes: dict[str, str] = {}
-    cells = []
-    for row in rows:
-        ours = {each["by"]: _ours(each) for each in row["outcomes"]}
-        marks = [notes.setdefault(text, f"[{len(notes) + 1}]") for text in (row["tolerance"], row["why"]) if text]
-        cells.append(
-            (
-                Cell(text=row["quantity"]),
-                Cell(text="–" if row["dp_MPa"] is None else f"{row['dp_MPa']:g}", kind="number"),
-                Cell(text=f"{row['published']} {'' if row['unit'] == '1' else row['unit']}".strip(), kind="number"),
-                *(Cell(text=ours.get(by, "–"), kind="number") for by in ("valve", "paper's law", "product")),
-                Cell(text="not required") if row["holds"] is None else verdict(row["holds"]),
-                Cell(text=" ".join(marks), kind="number"),
-            )
-        )
-    return Table(
-        caption=f"The paper's {valve}",
-        columns=("quantity", "dP (MPa)", "published", "bare valve", "paper's law", "product", "agrees", "notes"),
-        rows=tuple(cells),
-        notes=tuple(f"{mark} {text}" for text, mark in notes.items()),
+    texts = dict.fromkeys(text for row in rows for text in (row.tolerance, row.why) if text)
+    marks = {text: f"[{place}]" for place, text in enumerate(texts, start=1)}
+
+    def ours(row: PaperNumber, by: str) -> Cell:
+        return in_number_font(next((_ours(each) for each in row.outcomes if each.by == by), "–"))
+
+    return table_of(
+        f"The paper's {valve}",
+        rows,
+        ("quantity", lambda row: row.quantity),
+        ("dP (MPa)", lambda row: in_number_font("–" if row.dp_MPa is None else f"{row.dp_MPa:g}")),
+        ("published", lambda row: in_number_font(f"{row.published} {'' if row.unit == '1' else row.unit}".strip())),
+        ("bare valve", lambda row: ours(row, "valve")),
+        ("paper's law", lambda row: ours(row, "paper's law")),
+        ("product", lambda row: ours(row, "product")),
+        ("agrees", lambda row: "not required" if row.holds is None else verdict(row.holds)),
+        ("notes", lambda row: in_number_font(" ".join(marks[text] for text in (row.tolerance, row.why) if text))),
+        notes=[f"{mark} {text}" for text, mark in marks.items()],
     )
 
 
-def _ours(outcome: dict[str, Any]) -> str:
-    if outcome["value"] is None:
+def _ours(outcome: Outcome) -> str:
+    if outcome.value is None:
         return "not compared"
-    text = f"{outcome['value']:.2f}"
-    return text if outcome["difference"] is None else f"{text} ({outcome['difference']:+.2f})".replace("-", "−")
+    text = f"{outcome.value:.2f}"
+    return text if outcome.difference is None else f"{text} ({outcome.difference:+.2f})".replace("-", "−")
 
 
-def limits_table(document: dict[str, Any]) -> Table | None:
-    """Return the user's limits with their verdicts; None if none were given.
-
-    Parameters
-    ----------
-    document : dict
-        assessment.json.
-    """
-    if not document["limits"]:
-        return None
-    return Table(
-        caption="The limits that were set",
-        columns=("verdict", "quantity", "where", "limit", "found"),
-        rows=tuple(
-            (
-                verdict(each["holds"]),
-                Cell(text=_name(document, each["quantity"])),
-                Cell(text=each["place"]),
-                Cell(text=f"{each['limit']:.4g} {each['unit']}", kind="number"),
-                Cell(text=each["text"]),
-            )
-            for each in document["limits"]
-        ),
+def _limits_table(assessment: Assessment) -> Table:
+    """Return the user's limits with their verdicts."""
+    return table_of(
+        "The limits that were set",
+        assessment.limits,
+        ("verdict", lambda one: verdict(one.holds)),
+        ("quantity", lambda one: _name(assessment, one.quantity)),
+        ("where", lambda one: one.place),
+        ("limit", lambda one: in_number_font(f"{one.limit:.4g} {one.unit}")),
+        ("found", lambda one: one.text),
     )
 
 
-def assessed_table(document: dict[str, Any]) -> Table:
-    """Return each quantity before and after, at every pressure drop.
-
-    Parameters
-    ----------
-    document : dict
-        assessment.json.
-    """
-    rows = []
-    compared = [item for item in document["pressures"] if any(_is_after(sets) for sets in item["quantities"].values())]
-    for item in compared or document["pressures"]:
-        for key, sets in item["quantities"].items():
-            before, after = (_reading(document, key, sets.get(name)) for name in ("before", "after"))
-            if {before, after} - {"–", "not seen"}:
-                rows.append(
-                    (
-                        number(item["dp_MPa"], 2),
-                        Cell(text=item["side"]),
-                        Cell(text=_name(document, key)),
-                        Cell(text=before, kind="number"),
-                        Cell(text=after, kind="number"),
-                        Cell(text=_unit(document, key)),
-                    )
-                )
-    return Table(
-        caption="Recordings without and with the compensator, at the pressure drops that have both",
-        columns=("dP (MPa)", "commands", "quantity", "before", "after", "unit"),
-        rows=tuple(rows),
+def _before_after_table(assessment: Assessment) -> Table:
+    """Return each quantity before and after, at every pressure drop."""
+    compared = [item for item in assessment.pressures if item.readings("after")]
+    rows = [
+        (item, key, _reading(assessment, key, both.before), _reading(assessment, key, both.after))
+        for item in compared or assessment.pressures
+        for key, both in item.quantities.items()
+    ]
+    return table_of(
+        "Recordings without and with the compensator, at the pressure drops that have both",
+        [row for row in rows if {row[2], row[3]} - {"–", "not seen"}],
+        ("dP (MPa)", lambda row: number(row[0].dp_MPa, 2)),
+        ("commands", lambda row: row[0].side),
+        ("quantity", lambda row: _name(assessment, row[1])),
+        ("before", lambda row: in_number_font(row[2])),
+        ("after", lambda row: in_number_font(row[3])),
+        ("unit", lambda row: _unit(assessment, row[1])),
     )
 
 
-def _is_after(sets: Any) -> bool:
-    return isinstance(sets, dict) and isinstance(sets.get("after"), dict)
+def _name(assessment: Assessment, key: str) -> str:
+    return assessment.quantities[key].name if key in assessment.quantities else key
 
 
-def _entry(document: dict[str, Any], key: str, what: str) -> str:
-    entry = document["quantities"].get(key)
-    return str(entry[what]) if isinstance(entry, dict) and what in entry else ""
+def _unit(assessment: Assessment, key: str) -> str:
+    return assessment.quantities[key].unit if key in assessment.quantities else ""
 
 
-def _name(document: dict[str, Any], key: str) -> str:
-    return _entry(document, key, "name") or key
-
-
-def _unit(document: dict[str, Any], key: str) -> str:
-    return _entry(document, key, "unit")
-
-
-def _reading(document: dict[str, Any], key: str, reading: Any) -> str:
+def _reading(assessment: Assessment, key: str, reading: Reading | None) -> str:
     """Return a value, or the bound of what can't be seen."""
-    if not isinstance(reading, dict):
+    if reading is None:
         return "–"
-    digits = DECIMALS.get(_unit(document, key), 3)
-    if isinstance(reading.get("value"), int | float):
-        return number(reading["value"], digits).text
-    if isinstance(reading.get("at_most"), int | float):
-        return f"≤ {number(reading['at_most'], digits).text}"
-    return "not seen" if reading.get("not_observable") else "–"
+    digits = DECIMALS.get(_unit(assessment, key), 3)
+    if reading.value is not None:
+        return number(reading.value, digits).text
+    return "not seen" if reading.at_most is None else f"≤ {number(reading.at_most, digits).text}"

@@ -1,12 +1,14 @@
 """Tables of the report: cells with a meaning, not with markup."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 from dzdesign.core.verdicts import verdict_words
 
-#: The sign beside a verdict: colour is never the only carrier.
-SIGNS = {True: "✓", False: "✗", None: "?"}
+#: The sign beside a verdict, so that its colour is not its only carrier, and its kind.
+VERDICTS = {True: ("✓", "good"), False: ("✗", "bad"), None: ("?", "open")}
+Item = TypeVar("Item")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,6 +57,39 @@ class Table:
     notes: tuple[str, ...] = ()
 
 
+def table_of(
+    caption: str,
+    items: Iterable[Item],
+    *columns: tuple[str, Callable[[Item], Cell | str]],
+    csv: str = "",
+    name: str = "",
+    notes: Sequence[str] = (),
+) -> Table:
+    """Return a table with a row an item; a column is its heading and what makes a cell of an item.
+
+    Parameters
+    ----------
+    caption : str
+    items : iterable
+    *columns : (str, callable)
+    csv, name : str
+        All rows, to be downloaded under that name.
+    notes : sequence of str
+    """
+    return Table(
+        caption=caption,
+        columns=tuple(heading for heading, _ in columns),
+        rows=tuple(tuple(_cell(made(item)) for _, made in columns) for item in items),
+        csv=csv,
+        name=name,
+        notes=tuple(notes),
+    )
+
+
+def _cell(cell: Cell | str) -> Cell:
+    return cell if isinstance(cell, Cell) else Cell(text=cell)
+
+
 def number(value: float | None, digits: int, sign: str = "") -> Cell:
     """Return a number with so many decimals; a dash for None.
 
@@ -71,11 +106,16 @@ def number(value: float | None, digits: int, sign: str = "") -> Cell:
     ('1.2', '–', '0.0')
     """
     if value is None:
-        return Cell(text="–", kind="number")
-    shown = f"{value:{sign}.{digits}f}"
-    if float(shown) == 0:
-        shown = f"{0.0:{sign}.{digits}f}"
-    return Cell(text=shown.replace("-", "−"), kind="number")
+        return in_number_font("–")
+    text = f"{value:{sign}.{digits}f}"
+    if float(text) == 0:
+        text = f"{0.0:{sign}.{digits}f}"
+    return in_number_font(text.replace("-", "−"))
+
+
+def in_number_font(text: str) -> Cell:
+    """Return a text set as numbers are: such as a number with its unit, or a range."""
+    return Cell(text=text, kind="number")
 
 
 def whole(value: int) -> str:
@@ -110,21 +150,6 @@ def counted(count: int, noun: str) -> str:
 
 
 def verdict(holds: bool | None) -> Cell:
-    """Return a verdict with its sign.
-
-    Parameters
-    ----------
-    holds : bool or None
-        None: not checked.
-    """
-    return Cell(text=f"{SIGNS[holds]} {verdict_words(holds)}", kind={True: "good", False: "bad", None: "open"}[holds])
-
-
-def text_row(cells: Sequence[str]) -> tuple[Cell, ...]:
-    """Return a row of words.
-
-    Parameters
-    ----------
-    cells : sequence of str
-    """
-    return tuple(Cell(text=cell) for cell in cells)
+    """Return a verdict with its sign; None: not checked."""
+    sign, kind = VERDICTS[holds]
+    return Cell(text=f"{sign} {verdict_words(holds)}", kind=kind)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from dzdesign.assess.flow_curves import CELL, ZERO, FlowCurve, PressureCurves
-from dzdesign.assess.valve_quantities import L_MIN, Reading, hidden
+from dzdesign.assess.quantities import L_MIN, Reading, hidden, in_units, observed
 from dzdesign.identify.knees.linear_region import GATE, fit_line
 from dzdesign.identify.knees.noise import median
 from dzdesign.identify.knees.profile import crossing
@@ -27,7 +27,7 @@ FEWEST_CELLS = 10
 def read_quantities(
     curves: PressureCurves, *, u_max: float, level: float, rated: float, window: tuple[float, float]
 ) -> dict[str, Reading]:
-    """Read every quantity of one set at one pressure drop; symmetry, which needs both sides, is not among them.
+    """Read every quantity of one set at one pressure drop, in its unit; symmetry, which needs both sides, is missing.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def read_quantities(
         Commands between which linearity is taken, over u_max.
     """
     rising, falling = curves.rising, curves.falling
-    return {
+    si = {
         "dead_zone_opening": _dead_zone(rising, "rising", level, u_max),
         "dead_zone_closing": _dead_zone(falling, "falling", level, u_max),
         "knee_opening": _knee(rising, "rising", u_max),
@@ -51,8 +51,9 @@ def read_quantities(
         "linearity": _linearity(curves, rated, window, u_max),
         "gain": _gain(curves),
         "flow_at_zero": _flow_at_zero(curves),
-        "largest_flow": Reading(value=curves.q_max),
+        "largest_flow": observed(curves.q_max),
     }
+    return in_units(si)
 
 
 def _no_branch(direction: str) -> Reading:
@@ -102,11 +103,11 @@ def _passing(curve: FlowCurve, level: float, noise: float, u_max: float) -> Read
                 f"the flow lies above the level from the first recorded command of {u[0]:.3g} V on; record from zero",
                 at_most=float(u[0]) / u_max,
             )
-        return Reading(value=0.0, note="the flow lies above the level at every command, at zero too")
+        return observed(0.0, note="the flow lies above the level at every command, at zero too")
     next_ = int(np.clip(np.searchsorted(u, at), 1, u.size - 1))
     step = float(u[next_] - u[next_ - 1])
     rise = max(crossing(u, q, 2 * level) - at, step)
-    return Reading(value=at / u_max, se=math.hypot(step / math.sqrt(12), noise / level * rise) / u_max)
+    return observed(at / u_max, se=math.hypot(step / math.sqrt(12), noise / level * rise) / u_max)
 
 
 def _knee(curve: FlowCurve | None, direction: str, u_max: float) -> Reading:
@@ -122,7 +123,7 @@ def _knee(curve: FlowCurve | None, direction: str, u_max: float) -> Reading:
             f"recorded ({lowest / u_max:.2%})",
             at_most=max(lowest, 0.0) / u_max,
         )
-    return Reading(value=line.knee / u_max, se=line.knee_se / u_max)
+    return observed(line.knee / u_max, se=line.knee_se / u_max)
 
 
 def _hysteresis(rising: FlowCurve | None, falling: FlowCurve | None, u_max: float) -> Reading:
@@ -141,8 +142,8 @@ def _hysteresis(rising: FlowCurve | None, falling: FlowCurve | None, u_max: floa
     found = [(_command_at(rising, level), _command_at(falling, level)) for level in levels]
     widths = [abs(up[0] - down[0]) for up, down in found]
     widest = int(np.argmax(widths))
-    return Reading(
-        value=widths[widest] / u_max,
+    return observed(
+        widths[widest] / u_max,
         se=math.hypot(found[widest][0][1], found[widest][1][1]) / u_max,
         where=f"at {levels[widest] / top:.0%} of the largest flow",
     )
@@ -189,8 +190,8 @@ def _linearity(curves: PressureCurves, rated: float, window: tuple[float, float]
     departure = np.abs(mean - np.polyval(np.polyfit(u, mean, 1, w=weights), u))
     widest = int(np.argmax(departure))
     error = float(np.sqrt(np.sum(errors[:, widest] ** 2))) / len(errors) / rated
-    return Reading(
-        value=float(departure[widest]) / rated,
+    return observed(
+        float(departure[widest]) / rated,
         se=error if math.isfinite(error) else None,
         note=_one_branch(curves, len(curves.curves)),
         where=f"at {u[widest] / u_max:.0%} of command",
@@ -216,8 +217,8 @@ def _gain(curves: PressureCurves) -> Reading:
         spread = float(np.var(u[line.kept & ~line.censored])) * int(np.sum(line.kept & ~line.censored))
         errors.append(line.sigma * math.sqrt(line.colour / spread))
     count = len(lines)
-    return Reading(
-        value=sum(line.slope for line in lines) / count,
+    return observed(
+        sum(line.slope for line in lines) / count,
         se=math.sqrt(sum(error**2 for error in errors)) / count,
         note=_one_branch(curves, count),
     )
@@ -238,4 +239,4 @@ def _flow_at_zero(curves: PressureCurves) -> Reading:
     if abs(value) < floor:
         return hidden(f"the meter shows nothing below {floor / L_MIN:.3g} L/min", at_most=floor)
     spread = float(kept.std()) * math.sqrt(min(curves.colour, kept.size) / kept.size)
-    return Reading(value=value, se=spread)
+    return observed(value, se=spread)

@@ -1,0 +1,148 @@
+"""`assess`: ramps recorded without and with the compensator, side by side, and whether the latter meet their limits."""
+
+from collections.abc import Sequence
+
+from dzdesign.assess.assessment import (
+    Assessment,
+    BeforeAfter,
+    MeterTaken,
+    PressureAssessment,
+    RampSet,
+    Recording,
+    Request,
+)
+from dzdesign.assess.curve_pairs import Comparison, CurvePair, compare_curves, relative_distance
+from dzdesign.assess.flow_curves import PressureCurves
+from dzdesign.assess.limits import check_limits
+from dzdesign.assess.notes import find_notes
+from dzdesign.assess.options import BOTH_SIDES, SETS, AssessOptions, Set
+from dzdesign.assess.quantities import L_MIN, LOSS, LOSS_OF_FLOW, MPA, QUANTITIES, Reading, change, symmetry
+from dzdesign.assess.readings import read_quantities
+from dzdesign.core.artefact_types import THIS_TOOL
+from dzdesign.identify.ramps.pooling import SAME_PRESSURE
+from dzdesign.identify.reading.ramp_files import RampTest
+
+#: Set -> key of a quantity -> reading, of one side at one pressure drop.
+Readings = dict[Set, dict[str, Reading]]
+
+
+def assess(before: Sequence[RampTest], after: Sequence[RampTest], options: AssessOptions | None = None) -> Assessment:
+    """Compare ramps recorded without and with the compensator.
+
+    Parameters
+    ----------
+    before, after : sequence of RampTest
+        Recordings in any order, as `identify` takes them: several ramps in one, both sides of a bipolar valve. The
+        command of `after` is what enters the compensator.
+    options : AssessOptions, optional
+        Choices of the engineer.
+
+    Raises
+    ------
+    InputError
+        For recordings that can't be read, and for sets that share no pressure drop.
+    """
+    return assess_curves(compare_curves(before, after, options or AssessOptions()))
+
+
+def assess_curves(comparison: Comparison) -> Assessment:
+    """Read every quantity of both sets, and check the limits.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        Of `compare_curves`.
+    """
+    options = comparison.options
+    levels = [_level(pair, options) for pair in comparison.pairs]
+    readings = [_read(pair, level, options) for pair, level in zip(comparison.pairs, levels, strict=True)]
+    _add_symmetry(comparison.pairs, readings)
+    pressures = tuple(map(_pressure, comparison.pairs, levels, readings))
+    return Assessment(
+        tool=THIS_TOOL,
+        made_from=tuple(
+            Recording(set=name, source=test.source, sha256=test.sha256)
+            for name, tests in comparison.tests.items()
+            for test in tests
+        ),
+        options=_request(options),
+        meter=MeterTaken(
+            floor_L_min=comparison.floor / L_MIN, lag_s=comparison.lag.seconds, lag_is=comparison.lag.origin
+        ),
+        quantities={**QUANTITIES, LOSS: LOSS_OF_FLOW},
+        pressures=pressures,
+        limits=tuple(
+            result
+            for item, found in zip(pressures, readings, strict=True)
+            if "after" in found
+            for result in check_limits(options.limits, item.place, found.get("before"), found["after"])
+        ),
+        notes=find_notes(comparison, pressures),
+    )
+
+
+def _request(options: AssessOptions) -> Request:
+    return Request(
+        u_max_V=options.reading.u_max,
+        after_u_max_V=options.of_set("after").u_max,
+        knee_window=options.reading.knee_window,
+        linearity_window=options.window,
+        level_L_min=None if options.level is None else options.level / L_MIN,
+        level_share=options.level_share,
+        same_pressure_within=SAME_PRESSURE,
+    )
+
+
+def _level(pair: CurvePair, options: AssessOptions) -> float:
+    """Return the flow that ends the dead zone of both sets, m³/s."""
+    if options.level is not None:
+        return options.level
+    return pair.first.counts if options.level_share is None else options.level_share * pair.first.y_max
+
+
+def _read(pair: CurvePair, level: float, options: AssessOptions) -> Readings:
+    """Read all quantities at one pressure drop, of both sets at one level and over one rated flow."""
+    return {
+        name: read_quantities(
+            curves, u_max=options.of_set(name).u_max, level=level, rated=pair.first.y_max, window=options.window
+        )
+        for name, curves in pair.sets.items()
+    }
+
+
+def _add_symmetry(pairs: Sequence[CurvePair], readings: Sequence[Readings]) -> None:
+    """Add the symmetry of both sides' gains, once a pressure drop: to the positive side where there is one."""
+    for pair, found in zip(pairs, readings, strict=True):
+        for name, curves in pair.sets.items():
+            gains = {
+                other.side: of_other[name]["gain"]
+                for other, of_other in zip(pairs, readings, strict=True)
+                if name in other.sets and relative_distance(other.sets[name].dp, curves.dp) <= SAME_PRESSURE
+            }
+            if pair.side == "positive" or "positive" not in gains:
+                found[name]["symmetry"] = symmetry(*(gains.get(side) for side in BOTH_SIDES))
+
+
+def _pressure(pair: CurvePair, level: float, readings: Readings) -> PressureAssessment:
+    old, new = (readings.get(name, {}) for name in SETS)
+    keys = next(iter(readings.values()))
+    return PressureAssessment(
+        side=pair.side,
+        dp_MPa=_in_MPa(pair.first.dp),
+        level_L_min=level / L_MIN,
+        rated_flow_L_min=pair.first.y_max / L_MIN,
+        before=_ramp_set(pair.before),
+        after=_ramp_set(pair.after),
+        quantities={
+            key: BeforeAfter(before=old.get(key), after=new.get(key), change=change(old.get(key), new.get(key)))
+            for key in keys
+        },
+    )
+
+
+def _ramp_set(curves: PressureCurves | None) -> RampSet | None:
+    return None if curves is None else RampSet(source=curves.source, ramps=curves.ramps, dp_MPa=_in_MPa(curves.dp))
+
+
+def _in_MPa(dp: float | None) -> float | None:
+    return None if dp is None else dp / MPA

@@ -1,0 +1,178 @@
+"""Recordings without and with the compensator, paired: the curves of both at each pressure drop of each side."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from dzdesign.assess.flow_curves import PressureCurves, read_curves
+from dzdesign.assess.options import BOTH_SIDES, SETS, AssessOptions, Set, Side
+from dzdesign.assess.quantities import MPA
+from dzdesign.core.errors import InputError
+from dzdesign.identify.knees.meter_lag import MeterLag, find_lag
+from dzdesign.identify.knees.prepared_tests import found_floor, split_recordings
+from dzdesign.identify.ramps.pooling import SAME_PRESSURE, pool_ramps
+from dzdesign.identify.ramps.sides import tests_of_side
+from dzdesign.identify.reading.ramp_files import RampTest
+from dzdesign.identify.valve.model import SIDES
+
+Pair = tuple[PressureCurves | None, PressureCurves | None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CurvePair:
+    """The curves of one side at one pressure drop; None where a set has no recording there."""
+
+    side: Side
+    before: PressureCurves | None
+    after: PressureCurves | None
+
+    @property
+    def sets(self) -> dict[Set, PressureCurves]:
+        """The curves that there are, by the name of their set."""
+        both = zip(SETS, (self.before, self.after), strict=True)
+        return {name: curves for name, curves in both if curves is not None}
+
+    @property
+    def first(self) -> PressureCurves:
+        """The curves BEFORE where there are some, else those AFTER."""
+        return next(iter(self.sets.values()))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Comparison:
+    """Both sets of recordings, read.
+
+    Attributes
+    ----------
+    options : AssessOptions
+        Choices of the engineer.
+    tests : mapping
+        The recordings of each set.
+    floor : float
+        Flow below which the meter shows nothing, m³/s.
+    lag : MeterLag
+        Of the meter.
+    pairs : tuple of CurvePair
+        Side by side, each in the order of rising pressure drop.
+    """
+
+    options: AssessOptions
+    tests: Mapping[Set, Sequence[RampTest]]
+    floor: float
+    lag: MeterLag
+    pairs: tuple[CurvePair, ...]
+
+
+def compare_curves(before: Sequence[RampTest], after: Sequence[RampTest], options: AssessOptions) -> Comparison:
+    """Read the curves of both sets, and pair those of one side and pressure drop.
+
+    Parameters
+    ----------
+    before, after : sequence of RampTest
+        Recordings in any order, as `identify` takes them: several ramps in one, both sides of a bipolar valve. The
+        command of `after` is what enters the compensator.
+    options : AssessOptions
+        Choices of the engineer.
+
+    Raises
+    ------
+    InputError
+        For recordings that can't be read, and for sets that share no pressure drop.
+    """
+    sets: dict[Set, Sequence[RampTest]] = {"before": before, "after": after}
+    for name, tests in sets.items():
+        if not tests:
+            which = "without" if name == "before" else "with"
+            raise InputError(f"no recordings {which} the compensator were given; expected at least one file")
+    of_sides = {
+        (side, name): tests_of_side(tests, SIDES[side], options.of_set(name).u_max)
+        for side in BOTH_SIDES
+        for name, tests in sets.items()
+    }
+    floor, lag = _meter(of_sides, options)
+    curves = {
+        (side, name): read_curves(tests, options.of_set(name), floor=floor, lag=lag.seconds) if tests else []
+        for (side, name), tests in of_sides.items()
+    }
+    pairs = tuple(
+        CurvePair(side=side, before=one, after=other)
+        for side in BOTH_SIDES
+        for one, other in pair_by_pressure(curves[side, "before"], curves[side, "after"])
+    )
+    if not any(pair.before and pair.after for pair in pairs):
+        raise InputError(_no_pressure_in_common(pairs))
+    return Comparison(options=options, tests=sets, floor=floor, lag=lag, pairs=pairs)
+
+
+def _meter(of_sides: Mapping[tuple[Side, Set], Sequence[RampTest]], options: AssessOptions) -> tuple[float, MeterLag]:
+    """Return the meter's floor (m³/s) and its lag: declared, or found. One meter has read both sets.
+
+    The floor is read BEFORE only: a compensated valve may open with a jump of its own, which looks like a floor.
+    """
+    floors, lags = [], []
+    for (_, name), tests in sorted(of_sides.items(), key=lambda item: item[0][1], reverse=True):  # BEFORE first
+        if not tests:
+            continue
+        reading = options.of_set(name)
+        ramps = split_recordings(tests, reading, reading.meter_lag or 0.0)
+        lags.append(find_lag(ramps, reading))
+        if name == "before":
+            floors.append(found_floor(pool_ramps(ramps), reading))
+    floor = options.reading.meter_floor
+    return (
+        max(floors, default=0.0) if floor is None else floor,
+        next((lag for lag in lags if lag.origin != "unknown"), lags[0]),
+    )
+
+
+def pair_by_pressure(before: Sequence[PressureCurves], after: Sequence[PressureCurves]) -> list[Pair]:
+    """Pair curves whose pressure drops agree within `SAME_PRESSURE`, the nearest first; the others stay alone.
+
+    Parameters
+    ----------
+    before, after : sequence of PressureCurves
+        Of one side.
+
+    Returns
+    -------
+    list
+        In the order of rising pressure drop; None stands for a missing partner.
+    """
+    distances = sorted(
+        (relative_distance(one.dp, other.dp), row, column)
+        for row, one in enumerate(before)
+        for column, other in enumerate(after)
+    )
+    partner: dict[int, int] = {}
+    for distance, row, column in distances:
+        if distance <= SAME_PRESSURE and row not in partner and column not in partner.values():
+            partner[row] = column
+    pairs: list[tuple[float, Pair]] = [
+        (one.dp or 0.0, (one, after[partner[row]] if row in partner else None)) for row, one in enumerate(before)
+    ]
+    pairs += [(one.dp or 0.0, (None, one)) for column, one in enumerate(after) if column not in partner.values()]
+    return [pair for _, pair in sorted(pairs, key=lambda item: item[0])]
+
+
+def relative_distance(one: float | None, other: float | None) -> float:
+    """Return the difference of two pressure drops over the larger; none if both are unknown.
+
+    Examples
+    --------
+    >>> relative_distance(4e6, 5e6), relative_distance(None, None), relative_distance(None, 1e6)
+    (0.2, 0.0, 1.0)
+    """
+    if one is None or other is None:
+        return 0.0 if one is other else 1.0
+    return abs(one - other) / max(one, other)
+
+
+def _no_pressure_in_common(pairs: Sequence[CurvePair]) -> str:
+    def listed(name: Set) -> str:
+        found = [(pair.side, pair.sets[name].dp) for pair in pairs if name in pair.sets]
+        return ", ".join(f"{side} {'unknown' if dp is None else f'{dp / MPA:.2f} MPa'}" for side, dp in found) or "none"
+
+    return (
+        f"the recordings without the compensator ({listed('before')}) and with it ({listed('after')}) have no pressure "
+        f"drop in common within {SAME_PRESSURE:.0%}, expected one at least; record both sets at the same pressure "
+        "drops, or declare them by --dp or [dp]"
+    )

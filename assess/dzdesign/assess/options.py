@@ -1,0 +1,55 @@
+"""What the engineer chooses for an assessment."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+from dzdesign.core.errors import InputError
+from dzdesign.identify.options import IdentifyOptions
+
+Side = Literal["positive", "negative"]
+BOTH_SIDES: tuple[Side, Side] = ("positive", "negative")
+#: Recordings without the compensator, and with it.
+Set = Literal["before", "after"]
+SETS: tuple[Set, Set] = ("before", "after")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AssessOptions:
+    """Choices of the engineer, SI.
+
+    Attributes
+    ----------
+    reading : IdentifyOptions
+        How recordings are read: full command, meter, knee window.
+    after_u_max : float or None
+        Full command of the recordings with the compensator, V; None: the same.
+    level, level_share : float or None
+        Flow that ends the dead zone, m³/s, or as a share of the largest flow BEFORE at that pressure drop; None takes
+        what counts as flow BEFORE: the meter's floor, its noise or 0.5 % of the largest flow.
+    window : tuple of float
+        Commands between which linearity is taken, over u_max.
+    limits : mapping
+        Of `parse_limits`.
+    """
+
+    reading: IdentifyOptions = field(default_factory=IdentifyOptions)
+    after_u_max: float | None = None
+    level: float | None = None
+    level_share: float | None = None
+    window: tuple[float, float] = (0.1, 0.9)
+    limits: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.level is not None and self.level_share is not None:
+            raise InputError("the level is given both as a flow and as a share; keep one")
+        if not (self.level or self.level_share or 1.0) > 0 or 0.0 in (self.level, self.level_share):
+            raise InputError("the level is zero or negative, expected a flow such as '0.6 L/min', or a share of it")
+        if not (self.level_share or 0.0) < 1:
+            raise InputError(f"the level is {self.level_share:.0%} of the largest flow, expected less than all of it")
+        if not 0 <= self.window[0] < self.window[1] <= 1:
+            raise InputError(f"the linearity window is {self.window}, expected two rising shares such as '10-90 %'")
+
+    def of_set(self, name: Set) -> IdentifyOptions:
+        """Return how the recordings of a set are read."""
+        return self.reading if name == "before" else replace(self.reading, u_max=self.after_u_max or self.reading.u_max)

@@ -1,0 +1,177 @@
+"""What a hydraulic valve test states of a flow curve: dead zone, knee, hysteresis, linearity, gain, flow at zero.
+
+The words are those of such tests (as in ISO 10770-1); the formulas are ours, stand in `QUANTITIES`, and are printed
+with every result. No conformity with a standard is claimed.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Annotated
+
+from msgspec import Meta
+
+from dzdesign.core.artefact_types import RuleError
+
+L_MIN, MPA = 1e-3 / 60, 1e6
+#: Larger than any value that a recording may show, in any unit here; bounds in a file keep arithmetic from overflowing.
+LARGEST = 1e12
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Quantity:
+    """One quantity: what it is called, its unit, its formula."""
+
+    name: Annotated[str, Meta(description="For people.")]
+    unit: Annotated[str, Meta(description="Of its values.")]
+    formula: Annotated[str, Meta(description="How it is computed.")]
+
+
+QUANTITIES: dict[str, Quantity] = {
+    "dead_zone_opening": Quantity(
+        name="dead zone, opening",
+        unit="%",
+        formula="u_r(Q_L) / u_max: command at which the rising branch passes the level Q_L",
+    ),
+    "dead_zone_closing": Quantity(
+        name="dead zone, closing",
+        unit="%",
+        formula="u_f(Q_L) / u_max: command at which the falling branch passes the level Q_L",
+    ),
+    "knee_opening": Quantity(
+        name="knee, opening",
+        unit="%",
+        formula="zero of the line through the straight part of Q/sqrt(dP) on the rising branch, over u_max",
+    ),
+    "knee_closing": Quantity(
+        name="knee, closing",
+        unit="%",
+        formula="the same on the falling branch",
+    ),
+    "hysteresis": Quantity(
+        name="hysteresis",
+        unit="%",
+        formula="largest |u_r(Q) - u_f(Q)| / u_max at Q = 5, 10, ... 90 % of the largest flow",
+    ),
+    "linearity": Quantity(
+        name="linearity",
+        unit="%",
+        formula="largest |m(u) - (a + b u)| / Q_rated in the window of u; m is the mean of both branches, each "
+        "averaged over cells of 1 % of u_max (of single readings the noise would add to the largest), a + b u its "
+        "least-squares line there, Q_rated the largest flow BEFORE at this pressure drop",
+    ),
+    "gain": Quantity(
+        name="gain",
+        unit="L/min/V",
+        formula="slope of the lines through the straight part, mean of both branches",
+    ),
+    "flow_at_zero": Quantity(
+        name="flow at zero",
+        unit="L/min",
+        formula="mean of Q over the later half of the hold at zero command after closing",
+    ),
+    "largest_flow": Quantity(
+        name="largest flow",
+        unit="L/min",
+        formula="Q at the largest command, as recorded (its pressure drop may sag)",
+    ),
+    "symmetry": Quantity(
+        name="symmetry",
+        unit="%",
+        formula="gain of the positive side over that of the negative side, less 1",
+    ),
+}
+#: A quantity that compares both sets: it can be limited, and is read from no recording alone.
+LOSS = "largest_flow_loss"
+LOSS_OF_FLOW = Quantity(name="loss of largest flow", unit="%", formula="1 - largest flow AFTER / largest flow BEFORE")
+#: SI, or a share, to the unit of a quantity.
+IN_UNIT = {"%": 100.0, "L/min": 1 / L_MIN, "L/min/V": 1 / L_MIN}
+
+Value = Annotated[float, Meta(ge=-LARGEST, le=LARGEST)]
+StandardError = Annotated[float, Meta(ge=0, le=LARGEST)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reading:
+    """A quantity as read from a recording, in the unit of the quantity."""
+
+    value: Annotated[Value | None, Meta(description="The value; null where it can't be observed.")]
+    se: Annotated[StandardError | None, Meta(description="Its standard error, where one can be had.")]
+    at_most: Annotated[Value | None, Meta(description="A bound, where only that is known.")]
+    not_observable: Annotated[str | None, Meta(description="Why there is no value.")]
+    note: Annotated[str | None, Meta(description="What must be known beside the value.")]
+    where: Annotated[str | None, Meta(description="Flow or command at which it was found, of what is largest there.")]
+
+    def __post_init__(self) -> None:
+        if (self.value is None) == (self.not_observable is None):
+            raise RuleError("a reading has a value and a reason why it has none, or neither; expected one of them")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Change:
+    """AFTER less BEFORE, in the unit of the quantity."""
+
+    value: Annotated[Value, Meta(description="In the quantity's unit.")]
+    se: Annotated[StandardError | None, Meta(description="Its standard error.")]
+
+
+def observed(value: float, se: float | None = None, note: str | None = None, where: str | None = None) -> Reading:
+    """Return the reading of a quantity that is observable."""
+    return Reading(value=value, se=se, at_most=None, not_observable=None, note=note, where=where)
+
+
+def hidden(reason: str, at_most: float | None = None) -> Reading:
+    """Return the reading of a quantity that is not observable."""
+    return Reading(value=None, se=None, at_most=at_most, not_observable=reason, note=None, where=None)
+
+
+def in_units(readings: Mapping[str, Reading]) -> dict[str, Reading]:
+    """Return readings in SI, or as shares, in the units of their quantities.
+
+    Parameters
+    ----------
+    readings : mapping
+        Key of `QUANTITIES` -> reading.
+    """
+
+    def scaled(reading: Reading, factor: float) -> Reading:
+        value, se, at_most = (
+            None if each is None else factor * each for each in (reading.value, reading.se, reading.at_most)
+        )
+        return replace(reading, value=value, se=se, at_most=at_most)
+
+    return {key: scaled(reading, IN_UNIT[QUANTITIES[key].unit]) for key, reading in readings.items()}
+
+
+def symmetry(positive: Reading | None, negative: Reading | None) -> Reading:
+    """Return how much steeper one side is than the other, in per cent, from the gains of both.
+
+    Parameters
+    ----------
+    positive, negative : Reading or None
+        Gains at one pressure drop; None where the side was not recorded there.
+    """
+    known: list[tuple[float, float]] = []
+    for gain, side in ((positive, "positive"), (negative, "negative")):
+        if gain is None:
+            return hidden(f"the {side} side was not recorded at this pressure drop")
+        if gain.value is None:
+            return hidden(f"the {side} side's gain is not observable: {gain.not_observable}")
+        known.append((gain.value, gain.se or 0.0))
+    (over, over_se), (under, under_se) = known
+    ratio = over / under
+    return observed(100 * (ratio - 1), 100 * abs(ratio) * math.hypot(over_se / over, under_se / under))
+
+
+def change(before: Reading | None, after: Reading | None) -> Change | None:
+    """Return AFTER less BEFORE and its standard error; None where one of them shows no value.
+
+    Parameters
+    ----------
+    before, after : Reading or None
+        Of one quantity.
+    """
+    if before is None or after is None or before.value is None or after.value is None:
+        return None
+    se = None if before.se is None or after.se is None else math.hypot(before.se, after.se)
+    return Change(value=after.value - before.value, se=se)

@@ -1,0 +1,122 @@
+"""Sections on the compensator: its law in exact numbers, the integers of the C and what they cost."""
+
+from collections.abc import Iterator
+from fractions import Fraction
+
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.firmware_manifest import FirmwareConstant, FirmwareManifest
+from dzdesign.report.compensator_sides import laws_of, valve_in
+from dzdesign.report.figures.figure import csv_text
+from dzdesign.report.figures.law import law_figure
+from dzdesign.report.page import Section
+from dzdesign.report.sections.cells import Cell, Table, number, table_of
+
+#: Rows of a constant's table that stand in the page; all of them stand in the CSV.
+MOST_ROWS = 3
+BELOW_DP0 = {"hold": "β = 1, as in the paper", "extend": "β as tested"}
+
+
+def law_section(compensator: Compensator | None) -> Section:
+    """Return the section on the law; its derivation is added by the page."""
+    if compensator is None:
+        return Section(missing="No compensator is here: `dzdesign design` makes compensator.json.")
+    lines = [f"Up to dP0: {BELOW_DP0[compensator.below_reference]}."]
+    for name, side in laws_of(compensator).items():
+        kappa, u_min0 = side.k_x_max_over_u_max, side.u_min0_over_u_max
+        lines.append(
+            f"{name.capitalize()} commands: drive range of the law k x_max/u_max = {_exact(kappa)}, from its offset to "
+            f"full flow; the valve's, {valve_in(compensator).sides[name].k_x_max_over_u_max:.4f}, counts from the knee, "
+            f"which lies higher; offset at dP0 u_min0/u_max = {_exact(u_min0)}, both as shares of full command; β is "
+            f"straight between {len(side.beta_numerators)} nodes, {compensator.beta_step_codes} pressure codes apart, each a "
+            f"whole number of 1/{compensator.beta_denominator}."
+        )
+    both = len(laws_of(compensator)) > 1
+    return Section(figures=tuple(law_figure(compensator, name, both) for name in laws_of(compensator)), lines=tuple(lines))
+
+
+def _exact(value: Fraction) -> str:
+    return f"{value.numerator}/{value.denominator} = {float(value):.5f}"
+
+
+def integers_section(firmware: FirmwareManifest | None, compensator: Compensator | None) -> Section:
+    """Return the section on the integers of the C."""
+    tables = (rounding_table(compensator),) if compensator else ()
+    if firmware is None:
+        return Section(tables=tables, missing="No firmware is here: `dzdesign codegen` makes it, and its constants.")
+    return Section(tables=(*tables, constants_table(firmware)))
+
+
+def constants_table(firmware: FirmwareManifest) -> Table:
+    """Return every number in the C: what it stands for, how it was rounded and where it comes from."""
+    return table_of(
+        "Every number in the core, in the order of the files",
+        firmware.constants,
+        ("symbol", lambda one: Cell(text=one.symbol, kind="symbol", more=one.file)),
+        ("value", _value),
+        ("in engineering units", lambda one: Cell(text=one.engineering, more=f"rounding: {one.rounding}")),
+        ("what it is", lambda one: one.equation),
+        ("where it comes from", lambda one: Cell(text="", more=f"{_origin(one)}; by {one.generator}")),
+        csv=csv_text(
+            ("file", "symbol", "row", "value", "engineering", "rounding"),
+            (
+                (each.file, each.symbol, place, item, each.engineering, each.rounding)
+                for each in firmware.constants
+                for place, item in _rows(each)
+            ),
+        ),
+        name="constants",
+    )
+
+
+def _value(constant: FirmwareConstant) -> str:
+    if isinstance(constant.value, int):
+        return str(constant.value)
+    rows = ", ".join(str(list(row)) for row in constant.value[:MOST_ROWS])
+    return f"{len(constant.value)} rows: {rows}{', ...' if len(constant.value) > MOST_ROWS else ''}"
+
+
+def _rows(constant: FirmwareConstant) -> Iterator[tuple[int | None, str]]:
+    if isinstance(constant.value, int):
+        yield None, str(constant.value)
+        return
+    for place, row in enumerate(constant.value):
+        yield place, " ".join(map(str, row))
+
+
+def _origin(constant: FirmwareConstant) -> str:
+    if constant.valve_json:
+        return f"valve: {', '.join(constant.valve_json)}"
+    options = ", ".join(constant.compensator_json)
+    return f"option of design: {options}" if options else "the generator's own"
+
+
+def rounding_table(compensator: Compensator) -> Table:
+    """Return what turning the law into integers costs."""
+    u_max = compensator.u_max_V
+    rows = []
+    for name, side in laws_of(compensator).items():
+        certificate = side.certificate
+        offset = side.u_min0_over_u_max * u_max
+        node = offset / compensator.beta_denominator
+        of = f" ({name})" if len(laws_of(compensator)) > 1 else ""
+        if not compensator.edge_codes:  # which counts from the opening threshold, the valve's curve does not
+            wanted = Fraction(repr(valve_in(compensator).sides[name].guards[certificate.guard].u_min0_V))
+            volts = (f"{float(offset):.6f} V", f"{float(wanted):.6f} V")
+            rows.append(("u_min0" + of, *volts, 1e3 * float(offset - wanted)))
+        rows += [
+            ("one step of a node of β" + of, f"1/{compensator.beta_denominator}", "rounded down", -1e3 * float(node)),
+            (
+                "offset under the certified curve, mean" + of, "few nodes, rounding, the converter's error",
+                f"largest {1e3 * certificate.largest_loss_V:.2f} mV", -1e3 * certificate.mean_loss_V,
+            ),
+        ]  # fmt: skip
+    half_count = u_max / compensator.signals.compare_max / 2
+    rows.append(("compare value", "a whole count", "half a count", 1e3 * float(half_count)))
+    return table_of(
+        "What the integers cost",
+        rows,
+        ("number", lambda row: row[0]),
+        ("in the C", lambda row: row[1]),
+        ("exact, or what is done", lambda row: row[2]),
+        ("difference, at most (mV)", lambda row: number(row[3], 3, "+")),
+    )

@@ -1,0 +1,204 @@
+"""Sections on the evidence: every input, closed loop, requirements."""
+
+from collections.abc import Sequence
+from dataclasses import asdict
+
+from dzdesign.core.errors import InputError
+from dzdesign.core.verdicts import NOT_CHECKED
+from dzdesign.report.artefact_chain import Chain
+from dzdesign.report.compensator_sides import laws_of
+from dzdesign.report.figures.closed_loop import dead_zone_figure, loop_figure
+from dzdesign.report.figures.curves import Curves
+from dzdesign.report.figures.input_map import map_figure
+from dzdesign.report.figures.zero_command import zero_figure
+from dzdesign.report.page import Section
+from dzdesign.report.sections.cells import Cell, Table, in_number_font, number, table_of, verdict, whole
+from dzdesign.verify.closed_loop.evidence_curves import closed_loop_name, input_map_name, read_curves, zero_command_name
+from dzdesign.verify.evidence import (
+    ClosedLoopResult,
+    Evidence,
+    InputCheck,
+    MonteCarlo,
+    PressureResult,
+    ScenarioResult,
+    Spread,
+)
+from dzdesign.verify.requirements import requirement_statuses
+
+
+def _curves(chain: Chain, name: str) -> Curves | None:
+    """Return a CSV file of the evidence; None if it is not there."""
+    text = chain.curves.get(name)
+    if text is None:
+        return None
+    try:
+        return Curves(text=text, columns=read_curves(text))
+    except ValueError as error:
+        raise InputError(f"'{name}' is no table of numbers ({error}); make it again with `dzdesign verify`") from error
+
+
+def inputs_section(chain: Chain) -> Section:
+    """Return the section on the check of every input."""
+    if chain.evidence is None:
+        return Section(missing="No evidence is here: `dzdesign verify` tries every input of the C.")
+    figures, lines, missing = [], [], ""
+    for each in chain.evidence.inputs:
+        side = each.side
+        lines += _input_lines(each)
+        law = laws_of(chain.compensator).get(side)
+        map_curves, zero_curves = (_curves(chain, name(side)) for name in (input_map_name, zero_command_name))
+        if map_curves and law and chain.compensator:
+            figures.append(map_figure(map_curves, zero_curves, chain.compensator, each))
+        if zero_curves and law:
+            figures.append(zero_figure(zero_curves, side, law.certificate.guard))
+        for curves, name in ((map_curves, input_map_name(side)), (zero_curves, zero_command_name(side))):
+            if curves is None or law is None:
+                missing = f"{name} or its compensator is missing; `dzdesign verify` makes it."
+    if not chain.evidence.inputs:
+        missing = f"{NOT_CHECKED}: the C did not compile or did not run, see the requirements."
+    return Section(figures=tuple(figures), lines=tuple(lines), missing=missing)
+
+
+def _input_lines(found: InputCheck) -> list[str]:
+    line = (
+        f"{found.side.capitalize()} commands: {whole(found.inputs)} pairs of command and pressure-difference code "
+        f"compared with the exactly rounded law, {whole(found.wrong)} wrong, largest error {found.largest_error} "
+        f"counts; {found.over_compensated} pressure codes over-compensated, smallest margin of the C's compare values "
+        f"{1e3 * found.smallest_margin_V:.3f} mV."
+    )
+    return [line, f"First wrong: {found.first_wrong}."] if found.first_wrong else [line]
+
+
+def loop_section(chain: Chain) -> Section:
+    """Return the section on the closed loop."""
+    evidence = chain.evidence
+    if evidence is None:
+        return Section(missing="No evidence is here: `dzdesign verify` runs the closed loop.")
+    loop = evidence.closed_loop
+    if not loop.pressures:
+        return Section(missing=f"{NOT_CHECKED}: the closed loop did not run, see the requirements.")
+    sides = dict.fromkeys(each.side for each in loop.pressures)
+    figures, missing = [], ""
+    for side in sides:
+        figures.append(dead_zone_figure([each for each in loop.pressures if each.side == side], side, len(sides) > 1))
+        curves = _curves(chain, closed_loop_name(side))
+        if curves is None:
+            missing = f"{closed_loop_name(side)} is missing, so the ramps are not drawn; `dzdesign verify` makes it."
+        else:
+            figures.append(loop_figure(curves, side, len(sides) > 1))
+    tables = (
+        loops_table(loop.pressures),
+        scenarios_table(evidence.scenarios),
+        series_table(evidence.monte_carlo),
+        plant_table(loop),
+    )
+    return Section(
+        figures=tuple(figures),
+        tables=tuple(table for table in tables if table),
+        lines=(_plant_line(loop),),
+        missing=missing,
+    )
+
+
+def _plant_line(loop: ClosedLoopResult) -> str:
+    """Say which plant it was, and whether it stands in for the valve."""
+    line = f"A simulation. Plant: {loop.plant_source}"
+    if loop.plant_sha256:
+        return f"{line}, SHA-256 {loop.plant_sha256}."
+    if loop.plant:
+        return f"{line}."
+    return f"{line}, one for each pressure drop: this checks the design and the C, not the identification."
+
+
+def plant_table(loop: ClosedLoopResult) -> Table | None:
+    """Return the parameters of the closed loop's plant; from where to where, of one for each pressure drop."""
+    plants = [asdict(loop.plant)] if loop.plant else [asdict(each.parameters) for each in loop.plants]
+    cells = []
+    for name in plants[0] if plants else ():
+        values = sorted(plant[name] for plant in plants)
+        ends = dict.fromkeys(f"{value:.6g}" for value in (values[0], values[-1]))
+        cells.append((Cell(text=name, kind="symbol"), in_number_font(" to ".join(ends))))
+    if not cells:
+        return None
+    half = -(-len(cells) // 2)  # in two columns, or they would take a page of paper
+    right = [*cells[half:], (Cell(text=""), Cell(text=""))]
+    of = "" if len(plants) == 1 else f", from the least to the largest of {len(plants)} pressure drops"
+    return Table(
+        caption=f"The plant's parameters; the unit is in the name{of}",
+        columns=("parameter", "value", "parameter", "value"),
+        rows=tuple((*left, *beside) for left, beside in zip(cells[:half], right, strict=False)),
+    )
+
+
+def loops_table(pressures: Sequence[PressureResult]) -> Table:
+    """Return dead zones and flows of the closed loop."""
+    return table_of(
+        "Dead zones in per cent of command, flows in L/min",
+        pressures,
+        ("side", lambda one: one.side),
+        ("dP (MPa)", lambda one: number(one.dp_MPa, 2)),
+        ("opening without (%)", lambda one: number(100 * one.dead_zone_opening, 1)),
+        ("opening with (%)", lambda one: number(100 * one.residual_opening, 1)),
+        ("closing without (%)", lambda one: number(100 * one.dead_zone_closing, 1)),
+        ("closing with (%)", lambda one: number(100 * one.residual_closing, 1)),
+        ("at zero without β (L/min)", lambda one: number(one.q_zero_without_beta_L_min, 2)),
+        ("at zero (L/min)", lambda one: number(one.q_zero_L_min, 2)),
+        ("largest without (L/min)", lambda one: number(one.q_max_direct_L_min, 2)),
+        ("largest with (L/min)", lambda one: number(one.q_max_L_min, 2)),
+    )
+
+
+def scenarios_table(scenarios: Sequence[ScenarioResult]) -> Table | None:
+    """Return each scenario at the pressure drop where it is worst; None if there are none."""
+    worst: dict[str, ScenarioResult] = {}
+    for each in sorted(scenarios, key=lambda one: (one.q_zero_L_min, one.q_peak_at_zero_L_min, one.dp_MPa)):
+        worst[each.name] = each
+    if not worst:
+        return None
+    return table_of(
+        "Beside ramps: each scenario at the pressure drop where it is worst",
+        [worst[name] for name in dict.fromkeys(each.name for each in scenarios)],
+        ("scenario", lambda one: one.name),
+        ("dP (MPa)", lambda one: number(one.dp_MPa, 2)),
+        ("at zero, at the end (L/min)", lambda one: number(one.q_zero_L_min, 2)),
+        ("on the way, at most (L/min)", lambda one: number(one.q_peak_at_zero_L_min, 2)),
+        ("required", lambda one: "must be shut at the end" if one.must_shut else "no core can know: not required"),
+    )
+
+
+def series_table(series: MonteCarlo | None) -> Table | None:
+    """Return the quantiles of a series of plants; None if none was run."""
+    if series is None:
+        return None
+
+    def spread(of: Spread, factor: float) -> Cell:
+        middle, low, high = (f"{factor * value:.2f}" for value in (of.p50, of.p01, of.p99))
+        return in_number_font(f"{middle} ({low} to {high})")
+
+    return table_of(
+        "Series of plants: median (1 to 99 %). No requirement: the certificate is of the tests' valve",
+        series.pressures,
+        ("side", lambda one: one.side),
+        ("dP (MPa)", lambda one: number(one.dp_MPa, 2)),
+        ("opening with (%)", lambda one: spread(one.residual_opening, 100)),
+        ("closing with (%)", lambda one: spread(one.residual_closing, 100)),
+        ("at zero (L/min)", lambda one: spread(one.q_zero_L_min, 1)),
+        ("plants that leak", lambda one: in_number_font(f"{one.leaking} of {one.plants}")),
+    )
+
+
+def checks_section(evidence: Evidence | None) -> Section:
+    """Return the section with every requirement."""
+    if evidence is None:
+        return Section(missing=f"{NOT_CHECKED}: no evidence is here; `dzdesign verify` makes it.")
+    tried = [(verdict(check.holds), check.name, check.text) for check in evidence.checks]
+    untried = [each for each in requirement_statuses(evidence) if not each.tried]
+    rows = [*tried, *((verdict(None), each.title, f"to try it: {each.how}".replace("`", "")) for each in untried)]
+    table = table_of(
+        f"{len(tried)} requirements tried, {len(untried)} not",
+        rows,
+        ("verdict", lambda row: row[0]),
+        ("requirement", lambda row: row[1]),
+        ("figures", lambda row: row[2]),
+    )
+    return Section(tables=(table,))

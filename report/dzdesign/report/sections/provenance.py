@@ -1,0 +1,86 @@
+"""Sections on what the report was made from, and on what it does not cover."""
+
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.signal_descriptions import signals_in_words
+from dzdesign.identify.valve.model import ValveModel
+from dzdesign.report.artefact_chain import KINDS, Chain
+from dzdesign.report.page import Section
+from dzdesign.report.sections.cells import Cell, Table, table_of, whole
+
+#: Of every report, whatever it finds.
+NOT_PROVED = (
+    "Pressure drops beyond the tested interval: the nearest tested β is held there, and nothing is certified.",
+    "Commands above code 0: one code more is 1 to 2 mV more drive, and the law has no dead band.",
+    "What the certificate rests on: a threshold that runs one way with the pressure drop, also between the tests, and "
+    "a meter's lag that is as declared or found.",
+    "A leak or a soft edge below the flow that counts as flow; a meter's zero error that does not show at rest.",
+    "Errors of the pressure sensors beyond their converters', and failures that their signals hide.",
+    "Oil temperature and the spread between valves of a type: the compensator is certified for the valve of its tests.",
+    "The target's compiler and silicon: the C was compiled and tried on the host that made the evidence.",
+    "The closed loop is a simulation of the stated plant; it is no measurement.",
+)
+
+
+def warnings_section(valve: ValveModel | None, compensator: Compensator | None) -> Section:
+    """Return the section on warnings, costs, signals, and what is not proved."""
+    accepted = dict(compensator.request.options).get("accept", "") if compensator and compensator.request else ""
+    codes = accepted.replace(",", " ").split()
+    warnings = []
+    for warning in valve.warnings if valve else ():
+        source = f"{warning.source}: " if warning.source else ""
+        end = ", which it was (--accept)" if warning.code in codes else ""
+        warnings.append(f"[{warning.code}] {source}{warning.text}{end}")
+    signals = signals_in_words(compensator.signals, float(compensator.u_max_V)) if compensator else []
+    return Section(
+        groups=(
+            ("Warnings of the recordings", tuple(warnings) or (("None.",) if valve else ())),
+            ("What the design costs", compensator.costs if compensator else ()),
+            ("What the codes stand for", tuple(signals)),
+            ("What this report does not prove", NOT_PROVED),
+        )
+    )
+
+
+def provenance_section(chain: Chain) -> Section:
+    """Return the section with every hash."""
+    return Section(tables=tuple(table for table in (_provenance_table(chain), _hashes_table(chain)) if table))
+
+
+def _provenance_table(chain: Chain) -> Table:
+    """Return which file made which, from the firmware's evidence back to the recordings."""
+    rows: list[tuple[Cell | str, ...]] = []
+    for role, kind in KINDS.items():
+        place = chain.places.get(role)
+        if place:
+            sources = ", ".join(each.source for each in place.made_from) or "–"
+            rows.append((kind.label, place.name, Cell(text=place.sha256, kind="hash"), place.made_by, sources))
+        elif kind.command:
+            rows.append((kind.label, Cell(text="missing or not used", kind="open"), "", "", ""))
+    for source in chain.places["valve"].made_from if "valve" in chain.places else ():
+        rows.append(("recording", source.source, Cell(text=source.sha256, kind="hash"), "–", "–"))
+    headings = ("artefact", "file", "SHA-256", "made by", "made from")
+    return table_of(
+        "Each artefact with the SHA-256 of its bytes, and what it was made from",
+        rows,
+        *((heading, lambda row, place=place: row[place]) for place, heading in enumerate(headings)),
+    )
+
+
+def _hashes_table(chain: Chain) -> Table | None:
+    """Return the hashes of what was tried: sources, object, outputs; and of the firmware's files."""
+    rows = []
+    for each in chain.evidence.inputs if chain.evidence else ():
+        rows += [
+            (f"C of the {each.side} core that was compiled", each.core_sha256),
+            (f"object of the {each.side} core that was tried", each.object_sha256),
+            (f"compare values of all {whole(each.inputs)} inputs, 64 bits", each.outputs_hash),
+        ]
+    rows += chain.firmware.files.items() if chain.firmware else ()
+    if not rows:
+        return None
+    return table_of(
+        "Hashes of the firmware's files and of what was tried",
+        rows,
+        ("what", lambda row: row[0]),
+        ("SHA-256", lambda row: Cell(text=row[1], kind="code")),
+    )

@@ -1,0 +1,97 @@
+"""Sections on the identified valve: data and fit, thresholds, beta over the pressure drop."""
+
+from dzdesign.core.units import chance
+from dzdesign.design.compensator import Compensator
+from dzdesign.identify.valve.model import ValveModel
+from dzdesign.identify.valve.side_model import SideModel
+from dzdesign.report.compensator_sides import laws_of
+from dzdesign.report.figures.valve import beta_figure, lines_figure, thresholds_figure
+from dzdesign.report.page import Section
+from dzdesign.report.sections.cells import Table, counted, number, table_of
+
+LAG = {"declared": "declared", "identified": "from ramps of two rates", "unknown": "none declared"}
+
+
+def valve_sections(valve: ValveModel | None, compensator: Compensator | None) -> dict[str, Section]:
+    """Return the sections "data", "thresholds" and "beta".
+
+    Parameters
+    ----------
+    valve : ValveModel or None
+    compensator : Compensator or None
+        Whose guard the thresholds are of, and whose table is drawn over beta.
+    """
+    if valve is None:
+        gap = Section(missing="The valve is not here: `dzdesign identify` makes valve.json.")
+        return {"data": gap, "thresholds": gap, "beta": gap}
+    both = len(valve.sides) > 1
+    fits, thresholds, tables, betas = [], [], [], []
+    for name, side in valve.sides.items():
+        law = laws_of(compensator).get(name)
+        guard = law.certificate.guard if law else side.certificate.guard
+        fits.append(lines_figure(side, name, both))
+        thresholds.append(thresholds_figure(side, guard, name, both))
+        tables.append(thresholds_table(side, guard, f"Thresholds, {name} commands"))
+        betas.append(beta_figure(side, guard, name, both, compensator if law else None))
+    drawn = tuple(figure for figure in betas if figure)
+    meter = valve.meter
+    return {
+        "data": Section(
+            figures=tuple(fits),
+            lines=(
+                f"{counted(sum(len(side.tests) for side in valve.sides.values()), 'ramp test')}; full command "
+                f"{valve.u_max_V:g} V.",
+                f"Flow meter: floor {meter.floor_L_min:.2f} L/min; lag taken as {meter.lag_s:.3g} s "
+                f"({LAG[meter.lag_is]}).",
+                *(_trend(name, side) for name, side in valve.sides.items()),
+                *(f"{name.capitalize()} commands: not tested." for name in valve.untested_sides),
+            ),
+        ),
+        "thresholds": Section(figures=tuple(thresholds), tables=tuple(tables)),
+        "beta": Section(
+            figures=drawn,
+            missing="" if drawn else "One pressure drop was tested, so β is 1 and its trend is not known.",
+        ),
+    }
+
+
+def _trend(name: str, side: SideModel) -> str:
+    stroke = (
+        f"{name.capitalize()} commands: drive range of the valve k x_max/u_max = {side.k_x_max_over_u_max:.4f}, the "
+        "command from the knee to full stroke as a share of full command"
+    )
+    if side.trend is None or side.trend_change_V is None or side.trend_change_se_V is None or side.trend_p is None:
+        return f"{stroke}; how the threshold moves with the pressure drop can't be said from one ramp test."
+    change, error = 1e3 * side.trend_change_V, 1e3 * side.trend_change_se_V
+    return (
+        f"{stroke}; trend of the threshold with the pressure drop: {side.trend}, {change:+.1f} ± {error:.1f} mV "
+        f"over the tested range ({chance(side.trend_p)})."
+    )
+
+
+def thresholds_table(side: SideModel, guard: str, title: str) -> Table:
+    """Return the thresholds of each ramp test, with the lower bounds of the guarded one.
+
+    Parameters
+    ----------
+    side : SideModel
+    guard : str
+        Threshold that is guarded.
+    title : str
+    """
+    return table_of(
+        title,
+        zip(side.tests, side.guards[guard].u_lower_V, strict=True),
+        ("dP (MPa)", lambda row: number(row[0].dp_MPa, 3)),
+        ("knee opening (V)", lambda row: number(row[0].u_knee_rising_V, 3)),
+        ("knee closing (V)", lambda row: number(row[0].u_knee_falling_V, 3)),
+        ("onset opening (V)", lambda row: number(row[0].u_onset_rising_V, 3)),
+        ("onset closing (V)", lambda row: number(row[0].u_onset_falling_V, 3)),
+        ("s.e. of knee (mV)", lambda row: number(1e3 * row[0].u_knee_se_V, 1)),
+        (f"lower bound, {guard} (V)", lambda row: number(row[1], 3)),
+        ("slope (L/min/V)", lambda row: number(row[0].slope_L_min_V, 3)),
+        ("largest flow (L/min)", lambda row: number(row[0].q_max_L_min, 2)),
+        ("noise (L/min)", lambda row: number(row[0].noise_L_min, 3)),
+        ("outliers", lambda row: number(row[0].outliers, 0)),
+        ("ramp test", lambda row: row[0].source),
+    )
