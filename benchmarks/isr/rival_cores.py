@@ -37,7 +37,7 @@ def _line_terms(compensator: Compensator) -> tuple[Fraction, Fraction, Fraction]
         evaluate_line(
             law(compensator.law),
             beta=beta,
-            kappa=compensator.positive.k_x_max_over_u_max,
+            kappa=compensator.positive.drive_range_over_u_max,
             u_min0_over_u_max=compensator.positive.u_min0_over_u_max,
             n_adc=compensator.signals.code_max,
             n_full=compensator.signals.compare_max,
@@ -122,7 +122,7 @@ static const double beta_node[{len(betas)}] = {{
 
 
 def _naive_law(c: Compensator) -> str:
-    kappa, u_min0 = _double(c.positive.k_x_max_over_u_max), _double(c.positive.u_min0_over_u_max * c.u_max_V)
+    kappa, u_min0 = _double(c.positive.drive_range_over_u_max), _double(c.positive.u_min0_over_u_max * c.u_max_V)
     return {
         "paper": f"(beta * ({kappa} - 1.0) + 1.0) * u_i + beta * {u_min0}",
         "target": f"{kappa} * u_i + beta * {u_min0}",

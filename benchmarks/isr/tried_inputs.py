@@ -6,7 +6,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.compensator_file import compensator_document
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 
 SEED = 7
@@ -43,7 +42,7 @@ def tried_inputs(compensator: Compensator) -> list[Codes]:
 
 def expected_compares(compensator: Compensator, inputs: Sequence[Codes]) -> list[int]:
     """Return the exactly rounded law at `inputs`, by the reference of `dzdesign.verify`."""
-    exact = ExactLaw(compensator_document(compensator))
+    exact = ExactLaw(compensator)
     betas = []
     for _, p_a, p_b in inputs:
         possible = max(p_a, p_b) <= exact.code_max
@@ -72,7 +71,7 @@ def exact_rows_header(compensator: Compensator) -> str:
     from fractions import Fraction
     from math import lcm
 
-    exact = ExactLaw(compensator_document(compensator))
+    exact = ExactLaw(compensator)
     # Half a count more, so that the floor rounds to nearest, a half up.
     lines = {}
     for dp in range(-exact.code_max, exact.code_max + 1):

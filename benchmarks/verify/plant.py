@@ -21,7 +21,6 @@ from loop_peers import (
 )
 from scoreboard import Row, print_rows, say
 
-from dzdesign.design.compensator_file import compensator_document
 from dzdesign.verify.closed_loop.loop import PERIODS_PER_RECORD, RECORD_S, ClosedLoop
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
 
@@ -38,7 +37,7 @@ def print_plant(*, quick: bool, seed: int) -> list[Row]:
     """Print and return the rows of the closed loop."""
     with tempfile.TemporaryDirectory(prefix="bench-verify-") as folder:
         firmware = Path(folder) / "firmware"
-        document = compensator_document(example_firmware(firmware))
+        document = example_firmware(firmware)
         core = core_of(firmware)
         rows = _speed(firmware, document, quick)
         rows += _peers(core, rows[0].value, quick)

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from dzdesign.codegen.project import generate
-from dzdesign.core.artefact_files import to_json, write_folder
+from dzdesign.core.artefact_files import write_folder
+from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.compensator_file import compensator_document
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
 from dzdesign.example import example_folder
@@ -46,13 +46,13 @@ class Example:
     @cached_property
     def with_edge(self) -> Compensator:
         """The same with an edge over 1 % of command."""
-        return design(self.found.model, DesignOptions(edge=Fraction(1, 100)))
+        return design(self.found.model, DesignOptions(transition=Fraction(1, 100)))
 
     @cached_property
     def loop(self) -> ClosedLoop:
         """The plant driven by the generated C."""
         firmware = generate(self.compensator, "host")
-        document = json.loads(to_json(compensator_document(self.compensator)))
+        document = json.loads(to_json_bytes(self.compensator))
         with tempfile.TemporaryDirectory(prefix="dzdesign-") as scratch:
             folder = Path(scratch) / "firmware"
             write_folder(folder, firmware.files, firmware.manifest)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from dzdesign.core.artefact_files import read_bytes, sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL
 from dzdesign.core.errors import InputError, quoted
+from dzdesign.design.compensator import Compensator
 
 if TYPE_CHECKING:
     from dzdesign.design.firmware_manifest import FirmwareManifest
@@ -27,16 +28,18 @@ def with_regenerated(verification: "Verification", folder: Path) -> "Verificatio
     folder : Path
         Of the firmware.
     """
-    return verification.with_checks(regenerated(folder))
+    return verification.with_checks(regenerated(folder, verification.compensator))
 
 
-def regenerated(folder: Path) -> "Check":
+def regenerated(folder: Path, compensator: "Compensator | None" = None) -> "Check":
     """Tell whether every file is what `codegen` makes of compensator.json, but for those that are the user's.
 
     Parameters
     ----------
     folder : Path
         Of the firmware.
+    compensator : Compensator, optional
+        Of the folder; read there where it is not handed.
 
     Returns
     -------
@@ -45,7 +48,8 @@ def regenerated(folder: Path) -> "Check":
         tells an edited file from a generated one, so the firmware does not hold.
     """
     from dzdesign.codegen.project import generate
-    from dzdesign.design.compensator_file import compensator_from_document
+    from dzdesign.core.artefact_reading import read_artefact
+    from dzdesign.design.compensator import Compensator
     from dzdesign.verify.firmware.folder import read_firmware_manifest
     from dzdesign.verify.requirements import REGENERATED
 
@@ -55,7 +59,8 @@ def regenerated(folder: Path) -> "Check":
     source = folder / "compensator.json"
     content = read_bytes(source, "compensator")
     try:
-        expected = generate(compensator_from_document(content, str(source)), manifest.target, content).manifest
+        compensator = compensator or read_artefact(content, Compensator, str(source))
+        expected = generate(compensator, manifest.target, content).manifest
     except InputError as error:
         return REGENERATED.check(holds=False, text=str(error))
     compared = {name: digest for name, digest in expected.files.items() if name not in expected.board}

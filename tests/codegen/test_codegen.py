@@ -10,10 +10,10 @@ import pytest
 
 from dzdesign.codegen.core.integer_form import integer_form
 from dzdesign.codegen.project import generate
-from dzdesign.core.artefact_files import to_json, write_folder
+from dzdesign.core.artefact_files import write_folder
+from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
-from dzdesign.design.compensator import SideLaw
-from dzdesign.design.compensator_file import compensator_document
+from dzdesign.design.compensator import SideLaw, Sides
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.quantise import finest_units
@@ -52,7 +52,7 @@ def random_compensators(base, count: int, seed: int):
         unit = units.beta
         falling = np.sort(rng.integers(unit // 2, unit + 1, base.nodes(1)))[::-1]
         side = SideLaw(
-            k_x_max_over_u_max=Fraction(
+            drive_range_over_u_max=Fraction(
                 int(rng.integers(units.coefficient // 32, units.coefficient)), units.coefficient
             ),
             u_min0_over_u_max=Fraction(int(rng.integers(20, units.coefficient)), units.coefficient),
@@ -61,7 +61,9 @@ def random_compensators(base, count: int, seed: int):
             certificate=base.positive.certificate,
         )
         law_name = str(rng.choice(["paper", "target"]))
-        yield dataclasses.replace(base, law=law_name, positive=side, transition_codes=edge, beta_denominator=unit)
+        yield dataclasses.replace(
+            base, law=law_name, sides=Sides(positive=side), transition_codes=edge, beta_denominator=unit
+        )
 
 
 def test_integer_form_equals_the_exact_law_at_random_and_at_corners(example_compensator):
@@ -101,7 +103,7 @@ def test_reciprocal_is_exact_for_every_quotient_that_can_occur(example_compensat
 
 
 def test_same_input_same_bytes(example_compensator, example_firmware):
-    again = generate(example_compensator, "f28335", to_json(compensator_document(example_compensator)).encode())
+    again = generate(example_compensator, "f28335", to_json_bytes(example_compensator))
     assert dict(again.files) == dict(example_firmware.files)
 
 
@@ -153,7 +155,7 @@ def test_a_target_with_another_pwm_is_refused(example_compensator):
 def test_scalings_too_rich_for_the_integers_are_refused(example_compensator):
     awkward = with_side(
         example_compensator,
-        k_x_max_over_u_max=Fraction(10**12 + 39, 3 * 10**12),
+        drive_range_over_u_max=Fraction(10**12 + 39, 3 * 10**12),
         u_min0_over_u_max=Fraction(7, 10**9 + 7),
     )
     with pytest.raises(InputError, match=r"bits|reciprocal"):
@@ -181,7 +183,7 @@ def test_core_and_hardware_link_as_one_program(example_firmware, tmp_path):
 
 def test_a_law_whose_divisor_cancels_needs_no_reciprocal(example_compensator):
     even = with_side(
-        dataclasses.replace(example_compensator, law="target"), k_x_max_over_u_max=Fraction(273 * 100, 65536)
+        dataclasses.replace(example_compensator, law="target"), drive_range_over_u_max=Fraction(273 * 100, 65536)
     )
     form = integer_form(even)
     assert form.divisor == 1

@@ -12,10 +12,12 @@ import pytest
 
 from dzdesign.codegen.project import target_named
 from dzdesign.command_line.cli import main
+from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.options import arguments_of
-from dzdesign.design.compensator_file import compensator_from_document
+from dzdesign.design.compensator import Compensator
 from dzdesign.design.request import DesignChoices
-from dzdesign.design.signal_text import Converter, command_signal, parse_signal
+from dzdesign.design.signal_text import command_signal, parse_signal
+from dzdesign.design.target_inputs import Converter
 from tests.support.golden_firmware import FULL, GOLDENS
 
 C2000 = ("f28335", "f280049c")
@@ -56,7 +58,7 @@ def step(text: str, number: int) -> str:
 
 
 def compensator_of(folder: Path):
-    return compensator_from_document((folder / "compensator.json").read_bytes(), "compensator.json")
+    return read_artefact((folder / "compensator.json").read_bytes(), Compensator, "compensator.json")
 
 
 # --- the commands of the first power-up -----------------------------------------------------------------------

@@ -6,9 +6,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from dzdesign.core.artefact_files import to_json
+from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError, RequirementError
-from dzdesign.design.compensator_file import compensator_document, compensator_from_document
+from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
 from dzdesign.design.drive_functions import DriveFunctions
 from dzdesign.design.options import DesignOptions
@@ -65,14 +66,14 @@ def test_law_paper_is_equation_18(example_compensator):
     for dp_code in (0, 205, 600, 1023, 4095):
         beta, share = c.beta(dp_code), Fraction(1234, 4095)
         side = c.positive
-        expected = (beta * side.k_x_max_over_u_max - beta + 1) * share + beta * side.u_min0_over_u_max
+        expected = (beta * side.drive_range_over_u_max - beta + 1) * share + beta * side.u_min0_over_u_max
         assert c.drive(1234, dp_code) == expected
 
 
 def test_law_target_keeps_the_gain(example_valve):
     c = design(example_valve, DesignOptions(law="target"))
     rises = {c.drive(4095, code) - c.drive(0, code) for code in (0, 300, 1000)}
-    assert rises == {c.positive.k_x_max_over_u_max}
+    assert rises == {c.positive.drive_range_over_u_max}
 
 
 def test_halves_round_up():
@@ -80,7 +81,7 @@ def test_halves_round_up():
     _, compensator = compensator_of(lambda dp: 5.0, pressures=(1.0,))
     exact = with_side(
         dataclasses.replace(compensator, signals=signals, drive_functions=DriveFunctions(compare_limit=1)),
-        k_x_max_over_u_max=Fraction(1, 2),
+        drive_range_over_u_max=Fraction(1, 2),
         u_min0_over_u_max=Fraction(1, 4),
         beta=tuple(1 << 15 for _ in compensator.positive.beta),
     )
@@ -95,8 +96,8 @@ def test_failed_sensor_takes_the_smallest_beta(example_compensator):
 
 
 def test_document_round_trip(example_compensator):
-    text = to_json(compensator_document(example_compensator))
-    assert compensator_from_document(text.encode(), "compensator.json") == example_compensator
+    text = to_json_bytes(example_compensator).decode()
+    assert read_artefact(text.encode(), Compensator, "compensator.json") == example_compensator
 
 
 def with_curve(side, **changes):

@@ -39,7 +39,7 @@ def run(tmp_path, capsys):
     [
         (["--output-max", "40 %"], "the largest output is 40.0% of full drive, but the valve opens at"),
         (["--output-max", "0.0005 %"], "so nothing would ever flow"),
-        (["--edge", "7 %"], "choose one of 3.14 % (128 codes) at most"),
+        (["--transition", "7 %"], "choose one of 3.14 % (128 codes) at most"),
         (["--ramp-up", "0.1 ms"], "a ramp takes 0.0001 s, expected 0 (none), or from one sample"),
         (["--dither", "1 kHz 1 %"], "the dither's frequency is 1000 Hz, expected 100 to 300 Hz"),
         (["--dither", "150 Hz"], "expected 'off', or a frequency in Hz and the wave's peak"),
@@ -127,7 +127,7 @@ class TestEditedCompensators:
         def edit(document):
             document["sides"]["positive"]["certificate"]["guard"] = guard
 
-        assert "expected closing, mean or opening" in refused(edit)
+        assert "expected 'closing', 'mean' or 'opening'" in refused(edit)
 
     @pytest.mark.parametrize(
         ("key", "value", "words"),

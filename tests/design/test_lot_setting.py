@@ -10,7 +10,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.beta_table import offset_ceiling
 from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.designing import design
-from dzdesign.design.lot_setting import Designed, _limit, lot_setting
+from dzdesign.design.lot_setting import _limit, lot_setting
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.signal_text import command_signal, parse_signal
 from dzdesign.design.signals import Signals
@@ -28,7 +28,7 @@ def valve(knee, pressures=(1.0, 2.5, 5.0), *, seed=0):
 
 
 def designed(valve, options=None):
-    return Designed.of(design(valve, options))
+    return design(valve, options)
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +43,7 @@ def rising():
 
 def highest_over(common, each, label="positive", sign=1):
     """Return by how much the common offset exceeds a valve's own exact ceiling, at worst, over u_max."""
-    own = each.own
+    own = each
     curve = guarded_curve(each.valve.sides[label], own.side(sign).certificate.guard, own.below_dp0)
     limit = offset_ceiling(curve, own.signals, own.u_max_V, sign=sign).limit
     u_min0 = common.side(sign).u_min0_over_u_max
@@ -54,12 +54,12 @@ def test_valves_of_opposite_trends_have_one_setting_under_both(falling, rising):
     common = lot_setting({"falling": falling, "rising": rising})
     assert set(common.binding) == {"falling", "rising"}
     assert all(highest_over(common.compensator, each) <= 0 for each in (falling, rising))
-    assert highest_over(falling.own, rising) > 0 and highest_over(rising.own, falling) > 0  # neither own one would do
+    assert highest_over(falling, rising) > 0 and highest_over(rising, falling) > 0  # neither own one would do
 
 
 def test_of_valves_that_are_alike_it_is_their_own(falling):
     common = lot_setting({"a": falling, "b": falling}).compensator
-    assert common.positive == falling.own.positive
+    assert common.positive == falling.positive
 
 
 def test_both_signs():
@@ -69,7 +69,7 @@ def test_both_signs():
     options = DesignOptions(signals=_with_command(signals, command))
     each = designed(read_artefact(content, ValveModel, "valve.json"), options)
     common = lot_setting({"a": each, "b": each}).compensator
-    assert (common.positive, common.negative) == (each.own.positive, each.own.negative)
+    assert (common.positive, common.negative) == (each.positive, each.negative)
     assert highest_over(common, each, "negative", -1) <= 0
 
 
@@ -105,6 +105,6 @@ def test_what_has_no_common_setting_is_told_why(falling, rising):
     other = designed(rising.valve, DesignOptions(law="target"))
     with pytest.raises(InputError, match="another law"):
         lot_setting({"a": falling, "b": other})
-    edged = designed(falling.valve, DesignOptions(edge=Fraction(1, 50)))
-    with pytest.raises(InputError, match="with --edge"):
+    edged = designed(falling.valve, DesignOptions(transition=Fraction(1, 50)))
+    with pytest.raises(InputError, match="with --transition"):
         lot_setting({"a": edged, "b": edged})

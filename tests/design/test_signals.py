@@ -7,8 +7,9 @@ import pytest
 
 from dzdesign.core.errors import InputError
 from dzdesign.design.options import DesignOptions
-from dzdesign.design.signal_text import Converter, command_signal, parse_signal, pressure_signal
+from dzdesign.design.signal_text import command_signal, parse_signal, pressure_signal
 from dzdesign.design.signals import CommandSignal, PressureSignal, Signals
+from dzdesign.design.target_inputs import Converter
 
 ADC = Converter()
 
@@ -115,7 +116,7 @@ def test_sensors_too_unlike_are_refused():
 def test_the_amplifiers_integers():
     options = DesignOptions(
         signals=Signals(command=command("-10..10 V x 0.15 + 1.5 V")),
-        edge=Fraction(1, 100), ramp_up_s=(0.5, 0.8), dither_Hz=150.0, dither_peak=Fraction(1, 100),
+        transition=Fraction(1, 100), ramp_up_s=(0.5, 0.8), dither_Hz=150.0, dither_peak=Fraction(1, 100),
         output_max=Fraction(9, 10),
     )  # fmt: skip
     functions = options.drive_functions()
@@ -133,8 +134,8 @@ def test_the_amplifiers_integers():
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"edge": Fraction(1, 5)}, "the edge is 20.000%, expected 0 to 10%"),
-        ({"edge": Fraction(1, 10**5)}, "less than one code"),
+        ({"transition": Fraction(1, 5)}, "the transition is 20.000%, expected 0 to 10%"),
+        ({"transition": Fraction(1, 10**5)}, "less than one code"),
         ({"dither_Hz": 150.0}, "a dither needs both"),
         ({"dither_Hz": 50.0, "dither_peak": Fraction(1, 100)}, "expected 100 to 300 Hz"),
         ({"output_max": Fraction(0)}, "the largest output"),

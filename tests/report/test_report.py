@@ -230,7 +230,7 @@ def test_a_valve_that_was_edited_within_the_compensator_is_found(copied, old):
 def test_a_compensator_that_was_edited_by_hand_is_found(copied):
     """With every hash of the chain made to fit."""
     content = change_json(copied / "compensator.json", lambda one: one["sides"]["positive"].update(
-        k_x_max_over_u_max=[3, 5]))  # fmt: skip
+        drive_range_over_u_max=[3, 5]))  # fmt: skip
     (copied / "firmware" / "compensator.json").write_bytes(content)
     manifest = change_json(
         copied / "firmware" / MANIFEST_NAME,
@@ -240,7 +240,7 @@ def test_a_compensator_that_was_edited_by_hand_is_found(copied):
     change_evidence(copied, lambda each: each["made_from"][0].update(sha256=sha256_of(manifest)))
     report = report_of_folder(copied)
     assert report.kind == "bad"
-    assert any("'sides.positive.k_x_max_over_u_max' is 0.600000, but" in fault for fault in report.faults)
+    assert any("'sides.positive.drive_range_over_u_max' is 0.600000, but" in fault for fault in report.faults)
 
 
 def test_of_a_firmware_its_own_evidence_is_taken(copied):

@@ -45,12 +45,16 @@ class Tool:
     version: Annotated[str, Meta(description="Its version.")]
 
 
+#: A SHA-256 in hex; ``$`` alone would let a line break pass.
+Sha256 = Annotated[str, Meta(pattern="^[0-9a-f]{64}$", max_length=64)]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SourceFile:
     """A file that something was made from."""
 
     source: Annotated[str, Meta(description="File name.")]
-    sha256: Annotated[str, Meta(description="SHA-256 of its bytes.", pattern="^[0-9a-f]{64}$", max_length=64)]
+    sha256: Annotated[Sha256, Meta(description="SHA-256 of its bytes.")]
 
 
 #: What this program writes into the header of its artefacts.

@@ -24,8 +24,8 @@ share = sympy.Symbol("share", nonnegative=True)  # u_i/u_e
 LOWERED_BY = (beta_o - beta) * u_min0 * (1 - share)
 
 
-def evaluate_edge(
-    *, beta_opening: Any, beta_closing: Any, u_min0_over_u_max: Any, share_of_edge: Any, n_full: Any
+def evaluate_transition(
+    *, beta_opening: Any, beta_closing: Any, u_min0_over_u_max: Any, share_of_transition: Any, n_full: Any
 ) -> Any:
     """Return by how many counts the edge lowers the opening law, for numbers of any kind.
 
@@ -35,7 +35,7 @@ def evaluate_edge(
         Offsets of the two thresholds over the law's u_min0.
     u_min0_over_u_max : number or array
         The law's u_min0, dimensionless.
-    share_of_edge : number or array
+    share_of_transition : number or array
         u_i/u_e, from 0 to 1; beyond the edge there is nothing to lower.
     n_full : number
         Compare value of full drive.
@@ -47,10 +47,10 @@ def evaluate_edge(
 
     Examples
     --------
-    >>> evaluate_edge(beta_opening=1, beta_closing=0, u_min0_over_u_max=1, share_of_edge=0, n_full=600)
+    >>> evaluate_transition(beta_opening=1, beta_closing=0, u_min0_over_u_max=1, share_of_transition=0, n_full=600)
     Fraction(600, 1)
     """
-    return _lowered()(beta_opening, beta_closing, u_min0_over_u_max, share_of_edge, n_full)
+    return _lowered()(beta_opening, beta_closing, u_min0_over_u_max, share_of_transition, n_full)
 
 
 @cache

@@ -4,7 +4,6 @@
 from a file: a file can be edited, and the firmware's header would go on promising what no longer holds.
 """
 
-from collections.abc import Sequence
 from dataclasses import fields
 from fractions import Fraction
 
@@ -12,7 +11,7 @@ from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.beta_table import STEP_CODES, OffsetCeiling, OffsetCurve, offset_ceiling
 from dzdesign.design.compensator import Certificate, Compensator
 from dzdesign.design.signals import Signals
-from dzdesign.identify.fitting.guard_curve import GuardCurve
+from dzdesign.identify.fitting.guard_curve import Guard, GuardCurve
 from dzdesign.identify.valve.side_model import SideModel
 
 #: Of a loss in V: tenths of a microvolt.
@@ -24,11 +23,11 @@ def certify(
     curve: OffsetCurve,
     ceiling: OffsetCeiling,
     *,
-    guard: str,
+    guard: Guard,
     signals: Signals,
     u_max_V: Fraction,
     u_min0: Fraction,
-    table: Sequence[int],
+    table: tuple[int, ...],
     denominator: int,
 ) -> Certificate:
     """Prove the certificate of one side, in exact arithmetic, at every pressure code.
@@ -47,7 +46,7 @@ def certify(
         Full command.
     u_min0 : Fraction
         Of the law, over u_max.
-    table : sequence of int
+    table : tuple of int
         Nodes of beta over `denominator`.
     denominator : int
         Unit of the nodes.

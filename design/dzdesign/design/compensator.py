@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, get_args
 
 from msgspec import Meta
 
@@ -13,15 +13,17 @@ from dzdesign.core.errors import InputError
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.derivation.law import law
 from dzdesign.derivation.scaling import drive, evaluate_line
-from dzdesign.derivation.transition import evaluate_edge
+from dzdesign.derivation.transition import evaluate_transition
 from dzdesign.design.drive_functions import RAMPED_CODES, DriveFunctions
 from dzdesign.design.lot_valves import LotValve
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import TargetInputs
+from dzdesign.identify.fitting.guard_curve import Guard
 from dzdesign.identify.valve.model import ValveModel
 
 #: What to do below the reference pressure drop: beta = 1 as in Eq. (7), or what the tests there say.
-BELOW_REFERENCE = ("hold", "extend")
+BelowDp0 = Literal["hold", "extend"]
+BELOW_DP0: tuple[BelowDp0, ...] = get_args(BelowDp0)
 
 Node = Annotated[int, Meta(ge=1, le=2**31)]
 Codes = Annotated[int, Meta(ge=0, le=65535)]
@@ -34,7 +36,7 @@ class Certificate:
     confidence: Annotated[
         float, quantity("1", "Confidence with which the threshold's lower bounds hold together.", ge=0.5, le=1)
     ]
-    guard: Annotated[Literal["closing", "mean", "opening"], Meta(description="The threshold that they bound.")]
+    guard: Annotated[Guard, Meta(description="The threshold that they bound.")]
     level_L_min: Annotated[
         float,
         quantity("L/min", "Flow that counted as flow when the thresholds were identified.", ge=0, le=1e6),
@@ -125,14 +127,14 @@ class Compensator(Artefact, ShownInNotebooks):
     )
     target: Annotated[
         TargetInputs | None, Meta(description="Target that it was designed for; null where nobody wrote it down.")
-    ] = None
+    ]
     options: Annotated[
         Mapping[str, str] | None,
         Meta(description="Options of `design`, as written, defaults included; null where nobody wrote them down."),
-    ] = None
+    ]
     law: Annotated[str, Meta(description="paper (Eq. 18), or target (meets Eq. 16).")]
     below_dp0: Annotated[
-        Literal["hold", "extend"], Meta(description="For dP <= dP0 hold beta = 1, or follow the tests there.")
+        BelowDp0, Meta(description="For dP <= dP0 hold beta = 1, or follow the tests there.")
     ] = "hold"
     u_max_V: Annotated[Fraction, quantity("V", "Full command.")]
     signals: Annotated[Signals, Meta(description="Scalings of command, pressures and compare value.")]
@@ -186,7 +188,7 @@ class Compensator(Artefact, ShownInNotebooks):
             raise RuleError("the lot names a valve twice, expected each valve once")
         for sign in self.signals.signs:
             self._check_side(sign)
-        lot_json = to_json([as_document(valve) for valve in self.lot]).encode()
+        lot_json = to_json({"lot": [as_document(valve) for valve in self.lot]}).encode()
         object.__setattr__(self, "valve_sha256", sha256_of(to_json_bytes(self.valve)))
         object.__setattr__(self, "lot_sha256", sha256_of(lot_json) if self.lot else None)
 
@@ -239,9 +241,10 @@ class Compensator(Artefact, ShownInNotebooks):
 
     def side(self, sign: int = 1) -> SideLaw:
         """Return the law of one sign of command."""
-        if sign < 0 and self.negative is None:
+        side = self.positive if sign > 0 else self.negative
+        if side is None:
             raise InputError("this compensator has no law for negative commands")
-        return self.positive if sign > 0 else self.negative
+        return side
 
     def nodes(self, sign: int = 1) -> int:
         """Return how many nodes beta needs for every difference of pressure codes."""
@@ -252,7 +255,7 @@ class Compensator(Artefact, ShownInNotebooks):
         return self._interpolate(self.side(sign).beta, dp_code)
 
     def law_beta(self, dp_code: int, sign: int = 1) -> Fraction:
-        """Return the beta that the law follows beyond the edge; the certified one without an edge."""
+        """Return the beta that the law follows beyond the transition; the certified one without a transition."""
         return self._interpolate(self.side(sign).law_beta, dp_code)
 
     def _interpolate(self, numerators: tuple[int, ...], dp_code: int) -> Fraction:
@@ -280,11 +283,11 @@ class Compensator(Artefact, ShownInNotebooks):
         )
         counts = line.slope * from_zero + line.start
         if from_zero < self.transition_codes:
-            counts -= evaluate_edge(
+            counts -= evaluate_transition(
                 beta_opening=beta,
                 beta_closing=self.beta(dp_code, sign),
                 u_min0_over_u_max=side.u_min0_over_u_max,
-                share_of_edge=Fraction(from_zero, self.transition_codes),
+                share_of_transition=Fraction(from_zero, self.transition_codes),
                 n_full=signals.compare_max,
             )
         return counts

@@ -4,13 +4,12 @@ from dataclasses import replace
 from fractions import Fraction
 
 from dzdesign.core.artefact_files import sha256_of
-from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.core.artefact_types import to_json_bytes
+from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.derivation.law import law
 from dzdesign.design.beta_table import STEP_CODES, OffsetCeiling, OffsetCurve, choose_beta_table, offset_ceiling
 from dzdesign.design.certificate import certify, guarded_curve, hold_below
-from dzdesign.design.compensator import Compensator, SideLaw
+from dzdesign.design.compensator import Compensator, SideLaw, Sides
 from dzdesign.design.costs import costs_of
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.quantise import Units, finest_units
@@ -21,8 +20,8 @@ from dzdesign.identify.valve.side_model import SideModel
 
 #: Share of the sensor's span by which the difference may read negative before it counts as a failed sensor.
 REVERSE_SHARE = Fraction(1, 100)
-#: Standard errors by which the edge's end stands above the opening threshold.
-EDGE_ERRORS = 3
+#: Standard errors by which the transition's end stands above the opening threshold.
+OPENING_ERRORS = 3
 
 
 def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes: bytes | None = None) -> Compensator:
@@ -88,7 +87,7 @@ def _side_law(side: SideModel, options: DesignOptions, u_max: Fraction, sign: in
     if "branch-order" not in options.accept:
         _refuse_crossed_branches(side)
     certified = guarded_curve(side, options.guard, options.below_dp0)
-    opening = _opening_curve(side, options) if options.edge else None
+    opening = _opening_curve(side, options) if options.transition else None
     reference = Fraction(repr(side.reference.dp_MPa))
     top = (opening or certified).at(reference)
     # Half a count less, because the compare value of the offset may be rounded up.
@@ -161,18 +160,18 @@ def _refuse_two_signs(valve: ValveModel, guard: str) -> None:
 
 
 def _opening_curve(side: SideModel, options: DesignOptions) -> OffsetCurve:
-    """Return where the edge ends and the law goes on: the opening threshold, and its error on top.
+    """Return where the transition ends and the law goes on: the opening threshold, and its error on top.
 
     A law that starts above the threshold only shortens the dead zone that is left; one that starts below lengthens it.
     """
     opening = side.opening_curve
     if opening is None:
         raise InputError(
-            "an edge ends at the opening threshold, of which valve.json has no curve; record the rising branch with a "
-            "column of dP, make valve.json again, or leave out --edge"
+            "a transition ends at the opening threshold, of which valve.json has no curve; record the rising branch "
+            "with a column of dP, make valve.json again, or leave out --transition"
         )
     error = max(opening.u_se_V)
-    offset = [Fraction(repr(value)) + EDGE_ERRORS * Fraction(repr(error)) for value in opening.u_V]
+    offset = [Fraction(repr(value)) + OPENING_ERRORS * Fraction(repr(error)) for value in opening.u_V]
     return OffsetCurve(
         dp_MPa=tuple(Fraction(repr(value)) for value in opening.dp_MPa),
         offset_V=tuple(offset),
@@ -194,7 +193,7 @@ def travel(side: SideModel, u_max: Fraction, offset_V: Fraction) -> Fraction:
     Identification gives k x_max from the knee on. The law starts lower, at the guarded offset; without the difference
     full command would not reach full flow (u_O(u_max) = u_max exactly if k x_max = u_max - u_min0).
     """
-    reference = min(side.tests, key=lambda test: abs(test.dp_MPa - side.reference.dp_MPa))
+    reference = min(side.tests, key=lambda test: abs((test.dp_MPa or 0.0) - (side.reference.dp_MPa or 0.0)))
     knee = reference.u_knee_rising_V if reference.u_knee_rising_V is not None else reference.u_knee_falling_V
     below_knee = max(Fraction(repr(knee)) - offset_V, Fraction(0))
     travel = Fraction(repr(side.k_x_max_over_u_max)) + below_knee / u_max
@@ -211,7 +210,7 @@ def over(value: Fraction, rounding: str, unit: int) -> Fraction:
 def prove_monotone(compensator: Compensator, sign: int) -> None:
     """Prove that more command gives more drive, at every pressure: the gain is affine in beta, so its ends decide.
 
-    Inside the edge the drive rises faster still: what the edge takes away falls with the command.
+    Inside the transition the drive rises faster still: what the transition takes away falls with the command.
     """
     chosen, side = law(compensator.law), compensator.side(sign)
     numerators = side.law_beta

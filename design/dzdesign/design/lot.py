@@ -47,7 +47,8 @@ def lot_margins(compensator: Compensator) -> tuple[LotMargin, ...]:
         A lot setting with its lot.
     """
     signals = compensator.signals
-    kept = Fraction(1, 2 * signals.compare_max) + Fraction(compensator.drive_functions.dither_counts, signals.compare_max)
+    dither = Fraction(compensator.drive_functions.dither_counts, signals.compare_max)
+    kept = Fraction(1, 2 * signals.compare_max) + dither
     margins: dict[str, LotMargin] = {}
     for sign in signals.signs:
         law = compensator.side(sign)

@@ -16,17 +16,16 @@ from math import ceil, floor
 
 import numpy as np
 
-from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.beta_table import OffsetCeiling, OffsetCurve, choose_beta_table, offset_ceiling, pressures_MPa
 from dzdesign.design.certificate import certify, guarded_curve, prove_certificates
-from dzdesign.design.compensator import Certificate, Compensator, SideLaw
+from dzdesign.design.compensator import Certificate, Compensator, SideLaw, Sides
 from dzdesign.design.costs import costs_of
 from dzdesign.design.designing import over, prove_monotone, travel
-from dzdesign.design.lot import LotMargin, LotValve, prove_lot
+from dzdesign.design.lot import LotMargin, prove_lot
+from dzdesign.design.lot_valves import LotValve
 from dzdesign.design.quantise import finest_units
 from dzdesign.design.signals import Signals
-from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.side_model import SideModel
 
 #: Of u_max: a ceiling that is nowhere this near to the least one can't be the least by a rounding error (1e-12).
@@ -35,19 +34,6 @@ CLEAR = 1e-6
 NEAR_MPa = 1e-9
 #: What all compensators of a batch must have in common.
 SHARED = ("law", "below_dp0", "signals", "u_max_V", "beta_denominator", "transition_codes", "drive_functions")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Designed:
-    """A valve of the batch, as its file has it, and its own compensator."""
-
-    valve: ValveModel
-    own: Compensator
-
-    @classmethod
-    def of(cls, own: Compensator) -> "Designed":
-        """Return a compensator with the valve that it was designed from."""
-        return cls(valve=read_artefact(own.valve_document.encode(), ValveModel, "compensator.json: valve"), own=own)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,19 +81,19 @@ class _Side:
     nearness: Mapping[str, float]
 
 
-def lot_setting(batch: Mapping[str, Designed]) -> LotSetting:
+def lot_setting(batch: Mapping[str, Compensator]) -> LotSetting:
     """Return the largest setting, under one direction of the threshold, that is certified for every valve.
 
     Parameters
     ----------
-    batch : mapping of str to Designed
-        Name to valve and own compensator; two at least.
+    batch : mapping of str to Compensator
+        Name of a valve to its own compensator; two at least.
 
     Raises
     ------
     InputError
         If there is no such setting: valves designed with other options, without a common pressure drop, or with an
-        edge, whose end is no bound.
+        transition, whose end is no bound.
     RequirementError
         If a proof fails.
     """
@@ -126,11 +112,9 @@ def lot_setting(batch: Mapping[str, Designed]) -> LotSetting:
         raise InputError("no law of one direction lies under the least guarded offset of all valves")
     _, carrier, laws = best
     compensator = replace(
-        batch[carrier].own,
-        positive=laws[1],
-        negative=laws.get(-1),
+        batch[carrier],
+        sides=Sides(positive=laws[1], negative=laws.get(-1)),
         costs=(),
-        common_valves=len(batch),
         lot=_lot(batch, first, sides),
     )
     for side in sides:
@@ -143,10 +127,10 @@ def lot_setting(batch: Mapping[str, Designed]) -> LotSetting:
         if any(name in side.exact for side in sides)
     }
     line = (
-        f"common setting of {len(batch)} valves: under the bounds of each, with that valve's own confidence; this file "
+        f"lot setting of {len(batch)} valves: under the bounds of each, with that valve's own confidence; this file "
         f"holds the valve {carrier}, for which the lines above are"
     )
-    compensator = replace(compensator, costs=(*costs_of(compensator, batch[carrier].valve), line))
+    compensator = replace(compensator, costs=(*costs_of(compensator), line))
     return LotSetting(
         compensator=compensator,
         carrier=carrier,
@@ -157,28 +141,28 @@ def lot_setting(batch: Mapping[str, Designed]) -> LotSetting:
     )
 
 
-def _lot(batch: Mapping[str, Designed], first: Compensator, sides: Sequence[_Side]) -> tuple[LotValve, ...]:
+def _lot(batch: Mapping[str, Compensator], first: Compensator, sides: Sequence[_Side]) -> tuple[LotValve, ...]:
     """Return the valves with the bounds of the threshold that their compensators guard."""
     guards = {side.sign: first.side(side.sign).certificate.guard for side in sides}
     return tuple(
-        LotValve.of(name, each.own.valve_sha256, {side.sign: side.models[name] for side in sides}, guards)
+        LotValve.of(name, each.valve_json_sha256, {side.sign: side.models[name] for side in sides}, guards)
         for name, each in batch.items()
     )
 
 
-def _shared_design(batch: Mapping[str, Designed]) -> Compensator:
+def _shared_design(batch: Mapping[str, Compensator]) -> Compensator:
     """Return one compensator, whose options are those of all; refuse valves that were designed otherwise."""
     if len(batch) < 2:
-        raise InputError(f"a common setting needs two valves or more, got {len(batch)}")
-    name, first = next((name, each.own) for name, each in batch.items())
+        raise InputError(f"a lot setting needs two valves or more, got {len(batch)}")
+    name, first = next((name, each) for name, each in batch.items())
     for other, each in batch.items():
-        unlike = [field for field in SHARED if getattr(each.own, field) != getattr(first, field)]
-        if each.own.positive.certificate.guard != first.positive.certificate.guard:
+        unlike = [field for field in SHARED if getattr(each, field) != getattr(first, field)]
+        if each.positive.certificate.guard != first.positive.certificate.guard:
             unlike.append("guard")
         if unlike:
             raise InputError(f"{other} and {name} are designed with another {unlike[0]}, so no setting serves both")
     if first.transition_codes:
-        raise InputError("with --edge the law follows each valve's opening threshold, so no setting serves all")
+        raise InputError("with --transition the law follows each valve's opening threshold, so no setting serves all")
     return first
 
 
@@ -195,7 +179,7 @@ def _common_interval(sides: Iterable[Mapping[str, OffsetCurve]]) -> tuple[float,
     return float(low), float(high)
 
 
-def _side(batch: Mapping[str, Designed], first: Compensator, sign: int) -> _Side:
+def _side(batch: Mapping[str, Compensator], first: Compensator, sign: int) -> _Side:
     """Find the least ceiling of one sign of command: in doubles over all valves, exactly over those near it."""
     label = "positive" if sign > 0 else "negative"
     signals, u_max = first.signals, first.u_max_V
@@ -214,7 +198,7 @@ def _side(batch: Mapping[str, Designed], first: Compensator, sign: int) -> _Side
     certified = range(ceil(signals.dp_code(Fraction(repr(low)))), floor(signals.dp_code(Fraction(repr(high)))) + 1)
     ceiling = OffsetCeiling(limit=tuple(map(min, limits)), certified=certified)
     if min(ceiling.limit) <= 0:
-        raise InputError("one of the valves leaves no positive offset for a common setting")
+        raise InputError("one of the valves leaves no positive offset for a lot setting")
     return _Side(sign=sign, models=models, curves=curves, exact=exact, least=ceiling, nearness=least)
 
 
@@ -248,7 +232,7 @@ def _limit(curve: OffsetCurve, dp_MPa: np.ndarray) -> np.ndarray:
     return value
 
 
-def _carriers(batch: Mapping[str, Designed], sides: Sequence[_Side]) -> list[str]:
+def _carriers(batch: Mapping[str, Compensator], sides: Sequence[_Side]) -> list[str]:
     """Return, for each trend that a valve has, the valve of that trend whose own ceilings are nearest to the least."""
     nearest: dict[tuple[str | None, ...], tuple[float, str]] = {}
     for name in batch:
@@ -277,7 +261,7 @@ def _law(side: _Side, carrier: str, first: Compensator) -> SideLaw:
     # The longest travel: full command fully opens every valve.
     longest = max(travel(each, u_max, top) for each in side.models.values())
     law = SideLaw(
-        k_x_max_over_u_max=over(longest, "nearest", scale),
+        drive_range_over_u_max=over(longest, "nearest", scale),
         u_min0_over_u_max=u_min0,
         beta=table,
         certificate=first.side(side.sign).certificate,

@@ -8,13 +8,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import accumulate, pairwise
-from typing import Annotated, Literal
+from typing import Annotated
 
 from msgspec import Meta
 
-from dzdesign.core.artefact_types import RuleError, quantity
+from dzdesign.core.artefact_types import RuleError, Sha256, quantity
 from dzdesign.identify.valve.quantity_types import PressureDrop, Voltage
-from dzdesign.identify.valve.side_model import SideModel
+from dzdesign.identify.valve.side_model import SideModel, Trend
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,7 +22,7 @@ class LotSide:
     """One sign of command of a valve: lower bounds of the guarded threshold."""
 
     trend: Annotated[
-        Literal["decreasing", "flat", "increasing"] | None,
+        Trend | None,
         Meta(description="How the threshold runs with the pressure drop; null where fewer than two were tested."),
     ]
     confidence: Annotated[float, quantity("1", "Confidence with which all bounds hold together.", ge=0.5, le=1)]
@@ -69,7 +69,7 @@ class LotValve:
     """A valve of the lot."""
 
     name: Annotated[str, Meta(description="By which it stands in the table of the batch.")]
-    valve_sha256: Annotated[str, Meta(description="SHA-256 of its valve.json.", pattern="^[0-9a-f]{64}$", max_length=64)]
+    valve_sha256: Annotated[Sha256, Meta(description="SHA-256 of its valve.json.")]
     positive: Annotated[LotSide, Meta(description="Bounds of positive commands.")]
     negative: Annotated[
         LotSide | None, Meta(description="Bounds of negative commands; null: the setting drives none.")

@@ -3,15 +3,18 @@
 import re
 from collections.abc import Mapping
 from fractions import Fraction
+from typing import cast
 
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.options import flag_of
 from dzdesign.core.units import parse_quantity
+from dzdesign.design.compensator import BelowDp0
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.request import DEFAULTS, NEGATIVE_DP, POLARITIES, DesignRequest
 from dzdesign.design.signal_text import command_signal, parse_signal, pressure_signal
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import TargetInputs
+from dzdesign.identify.fitting.guard_curve import Guard
 
 
 def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
@@ -62,9 +65,9 @@ def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
             swapped=text["negative_dp"] == "swapped",
             **sensors,
         ),
-        guard=text["guard"],
-        below_dp0=text["below_dp0"],
-        edge=_share(text["transition"], "--transition"),
+        guard=cast(Guard, text["guard"]),
+        below_dp0=cast(BelowDp0, text["below_dp0"]),
+        transition=_share(text["transition"], "--transition"),
         window=_share(text["zero_window"], "--zero-window"),
         ramp_up_s=_seconds(text["ramp_up"], "--ramp-up"),
         ramp_down_s=_seconds(text["ramp_down"], "--ramp-down"),

@@ -34,7 +34,7 @@ def finest_units(signals: Signals, transition_codes: int) -> Units:
     signals : Signals
         Scalings: C codes of command, M counts of the PWM.
     transition_codes : int
-        E, codes of the edge; 0 without one.
+        E, codes of the transition; 0 without one.
 
     Raises
     ------
@@ -52,12 +52,12 @@ def finest_units(signals: Signals, transition_codes: int) -> Units:
     if shorter:
         share = shorter / min(signals.command.span(sign) for sign in signals.signs)
         raise InputError(
-            f"an edge of {transition_codes} codes of command, with {what}, needs more than 64-bit arithmetic; choose one of "
-            f"{100 * share + 0.01:.2f} % ({shorter} codes) at most"
+            f"a transition of {transition_codes} codes of command, with {what}, needs more than 64-bit arithmetic; "
+            f"choose one of {100 * share + 0.01:.2f} % ({shorter} codes) at most"
         )
     raise InputError(
         f"{what} needs more than 64-bit arithmetic; choose an attenuator whose full command has more factors in common "
-        "with the counts" + (", or leave out the edge" if transition_codes else "")
+        "with the counts" + (", or leave out the transition" if transition_codes else "")
     )
 
 
@@ -76,12 +76,12 @@ def _finest_that_fit(signals: Signals, transition_codes: int) -> Units | None:
 
 def _fits(span: int, compare_max: int, transition_codes: int, beta_bits: int, coefficient_bits: int) -> bool:
     """Tell whether table and factor fit with some divisor of what remains of the PWM's range moved to the table."""
-    edge = max(transition_codes, 1)
+    transition = max(transition_codes, 1)
     powers = STEP_CODES << (beta_bits + coefficient_bits)
-    shared = gcd(compare_max, powers * span * edge)
+    shared = gcd(compare_max, powers * span * transition)
     remains = compare_max // shared
     table = STEP_CODES << (beta_bits + 1)
-    factor = span * edge << coefficient_bits
+    factor = span * transition << coefficient_bits
     return any(
         table * moved < FACTOR_LIMIT and factor * (remains // moved) < FACTOR_LIMIT
         for moved in range(1, remains + 1)

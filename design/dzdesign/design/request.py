@@ -31,7 +31,7 @@ class DesignChoices:
         "C", LAW, "0 %", "1 %")] = None
     below_dp0: Annotated[Text, Option(
         "Below dP0: hold beta = 1 as the paper does, or extend it to the tests there.",
-        "B", LAW, "hold", choices="dzdesign.design.compensator:BELOW_REFERENCE")] = None
+        "B", LAW, "hold", choices="dzdesign.design.compensator:BELOW_DP0")] = None
     output_max: Annotated[Text, Option("Largest drive, in percent of full drive.", "C", LAW, "100 %", "95 %")] = None
     accept: Annotated[Text, Option(
         "Design in spite of this warning: branch-order (default: refuse).",

@@ -90,8 +90,7 @@ def run_chain(valve: "RecoveredValve", say: Callable[[str], None] = lambda _: No
     from dzdesign.codegen.project import generate
     from dzdesign.core.artefact_files import parse_document
     from dzdesign.core.artefact_types import to_json_bytes
-    from dzdesign.design.compensator_file import SCHEMA as COMPENSATOR_SCHEMA
-    from dzdesign.design.compensator_file import compensator_document
+    from dzdesign.design.compensator import SCHEMA as COMPENSATOR_SCHEMA
     from dzdesign.design.designing import design
     from dzdesign.identify.identification import identify
     from dzdesign.reproduce.runs import run_valve
@@ -106,7 +105,7 @@ def run_chain(valve: "RecoveredValve", say: Callable[[str], None] = lambda _: No
         identified = identify(_read_all(ramps, Path(scratch)), identify_options(valve))
         valve_json = to_json_bytes(identified)
         compensator = design(identified, valve_bytes=valve_json)
-        compensator_json = to_json(compensator_document(compensator))
+        compensator_json = to_json_bytes(compensator).decode()
         firmware = generate(compensator, "host", compensator_json.encode())
         write_folder(Path(scratch) / "firmware", firmware.files, firmware.manifest)
         design_document = parse_document(compensator_json.encode(), "compensator.json", (COMPENSATOR_SCHEMA,))

@@ -92,7 +92,7 @@ def compensator_html(compensator: "Compensator") -> str:
         rows.append(
             [
                 "positive" if sign > 0 else "negative",
-                f"{float(side.k_x_max_over_u_max):.5f}",
+                f"{float(side.drive_range_over_u_max):.5f}",
                 f"{float(side.u_min0_over_u_max):.5f}",
                 f"{100 * certificate.confidence:.6g}% bound of the {certificate.guard} threshold",
                 f"{low:.3f} to {high:.3f}",

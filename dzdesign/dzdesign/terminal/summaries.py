@@ -43,15 +43,15 @@ def valve_summary(valve: "ValveModel") -> str:
 
 def compensator_summary(compensator: "Compensator") -> str:
     """Return target and law, the offset and certificate of each side, and the costs."""
-    target = f" for {compensator.request.target.name}" if compensator.request else ""
+    target = f" for {compensator.target.name}" if compensator.target else ""
     lines = [f"Compensator{target}, law {compensator.law}, of a valve of {float(compensator.u_max_V):g} V"]
     for sign in compensator.signals.signs:
         side = compensator.side(sign)
         low, high = (float(end) for end in side.certificate.dp_MPa)
         lines.append(
             f"  {'positive' if sign > 0 else 'negative'} commands: u_min0/u_max = {float(side.u_min0_over_u_max):.5f}, "
-            f"k x_max/u_max = {float(side.k_x_max_over_u_max):.5f}; certified from {low:.3f} to {high:.3f} MPa with "
-            f"{100 * side.certificate.confidence:.6g} % confidence, guarding {side.certificate.guard}"
+            f"k x_max/u_max = {float(side.drive_range_over_u_max):.5f}; certified from {low:.3f} to {high:.3f} MPa "
+            f"with {100 * side.certificate.confidence:.6g} % confidence, guarding {side.certificate.guard}"
         )
     return "\n".join(map(one_line, [*lines, *(f"  cost: {line}" for line in compensator.costs)]))
 

@@ -98,11 +98,9 @@ def _side_lines(side: "SideModel") -> tuple[str, ...]:
 
 def print_compensator(compensator: "Compensator") -> None:
     """Print the law, the certificate and what the choices cost."""
-    from dzdesign.core.artefact_reading import read_artefact
     from dzdesign.derivation.law import law
     from dzdesign.design.costs import hidden_failures
     from dzdesign.design.signal_descriptions import signals_in_words
-    from dzdesign.identify.valve.model import ValveModel
 
     chosen = law(compensator.law)
     lines = [
@@ -115,7 +113,7 @@ def print_compensator(compensator: "Compensator") -> None:
         low, high = (float(end) for end in certificate.dp_MPa)
         label = "" if compensator.negative is None else "positive: " if sign > 0 else "negative: "
         lines += [
-            f"{label}drive range of the law k x_max/u_max = {_rational(side.k_x_max_over_u_max)} (from its offset, "
+            f"{label}drive range of the law k x_max/u_max = {_rational(side.drive_range_over_u_max)} (from its offset, "
             f"below the valve's knee, to full flow), offset at dP0 u_min0/u_max = {_rational(side.u_min0_over_u_max)}, "
             f"both as shares of full command; beta(dP): straight between {len(side.beta)} nodes, each a "
             f"whole number of 1/{compensator.beta_denominator}",
@@ -127,9 +125,8 @@ def print_compensator(compensator: "Compensator") -> None:
     if compensator.transition_codes:
         share = compensator.transition_codes / compensator.signals.command.span(1)
         guard = compensator.positive.certificate.guard
-        lines.append(f"edge: from the {guard} to the opening threshold over the first {share:.2%} of command")
-    valve = read_artefact(compensator.valve_document.encode(), ValveModel, "compensator.json: valve")
-    hidden = hidden_failures(compensator, valve)
+        lines.append(f"transition: from the {guard} to the opening threshold over the first {share:.2%} of command")
+    hidden = hidden_failures(compensator)
     costs = [line for line in compensator.costs if line not in hidden]
     console = new_console()
     for line in (*(f"warning: {line}" for line in hidden), *lines, *(f"cost: {line}" for line in costs)):
@@ -138,8 +135,8 @@ def print_compensator(compensator: "Compensator") -> None:
 
 def print_firmware(firmware: "Firmware", folder: str) -> None:
     """Print the files of a firmware folder."""
-    valves = json.loads(firmware.files["compensator.json"]).get("common_valves")
-    common = f", common setting of {valves} valves" if valves else ""
+    valves = len(json.loads(firmware.files["compensator.json"])["lot"])
+    common = f", lot setting of {valves} valves" if valves else ""
     print(one_line(f"Firmware for {firmware.manifest.target}, law {firmware.manifest.law}{common}, in {folder}:"))
     for name in firmware.files:
         print(f"  {name}")

@@ -1,8 +1,6 @@
 """Both sides of a compensator by their names, and the valve it holds."""
 
 from dzdesign.design.compensator import Compensator, SideLaw
-from dzdesign.identify.valve.model import ValveModel
-from dzdesign.identify.valve.valve_file import valve_from_document
 
 SIGNS = {"positive": 1, "negative": -1}
 
@@ -11,11 +9,6 @@ def laws_of(compensator: Compensator | None) -> dict[str, SideLaw]:
     """Return the law of each side that has one."""
     both = {"positive": compensator.positive, "negative": compensator.negative} if compensator else {}
     return {name: law for name, law in both.items() if law is not None}
-
-
-def valve_in(compensator: Compensator) -> ValveModel:
-    """Return the valve that it was designed from."""
-    return valve_from_document(compensator.valve_document.encode(), "compensator.json: valve")
 
 
 def code_MPa(compensator: Compensator) -> float:

@@ -151,6 +151,6 @@ def test_the_engineering_values_are_those_of_the_constants():
     assert said[core, "STEP_CODES"] == f"{64 * 20 / 4095:.4f} MPa"
     assert said[core, "HALF"] == f"{10 / 60000 / 2:.3g} V"
     assert said[core, "FACTOR_OFFSET"] == f"u_min0 = {10 * float(side.u_min0_over_u_max):.6f} V"
-    assert said[core, "FACTOR_SLOPE"] == f"k x_max/u_max - 1 = {float(side.k_x_max_over_u_max) - 1:.6f}"
+    assert said[core, "FACTOR_SLOPE"] == f"k x_max/u_max - 1 = {float(side.drive_range_over_u_max) - 1:.6f}"
     assert said[core, "COMMAND_HIGH_WORD"] == "1.000000"
     assert said[core, "law_segment"] == f"beta {min(side.beta) / 32768:.6f} to 1.000000"

@@ -43,7 +43,7 @@ def stated_compare(compensator, command: int, dp_code: int) -> int:
     values = {
         u_i: volts,
         beta: rational(compensator.beta(dp_code)),
-        k: rational(compensator.positive.k_x_max_over_u_max) * U_MAX_V / X_MAX_M,
+        k: rational(compensator.positive.drive_range_over_u_max) * U_MAX_V / X_MAX_M,
         x_max: X_MAX_M,
         u_max: U_MAX_V,
         u_min0: rational(compensator.positive.u_min0_over_u_max) * U_MAX_V,

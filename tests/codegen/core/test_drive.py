@@ -12,10 +12,11 @@ import pytest
 from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
-from dzdesign.design.compensator import Compensator
+from dzdesign.design.compensator import Compensator, Sides
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
-from dzdesign.design.signal_text import Converter, command_signal, parse_signal
+from dzdesign.design.signal_text import command_signal, parse_signal
+from dzdesign.design.target_inputs import Converter
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.exhaustive.drive_check import drive_samples as sequence
 from dzdesign.verify.exhaustive.exact_drive import STEP_UNIT, DriveModel
@@ -302,4 +303,5 @@ def test_what_the_firmwares_integers_cannot_hold_is_refused():
     functions = replace(plain.drive_functions, ramp_up=(1, 0))
     nodes = (32768,) * (signals.largest_difference(1) // plain.beta_step_codes + 2)
     with pytest.raises(InputError, match="32767 codes"):
-        replace(plain, signals=signals, drive_functions=functions, positive=replace(plain.positive, beta=nodes))
+        sides = Sides(positive=replace(plain.positive, beta=nodes))
+        replace(plain, signals=signals, drive_functions=functions, sides=sides)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_files import sha256_of, to_json, write_folder
+from dzdesign.core.artefact_files import sha256_of, write_folder
 from dzdesign.core.errors import RequirementError
 from dzdesign.derivation import law as laws
 from dzdesign.derivation import symbols as s
@@ -197,7 +197,7 @@ def test_the_closed_loop_catches_a_wrong_law_in_the_c(reproduced, monkeypatch, t
     """The C follows the wrong law faithfully at every input; only the plant behind it shows that flow is missing."""
     from dzdesign.codegen.project import generate
     from dzdesign.core.artefact_reading import read_artefact
-    from dzdesign.design.compensator_file import compensator_document
+    from dzdesign.core.artefact_types import to_json_bytes
     from dzdesign.design.designing import design
     from dzdesign.identify.valve.model import ValveModel
 
@@ -205,7 +205,7 @@ def test_the_closed_loop_catches_a_wrong_law_in_the_c(reproduced, monkeypatch, t
     valve = read_artefact((reproduced[0] / "second_valve" / "valve.json").read_bytes(), ValveModel, "valve.json")
     seed(monkeypatch, WRONG["beta on all of Eq. (14)"])
     compensator = design(valve)
-    document = json.loads(to_json(compensator_document(compensator)))
+    document = json.loads(to_json_bytes(compensator))
     firmware = generate(compensator, "host")
     write_folder(tmp_path / "firmware", firmware.files, firmware.manifest)
     assert check_all_inputs(tmp_path / "firmware").holds

@@ -9,7 +9,6 @@ import pytest
 
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.errors import InputError
-from dzdesign.design.compensator_file import compensator_document
 from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.plant import Plant, read_plant
 from dzdesign.verify.closed_loop.scenarios import SETTLE_S, STEP_S, Scene, run_scenarios
@@ -27,7 +26,7 @@ def plant(example_folder):
 
 
 def scene_of(folder, compensator, plant, dp_MPa=1.0, **changes) -> Scene:
-    loop = ClosedLoop(plant, folder, compensator_document(compensator))
+    loop = ClosedLoop(plant, folder, compensator)
     return Scene(
         loop=loop, plant=plant, side="positive", dp_MPa=dp_MPa, reference_MPa=1.0, tested_MPa=(0.5, 5.0), **changes
     )
@@ -145,14 +144,14 @@ class TestSeries:
         assert density.std() == pytest.approx(0.02, rel=0.05)
 
     def test_without_spread_a_series_is_the_plant(self, firmware, example_compensator, plant):
-        loop = ClosedLoop(plant, firmware, compensator_document(example_compensator))
+        loop = ClosedLoop(plant, firmware, example_compensator)
         found = scatter(loop, plant, Tolerances(spreads={"preload_N": (1e-12, "uniform")}, plants=3), 5.0)
         assert found.leaking == 0
         for spread in (found.residual_opening, found.residual_closing, found.q_zero_L_min, found.q_max_L_min):
             assert spread.p01 == pytest.approx(spread.p99, abs=1e-6)
 
     def test_plants_that_open_earlier_leak_and_the_worst_is_named(self, firmware, example_compensator, plant):
-        loop = ClosedLoop(plant, firmware, compensator_document(example_compensator))
+        loop = ClosedLoop(plant, firmware, example_compensator)
         found = scatter(loop, plant, Tolerances(spreads={"preload_N": (0.02, "uniform")}, plants=20), 5.0)
         assert 0 < found.leaking < 20
         worst = found.q_zero_L_min

@@ -8,7 +8,7 @@ from dzdesign.codegen.project import generate, targets
 from dzdesign.core.artefact_files import to_json, write_folder
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
-from dzdesign.design.compensator_file import compensator_from_document
+from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.firmware.manifest import manifest_follows
@@ -24,7 +24,7 @@ def manifest_of(folder):
 def follows(folder, manifest):
     """The check of a folder under another manifest."""
     content = (folder / "compensator.json").read_bytes()
-    compensator = compensator_from_document(content, "compensator.json")
+    compensator = read_artefact(content, Compensator, "compensator.json")
     valve = read_artefact(compensator.valve_document.encode(), ValveModel, "compensator.json")
     manifest = read_artefact(to_json(manifest).encode(), FirmwareManifest, "manifest.json")
     return manifest_follows(folder, manifest, compensator, valve)

@@ -1,18 +1,15 @@
 """`verify`: a firmware folder in, evidence out: strict compilation, every input, closed loop."""
 
-import json
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from dzdesign.core.artefact_files import MANIFEST_NAME, read_bytes, sha256_of
-from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, as_document, schema_of, to_json_bytes
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.result_display import ShownInNotebooks
-from dzdesign.design.compensator_file import compensator_from_document
-from dzdesign.identify.valve.model import ValveModel
+from dzdesign.design.compensator import Compensator
 from dzdesign.verify.closed_loop.evidence_curves import curve_files
 from dzdesign.verify.closed_loop.firmware_loop import FirmwareLoop, Watch, close_the_loop, scenes_of
 from dzdesign.verify.closed_loop.loop import LoopComparison, RampSequence
@@ -26,7 +23,7 @@ from dzdesign.verify.exhaustive.input_map import InputMap, map_inputs
 from dzdesign.verify.exhaustive.lot_check import lot_checked
 from dzdesign.verify.firmware.compensator_checks import certificate_follows, law_follows, valve_follows
 from dzdesign.verify.firmware.compilation import board_compiles, changed_board_files, check_include, compiles_strictly
-from dzdesign.verify.firmware.folder import read_firmware_manifest
+from dzdesign.verify.firmware.folder import read_compensator, read_firmware_manifest
 from dzdesign.verify.firmware.manifest import manifest_follows
 from dzdesign.verify.firmware.unchanged_files import files_unchanged, user_files
 from dzdesign.verify.requirements import EXACT_LAW
@@ -43,6 +40,8 @@ class Verification(ShownInNotebooks):
     ----------
     evidence : Evidence
         Every requirement that was tried, with its figures; stored as verification.json.
+    compensator : Compensator
+        Which the firmware was made from.
     maps : tuple of InputMap
         What the core gives over its inputs, one a sign of command, to be drawn.
     loops : tuple of LoopComparison
@@ -50,6 +49,7 @@ class Verification(ShownInNotebooks):
     """
 
     evidence: Evidence
+    compensator: Compensator
     maps: tuple[InputMap, ...]
     loops: tuple[LoopComparison, ...]
 
@@ -118,14 +118,11 @@ def verify(
     folder = Path(folder)
     manifest = read_firmware_manifest(folder)
     check_include(include, manifest)
-    content = read_bytes(folder / "compensator.json", "compensator")
-    compensator = compensator_from_document(content, str(folder / "compensator.json"))  # every key that is read below
-    document = json.loads(content)
-    valve = read_artefact(compensator.valve_document.encode(), ValveModel, "compensator.json")
+    compensator = read_compensator(folder)
     host_compiler()
     say("compiling the core with every warning an error")
     compiles = compiles_strictly(folder, manifest)
-    checks = [files_unchanged(folder, manifest), manifest_follows(folder, manifest, compensator, valve), compiles]
+    checks = [files_unchanged(folder, manifest), manifest_follows(folder, manifest, compensator), compiles]
     inputs: tuple[InputCheck, ...] = ()
     maps: tuple[InputMap, ...] = ()
     loop = FirmwareLoop()
@@ -133,23 +130,23 @@ def verify(
     if compiles.holds:
         say("comparing every input with the exact law")
         # A compiler's time, not ours.
-        building = ThreadPoolExecutor(1).submit(scenes_of, folder, compensator, document, valve, plant)
+        building = ThreadPoolExecutor(1).submit(scenes_of, folder, compensator, plant)
         try:
-            inputs = tuple(check_all_inputs(folder, sign) for sign in signs)
+            inputs = tuple(check_all_inputs(folder, sign, compensator) for sign in signs)
         except RequirementError as error:
             checks.append(EXACT_LAW.check(holds=False, text=str(error)))
     if inputs:
         for each in inputs:
             checks += input_checks(each, both_signs=len(inputs) > 1)
-        checks += lot_checked(inputs, document)
-        maps = tuple(map_inputs(folder, document, sign) for sign in signs)
+        checks += lot_checked(inputs, compensator)
+        maps = tuple(map_inputs(folder, compensator, sign) for sign in signs)
         checks.append(drive_follows(folder, compensator))
         loop = close_the_loop(
-            building.result(), compensator, valve, plant, sequence or RampSequence(), tolerances, say, watch
+            building.result(), compensator, plant, sequence or RampSequence(), tolerances, say, watch
         )
     board = board_compiles(folder, manifest, include)
-    checks += [*loop.checks, certificate_follows(compensator), law_follows(compensator, document)]
-    checks += [*valve_follows(folder, document), *board.checks]
+    checks += [*loop.checks, certificate_follows(compensator), law_follows(compensator)]
+    checks += [*valve_follows(folder, compensator), *board.checks]
     digest = sha256_of((folder / MANIFEST_NAME).read_bytes())
     evidence = Evidence(
         tool=THIS_TOOL,
@@ -171,7 +168,7 @@ def verify(
         monte_carlo=loop.monte_carlo,
         mutants=None,
     )
-    return Verification(evidence=evidence, maps=maps, loops=loop.loops)
+    return Verification(evidence=evidence, compensator=compensator, maps=maps, loops=loop.loops)
 
 
 def evidence_manifest(evidence: Evidence) -> dict[str, object]:

@@ -119,8 +119,8 @@ def _dither(compensator: Compensator) -> list[Define]:
     return [
         Define(symbol="DITHER_COUNTS", value=counts, equation="half the height of the dither's square wave",
                  engineering=f"{share:.3%} of full drive, {share * float(compensator.u_max_V):.4g} V",
-                 rounding="rounded to nearest", data=("drive_functions.dither_counts", "signals.compare_max", "u_max_V"),
-                 generator=OPTIONS),
+                 rounding="rounded to nearest", generator=OPTIONS,
+                 data=("drive_functions.dither_counts", "signals.compare_max", "u_max_V")),
         Define(symbol="DITHER_TICKS", value=ticks, equation="half the dither's period, PWM periods",
                  engineering=f"{1e3 * ticks / signals.tick_Hz:.4g} ms", rounding="rounded to nearest, 1 or more",
                  data=("drive_functions.dither_ticks", "signals.tick_Hz"), generator=OPTIONS),

@@ -100,7 +100,7 @@ def _law_source(compensator: Compensator, sign: int, arithmetic: str) -> CoreFil
         "rows": rows,
         "unit": of_law.unit,
         "guard": side.certificate.guard,
-        "kappa_text": f"{_rational(side.k_x_max_over_u_max)}, {KAPPA_ROUNDING}",
+        "kappa_text": f"{_rational(side.drive_range_over_u_max)}, {KAPPA_ROUNDING}",
         "u_min0_text": f"{_rational(side.u_min0_over_u_max)}, {U_MIN0_ROUNDING}",
         "transition_share": f"{transition / compensator.signals.command.span(sign):.2%}",
         "segment_count": len(tables[0].value) - 1,

@@ -123,8 +123,8 @@ class LawConstants:
         """Return what beta multiplies, by command and alone, and what the transition takes away."""
         c, form, side = self.compensator, self.form, self.compensator.side(self.sign)
         equation = equation_of(law(c.law))
-        kappa, u_min0 = side.k_x_max_over_u_max, side.u_min0_over_u_max
-        kappa_key, u_min0_key = f"{self.key}.k_x_max_over_u_max", f"{self.key}.u_min0_over_u_max"
+        kappa, u_min0 = side.drive_range_over_u_max, side.u_min0_over_u_max
+        kappa_key, u_min0_key = f"{self.key}.drive_range_over_u_max", f"{self.key}.u_min0_over_u_max"
         u_min0_text = f"u_min0/u_max = {u_min0}, {U_MIN0_ROUNDING}"
         found = []
         size = ", its size" if self.narrow and form.slope < 0 else ""
@@ -172,7 +172,7 @@ class LawConstants:
         total = form.linear << form.linear_shift
         equation = f"{equation_of(law(c.law))}, coefficient of u_i alone in u_O"
         engineering = f"{self._per_volt(total):.6f}"
-        kappa = () if c.law == "paper" else (f"{self.key}.k_x_max_over_u_max",)
+        kappa = () if c.law == "paper" else (f"{self.key}.drive_range_over_u_max",)
         data = (*kappa, *SCALED)
         high, low = divmod(total, 1 << 32)
         if low == 0:

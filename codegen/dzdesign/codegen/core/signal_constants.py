@@ -131,7 +131,8 @@ class SignalConstants:
             found.append(
                 Define(symbol="TRANSITION_CODES", value=transition,
                      equation="codes of command that the transition takes, u_transition",
-                         engineering=f"{share:.2%} of command, {share * float(c.u_max_V):.4g} V", data=("transition_codes",),
+                         engineering=f"{share:.2%} of command, {share * float(c.u_max_V):.4g} V",
+                         data=("transition_codes",),
                          rounding="the power of two below what was asked for",
                          generator="design/dzdesign/design/options.py")
             )  # fmt: skip

@@ -5,10 +5,11 @@ from dataclasses import replace
 from typing import Any
 
 from dzdesign.core.artefact_files import to_json
+from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
 from dzdesign.core.units import chance
 from dzdesign.core.verdicts import NOT_CHECKED
-from dzdesign.design.compensator_file import compensator_from_document
+from dzdesign.design.compensator import Compensator
 from dzdesign.design.signal_descriptions import signals_in_words
 from dzdesign.report.artefact_chain import Chain
 from dzdesign.report.figures.evidence import dead_zone_figure, loop_figure, map_figure, zero_figure
@@ -284,7 +285,7 @@ def _warnings_section(chain: Chain) -> Section:
         warnings.append(f"[{warning['code']}] {source}{warning['text']}{end}")
     signals = []
     if compensator:
-        one = compensator_from_document(to_json(compensator).encode(), "compensator.json")
+        one = read_artefact(to_json(compensator).encode(), Compensator, "compensator.json")
         signals = signals_in_words(one.signals, float(one.u_max_V))
     return Section(
         groups=(

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from dzdesign.design.compensator import Compensator
-from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.closed_loop.loop import ClosedLoop, LoopComparison, RampSequence, compare_at_pressure
 from dzdesign.verify.closed_loop.loop_checks import (
     no_flow_at_zero,
@@ -56,7 +55,7 @@ class FirmwareLoop:
 
 
 def scenes_of(
-    folder: Path, compensator: Compensator, document: dict[str, Any], valve: ValveModel, plant: Plant | None
+    folder: Path, compensator: Compensator, plant: Plant | None
 ) -> tuple[Scene, ...]:
     """Return the compensated loop of each side at every tested pressure drop.
 
@@ -66,10 +65,6 @@ def scenes_of(
         Of the firmware.
     compensator : Compensator
         What it was made from.
-    document : dict
-        Its file.
-    valve : ValveModel
-        What that was made from.
     plant : Plant or None
         None: plants are made from the identified thresholds.
     """
@@ -77,15 +72,15 @@ def scenes_of(
     for name, sign in SIGNS.items():
         if sign not in compensator.signals.signs:
             continue
-        side = valve.sides[name]
+        side = compensator.valve.sides[name]
         # One that stands in for the valve at one pressure drop says nothing of another.
-        plants = dict.fromkeys(side.beta.dp_MPa, plant) if plant else plants_from_tests(side, valve.u_max_V)
+        plants = dict.fromkeys(side.beta.dp_MPa, plant) if plant else plants_from_tests(side, compensator.valve.u_max_V)
         tested = (min(plants), max(plants)) if plant else None
-        first = ClosedLoop(next(iter(plants.values())), folder, document, sign)
+        first = ClosedLoop(next(iter(plants.values())), folder, compensator, sign)
         scenes += [
             Scene(
                 loop=first.with_plant(one), plant=one, side=name, dp_MPa=dp_MPa,
-                reference_MPa=side.reference.dp_MPa, tested_MPa=tested,
+                reference_MPa=side.reference.dp_MPa or 0.0, tested_MPa=tested,
             )
             for dp_MPa, one in plants.items()
         ]  # fmt: skip
@@ -95,7 +90,6 @@ def scenes_of(
 def close_the_loop(
     scenes: tuple[Scene, ...],
     compensator: Compensator,
-    valve: ValveModel,
     plant: Plant | None,
     sequence: RampSequence,
     tolerances: Tolerances | None,
@@ -110,8 +104,6 @@ def close_the_loop(
         Of `scenes_of`.
     compensator : Compensator
         What the firmware was made from.
-    valve : ValveModel
-        What that was made from.
     plant : Plant or None
         The one that was given.
     sequence : RampSequence
@@ -139,11 +131,11 @@ def close_the_loop(
         pieces = watch(scenes, len(scenes))
         series = monte_carlo(tolerances, [scatter(s.loop, plant, tolerances, s.dp_MPa, s.side) for s in pieces])
     results = [loop.result for loop in loops]
-    zero_flow = no_flow_at_zero(results, compensator, valve, plant_given=given)
+    zero_flow = no_flow_at_zero(results, compensator, plant_given=given)
     return FirmwareLoop(
         checks=(
             plant_opens(results),
-            plant_is_the_valve(results, valve),
+            plant_is_the_valve(results, compensator.valve),
             zero_flow,
             shut_after_scenarios(scenarios, zero_flow, plant_given=given),
         ),

@@ -5,12 +5,13 @@ import ctypes
 from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.design.compensator import Compensator
 from dzdesign.design.drive_functions import RAMP_UNIT
+from dzdesign.design.signals import Signals
 from dzdesign.verify.closed_loop.motion import motion_header, numbers_of
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
 from dzdesign.verify.evidence import PressureResult, Side
@@ -104,28 +105,26 @@ DIRECT = Scalings(
 )
 
 
-def _scalings(document: dict[str, Any], sign: int) -> Scalings:
-    signals = document["signals"]
-    command, sensors = signals["command"], (signals["pressure_a"], signals["pressure_b"])
-    full = command["full_code" if sign > 0 else "negative_full_code"]
+def _scalings(signals: Signals, sign: int) -> Scalings:
+    command, sensors = signals.command, (signals.pressure_a, signals.pressure_b)
+    full = command.full_code if sign > 0 else command.negative_full_code
     return Scalings(
-        zeros=np.array([command["zero_code"], *(sensor["zero_code"] for sensor in sensors)], dtype=np.int32),
-        fulls=np.array([full, *(sensor["full_code"] for sensor in sensors)], dtype=np.int32),
-        spans=np.array([1.0, *(sensor["span_MPa"][0] / sensor["span_MPa"][1] for sensor in sensors)]),
-        code_max=signals["code_max"],
-        compare_max=signals["compare_max"],
+        zeros=np.array([command.zero_code, *(sensor.zero_code for sensor in sensors)], dtype=np.int32),
+        fulls=np.array([full, *(sensor.full_code for sensor in sensors)], dtype=np.int32),
+        spans=np.array([1.0, *(float(sensor.span_MPa) for sensor in sensors)]),
+        code_max=signals.code_max,
+        compare_max=signals.compare_max,
         negative=sign < 0,
-        swapped=sign < 0 and signals["swapped"],
+        swapped=sign < 0 and signals.swapped,
     )
 
 
-def _slowest_ramp_s(document: dict[str, Any], sign: int) -> float:
-    amplifier, command = document["drive_functions"], document["signals"]["command"]
-    full = command["full_code" if sign > 0 else "negative_full_code"]
-    units = abs(full - command["zero_code"]) * RAMP_UNIT
+def _slowest_ramp_s(compensator: Compensator, sign: int) -> float:
+    functions, signals = compensator.drive_functions, compensator.signals
+    units = signals.command.span(sign) * RAMP_UNIT
     side = 0 if sign > 0 else 1
-    steps = [amplifier[name][side] for name in ("ramp_up", "ramp_down") if amplifier[name][side]]
-    return max((units / step / document["signals"]["sample_Hz"] * RAMP_RESERVE for step in steps), default=0.0)
+    steps = [ramp[side] for ramp in (functions.ramp_up, functions.ramp_down) if ramp[side]]
+    return max((units / step / signals.sample_Hz * RAMP_RESERVE for step in steps), default=0.0)
 
 
 class ClosedLoop:
@@ -137,14 +136,14 @@ class ClosedLoop:
         Parameters.
     firmware : Path or None
         Firmware folder; None leaves only the direct drive.
-    document : dict
-        compensator.json of the firmware: scalings of its inputs and output.
+    compensator : Compensator
+        Which the firmware was made from: scalings of its inputs and output.
     sign : {1, -1}
         Side of the valve: the sign of the command that opens it.
     """
 
     def __init__(
-        self, plant: Plant, firmware: Path | None = None, document: dict[str, Any] | None = None, sign: int = 1
+        self, plant: Plant, firmware: Path | None = None, compensator: Compensator | None = None, sign: int = 1
     ) -> None:
         driver = files("dzdesign.verify.closed_loop")
         sources = {"plant_motion.h": motion_header()}
@@ -158,9 +157,9 @@ class ClosedLoop:
             for path in sorted((firmware / "core").glob("*.[ch]")):
                 sources[path.name] = path.read_text(encoding="utf-8")
         self._library = load_library(sources, "the closed loop", FLOATING)
-        self._scalings = _scalings(document, sign) if document else DIRECT
-        #: Of the amplifier's own ramps on this side, from zero to full command or back, s; 0: none.
-        self.slowest_ramp_s = _slowest_ramp_s(document, sign) if document else 0.0
+        self._scalings = _scalings(compensator.signals, sign) if compensator else DIRECT
+        #: Of the drive's own ramps on this side, from zero to full command or back, s; 0: none.
+        self.slowest_ramp_s = _slowest_ramp_s(compensator, sign) if compensator else 0.0
         self._has_core = firmware is not None
         self._plant = numbers_of(plant, self._scalings.compare_max)
 

@@ -40,7 +40,7 @@ def plant_is_the_valve(ramps: Sequence[PressureResult], valve: ValveModel) -> Ch
 
 
 def no_flow_at_zero(
-    ramps: Sequence[PressureResult], compensator: Compensator, valve: ValveModel, *, plant_given: bool
+    ramps: Sequence[PressureResult], compensator: Compensator, *, plant_given: bool
 ) -> Check:
     """Tell whether the valve is shut at zero command, after closing.
 
@@ -49,15 +49,14 @@ def no_flow_at_zero(
     ramps : sequence of PressureResult
         One a side and pressure drop.
     compensator : Compensator
-        With the threshold that it guards.
-    valve : ValveModel
-        With the threshold that was identified to be guarded.
+        With the threshold that it guards, and the valve with the one that was identified to be guarded.
     plant_given : bool
         Whether the plant is the user's; one made from the thresholds closes where they say.
     """
     worst = max(ramps, key=lambda ramp: ramp.q_zero_L_min)
     guards = {sign: compensator.side(sign).certificate.guard for sign in compensator.signals.signs}
-    identified = {1: valve.sides.get("positive"), -1: valve.sides.get("negative")}
+    sides = compensator.valve.sides
+    identified = {1: sides.get("positive"), -1: sides.get("negative")}
     chosen = [guard for sign, guard in guards.items() if (side := identified[sign]) and side.certificate.guard != guard]
     if chosen:
         return ZERO_FLOW.check(

@@ -1,6 +1,5 @@
 """`simulate`: ramp tests as a bench would record them, from the plant; always marked as simulated."""
 
-import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -9,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from dzdesign.core.artefact_files import TOOL, read_bytes, sha256_of
+from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
-from dzdesign.design.compensator_file import compensator_from_document
+from dzdesign.design.compensator import Compensator
 from dzdesign.identify.reading.ramp_files import SIMULATED_MARK, ramp_file_bytes
 from dzdesign.verify.closed_loop.loop import RECORD_S, ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.plant import Plant
@@ -124,8 +124,7 @@ def simulated_files(
 def _loop_of(plant: Plant, firmware: Path) -> tuple[ClosedLoop, dict[str, Any]]:
     """Return the loop of a plant with a firmware's core, and what the manifest says of it."""
     check_firmware_inside(firmware)
-    path = firmware / "compensator.json"
+    path = firmware / Compensator.FILE_NAME
     content = read_bytes(path, "compensator of the firmware")
-    compensator_from_document(content, str(path))  # every key that the loop reads is there
     origin = {"compensator": {"source": path.name, "sha256": sha256_of(content)}}
-    return ClosedLoop(plant, firmware, json.loads(content)), origin
+    return ClosedLoop(plant, firmware, read_artefact(content, Compensator, str(path))), origin

@@ -1,19 +1,19 @@
 """Every input of the compiled core against the exactly rounded law, and the properties that make it safe."""
 
-import json
 from pathlib import Path
-from typing import Any
 
+from dzdesign.design.compensator import Compensator
 from dzdesign.verify import requirements
 from dzdesign.verify.evidence import Check, InputCheck
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.lot_check import check_lot
 from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
 from dzdesign.verify.exhaustive.zero_command import zero_command_margins
+from dzdesign.verify.firmware.folder import read_compensator
 from dzdesign.verify.toolchain.compiled_core import CompiledCore, Findings
 
 
-def check_all_inputs(folder: Path, sign: int = 1) -> InputCheck:
+def check_all_inputs(folder: Path, sign: int = 1, compensator: Compensator | None = None) -> InputCheck:
     """Compare one side of the compiled core with the exact law on every pair of command and pressure difference.
 
     The core has three inputs, 2^36 triples of 12 bits; it may depend on the two pressures by their difference only.
@@ -27,25 +27,29 @@ def check_all_inputs(folder: Path, sign: int = 1) -> InputCheck:
         Firmware folder: ``core/`` and ``compensator.json``.
     sign : {1, -1}
         Sign of the commands that the side is for.
+    compensator : Compensator, optional
+        Of the folder; read there where it is not handed.
 
     Raises
     ------
     RequirementError
         If the core does not compile, crashes, or hangs.
     """
-    document = json.loads((folder / "compensator.json").read_bytes())
-    prepared = PreparedInputs(ExactLaw(document, sign))
+    compensator = compensator or read_compensator(folder)
+    prepared = PreparedInputs(ExactLaw(compensator, sign))
     core = CompiledCore(folder, sign)
-    return input_check(document, prepared, core, core.check(prepared.everything()))
+    return input_check(compensator, prepared, core, core.check(prepared.everything()))
 
 
-def input_check(document: dict[str, Any], prepared: PreparedInputs, core: CompiledCore, found: Findings) -> InputCheck:
+def input_check(
+    compensator: Compensator, prepared: PreparedInputs, core: CompiledCore, found: Findings
+) -> InputCheck:
     """Return what was found, with the bound at zero command.
 
     Parameters
     ----------
-    document : dict
-        compensator.json.
+    compensator : Compensator
+        Which the core was made from.
     prepared : PreparedInputs
         What was tried.
     core : CompiledCore
@@ -54,7 +58,7 @@ def input_check(document: dict[str, Any], prepared: PreparedInputs, core: Compil
         What the machine reported.
     """
     exact = prepared.exact
-    above, margin = zero_command_margins(document, exact, prepared.differences, found.at_zero)
+    above, margin = zero_command_margins(compensator, exact, prepared.differences, found.at_zero)
     return InputCheck(
         sign=1 if exact.side == "positive" else -1,
         inputs=found.inputs,
@@ -75,7 +79,7 @@ def input_check(document: dict[str, Any], prepared: PreparedInputs, core: Compil
         calls=found.calls,
         pressure_pairs=prepared.differences.pairs,
         first_wrong=first_wrong(prepared, found),
-        lot=check_lot(document, exact, prepared.differences, found.at_zero),
+        lot=check_lot(compensator, exact, prepared.differences, found.at_zero),
     )
 
 

@@ -9,13 +9,15 @@ reciprocal is shared with the generated C.
 from collections.abc import Iterator
 from fractions import Fraction
 from math import lcm
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from dzdesign.core.errors import RequirementError
+from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.derivation.law import law
 from dzdesign.derivation.scaling import evaluate_line
+from dzdesign.design.compensator import Compensator
+from dzdesign.verify.evidence import Side
 
 #: What sensor B's weight is stated over, where the two sensors count unlike (DESIGN: codes of A over 2^12).
 WEIGHT_UNIT = 4096
@@ -37,38 +39,41 @@ class BetaNumerators(NamedTuple):
 
 
 class ExactLaw:
-    """The law of one side of a compensator document on integer codes.
+    """The law of one side of a compensator on integer codes.
 
     Parameters
     ----------
-    document : dict
-        compensator.json, parsed and checked.
+    compensator : Compensator
+        Its numbers alone are taken: no function of it that computes.
     sign : {1, -1}
         Sign of the command.
     """
 
-    def __init__(self, document: dict[str, Any], sign: int = 1) -> None:
-        signals = document["signals"]
-        self.side = "positive" if sign > 0 else "negative"
-        side = document["sides"][self.side]
-        command = signals["command"]
-        self.code_max: int = signals["code_max"]
-        self.compare_max: int = signals["compare_max"]
-        self.compare_limit: int = document["drive_functions"]["compare_limit"]
-        self.zero: int = command["zero_code"]
-        self.full: int = command["full_code" if sign > 0 else "negative_full_code"]
-        self.sound_commands = range(command["valid_codes"][0], command["valid_codes"][1] + 1)
-        self.a, self.b = signals["pressure_a"], signals["pressure_b"]
-        self.reverse: int = document["reverse_codes"]
-        self.turn = -1 if sign < 0 and signals["swapped"] else 1
-        self._law = law(document["law"])
-        self._kappa = Fraction(*side["k_x_max_over_u_max"])
-        self._u_min0 = Fraction(*side["u_min0_over_u_max"])
-        self._zero_nodes: list[int] = side["beta"]
-        self._law_nodes: list[int] = side["transition_beta"] or side["beta"]
-        self._denominator: int = document["beta_denominator"]
-        self._step: int = document["beta_step_codes"]
-        self.transition_codes: int = document["transition_codes"]
+    def __init__(self, compensator: Compensator, sign: int = 1) -> None:
+        signals = compensator.signals
+        self.side: Side = "positive" if sign > 0 else "negative"
+        side = compensator.side(sign)
+        command = signals.command
+        full = command.full_code if sign > 0 else command.negative_full_code
+        if full is None:
+            raise InputError("compensator.json has no negative command, of which the law was asked for")
+        self.code_max = signals.code_max
+        self.compare_max = signals.compare_max
+        self.compare_limit = compensator.drive_functions.compare_limit
+        self.zero = command.zero_code
+        self.full = full
+        self.sound_commands = range(command.valid_codes[0], command.valid_codes[1] + 1)
+        self.a, self.b = signals.pressure_a, signals.pressure_b
+        self.reverse = compensator.reverse_codes
+        self.turn = -1 if sign < 0 and signals.swapped else 1
+        self._law = law(compensator.law)
+        self._kappa = side.drive_range_over_u_max
+        self._u_min0 = side.u_min0_over_u_max
+        self._zero_nodes = side.beta
+        self._law_nodes = side.transition_beta or side.beta
+        self._denominator = compensator.beta_denominator
+        self._step = compensator.beta_step_codes
+        self.transition_codes = compensator.transition_codes
 
     @property
     def span(self) -> int:
@@ -83,22 +88,22 @@ class ExactLaw:
     def difference(self, p_a: np.ndarray, p_b: np.ndarray) -> np.ndarray:
         """Return the differences of pressure codes, in codes of sensor A, that pairs of codes make (rounded down)."""
         weight = self._weight()
-        a, b = (np.asarray(p, dtype=np.int64) - sensor["zero_code"] for p, sensor in ((p_a, self.a), (p_b, self.b)))
+        a, b = (np.asarray(p, dtype=np.int64) - sensor.zero_code for p, sensor in ((p_a, self.a), (p_b, self.b)))
         return np.floor_divide(self.turn * (a * WEIGHT_UNIT - b * weight), WEIGHT_UNIT)
 
     def sound_pressures(self, p_a: np.ndarray, p_b: np.ndarray) -> np.ndarray:
         """Tell which pairs of pressure codes both sensors can give."""
-        (a_low, a_high), (b_low, b_high) = self.a["valid_codes"], self.b["valid_codes"]
+        (a_low, a_high), (b_low, b_high) = self.a.valid_codes, self.b.valid_codes
         return (p_a >= a_low) & (p_a <= a_high) & (p_b >= b_low) & (p_b <= b_high)
 
     def slant(self) -> np.ndarray:
         """Return, per pressure code b, what a difference d is short of pressure code a: a = turn * d + slant[b]."""
-        away = (np.arange(self.code_max + 1) - self.b["zero_code"]) * self._weight()
-        return self.a["zero_code"] - self.turn * np.floor_divide(-self.turn * away, WEIGHT_UNIT)
+        away = (np.arange(self.code_max + 1) - self.b.zero_code) * self._weight()
+        return self.a.zero_code - self.turn * np.floor_divide(-self.turn * away, WEIGHT_UNIT)
 
     def _weight(self) -> int:
         a_MPa, b_MPa = (
-            Fraction(*sensor["span_MPa"]) / (sensor["full_code"] - sensor["zero_code"]) for sensor in (self.a, self.b)
+            sensor.span_MPa / (sensor.full_code - sensor.zero_code) for sensor in (self.a, self.b)
         )
         return max(1, round(b_MPa / a_MPa * WEIGHT_UNIT))
 
@@ -111,7 +116,7 @@ class ExactLaw:
         left, past = np.divmod(np.maximum(differences, 0), self._step)
         failed = differences < -self.reverse
 
-        def interpolated(nodes: list[int]) -> np.ndarray:
+        def interpolated(nodes: tuple[int, ...]) -> np.ndarray:
             node = np.array([*nodes, nodes[-1]], dtype=np.int64)  # the last node is reached, never passed
             between = node[left] * self._step + (node[left + 1] - node[left]) * past
             return np.where(failed, min(nodes) * self._step, between)
@@ -119,7 +124,7 @@ class ExactLaw:
         law, zero = interpolated(self._law_nodes), interpolated(self._zero_nodes)
         return BetaNumerators(law, zero, self._denominator * self._step)
 
-    def _at(self, nodes: list[int], dp_code: int | None) -> Fraction:
+    def _at(self, nodes: tuple[int, ...], dp_code: int | None) -> Fraction:
         if dp_code is None or dp_code < -self.reverse:
             return Fraction(min(nodes), self._denominator)
         left, past = divmod(max(dp_code, 0), self._step)

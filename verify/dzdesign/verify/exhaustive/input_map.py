@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from dzdesign.design.compensator import Compensator
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import Differences, differences
 from dzdesign.verify.exhaustive.zero_command import bounds_at
@@ -58,15 +58,15 @@ class InputMap:
                 yield code, dp_code, given, given - int(self.exact[i, j]), int(self.status[i, j])
 
 
-def map_inputs(folder: Path, document: dict[str, Any], sign: int = 1) -> InputMap:
+def map_inputs(folder: Path, compensator: Compensator, sign: int = 1) -> InputMap:
     """Call one side of the compiled core over the grid.
 
     Parameters
     ----------
     folder : Path
         Firmware folder.
-    document : dict
-        Its compensator.json, checked.
+    compensator : Compensator
+        Which it was made from.
     sign : {1, -1}
         Sign of the commands.
 
@@ -75,7 +75,7 @@ def map_inputs(folder: Path, document: dict[str, Any], sign: int = 1) -> InputMa
     RequirementError
         If the core does not compile.
     """
-    exact = ExactLaw(document, sign)
+    exact = ExactLaw(compensator, sign)
     name, ending = SOURCES[sign]
     texts = {
         file: (folder / "core" / file).read_text(encoding="utf-8", errors="surrogateescape")
@@ -85,15 +85,15 @@ def map_inputs(folder: Path, document: dict[str, Any], sign: int = 1) -> InputMa
     core, status = (getattr(library, f"dz_{what}{ending}") for what in ("comp", "status"))
     found = differences(exact)
     made = np.flatnonzero(found.made)
-    bounds = bounds_at(document, exact, found)
+    bounds = bounds_at(compensator, exact, found)
     tested = np.array([row for row in made if bounds[row] is not None])
     rows, commands = _grid_rows(found, made, tested), _commands(exact)
     pairs = {row: _pair(exact, found, row) for row in {*rows.tolist(), *tested.tolist()}}
     values = [[core(code, *pairs[row]) for code in commands] for row in rows.tolist()]
     compare = np.array(values)
-    a_MPa = float(Fraction(*exact.a["span_MPa"])) / (exact.a["full_code"] - exact.a["zero_code"])
-    volt = float(Fraction(*document["u_max_V"])) / exact.compare_max
-    peak = document["drive_functions"]["dither_counts"]
+    a_MPa = float(exact.a.span_MPa) / (exact.a.full_code - exact.a.zero_code)
+    volt = float(compensator.u_max_V) / exact.compare_max
+    peak = compensator.drive_functions.dither_counts
     return InputMap(
         side=exact.side,
         command_codes=tuple(commands),

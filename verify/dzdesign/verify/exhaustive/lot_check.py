@@ -1,15 +1,15 @@
-"""A common setting against every valve of its lot: the core's drive at zero command under each valve's own bounds.
+"""A lot setting against every valve of its lot: the core's drive at zero command under each valve's own bounds.
 
 The input check need not be repeated for each valve: the integers that the core gives at zero command are the same, one
 a difference of pressure codes. Each valve has its staircase of bounds, argued from its ramp tests as in `zero_command`.
 """
 
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 
 from dzdesign.core.errors import InputError, and_more
+from dzdesign.design.compensator import Compensator
 from dzdesign.verify.evidence import Check, InputCheck, LotCheck
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import Differences
@@ -22,13 +22,13 @@ NAMED = 5
 LARGEST = 2**62
 
 
-def check_lot(document: dict[str, Any], exact: ExactLaw, found: Differences, at_zero: np.ndarray) -> LotCheck | None:
+def check_lot(compensator: Compensator, exact: ExactLaw, found: Differences, at_zero: np.ndarray) -> LotCheck | None:
     """Compare the drive at zero command with the bounds of every valve of the lot; None of a valve's own setting.
 
     Parameters
     ----------
-    document : dict
-        compensator.json.
+    compensator : Compensator
+        Which the core was made from.
     exact : ExactLaw
         The side's law.
     found : Differences
@@ -41,26 +41,27 @@ def check_lot(document: dict[str, Any], exact: ExactLaw, found: Differences, at_
     InputError
         If a valve of the lot has no bounds of this side.
     """
-    lot = document.get("lot") or ()
-    if not lot:
+    if not compensator.lot:
         return None
-    sides = {each["name"]: each["sides"][exact.side] for each in lot}
-    for name, side in sides.items():
+    sides = {}
+    for valve in compensator.lot:
+        name, side = valve.name, valve.positive if exact.side == "positive" else valve.negative
         if side is None:
             raise InputError(f"'{name}' of the lot has no bounds of the {exact.side} side; run `dzdesign batch` again")
-    tested = {dp: Fraction(repr(dp)) for side in sides.values() for dp in side["dp_MPa"]}
+        sides[name] = side
+    tested = {dp: Fraction(repr(dp)) for side in sides.values() for dp in side.dp_MPa}
     scale, lowest, highest = pressure_drops(exact, found, sorted({dp.denominator for dp in tested.values()}))
     ends = {dp: int(value * scale) for dp, value in tested.items()}
     fits = max(*map(abs, (lowest[0], lowest[-1], highest[0], highest[-1])), *ends.values()) < LARGEST
     kind = np.int64 if fits else object
     low, high = np.array(lowest, dtype=kind), np.array(highest, dtype=kind)
     drive = np.where(found.made, at_zero, -1)
-    unit_V, peak = Fraction(*document["u_max_V"]) / exact.compare_max, document["drive_functions"]["dither_counts"]
+    unit_V, peak = compensator.u_max_V / exact.compare_max, compensator.drive_functions.dither_counts
     margins: list[tuple[Fraction, str, int]] = []
     for name, side in sides.items():
-        nodes = np.array([ends[dp] for dp in side["dp_MPa"]], dtype=kind)
-        bounds = best_bounds(side["trend"], [Fraction(repr(bound)) for bound in side["u_lower_V"]])
-        if side["trend"] == "decreasing":
+        nodes = np.array([ends[dp] for dp in side.dp_MPa], dtype=kind)
+        bounds = best_bounds(side.trend, [Fraction(repr(bound)) for bound in side.u_lower_V])
+        if side.trend == "decreasing":
             place = np.searchsorted(nodes, np.minimum(high, nodes[-1]), side="left")
         else:
             place = np.searchsorted(nodes, np.maximum(low, nodes[0]), side="right") - 1
@@ -75,7 +76,7 @@ def check_lot(document: dict[str, Any], exact: ExactLaw, found: Differences, at_
             margins.append(min(each))
     margins.sort()
     worst_margin, worst, code = margins[0]
-    confidence = [side["confidence"] for side in sides.values()]
+    confidence = [side.confidence for side in sides.values()]
     return LotCheck(
         valves=len(margins),
         over_compensated=tuple(name for margin, name, _ in margins if margin < 0),
@@ -86,23 +87,20 @@ def check_lot(document: dict[str, Any], exact: ExactLaw, found: Differences, at_
     )
 
 
-def lot_checked(inputs: tuple[InputCheck, ...], document: dict[str, Any]) -> list[Check]:
-    """Tell whether the core of a common setting over-compensates any valve of its lot; nothing of a valve's own.
+def lot_checked(inputs: tuple[InputCheck, ...], compensator: Compensator) -> list[Check]:
+    """Tell whether the core of a lot setting over-compensates any valve of its lot; nothing of a valve's own.
 
     Parameters
     ----------
     inputs : tuple of InputCheck
         One a sign of command.
-    document : dict
-        compensator.json.
+    compensator : Compensator
+        Which the core was made from.
     """
-    count = document.get("common_valves", 0)
-    if not count:
-        return []
+    count = len(compensator.lot)
     found = [each.lot for each in inputs if each.lot is not None]
     if not found:
-        text = f"compensator.json is of {count} valves and holds the bounds of one; run `dzdesign batch` again, and "
-        return [LOT.check(holds=None, text=f"{text}make the firmware from its common_compensator.json")]
+        return []
     worst = min(found, key=lambda each: each.smallest_margin_V)
     least, most = (f"{100 * ends:.6g}" for ends in worst.confidence)
     text = (

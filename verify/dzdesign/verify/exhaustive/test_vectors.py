@@ -71,7 +71,7 @@ class Differences:
 def differences(exact: ExactLaw) -> Differences:
     """Return every difference that sound pressure codes make."""
     slant = exact.slant()
-    (a_low, a_high), (b_low, b_high) = exact.a["valid_codes"], exact.b["valid_codes"]
+    (a_low, a_high), (b_low, b_high) = exact.a.valid_codes, exact.b.valid_codes
     sound = slant[b_low : b_high + 1]  # never falls: along a difference both codes rise together
     ends = sorted(exact.turn * (a - s) for a in (a_low, a_high) for s in (sound[0], sound[-1]))
     values = np.arange(ends[0], ends[-1] + 1)
@@ -228,7 +228,7 @@ class PreparedInputs:
         """Return pressure codes of which one or both are not sound, then sound ones; ends and middles."""
         inside, outside = [], []
         for sensor in (self.exact.a, self.exact.b):
-            low, high = sensor["valid_codes"]
+            low, high = sensor.valid_codes
             inside.append((low, (low + high) // 2, high))
             outside.append(tuple(code for code in (low - 1, high + 1, OUTSIDE) if code >= 0))
         pairs = [(a, b, 0) for a in outside[0] for b in inside[1] + outside[1]]
@@ -267,8 +267,8 @@ class PreparedInputs:
             "places": places.size,
             "stride": stride,
         }
-        values |= dict(zip(("a_low", "a_high"), exact.a["valid_codes"], strict=True))
-        values |= dict(zip(("b_low", "b_high"), exact.b["valid_codes"], strict=True))
+        values |= dict(zip(("a_low", "a_high"), exact.a.valid_codes, strict=True))
+        values |= dict(zip(("b_low", "b_high"), exact.b.valid_codes, strict=True))
         pairs = self._fallback_pairs()
         values["pairs"] = pairs.size
         tables = {

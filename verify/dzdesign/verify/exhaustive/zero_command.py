@@ -9,24 +9,25 @@ from bisect import bisect_left, bisect_right
 from fractions import Fraction
 from itertools import accumulate
 from math import lcm
-from typing import Any
 
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.design.compensator import Compensator
+from dzdesign.identify.valve.side_model import SideModel
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import Differences
 
 
 def zero_command_margins(
-    document: dict[str, Any], exact: ExactLaw, found: Differences, at_zero: np.ndarray
+    compensator: Compensator, exact: ExactLaw, found: Differences, at_zero: np.ndarray
 ) -> tuple[int, Fraction]:
     """Return how many differences of the tested interval are driven above the bound, and the smallest margin in V.
 
     Parameters
     ----------
-    document : dict
-        compensator.json.
+    compensator : Compensator
+        Which the core was made from.
     exact : ExactLaw
         The side's law.
     found : Differences
@@ -36,11 +37,11 @@ def zero_command_margins(
     """
     largest: dict[Fraction, int] = {}  # the largest drive for which each bound is what is known
     counts: dict[Fraction, list[int]] = {}
-    for bound, compare in zip(bounds_at(document, exact, found), at_zero.tolist(), strict=True):
+    for bound, compare in zip(bounds_at(compensator, exact, found), at_zero.tolist(), strict=True):
         if bound is not None:
             largest[bound] = max(largest.get(bound, 0), compare)
             counts.setdefault(bound, []).append(compare)
-    u_max, peak = Fraction(*document["u_max_V"]), document["drive_functions"]["dither_counts"]
+    u_max, peak = compensator.u_max_V, compensator.drive_functions.dither_counts
     margins = {bound: bound - u_max * (compare + peak) / exact.compare_max for bound, compare in largest.items()}
     above = 0
     for bound in (bound for bound, margin in margins.items() if margin < 0):
@@ -49,33 +50,33 @@ def zero_command_margins(
     return above, min(margins.values())
 
 
-def bounds_at(document: dict[str, Any], exact: ExactLaw, found: Differences) -> list[Fraction | None]:
+def bounds_at(compensator: Compensator, exact: ExactLaw, found: Differences) -> list[Fraction | None]:
     """Return the threshold's lower bound in V at every difference; None where none is known, or no codes make it.
 
     Parameters
     ----------
-    document : dict
-        compensator.json.
+    compensator : Compensator
+        Which the core was made from.
     exact : ExactLaw
         The side's law.
     found : Differences
         All differences.
     """
-    side = document["valve"]["sides"][exact.side]
-    bounds = bounds_of(side, document["sides"][exact.side]["certificate"]["guard"])
+    side = compensator.valve.sides[exact.side]
+    guard = compensator.side(1 if exact.side == "positive" else -1).certificate.guard
+    bounds = bounds_of(side, guard)
     tests = sorted(
-        (Fraction(repr(test["dp_MPa"])), Fraction(repr(bound)))
-        for test, bound in zip(side["tests"], bounds, strict=True)
+        (Fraction(repr(test.dp_MPa)), Fraction(repr(bound))) for test, bound in zip(side.tests, bounds, strict=True)
     )
     pressures, values = [dp for dp, _ in tests], [bound for _, bound in tests]
-    best = best_bounds(side["trend"], values)
+    best = best_bounds(side.trend, values)
     scale, lowest, highest = pressure_drops(exact, found, [dp.denominator for dp in pressures])
     ends = [int(dp * scale) for dp in pressures]
     known: list[Fraction | None] = []
     for low, high, made in zip(lowest, highest, found.made.tolist(), strict=True):
         if not made or high < ends[0] or low > ends[-1]:
             known.append(None)
-        elif side["trend"] == "decreasing":
+        elif side.trend == "decreasing":
             known.append(best[bisect_left(ends, min(high, ends[-1]))])
         else:
             known.append(best[bisect_right(ends, max(low, ends[0])) - 1])
@@ -99,7 +100,7 @@ def best_bounds(trend: str | None, values: list[Fraction]) -> list[Fraction]:
     return [min(values)] * len(values)
 
 
-def bounds_of(side: dict[str, Any], guard: str) -> list[float]:
+def bounds_of(side: SideModel, guard: str) -> tuple[float, ...]:
     """Return the lower bounds of the threshold that the compensator was certified for, V.
 
     Raises
@@ -107,14 +108,12 @@ def bounds_of(side: dict[str, Any], guard: str) -> list[float]:
     InputError
         If its valve has none.
     """
-    if guard == side["certificate"]["guard"]:
-        return [test["u_guard_lower_V"] for test in side["tests"]]
-    if guard not in side.get("guards", {}):
+    if guard not in side.guards:
         raise InputError(
             f"the certificate guards the {guard} threshold, of which its valve has no bounds; make the compensator "
             "again with `dzdesign design`"
         )
-    return side["guards"][guard]["u_lower_V"]
+    return side.guards[guard].u_lower_V
 
 
 def pressure_drops(exact: ExactLaw, found: Differences, denominators: list[int]) -> tuple[int, list[int], list[int]]:
@@ -134,15 +133,15 @@ def pressure_drops(exact: ExactLaw, found: Differences, denominators: list[int])
     scale, least, largest
         Integers, over `scale` in MPa.
     """
-    a_MPa, b_MPa = (Fraction(*s["span_MPa"]) / (s["full_code"] - s["zero_code"]) for s in (exact.a, exact.b))
-    (a_least, a_most), (b_least, b_most) = ([Fraction(*end) for end in s["error_MPa"]] for s in (exact.a, exact.b))
+    a_MPa, b_MPa = (s.span_MPa / (s.full_code - s.zero_code) for s in (exact.a, exact.b))
+    (a_least, a_most), (b_least, b_most) = (s.error_MPa for s in (exact.a, exact.b))
     ends = sorted(exact.turn * error for error in (a_least - b_most, a_most - b_least))
     scale = lcm(a_MPa.denominator, b_MPa.denominator, *(end.denominator for end in ends), *denominators)
     a_unit, b_unit = int(a_MPa * scale), int(b_MPa * scale)
     # A pair's drop is turn ((a - a0) a_MPa - (b - b0) b_MPa), and a - a0 is turn (difference) + slant[b] - a0.
     codes = np.arange(found.slant.size, dtype=object)
     rest = exact.turn * (
-        (found.slant.astype(object) - exact.a["zero_code"]) * a_unit - (codes - exact.b["zero_code"]) * b_unit
+        (found.slant.astype(object) - exact.a.zero_code) * a_unit - (codes - exact.b.zero_code) * b_unit
     )
     values = found.values.astype(object) * a_unit
     first, last = np.minimum(found.b_first, codes.size - 1), np.maximum(found.b_last, found.b_first)

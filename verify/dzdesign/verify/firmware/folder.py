@@ -5,6 +5,7 @@ from pathlib import Path
 from dzdesign.core.artefact_files import MANIFEST_NAME, check_inside, read_bytes
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
+from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest
 
 
@@ -27,6 +28,18 @@ def read_firmware_manifest(folder: Path) -> FirmwareManifest:
     check_inside(folder, [*manifest.files, *manifest.core], f"'{path}'")
     check_firmware_inside(folder)
     return manifest
+
+
+def read_compensator(folder: Path) -> Compensator:
+    """Return the compensator that a firmware was made from.
+
+    Raises
+    ------
+    InputError
+        If compensator.json can't be read.
+    """
+    path = folder / Compensator.FILE_NAME
+    return read_artefact(read_bytes(path, "compensator of the firmware"), Compensator, str(path))
 
 
 def check_firmware_inside(folder: Path) -> None:
