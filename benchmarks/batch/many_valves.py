@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 from bench_model import Bench, readings
 
-from dzdesign.identify.reading.ramp_files import RampTest, ramp_file_bytes
+from dzdesign.identify.reading.ramp_files import ramp_file_bytes
+from dzdesign.identify.reading.ramp_test import RampTest
 
 L_MIN, MPA = 1e-3 / 60, 1e6
 PRESSURES_MPa = (1.0, 2.5, 5.0)

@@ -17,7 +17,7 @@ from dzdesign.design.compensator import Compensator
 from dzdesign.design.signal_text import parse_signal
 from dzdesign.identify.reading.column_labels import find_columns, parse_columns
 from dzdesign.identify.reading.ramp_files import read_ramp_file
-from dzdesign.identify.reading.text.tables import text_tables
+from dzdesign.identify.reading.text.table_reader import read_text_table
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.closed_loop.plant import read_plant
 from dzdesign.verify.closed_loop.tolerances import read_tolerances
@@ -45,9 +45,9 @@ class Target:
 
 
 def _text(data: bytes) -> None:
-    for table in text_tables(io.BytesIO(data), Path("ramp.csv")):
-        for column in find_columns(table, {}).values():
-            table.numbers(column.label)
+    table = read_text_table(io.BytesIO(data), Path("ramp.csv"))
+    for column in find_columns(table, {}).values():
+        table.numbers(column.label)
 
 
 def _stored(read: Callable[[Path], object], name: str) -> Callable[[bytes], None]:

@@ -10,7 +10,7 @@ from math import exp, sqrt
 
 import numpy as np
 
-from dzdesign.identify.reading.ramp_files import RampTest
+from dzdesign.identify.reading.ramp_test import RampTest
 
 L_MIN, MPA = 1e-3 / 60, 1e6
 U_MAX_V = 10.0

@@ -12,7 +12,8 @@ from scoreboard import Row, print_rows
 from dzdesign.core.errors import InputError
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.reading.ramp_files import RampTest, read_ramp_file
+from dzdesign.identify.reading.ramp_files import read_ramp_file
+from dzdesign.identify.reading.ramp_test import RampTest
 
 SHARED = Path(os.environ.get("DZDESIGN_SHARED_DATA", Path(__file__).parents[3] / "shared" / "data"))
 LIMIT_mV = 15.0

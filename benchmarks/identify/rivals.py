@@ -3,7 +3,7 @@
 import numpy as np
 from bench_model import L_MIN
 
-from dzdesign.identify.reading.ramp_files import RampTest
+from dzdesign.identify.reading.ramp_test import RampTest
 
 
 def branches_of(test: RampTest, lag_s: float) -> list[tuple[np.ndarray, np.ndarray]]:

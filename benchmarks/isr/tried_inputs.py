@@ -3,8 +3,6 @@
 import random
 from collections.abc import Sequence
 
-import numpy as np
-
 from dzdesign.design.compensator import Compensator
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 
@@ -43,15 +41,13 @@ def tried_inputs(compensator: Compensator) -> list[Codes]:
 def expected_compares(compensator: Compensator, inputs: Sequence[Codes]) -> list[int]:
     """Return the exactly rounded law at `inputs`, by the reference of `dzdesign.verify`."""
     exact = ExactLaw(compensator)
-    betas = []
-    for _, p_a, p_b in inputs:
+    compares = []
+    for u, p_a, p_b in inputs:
         possible = max(p_a, p_b) <= exact.code_max
-        betas.append(exact.betas(p_a - p_b if possible else None))
-    table = np.array(list(exact.rows(betas)))
-    return [
-        int(table[u, at]) if u <= exact.code_max else 0  # an impossible command lets the valve go
-        for at, (u, _, _) in enumerate(inputs)
-    ]
+        corners = exact.corners(exact.betas(p_a - p_b if possible else None))
+        # An impossible command lets the valve go.
+        compares.append(exact.compare_value(u, corners) if u <= exact.code_max else 0)
+    return compares
 
 
 def inputs_header(inputs: Sequence[Codes], repeats: int, *, program_memory: bool = False) -> str:

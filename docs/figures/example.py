@@ -1,6 +1,5 @@
 """The bundled example through the product, once for all figures."""
 
-import json
 import tempfile
 from dataclasses import dataclass
 from fractions import Fraction
@@ -11,7 +10,6 @@ import numpy as np
 
 from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_files import write_folder
-from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
@@ -46,17 +44,16 @@ class Example:
     @cached_property
     def with_edge(self) -> Compensator:
         """The same with an edge over 1 % of command."""
-        return design(self.found.model, DesignOptions(transition=Fraction(1, 100)))
+        return design(self.found.model, DesignOptions(edge=Fraction(1, 100)))
 
     @cached_property
     def loop(self) -> ClosedLoop:
         """The plant driven by the generated C."""
         firmware = generate(self.compensator, "host")
-        document = json.loads(to_json_bytes(self.compensator))
         with tempfile.TemporaryDirectory(prefix="dzdesign-") as scratch:
             folder = Path(scratch) / "firmware"
             write_folder(folder, firmware.files, firmware.manifest)
-            return ClosedLoop(self.plant, folder, document)
+            return ClosedLoop(self.plant, folder, self.compensator)
 
     def ramp(self, dp_MPa: float, mode: str) -> LoopRun:
         """Return a ramp up and down; without beta the core is shown the reference pressure."""

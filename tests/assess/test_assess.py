@@ -19,7 +19,8 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import RuleError, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.reading.ramp_files import RampTest, read_ramp_file
+from dzdesign.identify.reading.ramp_files import read_ramp_file
+from dzdesign.identify.reading.ramp_test import RampTest
 from tests.support.bench_recordings import AFTER, BEFORE, L_MIN, Valve, record, write
 from tests.support.paths import ROOT
 from tests.support.synthetic import SHARED, needs_compiler

@@ -187,7 +187,7 @@ TEXTS: dict[str, tuple[Callable[[], bytes], str | None]] = {
     "gzip of lines": (lambda: repeated(b"\n" * MIB, 2000), None),
     "gzip of comments": (lambda: repeated(b"# x\n" * (MIB // 4), 40, HEAD + b"\n"), "unpacks to more than 64 times"),
     "gzip of rows": (lambda: repeated(b"0,0,1,0\n" * (MIB // 8), 40, HEAD + b"\n"), "unpacks to more than 64 times"),
-    "gzip of one line": (lambda: repeated(b"1" * MIB, 2000), "has a line of more than"),
+    "gzip of one line": (lambda: repeated(b"1" * MIB, 2000), "unpacks to more than 64 times"),
     "gzip of gzip": (lambda: gzip.compress(gzip.compress(CSV, mtime=0), mtime=0), "is not a text file"),
     "gzip and gzip": (lambda: gzip.compress(CSV, mtime=0) + gzip.compress(BODY, mtime=0), "the time goes back"),
     "gzip and something": (lambda: gzip.compress(CSV, mtime=0) + b"something", "not a whole gzip file"),
@@ -197,7 +197,7 @@ TEXTS: dict[str, tuple[Callable[[], bytes], str | None]] = {
     "zip": (zipped, "zip archive"),
     "zip behind gzip": (lambda: gzip.compress(zipped(), mtime=0), "zip archive"),
 }  # fmt: skip
-#: Of programs; what crashes or fills a library is refused in the words of `separate_reader`.
+#: Of programs; what crashes or fills a library is refused in the words of `reader_process`.
 BINARIES: dict[str, tuple[Callable[[], bytes], str | None]] = {
     "HDF5 with links elsewhere": (lambda: with_hdf5(linked_elsewhere), "holds no columns"),
     "HDF5 with a loop": (lambda: with_hdf5(hard_loop), None),

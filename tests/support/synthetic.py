@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dzdesign.design.signals import PressureSignal, Signals
-from dzdesign.identify.reading.ramp_files import RampTest
+from dzdesign.identify.reading.ramp_test import RampTest
 
 L_MIN, MPA = 1e-3 / 60, 1e6
 SHARED = Path(os.environ.get("DZDESIGN_SHARED_DATA", Path(__file__).parents[3] / "shared" / "data"))

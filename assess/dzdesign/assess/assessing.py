@@ -20,7 +20,7 @@ from dzdesign.assess.quantities import L_MIN, LOSS, LOSS_OF_FLOW, MPA, QUANTITIE
 from dzdesign.assess.readings import read_quantities
 from dzdesign.core.artefact_types import THIS_TOOL
 from dzdesign.identify.ramps.pooling import SAME_PRESSURE
-from dzdesign.identify.reading.ramp_files import RampTest
+from dzdesign.identify.reading.ramp_test import RampTest
 
 #: Set -> key of a quantity -> reading, of one side at one pressure drop.
 Readings = dict[Set, dict[str, Reading]]

@@ -11,7 +11,7 @@ from dzdesign.identify.knees.meter_lag import MeterLag, find_lag
 from dzdesign.identify.knees.prepared_tests import found_floor, split_recordings
 from dzdesign.identify.ramps.pooling import SAME_PRESSURE, pool_ramps
 from dzdesign.identify.ramps.sides import tests_of_side
-from dzdesign.identify.reading.ramp_files import RampTest
+from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.model import SIDES
 
 Pair = tuple[PressureCurves | None, PressureCurves | None]

@@ -82,8 +82,15 @@ def open_bytes(path: Path, what: str) -> Iterator[BinaryIO]:
             yield file
         except OSError as error:  # a disk that fails, a share that is gone
             raise InputError(f"{what} '{path}' can't be read: {error.strerror or error}") from error
-        if before is not None and _stamp(file) != before:
-            raise InputError(f"{what} '{path}' was changed while it was read; wait until it is written, then try again")
+        except InputError:  # whatever is wrong with a file that is still being written
+            _refuse_a_changed_file(file, before, path, what)
+            raise
+        _refuse_a_changed_file(file, before, path, what)
+
+
+def _refuse_a_changed_file(file: BinaryIO, before: tuple[int, int] | None, path: Path, what: str) -> None:
+    if before is not None and _stamp(file) != before:
+        raise InputError(f"{what} '{path}' was changed while it was read; wait until it is written, then try again")
 
 
 def _stamp(file: BinaryIO) -> tuple[int, int]:

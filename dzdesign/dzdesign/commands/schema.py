@@ -25,7 +25,7 @@ SCHEMAS: Mapping[str, tuple[str, str, str]] = MappingProxyType(
         "batch": ("dzdesign.report.lot.summary:LotSummary", "batch.json", "batch"),
         "reproduction": ("dzdesign.reproduce", "reproduction.json", "reproduce"),
         "derivation": (
-            "dzdesign.derivation.presentation.derivation_file:DerivationFile",
+            "dzdesign.derivation.presentation.content:DerivationReport",
             "derivation.json",
             "derive --format json",
         ),

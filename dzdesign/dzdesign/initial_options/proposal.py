@@ -13,7 +13,7 @@ from dzdesign.terminal.progress import say, stage_progress, with_bar
 
 if TYPE_CHECKING:
     from dzdesign.identify.first_look import GuessedColumns, SeenSide
-    from dzdesign.identify.reading.ramp_files import RampTest
+    from dzdesign.identify.reading.ramp_test import RampTest
     from dzdesign.identify.valve.model import Warning_
 
 #: Where recordings are looked for if none are named.

@@ -110,7 +110,7 @@ def run_chain(valve: "RecoveredValve", say: Callable[[str], None] = lambda _: No
         write_folder(Path(scratch) / "firmware", firmware.files, firmware.manifest)
         design_document = parse_document(compensator_json.encode(), "compensator.json", (COMPENSATOR_SCHEMA,))
         say(f"{name}: closed loop")
-        loop = ClosedLoop(valve.plant, Path(scratch) / "firmware", design_document)
+        loop = ClosedLoop(valve.plant, Path(scratch) / "firmware", compensator)
         runs = run_valve(valve, loop, design_document)
     place = name.replace(" ", "_")
     core = {path: text for path, text in firmware.files.items() if path.startswith("core/")}

@@ -25,7 +25,7 @@ from dzdesign.terminal.progress import say, stage_progress
 if TYPE_CHECKING:
     from dzdesign.assess.assessment import Assessment
     from dzdesign.assess.options import AssessOptions
-    from dzdesign.identify.reading.ramp_files import RampTest
+    from dzdesign.identify.reading.ramp_test import RampTest
 
 
 def _flow_or_share(text: str, option: str) -> tuple[float | None, float | None]:

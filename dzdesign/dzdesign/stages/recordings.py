@@ -28,7 +28,7 @@ from dzdesign.core.units import parse_quantity
 from dzdesign.terminal.progress import say, with_bar
 
 if TYPE_CHECKING:
-    from dzdesign.identify.reading.ramp_files import RampTest
+    from dzdesign.identify.reading.ramp_test import RampTest
 
 
 #: Reads --skip-rows.

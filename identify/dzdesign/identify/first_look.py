@@ -14,7 +14,8 @@ import numpy as np
 from dzdesign.core.artefact_files import open_bytes
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.units import measures, si_factor
-from dzdesign.identify.knees.prepared_tests import L_MIN, MPA, DescribedTests, describe_tests
+from dzdesign.identify.constants import L_MIN, MPA
+from dzdesign.identify.knees.prepared_tests import DescribedTests, describe_tests
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.sides import tests_of_side
 from dzdesign.identify.ramps.splitting import despiked
@@ -30,7 +31,8 @@ from dzdesign.identify.reading.column_labels import (
     is_telling,
     split_label,
 )
-from dzdesign.identify.reading.ramp_files import RampTest, read_tables
+from dzdesign.identify.reading.ramp_files import read_table
+from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.reading.scaling import range_example
 from dzdesign.identify.reading.table import Table
 from dzdesign.identify.valve.model import SIDES
@@ -87,9 +89,7 @@ def guess_columns(path: Path, skip_rows: int | None = None) -> GuessedColumns:
         If the file can't be read, or its labels contradict one another.
     """
     with open_bytes(Path(path), "ramp file") as file:
-        table = next(iter(read_tables(file, Path(path), skip_rows)), None)
-        if table is None:
-            raise InputError(f"'{path}' holds no table; expected a recording of a ramp test")
+        table = read_table(file, Path(path), skip_rows)
         try:
             understood = find_columns(table, {})
         except InputError:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from dzdesign.core.artefact_reading import rounded
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile
 from dzdesign.core.errors import InputError
+from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.data_quality.clipped_meter import without_clipping
 from dzdesign.identify.data_quality.pressures import (
     about_a_stuck_sensor,
@@ -15,10 +16,9 @@ from dzdesign.identify.data_quality.pressures import (
 )
 from dzdesign.identify.data_quality.quality import most_serious_first
 from dzdesign.identify.data_quality.recordings import about_recordings
-from dzdesign.identify.knees.prepared_tests import L_MIN
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.sides import tests_of_side
-from dzdesign.identify.reading.ramp_files import RampTest
+from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.side import IdentifiedSide, identify_side
 from dzdesign.identify.valve.model import DECIMALS, SIDES, Meter, ValveModel, Warning_
 

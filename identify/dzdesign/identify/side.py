@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.identify.constants import L_MIN, MPA
 from dzdesign.identify.data_quality.quality import find_warnings
 from dzdesign.identify.fitting.bounds import Trend, find_trend
 from dzdesign.identify.fitting.constrained_fits import KneeFit, fit_knees
@@ -23,9 +24,9 @@ from dzdesign.identify.fitting.guarding import (
     opening_curve,
     order_knees,
 )
-from dzdesign.identify.knees.prepared_tests import L_MIN, MPA, DescribedTest, DescribedTests, describe_tests
+from dzdesign.identify.knees.prepared_tests import DescribedTest, DescribedTests, describe_tests
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.reading.ramp_files import RampTest
+from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.ramp_result import BRANCHES, TestResult
 from dzdesign.identify.valve.side_model import BoundsBasis, Reference, SideModel

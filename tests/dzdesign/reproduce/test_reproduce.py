@@ -209,7 +209,7 @@ def test_the_closed_loop_catches_a_wrong_law_in_the_c(reproduced, monkeypatch, t
     firmware = generate(compensator, "host")
     write_folder(tmp_path / "firmware", firmware.files, firmware.manifest)
     assert check_all_inputs(tmp_path / "firmware").holds
-    runs = run_valve(second, ClosedLoop(second.plant, tmp_path / "firmware", document), document)
+    runs = run_valve(second, ClosedLoop(second.plant, tmp_path / "firmware", compensator), document)
     missed = {
         (row.quantity, row.dp_MPa, outcome.by)
         for row in paper_rows._rows_of_valve(runs)

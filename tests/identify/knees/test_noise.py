@@ -15,7 +15,7 @@ from dzdesign.identify.knees.noise import (
     taken_by_parabola,
 )
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.reading.ramp_files import RampTest
+from dzdesign.identify.reading.ramp_test import RampTest
 from tests.support.synthetic import L_MIN, MPA
 
 SEED = 20261121

@@ -13,7 +13,8 @@ from dzdesign.core.errors import InputError
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.splitting import split_ramps
-from dzdesign.identify.reading.ramp_files import RampTest, ramp_file_bytes, read_ramp_file
+from dzdesign.identify.reading.ramp_files import ramp_file_bytes, read_ramp_file
+from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.model import ValveModel
 from tests.support.synthetic import MPA, Truth, synthetic_ramp
 

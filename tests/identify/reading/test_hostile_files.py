@@ -23,16 +23,16 @@ from dzdesign.core.errors import InputError
 from dzdesign.core.units import SI_UNIT, parse_quantity, si_factor
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.signal_text import parse_signal
-from dzdesign.identify.reading.binary import reader_process as separate_reader
+from dzdesign.identify.reading.binary import reader_process
 from dzdesign.identify.reading.ramp_files import read_ramp_file
-from dzdesign.identify.reading.text import blocks as text_blocks
+from dzdesign.identify.reading.text import encoding
 from tests.identify.reading.test_file_formats import GOOD
 from tests.support.hostile_files import BINARIES, CSV, TEXTS, write
 
 #: More of what is random: make fuzz, or this many times as many examples.
 TIMES = int(os.environ.get("DZDESIGN_FUZZ", "1"))
 SEED = int(os.environ.get("DZDESIGN_SEED", "1"))
-#: A reader of text takes no more memory than this, whatever the file: a hundred blocks of 8 MiB.
+#: A reader of these texts takes no more memory than this: eight times the largest of them.
 TEXT_MEMORY = 800 << 20
 #: No file of these tests takes longer to read, on a busy machine.
 PATIENCE_S = 120.0
@@ -63,7 +63,7 @@ def largest_memory(reset: bool = False) -> int:
 
 @pytest.mark.parametrize("name", [*TEXTS, *BINARIES])
 def test_a_hostile_recording(tmp_path, monkeypatch, name):
-    monkeypatch.setattr(text_blocks, "FREE_BYTES", 1 << 22)  # a bomb is refused a little sooner
+    monkeypatch.setattr(encoding, "FREE_BYTES", 1 << 22)  # a bomb is refused a little sooner
     path, (_, words) = write(name, tmp_path), {**TEXTS, **BINARIES}[name]
     text = name in TEXTS
     memory = largest_memory(reset=True)
@@ -87,14 +87,13 @@ def test_a_reader_that_wants_more_memory_than_its_share_is_refused(tmp_path):
 
 def test_a_reader_that_hangs_is_ended(tmp_path, monkeypatch):
     (tmp_path / "ramp.mat").write_bytes(GOOD["mat 5"])
-    monkeypatch.setattr(separate_reader, "PATIENCE_S", 0.5)
+    monkeypatch.setattr(reader_process, "PATIENCE_S", 0.5)
     with contextlib.suppress(InputError):  # starting it may take as long
         read_ramp_file(tmp_path / "ramp.mat")
-    reader = separate_reader._Reader()
-    reader.patience = 0.5
+    reader = reader_process.ReaderProcess()
     os.kill(reader.process.pid, 19)  # SIGSTOP
     with pytest.raises(EOFError, match="takes more than"):
-        reader.ask({"close": True})
+        reader.ask(reader_process.Request(place="", path="", format_name="TDMS"), 0.5)
     reader.close()
 
 

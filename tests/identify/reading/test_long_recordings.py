@@ -1,4 +1,4 @@
-"""Recordings of many rows: read in blocks as they are at once, thinned without moving a knee, in bounded memory."""
+"""Recordings of many rows: thinned without moving a knee; text in pieces is what it is at once."""
 
 import dataclasses
 import gzip
@@ -13,16 +13,15 @@ from dzdesign.core.errors import InputError
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading import thinning
-from dzdesign.identify.reading.binary import tables as binary_tables
-from dzdesign.identify.reading.ramp_files import RampTest, ramp_file_bytes, read_ramp_file
-from dzdesign.identify.reading.text import blocks as text_blocks
-from dzdesign.identify.reading.thinning import Thinner
+from dzdesign.identify.reading.ramp_files import ramp_file_bytes, read_ramp_file
+from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.reading.text import table_reader
+from dzdesign.identify.reading.thinning import thin
 from tests.identify.reading.test_dirty_recordings import changed, jittered, spiked, staircase
-from tests.identify.reading.test_file_formats import GOOD
 from tests.identify.reading.test_ramp_files import assert_is_the_ramp, table
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
 
-LIMIT, BLOCK = 21_000, 7_001
+LIMIT = 21_000
 
 
 def long_ramp(**keywords) -> RampTest:
@@ -30,14 +29,10 @@ def long_ramp(**keywords) -> RampTest:
 
 
 def thinned(test: RampTest) -> RampTest:
-    """Return what is left of a recording that comes in blocks, none of them whole windows."""
-    thinner = Thinner(10.0)
-    rows = np.stack([test.time, test.u, test.q, test.dp])
-    for start in range(0, rows.shape[1], BLOCK):
-        thinner.add(rows[:, start : start + BLOCK])
-    assert thinner.read == test.u.size and thinner.kept <= LIMIT and thinner.run == 8
-    time, u, q, dp = (column.copy() for column in thinner.rows())
-    return changed(test, time=time, u=u, q=q, dp=dp, run=thinner.run, rows_read=thinner.read)
+    left = thin(np.stack([test.time, test.u, test.q, test.dp]))
+    assert left.rows.shape[1] <= LIMIT and left.run == 9
+    time, u, q, dp = (column.copy() for column in left.rows)
+    return changed(test, time=time, u=u, q=q, dp=dp, run=left.run, rows_read=test.u.size)
 
 
 def some(test: RampTest, name: str, share: float, values) -> RampTest:
@@ -89,16 +84,15 @@ def test_thinning_moves_no_knee(name, monkeypatch):
     assert 0.5 * full.u_knee_se_V < found.u_knee_se_V < 2 * full.u_knee_se_V
     assert found.q_max_L_min == pytest.approx(full.q_max_L_min, rel=2e-3)
     (warning,) = [warning for warning in few.warnings if warning.code == "thinned"]
-    assert "of 160000 rows every 8 in a row" in warning.text and warning.source == test.source
+    assert "of 160000 rows the medians of every 9 in a row" in warning.text and warning.source == test.source
 
 
 def test_a_staircase_keeps_its_levels(monkeypatch):
     monkeypatch.setattr(thinning, "MOST_ROWS", 2_000)
     test = staircase(long_ramp())  # 60 rows a level
-    thinner = Thinner(10.0)
-    thinner.add(np.stack([test.time, test.u, test.q, test.dp]))
-    u = thinner.rows()[1]
-    assert thinner.run == 8 and np.abs(u - np.round(u, 1)).max() < 1e-12
+    left = thin(np.stack([test.time, test.u, test.q, test.dp]))
+    u = left.rows[1]
+    assert left.run == 7 and np.abs(u - np.round(u, 1)).max() < 1e-12
     assert np.unique(np.round(u, 1)).size == 101
 
 
@@ -113,7 +107,7 @@ def test_no_flow_between_zero_and_the_floor_is_made_up(noise, monkeypatch):
 def test_means_of_all_rows_would_make_one_up(monkeypatch):
     """The check above, checked."""
     monkeypatch.setattr(thinning, "MOST_ROWS", LIMIT)
-    monkeypatch.setattr(thinning, "_typical", lambda windows, *_: np.ones(windows.shape, dtype=bool))
+    monkeypatch.setattr(np, "partition", lambda runs, *_, axis: np.repeat(runs.mean(axis, keepdims=True), 9, axis))
     test = thinned(with_true_floor(long_ramp(noise=0.02)))
     assert np.any((test.q > 1e-3 * L_MIN) & (test.q < (1.2 - 1e-9) * L_MIN))
 
@@ -122,21 +116,27 @@ def test_a_sweep_faster_than_its_runs_is_not_smeared(monkeypatch):
     monkeypatch.setattr(thinning, "MOST_ROWS", 500)
     up = np.linspace(0, 10, 1000)
     u = np.tile(np.concatenate([up, up[::-1]]), 8)
-    thinner = Thinner(10.0)
-    thinner.add(np.stack([np.arange(u.size) / 100, u, u**3, np.full(u.size, 1e6)]))
-    rows = thinner.rows()
-    assert rows.shape[1] <= 500 and thinner.run >= 32
+    left = thin(np.stack([np.arange(u.size) / 100, u, u**3, np.full(u.size, 1e6)]))
+    rows = left.rows
+    assert rows.shape[1] <= 500 and left.run == 33
     np.testing.assert_allclose(rows[2], rows[1] ** 3, rtol=1e-4, atol=1e-5)  # on the curve, not on a chord of it
 
 
 def test_below_the_limit_nothing_is_touched(monkeypatch):
     test = long_ramp()
     rows = np.stack([test.time, test.u, test.q, test.dp])
-    thinner = Thinner(10.0)
-    for start in range(0, rows.shape[1], BLOCK):
-        thinner.add(rows[:, start : start + BLOCK])
-    np.testing.assert_array_equal(thinner.rows(), rows)
-    assert thinner.run == 1
+    left = thin(rows)
+    np.testing.assert_array_equal(left.rows, rows)
+    assert left.run == 1
+
+
+def test_parts_that_are_thinned_one_after_the_other_make_no_difference(monkeypatch):
+    monkeypatch.setattr(thinning, "MOST_ROWS", LIMIT)
+    test = CASES["floor and spikes"]()
+    rows = np.stack([test.time, test.u, test.q, test.dp])[:, :-5]
+    at_once = thin(rows)
+    monkeypatch.setattr(thinning, "PART", 77)
+    np.testing.assert_array_equal(thin(rows).rows, at_once.rows)
 
 
 def assert_same(one: RampTest, other: RampTest) -> None:
@@ -156,25 +156,15 @@ def assert_same(one: RampTest, other: RampTest) -> None:
         lambda text: "\ufeff" + text,
     ],
 )
-def test_text_read_in_blocks_is_text_read_at_once(tmp_path, monkeypatch, spoil, end):
+def test_text_read_in_pieces_is_text_read_at_once(tmp_path, monkeypatch, spoil, end):
     content = spoil(table()).replace("\n", end).encode()
     for name, data in (("a.csv", content), ("a.csv.gz", gzip.compress(content))):
         (tmp_path / name).write_bytes(data)
         at_once = read_ramp_file(tmp_path / name)
         for size in (64, 65, 66, 67, 301):
             with monkeypatch.context() as context:
-                context.setattr(text_blocks, "BLOCK_BYTES", size)
+                context.setattr(table_reader, "PIECE_BYTES", size)
                 assert_same(read_ramp_file(tmp_path / name), at_once)
-
-
-@pytest.mark.parametrize("name", GOOD)
-def test_binary_files_read_in_blocks_are_read_at_once(name, tmp_path, monkeypatch):
-    path = tmp_path / "ramp.mat"
-    path.write_bytes(GOOD[name])
-    at_once = read_ramp_file(path)
-    monkeypatch.setattr(binary_tables, "BLOCK_ROWS", 7)
-    assert_same(read_ramp_file(path), at_once)
-    assert_is_the_ramp(at_once)
 
 
 @pytest.mark.parametrize(
@@ -189,8 +179,8 @@ def test_binary_files_read_in_blocks_are_read_at_once(name, tmp_path, monkeypatc
     ],
 )
 @pytest.mark.parametrize("before", ["", "# one\r\n\r\n"])
-def test_a_fault_in_a_later_block_is_found_in_its_row(tmp_path, monkeypatch, spoil, words, before):
-    monkeypatch.setattr(text_blocks, "BLOCK_BYTES", 128)
+def test_a_fault_in_a_later_piece_is_found_in_its_row(tmp_path, monkeypatch, spoil, words, before):
+    monkeypatch.setattr(table_reader, "PIECE_BYTES", 128)
     (tmp_path / "a.csv").write_bytes(before.encode() + "\n".join(spoil(table().splitlines())).encode())
     with pytest.raises(InputError) as caught:
         read_ramp_file(tmp_path / "a.csv")
@@ -213,24 +203,16 @@ def test_a_pipe_is_read_once(tmp_path):
     writer.join()
 
 
-def peak_of_reading(path) -> int:
+def test_memory_is_a_few_times_the_file(tmp_path, monkeypatch):
+    """Of what Python and NumPy take; `benchmarks/identify/reading.py` measures the whole process."""
+    monkeypatch.setattr(table_reader, "PIECE_BYTES", 1 << 16)
+    test = long_ramp()
+    columns = {"time_s": test.time, "u_V": test.u, "Q_Lmin": test.q / L_MIN, "dP_MPa": test.dp / 1e6}
+    content = ramp_file_bytes(columns, (), compress=False)
+    (tmp_path / "a.csv").write_bytes(content)
+    read_ramp_file(tmp_path / "a.csv")  # what is imported stays
     tracemalloc.start()
-    read_ramp_file(path)
+    read_ramp_file(tmp_path / "a.csv")
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    return peak
-
-
-def test_memory_does_not_grow_with_the_file(tmp_path, monkeypatch):
-    """Of what Python and NumPy take; `benchmarks/identify/reading.py` measures the whole process."""
-    monkeypatch.setattr(thinning, "MOST_ROWS", 5_000)
-    monkeypatch.setattr(text_blocks, "BLOCK_BYTES", 1 << 16)
-    test = long_ramp()
-    peaks = []
-    for rows in (20_000, 160_000):
-        part = slice(None, None, test.u.size // rows)
-        columns = {"time_s": test.time[part], "u_V": test.u[part], "Q_Lmin": test.q[part] / L_MIN}
-        (tmp_path / "a.csv").write_bytes(ramp_file_bytes(columns, (), compress=False))
-        read_ramp_file(tmp_path / "a.csv")  # what is imported stays
-        peaks.append(peak_of_reading(tmp_path / "a.csv"))
-    assert peaks[1] < 1.2 * peaks[0]
+    assert peak < 5 * len(content)

@@ -29,7 +29,8 @@ from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.lot_check import check_lot, lot_checked
 from dzdesign.verify.exhaustive.test_vectors import differences
-from dzdesign.verify.exhaustive.zero_command import zero_command_margins
+from dzdesign.verify.exhaustive.zero_command import guarded_bounds, zero_command_margins
+from dzdesign.verify.firmware.folder import read_compensator
 from tests.support.synthetic import Truth, needs_compiler, synthetic_ramp
 
 KNEES = {"a": lambda dp: 5.6 - 0.05 * dp, "b": lambda dp: 5.2 + 0.03 * dp, "c": lambda dp: 5.4, "d": lambda dp: 5.5}
@@ -180,21 +181,21 @@ def test_codegen_refuses_it_in_one_line(common, tmp_path, capsys):
 def firmware_of(compensator, folder):
     made = generate(compensator, "host")
     write_folder(folder, made.files, made.manifest)
-    return folder, json.loads((folder / "compensator.json").read_bytes())
+    return folder, read_compensator(folder)
 
 
 @needs_compiler
 def test_verify_compares_the_core_with_every_valve(common, tmp_path):
-    folder, document = firmware_of(common.compensator, tmp_path / "firmware")
+    folder, compensator = firmware_of(common.compensator, tmp_path / "firmware")
     found = check_all_inputs(folder)
-    (check,) = lot_checked((found,), document)
+    (check,) = lot_checked((found,), compensator)
     assert check.holds and found.holds and found.lot.valves == 4 and found.lot.over_compensated == ()
     assert check.text.startswith("4 of 4 valves, ") and f": {found.lot.worst}, " in check.text
     assert found.lot.worst == common.worst.name  # two arguments agree, but for the rounding of one count
     assert abs(found.lot.smallest_margin_V - float(common.worst.margin_V)) <= 10 / 60000
-    lower, document = firmware_of(with_bound(common.compensator, "d", 0, -0.5), tmp_path / "lower")
+    lower, compensator = firmware_of(with_bound(common.compensator, "d", 0, -0.5), tmp_path / "lower")
     found = check_all_inputs(lower)
-    (check,) = lot_checked((found,), document)
+    (check,) = lot_checked((found,), compensator)
     assert check.holds is False and not found.holds and found.lot.over_compensated == ("d",)
     assert "1 over-compensated: d; smallest margin of the C's compare values -" in check.text
     assert "d, 1.99 MPa" in check.text
@@ -213,25 +214,28 @@ def test_the_command_fails_and_names_the_valve(common, tmp_path, capsys):
 
 def test_of_the_valve_in_the_file_it_finds_what_the_input_check_finds(document):
     """On a drive that is the law's own, and on one that is a count too high everywhere."""
-    exact = ExactLaw(document)
+    compensator = read(document)
+    carrier = next(each for each in compensator.lot if each.valve_sha256 == compensator.valve_sha256)
+    exact = ExactLaw(compensator)
     found = differences(exact)
-    betas = [exact.betas(int(value)) for value in found.values]
-    at_zero = next(exact.rows(betas))
-    carrier = next(each for each in document["lot"] if each["valve_sha256"] == document["made_from"][0]["sha256"])
-    alone = {**document, "lot": [carrier]}
+    at_zero = np.array([exact.compare_value(exact.zero, exact.corners(exact.betas(int(dp)))) for dp in found.values])
+    own = guarded_bounds(compensator, 1)
     for higher in (0, 1, 500):
-        above, margin = zero_command_margins(document, exact, found, at_zero + higher)
-        check = check_lot(alone, exact, found, at_zero + higher)
-        assert check.smallest_margin_V == float(margin) and bool(check.over_compensated) == bool(above)
+        margin, of_lot = zero_command_margins(exact, found, at_zero + higher, [own, carrier.positive])
+        assert margin == of_lot
+        check = check_lot(exact, found, at_zero + higher)
+        assert check.smallest_margin_V <= float(margin.margin_V)
+        assert (carrier.name in check.over_compensated) == bool(margin.exceeded) == (margin.margin_V < 0)
 
 
 def test_a_file_from_before_lots_were_kept_is_not_shown_to_hold(document):
-    old = {name: value for name, value in document.items() if name not in ("lot", "lot_sha256")}
-    prove_derived(read(old))
-    assert check_lot(old, ExactLaw(old), differences(ExactLaw(old)), np.zeros(1)) is None
+    old = read({name: value for name, value in document.items() if name not in ("lot", "lot_sha256")})
+    prove_derived(old)
+    exact = ExactLaw(old)
+    assert check_lot(exact, differences(exact), np.zeros(1)) is None
     (check,) = lot_checked((), old)
     assert check.holds is None and "is of 4 valves and holds the bounds of one" in check.text
-    assert lot_checked((), {**old, "common_valves": 0}) == []
+    assert lot_checked((), replace(old, common_valves=0)) == []
 
 
 # ---- which pressure drops ----

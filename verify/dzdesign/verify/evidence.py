@@ -13,6 +13,7 @@ from dzdesign.core.artefact_types import Artefact, quantity
 from dzdesign.core.verdicts import DOES_NOT_HOLD, HOLDS, NOT_CHECKED
 from dzdesign.verify.closed_loop.plant import Plant
 
+Sign = Literal[1, -1]
 Side = Annotated[Literal["positive", "negative"], Meta(description="Side of the valve.")]
 PressureDrop = Annotated[float, quantity("MPa", "Pressure drop at no flow.", ge=0, le=1000)]
 Count = Annotated[int, Meta(ge=0, le=2**60)]
@@ -58,7 +59,7 @@ class LotCheck:
 class InputCheck:
     """The check of every input of one side; every count that ends in a fault must be zero."""
 
-    sign: Annotated[Literal[1, -1], Meta(description="Sign of the commands.")]
+    sign: Annotated[Sign, Meta(description="Sign of the commands.")]
     inputs: Annotated[
         Count,
         Meta(description="Pairs of command code and difference of pressure codes, each compared with the exact law."),

@@ -1,5 +1,6 @@
 """`verify`: a firmware folder in, evidence out: strict compilation, every input, closed loop."""
 
+import json
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -40,8 +41,6 @@ class Verification(ShownInNotebooks):
     ----------
     evidence : Evidence
         Every requirement that was tried, with its figures; stored as verification.json.
-    compensator : Compensator
-        Which the firmware was made from.
     maps : tuple of InputMap
         What the core gives over its inputs, one a sign of command, to be drawn.
     loops : tuple of LoopComparison
@@ -49,7 +48,6 @@ class Verification(ShownInNotebooks):
     """
 
     evidence: Evidence
-    compensator: Compensator
     maps: tuple[InputMap, ...]
     loops: tuple[LoopComparison, ...]
 
@@ -119,34 +117,19 @@ def verify(
     manifest = read_firmware_manifest(folder)
     check_include(include, manifest)
     compensator = read_compensator(folder)
+    document = json.loads((folder / "compensator.json").read_bytes())
     host_compiler()
     say("compiling the core with every warning an error")
     compiles = compiles_strictly(folder, manifest)
-    checks = [files_unchanged(folder, manifest), manifest_follows(folder, manifest, compensator), compiles]
-    inputs: tuple[InputCheck, ...] = ()
-    maps: tuple[InputMap, ...] = ()
-    loop = FirmwareLoop()
-    signs = compensator.signals.signs
+    core, loop = _Core(), FirmwareLoop()
     if compiles.holds:
         say("comparing every input with the exact law")
-        # A compiler's time, not ours.
-        building = ThreadPoolExecutor(1).submit(scenes_of, folder, compensator, plant)
-        try:
-            inputs = tuple(check_all_inputs(folder, sign, compensator) for sign in signs)
-        except RequirementError as error:
-            checks.append(EXACT_LAW.check(holds=False, text=str(error)))
-    if inputs:
-        for each in inputs:
-            checks += input_checks(each, both_signs=len(inputs) > 1)
-        checks += lot_checked(inputs, compensator)
-        maps = tuple(map_inputs(folder, compensator, sign) for sign in signs)
-        checks.append(drive_follows(folder, compensator))
-        loop = close_the_loop(
-            building.result(), compensator, plant, sequence or RampSequence(), tolerances, say, watch
-        )
+        building = ThreadPoolExecutor(1).submit(scenes_of, folder, compensator, plant)  # a compiler's time, not ours
+        core = _try_core(folder, compensator)
+        if core.inputs:
+            scenes = building.result()
+            loop = close_the_loop(scenes, compensator, plant, sequence or RampSequence(), tolerances, say, watch)
     board = board_compiles(folder, manifest, include)
-    checks += [*loop.checks, certificate_follows(compensator), law_follows(compensator)]
-    checks += [*valve_follows(folder, compensator), *board.checks]
     digest = sha256_of((folder / MANIFEST_NAME).read_bytes())
     evidence = Evidence(
         tool=THIS_TOOL,
@@ -155,8 +138,18 @@ def verify(
         changed_board_files=tuple(changed_board_files(folder, manifest)),
         user_files=tuple(user_files(folder, manifest)),
         board_not_compiled=board.not_compiled,
-        checks=tuple(checks),
-        inputs=inputs,
+        checks=(
+            files_unchanged(folder, manifest),
+            manifest_follows(folder, manifest, compensator),
+            compiles,
+            *core.checks,
+            *loop.checks,
+            certificate_follows(compensator),
+            law_follows(compensator, document),
+            *valve_follows(folder, document),
+            *board.checks,
+        ),
+        inputs=core.inputs,
         closed_loop=ClosedLoopResult(
             plant=plant,
             plant_source=plant_source or "made from the identified thresholds",
@@ -168,7 +161,34 @@ def verify(
         monte_carlo=loop.monte_carlo,
         mutants=None,
     )
-    return Verification(evidence=evidence, compensator=compensator, maps=maps, loops=loop.loops)
+    return Verification(evidence=evidence, maps=core.maps, loops=loop.loops)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Core:
+    """What trying the compiled core showed; nothing of it where it does not compile."""
+
+    checks: tuple[Check, ...] = ()
+    inputs: tuple[InputCheck, ...] = ()
+    maps: tuple[InputMap, ...] = ()
+
+
+def _try_core(folder: Path, compensator: Compensator) -> _Core:
+    """Compare every input with the exact law, and the drive with its model."""
+    signs = compensator.signals.signs
+    try:
+        inputs = tuple(check_all_inputs(folder, sign, compensator) for sign in signs)
+    except RequirementError as error:
+        return _Core(checks=(EXACT_LAW.check(holds=False, text=str(error)),))
+    return _Core(
+        checks=(
+            *(check for each in inputs for check in input_checks(each, both_signs=len(inputs) > 1)),
+            *lot_checked(inputs, compensator),
+            drive_follows(folder, compensator),
+        ),
+        inputs=inputs,
+        maps=tuple(map_inputs(folder, compensator, sign) for sign in signs),
+    )
 
 
 def evidence_manifest(evidence: Evidence) -> dict[str, object]:

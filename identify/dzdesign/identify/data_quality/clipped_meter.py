@@ -9,9 +9,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from dzdesign.identify.knees.prepared_tests import FEWEST_AT_REST, L_MIN, readings_at_rest
+from dzdesign.identify.constants import L_MIN
+from dzdesign.identify.knees.prepared_tests import FEWEST_AT_REST, readings_at_rest
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.reading.ramp_files import RampTest
+from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.model import Warning_
 
 #: Readings within this share of the largest are one reading.

@@ -5,15 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from dzdesign.identify.constants import FULL_SWEEP, L_MIN, MPA
 from dzdesign.identify.ramps.pooling import SAME_PRESSURE
 from dzdesign.identify.ramps.splitting import SHUT, despiked
 from dzdesign.identify.reading.named_pressure import claimed_pressures, contradicts
-from dzdesign.identify.reading.ramp_files import RampTest
+from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.ramp_result import TestResult
 
-MPA = 1e6
-L_MIN = 1e-3 / 60
 #: Pressure drops that differ by less than this share are one number: averaging may round the last digit.
 ONE_NUMBER = 1e-12
 #: A pressure drop stands still if all but the outermost readings lie within this share of it, or on so few levels of
@@ -40,8 +39,6 @@ GROSSLY_APART = 0.3
 FALLS, GROWS_TOO_LITTLE, GROWS_TOO_MUCH = 0.9, 2.5, 1.75
 #: Said of both kinds of contradiction.
 WHAT_FOLLOWS = "Thresholds may be assigned to wrong pressure drops, so the certificate may not hold"
-#: A recording that comes to this share of the largest command shows what flows there.
-FULL_SWEEP = 0.95
 
 
 def about_a_stuck_sensor(tests: Sequence[RampTest]) -> Iterator[Warning_]:

@@ -4,10 +4,11 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.data_quality.knee_errors import about_errors
 from dzdesign.identify.data_quality.pressures import about_flow_gains
 from dzdesign.identify.data_quality.sweeps import about_sweeps
-from dzdesign.identify.knees.prepared_tests import L_MIN, DescribedTest, DescribedTests
+from dzdesign.identify.knees.prepared_tests import DescribedTest, DescribedTests
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.ramp_result import TestResult

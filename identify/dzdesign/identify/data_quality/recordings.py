@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from dzdesign.identify.reading.clock import ASSUMED_MS
-from dzdesign.identify.reading.ramp_files import RampTest
+from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.model import Warning_
 
 #: Files that a text lists.
@@ -85,9 +85,8 @@ def _about_thinning(tests: Sequence[RampTest]) -> Iterator[Warning_]:
             yield Warning_(
                 code="thinned",
                 text=(
-                    f"of {test.rows_read} rows every {test.run} in a row were averaged, without their spikes, to "
-                    f"{test.time.size} samples, to which noise and outliers refer. The next one may be recorded at a "
-                    "lower rate"
+                    f"of {test.rows_read} rows the medians of every {test.run} in a row were taken, {test.time.size} "
+                    "samples, to which noise and outliers refer. The next one may be recorded at a lower rate"
                 ),
                 source=test.source,
             )

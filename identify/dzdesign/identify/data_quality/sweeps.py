@@ -4,8 +4,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.knees.characteristic import BranchShape
-from dzdesign.identify.knees.prepared_tests import L_MIN, DescribedTest
+from dzdesign.identify.knees.prepared_tests import DescribedTest
 from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.ramp_result import TestResult
 from dzdesign.identify.valve.side_model import SideModel

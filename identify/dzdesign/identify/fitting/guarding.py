@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.identify.constants import MPA
 from dzdesign.identify.fitting.bounds import excess_departure, lower_bounds, staircase
 from dzdesign.identify.fitting.constrained_fits import KneeFit, fit_knees, fit_offset
 from dzdesign.identify.fitting.guard_curve import GuardCurve, OpeningCurve
-from dzdesign.identify.knees.prepared_tests import MPA, DescribedTests
+from dzdesign.identify.knees.prepared_tests import DescribedTests
 from dzdesign.identify.options import IdentifyOptions
 
 #: Branch (column of the fit) whose threshold a guard protects; "mean" is of both.

@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.identify.constants import FULL_SWEEP
 from dzdesign.identify.knees.linear_region import lay_line, read_branch
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.branches import at_nominal_pressure
@@ -24,8 +25,6 @@ TWO_RATES = 1.5
 LAG_SIGNIFICANCE = 3.0
 #: A lag known no better than this, s, is not known.
 USELESS = 0.1
-#: A sweep that comes to this share of the largest command shows the knee.
-FULL_SWEEP = 0.95
 
 
 @dataclass(frozen=True, slots=True)

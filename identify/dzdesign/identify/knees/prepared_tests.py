@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.identify.constants import FULL_SWEEP, L_MIN
 from dzdesign.identify.knees.characteristic import BranchShape, describe_branches, find_meter_floor
 from dzdesign.identify.knees.linear_region import ReadBranch, read_branch
 from dzdesign.identify.knees.meter_lag import MeterLag, find_lag
@@ -16,14 +17,10 @@ from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.branches import Branch, at_nominal_pressure
 from dzdesign.identify.ramps.pooling import PooledTest, pool_ramps
 from dzdesign.identify.ramps.splitting import Ramp, despiked, nominal_dp, split_ramps
-from dzdesign.identify.reading.ramp_files import RampTest
+from dzdesign.identify.reading.ramp_test import RampTest
 
-MPA = 1e6
-L_MIN = 1e-3 / 60
 #: A recording whose command moves by less than this share of u_max is no part of a ramp.
 SMALLEST_SWEEP = 0.1
-#: A recording that comes to this share of the largest command is whole: the valve must have opened in it.
-FULL_SWEEP = 0.95
 #: Commands within this share of u_max are at rest; a wider one is taken where so few readings would be left.
 AT_REST, FEWEST_AT_REST = (0.01, 0.03, 0.1), 20
 #: Share of the largest flow that is a flow for certain, and share of the command there that lies far below it.

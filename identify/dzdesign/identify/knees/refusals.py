@@ -5,15 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.identify.constants import L_MIN, LARGEST_DP, MPA, SMALLEST_DP
 from dzdesign.identify.knees.linear_region import ReadBranch
 from dzdesign.identify.knees.noise import robust_sigma
 from dzdesign.identify.knees.profile import crossing, flow_at_top, smooth_profile
 from dzdesign.identify.ramps.branches import Branch
 
-MPA = 1e6
-L_MIN = 1e-3 / 60
-#: Pressure drops beyond these, Pa, are a wrong unit.
-SMALLEST_DP, LARGEST_DP = 1e3, 200 * MPA
 #: A flow that rises with the command has readings between these shares of the largest where its mean is between them.
 MIDDLE = (0.15, 0.45)
 #: A meter's floor up to this share of the largest flow leaves a straight part to be seen.

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.identification import Identified
 from dzdesign.identify.knees.characteristic import BranchShape
-from dzdesign.identify.knees.prepared_tests import L_MIN, DescribedTest
+from dzdesign.identify.knees.prepared_tests import DescribedTest
 from dzdesign.identify.plots.frame import finish, new_figure, plot_style, saved
 from dzdesign.identify.side import IdentifiedSide
 from dzdesign.identify.valve.model import ValveModel

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-#: Width of a bin over u_max: fine enough that a straight line inside it is exact to the noise.
-BIN_WIDTH = 1e-3
+from dzdesign.identify.constants import BIN_WIDTH
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,7 +8,7 @@ import numpy as np
 
 from dzdesign.identify.ramps.branches import Branch
 from dzdesign.identify.ramps.splitting import Ramp
-from dzdesign.identify.reading.ramp_files import RampTest
+from dzdesign.identify.reading.ramp_test import RampTest
 
 #: Ramps whose pressure drops differ by less than this share are one test.
 SAME_PRESSURE = 0.02

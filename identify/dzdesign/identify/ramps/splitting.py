@@ -15,7 +15,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.ramps.branches import Branch
-from dzdesign.identify.reading.ramp_files import RampTest
+from dzdesign.identify.reading.ramp_test import RampTest
 
 #: A change of direction is real when the command has gone back by this share of its range.
 TURN = 0.1

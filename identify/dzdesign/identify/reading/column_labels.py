@@ -242,7 +242,7 @@ def _missing_column(quantity: str, table: Table, columns: Collection[str]) -> In
     meant += [label for label in unused if measures(table.units.get(label, "") or split_label(label)[1], kind)]
     hint = f" (did you mean '{meant[0]}'? name it {EXAMPLE_LABELS[quantity]})" if meant else ""
     return InputError(
-        f"'{table.path}' has no column of {quantity} (columns found: {table.found()}){hint}; "
+        f"'{table.path}' has no column of {quantity} (columns found: {table.found_labels()}){hint}; "
         "expected names with units such as time_s,u_V,dP_MPa,Q_Lmin, or --columns"
     )
 

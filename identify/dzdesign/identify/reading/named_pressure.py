@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 
 from dzdesign.core.units import parse_quantity
-from dzdesign.identify.knees.refusals import LARGEST_DP, SMALLEST_DP
+from dzdesign.identify.constants import LARGEST_DP, SMALLEST_DP
 
 #: A number, and one that may be its whole part: names of files often can't hold a point.
 _NUMBER = r"(?:(?<!\d)(\d{1,9})([_p-]))?(?<![\d.])(\d{1,9}(?:[.,]\d{1,9})?)"

@@ -1,13 +1,12 @@
 """Ramp files: a recorded table whose columns are a quantity and its unit; read into SI, or written.
 
-A file is read block by block, and a long one thinned on the way: see `thinning`.
+A long recording is thinned: see `thinning`.
 """
 
 import gzip
 import io
 import re
-from collections.abc import Generator, Mapping
-from contextlib import closing
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
@@ -16,14 +15,16 @@ import numpy as np
 
 from dzdesign.core.artefact_files import open_bytes, sha256_of_file
 from dzdesign.core.errors import InputError
-from dzdesign.identify.reading.binary.tables import binary_reader
-from dzdesign.identify.reading.clock import ASSUMED_MS, Clock
+from dzdesign.identify.reading.binary.array_table import read_binary_table
+from dzdesign.identify.reading.binary.registry import LONGEST_MARK, format_of
+from dzdesign.identify.reading.clock import ASSUMED_MS, clock_doubt, may_count_ms, never_back, seconds_of_day_times
 from dzdesign.identify.reading.column_labels import QUANTITY_OF_COLUMN, Column, find_columns
-from dzdesign.identify.reading.missing_values import NoValues
+from dzdesign.identify.reading.missing_values import describe_placeholders, without_placeholders
+from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.reading.scaling import scaling_of
 from dzdesign.identify.reading.table import QUOTED_CHARACTERS, Table
-from dzdesign.identify.reading.text.tables import text_tables
-from dzdesign.identify.reading.thinning import Thinner
+from dzdesign.identify.reading.text.table_reader import read_text_table
+from dzdesign.identify.reading.thinning import thin
 
 #: Fewest complete rows in which two branches with a threshold could stand.
 MIN_ROWS = 20
@@ -31,52 +32,6 @@ MIN_ROWS = 20
 SIMULATED_MARK = "SIMULATED"
 #: SI numbers beyond these are no measurement of a valve: a wrong unit, or what a logger writes for an overflow.
 LARGEST = {"time": 1e12, "voltage": 1e4, "pressure": 1e9, "flow": 10.0}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RampTest:
-    """One recorded ramp test, SI, read-only.
-
-    Attributes
-    ----------
-    source, sha256 : str
-        File name (without its folder) and the hash of its bytes.
-    time, u, q : (N,) array
-        Time in s, command in V, flow in m³/s; rows with a missing value are left out.
-    dp : (N,) array or None
-        Pressure drop in Pa, or None if it is unknown.
-    dp_is_declared : bool
-        True if the pressure drop is the engineer's word (one constant) and not a recording.
-    rows_read, run : int
-        Complete rows in the file, and how many of them in a row were averaged to one sample (1: none were).
-    clock_doubt : str
-        What is doubtful about the unit of the time, as `Clock.doubt` gives it.
-    simulated : bool
-        True if a comment line above the labels begins with `SIMULATED_MARK`.
-    no_values : str
-        Numbers that were taken for missing samples, as `NoValues.said` gives them.
-    """
-
-    source: str
-    sha256: str
-    time: np.ndarray
-    u: np.ndarray
-    q: np.ndarray
-    dp: np.ndarray | None
-    dp_is_declared: bool = False
-    rows_read: int = 0
-    run: int = 1
-    clock_doubt: str = ""
-    simulated: bool = False
-    no_values: str = ""
-
-    def __post_init__(self) -> None:
-        for array in (self.time, self.u, self.q, self.dp):
-            if array is None:
-                continue
-            if array.shape != self.time.shape or array.ndim != 1:
-                raise ValueError("the columns of a ramp test are vectors of one length")
-            array.flags.writeable = False
 
 
 def read_ramp_file(
@@ -110,26 +65,18 @@ def read_ramp_file(
         Naming file, and row and column where there is one.
     """
     path = Path(path)
-    thinner, clock, no_values = Thinner(u_max), Clock(), NoValues()
-    found: dict[str, Column] = {}
-    simulated = False
     with open_bytes(path, "ramp file") as file:
         sha256 = sha256_of_file(file)
-        with closing(read_tables(file, path, skip_rows)) as tables:
-            for table in tables:
-                if not found:
-                    found = find_columns(table, columns or {})
-                    simulated = _is_marked(table.comments)
-                    _refuse_two_pressures(table, found, dp)
-                    _refuse_unequal_lengths(table, found)
-                thinner.add(_complete_rows(table, found, clock, no_values, u_max, dp))
-    _refuse_too_few_rows(path, thinner.read, no_values)
-    time, u, q, *measured = (column.copy() for column in thinner.rows())
-    doubt = clock.doubt(time, u)
+        recording = _read_recording(read_table(file, path, skip_rows), columns or {}, u_max, dp)
+    _refuse_too_few_rows(path, recording)
+    thinned = thin(recording.rows)
+    time, u, q, *measured = (np.array(column) for column in thinned.rows)
+    clock = recording.clock
+    doubt = clock_doubt(time, u, unit_stated=bool(clock.unit)) if recording.may_count_ms else ""
     if doubt == ASSUMED_MS:
         time /= 1e3
-    elif not found["time"].unit:
-        scaling_of(path, "time", found["time"], u_max)  # says that it lacks one
+    elif not clock.unit:
+        scaling_of(path, "time", clock, u_max)  # says that it lacks one
     return RampTest(
         source=path.name.encode(errors="replace").decode(),
         sha256=sha256,
@@ -138,17 +85,32 @@ def read_ramp_file(
         q=q,
         dp=measured[0] if measured else None,
         dp_is_declared=dp is not None,
-        rows_read=thinner.read,
-        run=thinner.run,
+        rows_read=recording.rows.shape[1],
+        run=thinned.run,
         clock_doubt=doubt,
-        simulated=simulated,
-        no_values=no_values.said(),
+        simulated=recording.simulated,
+        no_values=recording.no_values,
     )
 
 
-def _refuse_too_few_rows(path: Path, rows: int, no_values: NoValues) -> None:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Recording:
+    """The complete rows of a file: time, command, flow and, if it is known, pressure drop (3 or 4, N).
+
+    `clock` is the column of time, which may count milliseconds if `may_count_ms` says so; the rest is of `RampTest`.
+    """
+
+    rows: np.ndarray
+    clock: Column
+    simulated: bool
+    may_count_ms: bool
+    no_values: str
+
+
+def _refuse_too_few_rows(path: Path, recording: _Recording) -> None:
+    rows = recording.rows.shape[1]
     if rows < MIN_ROWS:
-        missing = f"; {no_values.said()} are missing samples" if no_values.said() else ""
+        missing = f"; {recording.no_values} are missing samples" if recording.no_values else ""
         raise InputError(f"'{path}' has {rows} complete rows, expected at least {MIN_ROWS} of a ramp test{missing}")
 
 
@@ -157,44 +119,63 @@ def _is_marked(comments: str) -> bool:
     return re.search(rf'^[ \t,;"]*#[ \t"]*{SIMULATED_MARK}\b', comments, re.MULTILINE) is not None
 
 
-def read_tables(file: BinaryIO, path: Path, skip_rows: int | None = None) -> Generator[Table, None, None]:
-    """Read a table of any known format, block by block; its first bytes tell which, not its name.
+def read_table(file: BinaryIO, path: Path, skip_rows: int | None = None) -> Table:
+    """Read a table of any known format; its first bytes tell which, not its name.
 
     Parameters
     ----------
     file : binary file
-        CSV (plain or gzip), TDMS, MAT, HDF5, Parquet or Feather.
+        Text (plain or gzip), or one of `binary.formats`.
     path : Path
         For messages.
     skip_rows : int, optional
-        Of `text_tables`.
+        Of `read_text_table`.
 
     Raises
     ------
     InputError
         If it is none of these, or not a whole one.
     """
-    start = file.read(32)
+    start = file.read(LONGEST_MARK)
     file.seek(0)
-    read = binary_reader(start, path)
-    return read(file, path) if read else text_tables(file, path, skip_rows)
+    kind = format_of(start, path)
+    return read_binary_table(file, path, kind) if kind else read_text_table(file, path, skip_rows)
 
 
-def _complete_rows(
-    table: Table, found: Mapping[str, Column], clock: Clock, no_values: NoValues, u_max: float, dp: float | None
-) -> np.ndarray:
-    """Return time, command, flow and, if it is known, pressure drop of the rows of a block that lack none of them."""
-    data = {
-        quantity: _si_numbers(table, quantity, column, clock, no_values, u_max) for quantity, column in found.items()
-    }
+def _read_recording(table: Table, chosen: Mapping[str, str], u_max: float, dp: float | None) -> _Recording:
+    """Return the rows of a file that lack nothing."""
+    found = find_columns(table, chosen)
+    _refuse_two_pressures(table, found, dp)
+    _refuse_unequal_lengths(table, found)
+    table.load([column.label for column in found.values()])
+    data, placeholders = {}, {}
+    is_clock = table.is_clock(found["time"].label)
+    for quantity, column in found.items():
+        if quantity == "time" and is_clock:
+            data[quantity] = seconds_of_day_times(table, column.label)
+            continue
+        numbers, placeholders[column.label] = without_placeholders(
+            table.numbers(column.label), rises=quantity == "time"
+        )
+        unclear = quantity == "time" and not column.unit and may_count_ms(numbers)
+        # The whole recording tells later what they count.
+        data[quantity] = numbers if unclear else _in_SI(table, quantity, column, numbers, u_max)
     measured = data["dP"] if "dP" in data else data["pA"] - data["pB"] if "pA" in data else None
     if measured is None and dp is not None:
         measured = np.full(data["time"].size, dp)
-    rows = np.stack([data["time"], data["u"], data["Q"], *([] if measured is None else [measured])])
-    complete = np.isfinite(rows).all(axis=0)
-    rows = rows[:, complete]
-    rows[0] = clock.steady(table, rows[0], complete)
-    return rows
+    columns = [data["time"], data["u"], data["Q"], *([] if measured is None else [measured])]
+    complete = np.logical_and.reduce([np.isfinite(column) for column in columns])
+    rows = np.empty((len(columns), np.count_nonzero(complete)))
+    for row, samples in zip(rows, columns, strict=True):
+        row[:] = samples[complete]
+    rows[0] = never_back(table, rows[0], complete)
+    return _Recording(
+        rows=rows,
+        clock=found["time"],
+        simulated=_is_marked(table.comments),
+        may_count_ms=not is_clock and may_count_ms(rows[0], longest_step=np.inf),
+        no_values=describe_placeholders(placeholders),
+    )
 
 
 def _refuse_two_pressures(table: Table, found: Mapping[str, Column], dp: float | None) -> None:
@@ -220,23 +201,15 @@ def _refuse_unequal_lengths(table: Table, found: Mapping[str, Column]) -> None:
             )
 
 
-def _si_numbers(
-    table: Table, quantity: str, column: Column, clock: Clock, no_values: NoValues, u_max: float
-) -> np.ndarray:
+def _in_SI(table: Table, quantity: str, column: Column, numbers: np.ndarray, u_max: float) -> np.ndarray:
     """Return one column in SI, NaN where a sample is missing; refuse what no valve gives."""
-    if quantity == "time":
-        seconds = clock.stamps(table, column)
-        if seconds is not None:
-            return seconds
-    numbers = no_values.without(table.numbers(column.label), column.label, rises=quantity == "time")
-    if quantity == "time" and not column.unit and clock.may_be_ms(numbers):
-        return numbers  # until the whole of it tells
     scaling = scaling_of(table.path, quantity, column, u_max)
     with np.errstate(over="ignore", invalid="ignore"):  # an infinity is refused below
-        numbers = numbers * scaling.gain + scaling.offset
-    far = np.flatnonzero(np.abs(numbers) > LARGEST[QUANTITY_OF_COLUMN[quantity]])
-    if far.size:
-        row = int(far[0])
+        numbers = numbers * scaling.gain
+        numbers += scaling.offset
+    largest = LARGEST[QUANTITY_OF_COLUMN[quantity]]
+    if np.fmax.reduce(numbers, initial=0.0) > largest or np.fmin.reduce(numbers, initial=0.0) < -largest:
+        row = int(np.flatnonzero(np.abs(numbers) > largest)[0])
         raise InputError(
             f"'{table.path}' {table.place(row)}, column '{column.label}': "
             f"'{table.cell(column.label, row)[:QUOTED_CHARACTERS]}' is no measurement of a valve in that unit; "

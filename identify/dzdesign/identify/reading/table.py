@@ -1,20 +1,16 @@
 """A table as recorded: labelled columns of numbers, from whatever file; what the readers give to `ramp_files`.
 
-A reader gives a file as several tables, one after the other: some hundred thousand rows each, with the same labels.
+What a file is read into, text or binary; columns that nobody asks for are never read as numbers.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, final
 
 import numpy as np
 
 from dzdesign.core.errors import InputError, nearest, one_line
-
-if TYPE_CHECKING:
-    from dzdesign.identify.reading.time_stamps import Stamps
 
 #: Characters of a cell, and columns of a file, that a message quotes.
 QUOTED_CHARACTERS, QUOTED_COLUMNS = 40, 12
@@ -29,7 +25,7 @@ def clean_label(label: str) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Table(ABC):
-    """Labelled columns: the next rows of a file.
+    """The labelled columns of a file.
 
     Attributes
     ----------
@@ -47,6 +43,10 @@ class Table(ABC):
     labels: tuple[str, ...]
     units: Mapping[str, str] = field(default_factory=dict)
     comments: str = ""
+
+    @abstractmethod
+    def load(self, labels: Collection[str]) -> None:
+        """Read columns at once, which takes less time than one after the other by `numbers`."""
 
     @abstractmethod
     def numbers(self, label: str) -> np.ndarray:
@@ -73,11 +73,11 @@ class Table(ABC):
         """Tell whether a column holds dates or times of day, which `numbers` can't give and `seconds` can."""
         return False
 
-    def seconds(self, label: str, stamps: "Stamps") -> np.ndarray:
+    def seconds(self, label: str) -> np.ndarray:
         """Return a column of dates or times of day, as `is_clock` tells, as seconds since the first row of the file."""
         raise TypeError(f"column '{label}' holds numbers")
 
-    def found(self) -> str:
+    def found_labels(self) -> str:
         """Return the labels for a message, the first `QUOTED_COLUMNS` of them."""
         labels = ", ".join(label[:QUOTED_CHARACTERS] for label in self.labels[:QUOTED_COLUMNS])
         return labels + (", ..." if len(self.labels) > QUOTED_COLUMNS else "")
@@ -85,63 +85,9 @@ class Table(ABC):
     def no_column(self, label: str, wanted_by: str) -> InputError:
         """Return the error for a label that is none of the table's, with the nearest one."""
         return InputError(
-            f"'{self.path}' has no column '{label}', which {wanted_by} (columns found: {self.found()})"
+            f"'{self.path}' has no column '{label}', which {wanted_by} (columns found: {self.found_labels()})"
             f"{nearest(label, self.labels)}; write the label as it stands in the file"
         )
-
-
-@final
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Samples:
-    """A column that is read where it is needed: its type, its length, and what gives the samples [start, stop)."""
-
-    dtype: np.dtype
-    size: int
-    read: Callable[[int, int], np.ndarray]
-
-
-@final
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ArrayTable(Table):
-    """A table whose columns are arrays: from TDMS, MAT, HDF5, Parquet, Feather.
-
-    Attributes
-    ----------
-    columns : mapping
-        Label -> samples of the whole file.
-    start, stop : int
-        Rows of the file that are in this table.
-    format : str
-        Of the file, for messages.
-    """
-
-    columns: Mapping[str, Samples]
-    start: int
-    stop: int
-    format: str
-
-    def length(self, label: str) -> int:
-        """Return how many samples a column has in the whole file."""
-        return self.columns[label].size
-
-    def numbers(self, label: str) -> np.ndarray:
-        """Return a column as float64."""
-        column = self.columns[label]
-        if column.dtype.kind not in "fiub":
-            first = np.asarray(self._read(label, 0, 1))
-            raise InputError(
-                f"'{self.path}' column '{label}' holds no numbers (first: '{str(first)[:QUOTED_CHARACTERS]}'); "
-                "give another column by --columns, or save it as numbers"
-            )
-        start, stop = (min(row, column.size) for row in (self.start, self.stop))
-        return np.asarray(self._read(label, start, stop)).astype(np.float64)
-
-    def place(self, row: int) -> str:
-        """Return ``sample 8``: such files have no rows that an editor would count."""
-        return f"sample {self.start + row + 1}"
-
-    def _read(self, label: str, start: int, stop: int) -> np.ndarray:
-        return self.columns[label].read(start, stop)
 
 
 def unreadable(path: Path, name: str, error: Exception) -> InputError:

@@ -7,8 +7,7 @@ part of a date is the day and which the month matters only where a recording goe
 
 import datetime
 import re
-from collections.abc import Callable
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -49,91 +48,81 @@ def is_unclear(cell: str) -> bool:
     return len(cell) <= LONGEST_STAMP and UNCLEAR.fullmatch(cell) is not None
 
 
-@final
-class Stamps:
-    """The clock of one file, from block to block: what its stamps count from."""
+def seconds_of_stamps(cells: "pl.Series", where: str) -> np.ndarray:
+    """Return stamps as seconds since the first of a file, NaN where a cell is blank.
 
-    def __init__(self) -> None:
-        self._first: float | None = None
-        self._latest = 0.0  # with the days that were added
-        self._days = 0.0
-        self._dates: dict[str, float] = {}
+    Parameters
+    ----------
+    cells : polars.Series
+        Strings without blanks around them.
+    where : str
+        File and column, for messages.
 
-    def seconds(self, cells: "pl.Series", where: str) -> np.ndarray:
-        """Return stamps as seconds since the first of the file, NaN where a cell is blank.
+    Raises
+    ------
+    InputError
+        If a date can't be told.
+    """
+    import polars as pl
 
-        Parameters
-        ----------
-        cells : polars.Series
-            Strings without blanks around them, of the next rows.
-        where : str
-            File and column, for messages.
+    parts = cells.str.extract_groups(STAMP).struct.unnest()
+    date, hour, minute, second, half, zone = (parts.to_series(index) for index in range(6))
+    number = pl.Float64
+    hours = hour.cast(number, strict=False)
+    if half.null_count() < half.len():  # 12 AM is midnight, 12 PM noon
+        afternoon = half.str.to_lowercase() == "p"
+        hours = (hours % 12) + 12.0 * afternoon.cast(number).fill_null(0.0)
+    point = second.str.replace(r"[,:]", ".").cast(number, strict=False)
+    of_day = 3600.0 * hours + 60.0 * minute.cast(number, strict=False) + point
+    seconds: np.ndarray = of_day.fill_null(np.nan).to_numpy()
+    if zone.null_count() < zone.len():
+        seconds = seconds - _replaced(zone, {text: _zone(text) for text in _different(zone)})
+    if date.null_count() < date.len():
+        seconds = seconds + _replaced(date, _days_since_the_first(_different(date), where))
+    else:
+        seconds = _over_midnight(seconds)
+    known = seconds[np.isfinite(seconds)]
+    return seconds - known[0] if known.size else seconds
 
-        Raises
-        ------
-        InputError
-            If a date can't be told.
-        """
-        import polars as pl
 
-        parts = cells.str.extract_groups(STAMP).struct.unnest()
-        date, hour, minute, second, half, zone = (parts.to_series(index) for index in range(6))
-        number = pl.Float64
-        hours = hour.cast(number, strict=False)
-        if half.null_count() < half.len():  # 12 AM is midnight, 12 PM noon
-            afternoon = half.str.to_lowercase() == "p"
-            hours = (hours % 12) + 12.0 * afternoon.cast(number).fill_null(0.0)
-        point = second.str.replace(r"[,:]", ".").cast(number, strict=False)
-        seconds = (3600.0 * hours + 60.0 * minute.cast(number, strict=False) + point).fill_null(np.nan).to_numpy()
-        if zone.null_count() < zone.len():
-            seconds = seconds - self._replaced(zone, _zone)
-        if date.null_count() < date.len():
-            seconds = seconds + self._replaced(date, lambda text: self._day(text, where))
-        else:
-            seconds = self._over_midnight(seconds)
-        told = seconds[np.isfinite(seconds)]
-        if self._first is None and told.size:
-            self._first = float(told[0])
-        return seconds - (self._first or 0.0)
+def _different(texts: "pl.Series") -> list[str]:
+    """Return the different texts, the first of the file first; there are few."""
+    return list(texts.unique(maintain_order=True).drop_nulls())
 
-    def _replaced(self, texts: "pl.Series", convert: Callable[[str], float]) -> np.ndarray:
-        """Return the number that each text means; there are few different ones."""
-        import polars as pl
 
-        known = {text: convert(text) for text in texts.unique(maintain_order=True).drop_nulls().to_list()}
-        return texts.replace_strict(known, default=0.0, return_dtype=pl.Float64).fill_null(0.0).to_numpy()
+def _replaced(texts: "pl.Series", numbers: dict[str, float]) -> np.ndarray:
+    """Return the number that each text means, 0 where there is none."""
+    import polars as pl
 
-    def _over_midnight(self, seconds: np.ndarray) -> np.ndarray:
-        """Return times of day that go on where they go back by more than half a day."""
-        told = np.flatnonzero(np.isfinite(seconds))
-        steps = np.diff(seconds[told], prepend=self._latest if self._first is not None else seconds[told[:1]])
-        days = self._days + DAY * np.cumsum(steps < -MIDNIGHT)
-        seconds = seconds.copy()
-        if told.size:
-            self._latest, self._days = float(seconds[told[-1]]), float(days[-1])
-            seconds[told] += days
-        return seconds
+    return np.asarray(texts.replace_strict(numbers, default=0.0, return_dtype=pl.Float64).fill_null(0.0).to_numpy())
 
-    def _day(self, text: str, where: str) -> float:
-        """Return the seconds from the first date of the file to the midnight of another."""
-        if text not in self._dates:
-            readings = _days(text)
-            if self._dates:
-                first = next(iter(self._dates))
-                both = sorted({other - one for one, other in _alike(first, text)})
-                both = [days for days in both if abs(days) <= LONGEST_RECORDING] or both
-                if len(both) != 1:
-                    count = " or ".join(map(str, both)) or "an unknown number of"
-                    raise InputError(
-                        f"{where}: from '{first}' to '{text}' it is {count} days, as it can't be told which number is "
-                        "the month; write dates as 2026-11-22, or the time in seconds"
-                    )
-                self._dates[text] = DAY * both[0]
-            elif readings:
-                self._dates[text] = 0.0
-            else:
-                raise InputError(f"{where}: '{text}' is no date; write dates as 2026-11-22, or the time in seconds")
-        return self._dates[text]
+
+def _over_midnight(seconds: np.ndarray) -> np.ndarray:
+    """Return times of day that go on where they go back by more than half a day."""
+    known = np.flatnonzero(np.isfinite(seconds))
+    steps = np.diff(seconds[known], prepend=seconds[known[:1]])
+    seconds = seconds.copy()
+    seconds[known] += DAY * np.cumsum(steps < -MIDNIGHT)
+    return seconds
+
+
+def _days_since_the_first(dates: list[str], where: str) -> dict[str, float]:
+    """Return the seconds from the first date of the file to the midnight of each."""
+    first = dates[0]
+    if not _days(first):
+        raise InputError(f"{where}: '{first}' is no date; write dates as 2026-11-22, or the time in seconds")
+    seconds = {first: 0.0}
+    for text in dates[1:]:
+        both = sorted({other - one for one, other in _alike(first, text)})
+        both = [days for days in both if abs(days) <= LONGEST_RECORDING] or both
+        if len(both) != 1:
+            count = " or ".join(map(str, both)) or "an unknown number of"
+            raise InputError(
+                f"{where}: from '{first}' to '{text}' it is {count} days, as it can't be told which number is "
+                "the month; write dates as 2026-11-22, or the time in seconds"
+            )
+        seconds[text] = DAY * both[0]
+    return seconds
 
 
 def _alike(one: str, other: str) -> list[tuple[int, int]]:
@@ -146,7 +135,7 @@ def _days(date: str) -> dict[str, int]:
     """Return order of day, month and year -> days, for each order that a date can be read in."""
     numbers = [int(part) for part in re.split(r"[-./]", date)]
     if len(date.split(".")) == 3 and numbers[0] <= 31:
-        orders = ("dmy",) if numbers[2] > 31 else ("dmy", "ymd")
+        orders: tuple[str, ...] = ("dmy",) if numbers[2] > 31 else ("dmy", "ymd")
     elif numbers[0] > 31:
         orders = ("ymd",)
     elif numbers[2] > 31:

@@ -47,7 +47,7 @@ class LawAccount:
     @property
     def holds(self) -> bool:
         """Whether every statement has the verdict that the account expects."""
-        return all(entry.verdict.as_expected for entry in (*self.main, *self.rest))
+        return all(entry.as_expected for entry in (*self.main, *self.rest))
 
     def outcome(self, entry: Entry) -> str:
         """Return the kind of a verdict's cell.
@@ -56,9 +56,9 @@ class LawAccount:
         ----------
         entry : Entry
         """
-        if not entry.verdict.as_expected or entry.verdict.outcome is Outcome.DOES_NOT_FOLLOW:
+        if not entry.as_expected or entry.outcome is Outcome.DOES_NOT_FOLLOW:
             return "bad"
-        return {Outcome.FOLLOWS: "good", Outcome.FOLLOWS_IF: "open"}.get(entry.verdict.outcome, "text")
+        return {Outcome.FOLLOWS: "good", Outcome.FOLLOWS_IF: "open"}.get(entry.outcome, "text")
 
 
 @cache
@@ -77,9 +77,9 @@ def account_of(law_name: str) -> LawAccount:
     direct = {ground.number for ground in statements[-1].grounds} | {number}
     return LawAccount(
         note=parse_prose(law(law_name).note),
-        main=_in(content.entries, direct),
-        rest=_in(content.entries, set(numbers) - direct),
-        glossary=content.glossary,
+        main=_in(content.statements, direct),
+        rest=_in(content.statements, set(numbers) - direct),
+        glossary=content.symbols,
         page=HtmlWriter(numbers),
     )
 

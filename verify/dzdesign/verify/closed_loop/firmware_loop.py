@@ -18,6 +18,7 @@ from dzdesign.verify.closed_loop.plant import Plant, plants_from_tests
 from dzdesign.verify.closed_loop.scenarios import Scene, run_scenarios
 from dzdesign.verify.closed_loop.tolerances import Tolerances, monte_carlo, scatter
 from dzdesign.verify.evidence import Check, IdentifiedPlant, MonteCarlo, PressureResult, ScenarioResult, Side
+from dzdesign.verify.firmware.folder import valve_of
 
 #: Shows how far a stage is: pieces and their number in, the pieces out.
 Watch = Callable[[Iterable[Any], int], Iterable[Any]]
@@ -54,9 +55,7 @@ class FirmwareLoop:
         return tuple(loop.result for loop in self.loops)
 
 
-def scenes_of(
-    folder: Path, compensator: Compensator, plant: Plant | None
-) -> tuple[Scene, ...]:
+def scenes_of(folder: Path, compensator: Compensator, plant: Plant | None) -> tuple[Scene, ...]:
     """Return the compensated loop of each side at every tested pressure drop.
 
     Parameters
@@ -68,22 +67,22 @@ def scenes_of(
     plant : Plant or None
         None: plants are made from the identified thresholds.
     """
+    valve = valve_of(compensator)
     scenes: list[Scene] = []
     for name, sign in SIGNS.items():
         if sign not in compensator.signals.signs:
             continue
-        side = compensator.valve.sides[name]
+        side = valve.sides[name]
         # One that stands in for the valve at one pressure drop says nothing of another.
-        plants = dict.fromkeys(side.beta.dp_MPa, plant) if plant else plants_from_tests(side, compensator.valve.u_max_V)
+        plants = dict.fromkeys(side.beta.dp_MPa, plant) if plant else plants_from_tests(side, valve.u_max_V)
         tested = (min(plants), max(plants)) if plant else None
         first = ClosedLoop(next(iter(plants.values())), folder, compensator, sign)
-        scenes += [
-            Scene(
-                loop=first.with_plant(one), plant=one, side=name, dp_MPa=dp_MPa,
-                reference_MPa=side.reference.dp_MPa or 0.0, tested_MPa=tested,
+        for dp_MPa, one in plants.items():
+            reference = dp_MPa if side.reference.dp_MPa is None else side.reference.dp_MPa
+            loop = first.with_plant(one)
+            scenes.append(
+                Scene(loop=loop, plant=one, side=name, dp_MPa=dp_MPa, reference_MPa=reference, tested_MPa=tested)
             )
-            for dp_MPa, one in plants.items()
-        ]  # fmt: skip
     return tuple(scenes)
 
 
@@ -135,7 +134,7 @@ def close_the_loop(
     return FirmwareLoop(
         checks=(
             plant_opens(results),
-            plant_is_the_valve(results, compensator.valve),
+            plant_is_the_valve(results, valve_of(compensator)),
             zero_flow,
             shut_after_scenarios(scenarios, zero_flow, plant_given=given),
         ),

@@ -7,14 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from dzdesign.core.artefact_files import TOOL, read_bytes, sha256_of
-from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.artefact_files import TOOL, sha256_of
 from dzdesign.core.errors import InputError
-from dzdesign.design.compensator import Compensator
 from dzdesign.identify.reading.ramp_files import SIMULATED_MARK, ramp_file_bytes
 from dzdesign.verify.closed_loop.loop import RECORD_S, ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.plant import Plant
-from dzdesign.verify.firmware.folder import check_firmware_inside
+from dzdesign.verify.firmware.folder import check_firmware_inside, read_compensator
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -124,7 +122,6 @@ def simulated_files(
 def _loop_of(plant: Plant, firmware: Path) -> tuple[ClosedLoop, dict[str, Any]]:
     """Return the loop of a plant with a firmware's core, and what the manifest says of it."""
     check_firmware_inside(firmware)
-    path = firmware / Compensator.FILE_NAME
-    content = read_bytes(path, "compensator of the firmware")
-    origin = {"compensator": {"source": path.name, "sha256": sha256_of(content)}}
-    return ClosedLoop(plant, firmware, read_artefact(content, Compensator, str(path))), origin
+    compensator = read_compensator(firmware)
+    digest = sha256_of((firmware / "compensator.json").read_bytes())
+    return ClosedLoop(plant, firmware, compensator), {"compensator": {"source": "compensator.json", "sha256": digest}}

@@ -109,11 +109,10 @@ class PreparedInputs:
         self._shown_betas = both[0] * SHOWN_BETA // self._unit
         self._law_of = law_of
         self._corners = self._corner_numerators(both)
-        self._along = 1 if exact.full > exact.zero else -1
         self._codes = exact.code_max + 1
-        self._zero_place = exact.zero if self._along > 0 else exact.code_max - exact.zero
+        self._zero_place = exact.zero if self.exact.along > 0 else exact.code_max - exact.zero
         ends = (exact.sound_commands[0], exact.sound_commands[-1])
-        self._sound = ends if self._along > 0 else tuple(exact.code_max - code for code in ends[::-1])
+        self._sound = ends if self.exact.along > 0 else tuple(exact.code_max - code for code in ends[::-1])
         self._parts = self._straight_parts()
 
     def everything(self, *, cube: bool = True, impatient: bool = False) -> bytes:
@@ -130,7 +129,7 @@ class PreparedInputs:
 
     def code_at(self, place: int) -> int:
         """Return the command's code at a place."""
-        return place if self._along > 0 else self.exact.code_max - place
+        return place if self.exact.along > 0 else self.exact.code_max - place
 
     def sampled_rows(self) -> np.ndarray:
         """Return rows at and beside the ends, no pressure drop, the failed-sensor limit, and some in between."""
@@ -252,7 +251,7 @@ class PreparedInputs:
             "parts": count,
             "codes": self._codes,
             "first_code": self.code_at(0),
-            "code_step": self._along,
+            "code_step": self.exact.along,
             "sound_from": self._sound[0],
             "sound_to": self._sound[1] + 1,
             "zero_place": self._zero_place,

@@ -1,12 +1,15 @@
 """A firmware folder as it is given: its manifest, and that nothing in it leads elsewhere."""
 
+from functools import cache
 from pathlib import Path
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, check_inside, read_bytes
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.design.firmware_manifest import FirmwareManifest
+from dzdesign.identify.valve.model import ValveModel
 
 
 def read_firmware_manifest(folder: Path) -> FirmwareManifest:
@@ -31,15 +34,25 @@ def read_firmware_manifest(folder: Path) -> FirmwareManifest:
 
 
 def read_compensator(folder: Path) -> Compensator:
-    """Return the compensator that a firmware was made from.
+    """Return the compensator of a firmware folder.
 
     Raises
     ------
     InputError
-        If compensator.json can't be read.
+        If it is missing or none.
     """
-    path = folder / Compensator.FILE_NAME
-    return read_artefact(read_bytes(path, "compensator of the firmware"), Compensator, str(path))
+    path = folder / "compensator.json"
+    return compensator_from_document(read_bytes(path, "compensator of the firmware"), str(path))
+
+
+@cache
+def _valve(content: str) -> ValveModel:
+    return read_artefact(content.encode(), ValveModel, "compensator.json: valve")
+
+
+def valve_of(compensator: Compensator) -> ValveModel:
+    """Return the valve that a compensator was made from."""
+    return _valve(compensator.valve_document)
 
 
 def check_firmware_inside(folder: Path) -> None:

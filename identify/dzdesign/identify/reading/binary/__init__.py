@@ -1,1 +1,1 @@
-"""Binary tables: TDMS, MAT, HDF5, Parquet and Feather files enter, their columns leave."""
+"""Binary tables: files of programs enter, their columns leave; one module of `formats` a format, read by a process."""

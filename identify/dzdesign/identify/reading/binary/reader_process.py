@@ -1,33 +1,33 @@
-"""Columns of a program's file, found and read by a process of their own.
+"""Columns of a binary file, found and read by a process of their own.
 
 What reads TDMS, MAT, HDF5, Parquet and Feather is C, C++ and Rust. A damaged file makes it crash, ask for all memory or
 write to the terminal, and no `except` catches that. So it works in another process, with memory of its own that has a
 bound; when that ends, this one says so in a sentence. One such process serves all files, until one of them ends it.
-Rejected: to check each format before its library reads it, which is to write five readers more.
+Rejected: to check each format before its library reads it, which is to write five readers more; and the pools of
+`concurrent.futures` and loky, whose processes import from the working folder while they start.
 
-Requests are lines of JSON; an answer is a kind, a length, and as many bytes.
+A request is a line of JSON, and so is its answer, which samples as float64 may follow.
 """
 
 import atexit
 import contextlib
 import io
-import json
 import os
 import signal
-import struct
 import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any, BinaryIO, final
+from typing import IO, BinaryIO, final
 
+import msgspec
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.reading.table import QUOTED_CHARACTERS, Samples, unreadable
+from dzdesign.identify.reading.table import QUOTED_CHARACTERS, unreadable
 
 #: Memory that reading may take beyond what the libraries themselves need: this, and so many times the file's size.
 SPARE_BYTES, MOST_TIMES = 1 << 30, 64
@@ -36,8 +36,6 @@ SPARE_BYTES, MOST_TIMES = 1 << 30, 64
 MOST_FOUND, SPARE_ROWS, ROWS_PER_BYTE = 4096, 1_000_000, 32
 #: One answer takes no longer than this, s, and what the file's size at so many bytes a second adds.
 PATIENCE_S, SLOWEST_BYTES_S = 60.0, 2e6
-HEAD = struct.Struct("<cQ")
-FOUND, NUMBERS, TEXT, REFUSED, FAILED, CLOSED, SPENT = b"C", b"N", b"T", b"R", b"F", b"0", b"1"
 #: The other process imports from where this one does, but never from the working folder.
 START = (
     "import sys; sys.path[:] = sys.argv[1:]; "
@@ -45,99 +43,35 @@ START = (
 )
 
 
-@final
-class _Reader:
-    """The other process, as this one sees it."""
+class Request(msgspec.Struct, frozen=True, kw_only=True):
+    """What the other process is asked: the columns of a file, or the samples of those with some numbers."""
 
-    def __init__(self) -> None:
-        # Few threads, few arenas: what each of them reserves counts as memory.
-        few = {"POLARS_MAX_THREADS": "2", "OPENBLAS_NUM_THREADS": "1", "MALLOC_ARENA_MAX": "2"}
-        self.owner, self.patience, self.in_step = os.getpid(), PATIENCE_S, True
-        self.process = subprocess.Popen(
-            [sys.executable, "-P", "-c", START, *(entry for entry in sys.path if entry)],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env={**os.environ, **few},
-        )  # fmt: skip
-
-    def ask(self, request: dict[str, Any]) -> tuple[bytes, bytes]:
-        """Return kind and content of the answer.
-
-        Raises
-        ------
-        EOFError
-            If the process ended instead; how, in words.
-        """
-        self.in_step = False
-        watch = threading.Timer(self.patience, self.process.kill)
-        watch.daemon = True
-        watch.start()
-        try:
-            with contextlib.suppress(BrokenPipeError):
-                self.process.stdin.write(json.dumps(request).encode() + b"\n")
-                self.process.stdin.flush()
-            head = self.process.stdout.read(HEAD.size)
-            kind, size = HEAD.unpack(head) if len(head) == HEAD.size else (b"", 0)
-            content = self.process.stdout.read(size)
-        finally:
-            late = not watch.is_alive()
-            watch.cancel()
-        if not kind or len(content) < size:
-            raise EOFError(f"reading takes more than {self.patience:.0f} s" if late else self._end())
-        self.in_step = True
-        return kind, content
-
-    def leave(self) -> bool:
-        """Close the file; return whether the process can serve another."""
-        try:
-            return self.ask({"close": True})[0] == CLOSED
-        except EOFError:
-            return False
-
-    def _end(self) -> str:
-        status = self.process.wait()
-        if status >= 0:
-            return "its reader failed"
-        return f"its reader crashed, {signal.Signals(-status).name}"
-
-    def close(self) -> None:
-        """End the process."""
-        self.process.kill()
-        self.process.stdin.close()
-        self.process.stdout.close()
-        self.process.wait()
+    place: str
+    path: str
+    format_name: str
+    numbers: tuple[int, ...] = ()
 
 
-_idle: list[_Reader] = []
+class ListedColumn(msgspec.Struct, frozen=True, kw_only=True):
+    """A column as its file lists it: see `FileColumn`."""
+
+    group: str
+    name: str
+    unit: str
+    size: int
 
 
-@contextlib.contextmanager
-def _reader() -> Iterator[_Reader]:
-    """Return a process that is used by nobody else; it is used again unless something went wrong."""
-    try:
-        reader = _idle.pop()
-    except IndexError:
-        reader = None
-    if reader is None or reader.owner != os.getpid():  # this process may be a copy of the one that it serves
-        reader = _Reader()
-    try:
-        yield reader
-    finally:
-        if reader.in_step and reader.leave():
-            _idle.append(reader)
-        else:
-            reader.close()
+class Answer(msgspec.Struct, frozen=True, kw_only=True):
+    """What the other process answers: columns, the sizes of those that follow, or why the file can't be read."""
+
+    columns: tuple[ListedColumn, ...] = ()
+    sizes: tuple[int, ...] = ()
+    refused: str = ""
+    failed: str = ""
 
 
-@atexit.register
-def _close_idle() -> None:
-    while _idle:
-        reader = _idle.pop()
-        if reader.owner == os.getpid():
-            reader.close()
-
-
-@contextlib.contextmanager
-def separate_columns(file: BinaryIO, path: Path, name: str) -> Iterator[list[tuple[str, str, str, Samples]]]:
-    """Find the columns of a file, in another process; they can be read until the context is left.
+def list_columns(file: BinaryIO, path: Path, format_name: str) -> tuple[ListedColumn, ...]:
+    """Return the columns of a file.
 
     Parameters
     ----------
@@ -145,7 +79,7 @@ def separate_columns(file: BinaryIO, path: Path, name: str) -> Iterator[list[tup
         Opened.
     path : Path
         Its name.
-    name : str
+    format_name : str
         Of its format.
 
     Raises
@@ -153,44 +87,50 @@ def separate_columns(file: BinaryIO, path: Path, name: str) -> Iterator[list[tup
     InputError
         If the file can't be read, or takes more than its share of memory or time.
     """
-    with _on_disk(file, path) as place, _reader() as reader:
+    with _on_disk(file, path) as place:
+        columns = _answer(Request(place=place, path=str(path), format_name=format_name))[0].columns
         size = os.path.getsize(place)
-        reader.patience = PATIENCE_S + size / SLOWEST_BYTES_S
-        _, content = _asked(reader, {"place": place, "path": str(path), "name": name}, path, name)
-        columns = json.loads(content)
-        most = SPARE_ROWS + ROWS_PER_BYTE * size
-        if len(columns) > MOST_FOUND:
-            raise InputError(f"'{path}' has more than {MOST_FOUND} columns; export only those of the ramp test")
-        for _, label, _, _, rows in columns:
-            if rows > most:
-                raise InputError(
-                    f"'{path}' ({name}) says that '{label[:QUOTED_CHARACTERS]}' has {rows} samples, which its {size} "
-                    "bytes can't hold; save it again, or export it as CSV"
-                )
-        yield [
-            (group, label, unit, _samples(reader, index, dtype, rows, path, name))
-            for index, (group, label, unit, dtype, rows) in enumerate(columns)
-        ]
+    if len(columns) > MOST_FOUND:
+        raise InputError(f"'{path}' has more than {MOST_FOUND} columns; export only those of the ramp test")
+    for column in columns:
+        if column.size > SPARE_ROWS + ROWS_PER_BYTE * size:
+            raise InputError(
+                f"'{path}' ({format_name}) says that '{column.name[:QUOTED_CHARACTERS]}' has {column.size} samples, "
+                f"which its {size} bytes can't hold; save it again, or export it as CSV"
+            )
+    return columns
 
 
-def _samples(reader: _Reader, index: int, dtype: str, rows: int, path: Path, name: str) -> Samples:
-    def read(start: int, stop: int) -> np.ndarray:
-        kind, content = _asked(reader, {"column": index, "start": start, "stop": stop}, path, name)
-        return np.frombuffer(content) if kind == NUMBERS else np.array(json.loads(content))
+def read_columns(file: BinaryIO, path: Path, format_name: str, numbers: Sequence[int]) -> list[np.ndarray]:
+    """Return the samples of columns as float64, NaN where one is missing.
 
-    return Samples(dtype=np.dtype(dtype), size=rows, read=read)
+    Parameters
+    ----------
+    file, path, format_name
+        As for `list_columns`.
+    numbers : sequence of int
+        Places of the columns in what `list_columns` returns.
+
+    Raises
+    ------
+    InputError
+        As `list_columns` does; and if a column holds no numbers.
+    """
+    with _on_disk(file, path) as place:
+        return _answer(Request(place=place, path=str(path), format_name=format_name, numbers=tuple(numbers)))[1]
 
 
-def _asked(reader: _Reader, request: dict[str, Any], path: Path, name: str) -> tuple[bytes, bytes]:
+def _answer(request: Request) -> tuple[Answer, list[np.ndarray]]:
+    patience = PATIENCE_S + os.path.getsize(request.place) / SLOWEST_BYTES_S
     try:
-        kind, content = reader.ask(request)
+        answer, arrays = _ask_a_process(request, patience)
     except EOFError as error:
-        raise unreadable(path, name, error) from error
-    if kind == REFUSED:
-        raise InputError(json.loads(content))
-    if kind == FAILED:
-        raise unreadable(path, name, ValueError(json.loads(content)))
-    return kind, content
+        raise unreadable(Path(request.path), request.format_name, error) from error
+    if answer.refused:
+        raise InputError(answer.refused)
+    if answer.failed:
+        raise unreadable(Path(request.path), request.format_name, ValueError(answer.failed))
+    return answer, arrays
 
 
 @contextlib.contextmanager
@@ -205,6 +145,92 @@ def _on_disk(file: BinaryIO, path: Path) -> Iterator[str]:
         yield str(place)
 
 
+@final
+class ReaderProcess:
+    """The other process, as this one sees it."""
+
+    def __init__(self) -> None:
+        # Few threads, few arenas: what each of them reserves counts as memory.
+        few = {"POLARS_MAX_THREADS": "2", "OPENBLAS_NUM_THREADS": "1", "MALLOC_ARENA_MAX": "2"}
+        self.owner = os.getpid()
+        self.process = subprocess.Popen(
+            [sys.executable, "-P", "-c", START, *(entry for entry in sys.path if entry)],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env={**os.environ, **few},
+        )  # fmt: skip
+
+    def ask(self, request: Request, patience: float) -> tuple[Answer, list[np.ndarray]]:
+        """Return the answer, and the arrays that belong to it.
+
+        Raises
+        ------
+        EOFError
+            If the process ended instead; how, in words.
+        """
+        questions, answers = self._pipes()
+        watch = threading.Timer(patience, self.process.kill)
+        watch.daemon = True
+        watch.start()
+        try:
+            with contextlib.suppress(BrokenPipeError):
+                questions.write(msgspec.json.encode(request) + b"\n")
+                questions.flush()
+            answer = msgspec.json.decode(answers.readline(), type=Answer)
+            arrays = [np.frombuffer(answers.read(8 * size)) for size in answer.sizes]
+            if tuple(array.size for array in arrays) != answer.sizes:
+                raise ValueError("half of an answer")
+            return answer, arrays
+        except (msgspec.DecodeError, ValueError) as error:  # or none
+            late = not watch.is_alive()
+            raise EOFError(f"reading takes more than {patience:.0f} s" if late else self._end()) from error
+        finally:
+            watch.cancel()
+
+    def _pipes(self) -> tuple[IO[bytes], IO[bytes]]:
+        if self.process.stdin is None or self.process.stdout is None:
+            raise TypeError("the process has no pipes")
+        return self.process.stdin, self.process.stdout
+
+    def _end(self) -> str:
+        status = self.process.wait()
+        return "its reader failed" if status >= 0 else f"its reader crashed, {signal.Signals(-status).name}"
+
+    def close(self) -> None:
+        """End the process."""
+        self.process.kill()
+        for pipe in self._pipes():
+            with contextlib.suppress(BrokenPipeError):
+                pipe.close()
+        self.process.wait()
+
+
+_idle: list[ReaderProcess] = []
+
+
+def _ask_a_process(request: Request, patience: float) -> tuple[Answer, list[np.ndarray]]:
+    """Ask a process that serves nobody else; it is used again unless something went wrong."""
+    try:
+        reader = _idle.pop()
+    except IndexError:
+        reader = ReaderProcess()
+    if reader.owner != os.getpid():  # this process is a copy of the one that it serves
+        reader = ReaderProcess()
+    try:
+        answer = reader.ask(request, patience)
+    except BaseException:
+        reader.close()
+        raise
+    _idle.append(reader)
+    return answer
+
+
+@atexit.register
+def _close_idle() -> None:
+    while _idle:
+        reader = _idle.pop()
+        if reader.owner == os.getpid():
+            reader.close()
+
+
 # what follows runs in the other process
 
 
@@ -216,49 +242,48 @@ def serve() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that asks
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # a library that prints does not answer
-    columns: list[Samples] = []
-    usual = 0  # memory of the libraries
-    with ExitStack() as stack:
-        for line in sys.stdin.buffer:
-            request = json.loads(line)
-            try:
-                if "close" in request:
-                    columns.clear()
-                    stack.close()
-                    kind, content = SPENT if _memory() > usual + SPARE_BYTES // 4 else CLOSED, b""
-                elif "place" in request:
-                    found = _found(request, stack)
-                    usual = usual or _memory()
-                    columns += [samples for *_, samples in found]
-                    listing = [(*words, samples.dtype.str, samples.size) for *words, samples in found]
-                    kind, content = FOUND, json.dumps(listing, default=int).encode()
-                else:
-                    kind, content = _read(columns[request["column"]], request["start"], request["stop"])
-            except InputError as error:
-                kind, content = REFUSED, json.dumps(str(error)).encode()
-            except Exception as error:  # each library raises kinds of its own; all mean "no whole file of this format"
-                kind, content = FAILED, json.dumps(str(error) or type(error).__name__).encode()
-            answers.write(HEAD.pack(kind, len(content)) + content)
-            answers.flush()
+    for line in sys.stdin.buffer:
+        arrays: list[np.ndarray] = []
+        try:
+            answer, arrays = _read(msgspec.json.decode(line, type=Request))
+        except InputError as error:
+            answer = Answer(refused=str(error))
+        except Exception as error:  # each library raises kinds of its own; all mean "no whole file of this format"
+            answer = Answer(failed=str(error) or type(error).__name__)
+        answers.write(msgspec.json.encode(answer) + b"\n")
+        for array in arrays:
+            answers.write(array.data)
+        answers.flush()
 
 
-def _found(request: dict[str, str], stack: ExitStack) -> list[tuple[str, str, str, Samples]]:
+def _read(request: Request) -> tuple[Answer, list[np.ndarray]]:
     from itertools import islice
 
-    from dzdesign.identify.reading.binary.tables import FINDERS
+    from dzdesign.identify.reading.binary.file_format import NUMBER_KINDS
+    from dzdesign.identify.reading.binary.registry import file_formats
 
-    place = request["place"]
-    finder = FINDERS[request["name"]]
-    _bound_memory(SPARE_BYTES + MOST_TIMES * os.path.getsize(place))
-    file = stack.enter_context(open(place, "rb"))  # noqa: SIM115
-    return list(islice(finder(file, Path(request["path"]), stack), MOST_FOUND + 1))
-
-
-def _read(samples: Samples, start: int, stop: int) -> tuple[bytes, bytes]:
-    if samples.dtype.kind in "fiub":
-        return NUMBERS, np.asarray(samples.read(start, stop)).astype(np.float64).tobytes()
-    first = samples.read(start, min(stop, start + 1))
-    return TEXT, json.dumps([str(value)[:QUOTED_CHARACTERS] for value in first]).encode()
+    path = Path(request.path)
+    find = next(item.columns for item in file_formats() if item.name == request.format_name)
+    _bound_memory(SPARE_BYTES + MOST_TIMES * os.path.getsize(request.place))
+    with open(request.place, "rb") as file, ExitStack() as stack:
+        found = list(islice(find(file, path, stack), MOST_FOUND + 1))
+        if not request.numbers:
+            listed = (
+                ListedColumn(group=column.group, name=column.name, unit=column.unit, size=int(column.size))
+                for column in found
+            )
+            return Answer(columns=tuple(listed)), []
+        arrays = []
+        for column in (found[number] for number in request.numbers):
+            samples = column.read()
+            if column.kind not in NUMBER_KINDS:
+                first = str(samples[:1])[:QUOTED_CHARACTERS]
+                raise InputError(
+                    f"'{path}' column '{column.name}' holds no numbers (first: '{first}'); give another column by "
+                    "--columns, or save it as numbers"
+                )
+            arrays.append(np.ascontiguousarray(samples, dtype=np.float64))
+        return Answer(sizes=tuple(array.size for array in arrays)), arrays
 
 
 def _bound_memory(spare: int) -> None:

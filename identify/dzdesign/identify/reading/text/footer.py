@@ -42,7 +42,7 @@ def _is_statistic(cell: str) -> bool:
 
 
 @final
-class Foot:
+class Footer:
     """The lines below the samples of one file.
 
     Parameters
@@ -68,7 +68,7 @@ class Foot:
         if self._count > MOST_LINES:
             raise self._error
 
-    def refuse_what_follows(self) -> None:
+    def refuse_samples_below(self) -> None:
         """Refuse samples below such lines, unless they are the first: between header and samples some stand as well."""
         if not self._begun:
             self._begun, self._error, self._count = True, None, 0

@@ -75,25 +75,25 @@ class Header:
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Line:
-    """A line that may belong to the table: its number in the file, its text, and where it ends in its block."""
+    """A line that may belong to the table: its number in the file, its text, and where it ends in it all."""
 
     number: int
     text: str
     end: int
 
 
-def find_header(block: bytes, number: int, path: Path, *, told: bool) -> tuple[Header | None, bytes]:
-    """Return the header and what follows it in the first block of a file; None if all is comments and blank lines.
+def find_header(text: bytes, number: int, path: Path, *, at_first_line: bool) -> tuple[Header, int] | None:
+    """Return the header and where in a text its rows begin; None if all is comments and blank lines.
 
     Parameters
     ----------
-    block : bytes
-        Whole lines, UTF-8.
+    text : bytes
+        UTF-8.
     number : int
-        Of the first of them in the file.
+        Of its first line in the file.
     path : Path
         For messages.
-    told : bool
+    at_first_line : bool
         True if the first line is the header by the engineer's word, comments and blank lines aside.
 
     Raises
@@ -101,19 +101,19 @@ def find_header(block: bytes, number: int, path: Path, *, told: bool) -> tuple[H
     InputError
         If there is none, or two lines could each be it.
     """
-    lines = _lines(block, number)
+    lines = _lines(text, number)
     if not lines:
-        return None, b""
-    _refuse_a_document(block, path)
-    found = None if told or len(lines[0].text) > LONGEST_LINE else _best(lines, path)
+        return None
+    _refuse_a_document(text, path)
+    found = None if at_first_line or len(lines[0].text) > LONGEST_LINE else _best(lines, path)
     at = found[0] if found else 0
     line = lines[at]
     separator = found[1] if found else _usual_separator(line.text)
     if found is None and _is_numbers(labels_of(line.text, separator, line.number, path)):
-        commented = _commented_header(block, number, line)
+        commented = _commented_header(text, number, line)
         if commented is not None:
             header = _header(commented.number, commented.text, separator, path)
-            return _fitted(header, lines), block[commented.end + 1 :]
+            return _fitted(header, lines), commented.end + 1
     header = _header(line.number, line.text, separator, path)
     end, rows = line.end, lines[at + 1 :]
     above = lines[at - 1] if at else None
@@ -129,7 +129,7 @@ def find_header(block: bytes, number: int, path: Path, *, told: bool) -> tuple[H
         header = _with_units(header, units.text)
     elif above and is_row_of_units(cells_of(above.text, separator)):
         header = _with_units(header, above.text)
-    return _fitted(header, rows), block[end + 1 :]
+    return _fitted(header, rows), end + 1
 
 
 def _rows_of_words(rows: list[_Line], separator: str) -> list[_Line]:
@@ -152,14 +152,14 @@ def _with_units(header: Header, line: str) -> Header:
     return replace(header, units=units, repeats=header.repeats | {line})
 
 
-def _lines(block: bytes, number: int) -> list[_Line]:
+def _lines(text: bytes, number: int) -> list[_Line]:
     """Return the first lines that are neither a comment nor blank."""
     lines: list[_Line] = []
     before = 0
-    for match in TABLE_LINE.finditer(block):
+    for match in TABLE_LINE.finditer(text):
         if lines and (len(lines) == MOST_LINES or match.end() - match.start() > LONGEST_LINE):
             break
-        number += block.count(b"\n", before, match.start())
+        number += text.count(b"\n", before, match.start())
         before = match.start()
         lines.append(_Line(number=number, text=match[0].decode(), end=match.end()))
     return _with_broken_ones_joined(lines)
@@ -178,15 +178,15 @@ def _with_broken_ones_joined(lines: list[_Line]) -> list[_Line]:
     return lines
 
 
-def _refuse_a_document(block: bytes, path: Path) -> None:
+def _refuse_a_document(text: bytes, path: Path) -> None:
     """Refuse what a pattern such as ``ramps/*`` catches beside recordings."""
-    artefact = ARTEFACT.match(block[: LONGEST_LINE])
+    artefact = ARTEFACT.match(text[:LONGEST_LINE])
     if artefact:
         raise InputError(
             f"'{path}' is no recording but a file that dzdesign wrote ({artefact[1].decode()}); leave it out, for "
             "example by a pattern such as *.csv"
         )
-    document = DOCUMENTS.get(block.lstrip()[:1])
+    document = DOCUMENTS.get(text[:LONGEST_HEADER].lstrip()[:1])
     if document:
         raise InputError(f"'{path}' is {document}, expected a table of numbers; export the recording as CSV")
 
@@ -267,11 +267,11 @@ def _bare(unit: str) -> str:
 
 def _score(cells: list[str], lines: list[_Line], index: int, separator: str) -> int:
     """Return how many quantities and units the labels of a line say, and whether units stand below it."""
-    said = set()
+    known = set()
     for label in cells[:MOST_COLUMNS]:
         quantity, unit = split_label(label)
-        said |= {quantity} if quantity else {unit} if unit != label and is_telling(unit) else set()
-    return len(said) + (len(TELLING) if is_row_of_units(cells_of(lines[index + 1].text, separator)) else 0)
+        known |= {quantity} if quantity else {unit} if unit != label and is_telling(unit) else set()
+    return len(known) + (len(TELLING) if is_row_of_units(cells_of(lines[index + 1].text, separator)) else 0)
 
 
 def _usual_separator(line: str) -> str:
@@ -287,17 +287,18 @@ def _is_numbers(labels: list[str]) -> bool:
     return all(not label.strip() or is_number(clean_label(label)) for label in labels)
 
 
-def _commented_header(block: bytes, number: int, row: _Line) -> _Line | None:
+def _commented_header(text: bytes, number: int, row: _Line) -> _Line | None:
     """Return the last comment above a table without a header, if it can be one: numpy.savetxt writes it so."""
-    above = block[: row.end].split(b"\n")[: row.number - number]
+    above = text[: row.end].split(b"\n")[: row.number - number]
     for back, line in enumerate(reversed(above), start=1):
-        text = line.decode(errors="replace").strip()
-        if not text:
+        comment = line.decode(errors="replace").strip()
+        if not comment:
             continue
-        bare = text.lstrip('" \t#')
+        bare = comment.lstrip('" \t#')
         separator = _usual_separator(row.text)
         names = cells_of(bare, separator)
-        if not text.startswith("#") or len(names) != len(cells_of(row.text, separator)) or not _could_be_labels(names):
+        as_many = len(names) == len(cells_of(row.text, separator))
+        if not (comment.startswith("#") and as_many and _could_be_labels(names)):
             return None
         end = sum(len(each) + 1 for each in above[: len(above) - back + 1]) - 1
         return _Line(number=row.number - back, text=bare, end=end)

@@ -1,0 +1,101 @@
+"""A table of a binary file: its columns as arrays."""
+
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import BinaryIO, final
+
+import numpy as np
+
+from dzdesign.core.errors import InputError
+from dzdesign.identify.reading.binary.file_format import FileFormat
+from dzdesign.identify.reading.binary.reader_process import ListedColumn, list_columns, read_columns
+from dzdesign.identify.reading.table import Table
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ArrayTable(Table):
+    """A table whose columns are arrays.
+
+    Attributes
+    ----------
+    file : binary file
+        Open as long as columns are loaded.
+    file_format : FileFormat
+        Of the file.
+    columns : mapping
+        Label -> number of the column in the file, and what the file says of it.
+    """
+
+    file: BinaryIO
+    file_format: FileFormat
+    columns: Mapping[str, tuple[int, ListedColumn]]
+    _loaded: dict[str, np.ndarray] = field(default_factory=dict)
+
+    def load(self, labels: Collection[str]) -> None:
+        """Read columns at once."""
+        numbers = [self.columns[label][0] for label in labels]
+        arrays = read_columns(self.file, self.path, self.file_format.name, numbers)
+        self._loaded.update(zip(labels, arrays, strict=True))
+
+    def length(self, label: str) -> int:
+        """Return how many samples a column has."""
+        return self.columns[label][1].size
+
+    def numbers(self, label: str) -> np.ndarray:
+        """Return a column as float64."""
+        if label not in self._loaded:
+            self.load([label])
+        return self._loaded.pop(label)
+
+    def place(self, row: int) -> str:
+        """Return ``sample 8``: such files have no rows that an editor would count."""
+        return f"sample {row + 1}"
+
+
+def read_binary_table(file: BinaryIO, path: Path, file_format: FileFormat) -> ArrayTable:
+    """Read a table of a binary format.
+
+    Parameters
+    ----------
+    file : binary file
+        Open.
+    path : Path
+        Of the file.
+    file_format : FileFormat
+        As `registry.format_of` tells it.
+
+    Raises
+    ------
+    InputError
+        If the file is not a whole one of that format, or holds no columns of numbers.
+    """
+    found = list_columns(file, path, file_format.name)
+    if not found:
+        raise InputError(
+            f"'{path}' ({file_format.name}) holds no columns of numbers; "
+            f"expected one vector per quantity, such as u_V{file_format.hint}"
+        )
+    labels = _unique_labels(found, path, file_format.name)
+    return ArrayTable(
+        path=path,
+        labels=tuple(labels),
+        units={label: column.unit for label, column in zip(labels, found, strict=True) if column.unit},
+        file=file,
+        file_format=file_format,
+        columns={label: (number, column) for number, (label, column) in enumerate(zip(labels, found, strict=True))},
+    )
+
+
+def _unique_labels(found: Sequence[ListedColumn], path: Path, format_name: str) -> list[str]:
+    """Return a label for each column: its name, and before it its group where another group has that name too."""
+    names = Counter(column.name for column in found)
+    labels = [
+        f"{column.group}/{column.name}" if column.group and names[column.name] > 1 else column.name for column in found
+    ]
+    if len(set(labels)) < len(labels):
+        twice = next(name for name, count in names.items() if count > 1)
+        raise InputError(f"'{path}' ({format_name}) has two columns '{twice[:80]}'; keep one")
+    return labels

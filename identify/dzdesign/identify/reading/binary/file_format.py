@@ -1,0 +1,109 @@
+"""What a module of `formats` declares: how a file format is recognised, and what finds the columns of such a file."""
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO, final
+
+import numpy as np
+
+#: Names of an attribute or property that holds a column's unit.
+UNIT_PROPERTIES = ("unit_string", "unit", "units", "Unit", "Units", "NI_UnitDescription")
+#: A matrix has at most this many columns, or rows: its longer side is time.
+MOST_COLUMNS = 256
+#: Kinds of NumPy's types that are columns: numbers, texts, objects and times; and those of them that are numbers.
+COLUMN_KINDS, NUMBER_KINDS = "fiubSUOMm", "fiub"
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FileColumn:
+    """A column of a file, not read yet.
+
+    Attributes
+    ----------
+    group, name, unit : str
+        As the file states them, or "". Two columns may have one name in different groups.
+    kind : str
+        Kind of NumPy's type: one of `NUMBER_KINDS` for numbers.
+    size : int
+        Samples.
+    read : callable
+        Returns all samples, (size,).
+    """
+
+    name: str
+    kind: str
+    size: int
+    read: Callable[[], np.ndarray]
+    group: str = ""
+    unit: str = ""
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FileFormat:
+    """A file format.
+
+    Attributes
+    ----------
+    name : str
+        For messages.
+    columns : callable
+        Yields the columns of an open file, whose path is for messages; what must stay open with the file goes on the
+        stack. Any exception means that the file is not a whole one of this format; an `InputError` says it in a
+        sentence of its own. It runs in a process of its own.
+    mark : bytes
+        First bytes of such a file.
+    suffix : str
+        Of the file's name, lower case, for a format without a mark.
+    hint : str
+        What to do about a file that holds no columns of numbers, as the rest of a sentence.
+    """
+
+    name: str
+    columns: Callable[[BinaryIO, Path, ExitStack], Iterator[FileColumn]]
+    mark: bytes = b""
+    suffix: str = ""
+    hint: str = ""
+
+
+def unit_among(properties: Mapping[str, object]) -> str:
+    """Return the unit among a column's properties, or an empty string."""
+    for name in UNIT_PROPERTIES:
+        value = properties.get(name)
+        if isinstance(value, bytes | str | np.ndarray) and np.size(value) == 1:
+            value = np.asarray(value).item()
+            return (value.decode(errors="replace") if isinstance(value, bytes) else str(value)).strip()
+    return ""
+
+
+def columns_of_array(array: Any, name: str, group: str = "", unit: str = "") -> Iterator[FileColumn]:
+    """Yield the columns of an array or HDF5 dataset: one of a vector, ``name(:,2)`` and so on of a matrix.
+
+    The longer side of a matrix is time.
+
+    Parameters
+    ----------
+    array : array
+        Anything with NumPy's ``dtype``, ``shape`` and slices.
+    name, group, unit : str
+        Of the array.
+    """
+    if array.dtype.kind not in COLUMN_KINDS or array.ndim > 2 or array.size < 2:
+        return
+    if array.ndim == 1:
+        yield _slice_of(array, slice(None), name, group, unit)
+        return
+    across = array.shape[0] < array.shape[1]
+    for index in range(min(array.shape) if min(array.shape) <= MOST_COLUMNS else 0):
+        place = (index, slice(None)) if across else (slice(None), index)
+        yield _slice_of(array, place, name if min(array.shape) == 1 else f"{name}(:,{index + 1})", group, unit)
+
+
+def _slice_of(array: Any, place: Any, name: str, group: str, unit: str) -> FileColumn:
+    return FileColumn(
+        name=name, kind=array.dtype.kind, size=max(array.shape), read=lambda: np.asarray(array[place]), group=group,
+        unit=unit,
+    )  # fmt: skip

@@ -1,0 +1,51 @@
+"""`RampTest`: one recorded ramp test, as all rooms of identify take it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RampTest:
+    """One recorded ramp test, SI, read-only.
+
+    Attributes
+    ----------
+    source, sha256 : str
+        File name (without its folder) and the hash of its bytes.
+    time, u, q : (N,) array
+        Time in s, command in V, flow in m³/s; rows with a missing value are left out.
+    dp : (N,) array or None
+        Pressure drop in Pa, or None if it is unknown.
+    dp_is_declared : bool
+        True if the pressure drop is the engineer's word (one constant) and not a recording.
+    rows_read, run : int
+        Complete rows in the file, and how many of them in a row became one sample, their median (1: none did).
+    clock_doubt : str
+        What is doubtful about the unit of the time, as `clock_doubt` gives it.
+    simulated : bool
+        True if a comment line above the labels begins with `SIMULATED_MARK`.
+    no_values : str
+        Numbers that were taken for missing samples, as `describe_placeholders` gives them.
+    """
+
+    source: str
+    sha256: str
+    time: np.ndarray
+    u: np.ndarray
+    q: np.ndarray
+    dp: np.ndarray | None
+    dp_is_declared: bool = False
+    rows_read: int = 0
+    run: int = 1
+    clock_doubt: str = ""
+    simulated: bool = False
+    no_values: str = ""
+
+    def __post_init__(self) -> None:
+        for array in (self.time, self.u, self.q, self.dp):
+            if array is None:
+                continue
+            if array.shape != self.time.shape or array.ndim != 1:
+                raise ValueError("the columns of a ramp test are vectors of one length")
+            array.flags.writeable = False

@@ -1,0 +1,171 @@
+"""A table of text: its columns as numbers, as times, and as they stand in the file."""
+
+import re
+from collections.abc import Collection
+from dataclasses import dataclass, field
+from functools import partial
+from typing import TYPE_CHECKING, final
+
+import numpy as np
+
+from dzdesign.core.errors import InputError
+from dzdesign.identify.reading.table import QUOTED_CHARACTERS, Table
+from dzdesign.identify.reading.text.decimal_marks import BETWEEN_THOUSANDS, FEW_ROWS, DecimalMarks
+from dzdesign.identify.reading.time_stamps import EXAMPLE, is_stamp, is_unclear, seconds_of_stamps
+
+if TYPE_CHECKING:
+    import polars as pl
+
+#: A cell with a date.
+DATE = re.compile(r"\d[-/.:]\d+[-/.:]\d")
+#: A cell whose column most likely holds nothing but numbers.
+NUMBER = re.compile(r"\s*[-+]?[\d.]+([eE][-+]?\d+)?")
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TextTable(Table):
+    """A table of text: its rows as they stand in the file, and where they stand in it.
+
+    Attributes
+    ----------
+    rows : bytes
+        UTF-8; each line has as many cells as there are labels.
+    separator : str
+        Between two cells.
+    header_line : int
+        Number of the header's line.
+    lines : range or (N,) array of int
+        Numbers of the rows' lines.
+    marks : DecimalMarks
+        Of the file.
+    """
+
+    rows: bytes
+    separator: str
+    header_line: int
+    lines: range | np.ndarray
+    marks: DecimalMarks
+    _loaded: "dict[str, pl.Series]" = field(default_factory=dict)
+
+    @property
+    def header(self) -> str:
+        """Where the labels stand."""
+        return f" row {self.header_line}"
+
+    def length(self, label: str) -> int:
+        """Return how many rows the table has, whatever the column."""
+        return len(self.lines)
+
+    def place(self, row: int) -> str:
+        """Return ``row 8``, as an editor counts."""
+        return f"row {self.lines[row]}"
+
+    def cell(self, label: str, row: int) -> str:
+        """Return a cell as it stands in the file."""
+        return str(self._texts(label, row + 1)[row])
+
+    def load(self, labels: Collection[str]) -> None:
+        """Read columns at once: as numbers where the first cell is one and all are, else as text."""
+        import polars as pl
+
+        end = self.rows.find(b"\n")
+        cells = self.rows[: end if end >= 0 else None].decode().split(self.separator)
+        first = dict(zip(reversed(self.labels), reversed(cells), strict=False))  # of two equal labels the first counts
+        types = {label: pl.Float64 if NUMBER.fullmatch(first.get(label, "")) else pl.String for label in labels}
+        try:
+            self._loaded.update(self._read(types))
+        except pl.exceptions.PolarsError:  # a cell is no number
+            self._loaded.update(self._read(dict.fromkeys(labels, pl.String)))
+
+    def numbers(self, label: str) -> np.ndarray:
+        """Return a column as float64, NaN where the cell is blank."""
+        import polars as pl
+
+        if label not in self._loaded:
+            self.load([label])
+        loaded = self._loaded.pop(label)  # a second copy of a long recording would double the memory
+        if loaded.dtype == pl.Float64:
+            read = np.asarray(loaded.fill_null(np.nan).to_numpy())
+            self.marks.check_points(label, read, partial(self._texts, label), self.place)
+            return read
+        texts = loaded.str.strip_chars(' \t"')
+        column = self.marks.with_points(label, texts, self.place)
+        numbers = column.cast(pl.Float64, strict=False)
+        filled = ~(column.is_null() | (column == ""))
+        if (filled & numbers.is_null()).any():
+            numbers = numbers.fill_null(_plainly_written(column).cast(pl.Float64, strict=False))
+        bad = (filled & numbers.is_null()).arg_true()
+        if len(bad):
+            raise self._no_number(label, int(bad[0]), texts[int(bad[0])])
+        return np.asarray(numbers.fill_null(np.nan).to_numpy())
+
+    def is_clock(self, label: str) -> bool:
+        """Tell whether the first cell of a column that is not blank holds a time of day."""
+        cell = self._first(label)
+        if is_unclear(cell):
+            raise InputError(
+                f"'{self.path}' column '{label}': '{cell}' may be hours and minutes, minutes and seconds or a date, "
+                f"expected seconds as a number, or a time such as {EXAMPLE}"
+            )
+        return is_stamp(cell)
+
+    def seconds(self, label: str) -> np.ndarray:
+        """Return a column of dates or times of day as seconds since the first row of the file."""
+        texts = self._texts(label)
+        seconds = seconds_of_stamps(texts, f"'{self.path}' column '{label}'")
+        bad = np.flatnonzero((~(texts.is_null() | (texts == ""))).to_numpy() & np.isnan(seconds))
+        if bad.size:
+            row = int(bad[0])
+            raise InputError(
+                f"'{self.path}' {self.place(row)}, column '{label}': '{texts[row][:QUOTED_CHARACTERS]}' is no time, "
+                f"expected one such as {EXAMPLE}, as above; correct it, or leave the cell blank if it is missing"
+            )
+        return seconds
+
+    def _first(self, label: str) -> str:
+        """Return the first cell of a column that is not blank."""
+        for rows in (FEW_ROWS, None):
+            texts = self._texts(label, rows)
+            filled = texts.filter(texts.is_not_null() & (texts != ""))
+            if len(filled):
+                return str(filled[0])
+        return ""
+
+    def _texts(self, label: str, rows: int | None = None) -> "pl.Series":
+        """Return the first cells of a column as they stand in the file, or all of them."""
+        import polars as pl
+
+        return self._read({label: pl.String}, rows)[label].str.strip_chars(' \t"')
+
+    def _read(self, types: "dict[str, type[pl.DataType]]", rows: int | None = None) -> "dict[str, pl.Series]":
+        import polars as pl
+
+        if len(self.lines) == 0:
+            return {label: pl.Series(label, [], dtype=kind) for label, kind in types.items()}
+        columns = {self.labels.index(label): kind for label, kind in types.items()}
+        schema = {f"c{index}": columns.get(index, pl.String) for index in range(len(self.labels))}
+        try:
+            frame = pl.read_csv(
+                self.rows, separator=self.separator, has_header=False, schema=schema, columns=sorted(columns),
+                quote_char=None, n_rows=rows,
+            )  # fmt: skip
+        except pl.exceptions.ComputeError as error:
+            if pl.Float64 in types.values():
+                raise
+            raise InputError(f"'{self.path}' can't be read as a table: {str(error).splitlines()[0]}") from error
+        return {label: frame[f"c{self.labels.index(label)}"] for label in types}
+
+    def _no_number(self, label: str, row: int, cell: str) -> InputError:
+        date = f" (a column of the time may hold stamps such as {EXAMPLE})" if DATE.search(cell) else ""
+        return InputError(
+            f"'{self.path}' {self.place(row)}, column '{label}': '{cell[:QUOTED_CHARACTERS]}' is not a "
+            f"number{date}; correct it, or leave the cell blank if the sample is missing"
+        )
+
+
+def _plainly_written(numbers: "pl.Series") -> "pl.Series":
+    """Return numbers with a decimal point without blanks behind a sign or between thousands, and with a plain minus."""
+    signed = numbers.str.replace("^\u2212", "-").str.replace(r"^([-+])\s", "${1}")
+    grouped = signed.str.contains(rf"^[-+]?\d{{1,3}}(?:[{BETWEEN_THOUSANDS}]\d{{3}})+(?:\.\d*)?$").fill_null(False)
+    return signed.str.replace_all(f"[{BETWEEN_THOUSANDS}]", "").zip_with(grouped, signed)
