@@ -11,7 +11,7 @@ from typing import Any
 from dzdesign.assess.assessment import Assessment
 from dzdesign.core.artefact_files import MANIFEST_NAME, TOOL, parse_document, sha256_of
 from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.core.artefact_types import THIS_TOOL, Artefact, SourceFile, schema_of, to_json_bytes
+from dzdesign.core.artefact_types import Artefact, SourceFile, schema_of, to_json_bytes
 from dzdesign.core.documents import written_by
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import SCHEMA as COMPENSATOR_SCHEMA
@@ -344,9 +344,6 @@ class _Search:
         self.places[role] = _place(name, self.hashes[name], self.found[role])
 
 
-def _place(name: str, sha256: str, artefact: Artefact | Compensator) -> Place:
-    if isinstance(artefact, Compensator):
-        source = SourceFile(source="valve.json", sha256=artefact.valve_sha256)
-        return Place(name=name, sha256=sha256, made_by=f"{THIS_TOOL.name} {THIS_TOOL.version}", made_from=(source,))
+def _place(name: str, sha256: str, artefact: Artefact) -> Place:
     tool = artefact.tool
     return Place(name=name, sha256=sha256, made_by=f"{tool.name} {tool.version}", made_from=artefact.made_from)

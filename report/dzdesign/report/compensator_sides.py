@@ -1,9 +1,6 @@
 """Both sides of a compensator by their names, and the valve it holds."""
 
-from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.design.compensator import Compensator, SideLaw
-from dzdesign.design.compensator_file import compensator_document
-from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 
 SIGNS = {"positive": 1, "negative": -1}
@@ -15,19 +12,9 @@ def laws_of(compensator: Compensator | None) -> dict[str, SideLaw]:
     return {name: law for name, law in both.items() if law is not None}
 
 
-def valve_in(compensator: Compensator) -> ValveModel:
-    """Return the valve that it was designed from."""
-    return read_artefact(compensator.valve_document.encode(), ValveModel, "compensator.json: valve")
-
-
 def exact_law_of(compensator: Compensator, sign: int) -> ExactLaw:
     """Return the exact law of one sign of command."""
     return ExactLaw(compensator, sign)
-
-
-def lot_sha256(compensator: Compensator) -> str:
-    """Return the hash of the valves of a lot setting."""
-    return str(compensator_document(compensator)["lot_sha256"])
 
 
 def code_MPa(compensator: Compensator) -> float:

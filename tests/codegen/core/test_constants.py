@@ -9,7 +9,6 @@ import pytest
 from dzdesign.codegen.core.constants import COLUMNS
 from dzdesign.codegen.project import TARGET_NAMES, generate
 from dzdesign.core.artefact_files import sha256_of
-from dzdesign.core.artefact_types import as_document
 from tests.support.core_variants import NAMES, firmware, variant
 from tests.support.golden_firmware import golden_compensator
 from tests.support.paths import ROOT
@@ -107,11 +106,11 @@ def test_every_entry_leads_to_its_datum(name, arithmetic):
     """Keys are followed in the documents, sources in this repository; the C's comment is the entry's text."""
     made, compensator = firmware(name, arithmetic), variant(name, arithmetic)
     document = json.loads(made.files["compensator.json"])
-    valve = json.loads(compensator.valve_document)
+    valve = document["valve"]
     origin = made.manifest.origin
     assert origin.compensator_json == sha256_of(made.files["compensator.json"].encode())
-    assert origin.valve_json == sha256_of(compensator.valve_document.encode())
-    assert [as_document(each) for each in origin.ramp_tests] == valve["made_from"]
+    assert origin.valve_json == compensator.valve_json_sha256
+    assert origin.ramp_tests == compensator.valve.made_from
     for entry in made.manifest.constants:
         for key, holder in [(key, document) for key in entry.compensator_json] + [
             (key, valve)

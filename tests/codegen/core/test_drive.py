@@ -237,9 +237,8 @@ def test_zero_command_stays_under_the_certified_bound_at_the_waves_top(side):
     """The bound, in closed form: of all thresholds' lower bounds of the side's tests at these pressures the lowest."""
     compensator = compensator_named("everything")
     signals = compensator.signals
-    valve = read_artefact(compensator.valve_document.encode(), ValveModel, "valve.json")
-    tests = valve.sides["positive" if side > 0 else "negative"].tests
-    rising = valve.sides["positive" if side > 0 else "negative"].trend == "increasing"
+    tests = compensator.valve.sides["positive" if side > 0 else "negative"].tests
+    rising = compensator.valve.sides["positive" if side > 0 else "negative"].trend == "increasing"
     counts_in_V = signals.compare_max / float(compensator.u_max_V)
     firmware, tried = Firmware(compensator), 0
     for _ in range(2000):

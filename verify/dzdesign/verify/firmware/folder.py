@@ -1,15 +1,12 @@
 """A firmware folder as it is given: its manifest, and that nothing in it leads elsewhere."""
 
-from functools import cache
 from pathlib import Path
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, check_inside, read_bytes
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.design.firmware_manifest import FirmwareManifest
-from dzdesign.identify.valve.model import ValveModel
 
 
 def read_firmware_manifest(folder: Path) -> FirmwareManifest:
@@ -42,17 +39,7 @@ def read_compensator(folder: Path) -> Compensator:
         If it is missing or none.
     """
     path = folder / "compensator.json"
-    return compensator_from_document(read_bytes(path, "compensator of the firmware"), str(path))
-
-
-@cache
-def _valve(content: str) -> ValveModel:
-    return read_artefact(content.encode(), ValveModel, "compensator.json: valve")
-
-
-def valve_of(compensator: Compensator) -> ValveModel:
-    """Return the valve that a compensator was made from."""
-    return _valve(compensator.valve_document)
+    return read_artefact(read_bytes(path, "compensator of the firmware"), Compensator, str(path))
 
 
 def check_firmware_inside(folder: Path) -> None:
