@@ -90,7 +90,7 @@ def _ramps(compensator: Compensator) -> list[Define]:
     signals, functions = compensator.signals, compensator.drive_functions
     found = [
         Define(symbol="RAMP_UNIT", value=RAMP_UNIT, literal="int32", equation="unit of the ramped command",
-                 engineering=f"1/{RAMP_UNIT} code of command", generator="design/dzdesign/design/drive.py")
+                 engineering=f"1/{RAMP_UNIT} code of command", generator="design/dzdesign/design/drive_functions.py")
     ]  # fmt: skip
     for way, name, steps in (("up", "away from zero", functions.ramp_up), ("down", "to zero", functions.ramp_down)):
         for place, sign in enumerate(signals.signs):
