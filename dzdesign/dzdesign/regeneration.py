@@ -48,19 +48,15 @@ def regenerated(folder: Path, compensator: "Compensator | None" = None) -> "Chec
         tells an edited file from a generated one, so the firmware does not hold.
     """
     from dzdesign.codegen.project import generate
-    from dzdesign.core.artefact_reading import read_artefact
-    from dzdesign.design.compensator import Compensator
-    from dzdesign.verify.firmware.folder import read_firmware_manifest
+    from dzdesign.verify.firmware.folder import read_compensator, read_firmware_manifest
     from dzdesign.verify.requirements import REGENERATED
 
     manifest = read_firmware_manifest(folder)
     if reason := _not_generated_here(manifest):
         return REGENERATED.check(holds=None, text=reason)
-    source = folder / "compensator.json"
-    content = read_bytes(source, "compensator")
+    content = read_bytes(folder / "compensator.json", "compensator")
     try:
-        compensator = compensator or read_artefact(content, Compensator, str(source))
-        expected = generate(compensator, manifest.target, content).manifest
+        expected = generate(read_compensator(folder), manifest.target, content).manifest
     except InputError as error:
         return REGENERATED.check(holds=False, text=str(error))
     compared = {name: digest for name, digest in expected.files.items() if name not in expected.board}

@@ -1,7 +1,8 @@
 """Both sides of a compensator by their names, and the valve it holds."""
 
 from dzdesign.design.compensator import Compensator, SideLaw
-from dzdesign.verify.exhaustive.exact_law import ExactLaw
+from dzdesign.design.compensator_file import compensator_document
+from dzdesign.identify.valve.model import ValveModel
 
 SIGNS = {"positive": 1, "negative": -1}
 
@@ -12,12 +13,11 @@ def laws_of(compensator: Compensator | None) -> dict[str, SideLaw]:
     return {name: law for name, law in both.items() if law is not None}
 
 
-def exact_law_of(compensator: Compensator, sign: int) -> ExactLaw:
-    """Return the exact law of one sign of command."""
-    return ExactLaw(compensator, sign)
+def valve_in(compensator: Compensator) -> ValveModel:
+    """Return the valve that it was designed from."""
+    return read_artefact(compensator.valve_document.encode(), ValveModel, "compensator.json: valve")
 
 
-def code_MPa(compensator: Compensator) -> float:
-    """Return the pressure drop of one code, MPa."""
-    sensor = compensator.signals.pressure_a
-    return float(sensor.span_MPa) / (sensor.full_code - sensor.zero_code)
+def lot_sha256(compensator: Compensator) -> str:
+    """Return the hash of the valves of a lot setting."""
+    return str(compensator_document(compensator)["lot_sha256"])
