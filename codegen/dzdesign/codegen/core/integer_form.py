@@ -13,7 +13,6 @@ can occur; where the target has 32-bit arithmetic only, it is an estimate and a 
 
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import pairwise
 from math import ceil, lcm
 from typing import NamedTuple
 
@@ -267,20 +266,6 @@ def _estimate(divisor: int, largest: int) -> Estimate:
     if (largest >> shift) * factor >= 1 << 32:
         raise InputError(f"a quotient of {largest} by {divisor} needs more than 32-bit arithmetic")
     return Estimate(shift=shift, factor=factor, corrections=ceil((1 << shift) / divisor + 2) - 1)
-
-
-def segments_of(table: tuple[int, ...], step: int) -> list[tuple[int, int]]:
-    """Return (start, slope) of each segment, ``start + slope * dp``: the fallback first, then one a node.
-
-    Between nodes n and n + 1 the table times `step` is ``T[n] step + (T[n+1] - T[n]) (dp - n step)``.
-    """
-    if not table:
-        return []
-    pairs = pairwise(table[:-2])
-    return [
-        (table[-1] * step, 0),
-        *((left * step - (right - left) * node * step, right - left) for node, (left, right) in enumerate(pairs)),
-    ]
 
 
 def _prove_widths(form: IntegerForm, compensator: Compensator, sign: int) -> None:
