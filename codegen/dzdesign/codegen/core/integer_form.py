@@ -19,7 +19,7 @@ from typing import NamedTuple
 from dzdesign.core.errors import InputError
 from dzdesign.derivation.law import law
 from dzdesign.derivation.scaling import Line, evaluate_line
-from dzdesign.derivation.transition import evaluate_edge
+from dzdesign.derivation.transition import evaluate_transition
 from dzdesign.design.compensator import Compensator
 
 INT32_MAX = 2**31 - 1
@@ -169,11 +169,11 @@ def _terms(compensator: Compensator, sign: int) -> _Terms:
     beta_unit = c.beta_denominator * c.beta_step_codes
     per_transition_code = Fraction(0)
     if c.edge_codes:  # what one unit of the gap lowers at zero command, over the transition's codes
-        lowered = evaluate_edge(
+        lowered = evaluate_transition(
             beta_opening=1,
             beta_closing=0,
             u_min0_over_u_max=side.u_min0_over_u_max,
-            share_of_edge=0,
+            share_of_transition=0,
             n_full=c.signals.compare_max,
         )
         per_transition_code = lowered / beta_unit / c.edge_codes
