@@ -22,7 +22,7 @@ from dzdesign.report.lot.report import report_of_lot
 from dzdesign.report.lot.sections import HEADINGS
 from dzdesign.report.lot.spread import FAR, LEVELS, quantiles, spread_of
 from dzdesign.report.lot.table import SideFigures
-from tests.support.page_reader import HOSTILE, Page
+from tests.support.html_pages import HOSTILE, Page
 from tests.support.schema_checks import overlooked, problems
 from tests.support.synthetic_lots import lot_rows, with_figures, write_lot_folder
 
