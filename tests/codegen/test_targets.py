@@ -210,7 +210,7 @@ def hostile_compensator(target: str, names: list[str]):
     valve["made_from"] = [{"source": name, "sha256": "0" * 64} for name in names]
     for test in valve["sides"]["positive"]["tests"]:
         test["source"] = names[0]
-        test["ramps"]["sources"] = names
+        test["ramps"] = names
     return replace(compensator, valve_document=to_json(valve))
 
 

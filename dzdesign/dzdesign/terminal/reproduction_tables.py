@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from dzdesign.core.verdicts import verdict_words
-from dzdesign.terminal.page import new_console, new_table, put_line
+from dzdesign.terminal.page import new_console, new_table, put_line, put_table
 
 if TYPE_CHECKING:
     from dzdesign.report.reproduction import PaperNumber, Reproduction
@@ -18,7 +18,7 @@ def print_reproduction(reproduction: "Reproduction") -> None:
     for name in dict.fromkeys(number.valve for number in numbers):
         table = new_table(
             f"The paper's numbers and ours: {name}", "", "MPa", "published", "in the fit", "valve", "paper's law",
-            "product", "within", "", "why", keys=2,
+            "product", "within", "", "why",
         )  # fmt: skip
         for item in numbers:
             if item.valve == name:
@@ -27,7 +27,7 @@ def print_reproduction(reproduction: "Reproduction") -> None:
                     letter = tolerances.setdefault(item.tolerance, chr(ord("a") + len(tolerances)))
                 note = f"[{reasons.setdefault(item.why, len(reasons) + 1)}]" if item.why else ""
                 table.add_row(*_cells(item, letter, note))
-        console.print(table)
+        put_table(console, table)
     for tolerance, letter in tolerances.items():
         put_line(console, f"({letter}) {tolerance}")
     for why, number in reasons.items():
