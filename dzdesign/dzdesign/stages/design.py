@@ -76,11 +76,6 @@ def design_options(choices: DesignChoices, target: str) -> "DesignOptions":
 def design(arguments: DesignArguments) -> "Compensator":
     """Design the compensator of a valve, certified.
 
-    Parameters
-    ----------
-    arguments : DesignArguments
-        Of the stage.
-
     Raises
     ------
     InputError

@@ -36,11 +36,6 @@ class GenerateArguments(DesignChoices):
 def generate(arguments: GenerateArguments) -> "Firmware":
     """Generate the C project of a compensator, whose numbers are derived again first.
 
-    Parameters
-    ----------
-    arguments : GenerateArguments
-        Of the stage.
-
     Raises
     ------
     InputError
