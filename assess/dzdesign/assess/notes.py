@@ -6,7 +6,7 @@ from dzdesign.assess.assessment import PressureAssessment
 from dzdesign.assess.curve_pairs import Comparison, CurvePair
 from dzdesign.assess.options import SETS, AssessOptions, Set
 from dzdesign.assess.quantities import L_MIN, MPA
-from dzdesign.identify.data_quality.quality import LIKELY_LAG
+from dzdesign.identify.data_quality.side_warnings import LIKELY_LAG
 from dzdesign.identify.data_quality.recordings import about_recordings
 from dzdesign.identify.valve.model import Warning_
 

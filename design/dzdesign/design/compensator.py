@@ -12,7 +12,7 @@ from dzdesign.design.drive import RAMPED_CODES, Amplifier
 from dzdesign.design.lot import LotValve
 from dzdesign.design.request import DesignRequest
 from dzdesign.design.signals import Signals
-from dzdesign.identify.fitting.guard_curve import GUARDS
+from dzdesign.identify.valve.guard_curve import GUARDS
 
 #: What to do below the reference pressure drop: beta = 1 as in Eq. (7), or what the tests there say.
 BELOW_REFERENCE = ("hold", "extend")

@@ -9,7 +9,7 @@ from dzdesign.design.compensator import BELOW_REFERENCE
 from dzdesign.design.drive import RAMP_UNIT, Amplifier
 from dzdesign.design.request import DesignRequest
 from dzdesign.design.signals import Signals
-from dzdesign.identify.fitting.guard_curve import GUARDS
+from dzdesign.identify.valve.guard_curve import GUARDS
 
 #: Largest edge, dither and window, of full command or drive.
 LARGEST_EDGE = Fraction(1, 10)

@@ -2,14 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Literal
+from typing import Annotated
 
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
-from dzdesign.identify.fitting.guard_curve import GUARDS, ROUNDING_V, GuardCurve, OpeningCurve
+from dzdesign.identify.valve.guard_curve import GUARDS, ROUNDING_V, Guard, GuardCurve, OpeningCurve
 from dzdesign.identify.valve.quantity_types import Flow, PressureDrop, Probability, Ratio, Voltage, VoltageError
 from dzdesign.identify.valve.ramp_result import TestResult
+from dzdesign.identify.valve.staircase import Direction
 
 TRENDS = ("decreasing", "flat", "increasing")
 
@@ -40,7 +41,7 @@ class Certificate:
         float, quantity("1", "Confidence with which all bounds of a guard hold together.", ge=0.5, le=1)
     ]
     guard: Annotated[
-        Literal["closing", "mean", "opening"],
+        Guard,
         Meta(
             description="The threshold that is protected unless `design --guard` asks for another: the safest that was "
             "recorded."
@@ -72,7 +73,7 @@ class SideModel:
     ]
     k_V_mm: Annotated[float, quantity("V/mm", "k of Eq. (11), where --x-max was given.", ge=0, le=1e9)] | None
     trend: Annotated[
-        Literal["decreasing", "flat", "increasing"] | None,
+        Direction | None,
         Meta(description="How the threshold runs with the pressure drop; null where fewer than two were tested."),
     ]
     trend_change_V: Annotated[Voltage | None, Meta(description="Change of the threshold over the tested range.")]
