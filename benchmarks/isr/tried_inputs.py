@@ -3,10 +3,7 @@
 import random
 from collections.abc import Sequence
 
-import numpy as np
-
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.compensator_file import compensator_document
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 
 SEED = 7
@@ -43,16 +40,14 @@ def tried_inputs(compensator: Compensator) -> list[Codes]:
 
 def expected_compares(compensator: Compensator, inputs: Sequence[Codes]) -> list[int]:
     """Return the exactly rounded law at `inputs`, by the reference of `dzdesign.verify`."""
-    exact = ExactLaw(compensator_document(compensator))
-    betas = []
-    for _, p_a, p_b in inputs:
+    exact = ExactLaw(compensator)
+    compares = []
+    for u, p_a, p_b in inputs:
         possible = max(p_a, p_b) <= exact.code_max
-        betas.append(exact.betas(p_a - p_b if possible else None))
-    table = np.array(list(exact.rows(betas)))
-    return [
-        int(table[u, at]) if u <= exact.code_max else 0  # an impossible command lets the valve go
-        for at, (u, _, _) in enumerate(inputs)
-    ]
+        corners = exact.corners(exact.betas(p_a - p_b if possible else None))
+        # An impossible command lets the valve go.
+        compares.append(exact.compare_value(u, corners) if u <= exact.code_max else 0)
+    return compares
 
 
 def inputs_header(inputs: Sequence[Codes], repeats: int, *, program_memory: bool = False) -> str:
@@ -72,7 +67,7 @@ def exact_rows_header(compensator: Compensator) -> str:
     from fractions import Fraction
     from math import lcm
 
-    exact = ExactLaw(compensator_document(compensator))
+    exact = ExactLaw(compensator)
     # Half a count more, so that the floor rounds to nearest, a half up.
     lines = {}
     for dp in range(-exact.code_max, exact.code_max + 1):

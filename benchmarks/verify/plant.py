@@ -21,7 +21,7 @@ from loop_peers import (
 )
 from scoreboard import Row, print_rows, say
 
-from dzdesign.design.compensator_file import compensator_document
+from dzdesign.design.compensator import Compensator
 from dzdesign.verify.closed_loop.loop import PERIODS_PER_RECORD, RECORD_S, ClosedLoop
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
 
@@ -38,12 +38,12 @@ def print_plant(*, quick: bool, seed: int) -> list[Row]:
     """Print and return the rows of the closed loop."""
     with tempfile.TemporaryDirectory(prefix="bench-verify-") as folder:
         firmware = Path(folder) / "firmware"
-        document = compensator_document(example_firmware(firmware))
+        compensator = example_firmware(firmware)
         core = core_of(firmware)
-        rows = _speed(firmware, document, quick)
+        rows = _speed(firmware, compensator, quick)
         rows += _peers(core, rows[0].value, quick)
         rows += _errors(quick, seed)
-        rows += _monte_carlo(core, firmware, document, quick, seed)
+        rows += _monte_carlo(core, firmware, compensator, quick, seed)
     print_rows(f"The plant in the loop, PWM resolved (seed {seed})", rows)
     return rows
 
@@ -69,12 +69,12 @@ def _goal(what: str, ratio: float, goal: float, note: str) -> Row:
     return Row(what=f"{what}, goal over measured", value=goal / ratio, limit=1.0, note=f"{ratio:.4g}; {note}")
 
 
-def _speed(firmware: Path, document: dict, quick: bool) -> list[Row]:
+def _speed(firmware: Path, compensator: Compensator, quick: bool) -> list[Row]:
     command = _ramp(RAMP_S, RECORD_S)
     rows = []
     for name, plant in (("nonlinear", NONLINEAR), ("linear", LINEAR)):
         start = perf_counter()
-        loop = ClosedLoop(plant, firmware, document)
+        loop = ClosedLoop(plant, firmware, compensator)
         built = perf_counter() - start
         taken = {mode: _least(lambda m=mode: loop.run(command, SUPPLY_MPA, m, 1.0), 3 if quick else REPEATS)  # noqa: B023
                  for mode in ("compensated", "direct")}  # fmt: skip
@@ -146,7 +146,7 @@ def _by_cvodes(plant: Plant, duties: np.ndarray) -> np.ndarray:
     return np.array(found)
 
 
-def _monte_carlo(core: Core, firmware: Path, document: dict, quick: bool, seed: int) -> list[Row]:
+def _monte_carlo(core: Core, firmware: Path, compensator: Compensator, quick: bool, seed: int) -> list[Row]:
     """Time 200 plants: one after another, two at a time, and as CasADi's fold.map."""
     rng = np.random.default_rng(seed)
     varied = ("preload_N", "K_et_N_m", "B_e_N_s_m", "C_d_W_mm", "rho_kg_m3")
@@ -154,7 +154,7 @@ def _monte_carlo(core: Core, firmware: Path, document: dict, quick: bool, seed: 
                                     for name in varied}) for _ in range(PLANTS)]  # fmt: skip
     command = _ramp(RAMP_S, RECORD_S)
 
-    loop = ClosedLoop(NONLINEAR, firmware, document)
+    loop = ClosedLoop(NONLINEAR, firmware, compensator)
 
     def one(plant: Plant) -> float:
         return float(loop.with_plant(plant).run(command, SUPPLY_MPA, "compensated").q_L_min[-1])

@@ -1,6 +1,5 @@
 """The bundled example through the product, once for all figures."""
 
-import json
 import tempfile
 from dataclasses import dataclass
 from fractions import Fraction
@@ -10,9 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from dzdesign.codegen.project import generate
-from dzdesign.core.artefact_files import to_json, write_folder
+from dzdesign.core.artefact_files import write_folder
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.compensator_file import compensator_document
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
 from dzdesign.example import example_folder
@@ -52,11 +50,10 @@ class Example:
     def loop(self) -> ClosedLoop:
         """The plant driven by the generated C."""
         firmware = generate(self.compensator, "host")
-        document = json.loads(to_json(compensator_document(self.compensator)))
         with tempfile.TemporaryDirectory(prefix="dzdesign-") as scratch:
             folder = Path(scratch) / "firmware"
             write_folder(folder, firmware.files, firmware.manifest)
-            return ClosedLoop(self.plant, folder, document)
+            return ClosedLoop(self.plant, folder, self.compensator)
 
     def ramp(self, dp_MPa: float, mode: str) -> LoopRun:
         """Return a ramp up and down; without beta the core is shown the reference pressure."""

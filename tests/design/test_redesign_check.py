@@ -8,7 +8,7 @@ import pytest
 from dzdesign import api
 from dzdesign.codegen.project import generate, target_named
 from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_files import MANIFEST_NAME, to_json, write_folder
+from dzdesign.core.artefact_files import to_json, write_folder
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator_file import LATER, compensator_document, compensator_from_document
 from dzdesign.design.designing import design
@@ -17,6 +17,7 @@ from dzdesign.design.option_texts import options_of
 from dzdesign.design.redesign_check import prove_derived
 from dzdesign.identify.identification import identify
 from dzdesign.verify.firmware.compensator_checks import law_follows
+from dzdesign.verify.firmware.folder import read_compensator, read_firmware_manifest
 from dzdesign.verify.firmware.manifest import manifest_follows
 from tests.support.synthetic import Truth, synthetic_ramp
 
@@ -206,9 +207,8 @@ def test_verify_says_that_the_design_was_for_another_target(example_valve, tmp_p
     for designed, said in (("cortex-m4", "was designed for cortex-m4, this is for f28335"), ("f28335", "as it says")):
         firmware = generate(designed_for(example_valve, designed), "f28335")
         write_folder(tmp_path / designed, firmware.files, firmware.manifest)
-        check = manifest_follows(
-            tmp_path / designed, dict(json.loads((tmp_path / designed / MANIFEST_NAME).read_text()))
-        )
+        folder = tmp_path / designed
+        check = manifest_follows(folder, read_firmware_manifest(folder), read_compensator(folder))
         assert check.holds and check.text.endswith(said)
 
 

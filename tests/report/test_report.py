@@ -9,18 +9,32 @@ from urllib.parse import unquote
 
 import pytest
 
+from dzdesign.assess.assessment import (
+    Assessment,
+    BeforeAfter,
+    MeterTaken,
+    PressureAssessment,
+    RampSet,
+    Recording,
+    Request,
+)
+from dzdesign.assess.limits import LimitResult
+from dzdesign.assess.quantities import Quantity, Reading
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of, to_json
-from dzdesign.core.artefact_types import to_json_bytes
+from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.artefact_types import THIS_TOOL, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.identify.identification import identify
+from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.artefact_chain import chain_of
-from dzdesign.report.artefact_folder import shelf_of
-from dzdesign.report.body import SECTIONS
+from dzdesign.report.artefact_folder import read_artefact_folder
 from dzdesign.report.figures.figure import PALETTE, csv_text
+from dzdesign.report.reproduction import Outcome, PaperNumber, Reproduction
 from dzdesign.report.summary import headline, worst_of
-from dzdesign.report.valve_report import REPORT_NAME, report_of_folder
+from dzdesign.report.valve_report import REPORT_NAME, SECTIONS, report_of_folder
 from dzdesign.verify.closed_loop.plant import Plant
+from dzdesign.verify.evidence import PressureResult
 from tests.support.page_reader import HOSTILE, Page
 from tests.support.synthetic import Truth, needs_compiler, synthetic_ramp
 
@@ -70,7 +84,7 @@ def test_every_section_is_there_with_its_figures_and_tables(html):
     page = Page(html)
     ids = [attributes["id"] for _, attributes in page.tags if "id" in attributes]
     assert len(ids) == len(set(ids))
-    assert [name for name, _ in SECTIONS] == [name for name in ids if name in dict(SECTIONS)]
+    assert [name for name, _ in SECTIONS if name != "lot"] == [name for name in ids if name in dict(SECTIONS)]
     figures = ("fit", "thresholds", "beta", "law", "map", "zero", "dead-zone", "loop")
     assert [f"figure-{name}-positive" for name in figures] == [name for name in ids if name.startswith("figure-")]
     links = [each["href"] for each in page.of("a")]
@@ -118,9 +132,9 @@ def test_figures_take_their_colours_from_the_page(html):
 
 def test_same_input_same_bytes_whichever_folder_is_named(reported_demo, html, copied):
     assert report_of_folder(copied).html == html
-    chain = chain_of(shelf_of(copied))
+    chain = chain_of(read_artefact_folder(copied))
     for folder in (reported_demo, reported_demo / "evidence", reported_demo / "firmware"):
-        assert chain_of(shelf_of(folder)) == chain
+        assert chain_of(read_artefact_folder(folder)) == chain
 
 
 def test_report_makes_the_page_again_and_the_folder_still_fits(copied, capsys):
@@ -172,21 +186,37 @@ def test_what_was_not_checked_is_not_green(copied):
 
 
 def test_a_missed_limit_of_recordings_does_not_hold(copied):
-    valve = json.loads((copied / "valve.json").read_bytes())
-    assessment = {
-        "schema": "dzdesign.assessment/1", "tool": valve["tool"], "made_from": valve["made_from"], "holds": False,
-        "quantities": {"hysteresis": {"name": "hysteresis", "unit": "%", "formula": "f"}},
-        "pressures": [{"side": "positive", "dp_MPa": 1.0, "quantities": {"hysteresis": {"before": None, "after": {
-            "value": 4.5, "se": None, "at_most": None}}}}],
-        "limits": [{"quantity": "hysteresis", "place": "1 MPa", "limit": 4.0, "unit": "%", "holds": False,
-                    "text": "4.5 %, more than 4 %"}],
-        "notes": [],
-    }  # fmt: skip
-    (copied / "assessment.json").write_text(to_json(assessment))
+    valve = read_artefact((copied / "valve.json").read_bytes(), ValveModel, "valve.json")
+    after = Reading(value=4.5, se=None, at_most=None, not_observable=None, note=None, where=None)
+    ramps = RampSet(source="ramp.csv", ramps=("ramp.csv 1",), dp_MPa=1.0)
+    assessment = Assessment(
+        tool=THIS_TOOL,
+        made_from=tuple(Recording(source=each.source, sha256=each.sha256, set="before") for each in valve.made_from),
+        options=Request(
+            u_max_V=10.0, after_u_max_V=10.0, knee_window=(0.1, 0.5), linearity_window=(0.1, 0.9), level_L_min=None,
+            level_share=0.01, same_pressure_within=0.05,
+        ),
+        meter=MeterTaken(floor_L_min=0.1, lag_s=0.0, lag_is="unknown"),
+        quantities={"hysteresis": Quantity(name="hysteresis", unit="%", formula="f")},
+        pressures=(
+            PressureAssessment(
+                side="positive", dp_MPa=1.0, level_L_min=0.1, rated_flow_L_min=15.0, before=ramps, after=ramps,
+                quantities={"hysteresis": BeforeAfter(before=None, after=after, change=None)},
+            ),
+        ),
+        limits=(
+            LimitResult(
+                quantity="hysteresis", place="1 MPa", limit=4.0, unit="%", holds=False, text="4.5 %, more than 4 %"
+            ),
+        ),
+        notes=(),
+    )  # fmt: skip
+    (copied / "assessment.json").write_bytes(to_json_bytes(assessment))
     report = report_of_folder(copied)
     assert report.kind == "bad" and "4.5 %, more than 4 %" in report.html
-    assessment["made_from"] = [{"source": "other.csv", "sha256": "0" * 64}]
-    (copied / "assessment.json").write_text(to_json(assessment))
+    assert "hysteresis</td><td class=\"number\">–</td><td class=\"number\">4.50</td>" in report.html
+    other = replace(assessment, made_from=(Recording(source="other.csv", sha256="0" * 64, set="before"),))
+    (copied / "assessment.json").write_bytes(to_json_bytes(other))
     report = report_of_folder(copied)  # of another valve that lies about: said, not shown, and no fault of this one
     assert any("compares others, so it is not shown" in line for line in report.missing)
     assert report.kind == "good" and "4.5 %, more than 4 %" not in report.html
@@ -245,7 +275,7 @@ def test_a_compensator_that_was_edited_by_hand_is_found(copied):
 
 def test_of_a_firmware_its_own_evidence_is_taken(copied):
     """Two firmware folders side by side, each with its evidence: the one that was named decides."""
-    chain = chain_of(shelf_of(copied / "firmware"))
+    chain = chain_of(read_artefact_folder(copied / "firmware"))
     for stage in ("firmware", "evidence"):
         shutil.copytree(copied / stage, copied / f"{stage}_b")
     manifest = change_json(copied / "firmware_b" / MANIFEST_NAME, lambda each: each.update(note="another"))
@@ -257,10 +287,10 @@ def test_of_a_firmware_its_own_evidence_is_taken(copied):
         copied / "evidence_b" / MANIFEST_NAME,
         lambda each: each["files"].update({"verification.json": sha256_of(content)}),
     )
-    assert chain_of(shelf_of(copied / "firmware")) == chain
-    other = chain_of(shelf_of(copied / "firmware_b"))
-    assert other.artefacts["verification"].name == "evidence_b/verification.json"
-    assert other.artefacts["firmware"].sha256 == digest and not other.faults
+    assert chain_of(read_artefact_folder(copied / "firmware")) == chain
+    other = chain_of(read_artefact_folder(copied / "firmware_b"))
+    assert other.places["evidence"].name == "evidence_b/verification.json"
+    assert other.places["firmware"].sha256 == digest and not other.faults
 
 
 def test_what_was_not_tried_is_said(copied):
@@ -291,20 +321,18 @@ def test_the_plant_of_the_tests_stands_in_the_closed_loop(copied):
 
 
 def test_the_papers_numbers_are_shown_where_they_lie(copied):
-    row = {
-        "valve": "first valve", "quantity": "dead zone", "unit": "%", "dp_MPa": 1.0, "published": "53.9",
-        "outcomes": [{"by": "product", "value": 54.1, "difference": 0.2, "holds": False}], "tolerance": "0.1",
-        "why": "because", "holds": False,
-    }  # fmt: skip
-    tool = {"name": "dzdesign", "version": "0"}
-    document = {"schema": "dzdesign.reproduction/1", "tool": tool, "paper": "doi", "holds": False, "rows": [row]}
+    ours = Outcome(by="product", value=54.1, difference=0.2, allowed=(53.8, 54.0))
+    row = PaperNumber(
+        valve="first valve", quantity="dead zone", unit="%", dp_MPa=1.0, published="53.9", in_fit=False,
+        outcomes=(ours,), tolerance="0.1", why="because",
+    )  # fmt: skip
+    paper = Reproduction(tool=THIS_TOOL, made_from=(), paper="10.1/x", numbers=(row,), valves=())
     folder = copied / "paper"
     folder.mkdir()
-    content = to_json({**document, "valves": []})
-    (folder / "reproduction.json").write_text(content)
+    content = to_json_bytes(paper)
+    (folder / "reproduction.json").write_bytes(content)
     # As `reproduce -o` writes it: of the same schema, and before it in the alphabet.
-    listing = {"reproduction.json": sha256_of(content.encode())}
-    manifest = {"schema": "dzdesign.reproduction/1", "tool": tool, "files": listing}
+    manifest = {"schema": paper.schema, "tool": asdict(THIS_TOOL), "files": {"reproduction.json": sha256_of(content)}}
     (folder / MANIFEST_NAME).write_text(to_json(manifest))
     html = report_of_folder(copied).html
     assert "lacks the key" not in html
@@ -330,7 +358,7 @@ def spoil(path: Path) -> None:
 )
 def test_a_file_that_was_changed_is_said_and_no_verdict_stands(copied, name, said):
     spoil(copied / name)
-    chain = chain_of(shelf_of(copied))
+    chain = chain_of(read_artefact_folder(copied))
     assert any(said in fault for fault in chain.faults), chain.faults
     assert headline(chain).kind == "bad" and "No verdict stands" in headline(chain).text
 
@@ -345,14 +373,14 @@ def test_a_page_of_files_that_do_not_fit_says_so_first(copied):
 
 def test_artefacts_are_found_by_their_hash_and_not_by_their_name(copied):
     (copied / "valve.json").rename(copied / "bench_7.json")
-    found = chain_of(shelf_of(copied)).artefacts["valve"]
+    found = chain_of(read_artefact_folder(copied)).places["valve"]
     assert found.name == "bench_7.json"
     other = json.loads((copied / "bench_7.json").read_bytes())
     other["u_max_V"] = 11.0
     (copied / "bench_7.json").unlink()
     (copied / "valve.json").write_text(to_json(other))
-    chain = chain_of(shelf_of(copied))  # the compensator holds its valve; the file beside it is another
-    assert chain.document("valve")["u_max_V"] == 10.0
+    chain = chain_of(read_artefact_folder(copied))  # the compensator holds its valve; the file beside it is another
+    assert chain.valve.u_max_V == 10.0
     assert [fault for fault in chain.faults if "valve.json has the SHA-256" in fault]
 
 
@@ -360,7 +388,7 @@ def test_a_manifest_reaches_no_file_outside_its_folder(copied, tmp_path):
     (tmp_path / "secret.txt").write_text("secret")
     outside = {"../../secret.txt": "0", str(tmp_path / "secret.txt"): "0"}
     change_json(copied / "firmware" / MANIFEST_NAME, lambda manifest: manifest["files"].update(outside))
-    assert not [name for name in shelf_of(copied) if "secret" in name]
+    assert not [name for name in read_artefact_folder(copied) if "secret" in name]
 
 
 # --- parts of a chain ------------------------------------------------------------------------------------------------
@@ -399,17 +427,17 @@ def test_evidence_of_an_earlier_version_without_curves(copied):
 
 def test_a_neighbour_that_can_not_be_read_does_not_hinder_the_rest(copied):
     (copied / "assessment.json").write_text('{"schema": "dzdesign.assessment/1", "holds": 3}')
-    chain = chain_of(shelf_of(copied))
+    chain = chain_of(read_artefact_folder(copied))
     assert headline(chain).kind == "good"
-    assert [line for line in chain.missing if "assessment.json' lacks the key 'tool'" in line]
+    assert [line for line in chain.missing if "assessment of recordings: 'assessment.json'" in line]
 
 
 def test_of_two_pieces_of_evidence_one_must_be_named(copied):
-    chain = chain_of(shelf_of(copied))
+    chain = chain_of(read_artefact_folder(copied))
     shutil.copytree(copied / "evidence", copied / "evidence of May")
     with pytest.raises(InputError, match=r"more than one piece of evidence, .* evidence of May/verification\.json"):
         report_of_folder(copied)
-    assert chain_of(shelf_of(copied / "evidence")) == chain
+    assert chain_of(read_artefact_folder(copied / "evidence")) == chain
 
 
 def test_a_folder_without_artefacts_is_refused(tmp_path):
@@ -471,9 +499,9 @@ def test_numbers_of_a_figure_are_a_table_whatever_stands_in_them():
 
 
 def test_the_headline_is_good_only_if_all_was_checked(copied):
-    assert headline(chain_of(shelf_of(copied))).kind == "good"
-    change_evidence(copied, lambda evidence: evidence.update(checks=[]))
-    assert headline(chain_of(shelf_of(copied))).kind == "open"
+    assert headline(chain_of(read_artefact_folder(copied))).kind == "good"
+    change_evidence(copied, lambda evidence: evidence["checks"][0].update(holds=None) or evidence.update(holds=False))
+    assert headline(chain_of(read_artefact_folder(copied))).kind == "open"
 
 
 def test_a_series_of_plants_is_shown(copied):
@@ -529,4 +557,9 @@ def test_figures_of_two_sides_say_which_they_are_of(reports):
     ],
 )
 def test_of_how_many_runs_a_figure_is_the_worst(sides, said):
-    assert worst_of([{"side": name, "dp_MPa": 1.0 + n} for name, count in sides.items() for n in range(count)]) == said
+    one = PressureResult(
+        side="positive", dp_MPa=1.0, dead_zone_opening=0.5, dead_zone_closing=0.5, residual_opening=0.1,
+        residual_closing=0.1, q_zero_L_min=0.0, q_zero_without_beta_L_min=0.0, q_max_direct_L_min=1.0, q_max_L_min=1.0,
+    )  # fmt: skip
+    runs = [replace(one, side=side, dp_MPa=1.0 + n) for side, count in sides.items() for n in range(count)]
+    assert worst_of(runs) == said

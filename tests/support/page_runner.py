@@ -96,3 +96,20 @@ def with_outputs(text: str, outputs: dict[str, str]) -> str:
         return "```console\n" + "\n".join(line for line in lines if line) + "\n```"
 
     return BLOCK.sub(block, text)
+
+
+def try_page(page: Path, folder: Path, update: bool) -> list[str]:
+    """Run a page's commands in a folder; return what differs. With `update` the page is written anew instead."""
+    text = page.read_text(encoding="utf-8")
+    wrong: list[str] = []
+    outputs: dict[str, str] = {}
+    for command in commands_of(text):
+        status, printed = run(command, folder)
+        outputs[command.shown] = printed
+        if status != command.status:
+            wrong.append(f"{command.shown}\nexit status {status}, the page says {command.status}\n{printed}")
+        elif not agrees(command.output, printed) and not (update and not leaves_out(command.output)):
+            wrong.append(f"{command.shown}\nthe page shows\n{command.output}\nprinted was\n{printed}")
+    if update:
+        page.write_text(with_outputs(text, outputs), encoding="utf-8")
+    return wrong

@@ -7,7 +7,7 @@ from typing import Any
 
 import msgspec
 
-from dzdesign.core.artefact_types import Artefact, schema_of
+from dzdesign.core.artefact_types import Artefact, JsonText, schema_of
 
 #: Node of a JSON Schema.
 Node = dict[str, Any]
@@ -142,6 +142,8 @@ def _resolved(node: Node, schema: Node) -> Node:
 def _schema_of_other_types(kind: type) -> Node:
     if kind is Fraction:
         return dict(FRACTION)
+    if issubclass(kind, JsonText):
+        return {"type": "string"}
     raise NotImplementedError  # msgspec then names the type
 
 

@@ -18,6 +18,7 @@ Examples
 b'{\\n "schema": "dzdesign.supply/1"'
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields
 from fractions import Fraction
@@ -65,6 +66,14 @@ class Artefact:
     schema: Annotated[str, Meta(description="Name and version of this schema.")]
     tool: Annotated[Tool, Meta(description="The program that wrote the file.")]
     made_from: Annotated[tuple[SourceFile, ...], Meta(description="The files that it was made from.")]
+
+
+class JsonText(ABC):
+    """A value that stands in a file as text, such as a formula; it is written only, never read back."""
+
+    @abstractmethod
+    def json_text(self) -> str:
+        """Return the text."""
 
 
 def quantity(
@@ -136,6 +145,8 @@ def _encoded(value: object) -> object:
     """Write what JSON has no type for."""
     if isinstance(value, Fraction):
         return [value.numerator, value.denominator]
+    if isinstance(value, JsonText):
+        return value.json_text()
     if isinstance(value, Mapping):  # one that is read-only
         return dict(value)
     raise TypeError(f"an artefact holds {quoted(value)} of type {type(value).__name__}, which can't be written")

@@ -23,9 +23,9 @@ SCHEMAS: Mapping[str, tuple[str, str, str]] = MappingProxyType(
         "evidence": ("dzdesign.verify.evidence:Evidence", "verification.json", "verify"),
         "assessment": ("dzdesign.assess.assessment:Assessment", "assessment.json", "assess"),
         "batch": ("dzdesign.report.lot.summary:LotSummary", "batch.json", "batch"),
-        "reproduction": ("dzdesign.reproduce", "reproduction.json", "reproduce"),
+        "reproduction": ("dzdesign.report.reproduction:Reproduction", "reproduction.json", "reproduce"),
         "derivation": (
-            "dzdesign.derivation.presentation.derivation_file:DerivationFile",
+            "dzdesign.derivation.presentation.content:DerivationReport",
             "derivation.json",
             "derive --format json",
         ),

@@ -11,7 +11,7 @@ from typing import Any
 from dzdesign.assess.assessment import Assessment
 from dzdesign.core.artefact_files import MANIFEST_NAME, TOOL, parse_document, sha256_of
 from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.core.artefact_types import Artefact, SourceFile, schema_of, to_json_bytes
+from dzdesign.core.artefact_types import THIS_TOOL, Artefact, SourceFile, schema_of, to_json_bytes
 from dzdesign.core.documents import written_by
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
@@ -35,8 +35,8 @@ class Kind:
     read: Callable[[bytes, str], Any]
 
     @property
-    def command(self) -> str:
-        """The command that makes it, if a chain lacks something without it."""
+    def command(self) -> str | None:
+        """The command that makes it; None of what no chain lacks."""
         return written_by(self.schema)
 
 
@@ -309,7 +309,7 @@ class _Search:
         return min((name for name, digest in self.hashes.items() if digest == stated), key=preferred, default=None)
 
     def _first(self, role: str) -> str | None:
-        """Return the first file of a kind; a manifest has the schema of what it lists, and is one of a firmware only."""
+        """Return the first file of a kind; a manifest, which has the schema of what it lists, is of firmware only."""
         for name, content in self.files.items():
             is_manifest = name.rpartition("/")[2] == MANIFEST_NAME
             if is_of(content, KINDS[role].schema) and (role == "firmware" or not is_manifest):
@@ -346,6 +346,9 @@ class _Search:
         self.places[role] = _place(name, self.hashes[name], self.found[role])
 
 
-def _place(name: str, sha256: str, artefact: Artefact) -> Place:
+def _place(name: str, sha256: str, artefact: Artefact | Compensator) -> Place:
+    if isinstance(artefact, Compensator):
+        source = SourceFile(source="valve.json", sha256=artefact.valve_sha256)
+        return Place(name=name, sha256=sha256, made_by=f"{THIS_TOOL.name} {THIS_TOOL.version}", made_from=(source,))
     tool = artefact.tool
     return Place(name=name, sha256=sha256, made_by=f"{tool.name} {tool.version}", made_from=artefact.made_from)

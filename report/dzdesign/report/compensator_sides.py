@@ -1,8 +1,9 @@
 """Both sides of a compensator by their names, and the valve it holds."""
 
+from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.design.compensator import Compensator, SideLaw
+from dzdesign.design.compensator_file import compensator_document
 from dzdesign.identify.valve.model import ValveModel
-from dzdesign.identify.valve.valve_file import valve_from_document
 
 SIGNS = {"positive": 1, "negative": -1}
 
@@ -15,10 +16,9 @@ def laws_of(compensator: Compensator | None) -> dict[str, SideLaw]:
 
 def valve_in(compensator: Compensator) -> ValveModel:
     """Return the valve that it was designed from."""
-    return valve_from_document(compensator.valve_document.encode(), "compensator.json: valve")
+    return read_artefact(compensator.valve_document.encode(), ValveModel, "compensator.json: valve")
 
 
-def code_MPa(compensator: Compensator) -> float:
-    """Return the pressure drop of one code, MPa."""
-    sensor = compensator.signals.pressure_a
-    return float(sensor.span_MPa) / (sensor.full_code - sensor.zero_code)
+def lot_sha256(compensator: Compensator) -> str:
+    """Return the hash of the valves of a lot setting."""
+    return str(compensator_document(compensator)["lot_sha256"])

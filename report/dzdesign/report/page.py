@@ -105,7 +105,7 @@ def render_page(
         autoescape=True,
     )
     environment.filters.update(data_uri=data_uri, anchor=anchor, words=_words, cell=_cell)
-    return environment.get_template("report.html.jinja").render(
+    html: str = environment.get_template("report.html.jinja").render(
         title=title,
         tool=TOOL,
         verdict=verdict,
@@ -119,6 +119,7 @@ def render_page(
         lot=lot,
         carrier=carrier,
     )
+    return html
 
 
 def _words(text: str) -> "markupsafe.Markup":

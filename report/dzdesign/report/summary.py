@@ -1,21 +1,17 @@
 """What the report leads with: the verdict, and the few numbers that matter."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from fractions import Fraction
-from typing import Any
 
 from dzdesign.core.units import span_MPa
 from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED
+from dzdesign.design.compensator import Compensator
+from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.artefact_chain import Chain
+from dzdesign.report.compensator_sides import laws_of
 from dzdesign.report.sections.cells import counted, whole
+from dzdesign.verify.evidence import Check, Evidence, InputCheck, PressureResult
 from dzdesign.verify.requirements import not_tried
-
-#: What the check of the inputs counts, each of which a requirement has to say.
-COUNTS = (
-    *("wrong", "out_of_range", "not_monotone_in_u", "not_monotone_in_dp", "over_compensated", "odd_pairs"),
-    *("bad_fallbacks", "bad_status", "bad_betas"),
-)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,6 +39,11 @@ class Headline:
     untried: tuple[str, ...] = ()
     cautions: tuple[str, ...] = ()
 
+    @property
+    def holds(self) -> bool | None:
+        """None where something was not checked, or is not there."""
+        return {"good": True, "bad": False}.get(self.kind)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Figure:
@@ -55,139 +56,121 @@ class Figure:
 
 
 def headline(chain: Chain) -> Headline:
-    """Return the verdict on a chain: good only if every requirement was checked and holds, and every file fits.
-
-    Parameters
-    ----------
-    chain : Chain
-    """
-    evidence = chain.document("verification")
-    untried = not_tried(chain.evidence()) if evidence and not chain.faults else ()
+    """Return the verdict on a chain: good only if every requirement was checked and holds, and every file fits."""
+    untried = not_tried(chain.evidence) if chain.evidence and not chain.faults else ()
     return replace(_verdict(chain), cautions=tuple(_cautions(chain)), untried=untried)
 
 
 def _cautions(chain: Chain) -> Iterator[str]:
     """Say what a verdict does not speak of: a machine's own valve, and a side without a law."""
-    valve, compensator = chain.document("valve"), chain.document("compensator")
-    for cost in dict.fromkeys(compensator["costs"] if compensator else ()):
+    valve, compensator = chain.valve, chain.compensator
+    for cost in dict.fromkeys(compensator.costs if compensator else ()):
         if cost.startswith("accepted, "):
             yield f"ACCEPTED warning, {cost.removeprefix('accepted, ')}."
-    if valve and any(warning["code"] == "simulated" for warning in valve["warnings"]):
+    if valve and any(warning.code == "simulated" for warning in valve.warnings):
         yield "SIMULATED recordings: this is an example, not of a measured valve."
     if valve and compensator:
-        for name in valve["sides"]:
-            if not compensator["sides"].get(name):
-                yield f"The {name} side was identified, and is NOT in this firmware: its command has one sign."
+        for name in valve.sides.keys() - laws_of(compensator).keys():
+            yield f"The {name} side was identified, and is NOT in this firmware: its command has one sign."
 
 
 def _verdict(chain: Chain) -> Headline:
-    evidence = chain.document("verification")
+    evidence = chain.evidence
     if chain.faults:
         return Headline(
             kind="bad", sign="✗", text="THE FILES DO NOT BELONG TOGETHER. No verdict stands.", reasons=chain.faults
         )
-    counted = sum(each.get(key, 0) for each in evidence["inputs"] for key in COUNTS) if evidence else 0
-    if counted and all(check["holds"] is not False for check in evidence["checks"]):
-        return Headline(
-            kind="bad",
-            sign="✗",
-            text=f"THE EVIDENCE CONTRADICTS ITSELF: {whole(counted)} faults counted, and every check holds",
-        )
     if evidence is None:
-        return Headline(
-            kind="open",
-            sign="?",
-            text="NOT VERIFIED: there is no evidence here, only a design"
-            if "compensator" in chain.artefacts
-            else "NOT VERIFIED: there is no evidence here, only an identified valve",
-        )
-    checks = [*evidence["checks"], *_limits(chain)]
-    missed = [check for check in checks if check["holds"] is False]
-    unknown = [check for check in checks if check["holds"] is None]
+        what = "a design" if chain.compensator else "an identified valve"
+        return Headline(kind="open", sign="?", text=f"NOT VERIFIED: there is no evidence here, only {what}")
+    faults = sum(each.faults for each in evidence.inputs)
+    if faults and all(check.holds is not False for check in evidence.checks):
+        text = f"THE EVIDENCE CONTRADICTS ITSELF: {whole(faults)} faults counted, and every check holds"
+        return Headline(kind="bad", sign="✗", text=text)
+    return _judged([*evidence.checks, *_limits(chain)])
+
+
+def _judged(checks: Sequence[Check]) -> Headline:
+    """Return the verdict on requirements."""
+    missed = [check for check in checks if check.holds is False]
+    unknown = [check for check in checks if check.holds is None]
     reasons = tuple(
-        f"{word}: {check['name']}: {check['text']}"
+        f"{word}: {check.name}: {check.text}"
         for word, group in ((DOES_NOT_HOLD, missed), (NOT_CHECKED, unknown))
         for check in group
     )
     if missed:
         text = f"{DOES_NOT_HOLD}: {len(missed)} of {len(checks)} requirements not met"
         return Headline(kind="bad", sign="✗", text=text, reasons=reasons)
-    if unknown or not checks or not evidence["holds"]:
+    if unknown:
         text = f"{NOT_CHECKED} in full: {len(unknown)} of {len(checks)} requirements are open"
         return Headline(kind="open", sign="?", text=text, reasons=reasons)
-    text = f"Every requirement holds, all {len(checks)} that were tried"
-    return Headline(kind="good", sign="✓", text=text)
+    return Headline(kind="good", sign="✓", text=f"Every requirement holds, all {len(checks)} that were tried")
 
 
-def _limits(chain: Chain) -> list[dict[str, Any]]:
+def _limits(chain: Chain) -> list[Check]:
     """Return the user's limits on recordings as requirements, if there are any."""
-    assessment = chain.document("assessment")
-    if assessment is None:
-        return []
     return [
-        {"name": f"limit of {each['quantity']}, {each['place']}", "holds": each["holds"], "text": each["text"]}
-        for each in assessment["limits"]
+        Check(id="limit", name=f"limit of {each.quantity}, {each.place}", holds=each.holds, text=each.text)
+        for each in (chain.assessment.limits if chain.assessment else ())
     ]
 
 
 def key_figures(chain: Chain) -> tuple[Figure, ...]:
-    """Return the numbers that matter; what they are read from decides which of them there are.
-
-    Parameters
-    ----------
-    chain : Chain
-    """
-    evidence, compensator = chain.document("verification"), chain.document("compensator")
+    """Return the numbers that matter; what they are read from decides which of them there are."""
+    evidence = chain.evidence
+    inputs = evidence.inputs if evidence else ()
+    loops = evidence.closed_loop.pressures if evidence else ()
     figures: list[Figure] = []
-    loops = evidence["closed_loop"]["pressures"] if evidence else []
     if loops:
-        for word in ("opening", "closing"):
-            figures.append(_dead_zone(loops, word))
-        figures.append(_at_zero(loops))
-    valve = chain.document("valve")
-    if not loops and valve:
-        figures.append(_threshold(valve))
-    if compensator:
-        figures.append(_certificate(compensator, evidence["inputs"] if evidence else []))
+        figures += [
+            _dead_zone(
+                loops, "opening", [each.dead_zone_opening for each in loops], [each.residual_opening for each in loops]
+            ),
+            _dead_zone(
+                loops, "closing", [each.dead_zone_closing for each in loops], [each.residual_closing for each in loops]
+            ),
+            _at_zero(loops),
+        ]
+    elif chain.valve:
+        figures.append(_threshold(chain.valve))
+    if chain.compensator:
+        figures.append(_certificate(chain.compensator, inputs))
     if evidence:
-        figures.append(_inputs(evidence["inputs"]))
+        figures.append(_inputs(evidence))
     return tuple(figures)
 
 
-def _dead_zone(loops: list[dict[str, Any]], word: str) -> Figure:
-    before = [100 * each[f"dead_zone_{word}"] for each in loops]
-    after = [100 * each[f"residual_{word}"] for each in loops]
+def _dead_zone(
+    loops: Sequence[PressureResult], branch: str, without: Sequence[float], residual: Sequence[float]
+) -> Figure:
+    before, after, least = 100 * max(without), 100 * max(residual), 100 * min(residual)
     return Figure(
-        label=f"Dead zone on {word}",
-        value=f"{max(before):.1f} % → {max(after):.1f} %",
+        label=f"Dead zone on {branch}",
+        value=f"{before:.1f} % → {after:.1f} %",
         note=f"of command, without → with; {worst_of(loops)}"
-        + (f". With: {min(after):.1f} to {max(after):.1f} %" if len(loops) > 1 else ""),
+        + (f". With: {least:.1f} to {after:.1f} %" if len(loops) > 1 else ""),
     )
 
 
-def worst_of(loops: list[dict[str, Any]]) -> str:
-    """Say of how many runs a figure is the worst: of two sides the pressure drops of each.
-
-    Parameters
-    ----------
-    loops : list of dict
-        Of verification.json.
-    """
-    sides = dict.fromkeys(each["side"] for each in loops)
-    counts = {name: sum(each["side"] == name for each in loops) for name in sides}
+def worst_of(loops: Sequence[PressureResult]) -> str:
+    """Say of how many runs a figure is the worst: of two sides the pressure drops of each."""
+    counts: dict[str, int] = {}
+    for each in loops:
+        counts[each.side] = counts.get(each.side, 0) + 1
     if len(set(counts.values())) > 1:
         return "the worst of " + " and ".join(f"{counted(n, 'pressure drop')} {name}" for name, n in counts.items())
     count = next(iter(counts.values()))
-    if count == 1:
-        where = f"at {loops[0]['dp_MPa']:.2f} MPa, the one pressure drop tested" if len(sides) == 1 else ""
-        return where or "the worse of both sides, each at one pressure drop"
-    return f"the worst of {count} pressure drops" + (f" on each of {len(sides)} sides" if len(sides) > 1 else "")
+    if count > 1:
+        return f"the worst of {count} pressure drops" + (f" on each of {len(counts)} sides" if len(counts) > 1 else "")
+    if len(counts) > 1:
+        return "the worse of both sides, each at one pressure drop"
+    return f"at {loops[0].dp_MPa:.2f} MPa, the one pressure drop tested"
 
 
-def _at_zero(loops: list[dict[str, Any]]) -> Figure:
-    worst = max(loops, key=lambda each: each["q_zero_L_min"])
-    flow = worst["q_zero_L_min"]
-    bare = max(each["q_zero_without_beta_L_min"] for each in loops)
+def _at_zero(loops: Sequence[PressureResult]) -> Figure:
+    flow = max(each.q_zero_L_min for each in loops)
+    bare = max(each.q_zero_without_beta_L_min for each in loops)
     return Figure(
         label="Flow at zero command",
         value="none" if flow <= 1e-9 else f"{flow:.3g} L/min",
@@ -196,57 +179,48 @@ def _at_zero(loops: list[dict[str, Any]]) -> Figure:
     )
 
 
-def _threshold(valve: dict[str, Any]) -> Figure:
-    name, side = next(iter(valve["sides"].items()))
-    opens = [test["u_knee_rising_V"] or test["u_guard_V"] for test in side["tests"]]
-    share = 100 / valve["u_max_V"]
+def _threshold(valve: ValveModel) -> Figure:
+    name, side = next(iter(valve.sides.items()))
+    opens = [100 * (test.u_knee_rising_V or test.u_guard_V) / valve.u_max_V for test in side.tests]
+    span = f"; {min(opens):.1f} to {max(opens):.1f} % over {len(opens)} pressure drops"
     return Figure(
         label="Dead zone of the valve",
-        value=f"{share * max(opens):.1f} %",
-        note=f"of {valve['u_max_V']:g} V, on opening, {name} commands"
-        + (
-            f"; {share * min(opens):.1f} to {share * max(opens):.1f} % over {len(opens)} pressure drops"
-            if len(opens) > 1
-            else ", at one pressure drop"
-        ),
+        value=f"{max(opens):.1f} %",
+        note=f"of {valve.u_max_V:g} V, on opening, {name} commands"
+        + (span if len(opens) > 1 else ", at one pressure drop"),
     )
 
 
-def _certificate(compensator: dict[str, Any], inputs: list[dict[str, Any]]) -> Figure:
-    sides = [side for side in compensator["sides"].values() if side]
-    worst = min(sides, key=lambda side: Fraction(*side["certificate"]["smallest_margin_V"]))["certificate"]
-    low, high = (float(Fraction(*end)) for end in worst["dp_MPa"])
-    margin = 1e3 * float(Fraction(*worst["smallest_margin_V"]))
-    exceeded = sum(each["over_compensated"] for each in inputs)
-    least = min((1e3 * each["smallest_margin_V"] for each in inputs), default=margin)
-    if exceeded:
+def _certificate(compensator: Compensator, inputs: Sequence[InputCheck]) -> Figure:
+    worst = min((law.certificate for law in laws_of(compensator).values()), key=lambda one: one.smallest_margin_V)
+    low, high = map(float, worst.dp_MPa)
+    least = min((1e3 * each.smallest_margin_V for each in inputs), default=0.0)
+    if exceeded := sum(each.over_compensated for each in inputs):
         return Figure(
             label="Certificate",
             value="EXCEEDED",
             note=f"at {whole(exceeded)} pressure codes the C drives the valve at zero command above the "
-            f"{worst['guard']} threshold's {100 * worst['confidence']:g} % bound, by up to {-least:.2f} mV",
+            f"{worst.guard} threshold's {100 * worst.confidence:g} % bound, by up to {-least:.2f} mV",
             kind="bad",
         )
     return Figure(
         label="Certificate",
-        value=f"{100 * worst['confidence']:g} %",
-        note=f"confidence that the drive at zero command stays below the {worst['guard']} threshold "
-        f"{span_MPa(low, high)}; smallest margin {margin:.3f} mV of the exact law under the certified offset, half a "
-        "count kept for the rounding"
+        value=f"{100 * worst.confidence:g} %",
+        note=f"confidence that the drive at zero command stays below the {worst.guard} threshold "
+        f"{span_MPa(low, high)}; smallest margin {1e3 * float(worst.smallest_margin_V):.3f} mV of the exact law under "
+        "the certified offset, half a count kept for the rounding"
         + (f"; {least:.3f} mV of the C's compare values under the threshold's bound" if inputs else "")
-        + f". Flow below {worst['level_L_min']:.2f} L/min counts as none",
+        + f". Flow below {worst.level_L_min:.2f} L/min counts as none",
     )
 
 
-def _inputs(inputs: list[dict[str, Any]]) -> Figure:
-    if not inputs:
+def _inputs(evidence: Evidence) -> Figure:
+    if not evidence.inputs:
         return Figure(label="Inputs checked", value=NOT_CHECKED, note="the C did not get so far", kind="open")
-    wrong, every = (sum(each[key] for each in inputs) for key in ("wrong", "inputs"))
+    wrong, every = sum(each.wrong for each in evidence.inputs), sum(each.inputs for each in evidence.inputs)
+    pairs = "pairs of command and pressure-difference code"
     if wrong:
-        note = f"of {whole(every)} pairs of command and pressure-difference code"
-        return Figure(label="Inputs checked", value=f"{whole(wrong)} wrong", note=note, kind="bad")
-    return Figure(
-        label="Inputs checked",
-        value=whole(every),
-        note="pairs of command and pressure-difference code, none wrong",
-    )
+        return Figure(
+            label="Inputs checked", value=f"{whole(wrong)} wrong", note=f"of {whole(every)} {pairs}", kind="bad"
+        )
+    return Figure(label="Inputs checked", value=whole(every), note=f"{pairs}, none wrong")

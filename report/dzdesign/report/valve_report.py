@@ -1,21 +1,42 @@
 """report.html: one page, from the verdict to the hashes, of whatever artefacts there are."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from dzdesign.identify.valve.model import SCHEMA as VALVE_SCHEMA
+from dzdesign.core.artefact_types import schema_of
+from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.artefact_chain import Chain, chain_of
-from dzdesign.report.artefact_folder import is_of, places_of, shelf_of
-from dzdesign.report.body import SECTIONS, sections_of
+from dzdesign.report.artefact_folder import asked_prefixes, is_of, read_artefact_folder
 from dzdesign.report.figures.figure import figure_style
-from dzdesign.report.page import render_page
+from dzdesign.report.page import Section, render_page
+from dzdesign.report.sections.acceptance import acceptance_section
+from dzdesign.report.sections.compensator import integers_section, law_section
+from dzdesign.report.sections.evidence import checks_section, inputs_section, loop_section
 from dzdesign.report.sections.law import account_of
-from dzdesign.report.sections.lot_setting import SECTION as LOT_SECTION
-from dzdesign.report.sections.lot_setting import carrier_of, common_count, lot_figures
+from dzdesign.report.sections.lot_setting import carrier_of, lot_figures, lot_section
+from dzdesign.report.sections.provenance import provenance_section, warnings_section
+from dzdesign.report.sections.valve import valve_sections
 from dzdesign.report.summary import headline, key_figures
 
 REPORT_NAME = "report.html"
+#: Anchor and heading of every section, in their order; the first is of a lot setting alone.
+SECTIONS = (
+    ("lot", "The lot"),
+    ("data", "Data and fit"),
+    ("thresholds", "Thresholds"),
+    ("beta", "β over the pressure drop"),
+    ("law", "The law and where it comes from"),
+    ("integers", "The integers and their error"),
+    ("inputs", "Every input"),
+    ("loop", "Closed loop"),
+    ("acceptance", "Acceptance"),
+    ("checks", "All requirements"),
+    ("warnings", "Warnings, and what is not covered"),
+    ("provenance", "Provenance"),
+)
+#: Of a lot setting, these are of the one valve that its file holds.
+OF_A_VALVE = ("data", "thresholds", "beta", "loop")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,7 +78,7 @@ def report_of_folder(folder: Path) -> Report:
     InputError
         If there is nothing to report, or an artefact is none.
     """
-    return make_report(chain_of(shelf_of(folder), own=places_of(folder)))
+    return make_report(chain_of(read_artefact_folder(folder), asked=asked_prefixes(folder)))
 
 
 def with_report(files: Mapping[str, str | bytes], firmware: Path, output: Path) -> dict[str, str | bytes]:
@@ -82,63 +103,73 @@ def with_report(files: Mapping[str, str | bytes], firmware: Path, output: Path) 
         f"{name}/{file}": content.encode() if isinstance(content, str) else content
         for file, content in files.items()
     }
-    around = shelf_of(firmware)
+    around = read_artefact_folder(firmware)
     compensator = around.get(f"{place}/compensator.json")
     used = {
         file: content
         for file, content in around.items()
-        if file.startswith(f"{place}/") or content == compensator or is_of(content, VALVE_SCHEMA)
+        if not file.startswith(f"{name}/")
+        and (file.startswith(f"{place}/") or content == compensator or is_of(content, schema_of(ValveModel)))
     }
-    kept = {file: content for file, content in used.items() if not file.startswith(f"{name}/")}
-    chain = chain_of(new | kept, own=(f"{name}/", f"{place}/"), sealed=False)
+    chain = chain_of(new | used, asked=(f"{name}/", f"{place}/"), sealed=False)
     return {**files, REPORT_NAME: make_report(chain).html}
 
 
 def make_report(chain: Chain) -> Report:
-    """Make the report of a chain of artefacts.
-
-    Parameters
-    ----------
-    chain : Chain
-        Of `chain_of`.
-    """
-    verdict = headline(chain)
-    compensator = chain.document("compensator")
+    """Make the report of a chain of artefacts."""
+    verdict, compensator = headline(chain), chain.compensator
     lot, figures = lot_figures(chain), key_figures(chain)
-    if lot and chain.document("verification"):  # the last of them, the inputs, is of the C and not of a valve
+    if lot and chain.evidence:  # the last of them, the inputs, is of the C and not of a valve
         lot, figures = (*lot, figures[-1]), figures[:-1]
     with figure_style():
-        sections = sections_of(chain)
+        sections = _sections(chain)
     html = render_page(
         title=_title(chain),
         verdict=verdict,
-        record=_record(chain),
+        record=tuple(chain.valve.record.items()) if chain.valve else (),
         figures=figures,
         lot=lot,
-        carrier=carrier_of(compensator) if common_count(compensator) and compensator else "",
-        headings=[(name, heading) for name, heading in (LOT_SECTION, *SECTIONS) if name in sections],
+        carrier=carrier_of(compensator) if compensator and compensator.common_valves else "",
+        headings=[(name, heading) for name, heading in SECTIONS if name in sections],
         sections=sections,
         missing=chain.missing,
-        law=account_of(compensator["law"]) if compensator else None,
+        law=account_of(compensator.law_name) if compensator else None,
     )
-    holds = {"good": True, "bad": False, "open": None}[verdict.kind]
     return Report(
-        html=html, kind=verdict.kind, holds=holds, verdict=verdict.text, faults=chain.faults, missing=chain.missing
+        html=html,
+        kind=verdict.kind,
+        holds=verdict.holds,
+        verdict=verdict.text,
+        faults=chain.faults,
+        missing=chain.missing,
     )
 
 
-def _record(chain: Chain) -> tuple[tuple[str, str], ...]:
-    """Return who and what, as valve.json has it: the engineer's words, escaped by the template as all others."""
-    valve = chain.document("valve")
-    return tuple(valve.get("record", {}).items()) if valve else ()
+def _sections(chain: Chain) -> dict[str, Section]:
+    """Return every section by its anchor."""
+    compensator = chain.compensator
+    sections = {
+        **valve_sections(chain.valve, compensator),
+        "law": law_section(compensator),
+        "integers": integers_section(chain.firmware, compensator),
+        "inputs": inputs_section(chain),
+        "loop": loop_section(chain),
+        "acceptance": acceptance_section(chain.assessment, chain.reproduction),
+        "checks": checks_section(chain.evidence),
+        "warnings": warnings_section(chain.valve, compensator),
+        "provenance": provenance_section(chain),
+    }
+    if compensator and compensator.common_valves:
+        sections |= {name: replace(sections[name], of_valve=True) for name in OF_A_VALVE}
+        sections["lot"] = lot_section(compensator)
+    return sections
 
 
 def _title(chain: Chain) -> str:
-    firmware, valve = chain.document("firmware"), chain.document("valve")
-    count = common_count(chain.document("compensator"))
-    what = f"Common setting of {count} valves: dead-zone compensator" if count else "Dead-zone compensator"
-    if firmware:
-        return f"{what} for {firmware['target']}, law “{firmware['law']}”"
-    if "compensator" in chain.artefacts:
+    count = chain.compensator.common_valves if chain.compensator else 0
+    what = f"Lot setting of {count} valves: dead-zone compensator" if count else "Dead-zone compensator"
+    if chain.firmware:
+        return f"{what} for {chain.firmware.target}, law “{chain.firmware.law}”"
+    if chain.compensator:
         return what
-    return "Valve, identified from ramp tests" if valve else "Evidence of a dead-zone compensator"
+    return "Valve, identified from ramp tests" if chain.valve else "Evidence of a dead-zone compensator"

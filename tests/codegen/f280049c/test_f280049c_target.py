@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 
 import pytest
 
+from dzdesign.codegen import c2000
 from dzdesign.codegen.banner import Banner
 from dzdesign.codegen.f280049c import target as f280049c
 from dzdesign.codegen.f280049c.target import TARGET
@@ -270,7 +271,8 @@ def test_numbers_follow_from_the_engineering_quantities():
     ],
 )
 def test_a_quantity_that_does_not_fit_is_refused(monkeypatch, name, value, said):
-    monkeypatch.setattr(f280049c, name, value)
+    for module in (c2000, f280049c):
+        monkeypatch.setattr(module, name, value, raising=False)
     with pytest.raises(DzdesignError, match=said):
         f280049c.timing()
         f280049c.converter()

@@ -28,7 +28,7 @@ from dzdesign.design.beta_table import DECIMALS
 from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.design.lot_setting import common_setting
 from dzdesign.report.artefact_chain import chain_of
-from dzdesign.report.artefact_folder import shelf_of
+from dzdesign.report.artefact_folder import read_artefact_folder
 from dzdesign.report.lot.valve_folder import read_manifest
 from tests.support.dying_work import die_over_bad
 from tests.support.synthetic import needs_compiler
@@ -109,8 +109,8 @@ def test_a_valve_of_a_batch_has_the_bytes_of_the_commands(lot, made, tmp_path, m
 def test_the_report_of_one_valve_is_of_that_valve(made):
     """Its folder has a manifest, as firmware has; what lies beside it is of other valves, not what it was made from."""
     folder = made / "valves" / "V0003"
-    chain = chain_of(shelf_of(folder))
-    hashes = {role: each.sha256 for role, each in chain.artefacts.items()}
+    chain = chain_of(read_artefact_folder(folder))
+    hashes = {role: each.sha256 for role, each in chain.places.items()}
     files = {"firmware": "firmware/manifest.json", "compensator": "compensator.json", "valve": "valve.json"}
     assert hashes == {role: sha256_of((folder / name).read_bytes()) for role, name in files.items()}
     assert not chain.faults

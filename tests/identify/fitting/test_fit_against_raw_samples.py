@@ -181,7 +181,7 @@ class Shape:
     knee: float
     sigma: float
     y_max: float
-    colour: float = 1.0
+    variance_inflation: float = 1.0
     dropped: float = 0.0
 
 

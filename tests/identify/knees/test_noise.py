@@ -69,7 +69,7 @@ def test_what_a_parabola_takes_is_what_it_takes():
         assert np.mean(left) == pytest.approx(400 - taken_by_parabola(correlation, 400), rel=0.15)
 
 
-def test_white_noise_has_no_colour():
+def test_white_noise_inflates_nothing():
     rng, u = np.random.default_rng(SEED), np.linspace(6, 8, 1750)
     residual = rng.standard_normal(u.size)
     assert variance_inflation(0.0, measure_roughness(u, residual), residual.std()) == pytest.approx(1, abs=0.1)

@@ -10,7 +10,6 @@ import pytest
 from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.design.compensator_file import compensator_document
 from dzdesign.design.designing import design
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence, compare_at_pressure
@@ -36,7 +35,7 @@ def compared(folder, side: int = 1, change=lambda compensator: compensator, **op
     write_folder(folder, firmware.files, firmware.manifest)
     name = "positive" if side > 0 else "negative"
     plant = plants_from_tests(valve().sides[name], 10.0)[3.0]
-    loop = ClosedLoop(plant, folder, compensator_document(compensator), side)
+    loop = ClosedLoop(plant, folder, compensator, side)
     return loop, compare_at_pressure(loop, 3.0, 1.0, QUICK, name)
 
 

@@ -9,7 +9,6 @@ import pytest
 
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.errors import InputError
-from dzdesign.design.compensator_file import compensator_document
 from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.plant import Plant, read_plant
 from dzdesign.verify.closed_loop.scenarios import SETTLE_S, STEP_S, Scene, run_scenarios
@@ -27,7 +26,7 @@ def plant(example_folder):
 
 
 def scene_of(folder, compensator, plant, dp_MPa=1.0, **changes) -> Scene:
-    loop = ClosedLoop(plant, folder, compensator_document(compensator))
+    loop = ClosedLoop(plant, folder, compensator)
     return Scene(
         loop=loop, plant=plant, side="positive", dp_MPa=dp_MPa, reference_MPa=1.0, tested_MPa=(0.5, 5.0), **changes
     )
@@ -80,11 +79,14 @@ def test_a_core_that_holds_its_offset_when_a_sensor_fails_leaks(firmware, exampl
     """The fallback for codes that are not sound, taken out of the C: seen at the end of a ramp, at a high pressure."""
     core = tmp_path / "fw" / "core"
     core.mkdir(parents=True)
+    names = []
     for path in (firmware / "core").iterdir():
+        names.append(path.name)
         # A difference far below what can be right is then taken for no pressure drop.
         text, count = re.subn(r"(?m)^#define REVERSE 40u", "#define REVERSE 5000u", path.read_text())
         assert count == (path.name == "dz_comp.c")
         (core / path.name).write_text(text)
+    assert "dz_comp.c" in names
     found = by_name(scene_of(core.parent, example_compensator, plant, dp_MPa=5.0))
     assert found["sensor ahead breaks, or the one behind shows full"].q_zero_L_min > 0.3
 
@@ -145,14 +147,14 @@ class TestSeries:
         assert density.std() == pytest.approx(0.02, rel=0.05)
 
     def test_without_spread_a_series_is_the_plant(self, firmware, example_compensator, plant):
-        loop = ClosedLoop(plant, firmware, compensator_document(example_compensator))
+        loop = ClosedLoop(plant, firmware, example_compensator)
         found = scatter(loop, plant, Tolerances(spreads={"preload_N": (1e-12, "uniform")}, plants=3), 5.0)
         assert found.leaking == 0
         for spread in (found.residual_opening, found.residual_closing, found.q_zero_L_min, found.q_max_L_min):
             assert spread.p01 == pytest.approx(spread.p99, abs=1e-6)
 
     def test_plants_that_open_earlier_leak_and_the_worst_is_named(self, firmware, example_compensator, plant):
-        loop = ClosedLoop(plant, firmware, compensator_document(example_compensator))
+        loop = ClosedLoop(plant, firmware, example_compensator)
         found = scatter(loop, plant, Tolerances(spreads={"preload_N": (0.02, "uniform")}, plants=20), 5.0)
         assert 0 < found.leaking < 20
         worst = found.q_zero_L_min

@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -27,6 +28,7 @@ from dzdesign.verify.exhaustive.test_vectors import (
     differences,
 )
 from dzdesign.verify.exhaustive.zero_command import pressure_drops
+from dzdesign.verify.firmware.folder import read_compensator
 from dzdesign.verify.toolchain import machines
 from dzdesign.verify.toolchain.compiled_core import CompiledCore, Findings
 from dzdesign.verify.toolchain.host_compiler import host_compiler
@@ -61,7 +63,7 @@ def full(tmp_path_factory):
 
 
 def exact_law(folder, sign: int = 1) -> ExactLaw:
-    return ExactLaw(json.loads((folder / INPUT).read_bytes()), sign)
+    return ExactLaw(read_compensator(folder), sign)
 
 
 def wrapped(core: CompiledCore, statement: str, function: str = "dz_comp") -> CompiledCore:
@@ -188,10 +190,9 @@ def test_the_layouts_are_those_of_the_header(tmp_path):
 def test_the_pairs_of_a_difference_are_those_that_make_it(full, sign):
     exact = exact_law(full, sign)
     codes = np.arange(exact.code_max + 1)
-    made, sound = (
-        exact.difference(codes[:, None], codes[None, :]),
-        exact.sound_pressures(codes[:, None], codes[None, :]),
-    )
+    made = exact.difference(codes[:, None], codes[None, :])
+    sound_a, sound_b = ((codes >= low) & (codes <= high) for low, high in (exact.a.valid_codes, exact.b.valid_codes))
+    sound = sound_a[:, None] & sound_b[None, :]
     found = differences(exact)
     counts = np.bincount(made[sound] - found.values[0], minlength=found.values.size)
     assert (counts == np.maximum(found.b_last - found.b_first + 1, 0)).all() and found.pairs == sound.sum()
@@ -205,27 +206,27 @@ def test_the_pairs_of_a_difference_are_those_that_make_it(full, sign):
 def test_the_pressure_drops_of_a_difference_are_the_extremes_over_its_pairs(full, sign):
     exact = exact_law(full, sign)
     found = differences(exact)
-    scale, least, most = pressure_drops(exact, found, [7])
-    a_MPa, b_MPa = (s["span_MPa"][0] / s["span_MPa"][1] / (s["full_code"] - s["zero_code"]) for s in (exact.a, exact.b))
-    errors = [[error[0] / error[1] for error in s["error_MPa"]] for s in (exact.a, exact.b)]
+    found_drops = pressure_drops(exact, found, [Fraction(1, 7)])
+    scale, least, most = found_drops.scale, found_drops.least, found_drops.most
+    a_MPa, b_MPa = (float(s.span_MPa) / (s.full_code - s.zero_code) for s in (exact.a, exact.b))
+    errors = [[float(error) for error in s.error_MPa] for s in (exact.a, exact.b)]
     ends = sorted(exact.turn * error for error in (errors[0][0] - errors[1][1], errors[0][1] - errors[1][0]))
     for place in np.flatnonzero(found.made)[::61]:
         b = np.arange(found.b_first[place], found.b_last[place] + 1)
         a = exact.turn * found.values[place] + found.slant[b]
-        drops = exact.turn * ((a - exact.a["zero_code"]) * a_MPa - (b - exact.b["zero_code"]) * b_MPa)
+        drops = exact.turn * ((a - exact.a.zero_code) * a_MPa - (b - exact.b.zero_code) * b_MPa)
         assert least[place] / scale == pytest.approx(drops.min() + ends[0], abs=1e-9)
         assert most[place] / scale == pytest.approx(drops.max() + ends[1], abs=1e-9)
 
 
 def test_the_steps_of_the_c_are_the_rows_of_the_reference(full):
-    """The C's quotients and remainders against `ExactLaw.rows`, which steps NumPy arrays."""
+    """The C's quotients and remainders against the law in fractions, command by command."""
     for sign in (1, -1):
         exact = exact_law(full, sign)
         prepared = PreparedInputs(exact)
-        betas = [exact.betas(int(code)) for code in prepared.differences.values[::501]]
-        rows = np.array(list(exact.rows(betas))).T
+        corners = [exact.corners(exact.betas(int(code))) for code in prepared.differences.values[::501]]
         laws, rows_of = prepared._laws(), prepared._rows()["law"][::501]
-        for row, law in zip(rows, rows_of, strict=True):
+        for ends, law in zip(corners, rows_of, strict=True):
             values, begin = [], 0
             for part, straight in enumerate(prepared._parts):
                 piece = laws[law, part]
@@ -236,7 +237,9 @@ def test_the_steps_of_the_c_are_the_rows_of_the_reference(full):
                 begin = straight.end
             for code in range(exact.code_max + 1):
                 place = code if sign > 0 else exact.code_max - code
-                assert values[place] == (row[exact.from_zero(code)] if code in exact.sound_commands else 0)
+                assert values[place] == (
+                    exact.compare_value(code, ends) if code in exact.sound_commands else 0
+                )
 
 
 def test_a_sample_has_the_corners(plain):
@@ -294,12 +297,11 @@ def test_a_machine_that_is_not_here_is_not_passed(plain, monkeypatch):
 
 def input_check_of(folder):
     """An InputCheck without running anything."""
-    document = json.loads((folder / INPUT).read_bytes())
-    prepared = PreparedInputs(ExactLaw(document, 1))
+    prepared = PreparedInputs(exact_law(folder))
     counts = [name for name, kind in Findings.__annotations__.items() if kind is int]
     at_zero = np.zeros(prepared.differences.values.size, dtype=int)
     found = Findings(outputs_hash="", object_sha256="", at_zero=at_zero, **dict.fromkeys(counts, 0))
-    return input_check(document, prepared, CompiledCore(folder), found)
+    return input_check(prepared, CompiledCore(folder), found)
 
 
 def test_the_command_line_reports_a_machine_that_is_not_here_and_does_not_hold(

@@ -7,7 +7,6 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from dzdesign.batch.summary import lacking_lines
 from dzdesign.codegen.project import generate, target_named, write_firmware
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import to_json, write_folder
@@ -21,13 +20,14 @@ from dzdesign.design.lot_setting import Designed, common_setting
 from dzdesign.design.option_texts import options_of
 from dzdesign.design.redesign_check import prove_derived
 from dzdesign.identify.identification import identify
-from dzdesign.report.artefact_chain import Artefact, Chain
+from dzdesign.report.artefact_chain import Chain
 from dzdesign.report.sections.lot_setting import lot_costs, lot_figures, lot_section
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.lot_check import check_lot, lot_checked
 from dzdesign.verify.exhaustive.test_vectors import differences
-from dzdesign.verify.exhaustive.zero_command import zero_command_margins
+from dzdesign.verify.exhaustive.zero_command import guarded_bounds, zero_command_margins
+from dzdesign.verify.firmware.folder import read_compensator
 from tests.support.synthetic import Truth, needs_compiler, synthetic_ramp
 
 KNEES = {"a": lambda dp: 5.6 - 0.05 * dp, "b": lambda dp: 5.2 + 0.03 * dp, "c": lambda dp: 5.4, "d": lambda dp: 5.5}
@@ -178,21 +178,21 @@ def test_codegen_refuses_it_in_one_line(common, tmp_path, capsys):
 def firmware_of(compensator, folder):
     made = generate(compensator, "host")
     write_folder(folder, made.files, made.manifest)
-    return folder, json.loads((folder / "compensator.json").read_bytes())
+    return folder, read_compensator(folder)
 
 
 @needs_compiler
 def test_verify_compares_the_core_with_every_valve(common, tmp_path):
-    folder, document = firmware_of(common.compensator, tmp_path / "firmware")
+    folder, compensator = firmware_of(common.compensator, tmp_path / "firmware")
     found = check_all_inputs(folder)
-    (check,) = lot_checked((found,), document)
+    (check,) = lot_checked((found,), compensator)
     assert check.holds and found.holds and found.lot.valves == 4 and found.lot.over_compensated == ()
     assert check.text.startswith("4 of 4 valves, ") and f": {found.lot.worst}, " in check.text
     assert found.lot.worst == common.worst.name  # two arguments agree, but for the rounding of one count
     assert abs(found.lot.smallest_margin_V - float(common.worst.margin_V)) <= 10 / 60000
-    lower, document = firmware_of(with_bound(common.compensator, "d", 0, -0.5), tmp_path / "lower")
+    lower, compensator = firmware_of(with_bound(common.compensator, "d", 0, -0.5), tmp_path / "lower")
     found = check_all_inputs(lower)
-    (check,) = lot_checked((found,), document)
+    (check,) = lot_checked((found,), compensator)
     assert check.holds is False and not found.holds and found.lot.over_compensated == ("d",)
     assert "1 over-compensated: d; smallest margin of the C's compare values -" in check.text
     assert "d, 1.99 MPa" in check.text
@@ -211,25 +211,28 @@ def test_the_command_fails_and_names_the_valve(common, tmp_path, capsys):
 
 def test_of_the_valve_in_the_file_it_finds_what_the_input_check_finds(document):
     """On a drive that is the law's own, and on one that is a count too high everywhere."""
-    exact = ExactLaw(document)
+    compensator = read(document)
+    carrier = next(each for each in compensator.lot if each.valve_sha256 == compensator.valve_sha256)
+    exact = ExactLaw(compensator)
     found = differences(exact)
-    betas = [exact.betas(int(value)) for value in found.values]
-    at_zero = next(exact.rows(betas))
-    carrier = next(each for each in document["lot"] if each["valve_sha256"] == document["made_from"][0]["sha256"])
-    alone = {**document, "lot": [carrier]}
+    at_zero = np.array([exact.compare_value(exact.zero, exact.corners(exact.betas(int(dp)))) for dp in found.values])
+    own = guarded_bounds(compensator, 1)
     for higher in (0, 1, 500):
-        above, margin = zero_command_margins(document, exact, found, at_zero + higher)
-        check = check_lot(alone, exact, found, at_zero + higher)
-        assert check.smallest_margin_V == float(margin) and bool(check.over_compensated) == bool(above)
+        margin, of_lot = zero_command_margins(exact, found, at_zero + higher, [own, carrier.positive])
+        assert margin == of_lot
+        check = check_lot(exact, found, at_zero + higher)
+        assert check.smallest_margin_V <= float(margin.margin_V)
+        assert (carrier.name in check.over_compensated) == bool(margin.exceeded) == (margin.margin_V < 0)
 
 
 def test_a_file_from_before_lots_were_kept_is_not_shown_to_hold(document):
-    old = {name: value for name, value in document.items() if name not in ("lot", "lot_sha256")}
-    prove_derived(read(old))
-    assert check_lot(old, ExactLaw(old), differences(ExactLaw(old)), np.zeros(1)) is None
+    old = read({name: value for name, value in document.items() if name not in ("lot", "lot_sha256")})
+    prove_derived(old)
+    exact = ExactLaw(old)
+    assert check_lot(exact, differences(exact), np.zeros(1)) is None
     (check,) = lot_checked((), old)
     assert check.holds is None and "is of 4 valves and holds the bounds of one" in check.text
-    assert lot_checked((), {**old, "common_valves": 0}) == []
+    assert lot_checked((), replace(old, common_valves=0)) == []
 
 
 # ---- which pressure drops ----
@@ -282,32 +285,6 @@ def test_a_range_that_would_be_none_without_them_and_one_that_another_side_ends(
     assert without_narrow(both, lacking_in(both)) == (frozenset(), None)
 
 
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        ({}, "about 34 mV under what a test would show, and V8 holds the common setting down: that may cost each valve "
-             "up to 0.74 % of command; record what is missing"),
-        ({"cost_percent": 0.0}, "which costs nothing, as other valves hold the common setting down"),
-        ({"cost_percent": 0.0, "coarser_V": 0.0}, "as the lot was: that costs the common setting nothing"),
-        (None, "between two tests only the lower of their bounds is known, which may hold the common setting down"),
-    ],
-)  # fmt: skip
-def test_what_lacks_between_two_tests_is_said_with_its_cost(change, said):
-    each = {"name": "V8", "side": "positive", "dp_MPa": [2.0], "narrows": change is None}
-    each |= {} if change is None else {"coarser_V": 0.034, "cost_percent": 0.74, **change}
-    # The last is of an older version, which called these two ranges different.
-    wider = [1.0, 4.0004] if change is None else None
-    (line,) = lacking_lines({"lacking": [each], "dp_MPa": [1.0003, 4.0], "dp_without_MPa": wider})
-    assert line.startswith("V8 was not tested at 2 MPa, as the lot was: ") and said in line
-    assert "without it" not in line and "holds for all" not in line
-
-
-def test_a_range_that_no_valve_would_widen_is_said_alone():
-    each = {"name": "a", "side": "positive", "dp_MPa": [4.0], "narrows": True, "coarser_V": 0.0, "cost_percent": 0.0}
-    (line,) = lacking_lines({"lacking": [each], "dp_MPa": [2.0, 2.0], "dp_without_MPa": None})
-    assert "so the common setting holds for all at 2 MPa only; record what is missing" in line
-
-
 # ---- what a reader is told ----
 
 
@@ -332,9 +309,9 @@ def test_firmware_and_report_say_first_that_they_are_of_a_lot(common, batch, tmp
     report = (evidence / "report.html").read_text(encoding="utf-8")
     lot = json.loads((evidence / "verification.json").read_bytes())["inputs"][0]["lot"]
     head = report[: report.index('<section id="lot">')]
-    assert "<h1>Common setting of 4 valves: dead-zone compensator for f28335" in head
+    assert "<h1>Lot setting of 4 valves: dead-zone compensator for f28335" in head
     assert f"Worst valve of the lot: {lot['worst']}" in head and f"{1e3 * lot['smallest_margin_V']:.3f} mV" in head
-    costs = lot_costs(document)
+    costs = lot_costs(common.compensator)
     least = min(each.least_percent for each in costs)
     assert f"{least:.1f} to {costs[0].most_percent:.1f} %" in head
     carrier = head.index(f"Of one of these valves, {common.carrier}, the carrier")
@@ -344,10 +321,10 @@ def test_firmware_and_report_say_first_that_they_are_of_a_lot(common, batch, tmp
     assert document["lot_sha256"] in report[report.index('<section id="lot">') :]
 
 
-def test_what_it_costs_a_valve_is_the_command_before_its_own_bound(document, common):
+def test_what_it_costs_a_valve_is_the_command_before_its_own_bound(common):
     """Counted anew, code by code, by the compensator's own rounding: the least command at which the drive is there."""
     compensator, signals = common.compensator, common.compensator.signals
-    costs = {each.valve: each for each in lot_costs(document)}
+    costs = {each.valve: each for each in lot_costs(common.compensator)}
     assert set(costs) == set(KNEES)
     for valve in common.compensator.lot:
         shares = []
@@ -365,9 +342,6 @@ def test_an_old_common_file_without_its_lot_says_that_it_is_not_known(document):
     compensator = read(old)
     said = generate(compensator, "host").files["core/dz_comp.h"]
     assert "LOT SETTING of 4 valves, the file does not say which." in said
-    artefacts = {
-        "compensator": Artefact(role="compensator", name="compensator.json", sha256="0" * 64, document=old),
-    }
-    first, worst, cost = lot_figures(Chain(artefacts=artefacts))
+    first, worst, cost = lot_figures(Chain(compensator=compensator))
     assert first.value == "of 4 valves" and worst.value == "NOT CHECKED" and cost.value == "not known"
-    assert "run `dzdesign batch` again" in lot_section(old).missing
+    assert "run `dzdesign batch` again" in lot_section(compensator).missing

@@ -8,9 +8,8 @@ from dzdesign.codegen.project import generate, targets
 from dzdesign.core.artefact_files import to_json, write_folder
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
-from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.design.firmware_manifest import FirmwareManifest
-from dzdesign.identify.valve.model import ValveModel
+from dzdesign.verify.firmware.folder import read_compensator
 from dzdesign.verify.firmware.manifest import manifest_follows
 from dzdesign.verify.verification import verify
 from tests.support.golden_firmware import FULL, FULL_TARGETS, GOLDENS, golden_compensator
@@ -23,11 +22,8 @@ def manifest_of(folder):
 
 def follows(folder, manifest):
     """The check of a folder under another manifest."""
-    content = (folder / "compensator.json").read_bytes()
-    compensator = compensator_from_document(content, "compensator.json")
-    valve = read_artefact(compensator.valve_document.encode(), ValveModel, "compensator.json")
     manifest = read_artefact(to_json(manifest).encode(), FirmwareManifest, "manifest.json")
-    return manifest_follows(folder, manifest, compensator, valve)
+    return manifest_follows(folder, manifest, read_compensator(folder))
 
 
 @pytest.mark.parametrize(

@@ -6,17 +6,14 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from dzdesign.core.artefact_files import MANIFEST_NAME, read_bytes, sha256_of
-from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, as_document, schema_of, to_json_bytes
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.result_display import ShownInNotebooks
-from dzdesign.design.compensator_file import compensator_from_document
-from dzdesign.identify.valve.model import ValveModel
+from dzdesign.design.compensator import Compensator
 from dzdesign.verify.closed_loop.evidence_curves import curve_files
 from dzdesign.verify.closed_loop.firmware_loop import FirmwareLoop, Watch, close_the_loop, scenes_of
 from dzdesign.verify.closed_loop.loop import LoopComparison, RampSequence
-from dzdesign.verify.closed_loop.loop_plot import plot_loops
 from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.closed_loop.tolerances import Tolerances
 from dzdesign.verify.evidence import Check, ClosedLoopResult, Evidence, InputCheck
@@ -26,7 +23,7 @@ from dzdesign.verify.exhaustive.input_map import InputMap, map_inputs
 from dzdesign.verify.exhaustive.lot_check import lot_checked
 from dzdesign.verify.firmware.compensator_checks import certificate_follows, law_follows, valve_follows
 from dzdesign.verify.firmware.compilation import board_compiles, changed_board_files, check_include, compiles_strictly
-from dzdesign.verify.firmware.folder import read_firmware_manifest
+from dzdesign.verify.firmware.folder import read_compensator, read_firmware_manifest
 from dzdesign.verify.firmware.manifest import manifest_follows
 from dzdesign.verify.firmware.unchanged_files import files_unchanged, user_files
 from dzdesign.verify.requirements import EXACT_LAW
@@ -118,38 +115,20 @@ def verify(
     folder = Path(folder)
     manifest = read_firmware_manifest(folder)
     check_include(include, manifest)
-    content = read_bytes(folder / "compensator.json", "compensator")
-    compensator = compensator_from_document(content, str(folder / "compensator.json"))  # every key that is read below
-    document = json.loads(content)
-    valve = read_artefact(compensator.valve_document.encode(), ValveModel, "compensator.json")
+    compensator = read_compensator(folder)
+    document = json.loads((folder / "compensator.json").read_bytes())
     host_compiler()
     say("compiling the core with every warning an error")
     compiles = compiles_strictly(folder, manifest)
-    checks = [files_unchanged(folder, manifest), manifest_follows(folder, manifest, compensator, valve), compiles]
-    inputs: tuple[InputCheck, ...] = ()
-    maps: tuple[InputMap, ...] = ()
-    loop = FirmwareLoop()
-    signs = compensator.signals.signs
+    core, loop = _Core(), FirmwareLoop()
     if compiles.holds:
         say("comparing every input with the exact law")
-        # A compiler's time, not ours.
-        building = ThreadPoolExecutor(1).submit(scenes_of, folder, compensator, document, valve, plant)
-        try:
-            inputs = tuple(check_all_inputs(folder, sign) for sign in signs)
-        except RequirementError as error:
-            checks.append(EXACT_LAW.check(holds=False, text=str(error)))
-    if inputs:
-        for each in inputs:
-            checks += input_checks(each, both_signs=len(inputs) > 1)
-        checks += lot_checked(inputs, document)
-        maps = tuple(map_inputs(folder, document, sign) for sign in signs)
-        checks.append(drive_follows(folder, compensator))
-        loop = close_the_loop(
-            building.result(), compensator, valve, plant, sequence or RampSequence(), tolerances, say, watch
-        )
+        building = ThreadPoolExecutor(1).submit(scenes_of, folder, compensator, plant)  # a compiler's time, not ours
+        core = _try_core(folder, compensator)
+        if core.inputs:
+            scenes = building.result()
+            loop = close_the_loop(scenes, compensator, plant, sequence or RampSequence(), tolerances, say, watch)
     board = board_compiles(folder, manifest, include)
-    checks += [*loop.checks, certificate_follows(compensator), law_follows(compensator, document)]
-    checks += [*valve_follows(folder, document), *board.checks]
     digest = sha256_of((folder / MANIFEST_NAME).read_bytes())
     evidence = Evidence(
         tool=THIS_TOOL,
@@ -158,8 +137,18 @@ def verify(
         changed_board_files=tuple(changed_board_files(folder, manifest)),
         user_files=tuple(user_files(folder, manifest)),
         board_not_compiled=board.not_compiled,
-        checks=tuple(checks),
-        inputs=inputs,
+        checks=(
+            files_unchanged(folder, manifest),
+            manifest_follows(folder, manifest, compensator),
+            compiles,
+            *core.checks,
+            *loop.checks,
+            certificate_follows(compensator),
+            law_follows(compensator, document),
+            *valve_follows(folder, document),
+            *board.checks,
+        ),
+        inputs=core.inputs,
         closed_loop=ClosedLoopResult(
             plant=plant,
             plant_source=plant_source or "made from the identified thresholds",
@@ -171,7 +160,34 @@ def verify(
         monte_carlo=loop.monte_carlo,
         mutants=None,
     )
-    return Verification(evidence=evidence, maps=maps, loops=loop.loops)
+    return Verification(evidence=evidence, maps=core.maps, loops=loop.loops)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Core:
+    """What trying the compiled core showed; nothing of it where it does not compile."""
+
+    checks: tuple[Check, ...] = ()
+    inputs: tuple[InputCheck, ...] = ()
+    maps: tuple[InputMap, ...] = ()
+
+
+def _try_core(folder: Path, compensator: Compensator) -> _Core:
+    """Compare every input with the exact law, and the drive with its model."""
+    signs = compensator.signals.signs
+    try:
+        inputs = tuple(check_all_inputs(folder, sign, compensator) for sign in signs)
+    except RequirementError as error:
+        return _Core(checks=(EXACT_LAW.check(holds=False, text=str(error)),))
+    return _Core(
+        checks=(
+            *(check for each in inputs for check in input_checks(each, both_signs=len(inputs) > 1)),
+            *lot_checked(inputs, compensator),
+            drive_follows(folder, compensator),
+        ),
+        inputs=inputs,
+        maps=tuple(map_inputs(folder, compensator, sign) for sign in signs),
+    )
 
 
 def evidence_manifest(evidence: Evidence) -> dict[str, object]:
@@ -181,9 +197,7 @@ def evidence_manifest(evidence: Evidence) -> dict[str, object]:
 
 
 def evidence_files(verification: Verification) -> dict[str, bytes]:
-    """Return the files of the evidence folder: verification.json, the plot of the closed loop, curves to draw."""
+    """Return the files of the evidence folder: verification.json, and curves to draw."""
     contents = {Evidence.FILE_NAME: to_json_bytes(verification.evidence)}
     contents |= {name: text.encode() for name, text in curve_files(verification.loops, verification.maps).items()}
-    if verification.loops:
-        contents["closed_loop.svg"] = plot_loops(verification.loops)
     return contents

@@ -5,6 +5,18 @@ Register fields and limits: SPRUI07 (technical reference manual of the TMS320x28
 
 from fractions import Fraction
 
+from dzdesign.codegen.c2000 import (
+    ADC_BITS,
+    CHANNELS,
+    ISR_DELAY_S,
+    PWM_HZ,
+    SAMPLE_HZ,
+    TOOLS,
+    exact,
+    printed,
+    pwm_timing,
+    within,
+)
 from dzdesign.codegen.target import Target
 from dzdesign.codegen.telemetry.frame import (
     CRC_OCTETS,
@@ -14,21 +26,15 @@ from dzdesign.codegen.telemetry.frame import (
     frame_context,
     line_load,
 )
-from dzdesign.core.errors import DzdesignError
 
 CRYSTAL_HZ = 30_000_000
 PLL_DIV, PLL_DIVSEL = 10, 2  # SYSCLKOUT = crystal * DIV / DIVSEL, as C2000Ware's InitSysCtrl() sets it
 SYSCLKOUT_MAX_HZ = 150_000_000
-PWM_HZ = 2_500  # section 3 of the paper
-SAMPLE_HZ = 1_250  # section 4.1 of the paper
-ISR_DELAY_S = Fraction(20, 10**6)  # from the start of conversion to the interrupt
 HISPCP, ADCCLKPS, ACQ_PS = 3, 1, 15
 ADCCLK_MAX_HZ = 25_000_000
 # SPRS439, sequential sampling mode: from the trigger to the sample window, and to the first result after it; ADCCLKs.
-ADC_TRIGGER_ADCCLKS, ADC_RESULT_ADCCLKS, ADC_CHANNELS = Fraction(5, 2), 4, 3
-SAMPLE_TIMEOUT_S = Fraction(32, 10**4)  # four sample periods
-WATCHDOG_COUNTS = 512 * 256  # OSCCLK / 512 into eight bits, WDPS = /1
-ADC_BITS, ADC_SPAN_V = 12, 3
+ADC_TRIGGER_ADCCLKS, ADC_RESULT_ADCCLKS = Fraction(5, 2), 4
+ADC_SPAN_V = 3
 LOSPCP, LSPCLK_MAX_HZ = 1, 75_000_000
 LINK = Link(tick_Hz=PWM_HZ, frame_ticks=25, baud=115_200)  # section 4.1 of the paper records at 100 Hz
 BAUD_ERROR_MAX = Fraction(2, 100)  # what a receiver bears, with as much again for its own clock
@@ -37,64 +43,6 @@ LINE_LOAD_MAX = Fraction(1, 2)
 # 8 bits take several instructions where the C28x takes one.
 FRAME_CYCLES = 6_000
 EVENT_PRESCALE = {1: "ET_1ST", 2: "ET_2ND", 3: "ET_3RD"}
-
-
-def exact(quantity: Fraction, what: str, largest: int) -> int:
-    """Return `quantity` as the integer that it must be.
-
-    Parameters
-    ----------
-    quantity
-        A number of counts or periods, exact.
-    what
-        Its name in the message.
-    largest
-        What its register holds.
-
-    Raises
-    ------
-    DzdesignError
-        If it is not an integer from 1 to `largest`.
-
-    Examples
-    --------
-    >>> exact(Fraction(150_000_000, 2_500), "counts per PWM period", 65536)
-    60000
-    """
-    if quantity.denominator != 1 or not 0 < quantity <= largest:
-        raise DzdesignError(f"f28335: {what} must be an integer from 1 to {largest}, got {quantity}")
-    return quantity.numerator
-
-
-def at_most(quantity: Fraction, limit: Fraction | int, what: str) -> Fraction:
-    """Return `quantity` if it keeps within its limit.
-
-    Parameters
-    ----------
-    quantity, limit
-        In the same unit.
-    what
-        Name and unit for the message.
-
-    Raises
-    ------
-    DzdesignError
-        If `quantity` exceeds `limit`.
-    """
-    if quantity > limit:
-        raise DzdesignError(f"f28335: {what} must be at most {float(limit):g}, got {float(quantity):g}")
-    return quantity
-
-
-def printed(quantity: Fraction) -> str:
-    """Print `quantity` for a comment: exactly if it is an integer, else with three significant digits.
-
-    Examples
-    --------
-    >>> printed(Fraction(113, 25))
-    '4.52'
-    """
-    return str(quantity.numerator) if quantity.denominator == 1 else f"{float(quantity):.3g}"
 
 
 def in_us(time_s: Fraction) -> str:
@@ -110,47 +58,30 @@ def in_us(time_s: Fraction) -> str:
 
 def timing() -> dict[str, str]:
     """Clock, PWM, interrupt and time-out figures."""
-    sysclkout_hz = at_most(Fraction(CRYSTAL_HZ * PLL_DIV, PLL_DIVSEL), SYSCLKOUT_MAX_HZ, "SYSCLKOUT in Hz")
-    # CMPA must reach period + 1 (100 % duty), so the period is limited to 65535 counts, not 65536.
-    period = exact(sysclkout_hz / PWM_HZ, "counts per PWM period", 0xFFFF)
-    delay = exact(sysclkout_hz * ISR_DELAY_S, "counts of the interrupt delay", period - 1)
-    ticks_per_sample = exact(Fraction(PWM_HZ, SAMPLE_HZ), "PWM periods per sample", max(EVENT_PRESCALE))
-    timeout = exact(SAMPLE_TIMEOUT_S * PWM_HZ, "PWM periods of the sample time-out", 0xFFFF)
-    if timeout < 2 * ticks_per_sample:
-        raise DzdesignError(f"f28335: a time-out of {timeout} PWM periods would trip on one late sample")
-    watchdog_s = Fraction(WATCHDOG_COUNTS, CRYSTAL_HZ)
-    at_most(Fraction(2, PWM_HZ), watchdog_s, "two PWM periods, in watchdog time,")
+    sysclkout_hz = within(Fraction(CRYSTAL_HZ * PLL_DIV, PLL_DIVSEL), 1, SYSCLKOUT_MAX_HZ, "SYSCLKOUT in Hz")
+    figures = pwm_timing(sysclkout_hz, CRYSTAL_HZ, max(EVENT_PRESCALE))
+    rest_s = Fraction(1, PWM_HZ) - ISR_DELAY_S
     return {
+        **figures,
         "sysclkout_mhz": printed(sysclkout_hz / 10**6),
         "crystal_mhz": printed(Fraction(CRYSTAL_HZ, 10**6)),
         "pll_div": str(PLL_DIV),
         "pll_divsel": str(PLL_DIVSEL),
-        "pwm_hz": str(PWM_HZ),
-        "sample_hz": str(SAMPLE_HZ),
-        "period_us": printed(Fraction(10**6, PWM_HZ)),
-        "compare_max": str(period),
-        "tbprd": str(period - 1),
-        "cmpb": str(delay),
-        "isr_delay_us": printed(ISR_DELAY_S * 10**6),
-        "isr_rest_us": printed(Fraction(10**6, PWM_HZ) - ISR_DELAY_S * 10**6),
-        "isr_rest_cycles": str(period - delay),
-        "ticks_per_sample": str(ticks_per_sample),
-        "soca_prescale": EVENT_PRESCALE[ticks_per_sample],
-        "sample_timeout_ticks": str(timeout),
-        "sample_timeout_ms": printed(SAMPLE_TIMEOUT_S * 1000),
-        "watchdog_ms": printed(watchdog_s * 1000),
+        "isr_rest_us": printed(rest_s * 10**6),
+        "isr_rest_cycles": printed(rest_s * sysclkout_hz),
+        "soca_prescale": EVENT_PRESCALE[int(figures["ticks_per_sample"])],
     }
 
 
 def converter() -> dict[str, str]:
     """Clock and window of the converter; the sequence must be over well before the interrupt."""
     sysclkout_hz = Fraction(CRYSTAL_HZ * PLL_DIV, PLL_DIVSEL)
-    hspclk_hz = at_most(sysclkout_hz / (2 * HISPCP), ADCCLK_MAX_HZ, "HSPCLK in Hz")
-    adcclk_hz = at_most(hspclk_hz / (2 * ADCCLKPS), ADCCLK_MAX_HZ, "ADCCLK in Hz")
+    hspclk_hz = within(sysclkout_hz / (2 * HISPCP), 1, ADCCLK_MAX_HZ, "HSPCLK in Hz")
+    adcclk_hz = within(hspclk_hz / (2 * ADCCLKPS), 1, ADCCLK_MAX_HZ, "ADCCLK in Hz")
     next_channel = ACQ_PS + 2
     held_s = (ADC_TRIGGER_ADCCLKS + ACQ_PS + 1) / adcclk_hz  # the first channel, the command: end of its window
-    results = ADC_RESULT_ADCCLKS + (ADC_CHANNELS - 1) * next_channel
-    sequence_s = at_most(held_s + results / adcclk_hz, ISR_DELAY_S / 2, "the sequence of three, in s,")
+    results = ADC_RESULT_ADCCLKS + (CHANNELS - 1) * next_channel
+    sequence_s = within(held_s + results / adcclk_hz, 0, ISR_DELAY_S / 2, "the sequence of three, in s,")
     period_s = Fraction(1, PWM_HZ)
     # The value is written before the period ends and loaded at its end; the latest falling edge is one count before
     # the next end. Between two samples the value is used once more.
@@ -179,16 +110,16 @@ def converter() -> dict[str, str]:
 def serial_line() -> dict[str, str]:
     """Clock and rate of SCI-A, and what the frames cost."""
     sysclkout_hz = Fraction(CRYSTAL_HZ * PLL_DIV, PLL_DIVSEL)
-    lspclk_hz = at_most(sysclkout_hz / (2 * LOSPCP), LSPCLK_MAX_HZ, "LSPCLK in Hz")
+    lspclk_hz = within(sysclkout_hz / (2 * LOSPCP), 1, LSPCLK_MAX_HZ, "LSPCLK in Hz")
     brr = exact(Fraction(round(lspclk_hz / (8 * LINK.baud)) - 1), "the baud register", 0xFFFF)
     baud = lspclk_hz / (8 * (brr + 1))
     error = baud / LINK.baud - 1
-    at_most(abs(error), BAUD_ERROR_MAX, "the error of the baud rate")
+    within(abs(error), 0, BAUD_ERROR_MAX, "the error of the baud rate")
     frame_hz = exact(Fraction(LINK.tick_Hz, LINK.frame_ticks), "frames a second", LINK.tick_Hz)
-    load = at_most(line_load(baud, frame_hz), LINE_LOAD_MAX, "the load of the line")
+    load = within(line_load(baud, frame_hz), 0, LINE_LOAD_MAX, "the load of the line")
     # A turn of the main loop makes one frame at most; with the interrupt's share off it must fit in a PWM period,
     # of which the watchdog allows several.
-    frame_s = at_most(FRAME_CYCLES / sysclkout_hz, Fraction(1, 4 * PWM_HZ), "the making of a frame, in s,")
+    frame_s = within(FRAME_CYCLES / sysclkout_hz, 0, Fraction(1, 4 * PWM_HZ), "the making of a frame, in s,")
     return {
         "lospcp": str(LOSPCP),
         "lspclk_mhz": printed(lspclk_hz / 10**6),
@@ -229,9 +160,7 @@ CONTEXT = {
     **converter(),
     **serial_line(),
     **frame_context(),
-    "cgt_version": "22.6.3.LTS",
-    # Where TI's Windows installer puts C2000Ware; the user changes this one line of the projectspec.
-    "c2000ware_default": "C:/ti/c2000/C2000Ware_26_01_00_00",
+    **TOOLS,
 }
 
 TARGET = Target(

@@ -1,14 +1,13 @@
 """The report as one page for a browser: MathML, no scripts, nothing loaded from elsewhere."""
 
 import re
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from html import escape
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from dzdesign.derivation.account.statement import Outcome
 from dzdesign.derivation.presentation.formulas import to_latex, to_mathml
-from dzdesign.derivation.presentation.prose import Formula, Reference, Words
-from dzdesign.derivation.presentation.text import plain
+from dzdesign.derivation.presentation.prose import Formula, Part
 from dzdesign.derivation.presentation.writer import Writer, anchor
 
 if TYPE_CHECKING:
@@ -28,8 +27,8 @@ class HtmlWriter(Writer):
     TEMPLATE = "derivation.html.jinja"
     SYNTAX: ClassVar = {"autoescape": True}
 
-    def words(self, words: Words) -> "Markup":
-        return _markup(_TIED.sub(_tie, super().words(words)))
+    def words(self, *parts: Part) -> "Markup":
+        return _markup(_TIED.sub(_tie, super().words(*parts)))
 
     def text(self, text: str) -> str:
         return escape(text)
@@ -38,7 +37,7 @@ class HtmlWriter(Writer):
         chain = " = ".join(map(to_latex, formula.sides))
         style = ' displaystyle="true"' if r"\frac" in chain else ""
         math = f"<math{style}>{to_mathml(chain)}</math>"
-        return f'<span class="long">{math}</span>' if len(plain((formula,))) > _LONG else math
+        return f'<span class="long">{math}</span>' if len(str(formula)) > _LONG else math
 
     def display(self, formula: Formula) -> "Markup":
         first, *members = (to_mathml(to_latex(side)) for side in formula.sides)
@@ -54,9 +53,6 @@ class HtmlWriter(Writer):
 
     def link(self, number: str, text: str) -> str:
         return f'<a href="#{anchor(number)}">{text}</a>'
-
-    def references(self, references: Collection[Reference], by_number: bool = False) -> "Markup":
-        return _markup(super().references(references, by_number))
 
     def filters(self) -> dict[str, Callable[..., Any]]:
         return {**super().filters(), "css": _css_class, "sign": _sign}

@@ -1,38 +1,91 @@
-"""Finds the symbols and the references in a sentence, so that a report can set them as such."""
+"""Words of a report: text with formulas and references in it, each format writing these its own way."""
 
 import re
-from collections.abc import Collection, Iterator
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Iterator
 from functools import cache
 
 import sympy
 
+from dzdesign.core.artefact_types import JsonText
+from dzdesign.derivation.presentation.formulas import to_python, to_text
 from dzdesign.derivation.symbols import QUANTITIES
 
+_KEYBOARD = str.maketrans({"−": "-", "–": "-", "≤": "<=", "≥": ">=", "→": "->", "“": '"', "”": '"'})
 
-@dataclass(frozen=True, slots=True)
-class Formula:
+
+class Formula(JsonText):
     """An expression, or a chain of equal ones, in a sentence or on a line of its own."""
 
-    sides: tuple[sympy.Basic, ...]
+    __match_args__ = ("sides",)
+
+    def __init__(self, *sides: sympy.Basic) -> None:
+        self.sides = sides
+
+    def __str__(self) -> str:
+        return " = ".join(map(to_text, self.sides))
+
+    def json_text(self) -> str:
+        return " = ".join(map(to_python, self.sides))
 
 
-@dataclass(frozen=True, slots=True)
-class Reference:
-    """A statement that a sentence points to, with the words that name it there."""
+class Reference(JsonText):
+    """A statement that a sentence points to, with the words that name it there; its number unless given."""
 
-    number: str
-    words: "Words" = ()
+    __match_args__ = ("number", "words")
+
+    def __init__(self, number: str, *words: "Part") -> None:
+        self.number = number
+        self.words = Words(*words) if words else Words(number)
+
+    def __str__(self) -> str:
+        return str(self.words)
+
+    def json_text(self) -> str:
+        return self.number
 
 
-@dataclass(frozen=True, slots=True)
-class Code:
+class Code(JsonText):
     """A word of the command line or of a file."""
 
-    text: str
+    __match_args__ = ("text",)
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+
+    def __str__(self) -> str:
+        return f"`{self.text}`"
+
+    json_text = __str__
 
 
-Words = tuple[str | Formula | Reference | Code, ...]
+class Words(JsonText):
+    """Text, formulas, references and code in a row.
+
+    Parameters
+    ----------
+    *parts : str, Formula, Reference, Code or Words
+    """
+
+    def __init__(self, *parts: "Part") -> None:
+        flat = (one for part in parts for one in (part.parts if isinstance(part, Words) else (part,)))
+        self.parts: tuple[str | Formula | Reference | Code, ...] = tuple(one for one in flat if one != "")
+
+    @classmethod
+    def join(cls, parts: "Iterable[Part]", joint: str = ", ") -> "Words":
+        """Return parts with a joint between each two."""
+        return cls(*[one for part in parts for one in (joint, part)][1:])
+
+    def __bool__(self) -> bool:
+        return bool(self.parts)
+
+    def __str__(self) -> str:
+        """Return them as ASCII text."""
+        return "".join(part.translate(_KEYBOARD) if isinstance(part, str) else str(part) for part in self.parts)
+
+    json_text = __str__
+
+
+Part = str | Formula | Reference | Code | Words
 
 #: Letters that are symbols wherever they stand alone, and those that are beside a sign only: elsewhere they are words.
 _LETTERS = ("k", "x", "f", "n", "Q", "S", "W", "beta", "gamma", "kappa", "lambda", "rho")
@@ -69,13 +122,13 @@ def parse_prose(sentence: str, numbers: Collection[str] = ()) -> Words:
 
     Examples
     --------
-    >>> parse_prose("u_min0 by (18)", ["(18)"])
-    (Formula(sides=(u_min0,)), ' by ', Reference(number='(18)', words=()))
+    >>> [type(part).__name__ for part in parse_prose("u_min0 by (18)", ["(18)"]).parts]
+    ['Formula', 'str', 'Reference']
     """
-    return tuple(_words(_with_signs(sentence), numbers))
+    return Words(*_parts(_with_signs(sentence), numbers))
 
 
-def _words(sentence: str, numbers: Collection[str]) -> Iterator[str | Formula | Reference | Code]:
+def _parts(sentence: str, numbers: Collection[str]) -> Iterator[Part]:
     by_name = {str(name): name for name in QUANTITIES}
     end = 0
     for found in _pattern().finditer(sentence):
@@ -88,7 +141,7 @@ def _words(sentence: str, numbers: Collection[str]) -> Iterator[str | Formula | 
         elif found["reference"]:
             yield Reference(found["reference"])
         else:
-            yield Formula((by_name.get(found["name"], sympy.Symbol(found["name"])),))
+            yield Formula(by_name.get(found["name"], sympy.Symbol(found["name"])))
         end = found.end()
     if end < len(sentence):
         yield sentence[end:]

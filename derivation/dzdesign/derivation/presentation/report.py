@@ -4,14 +4,15 @@ from collections.abc import Callable, Sequence
 
 from sympy.core.function import AppliedUndef
 
+from dzdesign.core.artefact_types import THIS_TOOL, to_json_bytes
 from dzdesign.core.errors import InputError, RequirementError, nearest
 from dzdesign.derivation.account.equations import PAPER_NUMBERS
 from dzdesign.derivation.account.proof import Verdict
 from dzdesign.derivation.account.statement import Outcome, Statement
 from dzdesign.derivation.account.symbol_units import print_unit
-from dzdesign.derivation.presentation.content import Content, Entry, Term
+from dzdesign.derivation.presentation.content import DerivationReport, Entry, Term
+from dzdesign.derivation.presentation.formulas import to_latex, to_python
 from dzdesign.derivation.presentation.html import HtmlWriter
-from dzdesign.derivation.presentation.json_document import write_json
 from dzdesign.derivation.presentation.latex import LatexWriter
 from dzdesign.derivation.presentation.prose import Formula, Words, parse_prose
 from dzdesign.derivation.presentation.text import TextWriter
@@ -19,11 +20,11 @@ from dzdesign.derivation.presentation.wording import describe, refer
 from dzdesign.derivation.presentation.writer import write
 from dzdesign.derivation.symbols import QUANTITIES
 
-_FORMATS: dict[str, Callable[[Content], str]] = {
-    "text": lambda content: write(TextWriter, content),
-    "json": write_json,
-    "latex": lambda content: write(LatexWriter, content),
-    "html": lambda content: write(HtmlWriter, content),
+_FORMATS: dict[str, Callable[[DerivationReport], str]] = {
+    "text": lambda report: write(TextWriter, report),
+    "json": lambda report: to_json_bytes(report).decode(),
+    "latex": lambda report: write(LatexWriter, report),
+    "html": lambda report: write(HtmlWriter, report),
 }
 FORMATS = tuple(_FORMATS)
 _COUNTED = {
@@ -139,7 +140,7 @@ def _number(text: str, numbers: dict[str, str]) -> str:
 # --- what the report says of the whole ------------------------------------------------------------------------
 
 
-def compose(verdicts: Sequence[Verdict], shown: Sequence[str]) -> Content:
+def compose(verdicts: Sequence[Verdict], shown: Sequence[str]) -> DerivationReport:
     """Say what the account found, of the statements to show.
 
     Parameters
@@ -151,69 +152,75 @@ def compose(verdicts: Sequence[Verdict], shown: Sequence[str]) -> Content:
 
     Returns
     -------
-    Content
+    DerivationReport
     """
     book = {verdict.number: verdict for verdict in verdicts}
-    entries = {number: describe(book[number], book) for number in shown}
-    sections: dict[str, list[Entry]] = {}
-    for entry in entries.values():
-        sections.setdefault(entry.verdict.statement.section, []).append(entry)
-    table = tuple(entries[number] for number in PAPER_NUMBERS if number in entries)
-    conditional = [entry for entry in entries.values() if entry.verdict.outcome is Outcome.FOLLOWS_IF]
+    entries = tuple(describe(book[number], book) for number in shown)
     partial = len(shown) < len(book)
-    return Content(
+    return DerivationReport(
+        tool=THIS_TOOL,
+        made_from=(),
         title="Derivation of the dead-zone compensation law" + (", in part" if partial else ""),
-        summary=_summary([entry.verdict for entry in entries.values()], [entry.verdict for entry in table]),
-        findings=(
-            ("What does not hold", tuple(_fault(entry) for entry in entries.values() if _is_wrong(entry.verdict))),
-            ("What holds on a condition only", tuple(_judged(entry) for entry in conditional)),
-        ),
-        table=table,
-        glossary=_glossary([entry.verdict.statement for entry in entries.values()]),
-        sections=tuple((section, tuple(members)) for section, members in sections.items()),
+        source="The paper: Wu et al. 2022, doi 10.11916/j.issn.1005-9113.20063.",
+        holds=all(entry.as_expected for entry in entries),
+        summary=_summary([book[number] for number in shown]),
+        wrong=tuple(_fault(entry) for entry in entries if _is_wrong(entry)),
+        conditional=tuple(_judged(entry) for entry in entries if entry.outcome is Outcome.FOLLOWS_IF),
+        symbols=_symbols([book[number].statement for number in shown]),
+        statements=entries,
     )
 
 
-def _glossary(statements: Sequence[Statement]) -> tuple[Term, ...]:
+def _symbols(statements: Sequence[Statement]) -> tuple[Term, ...]:
     """Explain the symbols that occur."""
     replaced = [pair for one in statements for ground in one.grounds for pair in ground.at]
     replaced += [pair for one in statements for case in one.cases for pair in case.at]
     sides = [side for one in statements for side in (one.symbol, *one.members)] + [value for _, value in replaced]
     used = set().union(*(side.free_symbols | {part.func for part in side.atoms(AppliedUndef)} for side in sides))
     names = sorted((name for name in QUANTITIES if name in used or name.func in used), key=lambda one: str(one).lower())
-    return tuple(Term(Formula((name,)), parse_prose(QUANTITIES[name].meaning), print_unit(name)) for name in names)
+    return tuple(
+        Term(
+            name=to_python(name).partition("(")[0],
+            symbol=Formula(name),
+            meaning=parse_prose(QUANTITIES[name].meaning),
+            unit=print_unit(name),
+            latex=to_latex(name),
+        )
+        for name in names
+    )
 
 
-def _summary(verdicts: Sequence[Verdict], paper: Sequence[Verdict]) -> tuple[Words, ...]:
+def _summary(verdicts: Sequence[Verdict]) -> tuple[Words, ...]:
+    paper = [verdict for verdict in verdicts if verdict.number in PAPER_NUMBERS]
     wrong = [verdict for verdict in verdicts if not verdict.as_expected]
     expected = (
         f"{len(verdicts) - len(wrong)} of {len(verdicts)} statements have the verdict expected of them, "
         "those that do not hold included"
     )
-    lines: list[Words] = [(expected + ("; these are not:" if wrong else "."),)]
+    lines = [Words(expected, "; these are not:" if wrong else ".")]
     for verdict in wrong:
         expected = f" should be found to be “{verdict.statement.expected.value}”, but: "
         unit = f"; its units: {verdict.unit_error}" if verdict.unit_error else ""
-        lines.append((refer(verdict.statement), expected, *parse_prose(verdict.words), unit, "."))
+        lines.append(Words(refer(verdict.statement), expected, parse_prose(verdict.words), unit, "."))
     if paper:
         which = f"the {len(paper)} equations" if len(paper) > 1 else "the one equation"
         counts = "; ".join(
             f"{words}: {sum(verdict.outcome is outcome for verdict in paper)}" for outcome, words in _COUNTED.items()
         )
-        lines.append((f"Of {which} of the paper shown here, {counts}.",))
+        lines.append(Words(f"Of {which} of the paper shown here, {counts}."))
     return tuple(lines)
 
 
-def _is_wrong(verdict: Verdict) -> bool:
-    return verdict.outcome is Outcome.DOES_NOT_FOLLOW or bool(verdict.statement.corrected_by)
+def _is_wrong(entry: Entry) -> bool:
+    return entry.outcome is Outcome.DOES_NOT_FOLLOW or bool(entry.corrected_by)
 
 
 def _fault(entry: Entry) -> Words:
     words = _judged(entry, otherwise="the paper's choice; it does not meet the target (16).")
     for line in entry.corrections:
-        words = (*words, " ", *line.words, *((" ", line.display) if line.display else ()))
+        words = Words(words, " ", line.words, *((" ", line.formula) if line.formula else ()))
     return words
 
 
 def _judged(entry: Entry, otherwise: str = "") -> Words:
-    return (refer(entry.verdict.statement), " ", *entry.title, ": ", *(entry.judgement or (otherwise,)))
+    return Words(entry.reference, " ", entry.title, ": ", entry.judgement or otherwise)

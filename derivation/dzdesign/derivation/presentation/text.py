@@ -13,7 +13,6 @@ from dzdesign.derivation.presentation.writer import Writer
 
 _WIDTH = 100  # columns
 _COLUMNS = (5, 45, 17, 9, 20)  # of the table of equations
-_KEYBOARD = str.maketrans({"−": "-", "–": "-", "≤": "<=", "≥": ">=", "→": "->", "“": '"', "”": '"'})
 #: Stands for a blank at which a line may not be broken.
 _FIXED = "\0"
 
@@ -24,10 +23,10 @@ class TextWriter(Writer):
     TEMPLATE = "derivation.txt.jinja"
 
     def text(self, text: str) -> str:
-        return text.translate(_KEYBOARD)
+        return str(Words(text))
 
     def formula(self, formula: Formula) -> str:
-        return _fixed(" = ".join(map(to_text, formula.sides)))
+        return _fixed(str(formula))
 
     def code(self, text: str) -> str:
         return f"`{text}`"
@@ -48,38 +47,24 @@ class TextWriter(Writer):
         return "\n".join(rows)
 
     def filters(self) -> dict[str, Callable[..., Any]]:
-        own = {"wrap": wrap, "plain": plain, "head": head, "line": self.line, "labelled": labelled}
+        own = {"wrap": wrap, "head": head, "line": self.line, "labelled": labelled}
         return {**super().filters(), **own, "equations": equations, "figures": self.figures}
 
     def line(self, line: Line, indent: str) -> str:
         """Return a sentence, and below it the formula that it leads to."""
         words = wrap(self.words(line.words), indent)
-        return words if line.display is None else f"{words}\n{self.display(line.display, 2 * indent)}"
+        return words if line.formula is None else f"{words}\n{self.display(line.formula, 2 * indent)}"
 
     def figures(self, figures: Sequence[Figure], indent: str) -> str:
         """Return our numbers beside the paper's, each with its remark below."""
         rows = [("number", "ours", "paper")]
-        rows += [(plain(one.label), one.ours, one.paper.translate(_KEYBOARD) or "-") for one in figures]
+        rows += [(str(one.label), one.ours, self.text(one.paper) or "-") for one in figures]
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
         lines = []
         for row, remark in zip(rows, ["", *(self.words(one.remark) for one in figures)], strict=True):
             lines.append(indent + _columns(row, widths, "  "))
             lines += [wrap(remark, 2 * indent)] if remark else []
         return "\n".join(lines)
-
-
-def plain(words: Words) -> str:
-    """Return words as ASCII text on one line.
-
-    Parameters
-    ----------
-    words : Words
-
-    Returns
-    -------
-    str
-    """
-    return TextWriter().words(words).replace(_FIXED, " ")
 
 
 def wrap(text: str, first: str = "", others: str | None = None) -> str:
@@ -120,7 +105,7 @@ def equations(entries: Sequence[Entry]) -> str:
     rows = [("", "title", "verdict", "corrected", "see")]
     for entry in entries:
         corrected, see = (", ".join(one.number for one in found) for found in (entry.corrected_by, entry.see))
-        rows.append((entry.number, plain(entry.title), entry.mark, corrected, see))
+        rows.append((entry.number, str(entry.title), entry.mark, corrected, see))
     lines = []
     for row in rows:
         cells = [textwrap.wrap(cell, width) or [""] for cell, width in zip(row, _COLUMNS, strict=True)]
@@ -140,7 +125,7 @@ def head(entry: Entry) -> str:
     str
     """
     room = _WIDTH - len(entry.number) - len(entry.mark) - 6
-    line = f"{entry.number}  {plain(entry.title):<{room}}  [{entry.mark}]"
+    line = f"{entry.number}  {entry.title!s:<{room}}  [{entry.mark}]"
     return line if len(line) <= _WIDTH else wrap(line)
 
 

@@ -6,14 +6,16 @@ from collections.abc import Iterator, Mapping
 import sympy
 
 from dzdesign.derivation.account.proof import CaseProof, Verdict
-from dzdesign.derivation.account.statement import Condition, Ground, Kind, Outcome, Replacements, Statement, Value
+from dzdesign.derivation.account.statement import Condition, Ground, Outcome, Replacements, Statement, Value
 from dzdesign.derivation.account.steps import Relation, Step
-from dzdesign.derivation.presentation.content import SIGNS, Derivation, Entry, Figure, Line
-from dzdesign.derivation.presentation.formulas import to_text
-from dzdesign.derivation.presentation.prose import Formula, Reference, Words, parse_prose
+from dzdesign.derivation.presentation.content import Derivation, Entry, Figure, Line, Premise
+from dzdesign.derivation.presentation.formulas import to_latex, to_text
+from dzdesign.derivation.presentation.prose import Formula, Part, Reference, Words, parse_prose
 
 _NUMBERED = re.compile(r"\(\d+[a-z]?\)|[TL]\d[a-z]?")
 _FORMS = ("first", "second", "third", "fourth")
+#: What is known of the sign of a symbol, as SymPy calls it and as the report does; the first that holds.
+_SIGNS = {"positive": "positive", "nonnegative": "zero or positive", "real": "of either sign"}
 
 
 def describe(verdict: Verdict, book: Mapping[str, Verdict]) -> Entry:
@@ -29,35 +31,43 @@ def describe(verdict: Verdict, book: Mapping[str, Verdict]) -> Entry:
     -------
     Entry
     """
-    statement = verdict.statement
+    statement, condition = verdict.statement, verdict.statement.condition
+    # Members that differ in the order of their terms only look alike.
+    sides = (statement.symbol, *{to_text(member): member for member in statement.members}.values())
+    corrected = book.get(statement.corrected_by)
+    see = [number for number in statement.see if number in book and number != statement.corrected_by]
     return Entry(
-        verdict=verdict,
-        name=parse_prose(statement.number),
+        number=statement.number,
         title=parse_prose(statement.title, book),
-        mark=_mark(verdict),
-        # Members that differ in the order of their terms only look alike.
-        chain=Formula((statement.symbol, *{to_text(member): member for member in statement.members}.values())),
-        judgement=_judgement(verdict, book),
-        scope=_scope(verdict, book),
+        kind=statement.kind,
+        section=statement.section,
+        statement=Formula(*sides),
+        latex=" = ".join(map(to_latex, sides)),
         premises=tuple(_premise(ground, book) for ground in statement.grounds),
+        outcome=verdict.outcome,
+        expected=statement.expected,
+        as_expected=verdict.as_expected,
+        holds=verdict.holds,
+        verdict=verdict.words,
+        judgement=Words.join(_sentences(verdict, book), " "),
+        any_of=tuple(tuple(map(Formula, alternative)) for alternative in condition.any_of) if condition else (),
+        ruled_out_by=tuple(Formula(*pair) for pair in condition.ruled_out_by) if condition else (),
+        necessary=verdict.necessary,
+        positive_if=None if statement.positive_if is None else Formula(statement.positive_if),
+        provided=tuple(map(Formula, statement.provided)),
+        scope=Words.join(_scope(verdict, book), " "),
+        limited_by=verdict.limited_by,
+        inherited=verdict.inherited,
+        unit_error=verdict.unit_error,
         derivations=tuple(_derivation(proof, index, book) for index, proof in enumerate(verdict.proofs)),
         differences=tuple(_differences(verdict, book)),
-        corrections=tuple(_corrections(statement, book)),
-        signs=_signs(verdict, book),
+        corrections=(_correction(statement, corrected.statement, book),) if corrected else (),
+        corrected_by=(Reference(statement.corrected_by),) if statement.corrected_by else (),
+        see=tuple(refer(book[number].statement) for number in see),
         figures=tuple(_figure(value, statement, book) for value in statement.values),
+        signs=_signs(verdict, book),
         note=parse_prose(statement.note, book),
-        see=tuple(
-            refer(book[number].statement)
-            for number in statement.see
-            if number in book and number != statement.corrected_by
-        ),
     )
-
-
-def _mark(verdict: Verdict) -> str:
-    kind = verdict.statement.kind
-    given = "our choice" if kind is Kind.CHOICE else kind.value
-    return f"given: {given}" if verdict.outcome is Outcome.GIVEN else verdict.outcome.value
 
 
 def refer(statement: Statement) -> Reference:
@@ -72,26 +82,31 @@ def refer(statement: Statement) -> Reference:
     Reference
     """
     number = statement.number
-    name = parse_prose(number)
     if _NUMBERED.fullmatch(number):
-        return Reference(number, (number,))
+        return Reference(number)
     kind = statement.kind.value if statement.kind.is_given else "equation"
     if number == str(statement.symbol):
-        return Reference(number, (f"the {kind} of ", *name))
-    return Reference(number, (f"the {kind} “", *name, "”"))
+        return Reference(number, f"the {kind} of ", parse_prose(number))
+    return Reference(number, f"the {kind} “", parse_prose(number), "”")
+
+
+def _refer_to_all(numbers: tuple[str, ...], book: Mapping[str, Verdict]) -> Words:
+    return Words.join(refer(book[number].statement) for number in numbers)
 
 
 def _ground(ground: Ground, book: Mapping[str, Verdict]) -> Words:
-    where = parse_prose(ground.where, book)
-    return (refer(book[ground.number].statement), *((" ", *where) if where else ()))
+    where = (" ", parse_prose(ground.where, book)) if ground.where else ()
+    return Words(refer(book[ground.number].statement), *where)
 
 
-def _premise(ground: Ground, book: Mapping[str, Verdict]) -> Words:
+def _premise(ground: Ground, book: Mapping[str, Verdict]) -> Premise:
     """Refer to a ground, with what replaces its symbols."""
+    words = _ground(ground, book)
     replaced = tuple((name, value) for name, value in _used(ground, book) if f"{name} = {value}" not in ground.where)
-    if not replaced or ground.where.startswith("with "):
-        return _ground(ground, book)
-    return (*_ground(ground, book), " (", *_replacements(replaced, " for "), ")")
+    if replaced and not ground.where.startswith("with "):
+        made = Words.join(Words(Formula(value), " for ", Formula(name)) for name, value in replaced)
+        words = Words(words, " (", made, ")")
+    return Premise(number=ground.number, at=tuple(Formula(*pair) for pair in ground.at), words=words)
 
 
 def _used(ground: Ground, book: Mapping[str, Verdict]) -> Replacements:
@@ -101,64 +116,42 @@ def _used(ground: Ground, book: Mapping[str, Verdict]) -> Replacements:
     return tuple((name, value) for name, value in ground.at if name != value and any(side.has(name) for side in sides))
 
 
-def _replacements(pairs: Replacements, joint: str) -> Words:
-    words: list = []
-    for name, value in pairs:
-        sides = (Formula((name, value)),) if joint == "=" else (Formula((value,)), joint, Formula((name,)))
-        words += [", ", *sides]
-    return tuple(words[1:])
-
-
-def _judgement(verdict: Verdict, book: Mapping[str, Verdict]) -> Words:
-    sentences = list(_sentences(verdict, book))
-    return tuple(part for sentence in sentences for part in (" ", *sentence))[1:]
-
-
 def _sentences(verdict: Verdict, book: Mapping[str, Verdict]) -> Iterator[Words]:
     statement = verdict.statement
     if verdict.necessary is not None and statement.condition is not None:
-        yield tuple(_condition(verdict, statement.condition))
+        yield _condition(verdict, statement.condition)
     elif statement.positive_if is not None and verdict.outcome is Outcome.FOLLOWS:
-        yield ("Follows, and is positive exactly if ", Formula((statement.positive_if,)), ".")
+        yield Words("Follows, and is positive exactly if ", Formula(statement.positive_if), ".")
     elif verdict.words not in (verdict.outcome.value, statement.kind.value) and not verdict.inherited:
-        yield (*parse_prose(verdict.words[0].upper() + verdict.words[1:], book), ".")
+        yield Words(parse_prose(verdict.words[0].upper() + verdict.words[1:], book), ".")
     if verdict.inherited:
-        names = [part for number in verdict.inherited for part in (", ", refer(book[number].statement))]
-        yield ("Rests on the condition of ", *names[1:], ".")
+        yield Words("Rests on the condition of ", _refer_to_all(verdict.inherited, book), ".")
     if verdict.unit_error:
-        yield (f"Its units do not agree: {verdict.unit_error}.",)
+        yield Words(f"Its units do not agree: {verdict.unit_error}.")
     if not verdict.as_expected:
-        yield (f"A correct account finds otherwise: {statement.expected.value}.",)
+        yield Words(f"A correct account finds otherwise: {statement.expected.value}.")
 
 
-def _scope(verdict: Verdict, book: Mapping[str, Verdict]) -> Words:
+def _scope(verdict: Verdict, book: Mapping[str, Verdict]) -> Iterator[Words]:
     """Say where a statement is proved, if not everywhere."""
     statement = verdict.statement
     limits = [parse_prose(statement.scope, book)] if statement.scope else []
-    limits += [(Formula((one,)),) for one in statement.provided]
-    words = [part for limit in limits for part in (" and ", *limit)]
-    if words:
-        words = ["Proved for", " ", *words[1:], "."]
+    limits += map(Formula, statement.provided)
+    if limits:
+        yield Words("Proved for ", Words.join(limits, " and "), ".")
     if verdict.limited_by:
-        names = [part for number in verdict.limited_by for part in (", ", refer(book[number].statement))]
-        words += [" " if words else "", "As far as is proved of ", *names[1:], "."]
-    return tuple(words)
+        yield Words("As far as is proved of ", _refer_to_all(verdict.limited_by, book), ".")
 
 
-def _condition(verdict: Verdict, condition: Condition) -> Iterator:
-    ruled_out = verdict.outcome is Outcome.DOES_NOT_FOLLOW
-    yield ("It would follow only if " if verdict.necessary else "It would follow if ") if ruled_out else "Follows if "
-    for index, alternative in enumerate(condition.any_of):
-        yield " or " if index else ""
-        for position, equation in enumerate(alternative):
-            yield from (" and " if position else "", Formula((equation.lhs, equation.rhs)))
-    if condition.words:
-        yield from (" ", *parse_prose(condition.words))
-    if ruled_out:
-        published = tuple((name, _decimal(value)) for name, value in condition.ruled_out_by)
-        yield from ("; the published numbers give ", *_replacements(published, "="), ".")
-    else:
-        yield ", and only then (proved)." if verdict.necessary else ". Whether only then is not proved."
+def _condition(verdict: Verdict, condition: Condition) -> Words:
+    alternatives = (Words.join((Formula(*one.args) for one in every), " and ") for every in condition.any_of)
+    words = Words(Words.join(alternatives, " or "), *([" ", parse_prose(condition.words)] if condition.words else []))
+    if verdict.outcome is not Outcome.DOES_NOT_FOLLOW:
+        proved = ", and only then (proved)." if verdict.necessary else ". Whether only then is not proved."
+        return Words("Follows if ", words, proved)
+    published = Words.join(Formula(name, _decimal(value)) for name, value in condition.ruled_out_by)
+    only = "only if " if verdict.necessary else "if "
+    return Words("It would follow ", only, words, "; the published numbers give ", published, ".")
 
 
 def _decimal(value: sympy.Expr) -> sympy.Expr:
@@ -177,47 +170,49 @@ def _differences(verdict: Verdict, book: Mapping[str, Verdict]) -> Iterator[Line
             if value == 0:
                 continue
             which = f", {form} form" if len(proof.discrepancies) > 1 else ""
-            where = (", ", *parse_prose(proof.where, book)) if proof.where else ()
-            shown = sympy.factor(value) if stated is None else stated
-            yield Line(words=("Derived minus published", which, *where, ":"), display=Formula((shown,)))
+            where = Words(", ", parse_prose(proof.where, book)) if proof.where else ""
+            formula = Formula(sympy.factor(value) if stated is None else stated)
+            yield Line(words=Words("Derived minus published", which, where, ":"), formula=formula)
             stated = None
 
 
-def _corrections(statement: Statement, book: Mapping[str, Verdict]) -> Iterator[Line]:
-    """Say what a statement should read, if something else than it does."""
-    if statement.corrected_by not in book:
-        return
-    corrected = book[statement.corrected_by].statement
+def _correction(statement: Statement, corrected: Statement, book: Mapping[str, Verdict]) -> Line:
+    """Say what a statement should read."""
     if corrected.published == statement.published:  # the same claim, of something else
-        yield Line(words=("What holds is ", refer(corrected), ": ", *parse_prose(corrected.title, book), "."))
-    else:
-        formula = Formula((corrected.symbol, corrected.members[-1]))
-        yield Line(words=("It should read, by ", refer(corrected), ":"), display=formula)
+        return Line(words=Words("What holds is ", refer(corrected), ": ", parse_prose(corrected.title, book), "."))
+    formula = Formula(corrected.symbol, corrected.members[-1])
+    return Line(words=Words("It should read, by ", refer(corrected), ":"), formula=formula)
 
 
-def _signs(verdict: Verdict, book: Mapping[str, Verdict]) -> dict[str, tuple[sympy.Symbol, ...]]:
+def _signs(verdict: Verdict, book: Mapping[str, Verdict]) -> dict[str, tuple[Formula, ...]]:
     sides = [verdict.statement.symbol, *verdict.statement.members]
     sides += [side for proof in verdict.proofs for one in proof.relations for side in (one.left, one.right)]
     replaced = [pair for ground in verdict.statement.grounds for pair in _used(ground, book)]
     sides += [value for _, value in (*replaced, *(pair for case in verdict.statement.cases for pair in case.at))]
     names = sorted(set().union(*(side.free_symbols for side in sides)), key=lambda name: (name.name.lower(), name.name))
-    found: dict[str, list[sympy.Symbol]] = {}
+    found: dict[str, list[Formula]] = {words: [] for words in _SIGNS.values()}
     for name in names:
-        found.setdefault(next(sign for sign in SIGNS if getattr(name, f"is_{sign}")), []).append(name)
-    return {sign: tuple(found[sign]) for sign in SIGNS if sign in found}
+        found[next(words for sign, words in _SIGNS.items() if getattr(name, f"is_{sign}"))].append(Formula(name))
+    return {sign: tuple(formulas) for sign, formulas in found.items() if formulas}
 
 
 def _figure(value: Value, statement: Statement, book: Mapping[str, Verdict]) -> Figure:
-    ours = value.exact(statement)
+    exact = value.exact(statement)
     unit = "" if value.unit == "1" else f" {value.unit}"
-    paper = ""
+    agrees, paper = None, ""
     if value.published:
-        deviation = float(ours / sympy.Rational(value.published) - 1)
-        remark = "agrees" if value.agrees(statement) else f"ours {100 * deviation:+.1f} %".replace("-", "−")
+        agrees = value.agrees(statement)
+        deviation = float(exact / sympy.Rational(value.published) - 1)
+        remark = "agrees" if agrees else f"ours {100 * deviation:+.1f} %".replace("-", "−")
         paper = f"{value.published}{unit} ({remark})"
     return Figure(
         label=parse_prose(value.label, book),
-        ours=f"{significant(float(ours))}{unit}",
+        exact=Formula(exact),
+        value=float(exact),
+        unit=value.unit,
+        published=value.published,
+        agrees=agrees,
+        ours=f"{significant(float(exact))}{unit}",
         paper=paper,
         remark=parse_prose(value.remark, book),
     )
@@ -246,21 +241,24 @@ def significant(number: float) -> str:
 
 
 def _derivation(proof: CaseProof, index: int, book: Mapping[str, Verdict]) -> Derivation:
-    cases = proof.statement.cases
+    symbol, cases = proof.statement.symbol, proof.statement.cases
     where = parse_prose(proof.where, book)
     if cases:
-        made = _replacements(cases[index].at, "=")
-        where = ("Case: ", *where, ", that is ", *made) if where else ("With ", *made)
+        made = Words.join(Formula(*pair) for pair in cases[index].at)
+        where = Words("Case: ", where, ", that is ", made) if where else Words("With ", made)
     steps = tuple(_visible(proof))
-    symbol = proof.statement.symbol
-    lines = tuple(
-        Line(words=tuple(_step(step, before, proof, book)), display=Formula((symbol, step.result)))
-        for before, step in steps
-    )
+    lines = [Line(words=_step(one, before, proof, book), formula=Formula(symbol, one.result)) for before, one in steps]
     if lines and cases and not any(proof.discrepancies) and to_text(proof.published) != to_text(steps[-1][1].result):
-        lines += (Line(words=("In the form stated:",), display=Formula((symbol, proof.published))),)
-    at_once = Line(words=("The premises, solved together, give:",), display=Formula((symbol, proof.derived)))
-    return Derivation(where=where, proof=proof, steps=tuple(step for _, step in steps), lines=lines or (at_once,))
+        lines.append(Line(words=Words("In the form stated:"), formula=Formula(symbol, proof.published)))
+    if not lines:
+        at_once = Words("The premises, solved together, give:")
+        lines = [Line(words=at_once, formula=Formula(symbol, proof.derived))]
+    return Derivation(
+        where=where,
+        derived=Formula(proof.derived),
+        discrepancies=tuple(Formula(sympy.factor(value)) for value in proof.discrepancies),
+        lines=tuple(lines),
+    )
 
 
 def _visible(proof: CaseProof) -> Iterator[tuple[Step | None, Step]]:
@@ -272,29 +270,27 @@ def _visible(proof: CaseProof) -> Iterator[tuple[Step | None, Step]]:
         before = step
 
 
-def _step(step: Step, before: Step | None, proof: CaseProof, book: Mapping[str, Verdict]) -> Iterator:
+def _step(step: Step, before: Step | None, proof: CaseProof, book: Mapping[str, Verdict]) -> Words:
     symbol = proof.statement.symbol
     if not step.used:
         if before is not None and before.result.has(symbol):
-            yield from ("Solve for ", Formula((symbol,)), ", which stands on both sides:")
-        else:
-            yield "Rearranged:"
-        return
+            return Words("Solve for ", Formula(symbol), ", which stands on both sides:")
+        return Words("Rearranged:")
     relations = [next(one for one in proof.relations if one.ground == ground) for ground in step.used]
+    used = Words(_ground(step.used[0], book), *_solved(relations[0], step), ":")
     if before is None:
-        yield from ("Start from ", *_ground(step.used[0], book), *_solved(relations[0], step), ":")
-    elif step.name == symbol:
-        relations = [relation for relation in relations if relation.left != relation.right]
-        for index, relation in enumerate(relations):
-            joint = "With " if index == 0 else " and " if index == len(relations) - 1 else ", "
-            yield from (joint, Formula((relation.left, relation.right)), " from ", *_ground(relation.ground, book))
-        yield ", this is:"
-    else:
-        yield from ("Put in ", Formula((step.name, step.gives)), " from ", *_ground(step.used[0], book))
-        yield from (*_solved(relations[0], step), ":")
+        return Words("Start from ", used)
+    if step.name != symbol:
+        return Words("Put in ", Formula(step.name, step.gives), " from ", used)
+    *others, last = [
+        Words(Formula(one.left, one.right), " from ", _ground(one.ground, book))
+        for one in relations
+        if one.left != one.right
+    ]
+    return Words("With ", *([Words.join(others), " and "] if others else []), last, ", this is:")
 
 
-def _solved(relation: Relation, step: Step) -> Words:
+def _solved(relation: Relation, step: Step) -> tuple[Part, ...]:
     if relation.left == step.name and relation.right == step.gives:
         return ()
-    return (", solved for ", Formula((step.name,)))
+    return ", solved for ", Formula(step.name)

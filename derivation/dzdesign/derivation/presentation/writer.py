@@ -5,8 +5,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping
 from typing import Any, ClassVar
 
-from dzdesign.derivation.presentation.content import Content
-from dzdesign.derivation.presentation.prose import Code, Formula, Reference, Words
+from dzdesign.derivation.presentation.content import DerivationReport
+from dzdesign.derivation.presentation.prose import Code, Formula, Part, Reference, Words
 
 
 class Writer(ABC):
@@ -26,14 +26,14 @@ class Writer(ABC):
     def __init__(self, shown: Collection[str] = ()) -> None:
         self.shown = shown
 
-    def words(self, words: Words) -> str:
+    def words(self, *parts: Part) -> str:
         """Return words in this notation.
 
         Parameters
         ----------
-        words : Words
+        *parts : Words, or what is in them
         """
-        return "".join(map(self._part, words))
+        return "".join(map(self._part, Words(*parts).parts))
 
     def _part(self, part: str | Formula | Reference | Code) -> str:
         match part:
@@ -42,8 +42,7 @@ class Writer(ABC):
             case Code(text):
                 return self.code(text)
             case Reference(number, words):
-                text = self.words(words) or self.text(number)
-                return self.link(number, text) if number in self.shown else text
+                return self.link(number, self.words(words)) if number in self.shown else self.words(words)
         return self.text(part)
 
     @abstractmethod
@@ -72,18 +71,17 @@ class Writer(ABC):
 
     def references(self, references: Collection[Reference], by_number: bool = False) -> str:
         """Return references with commas between, by their numbers alone or by the words that name them."""
-        named = (Reference(one.number) if by_number else one for one in references)
-        return ", ".join(self.words((one,)) for one in named)
+        return self.words(Words.join(Reference(one.number) if by_number else one for one in references))
 
 
-def write(kind: type[Writer], content: Content) -> str:
+def write(kind: type[Writer], report: DerivationReport) -> str:
     """Return a whole document.
 
     Parameters
     ----------
     kind : type
         The notation.
-    content : Content
+    report : DerivationReport
 
     Returns
     -------
@@ -99,8 +97,8 @@ def write(kind: type[Writer], content: Content) -> str:
         lstrip_blocks=True,
         **kind.SYNTAX,
     )
-    environment.filters.update(kind({entry.number for entry in content.entries}).filters())
-    return environment.get_template(kind.TEMPLATE).render(content=content)
+    environment.filters.update(kind({entry.number for entry in report.statements}).filters())
+    return environment.get_template(kind.TEMPLATE).render(content=report)
 
 
 def anchor(number: str) -> str:

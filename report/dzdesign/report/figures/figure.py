@@ -8,13 +8,14 @@ never in colour alone.
 import csv
 import io
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 if TYPE_CHECKING:
+    import numpy as np
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -36,6 +37,36 @@ LIGHT = {name: light for name, (light, _) in PALETTE.items()}
 #: For a series over the pressure drop: hues in turn.
 CYCLE = ("blue", "vermilion", "green", "purple", "orange", "ink")
 WIDTH = 7.4
+#: Of Matplotlib, while a figure is drawn.
+STYLE = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9,
+    "axes.labelsize": 9,
+    "axes.titlesize": 9.5,
+    "axes.titlelocation": "left",
+    "xtick.labelsize": 8.5,
+    "ytick.labelsize": 8.5,
+    "legend.fontsize": 8.5,
+    "legend.frameon": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": LIGHT["grid"],
+    "grid.linewidth": 0.7,
+    "axes.edgecolor": LIGHT["soft"],
+    "axes.labelcolor": LIGHT["ink"],
+    "text.color": LIGHT["ink"],
+    "xtick.color": LIGHT["soft"],
+    "ytick.color": LIGHT["soft"],
+    "xtick.labelcolor": LIGHT["ink"],
+    "ytick.labelcolor": LIGHT["ink"],
+    "axes.facecolor": "none",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "hatch.linewidth": 0.8,
+    "text.parse_math": False,
+    "svg.fonttype": "none",  # text stays text: to be searched, read out, and set in the page's own font
+    "svg.hashsalt": "dzdesign",  # ids follow from the content: same input, same bytes
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,6 +97,14 @@ class ReportFigure:
     def href(self) -> str:
         """The numbers as an address that needs no network."""
         return data_uri(self.csv)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Curves:
+    """A CSV file of the evidence: its text, and its columns as numbers."""
+
+    text: str
+    columns: "Mapping[str, np.ndarray]"
 
 
 def data_uri(text: str) -> str:
@@ -105,37 +144,7 @@ def figure_style() -> AbstractContextManager[None]:
     """Return the style under which the report's figures are drawn."""
     from matplotlib import rc_context
 
-    return rc_context(
-        {
-            "font.family": "DejaVu Sans",
-            "font.size": 9,
-            "axes.labelsize": 9,
-            "axes.titlesize": 9.5,
-            "axes.titlelocation": "left",
-            "xtick.labelsize": 8.5,
-            "ytick.labelsize": 8.5,
-            "legend.fontsize": 8.5,
-            "legend.frameon": False,
-            "axes.grid": True,
-            "axes.axisbelow": True,
-            "grid.color": LIGHT["grid"],
-            "grid.linewidth": 0.7,
-            "axes.edgecolor": LIGHT["soft"],
-            "axes.labelcolor": LIGHT["ink"],
-            "text.color": LIGHT["ink"],
-            "xtick.color": LIGHT["soft"],
-            "ytick.color": LIGHT["soft"],
-            "xtick.labelcolor": LIGHT["ink"],
-            "ytick.labelcolor": LIGHT["ink"],
-            "axes.facecolor": "none",
-            "axes.spines.top": False,
-            "axes.spines.right": False,
-            "hatch.linewidth": 0.8,
-            "text.parse_math": False,
-            "svg.fonttype": "none",  # text stays text: to be searched, read out, and set in the page's own font
-            "svg.hashsalt": "dzdesign",  # ids follow from the content: same input, same bytes
-        }
-    )
+    return rc_context(STYLE)
 
 
 def new_figure(height: float, *, legend_rows: int = 0, right: float = 0.2, top: float = 0.12) -> "Figure":
@@ -162,15 +171,24 @@ def new_figure(height: float, *, legend_rows: int = 0, right: float = 0.2, top: 
     return figure
 
 
-def legend_below(figure: "Figure", columns: int) -> None:
-    """Put a legend of all axes at the figure's foot.
+def titled_axes(
+    height: float, name: str, both: bool, *, legend_rows: int = 0, right: float = 0.2
+) -> "tuple[Figure, Axes]":
+    """Return an empty figure of one panel; of a valve with two sides its title says which it is of."""
+    figure = new_figure(height, legend_rows=legend_rows, right=right, top=0.3 if both else 0.12)
+    axes = figure.subplots()
+    if both:
+        axes.set_title(f"{name} commands")
+    return figure, axes
 
-    Parameters
-    ----------
-    figure : Figure
-        Made with `legend_rows`.
-    columns : int
-    """
+
+def side_words(name: str, both: bool) -> str:
+    """Return which side a caption is of, where a valve has two."""
+    return f", {name} commands" if both else ""
+
+
+def legend_below(figure: "Figure", columns: int) -> None:
+    """Put a legend of all axes below them, in a figure made with `legend_rows`."""
     figure.legend(loc="lower center", ncols=columns, columnspacing=1.2, borderpad=0.1, borderaxespad=0.1)
 
 
@@ -180,30 +198,27 @@ def label_ends(axes: "Axes", labels: Sequence[tuple[float, float, str, str]]) ->
     Parameters
     ----------
     axes : Axes
-    labels : sequence of (x, y, text, colour)
+    labels : sequence of (x, y, text, hue)
         In the axes' units.
     """
     room = 0.055 * max((label[1] for label in labels), default=1.0)
     below = -room
-    for x, y, text, colour in sorted(labels, key=lambda label: label[1]):
+    for x, y, text, hue in sorted(labels, key=lambda label: label[1]):
         if y - below >= room:
             axes.annotate(text, (x, y), xytext=(5, 0), textcoords="offset points", va="center", fontsize=8,
-                          color=colour, annotation_clip=False)  # fmt: skip
+                          color=hue, annotation_clip=False)  # fmt: skip
             below = y
 
 
-def svg_of(figure: "Figure", name: str, description: str) -> str:
-    """Return a figure as markup of a page.
+def to_report_figure(figure: "Figure", name: str, caption: str, description: str, csv: str) -> ReportFigure:
+    """Return a figure as the page shows it; see `ReportFigure`."""
+    return ReportFigure(
+        name=name, caption=caption, description=description, svg=_svg_of(figure, name, description), csv=csv
+    )
 
-    Parameters
-    ----------
-    figure : Figure
-        Drawn in the colours of `LIGHT`.
-    name : str
-        Set before all ids, which would else be those of another figure too.
-    description : str
-        For who can't see it.
-    """
+
+def _svg_of(figure: "Figure", name: str, description: str) -> str:
+    """Return a figure, drawn in the colours of `LIGHT`, as markup; all ids begin with its name, unlike any other's."""
     from markupsafe import escape
 
     out = io.StringIO()
@@ -216,7 +231,8 @@ def svg_of(figure: "Figure", name: str, description: str) -> str:
     text = re.sub(rf"url\(#(?!{re.escape(name)}-)", f"url(#{name}-", text)
     for variable, (light, _) in PALETTE.items():
         text = text.replace(light, f"var(--fig-{variable})")
-    width, height = (float(size) for size in re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', text).groups())
+    box = re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', text)
+    width, height = map(float, box.groups()) if box else (1.0, 1.0)
     head = (
         f'<svg class="drawing" role="img" aria-label="{escape(description)}" viewBox="0 0 {width:g} {height:g}" '
         f'width="{width:g}" height="{height:g}" xmlns="http://www.w3.org/2000/svg" '

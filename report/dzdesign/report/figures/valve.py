@@ -1,11 +1,13 @@
 """Figures of the identified valve and of the law, from valve.json and compensator.json alone."""
 
 from collections.abc import Sequence
-from fractions import Fraction
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dzdesign.design.compensator import Compensator
+from dzdesign.identify.valve.ramp_result import TestResult
+from dzdesign.identify.valve.side_model import SideModel
+from dzdesign.report.compensator_sides import laws_of
 from dzdesign.report.figures.figure import (
     CYCLE,
     LIGHT,
@@ -13,61 +15,42 @@ from dzdesign.report.figures.figure import (
     csv_text,
     label_ends,
     legend_below,
-    new_figure,
-    svg_of,
+    side_words,
+    titled_axes,
+    to_report_figure,
 )
 from dzdesign.report.sections.cells import counted
-from dzdesign.verify.exhaustive.exact_law import ExactLaw
-from dzdesign.verify.exhaustive.zero_command import bounds_of
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 BRANCHES = (("rising", "opening", "^", "-", "blue"), ("falling", "closing", "v", "--", "vermilion"))
 
 
-def _side_words(name: str, both: bool) -> str:
-    return f", {name} commands" if both else ""
-
-
-def _titled(height: float, name: str, both: bool, **margins: Any) -> tuple["Figure", "Axes"]:
-    """Return an empty figure; of a valve with two sides its title says which it is of."""
-    figure = new_figure(height, **margins, **({"top": 0.3} if both else {}))
-    axes = figure.subplots()
-    if both:
-        axes.set_title(f"{name} commands")
-    return figure, axes
-
-
-def lines_figure(side: dict[str, Any], name: str, both: bool) -> ReportFigure:
+def lines_figure(side: SideModel, name: str, both: bool) -> ReportFigure:
     """Draw the straight parts that were fitted, and the knees that they give, one hue a pressure drop.
 
     Parameters
     ----------
-    side : dict
-        Of valve.json.
+    side : SideModel
     name : str
         ``positive`` or ``negative``.
     both : bool
         Whether the valve has two sides.
     """
-    figure, axes = _titled(3.5, name, both, right=0.65)
+    figure, axes = titled_axes(3.5, name, both, right=0.65)
     rows, labels = [], []
-    for index, test in enumerate(side["tests"]):
+    for index, test in enumerate(side.tests):
         colour = LIGHT[CYCLE[index % len(CYCLE)]]
         far = (0.0, 0.0)
         for branch, word, marker, dash, _ in BRANCHES:
-            knee, share = test[f"u_knee_{branch}_V"], test[f"straight_{branch}"]
+            knee, share = getattr(test, f"u_knee_{branch}_V"), getattr(test, f"straight_{branch}")
             if knee is None:
                 continue
-            flows = np.array(share or [0.0, 0.5]) * test["q_max_L_min"]
-            ends = knee + flows / test["slope_L_min_V"]
+            flows = np.array(share) * test.q_max_L_min
+            ends = knee + flows / test.slope_L_min_V
             far = max(far, (float(ends[1]), float(flows[1])))
             axes.plot([knee, ends[0]], [0, flows[0]], ":", color=colour, lw=1.2)
             axes.plot(ends, flows, dash, color=colour, lw=1.8)
             axes.plot(knee, 0, marker, color=colour, ms=5, clip_on=False, zorder=4)
-            rows.append([test["dp_MPa"], word, knee, *ends.round(4).tolist(), *flows.round(4).tolist()])
+            rows.append([test.dp_MPa, word, knee, *ends.round(4).tolist(), *flows.round(4).tolist()])
         labels.append((*far, _dp_text(test), colour))
     label_ends(axes, labels)
     for _, word, marker, dash, _ in BRANCHES:
@@ -75,37 +58,33 @@ def lines_figure(side: dict[str, Any], name: str, both: bool) -> ReportFigure:
     axes.plot([], [], ":", color=LIGHT["soft"], label="extrapolated to the knee")
     axes.legend(loc="upper left")
     axes.set(xlabel="valve command u (V)", ylabel="flow Q (L/min)", ylim=(0, None))
-    description = (
-        f"Straight lines of flow over command of {counted(len(side['tests']), 'pressure drop')}; they meet zero "
-        f"flow at the knees, {_span([row[2] for row in rows], 'V', 3)}."
-    )
-    return ReportFigure(
-        name=f"fit-{name}",
-        caption="The straight part of each branch, where the fit looked, and its extrapolation to zero flow: the knee"
-        + _side_words(name, both)
+    return to_report_figure(
+        figure,
+        f"fit-{name}",
+        "The straight part of each branch, where the fit looked, and its extrapolation to zero flow: the knee"
+        + side_words(name, both)
         + ". Samples and residuals are drawn by dzdesign identify --plots: the recordings are not part of an "
         "artefact folder.",
-        description=description,
-        svg=svg_of(figure, f"fit-{name}", description),
-        csv=csv_text(("dp_MPa", "branch", "knee_V", "from_V", "to_V", "from_L_min", "to_L_min"), rows),
+        f"Straight lines of flow over command of {counted(len(side.tests), 'pressure drop')}; they meet zero "
+        f"flow at the knees, {_span([row[2] for row in rows], 'V', 3)}.",
+        csv_text(("dp_MPa", "branch", "knee_V", "from_V", "to_V", "from_L_min", "to_L_min"), rows),
     )
 
 
-def _dp_text(test: dict[str, Any]) -> str:
-    return "dP not recorded" if test["dp_MPa"] is None else f"{test['dp_MPa']:.2f} MPa"
+def _dp_text(test: TestResult) -> str:
+    return "dP not recorded" if test.dp_MPa is None else f"{test.dp_MPa:.2f} MPa"
 
 
-def _span(values: Sequence[float], unit: str, digits: int) -> str:
+def _span(values: Sequence[float] | np.ndarray, unit: str, digits: int) -> str:
     return f"{min(values):.{digits}f} to {max(values):.{digits}f} {unit}"
 
 
-def thresholds_figure(side: dict[str, Any], guard: str, name: str, both: bool) -> ReportFigure:
+def thresholds_figure(side: SideModel, guard: str, name: str, both: bool) -> ReportFigure:
     """Draw knees and onsets with their errors, the certified staircase and the largest offset over the pressure drop.
 
     Parameters
     ----------
-    side : dict
-        Of valve.json.
+    side : SideModel
     guard : str
         Threshold that is guarded.
     name : str
@@ -113,109 +92,90 @@ def thresholds_figure(side: dict[str, Any], guard: str, name: str, both: bool) -
     both : bool
         Whether the valve has two sides.
     """
-    curve = _guard_curve(side, guard)
-    dp = np.array([test["dp_MPa"] or 0.0 for test in side["tests"]])
-    figure, axes = _titled(3.8, name, both, legend_rows=2)
+    curve = side.guards[guard]
+    dp = np.array([test.dp_MPa or 0.0 for test in side.tests])
+    figure, axes = titled_axes(3.8, name, both, legend_rows=2)
     for branch, word, marker, _, colour in BRANCHES:
         for what, face, size in (("knee", LIGHT[colour], 5.5), ("onset", "none", 8.5)):
-            at = [test[f"u_{what}_{branch}_V"] for test in side["tests"]]
+            at = [getattr(test, f"u_{what}_{branch}_V") for test in side.tests]
             seen = [i for i, value in enumerate(at) if value is not None]
             if seen:
-                error = [2 * (side["tests"][i][f"u_{what}_{branch}_se_V"] or 0.0) for i in seen]
+                error = [2 * (getattr(side.tests[i], f"u_{what}_{branch}_se_V") or 0.0) for i in seen]
                 axes.errorbar(dp[seen], [at[i] for i in seen], yerr=error, fmt=marker, ms=size, mfc=face,
                               mec=LIGHT[colour], ecolor=LIGHT[colour], capsize=3, lw=1, label=f"{what} {word} ± 2 s.e.",
                               zorder=4)  # fmt: skip
-    axes.plot(dp, curve["u_lower_V"], "_", ms=13, mew=2, color=LIGHT["ink"], label="lower bound, at the test", zorder=5)
+    axes.plot(dp, curve.u_lower_V, "_", ms=13, mew=2, color=LIGHT["ink"], label="lower bound, at the test", zorder=5)
     if len(dp) > 1:
-        axes.stairs(curve["certified_steps_V"], dp, baseline=None, color=LIGHT["green"], lw=2,
+        axes.stairs(curve.certified_steps_V, dp, baseline=None, color=LIGHT["green"], lw=2,
                     label="certified staircase")  # fmt: skip
-    offset = curve["u_min0_V"] * np.array(curve["beta"] or [1.0])
+    offset = curve.u_min0_V * np.array(curve.beta or [1.0])
     axes.plot(dp, offset, "D-.", ms=4, lw=1.3, color=LIGHT["purple"], label="largest certified offset", zorder=6)
     axes.set(xlabel="pressure drop dP (MPa)", ylabel="command u (V)")
     legend_below(figure, 4)
-    description = (
-        f"Thresholds over the pressure drop: the {guard} threshold lies at {_span(curve['u_threshold_V'], 'V', 3)}, "
-        f"its lower bound at {_span(curve['u_lower_V'], 'V', 3)}, the largest certified offset at "
-        f"{_span(offset, 'V', 3)}."
-    )
-    return ReportFigure(
-        name=f"thresholds-{name}",
-        caption=f"Thresholds over the pressure drop{_side_words(name, both)}. The {guard} threshold is guarded: the "
+    return to_report_figure(
+        figure,
+        f"thresholds-{name}",
+        f"Thresholds over the pressure drop{side_words(name, both)}. The {guard} threshold is guarded: the "
         "drive at zero command stays below "
         + (
             "the staircase, which is what the bounds of all tests together certify between the tests too."
             if len(dp) > 1
             else "its lower bound. One pressure drop was tested, and nothing is certified at another."
         ),
-        description=description,
-        svg=svg_of(figure, f"thresholds-{name}", description),
-        csv=csv_text(
+        f"Thresholds over the pressure drop: the {guard} threshold lies at {_span(curve.u_threshold_V, 'V', 3)}, "
+        f"its lower bound at {_span(curve.u_lower_V, 'V', 3)}, the largest certified offset at "
+        f"{_span(offset, 'V', 3)}.",
+        csv_text(
             ("dp_MPa", "knee_opening_V", "knee_closing_V", "onset_opening_V", "onset_closing_V", "threshold_V",
              "lower_bound_V", "offset_V", "certified_up_to_next_V"),
             [
                 [
-                    test["dp_MPa"], test["u_knee_rising_V"], test["u_knee_falling_V"], test["u_onset_rising_V"],
-                    test["u_onset_falling_V"], curve["u_threshold_V"][i], curve["u_lower_V"][i],
+                    test.dp_MPa, test.u_knee_rising_V, test.u_knee_falling_V, test.u_onset_rising_V,
+                    test.u_onset_falling_V, curve.u_threshold_V[i], curve.u_lower_V[i],
                     round(float(offset[min(i, len(offset) - 1)]), 7),
-                    curve["certified_steps_V"][i] if i < len(curve["certified_steps_V"]) else None,
+                    curve.certified_steps_V[i] if i < len(curve.certified_steps_V) else None,
                 ]
-                for i, test in enumerate(side["tests"])
+                for i, test in enumerate(side.tests)
             ],
         ),
     )  # fmt: skip
 
 
-def _guard_curve(side: dict[str, Any], guard: str) -> dict[str, Any]:
-    """Return the curve of a guard; of a valve.json without that curve, what its own certificate says."""
-    if guard in side.get("guards", {}):
-        return side["guards"][guard]
-    return {
-        "u_min0_V": side["reference"]["u_min_V"],
-        "beta": side["beta"]["beta"],
-        "beta_dp_MPa": side["beta"]["dp_MPa"],
-        "certified_steps_V": side["certificate"]["steps_V"],
-        "u_lower_V": [test["u_guard_lower_V"] for test in side["tests"]],
-        "u_threshold_V": [test["u_guard_V"] for test in side["tests"]],
-    }
-
-
 def beta_figure(
-    side: dict[str, Any], guard: str, name: str, both: bool, compensator: dict[str, Any] | None
+    side: SideModel, guard: str, name: str, both: bool, compensator: Compensator | None
 ) -> ReportFigure | None:
     """Draw beta between what the bounds allow and, where there is a compensator, its table of integers.
 
     Parameters
     ----------
-    side : dict
-        Of valve.json.
+    side : SideModel
     guard : str
         Threshold that is guarded.
     name : str
         ``positive`` or ``negative``.
     both : bool
         Whether the valve has two sides.
-    compensator : dict or None
-        compensator.json.
+    compensator : Compensator or None
 
     Returns
     -------
     ReportFigure or None
         None of a valve tested at one pressure drop.
     """
-    curve = _guard_curve(side, guard)
-    if not curve["beta"] or len(curve["beta"]) < 2:
+    curve = side.guards[guard]
+    if len(curve.beta) < 2:
         return None
-    dp, u_min0 = np.array(curve["beta_dp_MPa"]), curve["u_min0_V"]
+    dp, u_min0 = np.array(curve.beta_dp_MPa), curve.u_min0_V
     steps, lower, threshold = (
-        np.array(curve[key]) / u_min0 for key in ("certified_steps_V", "u_lower_V", "u_threshold_V")
+        np.array(values) / u_min0 for values in (curve.certified_steps_V, curve.u_lower_V, curve.u_threshold_V)
     )
-    figure, axes = _titled(3.6, name, both, legend_rows=2)
+    figure, axes = titled_axes(3.6, name, both, legend_rows=2)
     axes.fill_between(dp, lower, threshold, color=LIGHT["sky"], alpha=0.25, lw=0,
                       label="from bound to threshold, over u_min0")  # fmt: skip
     axes.plot(dp, threshold, ":", color=LIGHT["blue"], lw=1.4, label="threshold / u_min0")
     axes.stairs(steps, dp, baseline=None, color=LIGHT["green"], lw=2, label="certified staircase / u_min0")
-    axes.plot(dp, curve["beta"], "D-.", color=LIGHT["purple"], ms=4.5, lw=1.4, label="β(dP) of the valve")
-    pairs = zip(dp.tolist(), curve["beta"], strict=True)
+    axes.plot(dp, curve.beta, "D-.", color=LIGHT["purple"], ms=4.5, lw=1.4, label="β(dP) of the valve")
+    pairs = zip(dp.tolist(), curve.beta, strict=True)
     rows = [["valve", at, value, round(value * u_min0, 7)] for at, value in pairs]
     if compensator:
         where, nodes, of_the_C = _beta_table(compensator, name)
@@ -228,75 +188,30 @@ def beta_figure(
         ]
     axes.set(xlabel="pressure drop dP (MPa)", ylabel="β (no unit)")
     legend_below(figure, 3)
-    low, high = min(curve["beta"]), max(curve["beta"])
-    description = (
-        f"Beta lies between {low:.4f} and {high:.4f} over {dp[0]:.2f} to {dp[-1]:.2f} MPa, the certified staircase "
-        f"at {_span(steps, '', 4).strip()}."
-    )
-    return ReportFigure(
-        name=f"beta-{name}",
-        caption=f"β over the pressure drop{_side_words(name, both)}: the share of u_min0 that the law puts out at zero "
+    low, high = min(curve.beta), max(curve.beta)
+    return to_report_figure(
+        figure,
+        f"beta-{name}",
+        f"β over the pressure drop{side_words(name, both)}: the share of u_min0 that the law puts out at zero "
         "command."
         + _of_the_table(compensator),
-        description=description,
-        svg=svg_of(figure, f"beta-{name}", description),
-        csv=csv_text(("of", "dp_MPa", "beta", "offset_V"), rows),
+        f"Beta lies between {low:.4f} and {high:.4f} over {dp[0]:.2f} to {dp[-1]:.2f} MPa, the certified staircase "
+        f"at {_span(steps, '', 4).strip()}.",
+        csv_text(("of", "dp_MPa", "beta", "offset_V"), rows),
     )
 
 
-def _of_the_table(compensator: dict[str, Any] | None) -> str:
+def _of_the_table(compensator: Compensator | None) -> str:
     if compensator is None:
         return ""
-    held = " Up to dP0 the C holds what it has there, as the paper does." if compensator["below_dp0"] == "hold" else ""
+    holds = compensator.below_reference == "hold"
+    held = " Up to dP0 the C holds what it has there, as the paper does." if holds else ""
     return f"{held} The table in the C is rounded down, so that it stays below the staircase."
 
 
-def _beta_table(compensator: dict[str, Any], name: str) -> tuple[np.ndarray, np.ndarray, float]:
+def _beta_table(compensator: Compensator, name: str) -> tuple[np.ndarray, np.ndarray, float]:
     """Return pressure drops (MPa) and betas at the nodes of the compensator's table, and its u_min0 (V)."""
-    sensor = compensator["signals"]["pressure_a"]
-    code_MPa = float(Fraction(*sensor["span_MPa"])) / (sensor["full_code"] - sensor["zero_code"])
-    side = compensator["sides"][name]
-    nodes = np.array(side["beta"])
-    where = np.arange(nodes.size) * compensator["beta_step_codes"] * code_MPa
-    u_min0 = float(Fraction(*side["u_min0_over_u_max"]) * Fraction(*compensator["u_max_V"]))
-    return where, nodes / compensator["beta_denominator"], u_min0
-
-
-def law_figure(compensator: dict[str, Any], name: str, both: bool) -> ReportFigure:
-    """Draw the compensator's output over the command at the ends of the tested interval, and the threshold's bound.
-
-    Parameters
-    ----------
-    compensator : dict
-        compensator.json.
-    name : str
-        ``positive`` or ``negative``.
-    both : bool
-        Whether the valve has two sides.
-    """
-    exact = ExactLaw(compensator, 1 if name == "positive" else -1)
-    u_max = float(Fraction(*compensator["u_max_V"]))
-    sensor = compensator["signals"]["pressure_a"]
-    code_MPa = float(Fraction(*sensor["span_MPa"])) / (sensor["full_code"] - sensor["zero_code"])
-    low, high = (float(Fraction(*end)) for end in compensator["sides"][name]["certificate"]["dp_MPa"])
-    figure, axes = _titled(3.2, name, both)
-    axes.plot([0, 100], [0, u_max], ":", color=LIGHT["soft"], lw=1.3, label="without compensator")
-    rows = []
-    for dp_MPa, dash, colour in ((low, "-", "blue"), (high, "--", "vermilion")):
-        corners = exact.corners(exact.betas(round(dp_MPa / code_MPa)))
-        percent = [100 * away / exact.span for away, _ in corners]
-        volts = [u_max * float(count) / exact.compare_max for _, count in corners]
-        axes.plot(percent, volts, dash, color=LIGHT[colour], lw=1.8, label=f"at {dp_MPa:.2f} MPa")
-        rows += [[round(dp_MPa, 4), round(x, 4), round(y, 6)] for x, y in zip(percent, volts, strict=True)]
-    bound = min(bounds_of(compensator["valve"]["sides"][name], compensator["sides"][name]["certificate"]["guard"]))
-    axes.axhline(bound, color=LIGHT["green"], lw=1.2, ls="-.", label="least lower bound of the threshold")
-    axes.set(xlabel="command u_i (% of full)", ylabel="output u_O (V)", xlim=(0, 100), ylim=(0, None))
-    axes.legend(loc="lower right")
-    description = f"The compensator's output starts at {rows[0][2]:.3f} V and ends at {rows[-1][2]:.3f} V."
-    return ReportFigure(
-        name=f"law-{name}",
-        caption=f"The law in exact coefficients at both ends of the tested interval{_side_words(name, both)}.",
-        description=description,
-        svg=svg_of(figure, f"law-{name}", description),
-        csv=csv_text(("dp_MPa", "command_percent", "output_V"), rows),
-    )
+    law = laws_of(compensator)[name]
+    nodes = np.array(law.beta_numerators)
+    where = np.arange(nodes.size) * compensator.beta_step_codes * float(compensator.signals.pressure_a.per_code_MPa)
+    return where, nodes / compensator.beta_denominator, float(law.u_min0_over_u_max * compensator.u_max_V)

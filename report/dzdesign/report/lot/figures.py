@@ -16,7 +16,7 @@ from dzdesign.report.figures.figure import (
     figure_style,
     legend_below,
     new_figure,
-    svg_of,
+    to_report_figure,
 )
 from dzdesign.report.lot.spread import FAR, TWENTY, Spread
 from dzdesign.report.lot.valve_names import short
@@ -92,23 +92,18 @@ def spread_figure(name: str, spreads: Sequence[Spread], caption: str, *, one_sca
         borderaxespad=0.1, handlelength=1.6,
     )  # fmt: skip
     description = "; ".join(in_words(spread) for spread in spreads) + "."
-    return ReportFigure(
-        name=name,
-        caption=caption,
-        description=description,
-        svg=svg_of(figure, name, description),
-        csv=csv_text(
-            ("quantity", "valve", "value", "robust_sd_from_median"),
+    csv = csv_text(
+        ("quantity", "valve", "value", "robust_sd_from_median"),
+        (
             (
-                (
-                    spread.column, valve, value,
-                    round(spread.distance(value), 2) if spread.limits else None,
-                )
-                for spread in spreads
-                for valve, value in zip(spread.names, spread.values, strict=True)
-            ),
+                spread.column, valve, value,
+                round(spread.distance(value), 2) if spread.limits else None,
+            )
+            for spread in spreads
+            for valve, value in zip(spread.names, spread.values, strict=True)
         ),
-    )  # fmt: skip
+    )
+    return to_report_figure(figure, name, caption, description, csv)
 
 
 def in_words(spread: Spread) -> str:
@@ -262,13 +257,8 @@ def order_figure(name: str, spread: Spread, caption: str) -> ReportFigure:
     legend_below(figure, 4)
     figure.subplots_adjust(left=0.68 / WIDTH)
     description = f"{in_words(spread)}, in the order of the names."
-    return ReportFigure(
-        name=name,
-        caption=caption,
-        description=description,
-        svg=svg_of(figure, name, description),
-        csv=csv_text(
-            ("place", "valve", spread.column),
-            zip(range(1, count + 1), spread.names, spread.values, strict=True),
-        ),
+    csv = csv_text(
+        ("place", "valve", spread.column),
+        zip(range(1, count + 1), spread.names, spread.values, strict=True),
     )
+    return to_report_figure(figure, name, caption, description, csv)

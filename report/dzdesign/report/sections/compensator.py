@@ -20,18 +20,18 @@ def law_section(compensator: Compensator | None) -> Section:
     """Return the section on the law; its derivation is added by the page."""
     if compensator is None:
         return Section(missing="No compensator is here: `dzdesign design` makes compensator.json.")
+    laws, valve = laws_of(compensator), valve_in(compensator)
     lines = [f"Up to dP0: {BELOW_DP0[compensator.below_reference]}."]
-    for name, side in laws_of(compensator).items():
+    for name, side in laws.items():
         kappa, u_min0 = side.k_x_max_over_u_max, side.u_min0_over_u_max
         lines.append(
             f"{name.capitalize()} commands: drive range of the law k x_max/u_max = {_exact(kappa)}, from its offset to "
-            f"full flow; the valve's, {valve_in(compensator).sides[name].k_x_max_over_u_max:.4f}, counts from the knee, "
-            f"which lies higher; offset at dP0 u_min0/u_max = {_exact(u_min0)}, both as shares of full command; β is "
-            f"straight between {len(side.beta_numerators)} nodes, {compensator.beta_step_codes} pressure codes apart, each a "
+            f"full flow; the valve's, {valve.sides[name].k_x_max_over_u_max:.4f}, counts from the knee, which lies "
+            f"higher; offset at dP0 u_min0/u_max = {_exact(u_min0)}, both as shares of full command; β is straight "
+            f"between {len(side.beta_numerators)} nodes, {compensator.beta_step_codes} pressure codes apart, each a "
             f"whole number of 1/{compensator.beta_denominator}."
         )
-    both = len(laws_of(compensator)) > 1
-    return Section(figures=tuple(law_figure(compensator, name, both) for name in laws_of(compensator)), lines=tuple(lines))
+    return Section(figures=tuple(law_figure(compensator, name, len(laws) > 1) for name in laws), lines=tuple(lines))
 
 
 def _exact(value: Fraction) -> str:

@@ -8,7 +8,7 @@ from dzdesign.core.verdicts import NOT_CHECKED
 from dzdesign.report.artefact_chain import Chain
 from dzdesign.report.compensator_sides import laws_of
 from dzdesign.report.figures.closed_loop import dead_zone_figure, loop_figure
-from dzdesign.report.figures.curves import Curves
+from dzdesign.report.figures.figure import Curves, ReportFigure
 from dzdesign.report.figures.input_map import map_figure
 from dzdesign.report.figures.zero_command import zero_figure
 from dzdesign.report.page import Section
@@ -23,7 +23,7 @@ from dzdesign.verify.evidence import (
     ScenarioResult,
     Spread,
 )
-from dzdesign.verify.requirements import requirement_statuses
+from dzdesign.verify.requirements import untried_requirements
 
 
 def _curves(chain: Chain, name: str) -> Curves | None:
@@ -41,7 +41,8 @@ def inputs_section(chain: Chain) -> Section:
     """Return the section on the check of every input."""
     if chain.evidence is None:
         return Section(missing="No evidence is here: `dzdesign verify` tries every input of the C.")
-    figures, lines, missing = [], [], ""
+    figures: list[ReportFigure] = []
+    lines, missing = [], ""
     for each in chain.evidence.inputs:
         side = each.side
         lines += _input_lines(each)
@@ -192,7 +193,7 @@ def checks_section(evidence: Evidence | None) -> Section:
     if evidence is None:
         return Section(missing=f"{NOT_CHECKED}: no evidence is here; `dzdesign verify` makes it.")
     tried = [(verdict(check.holds), check.name, check.text) for check in evidence.checks]
-    untried = [each for each in requirement_statuses(evidence) if not each.tried]
+    untried = untried_requirements(evidence)
     rows = [*tried, *((verdict(None), each.title, f"to try it: {each.how}".replace("`", "")) for each in untried)]
     table = table_of(
         f"{len(tried)} requirements tried, {len(untried)} not",

@@ -16,8 +16,6 @@ from dzdesign.derivation.presentation.report import closure, compose
 
 #: All that the laws rest on: sections of the account. Of the others some take a second to import.
 STATEMENTS = (*APPROACH, *AT_REFERENCE, *OFF_REFERENCE, *TIES, *TARGET)
-#: The statement of the account that ends the derivation of each law: Eq. (18), and that the other meets the target.
-STATED_AS = {"paper": "(18)", "target": "T1d"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,7 +45,7 @@ class LawAccount:
     @property
     def holds(self) -> bool:
         """Whether every statement has the verdict that the account expects."""
-        return all(entry.verdict.as_expected for entry in (*self.main, *self.rest))
+        return all(entry.as_expected for entry in (*self.main, *self.rest))
 
     def outcome(self, entry: Entry) -> str:
         """Return the kind of a verdict's cell.
@@ -56,9 +54,9 @@ class LawAccount:
         ----------
         entry : Entry
         """
-        if not entry.verdict.as_expected or entry.verdict.outcome is Outcome.DOES_NOT_FOLLOW:
+        if not entry.as_expected or entry.outcome is Outcome.DOES_NOT_FOLLOW:
             return "bad"
-        return {Outcome.FOLLOWS: "good", Outcome.FOLLOWS_IF: "open"}.get(entry.verdict.outcome, "text")
+        return {Outcome.FOLLOWS: "good", Outcome.FOLLOWS_IF: "open"}.get(entry.outcome, "text")
 
 
 @cache
@@ -70,16 +68,16 @@ def account_of(law_name: str) -> LawAccount:
     law_name : str
         Of compensator.json.
     """
-    number = STATED_AS[law_name]
+    number = law(law_name).stated_as
     numbers = closure(STATEMENTS, [number])
     statements = [statement for statement in STATEMENTS if statement.number in numbers]
     content = compose(prove(statements), numbers)
     direct = {ground.number for ground in statements[-1].grounds} | {number}
     return LawAccount(
         note=parse_prose(law(law_name).note),
-        main=_in(content.entries, direct),
-        rest=_in(content.entries, set(numbers) - direct),
-        glossary=content.glossary,
+        main=_in(content.statements, direct),
+        rest=_in(content.statements, set(numbers) - direct),
+        glossary=content.symbols,
         page=HtmlWriter(numbers),
     )
 

@@ -1,18 +1,21 @@
-"""A common setting in the report: of how many valves it is, which is the worst, and what it costs each of them."""
+"""A lot setting in the report of its firmware: of how many valves it is, the worst of them, and what each pays."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass, fields
 from fractions import Fraction
 from functools import cache
 from itertools import pairwise
-from typing import Any
 
 from dzdesign.core.verdicts import NOT_CHECKED
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.lot import LotSide
 from dzdesign.report.artefact_chain import Chain
+from dzdesign.report.compensator_sides import SIGNS, laws_of, lot_sha256
 from dzdesign.report.figures.figure import csv_text
 from dzdesign.report.page import Section
-from dzdesign.report.sections.cells import Cell, Table, number
+from dzdesign.report.sections.cells import in_number_font, number, table_of
 from dzdesign.report.summary import Figure
+from dzdesign.verify.evidence import Evidence
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 
 #: Valves in the table of the page; all of them stand in the CSV.
@@ -22,7 +25,7 @@ SECTION = ("lot", "The lot")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LotCost:
-    """What a common setting costs one valve on one side, as shares of full command.
+    """What a lot setting costs one valve on one side, as shares of full command.
 
     The command that passes before the drive reaches the valve's own lower bound, at a tested pressure drop.
     """
@@ -35,66 +38,43 @@ class LotCost:
     most_dp_MPa: float
 
 
-def common_count(compensator: dict[str, Any] | None) -> int:
-    """Return of how many valves a compensator is the common setting; 0 of a valve's own.
-
-    Parameters
-    ----------
-    compensator : dict or None
-        compensator.json.
-    """
-    return (compensator or {}).get("common_valves") or 0
-
-
-def carrier_of(compensator: dict[str, Any]) -> str:
-    """Return the name, in the lot, of the valve that the file holds.
-
-    Parameters
-    ----------
-    compensator : dict
-        compensator.json of a common setting.
-    """
-    stated = compensator["made_from"][0]["sha256"]
-    names = (each["name"] for each in compensator.get("lot", ()) if each["valve_sha256"] == stated)
+def carrier_of(compensator: Compensator) -> str:
+    """Return the name, in the lot, of the valve that the file of a lot setting holds."""
+    names = (each.name for each in compensator.lot if each.valve_sha256 == compensator.valve_sha256)
     return next(names, "the valve in compensator.json")
 
 
-def lot_costs(compensator: dict[str, Any]) -> tuple[LotCost, ...]:
-    """Return what the setting costs every valve, the dearest first.
-
-    Parameters
-    ----------
-    compensator : dict
-        compensator.json of a common setting.
-    """
-    signs = {name: sign for name, sign in (("positive", 1), ("negative", -1)) if compensator["sides"][name]}
-    found = [
-        cost for name, sign in signs.items() for cost in _costs_of_side(compensator, ExactLaw(compensator, sign), name)
-    ]
+def lot_costs(compensator: Compensator) -> tuple[LotCost, ...]:
+    """Return what a lot setting costs every valve, the dearest first."""
+    found = [cost for name in laws_of(compensator) for cost in _costs_of_side(compensator, name)]
     return tuple(sorted(found, key=lambda each: -each.most_percent))
 
 
-def _costs_of_side(compensator: dict[str, Any], exact: ExactLaw, name: str) -> Iterator[LotCost]:
-    u_max = float(Fraction(*compensator["u_max_V"]))
-    code_MPa = float(Fraction(*exact.a["span_MPa"])) / (exact.a["full_code"] - exact.a["zero_code"])
+def _costs_of_side(compensator: Compensator, name: str) -> Iterator[LotCost]:
+    exact = ExactLaw(compensator, SIGNS[name])
+    counts_per_V = exact.compare_max / float(compensator.u_max_V)
 
     @cache  # the valves of a lot are tested at the same few pressure drops
     def corners_at(dp_code: int) -> list[tuple[float, float]]:
         return [(away / exact.span, float(counts)) for away, counts in exact.corners(exact.betas(dp_code))]
 
-    for valve in compensator.get("lot", ()):
-        side = valve["sides"][name]
-        if side is None:
-            continue
+    for valve_name, side in _lot_sides(compensator, name):
         shares = [
-            (_share(corners_at(round(dp / code_MPa)), bound * exact.compare_max / u_max), dp)
-            for dp, bound in zip(side["dp_MPa"], side["u_lower_V"], strict=True)
+            (_share(corners_at(round(compensator.signals.dp_code(Fraction(dp)))), bound * counts_per_V), dp)
+            for dp, bound in zip(side.dp_MPa, side.lower_V, strict=True)
         ]
         (least, least_at), (most, most_at) = min(shares), max(shares)
         yield LotCost(
-            valve=valve["name"], side=name, least_percent=100 * least, least_dp_MPa=least_at, most_percent=100 * most,
+            valve=valve_name, side=name, least_percent=100 * least, least_dp_MPa=least_at, most_percent=100 * most,
             most_dp_MPa=most_at,
         )  # fmt: skip
+
+
+def _lot_sides(compensator: Compensator, name: str) -> Iterator[tuple[str, LotSide]]:
+    for valve in compensator.lot:
+        side = valve.positive if name == "positive" else valve.negative
+        if side is not None:
+            yield valve.name, side
 
 
 def _share(corners: list[tuple[float, float]], counts: float) -> float:
@@ -108,40 +88,32 @@ def _share(corners: list[tuple[float, float]], counts: float) -> float:
 
 
 def lot_figures(chain: Chain) -> tuple[Figure, ...]:
-    """Return what the page of a common setting leads with; none of a valve's own.
-
-    Parameters
-    ----------
-    chain : Chain
-    """
-    compensator, evidence = chain.document("compensator"), chain.document("verification")
-    count = common_count(compensator)
-    if not count or compensator is None:
+    """Return what the page of a lot setting leads with; none of a valve's own."""
+    compensator = chain.compensator
+    if compensator is None or not compensator.common_valves:
         return ()
-    carrier = carrier_of(compensator)
     first = Figure(
-        label="Common setting",
-        value=f"of {count} valves",
-        note=f"one law for all; the file holds one of them, {carrier}, its carrier",
+        label="Lot setting",
+        value=f"of {compensator.common_valves} valves",
+        note=f"one law for all; the file holds one of them, {carrier_of(compensator)}, its carrier",
     )
-    return (first, _worst(evidence), _cost(lot_costs(compensator)))
+    return (first, _worst(chain.evidence), _cost(lot_costs(compensator)))
 
 
-def _worst(evidence: dict[str, Any] | None) -> Figure:
-    found = [each["lot"] for each in evidence["inputs"] if each.get("lot")] if evidence else []
+def _worst(evidence: Evidence | None) -> Figure:
+    found = [each.lot for each in evidence.inputs if each.lot] if evidence else []
     if not found:
         return Figure(
             label="Worst valve of the lot", value=NOT_CHECKED, kind="open",
             note="no evidence here compares the C with the bounds of each valve",
         )  # fmt: skip
-    worst = min(found, key=lambda each: each["smallest_margin_V"])
-    over = list(dict.fromkeys(name for each in found for name in each["over_compensated"]))
+    worst = min(found, key=lambda each: each.smallest_margin_V)
+    over = {name for each in found for name in each.over_compensated}
     return Figure(
-        label=f"Worst valve of the lot: {worst['worst']}",
-        value=f"{1e3 * worst['smallest_margin_V']:.3f} mV",
+        label=f"Worst valve of the lot: {worst.worst}",
+        value=f"{1e3 * worst.smallest_margin_V:.3f} mV",
         note="margin of the C's compare values at zero command under its own lower bound, at "
-        f"{worst['worst_dp_MPa']:.2f} MPa; {len(over)} of {min(each['valves'] for each in found)} valves "
-        "over-compensated",
+        f"{worst.worst_dp_MPa:.2f} MPa; {len(over)} of {min(each.valves for each in found)} valves over-compensated",
         kind="bad" if over else "text",
     )
 
@@ -159,61 +131,47 @@ def _cost(costs: tuple[LotCost, ...]) -> Figure:
     )
 
 
-def lot_section(compensator: dict[str, Any]) -> Section:
-    """Return the section on the lot.
-
-    Parameters
-    ----------
-    compensator : dict
-        compensator.json of a common setting.
-    """
-    count, carrier, lot = common_count(compensator), carrier_of(compensator), compensator.get("lot", [])
-    if not lot:
+def lot_section(compensator: Compensator) -> Section:
+    """Return the section on the lot of a lot setting."""
+    count, costs = compensator.common_valves, lot_costs(compensator)
+    if not costs:
         return Section(missing=f"The file is of {count} valves and names none but one; run `dzdesign batch` again.")
-    costs = lot_costs(compensator)
-    sides = {(each["name"], name): side for each in lot for name, side in each["sides"].items() if side}
-    rows = [_row(cost, sides[cost.valve, cost.side]) for cost in costs]
-    caption = "What the common setting costs each valve, the dearest first"
-    if len(costs) > ROWS:
-        caption += f": the first {ROWS} of {len(costs)}"
+    sides = {(valve, name): side for name in SIGNS for valve, side in _lot_sides(compensator, name)}
+    more = f": the first {ROWS} of {len(costs)}" if len(costs) > ROWS else ""
+
+    def side_of(cost: LotCost) -> LotSide:
+        return sides[cost.valve, cost.side]
+
+    table = table_of(
+        f"What the lot setting costs each valve, the dearest first{more}",
+        costs[:ROWS],
+        ("valve", lambda one: one.valve),
+        ("commands", lambda one: one.side),
+        ("tested (MPa)", lambda one: in_number_font(_from_to(side_of(one).dp_MPa))),
+        ("least bound (V)", lambda one: number(min(side_of(one).lower_V), 3)),
+        ("confidence (%)", lambda one: in_number_font(f"{100 * side_of(one).confidence:.6g}")),
+        ("cost, least (%)", lambda one: number(one.least_percent, 2)),
+        ("cost, most (%)", lambda one: number(one.most_percent, 2)),
+        ("most at (MPa)", lambda one: number(one.most_dp_MPa, 2)),
+        csv=csv_text(
+            [each.name for each in fields(LotCost)],
+            ([each if isinstance(each, str) else round(each, 4) for each in astuple(cost)] for cost in costs),
+        ),
+        name="lot",
+    )
     return Section(
         lines=(
-            f"One setting for {count} valves, each with bounds of its own; lot SHA-256 {compensator['lot_sha256']}.",
+            f"One setting for {count} valves, each with bounds of its own; lot SHA-256 {lot_sha256(compensator)}.",
             f"All else in this report that is of one valve (recordings, thresholds, β, certificate, closed loop) is of "
-            f"{carrier}, the carrier.",
+            f"{carrier_of(compensator)}, the carrier.",
             "Cost: the share of the command that passes before the drive reaches the valve's own lower bound, at its "
             "tested pressure drops, in the exact law. How much more that is than with a setting of its own stands in "
             "the report of dzdesign batch.",
         ),
-        tables=(
-            Table(
-                caption=caption,
-                columns=("valve", "commands", "tested (MPa)", "least bound (V)", "confidence (%)", "cost, least (%)",
-                         "cost, most (%)", "most at (MPa)"),
-                rows=tuple(rows[:ROWS]),
-                csv=csv_text(
-                    ("valve", "side", "least_percent", "least_dp_MPa", "most_percent", "most_dp_MPa"),
-                    [
-                        [each.valve, each.side, round(each.least_percent, 4), each.least_dp_MPa,
-                         round(each.most_percent, 4), each.most_dp_MPa]
-                        for each in costs
-                    ],
-                ),
-                name="lot",
-            ),
-        ),
-    )  # fmt: skip
-
-
-def _row(cost: LotCost, side: dict[str, Any]) -> tuple[Cell, ...]:
-    low, high = side["dp_MPa"][0], side["dp_MPa"][-1]
-    return (
-        Cell(text=cost.valve),
-        Cell(text=cost.side),
-        Cell(text=f"{low:.2f}" if low == high else f"{low:.2f} to {high:.2f}", kind="number"),
-        number(min(side["u_lower_V"]), 3),
-        Cell(text=f"{100 * side['confidence']:.6g}", kind="number"),
-        number(cost.least_percent, 2),
-        number(cost.most_percent, 2),
-        number(cost.most_dp_MPa, 2),
+        tables=(table,),
     )
+
+
+def _from_to(pressures: tuple[float, ...]) -> str:
+    low, high = pressures[0], pressures[-1]
+    return f"{low:.2f}" if low == high else f"{low:.2f} to {high:.2f}"

@@ -7,7 +7,7 @@
  *     u_i      command, 0 to u_max = 10 V
  *     u_O      what the valve is driven with, 0 to u_max; the PWM's duty is u_O/u_max
  *     dP       pressure drop over the metering edge
- *     u_min0   offset at the reference pressure drop, close to where the valve opens; zero command gives less: the transition
+ *     u_min0   offset at the reference pressure drop, near where the valve opens; zero command gives less (transition)
  *     beta     how that offset changes with dP, 1 at the reference; read from a table
  *     k x_max  span of u_O from that offset to full opening
  *

@@ -5,7 +5,6 @@ table may do by chance what was meant. Eva reads the C as the standard does, wit
 """
 
 import csv
-import json
 import os
 import re
 import shutil
@@ -23,6 +22,7 @@ import numpy as np
 from dzdesign.core.errors import RequirementError
 from dzdesign.verify.evidence import Check
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
+from dzdesign.verify.firmware.folder import read_compensator
 from dzdesign.verify.requirements import UNDEFINED_BEHAVIOUR
 from dzdesign.verify.toolchain.compiled_core import SOURCES
 from dzdesign.verify.toolchain.machines import programs_folder
@@ -112,7 +112,7 @@ def prove(folder: Path, rows: int | None = None) -> Proof:
     RequirementError
         If Frama-C fails or takes longer than `TIMEOUT_S`.
     """
-    document = json.loads((folder / "compensator.json").read_bytes())
+    compensator = read_compensator(folder)
     sources = sorted(path.name for path in (folder / "core").glob("*.[ch]"))
     alarms: set[Alarm] = set()
     functions: list[str] = []
@@ -120,13 +120,13 @@ def prove(folder: Path, rows: int | None = None) -> Proof:
         for sign, (source, ending) in SOURCES.items():
             if source not in sources:
                 continue
-            law = ExactLaw(document, sign)
+            law = ExactLaw(compensator, sign)
             work = Path(name) / source
             work.mkdir()
             for each in sources:
                 shutil.copyfile(folder / "core" / each, work / each)
             shutil.copyfile(programs_folder() / "proof.c", work / "proof.c")
-            tried = _sound(law.b["valid_codes"])[:rows]
+            tried = _sound(law.b.valid_codes)[:rows]
             (work / "pieces.h").write_text(_pieces(law, ending, tried))
             alarms |= _of_side(work, [each for each in sources if each.endswith(".c")], len(tried))
             functions += [f"dz_{function}{ending}" for function in ("comp", "beta", "status")]
@@ -147,7 +147,7 @@ def _of_side(work: Path, sources: list[str], rows: int) -> set[Alarm]:
 
 def _pieces(law: ExactLaw, ending: str, tried: range) -> str:
     """Return pieces.h: the functions of a side, and the codes where the pieces of each input end; of B those tried."""
-    a, b = _sound(law.a["valid_codes"]), _sound(law.b["valid_codes"])
+    a, b = _sound(law.a.valid_codes), _sound(law.b.valid_codes)
     commands = law.sound_commands
     corners = {law.zero, law.full, law.zero + law.edge_codes, max(law.zero - law.edge_codes, 0)}
     ends = sorted({0, CODES, *_ends_of(commands), *corners, *(code + 1 for code in corners)})
@@ -181,11 +181,11 @@ def _kinds(law: ExactLaw, a: range, code_b: int) -> tuple[int, ...]:
     difference = law.difference(np.arange(a.start, a.stop), np.array(code_b))
     kind = np.where(difference < -law.reverse, 0, np.where(difference < 0, 1, 2))
     changes = (np.flatnonzero(np.diff(kind)) + 1 + a.start).tolist()
-    ends = sorted({a.start, a.stop, *changes, *({law.a["zero_code"]} & {*a})})
+    ends = sorted({a.start, a.stop, *changes, *({law.a.zero_code} & {*a})})
     return (*ends, *[a.stop] * (5 - len(ends)))
 
 
-def _sound(ends: list[int]) -> range:
+def _sound(ends: tuple[int, int]) -> range:
     return range(ends[0], ends[1] + 1)
 
 
@@ -208,8 +208,8 @@ def _alarms(work: Path, sources: list[str], main: str, first: int, end: int) -> 
     except (OSError, subprocess.TimeoutExpired) as error:
         raise RequirementError(f"{PROGRAM} did not end: {error}") from error
     if done.returncode or not report.exists():
-        said = [line for line in (done.stdout + done.stderr).splitlines() if "rror" in line or "aborted" in line]
-        raise RequirementError(f"{PROGRAM} {_version()} failed on {main}: {' '.join(said)[:300]}")
+        errors = [line for line in (done.stdout + done.stderr).splitlines() if "rror" in line or "aborted" in line]
+        raise RequirementError(f"{PROGRAM} {_version()} failed on {main}: {' '.join(errors)[:300]}")
     with report.open(newline="") as lines:
         rows = list(csv.DictReader(lines, dialect="excel-tab"))
     return {

@@ -1,6 +1,5 @@
 """The same check on other processors' machine code: all inputs on a Cortex-M4 in QEMU, a sample on an AVR."""
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,6 +7,7 @@ from dzdesign.core.errors import RequirementError
 from dzdesign.verify.evidence import Check, InputCheck
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import SAMPLED_STRIDE, PreparedInputs
+from dzdesign.verify.firmware.folder import read_compensator
 from dzdesign.verify.requirements import MACHINE_CODE
 from dzdesign.verify.toolchain.compiled_core import CompiledCore, Findings
 from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4, Machine
@@ -49,7 +49,7 @@ def check_on_machine(folder: Path, machine: Machine, host: InputCheck) -> Machin
         If the core does not compile or the program does not end there.
     """
     core = CompiledCore(folder, host.sign)
-    prepared = PreparedInputs(ExactLaw(json.loads((folder / "compensator.json").read_bytes()), host.sign))
+    prepared = PreparedInputs(ExactLaw(read_compensator(folder), host.sign))
     if machine.small:
         sample = prepared.sample()
         found, host_hash = core.check(sample, machine), core.check(sample, sample=True).outputs_hash

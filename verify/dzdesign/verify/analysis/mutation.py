@@ -16,14 +16,13 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
-from dzdesign.core.artefact_files import parse_document, read_bytes
 from dzdesign.core.errors import RequirementError
-from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.verify.analysis.c_mutants import Mutant, mutants_of
 from dzdesign.verify.evidence import Check, MutantOutcome, MutationScore
 from dzdesign.verify.exhaustive.drive_check import CompiledDrive, PreparedDrive
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
+from dzdesign.verify.firmware.folder import read_compensator
 from dzdesign.verify.requirements import MUTATION
 from dzdesign.verify.toolchain.compiled_core import CompiledCore
 from dzdesign.verify.toolchain.machines import HOST, compile_object, link_program, programs_folder, run_program
@@ -44,12 +43,10 @@ class MutationBench:
     """
 
     def __init__(self, folder: Path) -> None:
-        content = read_bytes(folder / "compensator.json", "compensator")
-        document = parse_document(content, str(folder / "compensator.json"), ("dzdesign.compensator/1",))
-        self._compensator = compensator_from_document(content, str(folder / "compensator.json"))
-        self._signs = (1, -1) if document["sides"]["negative"] else (1,)
+        self._compensator = read_compensator(folder)
+        self._signs = self._compensator.signals.signs
         self._cores = {sign: CompiledCore(folder, sign) for sign in self._signs}
-        prepared = {sign: PreparedInputs(ExactLaw(document, sign)) for sign in self._signs}
+        prepared = {sign: PreparedInputs(ExactLaw(self._compensator, sign)) for sign in self._signs}
         self._samples = {sign: each.sample() for sign, each in prepared.items()}
         self._everything = {sign: each.everything(impatient=True) for sign, each in prepared.items()}
         self._drive = CompiledDrive(folder)

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from dzdesign.design.compensator import Compensator
-from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.closed_loop.loop import ClosedLoop, LoopComparison, RampSequence, compare_at_pressure
 from dzdesign.verify.closed_loop.loop_checks import (
     no_flow_at_zero,
@@ -19,6 +18,7 @@ from dzdesign.verify.closed_loop.plant import Plant, plants_from_tests
 from dzdesign.verify.closed_loop.scenarios import Scene, run_scenarios
 from dzdesign.verify.closed_loop.tolerances import Tolerances, monte_carlo, scatter
 from dzdesign.verify.evidence import Check, IdentifiedPlant, MonteCarlo, PressureResult, ScenarioResult, Side
+from dzdesign.verify.firmware.folder import valve_of
 
 #: Shows how far a stage is: pieces and their number in, the pieces out.
 Watch = Callable[[Iterable[Any], int], Iterable[Any]]
@@ -55,9 +55,7 @@ class FirmwareLoop:
         return tuple(loop.result for loop in self.loops)
 
 
-def scenes_of(
-    folder: Path, compensator: Compensator, document: dict[str, Any], valve: ValveModel, plant: Plant | None
-) -> tuple[Scene, ...]:
+def scenes_of(folder: Path, compensator: Compensator, plant: Plant | None) -> tuple[Scene, ...]:
     """Return the compensated loop of each side at every tested pressure drop.
 
     Parameters
@@ -66,13 +64,10 @@ def scenes_of(
         Of the firmware.
     compensator : Compensator
         What it was made from.
-    document : dict
-        Its file.
-    valve : ValveModel
-        What that was made from.
     plant : Plant or None
         None: plants are made from the identified thresholds.
     """
+    valve = valve_of(compensator)
     scenes: list[Scene] = []
     for name, sign in SIGNS.items():
         if sign not in compensator.signals.signs:
@@ -81,21 +76,19 @@ def scenes_of(
         # One that stands in for the valve at one pressure drop says nothing of another.
         plants = dict.fromkeys(side.beta.dp_MPa, plant) if plant else plants_from_tests(side, valve.u_max_V)
         tested = (min(plants), max(plants)) if plant else None
-        first = ClosedLoop(next(iter(plants.values())), folder, document, sign)
-        scenes += [
-            Scene(
-                loop=first.with_plant(one), plant=one, side=name, dp_MPa=dp_MPa,
-                reference_MPa=side.reference.dp_MPa, tested_MPa=tested,
+        first = ClosedLoop(next(iter(plants.values())), folder, compensator, sign)
+        for dp_MPa, one in plants.items():
+            reference = dp_MPa if side.reference.dp_MPa is None else side.reference.dp_MPa
+            loop = first.with_plant(one)
+            scenes.append(
+                Scene(loop=loop, plant=one, side=name, dp_MPa=dp_MPa, reference_MPa=reference, tested_MPa=tested)
             )
-            for dp_MPa, one in plants.items()
-        ]  # fmt: skip
     return tuple(scenes)
 
 
 def close_the_loop(
     scenes: tuple[Scene, ...],
     compensator: Compensator,
-    valve: ValveModel,
     plant: Plant | None,
     sequence: RampSequence,
     tolerances: Tolerances | None,
@@ -110,8 +103,6 @@ def close_the_loop(
         Of `scenes_of`.
     compensator : Compensator
         What the firmware was made from.
-    valve : ValveModel
-        What that was made from.
     plant : Plant or None
         The one that was given.
     sequence : RampSequence
@@ -139,11 +130,11 @@ def close_the_loop(
         pieces = watch(scenes, len(scenes))
         series = monte_carlo(tolerances, [scatter(s.loop, plant, tolerances, s.dp_MPa, s.side) for s in pieces])
     results = [loop.result for loop in loops]
-    zero_flow = no_flow_at_zero(results, compensator, valve, plant_given=given)
+    zero_flow = no_flow_at_zero(results, compensator, plant_given=given)
     return FirmwareLoop(
         checks=(
             plant_opens(results),
-            plant_is_the_valve(results, valve),
+            plant_is_the_valve(results, valve_of(compensator)),
             zero_flow,
             shut_after_scenarios(scenarios, zero_flow, plant_given=given),
         ),

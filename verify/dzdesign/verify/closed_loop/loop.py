@@ -5,12 +5,13 @@ import ctypes
 from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.design.compensator import Compensator
 from dzdesign.design.drive import RAMP_UNIT
+from dzdesign.design.signals import Signals
 from dzdesign.verify.closed_loop.motion import motion_header, numbers_of
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
 from dzdesign.verify.evidence import PressureResult, Side
@@ -81,51 +82,12 @@ class LoopComparison:
     compensated: LoopRun
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Scalings:
-    """Converter codes of command, pressure A and B at zero and at their spans (1, MPa, MPa); all (3,)."""
-
-    zeros: np.ndarray
-    fulls: np.ndarray
-    spans: np.ndarray
-    code_max: int
-    compare_max: int
-    negative: bool = False
-    swapped: bool = False
-
-
-#: Of the direct drive: without a compensator no code is read.
-DIRECT = Scalings(
-    zeros=np.zeros(3, dtype=np.int32),
-    fulls=np.full(3, 4095, dtype=np.int32),
-    spans=np.array([1.0, 20.0, 20.0]),
-    code_max=4095,
-    compare_max=60000,
-)
-
-
-def _scalings(document: dict[str, Any], sign: int) -> Scalings:
-    signals = document["signals"]
-    command, sensors = signals["command"], (signals["pressure_a"], signals["pressure_b"])
-    full = command["full_code" if sign > 0 else "negative_full_code"]
-    return Scalings(
-        zeros=np.array([command["zero_code"], *(sensor["zero_code"] for sensor in sensors)], dtype=np.int32),
-        fulls=np.array([full, *(sensor["full_code"] for sensor in sensors)], dtype=np.int32),
-        spans=np.array([1.0, *(sensor["span_MPa"][0] / sensor["span_MPa"][1] for sensor in sensors)]),
-        code_max=signals["code_max"],
-        compare_max=signals["compare_max"],
-        negative=sign < 0,
-        swapped=sign < 0 and signals["swapped"],
-    )
-
-
-def _slowest_ramp_s(document: dict[str, Any], sign: int) -> float:
-    amplifier, command = document["amplifier"], document["signals"]["command"]
-    full = command["full_code" if sign > 0 else "negative_full_code"]
-    units = abs(full - command["zero_code"]) * RAMP_UNIT
-    side = 0 if sign > 0 else 1
-    steps = [amplifier[name][side] for name in ("ramp_up", "ramp_down") if amplifier[name][side]]
-    return max((units / step / document["signals"]["sample_Hz"] * RAMP_RESERVE for step in steps), default=0.0)
+def _slowest_ramp_s(compensator: Compensator, sign: int) -> float:
+    """Return the time that the amplifier's own ramps take from zero to full command or back, at most; 0: none."""
+    amplifier, signals = compensator.amplifier, compensator.signals
+    units, side = signals.command.span(sign) * RAMP_UNIT, 0 if sign > 0 else 1
+    steps = [ramp[side] for ramp in (amplifier.ramp_up, amplifier.ramp_down) if ramp[side]]
+    return max((units / step / signals.sample_Hz * RAMP_RESERVE for step in steps), default=0.0)
 
 
 class ClosedLoop:
@@ -137,14 +99,14 @@ class ClosedLoop:
         Parameters.
     firmware : Path or None
         Firmware folder; None leaves only the direct drive.
-    document : dict
-        compensator.json of the firmware: scalings of its inputs and output.
+    compensator : Compensator
+        Of the firmware: scalings of its inputs and output, and its ramps.
     sign : {1, -1}
         Side of the valve: the sign of the command that opens it.
     """
 
     def __init__(
-        self, plant: Plant, firmware: Path | None = None, document: dict[str, Any] | None = None, sign: int = 1
+        self, plant: Plant, firmware: Path | None = None, compensator: Compensator | None = None, sign: int = 1
     ) -> None:
         driver = files("dzdesign.verify.closed_loop")
         sources = {"plant_motion.h": motion_header()}
@@ -158,16 +120,26 @@ class ClosedLoop:
             for path in sorted((firmware / "core").glob("*.[ch]")):
                 sources[path.name] = path.read_text(encoding="utf-8")
         self._library = load_library(sources, "the closed loop", FLOATING)
-        self._scalings = _scalings(document, sign) if document else DIRECT
+        #: Without a compensator no code is read, and any scaling serves.
+        self._signals = compensator.signals if compensator else Signals()
+        self._negative = sign < 0
+        command, sensors = self._signals.command, (self._signals.pressure_a, self._signals.pressure_b)
+        full = command.zero_code + command.direction(sign) * command.span(sign)
+        #: Codes of command and pressures at zero and at their spans, and these (1, MPa, MPa).
+        self._scalings = (
+            np.array([command.zero_code, *(sensor.zero_code for sensor in sensors)], dtype=np.int32),
+            np.array([full, *(sensor.full_code for sensor in sensors)], dtype=np.int32),
+            np.array([1.0, *(float(sensor.span_MPa) for sensor in sensors)]),
+        )
         #: Of the amplifier's own ramps on this side, from zero to full command or back, s; 0: none.
-        self.slowest_ramp_s = _slowest_ramp_s(document, sign) if document else 0.0
+        self.slowest_ramp_s = _slowest_ramp_s(compensator, sign) if compensator else 0.0
         self._has_core = firmware is not None
-        self._plant = numbers_of(plant, self._scalings.compare_max)
+        self._plant = numbers_of(plant, self._signals.compare_max)
 
     def with_plant(self, plant: Plant) -> "ClosedLoop":
         """Return the same loop with another plant; nothing is compiled again."""
         other = copy.copy(self)
-        other._plant = numbers_of(plant, self._scalings.compare_max)
+        other._plant = numbers_of(plant, self._signals.compare_max)
         return other
 
     def run(
@@ -207,17 +179,17 @@ class ClosedLoop:
             seen_MPa = np.full(command.shape, dp_frozen_MPa)
         seen = np.full(command.shape, np.nan) if seen_MPa is None else np.ascontiguousarray(seen_MPa, dtype=float)
         record = np.empty((command.size, RECORDED))
-        scalings, plant = self._scalings, self._plant
-        span, highest = float(scalings.spans[1:].min()), float(supply.max())
+        signals, plant, negative = self._signals, self._plant, self._negative
+        span, highest = float(self._scalings[2][1:].min()), float(supply.max())
         back_MPa = min(BACK_PRESSURE_MPA, span - highest)
         if back_MPa < 0:
             raise InputError(f"a pressure drop of {highest:g} MPa exceeds the sensors' span of {span:g} MPa")
         choices = (
-            command.size, periods_per_record, mode != "direct", scalings.negative, scalings.swapped,
-            scalings.code_max, scalings.compare_max,
+            command.size, periods_per_record, mode != "direct", negative, negative and signals.swapped,
+            signals.code_max, signals.compare_max,
         )  # fmt: skip
         series = (np.array(choices, dtype=np.int32), command, supply, seen)
-        given = (scalings.zeros, scalings.fulls, scalings.spans, plant.flat, plant.coarse, plant.fine, record)
+        given = (*self._scalings, plant.flat, plant.coarse, plant.fine, record)
         pointers = [[array.ctypes.data_as(ctypes.c_void_p) for array in arrays] for arrays in (series, given)]
         self._library.dz_loop(*pointers[0], ctypes.c_double(back_MPa), *pointers[1])
         return LoopRun(

@@ -6,6 +6,7 @@ from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN
 from dzdesign.verify.evidence import Check, PressureResult, ScenarioResult
+from dzdesign.verify.firmware.folder import valve_of
 from dzdesign.verify.requirements import PLANT_IS_THE_VALVE, PLANT_OPENS, ZERO_FLOW, ZERO_FLOW_AFTER_SCENARIOS
 
 #: Share of full command by which the opening of a plant may differ from the identified valve's: rounding, a quick ramp.
@@ -39,9 +40,7 @@ def plant_is_the_valve(ramps: Sequence[PressureResult], valve: ValveModel) -> Ch
     return PLANT_IS_THE_VALVE.check(holds=holds, text=text)
 
 
-def no_flow_at_zero(
-    ramps: Sequence[PressureResult], compensator: Compensator, valve: ValveModel, *, plant_given: bool
-) -> Check:
+def no_flow_at_zero(ramps: Sequence[PressureResult], compensator: Compensator, *, plant_given: bool) -> Check:
     """Tell whether the valve is shut at zero command, after closing.
 
     Parameters
@@ -49,15 +48,14 @@ def no_flow_at_zero(
     ramps : sequence of PressureResult
         One a side and pressure drop.
     compensator : Compensator
-        With the threshold that it guards.
-    valve : ValveModel
-        With the threshold that was identified to be guarded.
+        With the threshold that it guards, and its valve with the one that was identified to be guarded.
     plant_given : bool
         Whether the plant is the user's; one made from the thresholds closes where they say.
     """
     worst = max(ramps, key=lambda ramp: ramp.q_zero_L_min)
     guards = {sign: compensator.side(sign).certificate.guard for sign in compensator.signals.signs}
-    identified = {1: valve.sides.get("positive"), -1: valve.sides.get("negative")}
+    sides = valve_of(compensator).sides
+    identified = {1: sides.get("positive"), -1: sides.get("negative")}
     chosen = [guard for sign, guard in guards.items() if (side := identified[sign]) and side.certificate.guard != guard]
     if chosen:
         return ZERO_FLOW.check(

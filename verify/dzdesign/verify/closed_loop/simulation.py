@@ -1,45 +1,35 @@
 """`simulate`: ramp tests as a bench would record them, from the plant; always marked as simulated."""
 
-import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from msgspec import Meta
 
-from dzdesign.core.artefact_files import TOOL, read_bytes, sha256_of
+from dzdesign.core.artefact_files import TOOL, sha256_of
+from dzdesign.core.artefact_types import quantity
 from dzdesign.core.errors import InputError
-from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.identify.reading.ramp_files import SIMULATED_MARK, ramp_file_bytes
 from dzdesign.verify.closed_loop.loop import RECORD_S, ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.plant import Plant
-from dzdesign.verify.firmware.folder import check_firmware_inside
+from dzdesign.verify.firmware.folder import check_firmware_inside, read_compensator
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bench:
-    """The sensors and the recorder of a bench.
+    """The sensors and the recorder of a bench."""
 
-    Attributes
-    ----------
-    rate_Hz : float
-        Rows per second.
-    meter_lag_s, meter_floor_L_min, meter_noise_L_min : float
-        Flow meter: first-order lag, flow below which it reads zero, standard deviation of its noise.
-    command_noise_V, pressure_noise_MPa : float
-        Standard deviations of the other two channels.
-    seed : int
-        Of the noise; the same seed gives the same bytes.
-    """
-
-    rate_Hz: float = 25.0
-    meter_lag_s: float = 0.1
-    meter_floor_L_min: float = 0.6
-    meter_noise_L_min: float = 0.08
-    command_noise_V: float = 0.002
-    pressure_noise_MPa: float = 0.01
-    seed: int = 1
+    rate_Hz: Annotated[float, quantity("Hz", "Rows per second.")] = 25.0
+    meter_lag_s: Annotated[float, quantity("s", "First-order lag of the flow meter.", ge=0, le=1e6)] = 0.1
+    meter_floor_L_min: Annotated[float, quantity("L/min", "Flow below which it reads zero.", ge=0, le=1e6)] = 0.6
+    meter_noise_L_min: Annotated[float, quantity("L/min", "Standard deviation of its noise.", ge=0, le=1e6)] = 0.08
+    command_noise_V: Annotated[float, quantity("V", "Standard deviation of the command's noise.", ge=0, le=1e6)] = 0.002
+    pressure_noise_MPa: Annotated[
+        float, quantity("MPa", "Standard deviation of the pressures' noise.", ge=0, le=1e6)
+    ] = 0.01
+    seed: Annotated[int, Meta(description="Of the noise; the same seed gives the same bytes.")] = 1
 
     def __post_init__(self) -> None:
         if not 1 <= self.rate_Hz <= 1 / RECORD_S:
@@ -124,8 +114,6 @@ def simulated_files(
 def _loop_of(plant: Plant, firmware: Path) -> tuple[ClosedLoop, dict[str, Any]]:
     """Return the loop of a plant with a firmware's core, and what the manifest says of it."""
     check_firmware_inside(firmware)
-    path = firmware / "compensator.json"
-    content = read_bytes(path, "compensator of the firmware")
-    compensator_from_document(content, str(path))  # every key that the loop reads is there
-    origin = {"compensator": {"source": path.name, "sha256": sha256_of(content)}}
-    return ClosedLoop(plant, firmware, json.loads(content)), origin
+    compensator = read_compensator(firmware)
+    digest = sha256_of((firmware / "compensator.json").read_bytes())
+    return ClosedLoop(plant, firmware, compensator), {"compensator": {"source": "compensator.json", "sha256": digest}}

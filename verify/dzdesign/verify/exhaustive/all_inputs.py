@@ -1,19 +1,20 @@
 """Every input of the compiled core against the exactly rounded law, and the properties that make it safe."""
 
-import json
 from pathlib import Path
-from typing import Any
 
+from dzdesign.core.errors import RequirementError
+from dzdesign.design.compensator import Compensator
 from dzdesign.verify import requirements
 from dzdesign.verify.evidence import Check, InputCheck
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.lot_check import check_lot
 from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
-from dzdesign.verify.exhaustive.zero_command import zero_command_margins
+from dzdesign.verify.exhaustive.zero_command import guarded_bounds, zero_command_margins
+from dzdesign.verify.firmware.folder import read_compensator
 from dzdesign.verify.toolchain.compiled_core import CompiledCore, Findings
 
 
-def check_all_inputs(folder: Path, sign: int = 1) -> InputCheck:
+def check_all_inputs(folder: Path, sign: int = 1, compensator: Compensator | None = None) -> InputCheck:
     """Compare one side of the compiled core with the exact law on every pair of command and pressure difference.
 
     The core has three inputs, 2^36 triples of 12 bits; it may depend on the two pressures by their difference only.
@@ -27,55 +28,61 @@ def check_all_inputs(folder: Path, sign: int = 1) -> InputCheck:
         Firmware folder: ``core/`` and ``compensator.json``.
     sign : {1, -1}
         Sign of the commands that the side is for.
+    compensator : Compensator, optional
+        The folder's, where it has been read.
 
     Raises
     ------
     RequirementError
         If the core does not compile, crashes, or hangs.
     """
-    document = json.loads((folder / "compensator.json").read_bytes())
-    prepared = PreparedInputs(ExactLaw(document, sign))
+    prepared = PreparedInputs(ExactLaw(compensator or read_compensator(folder), sign))
     core = CompiledCore(folder, sign)
-    return input_check(document, prepared, core, core.check(prepared.everything()))
+    return input_check(prepared, core, core.check(prepared.everything()))
 
 
-def input_check(document: dict[str, Any], prepared: PreparedInputs, core: CompiledCore, found: Findings) -> InputCheck:
+def input_check(prepared: PreparedInputs, core: CompiledCore, found: Findings) -> InputCheck:
     """Return what was found, with the bound at zero command.
 
     Parameters
     ----------
-    document : dict
-        compensator.json.
     prepared : PreparedInputs
         What was tried.
     core : CompiledCore
         What it was tried on.
     found : Findings
         What the machine reported.
+
+    Raises
+    ------
+    RequirementError
+        If no pair of pressure codes makes a pressure drop that was tested.
     """
-    exact = prepared.exact
-    above, margin = zero_command_margins(document, exact, prepared.differences, found.at_zero)
+    exact, differences = prepared.exact, prepared.differences
+    (margin,) = zero_command_margins(exact, differences, found.at_zero, [guarded_bounds(exact.compensator, exact.sign)])
+    if margin is None:
+        raise RequirementError("no pair of valid pressure codes makes a tested pressure drop, so no bound is known")
     return InputCheck(
-        sign=1 if exact.side == "positive" else -1,
+        sign=1 if exact.sign > 0 else -1,
         inputs=found.inputs,
         wrong=found.wrong,
         largest_error=found.largest_error,
         out_of_range=found.out_of_range,
         not_monotone_in_u=found.falls,
         not_monotone_in_dp=found.against,
-        over_compensated=above,
+        over_compensated=margin.exceeded,
         odd_pairs=found.odd,
         bad_fallbacks=found.bad_fallbacks,
         bad_status=found.bad_status,
         bad_betas=found.bad_betas,
-        smallest_margin_V=float(margin),
+        smallest_margin_V=float(margin.margin_V),
         core_sha256=core.sha256,
         object_sha256=found.object_sha256,
         outputs_hash=found.outputs_hash,
         calls=found.calls,
-        pressure_pairs=prepared.differences.pairs,
+        pressure_pairs=differences.pairs,
         first_wrong=first_wrong(prepared, found),
-        lot=check_lot(document, exact, prepared.differences, found.at_zero),
+        lot=check_lot(exact, differences, found.at_zero),
     )
 
 

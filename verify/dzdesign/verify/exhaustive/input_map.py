@@ -5,15 +5,15 @@ The check of all inputs (`all_inputs`) counts; this shows. The grid is denser wh
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from dzdesign.design.compensator import Compensator
+from dzdesign.verify.evidence import Side
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import Differences, differences
-from dzdesign.verify.exhaustive.zero_command import bounds_at
+from dzdesign.verify.exhaustive.zero_command import Staircase, guarded_bounds, pressure_drops
 from dzdesign.verify.toolchain.compiled_core import SOURCES
 from dzdesign.verify.toolchain.host_compiler import load_library
 
@@ -42,7 +42,7 @@ class InputMap:
         a dither its peak), and the lower bound of the threshold in V.
     """
 
-    side: str
+    side: Side
     command_codes: tuple[int, ...]
     dp_codes: tuple[int, ...]
     compare: np.ndarray
@@ -58,15 +58,15 @@ class InputMap:
                 yield code, dp_code, given, given - int(self.exact[i, j]), int(self.status[i, j])
 
 
-def map_inputs(folder: Path, document: dict[str, Any], sign: int = 1) -> InputMap:
+def map_inputs(folder: Path, compensator: Compensator, sign: int = 1) -> InputMap:
     """Call one side of the compiled core over the grid.
 
     Parameters
     ----------
     folder : Path
         Firmware folder.
-    document : dict
-        Its compensator.json, checked.
+    compensator : Compensator
+        What it was made from.
     sign : {1, -1}
         Sign of the commands.
 
@@ -75,7 +75,7 @@ def map_inputs(folder: Path, document: dict[str, Any], sign: int = 1) -> InputMa
     RequirementError
         If the core does not compile.
     """
-    exact = ExactLaw(document, sign)
+    exact = ExactLaw(compensator, sign)
     name, ending = SOURCES[sign]
     texts = {
         file: (folder / "core" / file).read_text(encoding="utf-8", errors="surrogateescape")
@@ -85,15 +85,16 @@ def map_inputs(folder: Path, document: dict[str, Any], sign: int = 1) -> InputMa
     core, status = (getattr(library, f"dz_{what}{ending}") for what in ("comp", "status"))
     found = differences(exact)
     made = np.flatnonzero(found.made)
-    bounds = bounds_at(document, exact, found)
-    tested = np.array([row for row in made if bounds[row] is not None])
+    bounds = Staircase(guarded_bounds(compensator, sign))
+    steps = pressure_drops(exact, found, bounds.dp_MPa).steps_of(bounds)
+    tested = np.flatnonzero(steps >= 0)
     rows, commands = _grid_rows(found, made, tested), _commands(exact)
     pairs = {row: _pair(exact, found, row) for row in {*rows.tolist(), *tested.tolist()}}
     values = [[core(code, *pairs[row]) for code in commands] for row in rows.tolist()]
     compare = np.array(values)
-    a_MPa = float(Fraction(*exact.a["span_MPa"])) / (exact.a["full_code"] - exact.a["zero_code"])
-    volt = float(Fraction(*document["u_max_V"])) / exact.compare_max
-    peak = document["amplifier"]["dither_counts"]
+    a_MPa = float(exact.a.span_MPa) / (exact.a.full_code - exact.a.zero_code)
+    volt = float(compensator.u_max_V) / exact.compare_max
+    peak = compensator.amplifier.dither_counts
     return InputMap(
         side=exact.side,
         command_codes=tuple(commands),
@@ -106,7 +107,7 @@ def map_inputs(folder: Path, document: dict[str, Any], sign: int = 1) -> InputMa
                 int(found.values[row]),
                 float(found.values[row]) * a_MPa,
                 (core(exact.zero, *pairs[row]) + peak) * volt,
-                float(bounds[row]),
+                float(bounds.bounds_V[steps[row]]),
             )
             for row in tested.tolist()
         ),
@@ -143,9 +144,5 @@ def _exact_values(exact: ExactLaw, dp_codes: list[int], commands: list[int], giv
         corners = exact.corners(exact.betas(dp_code))
         for column, code in enumerate(commands):
             if code in exact.sound_commands:
-                away = exact.from_zero(code)
-                part = next(i for i in range(len(corners) - 1) if away <= corners[i + 1][0])
-                (first, start), (last, end) = corners[part : part + 2]
-                count = start + (end - start) * Fraction(away - first, last - first)
-                values[row, column] = min(max((count + Fraction(1, 2)).__floor__(), 0), exact.compare_limit)
+                values[row, column] = exact.compare_value(code, corners)
     return values

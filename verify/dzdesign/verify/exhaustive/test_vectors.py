@@ -24,7 +24,7 @@ SPREAD = 40503
 #: Above every numerator of beta.
 KEY = 2**31
 #: What dz_beta() multiplies beta by, rounding down.
-SHOWN_BETA = 2**15
+BETA_UNIT = 2**15
 SCALARS = (
     "parts", "codes", "first_code", "code_step", "sound_from", "sound_to", "zero_place", "zero_code", "compare_limit",
     "a_low", "a_high", "b_low", "b_high", "turn", "reverse", "lowest", "safe_law", "safe_at_zero", "rows", "pairs",
@@ -71,7 +71,7 @@ class Differences:
 def differences(exact: ExactLaw) -> Differences:
     """Return every difference that sound pressure codes make."""
     slant = exact.slant()
-    (a_low, a_high), (b_low, b_high) = exact.a["valid_codes"], exact.b["valid_codes"]
+    (a_low, a_high), (b_low, b_high) = exact.a.valid_codes, exact.b.valid_codes
     sound = slant[b_low : b_high + 1]  # never falls: along a difference both codes rise together
     ends = sorted(exact.turn * (a - s) for a in (a_low, a_high) for s in (sound[0], sound[-1]))
     values = np.arange(ends[0], ends[-1] + 1)
@@ -106,14 +106,13 @@ class PreparedInputs:
         self._unit = betas.denominator
         key, law_of = np.unique(betas.law * KEY + betas.zero, return_inverse=True)
         both = np.stack(np.divmod(key, KEY))
-        self._shown_betas = both[0] * SHOWN_BETA // self._unit
+        self._beta_values = both[0] * BETA_UNIT // self._unit
         self._law_of = law_of
         self._corners = self._corner_numerators(both)
-        self._along = 1 if exact.full > exact.zero else -1
         self._codes = exact.code_max + 1
-        self._zero_place = exact.zero if self._along > 0 else exact.code_max - exact.zero
+        self._zero_place = exact.zero if self.exact.along > 0 else exact.code_max - exact.zero
         ends = (exact.sound_commands[0], exact.sound_commands[-1])
-        self._sound = ends if self._along > 0 else tuple(exact.code_max - code for code in ends[::-1])
+        self._sound = ends if self.exact.along > 0 else tuple(exact.code_max - code for code in ends[::-1])
         self._parts = self._straight_parts()
 
     def everything(self, *, cube: bool = True, impatient: bool = False) -> bytes:
@@ -130,7 +129,7 @@ class PreparedInputs:
 
     def code_at(self, place: int) -> int:
         """Return the command's code at a place."""
-        return place if self._along > 0 else self.exact.code_max - place
+        return place if self.exact.along > 0 else self.exact.code_max - place
 
     def sampled_rows(self) -> np.ndarray:
         """Return rows at and beside the ends, no pressure drop, the failed-sensor limit, and some in between."""
@@ -228,7 +227,7 @@ class PreparedInputs:
         """Return pressure codes of which one or both are not sound, then sound ones; ends and middles."""
         inside, outside = [], []
         for sensor in (self.exact.a, self.exact.b):
-            low, high = sensor["valid_codes"]
+            low, high = sensor.valid_codes
             inside.append((low, (low + high) // 2, high))
             outside.append(tuple(code for code in (low - 1, high + 1, OUTSIDE) if code >= 0))
         pairs = [(a, b, 0) for a in outside[0] for b in inside[1] + outside[1]]
@@ -252,7 +251,7 @@ class PreparedInputs:
             "parts": count,
             "codes": self._codes,
             "first_code": self.code_at(0),
-            "code_step": self._along,
+            "code_step": self.exact.along,
             "sound_from": self._sound[0],
             "sound_to": self._sound[1] + 1,
             "zero_place": self._zero_place,
@@ -267,8 +266,8 @@ class PreparedInputs:
             "places": places.size,
             "stride": stride,
         }
-        values |= dict(zip(("a_low", "a_high"), exact.a["valid_codes"], strict=True))
-        values |= dict(zip(("b_low", "b_high"), exact.b["valid_codes"], strict=True))
+        values |= dict(zip(("a_low", "a_high"), exact.a.valid_codes, strict=True))
+        values |= dict(zip(("b_low", "b_high"), exact.b.valid_codes, strict=True))
         pairs = self._fallback_pairs()
         values["pairs"] = pairs.size
         tables = {
@@ -278,7 +277,7 @@ class PreparedInputs:
             "slant_at": self.differences.slant.astype("<i4"),
             "pairs_at": pairs,
             "places_at": places,
-            "betas_at": self._shown_betas[used].astype("<u2"),
+            "betas_at": self._beta_values[used].astype("<u2"),
         }
         content = b""
         for name, table in tables.items():

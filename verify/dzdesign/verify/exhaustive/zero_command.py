@@ -1,124 +1,106 @@
-"""What the zero-command drive leaves to the threshold's lower bound, at every difference of pressure codes.
+"""What the zero-command drive leaves to a threshold's lower bound, at every difference of pressure codes.
 
 The bound is argued from the ramp tests anew: by monotonicity a threshold that falls with dP is at least the bound of
 any test at a higher dP, one that rises at least that of any test at a lower dP, and of a flat one only the lowest bound
 is known. A code stands for all pressures that may have made it; a dither's peak counts as drive.
 """
 
-from bisect import bisect_left, bisect_right
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from itertools import accumulate
-from math import lcm
-from typing import Any
+from math import floor, lcm
 
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.lot import LotSide
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import Differences
+from dzdesign.verify.firmware.folder import valve_of
+
+#: Whole numbers below this, and their differences, fit 64 bits with a sign.
+LARGEST = 2**62
 
 
-def zero_command_margins(
-    document: dict[str, Any], exact: ExactLaw, found: Differences, at_zero: np.ndarray
-) -> tuple[int, Fraction]:
-    """Return how many differences of the tested interval are driven above the bound, and the smallest margin in V.
-
-    Parameters
-    ----------
-    document : dict
-        compensator.json.
-    exact : ExactLaw
-        The side's law.
-    found : Differences
-        All differences.
-    at_zero : (D,) array
-        Compare values that the core gives at zero command.
-    """
-    largest: dict[Fraction, int] = {}  # the largest drive for which each bound is what is known
-    counts: dict[Fraction, list[int]] = {}
-    for bound, compare in zip(bounds_at(document, exact, found), at_zero.tolist(), strict=True):
-        if bound is not None:
-            largest[bound] = max(largest.get(bound, 0), compare)
-            counts.setdefault(bound, []).append(compare)
-    u_max, peak = Fraction(*document["u_max_V"]), document["amplifier"]["dither_counts"]
-    margins = {bound: bound - u_max * (compare + peak) / exact.compare_max for bound, compare in largest.items()}
-    above = 0
-    for bound in (bound for bound, margin in margins.items() if margin < 0):
-        limit = bound * exact.compare_max / u_max - peak
-        above += sum(compare > limit for compare in counts[bound])
-    return above, min(margins.values())
-
-
-def bounds_at(document: dict[str, Any], exact: ExactLaw, found: Differences) -> list[Fraction | None]:
-    """Return the threshold's lower bound in V at every difference; None where none is known, or no codes make it.
+class Staircase:
+    """What is known of a threshold's lower bound between its ramp tests, by its monotony.
 
     Parameters
     ----------
-    document : dict
-        compensator.json.
-    exact : ExactLaw
-        The side's law.
-    found : Differences
-        All differences.
+    bounds : LotSide
+        Pressure drops of the tests, the bound at each, and how the threshold runs with the pressure drop.
+
+    Attributes
+    ----------
+    dp_MPa, bounds_V : list of Fraction
+        Pressure drops of the tests, rising, and what is known of the bound at each.
+    falling : bool
+        Whether the threshold falls with the pressure drop.
     """
-    side = document["valve"]["sides"][exact.side]
-    bounds = bounds_of(side, document["sides"][exact.side]["certificate"]["guard"])
-    tests = sorted(
-        (Fraction(repr(test["dp_MPa"])), Fraction(repr(bound)))
-        for test, bound in zip(side["tests"], bounds, strict=True)
-    )
-    pressures, values = [dp for dp, _ in tests], [bound for _, bound in tests]
-    best = best_bounds(side["trend"], values)
-    scale, lowest, highest = pressure_drops(exact, found, [dp.denominator for dp in pressures])
-    ends = [int(dp * scale) for dp in pressures]
-    known: list[Fraction | None] = []
-    for low, high, made in zip(lowest, highest, found.made.tolist(), strict=True):
-        if not made or high < ends[0] or low > ends[-1]:
-            known.append(None)
-        elif side["trend"] == "decreasing":
-            known.append(best[bisect_left(ends, min(high, ends[-1]))])
+
+    def __init__(self, bounds: LotSide) -> None:
+        pairs = zip(bounds.dp_MPa, bounds.lower_V, strict=True)
+        tests = sorted((Fraction(repr(dp)), Fraction(repr(bound))) for dp, bound in pairs)
+        self.dp_MPa, values = [dp for dp, _ in tests], [bound for _, bound in tests]
+        self.falling = bounds.trend == "decreasing"
+        if self.falling:
+            self.bounds_V = list(accumulate(values[::-1], max))[::-1]  # of a test and all above it
+        elif bounds.trend == "increasing":
+            self.bounds_V = list(accumulate(values, max))  # of a test and all below it
         else:
-            known.append(best[bisect_right(ends, max(low, ends[0])) - 1])
-    return known
+            self.bounds_V = [min(values)] * len(values)
 
 
-def best_bounds(trend: str | None, values: list[Fraction]) -> list[Fraction]:
-    """Return what is known at each test of the threshold's lower bound, by its monotony.
-
-    Parameters
-    ----------
-    trend : str or None
-        Of the threshold over the pressure drop.
-    values : list of Fraction
-        Bounds of the tests, in the order of rising pressure drop.
-    """
-    if trend == "decreasing":
-        return list(accumulate(values[::-1], max))[::-1]  # of a test and all above it
-    if trend == "increasing":
-        return list(accumulate(values, max))  # of a test and all below it
-    return [min(values)] * len(values)
-
-
-def bounds_of(side: dict[str, Any], guard: str) -> list[float]:
-    """Return the lower bounds of the threshold that the compensator was certified for, V.
+def guarded_bounds(compensator: Compensator, sign: int) -> LotSide:
+    """Return the lower bounds of the threshold that a compensator was certified for.
 
     Raises
     ------
     InputError
         If its valve has none.
     """
-    if guard == side["certificate"]["guard"]:
-        return [test["u_guard_lower_V"] for test in side["tests"]]
-    if guard not in side.get("guards", {}):
+    side = valve_of(compensator).sides["positive" if sign > 0 else "negative"]
+    guard = compensator.side(sign).certificate.guard
+    if guard not in side.guards:
         raise InputError(
             f"the certificate guards the {guard} threshold, of which its valve has no bounds; make the compensator "
             "again with `dzdesign design`"
         )
-    return side["guards"][guard]["u_lower_V"]
+    return LotSide.of(side, guard)
 
 
-def pressure_drops(exact: ExactLaw, found: Differences, denominators: list[int]) -> tuple[int, list[int], list[int]]:
-    """Return the least and the largest pressure drop that may have made each difference, over all its pairs.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PressureDrops:
+    """The least and the largest pressure drop that may have made each difference, over all its pairs.
+
+    Attributes
+    ----------
+    scale : int
+        What they are over, in MPa.
+    least, most : (D,) array of int
+    made : (D,) array of bool
+        Which differences sound codes make.
+    """
+
+    scale: int
+    least: np.ndarray
+    most: np.ndarray
+    made: np.ndarray
+
+    def steps_of(self, staircase: Staircase) -> np.ndarray:
+        """Return which bound of a staircase is known at each difference, by its place; -1: none."""
+        ends = np.array([int(dp * self.scale) for dp in staircase.dp_MPa], dtype=self.least.dtype)
+        if staircase.falling:
+            place = np.searchsorted(ends, np.minimum(self.most, ends[-1]), side="left")
+        else:
+            place = np.searchsorted(ends, np.maximum(self.least, ends[0]), side="right") - 1
+        return np.where(self.made & (self.most >= ends[0]) & (self.least <= ends[-1]), place, -1)
+
+
+def pressure_drops(exact: ExactLaw, found: Differences, tested_MPa: Iterable[Fraction]) -> PressureDrops:
+    """Return the pressure drops of all differences.
 
     Parameters
     ----------
@@ -126,29 +108,28 @@ def pressure_drops(exact: ExactLaw, found: Differences, denominators: list[int])
         Its sensors and what their codes stand for.
     found : Differences
         All differences.
-    denominators : list of int
-        What the scale must be a multiple of.
-
-    Returns
-    -------
-    scale, least, largest
-        Integers, over `scale` in MPa.
+    tested_MPa : iterable of Fraction
+        Pressure drops that they are to be compared with: whole numbers over the scale, too.
     """
-    a_MPa, b_MPa = (Fraction(*s["span_MPa"]) / (s["full_code"] - s["zero_code"]) for s in (exact.a, exact.b))
-    (a_least, a_most), (b_least, b_most) = ([Fraction(*end) for end in s["error_MPa"]] for s in (exact.a, exact.b))
+    tested = set(tested_MPa)
+    a_MPa, b_MPa, (a_least, a_most), (b_least, b_most) = (
+        exact.a.per_code_MPa, exact.b.per_code_MPa, exact.a.error_MPa, exact.b.error_MPa,
+    )  # fmt: skip
     ends = sorted(exact.turn * error for error in (a_least - b_most, a_most - b_least))
-    scale = lcm(a_MPa.denominator, b_MPa.denominator, *(end.denominator for end in ends), *denominators)
+    scale = lcm(*(value.denominator for value in (a_MPa, b_MPa, *ends, *tested)))
     a_unit, b_unit = int(a_MPa * scale), int(b_MPa * scale)
     # A pair's drop is turn ((a - a0) a_MPa - (b - b0) b_MPa), and a - a0 is turn (difference) + slant[b] - a0.
     codes = np.arange(found.slant.size, dtype=object)
     rest = exact.turn * (
-        (found.slant.astype(object) - exact.a["zero_code"]) * a_unit - (codes - exact.b["zero_code"]) * b_unit
+        (found.slant.astype(object) - exact.a.zero_code) * a_unit - (codes - exact.b.zero_code) * b_unit
     )
     values = found.values.astype(object) * a_unit
     first, last = np.minimum(found.b_first, codes.size - 1), np.maximum(found.b_last, found.b_first)
     least = values + _extreme(rest, first, last, np.minimum) + int(ends[0] * scale)
     most = values + _extreme(rest, first, last, np.maximum) + int(ends[1] * scale)
-    return scale, least.tolist(), most.tolist()
+    largest = max(*(int(dp * scale) for dp in tested), *(abs(each[end]) for each in (least, most) for end in (0, -1)))
+    kind = np.int64 if largest < LARGEST else object
+    return PressureDrops(scale=scale, least=least.astype(kind), most=most.astype(kind), made=found.made)
 
 
 def _extreme(values: np.ndarray, first: np.ndarray, last: np.ndarray, extreme: np.ufunc) -> np.ndarray:
@@ -163,3 +144,64 @@ def _extreme(values: np.ndarray, first: np.ndarray, last: np.ndarray, extreme: n
     level = np.array([int(width).bit_length() - 1 for width in last - first + 1])
     windows = zip(level, first, last, strict=True)
     return np.array([extreme(ranges[k][begin], ranges[k][end - 2**k + 1]) for k, begin, end in windows], dtype=object)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ZeroCommandMargin:
+    """What the drive at zero command leaves to one staircase of bounds.
+
+    Attributes
+    ----------
+    margin_V : Fraction
+        The least distance to the bound; negative if it is exceeded.
+    dp_MPa : float
+        Pressure drop where it is least: the middle of those that the difference of codes stands for.
+    exceeded : int
+        Differences of pressure codes at which the drive lies above the bound.
+    """
+
+    margin_V: Fraction
+    dp_MPa: float
+    exceeded: int
+
+
+def zero_command_margins(
+    exact: ExactLaw, found: Differences, at_zero: np.ndarray, bounds: Sequence[LotSide]
+) -> list[ZeroCommandMargin | None]:
+    """Return what the drive at zero command leaves to each valve's bounds; None where no code reaches its tests.
+
+    Parameters
+    ----------
+    exact : ExactLaw
+        The side's law.
+    found : Differences
+        All differences.
+    at_zero : (D,) array
+        Compare values that the core gives at zero command.
+    bounds : sequence of LotSide
+        One entry a valve.
+    """
+    stairs = [Staircase(each) for each in bounds]
+    drops = pressure_drops(exact, found, {dp for each in stairs for dp in each.dp_MPa})
+    unit_V = exact.compensator.u_max_V / exact.compare_max
+    at_peak = at_zero + exact.compensator.amplifier.dither_counts
+    return [_margin(staircase, drops, at_peak, unit_V) for staircase in stairs]
+
+
+def _margin(
+    staircase: Staircase, drops: PressureDrops, at_peak: np.ndarray, unit_V: Fraction
+) -> ZeroCommandMargin | None:
+    """Return what drives, counts of `unit_V`, leave to a staircase."""
+    steps, exceeded = drops.steps_of(staircase), 0
+    least: list[tuple[Fraction, int]] = []
+    for place, bound in enumerate(staircase.bounds_V):
+        drive = np.where(steps == place, at_peak, -1)
+        row = int(drive.argmax())
+        if drive[row] >= 0:
+            least.append((bound - unit_V * int(drive[row]), row))
+            exceeded += int(((steps == place) & (at_peak > floor(bound / unit_V))).sum())
+    if not least:
+        return None
+    margin, row = min(least)
+    middle = Fraction(int(drops.least[row]) + int(drops.most[row]), 2 * drops.scale)
+    return ZeroCommandMargin(margin_V=margin, dp_MPa=round(float(middle), 4), exceeded=exceeded)

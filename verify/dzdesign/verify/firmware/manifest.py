@@ -8,8 +8,8 @@ from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.artefact_types import SourceFile
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest
-from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.evidence import Check
+from dzdesign.verify.firmware.folder import valve_of
 from dzdesign.verify.requirements import MANIFEST
 
 COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
@@ -22,7 +22,7 @@ BANNER = re.compile(r"Compensator SHA-256: (\w+)")
 Value = int | tuple[tuple[int, ...], ...] | str
 
 
-def manifest_follows(folder: Path, manifest: FirmwareManifest, compensator: Compensator, valve: ValveModel) -> Check:
+def manifest_follows(folder: Path, manifest: FirmwareManifest, compensator: Compensator) -> Check:
     """Tell whether the manifest says what is in the folder; its words on a constant are not read.
 
     Parameters
@@ -33,10 +33,8 @@ def manifest_follows(folder: Path, manifest: FirmwareManifest, compensator: Comp
         Of `read_firmware_manifest`.
     compensator : Compensator
         The folder's compensator.json.
-    valve : ValveModel
-        What that was made from.
     """
-    faults = [*_faults_of_origin(folder, manifest, compensator, valve), *_faults_of_constants(folder, manifest)]
+    faults = [*_faults_of_origin(folder, manifest, compensator), *_faults_of_constants(folder, manifest)]
     if faults:
         more = f", and {len(faults) - 1} more" if len(faults) > 1 else ""
         return MANIFEST.check(holds=False, text=f"{faults[0]}{more}; make the firmware again with `dzdesign codegen`")
@@ -46,9 +44,7 @@ def manifest_follows(folder: Path, manifest: FirmwareManifest, compensator: Comp
     return MANIFEST.check(holds=True, text=text)
 
 
-def _faults_of_origin(
-    folder: Path, manifest: FirmwareManifest, compensator: Compensator, valve: ValveModel
-) -> Iterator[str]:
+def _faults_of_origin(folder: Path, manifest: FirmwareManifest, compensator: Compensator) -> Iterator[str]:
     """Yield what the manifest says of the compensator and the valve, and is otherwise."""
     digest = sha256_of((folder / "compensator.json").read_bytes())
     if manifest.law != compensator.law_name:
@@ -57,12 +53,11 @@ def _faults_of_origin(
     if targets != {manifest.target}:
         there = " and ".join(sorted(targets)) or "no target"
         yield f"the manifest's target is {manifest.target}, but the files are those of {there}"
-    recordings = tuple(SourceFile(source=source, sha256=sha256) for source, sha256 in valve.made_from)
     for key, stated, value in (
         ("made_from", manifest.made_from, (SourceFile(source="compensator.json", sha256=digest),)),
         ("origin.compensator_json", manifest.origin.compensator_json, digest),
         ("origin.valve_json", manifest.origin.valve_json, compensator.valve_sha256),
-        ("origin.ramp_tests", manifest.origin.ramp_tests, recordings),
+        ("origin.ramp_tests", manifest.origin.ramp_tests, valve_of(compensator).made_from),
     ):
         if stated != value:
             yield f"the manifest's {key} is not that of compensator.json"

@@ -1,0 +1,114 @@
+"""What both C2000 targets compute alike: integers for registers, limits, and the times about a PWM period."""
+
+from fractions import Fraction
+
+from dzdesign.core.errors import DzdesignError
+
+PWM_HZ = 2_500  # section 3 of the paper
+SAMPLE_HZ = 1_250  # section 4.1 of the paper
+ISR_DELAY_S = Fraction(20, 10**6)  # from the start of conversion to the interrupt
+SAMPLE_TIMEOUT_S = Fraction(32, 10**4)  # four sample periods
+WATCHDOG_COUNTS = 512 * 256  # clock / 512 into eight bits, no further divider
+ADC_BITS, CHANNELS = 12, 3
+#: What the projects of both build with.
+TOOLS = {
+    "cgt_version": "22.6.3.LTS",
+    # Where TI's Windows installer puts C2000Ware; the user changes this one line of the projectspec.
+    "c2000ware_default": "C:/ti/c2000/C2000Ware_26_01_00_00",
+}
+
+
+def exact(quantity: Fraction, what: str, largest: int) -> int:
+    """Return `quantity` as the integer that it must be.
+
+    Parameters
+    ----------
+    quantity : Fraction
+        A number of counts or periods, exact.
+    what : str
+        Its name in the message.
+    largest : int
+        What its register or function takes.
+
+    Raises
+    ------
+    DzdesignError
+        If it is not an integer from 1 to `largest`.
+
+    Examples
+    --------
+    >>> exact(Fraction(150_000_000, 2_500), "counts per PWM period", 65536)
+    60000
+    """
+    if quantity.denominator != 1 or not 0 < quantity <= largest:
+        raise DzdesignError(f"{what} must be an integer from 1 to {largest}, got {quantity}")
+    return quantity.numerator
+
+
+def within(quantity: Fraction, least: Fraction | int, most: Fraction | int, what: str) -> Fraction:
+    """Return `quantity` if it lies from `least` to `most`.
+
+    Parameters
+    ----------
+    quantity, least, most : Fraction
+        In the same unit.
+    what : str
+        Name and unit for the message.
+
+    Raises
+    ------
+    DzdesignError
+        If it lies outside.
+    """
+    if not least <= quantity <= most:
+        raise DzdesignError(f"{what} must lie from {float(least):g} to {float(most):g}, got {float(quantity):g}")
+    return quantity
+
+
+def printed(quantity: Fraction) -> str:
+    """Print `quantity` for a comment: exactly if it is an integer, else with three significant digits.
+
+    Examples
+    --------
+    >>> printed(Fraction(113, 25))
+    '4.52'
+    """
+    return str(quantity.numerator) if quantity.denominator == 1 else f"{float(quantity):.3g}"
+
+
+def pwm_timing(clock_hz: Fraction | int, watchdog_hz: int, prescale_max: int) -> dict[str, str]:
+    """Return the figures of PWM, interrupt and time-outs, printed.
+
+    Parameters
+    ----------
+    clock_hz, watchdog_hz : Fraction or int
+        What the PWM counts, and the clock of the watchdog.
+    prescale_max : int
+        PWM periods that two starts of conversion may be apart.
+
+    Raises
+    ------
+    DzdesignError
+        If a figure is none that the registers hold.
+    """
+    # The compare value must reach period + 1 (100 % duty), so the period is limited to 65535 counts, not 65536.
+    period = exact(Fraction(clock_hz) / PWM_HZ, "counts per PWM period", 0xFFFF)
+    delay = exact(clock_hz * ISR_DELAY_S, "counts of the interrupt delay", period - 1)
+    ticks_per_sample = exact(Fraction(PWM_HZ, SAMPLE_HZ), "PWM periods per sample", prescale_max)
+    timeout = exact(SAMPLE_TIMEOUT_S * PWM_HZ, "PWM periods of the sample time-out", 0xFFFF)
+    if timeout < 2 * ticks_per_sample:
+        raise DzdesignError(f"a time-out of {timeout} PWM periods would trip on one late sample")
+    watchdog_s = within(Fraction(WATCHDOG_COUNTS, watchdog_hz), Fraction(2, PWM_HZ), 1, "the watchdog's time in s")
+    return {
+        "pwm_hz": str(PWM_HZ),
+        "sample_hz": str(SAMPLE_HZ),
+        "period_us": printed(Fraction(10**6, PWM_HZ)),
+        "compare_max": str(period),
+        "tbprd": str(period - 1),
+        "cmpb": str(delay),
+        "isr_delay_us": printed(ISR_DELAY_S * 10**6),
+        "ticks_per_sample": str(ticks_per_sample),
+        "sample_timeout_ticks": str(timeout),
+        "sample_timeout_ms": printed(SAMPLE_TIMEOUT_S * 1000),
+        "watchdog_ms": printed(watchdog_s * 1000),
+    }

@@ -1,0 +1,147 @@
+"""Figures of the closed loop: flow over command, and the dead zone before and after."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dzdesign.report.figures.figure import (
+    CYCLE,
+    LIGHT,
+    Curves,
+    ReportFigure,
+    csv_text,
+    label_ends,
+    legend_below,
+    new_figure,
+    titled_axes,
+    to_report_figure,
+)
+from dzdesign.verify.evidence import PressureResult
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+#: Where the enlarged panel ends, per cent of full command.
+NEAR_ZERO = 15.0
+
+
+def loop_figure(curves: Curves, side: str, both: bool) -> ReportFigure:
+    """Draw flow over command without and with the compensator, whole and near zero.
+
+    Parameters
+    ----------
+    curves : Curves
+        Of closed_loop_<side>.csv.
+    side : str
+        ``positive`` or ``negative``.
+    both : bool
+        Whether the valve has two sides.
+    """
+    ends = [name.removeprefix("q_with_") for name in curves.columns if name.startswith("q_with_")]
+    figure = new_figure(3.9, top=0.3, right=0.5)
+    wide, near = figure.subplots(1, 2, width_ratios=(1.35, 1), gridspec_kw={"wspace": 0.36})
+    _draw_whole(wide, curves, ends)
+    _draw_near_zero(near, curves, ends)
+    starts = {
+        which: [_first_flow(curves, f"q_{which}_{end}") for end in ends] for which in ("without", "with")
+    }
+    return to_report_figure(
+        figure,
+        f"loop-{side}",
+        "Closed loop: a ramp up and down, the generated C driving the simulated valve"
+        + (f", {side} commands" if both else "")
+        + ". Of two branches the one at lower commands is closing; what lies between is the valve's hysteresis.",
+        f"Flow over command at {len(ends)} pressure drops. First flow on the ramp up: without the "
+        f"compensator at {_span(starts['without'])}, with it at {_span(starts['with'])} of full command.",
+        curves.text,
+    )
+
+
+def _draw_whole(axes: "Axes", curves: Curves, ends: Sequence[str]) -> None:
+    command, labels = curves.columns["command_percent"], []
+    for index, end in enumerate(ends):
+        hue = LIGHT[CYCLE[index % len(CYCLE)]]
+        driven = curves.columns[f"q_with_{end}"]
+        axes.plot(command, curves.columns[f"q_without_{end}"], ":", color=hue, lw=1.4)
+        axes.plot(command, driven, "-", color=hue, lw=1.5)
+        labels.append((100.0, float(driven.max()), _pressure(end), hue))
+    label_ends(axes, labels)
+    axes.plot([], [], "-", color=LIGHT["soft"], label="with")
+    axes.plot([], [], ":", color=LIGHT["soft"], label="without")
+    axes.legend(loc="upper left", title="the compensator", alignment="left")
+    axes.set(xlabel="command (% of full)", ylabel="flow Q (L/min)", xlim=(0, 100), ylim=(0, None),
+             title="whole range; dP in MPa at the end")  # fmt: skip
+
+
+def _draw_near_zero(axes: "Axes", curves: Curves, ends: Sequence[str]) -> None:
+    command, labels, top = curves.columns["command_percent"], [], 0.0
+    opening = np.arange(command.size) <= int(np.argmax(command))
+    for index, end in enumerate(ends):
+        hue, driven = LIGHT[CYCLE[index % len(CYCLE)]], curves.columns[f"q_with_{end}"]
+        for dash, branch in (("-", opening), ("--", ~opening)):
+            inside = branch & (command <= NEAR_ZERO)
+            axes.plot(command[inside], driven[inside], dash, color=hue, lw=1.5)
+            top = max(top, float(driven[inside].max()))
+            if dash == "-":
+                labels.append((NEAR_ZERO, float(driven[inside][-1]), _pressure(end), hue))
+    label_ends(axes, labels)
+    for dash, word in (("-", "opening, dP in MPa at the end"), ("--", "closing")):
+        axes.plot([], [], dash, color=LIGHT["soft"], label=word)
+    axes.legend(loc="upper left")
+    axes.set(xlabel="command (% of full)", ylabel="flow Q (L/min)", xlim=(0, NEAR_ZERO), ylim=(0, 1.1 * top or 1),
+             title="with the compensator, near zero")  # fmt: skip
+
+
+def _pressure(end: str) -> str:
+    return f"{float(end.removesuffix('_MPa_L_min')):.2f}"
+
+
+def _first_flow(curves: Curves, column: str) -> float:
+    """Return the first command at which there is flow, per cent."""
+    flowing = curves.columns["command_percent"][curves.columns[column] > 0]
+    return float(flowing[0]) if flowing.size else 100.0
+
+
+def _span(values: Sequence[float]) -> str:
+    return f"{min(values):.1f} to {max(values):.1f} %"
+
+
+def dead_zone_figure(pressures: Sequence[PressureResult], side: str, both: bool) -> ReportFigure:
+    """Draw the dead zone on both branches over the pressure drop, before and after.
+
+    Parameters
+    ----------
+    pressures : sequence of PressureResult
+        Of one side.
+    side : str
+        ``positive`` or ``negative``.
+    both : bool
+        Whether the valve has two sides.
+    """
+    figure, axes = titled_axes(3.0, side, both, legend_rows=1)
+    dp = [each.dp_MPa for each in pressures]
+    lines = {
+        "dead_zone_opening": ("without, opening", "^", "-", "vermilion"),
+        "dead_zone_closing": ("without, closing", "v", "--", "vermilion"),
+        "residual_opening": ("with, opening", "^", "-", "blue"),
+        "residual_closing": ("with, closing", "v", "--", "blue"),
+    }
+    percent = {key: [100 * getattr(each, key) for each in pressures] for key in lines}
+    for key, (label, marker, dash, hue) in lines.items():
+        axes.plot(dp, percent[key], dash, marker=marker, ms=5.5, lw=1.6, color=LIGHT[hue], label=label)
+    axes.set(xlabel="pressure drop dP (MPa)", ylabel="dead zone (% of command)", ylim=(0, None))
+    legend_below(figure, 4)
+    worst = {key: max(values) for key, values in percent.items()}
+    return to_report_figure(
+        figure,
+        f"dead-zone-{side}",
+        "Dead zone in the closed loop, without and with the compensator" + (f", {side} commands." if both else "."),
+        f"The dead zone on opening falls from at most {worst['dead_zone_opening']:.1f} % to at most "
+        f"{worst['residual_opening']:.1f} % of command, on closing from {worst['dead_zone_closing']:.1f} % to "
+        f"{worst['residual_closing']:.1f} %.",
+        csv_text(
+            ("dp_MPa", *(f"{key}_percent" for key in lines)),
+            zip(dp, *([round(value, 4) for value in values] for values in percent.values()), strict=True),
+        ),
+    )
