@@ -224,7 +224,8 @@ def test_what_a_notebook_shows_is_escaped(example_valve, example_compensator, ex
         warnings=(replace(example_valve.warnings[0], text=HOSTILE, source=HOSTILE),),
     )
     files = {**example_firmware.files, HOSTILE: "int x;"}
-    firmware = replace(example_firmware, files=files, manifest=replace(example_firmware.manifest, target=HOSTILE, law=HOSTILE))
+    manifest = replace(example_firmware.manifest, target=HOSTILE, law=HOSTILE)
+    firmware = replace(example_firmware, files=files, manifest=manifest)
     for result, count in ((valve, 3), (replace(example_compensator, costs=(HOSTILE,)), 1), (firmware, 3)):
         page = Tags(result._repr_html_())
         assert page.tags <= {"pre", "span"}

@@ -3,7 +3,7 @@
 from fractions import Fraction
 
 from dzdesign.design.compensator import Compensator
-from dzdesign.report.compensator_sides import SIGNS, laws_of, valve_in
+from dzdesign.report.compensator_sides import SIGNS, laws_of
 from dzdesign.report.figures.figure import LIGHT, ReportFigure, csv_text, side_words, titled_axes, to_report_figure
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 
