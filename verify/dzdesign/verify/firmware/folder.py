@@ -46,17 +46,7 @@ def read_compensator(folder: Path) -> Compensator:
 @lru_cache(maxsize=1)
 def _compensator(content: bytes, source: str) -> Compensator:
     """Read a compensator once for all checks of a firmware; nothing changes one."""
-    return compensator_from_document(content, source)
-
-
-@lru_cache(maxsize=1)
-def _valve(content: str) -> ValveModel:
-    return read_artefact(content.encode(), ValveModel, "compensator.json: valve")
-
-
-def valve_of(compensator: Compensator) -> ValveModel:
-    """Return the valve that a compensator was made from."""
-    return _valve(compensator.valve_document)
+    return read_artefact(content, Compensator, source)
 
 
 def check_firmware_inside(folder: Path) -> None:
