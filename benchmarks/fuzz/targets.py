@@ -14,7 +14,7 @@ from dzdesign.command_line.parser import arguments_of_command
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
 from dzdesign.core.units import SI_UNIT, parse_quantity
-from dzdesign.design.compensator_file import compensator_from_document
+from dzdesign.design.compensator import Compensator
 from dzdesign.design.signal_text import parse_signal
 from dzdesign.identify.reading.column_labels import find_columns, parse_columns
 from dzdesign.identify.reading.ramp_files import read_ramp_file
@@ -99,7 +99,7 @@ TARGETS = {
         run=lambda data: read_artefact(data, ValveModel, "valve.json"), seeds=((GOLDENS / "valve.json").read_bytes(),)
     ),
     "compensator": Target(
-        run=lambda data: compensator_from_document(data, "compensator.json"),
+        run=lambda data: read_artefact(data, Compensator, "compensator.json"),
         seeds=((GOLDENS / "compensator.json").read_bytes(),),
     ),
     "options": Target(

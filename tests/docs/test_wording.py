@@ -49,7 +49,7 @@ def test_numbers_of_the_law_are_put_into_words(example_valve, example_compensato
     first = design.index("warning: of sensor A a broken wire")
     assert first < design.index("law paper") < design.index("cost: ") and "cost: of sensor" not in design
     assert re.search(r"drive range of the law k x_max/u_max = \d+/\d+ = 0\.\d{5} \(from its offset", design)
-    nodes = len(example_compensator.positive.beta_numerators)
+    nodes = len(example_compensator.positive.beta)
     assert f"beta(dP): straight between {nodes} nodes, each a whole number of 1/32768" in design
     assert "both as shares of full command" in design
     assert re.search(r"drive range of the valve k x_max/u_max = 0\.\d{4}: command", html_of(example_valve))
