@@ -48,8 +48,8 @@ AMPLIFIER = {
 VARIANTS = {
     "plain": {},
     "target law": {"law": "target"},
-    "edge": {"transition": Fraction(1, 100)},
-    "target law, edge": {"law": "target", "transition": Fraction(1, 100)},
+    "transition": {"transition": Fraction(1, 100)},
+    "target law, transition": {"law": "target", "transition": Fraction(1, 100)},
     "live zero": {"signals": UNLIKE | {"command": _command("4..20 mA on 149 ohm")}},
     "inverted": {"signals": {"command": _command("0..10 V x 0.3", inverted=True)}, **AMPLIFIER},
     "bipolar": {"signals": {"command": BOTH}},

@@ -1,4 +1,4 @@
-"""Both forms of the core, both sides of a valve, with an edge and sensors of unlike scaling: on every input."""
+"""Both forms of the core, both sides of a valve, with a transition and sensors of unlike scaling: on every input."""
 
 import dataclasses
 from fractions import Fraction
