@@ -6,7 +6,7 @@ engine; only figures and formulas, made here, are markup.
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 from dzdesign.core.artefact_files import TOOL
@@ -43,7 +43,7 @@ class Section:
     note : str
         What to do with it; what stands between backticks is a command.
     of_valve : bool
-        Whether it is of one valve: of a common setting, of its carrier.
+        Whether it is of one valve: of a lot setting, of its carrier.
     """
 
     figures: tuple[ReportFigure, ...] = ()
@@ -56,22 +56,11 @@ class Section:
     of_valve: bool = False
 
 
-def render_page(
-    *,
-    title: str,
-    verdict: "Headline",
-    figures: "Sequence[Figure]",
-    headings: Sequence[tuple[str, str]],
-    sections: Mapping[str, Section],
-    missing: Sequence[str] = (),
-    law: "LawAccount | None" = None,
-    record: Sequence[tuple[str, str]] = (),
-    lot: "Sequence[Figure]" = (),
-    carrier: str = "",
-) -> str:
-    """Return the page.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Page:
+    """What a page holds.
 
-    Parameters
+    Attributes
     ----------
     title : str
         Its first heading.
@@ -90,10 +79,25 @@ def render_page(
     record : sequence of (str, str)
         Who and what, in the engineer's words.
     lot : sequence of Figure
-        Of a common setting, before all others.
+        Of a lot setting, before all others.
     carrier : str
-        Of a common setting: the one valve that `record` and `figures` are of.
+        Of a lot setting: the one valve that `record` and `figures` are of.
     """
+
+    title: str
+    verdict: "Headline"
+    figures: "Sequence[Figure]"
+    headings: Sequence[tuple[str, str]]
+    sections: Mapping[str, Section]
+    missing: Sequence[str] = ()
+    law: "LawAccount | None" = None
+    record: Sequence[tuple[str, str]] = ()
+    lot: "Sequence[Figure]" = ()
+    carrier: str = ""
+
+
+def render(page: Page) -> str:
+    """Return a page as HTML."""
     import jinja2
 
     environment = jinja2.Environment(
@@ -105,20 +109,8 @@ def render_page(
         autoescape=True,
     )
     environment.filters.update(data_uri=data_uri, anchor=anchor, words=_words, cell=_cell)
-    html: str = environment.get_template("report.html.jinja").render(
-        title=title,
-        tool=TOOL,
-        verdict=verdict,
-        figures=figures,
-        sections=sections,
-        headings=headings,
-        law=law,
-        palette=PALETTE,
-        missing=missing,
-        record=record,
-        lot=lot,
-        carrier=carrier,
-    )
+    content = {each.name: getattr(page, each.name) for each in fields(page)}
+    html: str = environment.get_template("report.html.jinja").render(tool=TOOL, palette=PALETTE, **content)
     return html
 
 

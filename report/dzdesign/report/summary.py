@@ -7,7 +7,7 @@ from dzdesign.core.units import span_MPa
 from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED
 from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.model import ValveModel
-from dzdesign.report.artefact_chain import Chain
+from dzdesign.report.chain import Chain
 from dzdesign.report.compensator_sides import laws_of
 from dzdesign.report.sections.cells import counted, whole
 from dzdesign.verify.evidence import Check, Evidence, InputCheck, PressureResult

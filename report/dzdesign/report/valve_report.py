@@ -6,10 +6,11 @@ from pathlib import Path
 
 from dzdesign.core.artefact_types import schema_of
 from dzdesign.identify.valve.model import ValveModel
-from dzdesign.report.artefact_chain import Chain, chain_of
+from dzdesign.report.artefact_chain import chain_of
 from dzdesign.report.artefact_folder import asked_prefixes, is_of, read_artefact_folder
+from dzdesign.report.chain import Chain
 from dzdesign.report.figures.figure import figure_style
-from dzdesign.report.page import Section, render_page
+from dzdesign.report.page import Page, Section, render
 from dzdesign.report.sections.acceptance import acceptance_section
 from dzdesign.report.sections.compensator import integers_section, law_section
 from dzdesign.report.sections.evidence import checks_section, inputs_section, loop_section
@@ -123,7 +124,7 @@ def make_report(chain: Chain) -> Report:
         lot, figures = (*lot, figures[-1]), figures[:-1]
     with figure_style():
         sections = _sections(chain)
-    html = render_page(
+    page = Page(
         title=_title(chain),
         verdict=verdict,
         record=tuple(chain.valve.record.items()) if chain.valve else (),
@@ -136,7 +137,7 @@ def make_report(chain: Chain) -> Report:
         law=account_of(compensator.law_name) if compensator else None,
     )
     return Report(
-        html=html,
+        html=render(page),
         kind=verdict.kind,
         holds=verdict.holds,
         verdict=verdict.text,

@@ -12,7 +12,7 @@ from dzdesign.report.lot.setting_text import untested_lines
 from dzdesign.report.lot.spread import FAR, TWENTY, Spread, spreads_of
 from dzdesign.report.lot.summary import DOES_NOT_HOLD
 from dzdesign.report.lot.table import column_of
-from dzdesign.report.page import render_page
+from dzdesign.report.page import Page, render
 from dzdesign.report.sections.cells import whole
 from dzdesign.report.summary import Figure, Headline
 from dzdesign.report.valve_report import Report
@@ -50,7 +50,7 @@ def make_lot_report(lot: Lot) -> Report:
     missing = list(lot.missing)
     if lot.summary and lot.calibrated and not lot.summary.verified:
         missing.append("the evidence of each valve: `dzdesign batch --verify` makes it")
-    html = render_page(
+    page = Page(
         title=f"Lot of {whole(lot.expected)} valve{'' if lot.expected == 1 else 's'}",
         verdict=verdict,
         figures=key_figures_of_lot(lot, spreads),
@@ -60,7 +60,7 @@ def make_lot_report(lot: Lot) -> Report:
     )
     refuted = verdict.kind == "bad" or bool(lot.failed)
     return Report(
-        html=html,
+        html=render(page),
         kind=verdict.kind,
         holds=False if refuted else True if verdict.kind == "good" else None,
         verdict=verdict.text,
