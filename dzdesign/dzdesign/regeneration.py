@@ -45,17 +45,15 @@ def regenerated(folder: Path) -> "Check":
         tells an edited file from a generated one, so the firmware does not hold.
     """
     from dzdesign.codegen.project import generate
-    from dzdesign.design.compensator_file import compensator_from_document
-    from dzdesign.verify.firmware.folder import read_firmware_manifest
+    from dzdesign.verify.firmware.folder import read_compensator, read_firmware_manifest
     from dzdesign.verify.requirements import REGENERATED
 
     manifest = read_firmware_manifest(folder)
     if reason := _not_generated_here(manifest):
         return REGENERATED.check(holds=None, text=reason)
-    source = folder / "compensator.json"
-    content = read_bytes(source, "compensator")
+    content = read_bytes(folder / "compensator.json", "compensator")
     try:
-        expected = generate(compensator_from_document(content, str(source)), manifest.target, content).manifest
+        expected = generate(read_compensator(folder), manifest.target, content).manifest
     except InputError as error:
         return REGENERATED.check(holds=False, text=str(error))
     compared = {name: digest for name, digest in expected.files.items() if name not in expected.board}

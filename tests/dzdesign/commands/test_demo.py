@@ -28,7 +28,7 @@ def test_demo_leaves_every_artefact_with_its_origin(demo):
     assert compensator["made_from"][0]["source"] == "valve.json"
     assert evidence["holds"] is True
     assert [(each["inputs"], each["wrong"]) for each in evidence["inputs"]] == [(33550336, 0)]
-    assert (demo / "evidence" / "closed_loop.svg").read_text().startswith("<?xml")
+    assert (demo / "evidence" / "closed_loop_positive.csv").read_text().startswith("time_s,command_percent,")
 
 
 @needs_compiler

@@ -13,8 +13,14 @@ from dzdesign.core.artefact_types import Artefact, quantity
 from dzdesign.core.verdicts import DOES_NOT_HOLD, HOLDS, NOT_CHECKED
 from dzdesign.verify.closed_loop.plant import Plant
 
+
+def about(description: str) -> Meta:
+    """Return what an annotation says of a field."""
+    return Meta(description=description)
+
+
 Sign = Literal[1, -1]
-Side = Annotated[Literal["positive", "negative"], Meta(description="Side of the valve.")]
+Side = Annotated[Literal["positive", "negative"], about("Side of the valve.")]
 PressureDrop = Annotated[float, quantity("MPa", "Pressure drop at no flow.", ge=0, le=1000)]
 Count = Annotated[int, Meta(ge=0, le=2**60)]
 Share = Annotated[float, Meta(ge=-1, le=1, extra_json_schema={"unit": "1"})]
@@ -29,67 +35,57 @@ MOST_V = 1e4
 class Check:
     """One requirement that was tried."""
 
-    id: Annotated[str, Meta(description="Short name of the requirement, the same in every version.")]
-    name: Annotated[str, Meta(description="What is required, with the sign of command or the processor it is of.")]
+    id: Annotated[str, about("Short name of the requirement, the same in every version.")]
+    name: Annotated[str, about("What is required, with the sign of command or the processor it is of.")]
     holds: Annotated[
-        bool | None, Meta(description=f"True: {HOLDS}; false: {DOES_NOT_HOLD}; null: {NOT_CHECKED}, it could not be.")
+        bool | None, about(f"True: {HOLDS}; false: {DOES_NOT_HOLD}; null: {NOT_CHECKED}, it could not be.")
     ]
-    text: Annotated[str, Meta(description="What was found, with its figures.")]
+    text: Annotated[str, about("What was found, with its figures.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LotCheck:
     """What one sign of command of a common setting leaves to the bounds of every valve of its lot."""
 
-    valves: Annotated[Count, Meta(description="How many were compared.")]
+    valves: Annotated[Count, about("How many were compared.")]
     over_compensated: Annotated[
-        Names, Meta(description="Names of those driven above their bound at zero command, the worst first.")
+        Names, about("Names of those driven above their bound at zero command, the worst first.")
     ]
-    worst: Annotated[str, Meta(description="Name of the valve with the smallest margin.")]
+    worst: Annotated[str, about("Name of the valve with the smallest margin.")]
     worst_dp_MPa: Annotated[float, quantity("MPa", "Pressure drop where it has it.", ge=-1000, le=1000)]
     smallest_margin_V: Annotated[
         float, quantity("V", "That margin; negative if the bound is exceeded.", ge=-MOST_V, le=MOST_V)
     ]
-    confidence: Annotated[
-        tuple[float, float], Meta(description="The least and the largest with which a valve's bounds hold.")
-    ]
+    confidence: Annotated[tuple[float, float], about("The least and the largest with which a valve's bounds hold.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InputCheck:
     """The check of every input of one side; every count that ends in a fault must be zero."""
 
-    sign: Annotated[Sign, Meta(description="Sign of the commands.")]
+    sign: Annotated[Sign, about("Sign of the commands.")]
     inputs: Annotated[
-        Count,
-        Meta(description="Pairs of command code and difference of pressure codes, each compared with the exact law."),
+        Count, about("Pairs of command code and difference of pressure codes, each compared with the exact law.")
     ]
-    wrong: Annotated[Count, Meta(description="Pairs whose compare value is not the exactly rounded law.")]
+    wrong: Annotated[Count, about("Pairs whose compare value is not the exactly rounded law.")]
     largest_error: Annotated[int, quantity("compare counts", "Largest difference.", ge=0, le=2**32)]
-    out_of_range: Annotated[Count, Meta(description="Compare values above the limit.")]
-    not_monotone_in_u: Annotated[Count, Meta(description="Falls with rising command.")]
-    not_monotone_in_dp: Annotated[
-        Count, Meta(description="Steps over the pressure difference against the law's direction.")
-    ]
+    out_of_range: Annotated[Count, about("Compare values above the limit.")]
+    not_monotone_in_u: Annotated[Count, about("Falls with rising command.")]
+    not_monotone_in_dp: Annotated[Count, about("Steps over the pressure difference against the law's direction.")]
     over_compensated: Annotated[
-        Count,
-        Meta(description="Pressure codes of the certified interval whose drive at zero command lies above the bound."),
+        Count, about("Pressure codes of the certified interval whose drive at zero command lies above the bound.")
     ]
-    odd_pairs: Annotated[
-        Count, Meta(description="Pairs of pressure codes that give another value than their difference does.")
-    ]
+    odd_pairs: Annotated[Count, about("Pairs of pressure codes that give another value than their difference does.")]
     bad_fallbacks: Annotated[
-        Count,
-        Meta(description="Codes outside their signal's valid range that do not fall back to the safe value."),
+        Count, about("Codes outside their signal's valid range that do not fall back to the safe value.")
     ]
-    bad_status: Annotated[Count, Meta(description="Status words that say something else.")]
-    bad_betas: Annotated[Count, Meta(description="Pairs of pressure codes at which dz_beta() is not the law's.")]
+    bad_status: Annotated[Count, about("Status words that say something else.")]
+    bad_betas: Annotated[Count, about("Pairs of pressure codes at which dz_beta() is not the law's.")]
     smallest_margin_V: Annotated[
-        float,
-        quantity("V", "Smallest distance from the drive at zero command to the bound.", ge=-MOST_V, le=MOST_V),
+        float, quantity("V", "Smallest distance from the drive at zero command to the bound.", ge=-MOST_V, le=MOST_V)
     ]
-    core_sha256: Annotated[Sha256, Meta(description="Hash of the C that was compiled.")]
-    object_sha256: Annotated[Sha256, Meta(description="Hash of the object that was tried.")]
+    core_sha256: Annotated[Sha256, about("Hash of the C that was compiled.")]
+    object_sha256: Annotated[Sha256, about("Hash of the object that was tried.")]
     outputs_hash: Annotated[
         str,
         Meta(
@@ -97,12 +93,12 @@ class InputCheck:
             pattern="^[0-9a-f]{16}$", max_length=16,
         ),
     ]  # fmt: skip
-    calls: Annotated[Count, Meta(description="Calls of the core in all.")]
-    pressure_pairs: Annotated[Count, Meta(description="Pairs of valid pressure codes, each of which was tried.")]
-    first_wrong: Annotated[str | None, Meta(description="The first fault, in words.")]
+    calls: Annotated[Count, about("Calls of the core in all.")]
+    pressure_pairs: Annotated[Count, about("Pairs of valid pressure codes, each of which was tried.")]
+    first_wrong: Annotated[str | None, about("The first fault, in words.")]
     lot: Annotated[
         LotCheck | None,
-        Meta(description="Of a common setting: every valve of its lot against its own bounds; null of a valve's own."),
+        about("Of a common setting: every valve of its lot against its own bounds; null of a valve's own."),
     ]
 
     @property
@@ -130,16 +126,14 @@ class PressureResult:
 
     side: Side
     dp_MPa: PressureDrop
-    dead_zone_opening: Annotated[Share, Meta(description="Dead zone on opening without compensator.")]
-    dead_zone_closing: Annotated[Share, Meta(description="The same on closing.")]
-    residual_opening: Annotated[Share, Meta(description="Dead zone on opening that the compensator leaves.")]
-    residual_closing: Annotated[Share, Meta(description="The same on closing.")]
-    q_zero_L_min: Annotated[Flow, Meta(description="Flow at zero command after closing, with compensator.")]
-    q_zero_without_beta_L_min: Annotated[
-        Flow, Meta(description="The same with beta held at 1: what over-compensation would do.")
-    ]
-    q_max_direct_L_min: Annotated[Flow, Meta(description="Largest flow without compensator.")]
-    q_max_L_min: Annotated[Flow, Meta(description="Largest flow with it.")]
+    dead_zone_opening: Annotated[Share, about("Dead zone on opening without compensator.")]
+    dead_zone_closing: Annotated[Share, about("The same on closing.")]
+    residual_opening: Annotated[Share, about("Dead zone on opening that the compensator leaves.")]
+    residual_closing: Annotated[Share, about("The same on closing.")]
+    q_zero_L_min: Annotated[Flow, about("Flow at zero command after closing, with compensator.")]
+    q_zero_without_beta_L_min: Annotated[Flow, about("The same with beta held at 1: what over-compensation would do.")]
+    q_max_direct_L_min: Annotated[Flow, about("Largest flow without compensator.")]
+    q_max_L_min: Annotated[Flow, about("Largest flow with it.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -148,27 +142,24 @@ class IdentifiedPlant:
 
     side: Side
     dp_MPa: PressureDrop
-    parameters: Annotated[Plant, Meta(description="Its parameters.")]
+    parameters: Annotated[Plant, about("Its parameters.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClosedLoopResult:
     """Ramps in closed loop with the generated C."""
 
-    plant: Annotated[
-        Plant | None, Meta(description="The plant that was given; null where plants were made from the thresholds.")
-    ]
-    plant_source: Annotated[str, Meta(description="Where the plant came from.")]
+    plant: Annotated[Plant | None, about("The plant that was given; null where plants were made from the thresholds.")]
+    plant_source: Annotated[str, about("Where the plant came from.")]
     plant_sha256: Annotated[
-        Sha256 | None, Meta(description="Hash of the plant's file; null of one made from the identified thresholds.")
+        Sha256 | None, about("Hash of the plant's file; null of one made from the identified thresholds.")
     ]
     plants: Annotated[
         tuple[IdentifiedPlant, ...],
-        Meta(description="Plants made from the identified thresholds, one entry a side and pressure drop."),
+        about("Plants made from the identified thresholds, one entry a side and pressure drop."),
     ]
     pressures: Annotated[
-        tuple[PressureResult, ...],
-        Meta(description="One entry a side and tested pressure drop; none if it did not run."),
+        tuple[PressureResult, ...], about("One entry a side and tested pressure drop; none if it did not run.")
     ]
 
 
@@ -176,32 +167,30 @@ class ClosedLoopResult:
 class ScenarioResult:
     """One scenario beside the ramps, at one pressure drop."""
 
-    name: Annotated[str, Meta(description="What happens.")]
+    name: Annotated[str, about("What happens.")]
     side: Side
     dp_MPa: PressureDrop
-    q_zero_L_min: Annotated[Flow, Meta(description="Flow at zero command at the end.")]
+    q_zero_L_min: Annotated[Flow, about("Flow at zero command at the end.")]
     q_peak_at_zero_L_min: Annotated[
-        Flow, Meta(description="Largest flow while the command was zero and the valve had closed before.")
+        Flow, about("Largest flow while the command was zero and the valve had closed before.")
     ]
     must_shut: Annotated[
-        bool, Meta(description="Whether flow at the end is a failure: not where no compensator could know better.")
+        bool, about("Whether flow at the end is a failure: not where no compensator could know better.")
     ]
-    figures: Annotated[
-        Mapping[str, float], Meta(description="What else was measured; the unit is the end of the name.")
-    ]
+    figures: Annotated[Mapping[str, float], about("What else was measured; the unit is the end of the name.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spread:
     """Quantiles of one quantity over a series of plants, and the plant at its bad end."""
 
-    p01: Annotated[float, Meta(description="1 % quantile.")]
-    p05: Annotated[float, Meta(description="5 % quantile.")]
-    p50: Annotated[float, Meta(description="Median.")]
-    p95: Annotated[float, Meta(description="95 % quantile.")]
-    p99: Annotated[float, Meta(description="99 % quantile.")]
-    worst: Annotated[float, Meta(description="Value of the plant at the bad end.")]
-    worst_plant: Annotated[Mapping[str, float], Meta(description="Those of its parameters that were drawn.")]
+    p01: Annotated[float, about("1 % quantile.")]
+    p05: Annotated[float, about("5 % quantile.")]
+    p50: Annotated[float, about("Median.")]
+    p95: Annotated[float, about("95 % quantile.")]
+    p99: Annotated[float, about("99 % quantile.")]
+    worst: Annotated[float, about("Value of the plant at the bad end.")]
+    worst_plant: Annotated[Mapping[str, float], about("Those of its parameters that were drawn.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -211,11 +200,11 @@ class Scatter:
     side: Side
     dp_MPa: PressureDrop
     plants: Annotated[int, Meta(description="How many plants.", ge=1, le=10**6)]
-    leaking: Annotated[Count, Meta(description="How many pass flow at zero command after closing.")]
-    residual_opening: Annotated[Spread, Meta(description="Dead zone on opening, share of full command.")]
-    residual_closing: Annotated[Spread, Meta(description="Dead zone on closing, share of full command.")]
-    q_zero_L_min: Annotated[Spread, Meta(description="Flow at zero command, L/min.")]
-    q_max_L_min: Annotated[Spread, Meta(description="Largest flow, L/min.")]
+    leaking: Annotated[Count, about("How many pass flow at zero command after closing.")]
+    residual_opening: Annotated[Spread, about("Dead zone on opening, share of full command.")]
+    residual_closing: Annotated[Spread, about("Dead zone on closing, share of full command.")]
+    q_zero_L_min: Annotated[Spread, about("Flow at zero command, L/min.")]
+    q_max_L_min: Annotated[Spread, about("Largest flow, L/min.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -224,34 +213,34 @@ class MonteCarlo:
 
     plants: Annotated[int, Meta(description="How many.", ge=1, le=10**6)]
     seed: Annotated[int, Meta(description="Of the draw.", ge=0, le=2**60)]
-    spreads: Annotated[Mapping[str, str], Meta(description="Parameter to its spread, in words.")]
-    pressures: Annotated[tuple[Scatter, ...], Meta(description="One entry a side and pressure drop.")]
+    spreads: Annotated[Mapping[str, str], about("Parameter to its spread, in words.")]
+    pressures: Annotated[tuple[Scatter, ...], about("One entry a side and pressure drop.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MutantOutcome:
     """What became of one mutant."""
 
-    file: Annotated[str, Meta(description="File.")]
+    file: Annotated[str, about("File.")]
     line: Annotated[int, Meta(description="Line.", ge=1, le=10**6)]
-    change: Annotated[str, Meta(description="What was changed.")]
-    verdict: Annotated[str, Meta(description="Killed, refused by the compiler, equivalent or survived.")]
-    killer: Annotated[str, Meta(description="What caught it; empty if nothing did.")] = ""
+    change: Annotated[str, about("What was changed.")]
+    verdict: Annotated[str, about("Killed, refused by the compiler, equivalent or survived.")]
+    killer: Annotated[str, about("What caught it; empty if nothing did.")] = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MutationScore:
     """Wrong versions of the C, and how many of them the checks caught."""
 
-    mutants: Annotated[Count, Meta(description="How many.")]
-    killed: Annotated[Count, Meta(description="Caught by a check.")]
-    refused: Annotated[Count, Meta(description="Refused by the compiler.")]
-    same_object: Annotated[Count, Meta(description="Equivalent: the same object code.")]
-    same_outputs: Annotated[Count, Meta(description="Equivalent: the same outputs.")]
-    survived: Annotated[Count, Meta(description="Neither: must be 0.")]
-    killers: Annotated[Mapping[str, Count], Meta(description="Check to how many it caught.")]
-    equivalent_means: Annotated[str, Meta(description="What equivalence rests on.")]
-    not_killed: Annotated[tuple[MutantOutcome, ...], Meta(description="Those that no check caught, with the reason.")]
+    mutants: Annotated[Count, about("How many.")]
+    killed: Annotated[Count, about("Caught by a check.")]
+    refused: Annotated[Count, about("Refused by the compiler.")]
+    same_object: Annotated[Count, about("Equivalent: the same object code.")]
+    same_outputs: Annotated[Count, about("Equivalent: the same outputs.")]
+    survived: Annotated[Count, about("Neither: must be 0.")]
+    killers: Annotated[Mapping[str, Count], about("Check to how many it caught.")]
+    equivalent_means: Annotated[str, about("What equivalence rests on.")]
+    not_killed: Annotated[tuple[MutantOutcome, ...], about("Those that no check caught, with the reason.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -259,32 +248,26 @@ class Evidence(Artefact):
     """The evidence about one firmware, as `dzdesign verify` writes it."""
 
     FILE_NAME: ClassVar[str] = "verification.json"
-    schema: Annotated[Literal["dzdesign.evidence/1"], Meta(description="Name and version of this schema.")] = (
-        "dzdesign.evidence/1"
-    )
-    target: Annotated[str, Meta(description="Microcontroller of the firmware.")]
+    schema: Annotated[Literal["dzdesign.evidence/1"], about("Name and version of this schema.")] = "dzdesign.evidence/1"
+    target: Annotated[str, about("Microcontroller of the firmware.")]
     changed_board_files: Annotated[
-        Names, Meta(description="Board files that were filled in since they were generated: not checked.")
+        Names, about("Board files that were filled in since they were generated: not checked.")
     ]
-    user_files: Annotated[
-        Names, Meta(description="Source and project files of the user's in the folder board/: not checked.")
-    ]
+    user_files: Annotated[Names, about("Source and project files of the user's in the folder board/: not checked.")]
     board_not_compiled: Annotated[
-        str, Meta(description="Why the changed board files were not compiled; empty if they were, or none was changed.")
+        str, about("Why the changed board files were not compiled; empty if they were, or none was changed.")
     ]
     holds: Annotated[
-        bool,
-        Meta(description="Whether every requirement that was tried holds; one that could not be checked does not."),
+        bool, about("Whether every requirement that was tried holds; one that could not be checked does not.")
     ] = field(init=False)
     checks: Annotated[tuple[Check, ...], Meta(description="Every requirement that was tried.", min_length=1)]
     inputs: Annotated[
-        tuple[InputCheck, ...],
-        Meta(description="One entry a side; empty if the core did not compile or its check could not run."),
+        tuple[InputCheck, ...], about("One entry a side; empty if the core did not compile or its check could not run.")
     ]
-    closed_loop: Annotated[ClosedLoopResult, Meta(description="Ramps in closed loop with the generated C.")]
-    scenarios: Annotated[tuple[ScenarioResult, ...], Meta(description="What happens beside ramps.")]
-    monte_carlo: Annotated[MonteCarlo | None, Meta(description="The series of plants, where --tolerances was given.")]
-    mutants: Annotated[MutationScore | None, Meta(description="Wrong versions of the C, where --mutate was given.")]
+    closed_loop: Annotated[ClosedLoopResult, about("Ramps in closed loop with the generated C.")]
+    scenarios: Annotated[tuple[ScenarioResult, ...], about("What happens beside ramps.")]
+    monte_carlo: Annotated[MonteCarlo | None, about("The series of plants, where --tolerances was given.")]
+    mutants: Annotated[MutationScore | None, about("Wrong versions of the C, where --mutate was given.")]
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "holds", all(check.holds for check in self.checks))

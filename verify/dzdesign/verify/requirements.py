@@ -1,6 +1,6 @@
-"""Every requirement on a firmware, declared once: id, title and how to have it checked; and which of them were."""
+"""Every requirement on a firmware, declared once: id, title and how to have it checked; and which were not."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from dzdesign.verify.evidence import Check, Evidence
 
@@ -73,6 +73,11 @@ UNDEFINED_BEHAVIOUR = Requirement(
 )
 MUTATION = Requirement(id="mutation", title="wrong C is caught", how="`verify --mutate`")
 C2000WARE = Requirement(id="c2000ware", title="compiles against C2000Ware", how="`verify --c2000ware`")
+NEED_A_PLANT = (
+    Requirement(id="own-plant", title="closed loop with a plant of the machine's own", how="`verify --plant`"),
+    Requirement(id="load-steps", title="load steps and frozen sensors in the closed loop", how="`verify --plant`"),
+)
+SERIES = Requirement(id="series", title="a series of plants, with tolerances", how="`verify --tolerances`")
 #: What every `verify` checks, in the order of the report.
 ALWAYS = (
     FILES, MANIFEST, COMPILES, EXACT_LAW, MONOTONE, ZERO_COMMAND, PRESSURE_DIFFERENCE, FALLBACK, DRIVE, PLANT_OPENS,
@@ -84,69 +89,39 @@ OPTIONAL = (MACHINE_CODE, UNDEFINED_BEHAVIOUR, MUTATION)
 REVIEW = "review it, and try it on the machine"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RequirementStatus:
-    """What the evidence says of one requirement.
-
-    Attributes
-    ----------
-    title : str
-        What is required.
-    tried : bool
-        Whether the evidence has a check of it.
-    holds : bool or None
-        As found; None where it was not tried or could not be checked.
-    how : str
-        What to do to have it tried; a command stands in backticks.
-    """
-
-    title: str
-    tried: bool
-    holds: bool | None
-    how: str
-
-
-def requirement_statuses(evidence: Evidence) -> tuple[RequirementStatus, ...]:
-    """Return everything that can be checked of a firmware, with what the evidence says of it.
+def untried_requirements(evidence: Evidence) -> tuple[Requirement, ...]:
+    """Return what can be checked of a firmware and was not tried, and how to have it tried.
 
     Parameters
     ----------
     evidence : Evidence
         Of the firmware.
     """
-    found = [_part(f"{name}, which is yours and was changed", False, REVIEW) for name in evidence.changed_board_files]
-    found += [_part(f"{name}, which is yours", False, REVIEW) for name in evidence.user_files]
+    tried = {check.id for check in evidence.checks}
+    untried = [
+        Requirement(id="user-file", title=f"{name}, which is yours and was changed", how=REVIEW)
+        for name in evidence.changed_board_files
+    ]
+    untried += [
+        Requirement(id="user-file", title=f"{name}, which is yours", how=REVIEW) for name in evidence.user_files
+    ]
     if evidence.board_not_compiled:
-        found.append(_part(BOARD_FILES.title, False, evidence.board_not_compiled))
-    found += [_status(evidence, requirement) for requirement in ALWAYS]
-    own_plant = evidence.closed_loop.plant is not None
-    found.append(_part("closed loop with a plant of the machine's own", own_plant, "`verify --plant`"))
-    found.append(_part("load steps and frozen sensors in the closed loop", own_plant, "`verify --plant`"))
-    series = evidence.monte_carlo is not None
-    found.append(_part("a series of plants, with tolerances", series, "`verify --tolerances`"))
-    found += [_status(evidence, requirement) for requirement in OPTIONAL]
-    if evidence.target in ("", "f28335"):
-        found.append(_status(evidence, C2000WARE))
-    return tuple(found)
+        untried.append(replace(BOARD_FILES, how=evidence.board_not_compiled))
+    untried += [each for each in ALWAYS if each.id not in tried]
+    if evidence.closed_loop.plant is None:
+        untried += NEED_A_PLANT
+    if evidence.monte_carlo is None:
+        untried.append(SERIES)
+    optional = OPTIONAL + ((C2000WARE,) if evidence.target == "f28335" else ())
+    return tuple(untried + [each for each in optional if each.id not in tried])
 
 
 def not_tried(evidence: Evidence) -> tuple[str, ...]:
-    """Return what was not tried, each with the command that would.
+    """Return the lines of what was not tried, each with the command that would.
 
     Parameters
     ----------
     evidence : Evidence
         Of the firmware.
     """
-    return tuple(f"{each.title}: {each.how}" for each in requirement_statuses(evidence) if not each.tried)
-
-
-def _status(evidence: Evidence, requirement: Requirement) -> RequirementStatus:
-    """Return the status of a requirement over its checks: of both signs of command, of every processor."""
-    found = [check.holds for check in evidence.checks if check.id == requirement.id]
-    holds = False if False in found else None if None in found or not found else True
-    return RequirementStatus(title=requirement.title, tried=bool(found), holds=holds, how=requirement.how)
-
-
-def _part(title: str, tried: bool, how: str) -> RequirementStatus:
-    return RequirementStatus(title=title, tried=tried, holds=True if tried else None, how=how)
+    return tuple(f"{each.title}: {each.how}" for each in untried_requirements(evidence))

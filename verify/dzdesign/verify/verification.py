@@ -14,7 +14,6 @@ from dzdesign.design.compensator import Compensator
 from dzdesign.verify.closed_loop.evidence_curves import curve_files
 from dzdesign.verify.closed_loop.firmware_loop import FirmwareLoop, Watch, close_the_loop, scenes_of
 from dzdesign.verify.closed_loop.loop import LoopComparison, RampSequence
-from dzdesign.verify.closed_loop.loop_plot import plot_loops
 from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.closed_loop.tolerances import Tolerances
 from dzdesign.verify.evidence import Check, ClosedLoopResult, Evidence, InputCheck
@@ -198,9 +197,7 @@ def evidence_manifest(evidence: Evidence) -> dict[str, object]:
 
 
 def evidence_files(verification: Verification) -> dict[str, bytes]:
-    """Return the files of the evidence folder: verification.json, the plot of the closed loop, curves to draw."""
+    """Return the files of the evidence folder: verification.json, and curves to draw."""
     contents = {Evidence.FILE_NAME: to_json_bytes(verification.evidence)}
     contents |= {name: text.encode() for name, text in curve_files(verification.loops, verification.maps).items()}
-    if verification.loops:
-        contents["closed_loop.svg"] = plot_loops(verification.loops)
     return contents

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 from dzdesign.codegen.core.constants import Define, Table
-from dzdesign.codegen.core.integer_form import IntegerForm, segments_of
+from dzdesign.codegen.core.integer_form import IntegerForm
+from dzdesign.codegen.core.table_form import TableForm, segments_of
 from dzdesign.codegen.telemetry.frame import beta_factor
 from dzdesign.derivation.law import Law, law
 from dzdesign.derivation.presentation.formulas import to_text
@@ -20,34 +21,6 @@ SCALED = ("signals.compare_max", "signals.command", "beta_denominator", "beta_st
 def equation_of(chosen: Law) -> str:
     """Return where a law comes from, as a reader looks for it."""
     return f"Eq. {chosen.equation}" if chosen.equation.startswith("(") else chosen.equation.replace("(", "Eq. (")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TableForm:
-    """How the rows of a table stand in C: the changes' sign, and their type."""
-
-    change_sign: str
-    change_type: str
-
-    @property
-    def falls(self) -> bool:
-        """True if the C subtracts the changes."""
-        return self.change_sign == "-"
-
-    @property
-    def short(self) -> bool:
-        """True if a product with a change is one of 16 by 16 bits."""
-        return self.change_type == "uint16_t"
-
-
-def table_form(form: IntegerForm, step: int, arithmetic: str) -> TableForm:
-    """Choose the rows: signed where products of 32 bits are cheap, of one direction in 16 bits else."""
-    changes = [change for table in (form.table, form.zero_table) for _, change in segments_of(table, step)]
-    falls = max(changes) <= 0
-    short = (falls or min(changes) >= 0) and max(map(abs, changes)) < 1 << 16
-    if arithmetic == "narrow" and short:
-        return TableForm(change_sign="-" if falls else "+", change_type="uint16_t")
-    return TableForm(change_sign="+", change_type="int32_t")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -23,7 +23,7 @@ from dzdesign.verify.evidence import (
     ScenarioResult,
     Spread,
 )
-from dzdesign.verify.requirements import requirement_statuses
+from dzdesign.verify.requirements import untried_requirements
 
 
 def _curves(chain: Chain, name: str) -> Curves | None:
@@ -193,7 +193,7 @@ def checks_section(evidence: Evidence | None) -> Section:
     if evidence is None:
         return Section(missing=f"{NOT_CHECKED}: no evidence is here; `dzdesign verify` makes it.")
     tried = [(verdict(check.holds), check.name, check.text) for check in evidence.checks]
-    untried = [each for each in requirement_statuses(evidence) if not each.tried]
+    untried = untried_requirements(evidence)
     rows = [*tried, *((verdict(None), each.title, f"to try it: {each.how}".replace("`", "")) for each in untried)]
     table = table_of(
         f"{len(tried)} requirements tried, {len(untried)} not",

@@ -63,8 +63,8 @@ def mutants_of(file: str, text: str) -> Iterator[Mutant]:
         start, end = token.span("number") if token["number"] else token.span()
         for new in _instead(token, before):
             line = text.count("\n", 0, start) + 1
-            shown = text.splitlines()[line - 1].strip()
-            change = f"{shown[:70]}: {text[start:end]} -> {new or 'nothing'}"
+            code = text.splitlines()[line - 1].strip()
+            change = f"{code[:70]}: {text[start:end]} -> {new or 'nothing'}"
             yield Mutant(file=file, line=line, change=change, text=text[:start] + new + text[end:])
         before = token[0]
 

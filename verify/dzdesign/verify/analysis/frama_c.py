@@ -208,8 +208,8 @@ def _alarms(work: Path, sources: list[str], main: str, first: int, end: int) -> 
     except (OSError, subprocess.TimeoutExpired) as error:
         raise RequirementError(f"{PROGRAM} did not end: {error}") from error
     if done.returncode or not report.exists():
-        said = [line for line in (done.stdout + done.stderr).splitlines() if "rror" in line or "aborted" in line]
-        raise RequirementError(f"{PROGRAM} {_version()} failed on {main}: {' '.join(said)[:300]}")
+        errors = [line for line in (done.stdout + done.stderr).splitlines() if "rror" in line or "aborted" in line]
+        raise RequirementError(f"{PROGRAM} {_version()} failed on {main}: {' '.join(errors)[:300]}")
     with report.open(newline="") as lines:
         rows = list(csv.DictReader(lines, dialect="excel-tab"))
     return {

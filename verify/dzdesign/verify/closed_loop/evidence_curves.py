@@ -13,37 +13,10 @@ KEPT_RECORD = 20
 FLOW_DIGITS = 3
 
 
-def closed_loop_name(side: str) -> str:
-    """Return the name of the file with the ramps of a side.
-
-    Parameters
-    ----------
-    side : str
-        ``positive`` or ``negative``.
-    """
-    return f"closed_loop_{side}.csv"
-
-
-def input_map_name(side: str) -> str:
-    """Return the name of the file with the compare values of a side.
-
-    Parameters
-    ----------
-    side : str
-        ``positive`` or ``negative``.
-    """
-    return f"input_map_{side}.csv"
-
-
-def zero_command_name(side: str) -> str:
-    """Return the name of the file with the drive at zero command of a side.
-
-    Parameters
-    ----------
-    side : str
-        ``positive`` or ``negative``.
-    """
-    return f"zero_command_{side}.csv"
+#: Names of the files of a side, ``positive`` or ``negative``: ramps, compare values, drive at zero command.
+closed_loop_name, input_map_name, zero_command_name = (
+    f"{what}_{{}}.csv".format for what in ("closed_loop", "input_map", "zero_command")
+)
 
 
 def curve_files(loops: Sequence[LoopComparison], maps: Sequence[InputMap]) -> dict[str, str]:

@@ -176,11 +176,11 @@ def _load_step_in_motion(scene: Scene, tested_MPa: Ends) -> ScenarioResult:
 def _failing_sensors(scene: Scene) -> Iterator[ScenarioResult]:
     """A sensor fails in mid-ramp: its wire breaks, or it shows full pressure."""
     beyond = 1e3  # MPa: the converter's end
-    for name, shown_MPa in (
+    for name, signal_MPa in (
         ("sensor ahead breaks, or the one behind shows full", -beyond),
         ("sensor ahead shows full, or the one behind breaks", beyond),
     ):
-        yield scene.result(name, _fail(scene, shown_MPa, scene.dp_MPa))
+        yield scene.result(name, _fail(scene, signal_MPa, scene.dp_MPa))
 
 
 def _frozen_sensors(scene: Scene, tested_MPa: Ends) -> ScenarioResult:
@@ -190,13 +190,13 @@ def _frozen_sensors(scene: Scene, tested_MPa: Ends) -> ScenarioResult:
     return scene.result(name, _fail(scene, low, high), must_shut=False)
 
 
-def _fail(scene: Scene, shown_MPa: float, supply_MPa: float) -> LoopRun:
+def _fail(scene: Scene, signal_MPa: float, supply_MPa: float) -> LoopRun:
     """Run a ramp up and down; in mid-ramp the sensors begin to show something, and the supply becomes another."""
     before = scene.opened_and_closed()
     command = np.concatenate([before, _ramp(0, 0.6), _ramp(0.6, 0), scene.held(0, 2)])
     failure = before.size + _ramp(0, 1).size // 2
     seen, supply = np.full(command.size, np.nan), np.full(command.size, scene.dp_MPa)
-    seen[failure:], supply[failure:] = shown_MPa, supply_MPa
+    seen[failure:], supply[failure:] = signal_MPa, supply_MPa
     return scene.run(command, supply_MPa=supply, seen_MPa=seen)
 
 

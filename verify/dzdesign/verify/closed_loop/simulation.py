@@ -3,11 +3,13 @@
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from msgspec import Meta
 
 from dzdesign.core.artefact_files import TOOL, sha256_of
+from dzdesign.core.artefact_types import quantity
 from dzdesign.core.errors import InputError
 from dzdesign.identify.reading.ramp_files import SIMULATED_MARK, ramp_file_bytes
 from dzdesign.verify.closed_loop.loop import RECORD_S, ClosedLoop, RampSequence
@@ -17,27 +19,17 @@ from dzdesign.verify.firmware.folder import check_firmware_inside, read_compensa
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bench:
-    """The sensors and the recorder of a bench.
+    """The sensors and the recorder of a bench."""
 
-    Attributes
-    ----------
-    rate_Hz : float
-        Rows per second.
-    meter_lag_s, meter_floor_L_min, meter_noise_L_min : float
-        Flow meter: first-order lag, flow below which it reads zero, standard deviation of its noise.
-    command_noise_V, pressure_noise_MPa : float
-        Standard deviations of the other two channels.
-    seed : int
-        Of the noise; the same seed gives the same bytes.
-    """
-
-    rate_Hz: float = 25.0
-    meter_lag_s: float = 0.1
-    meter_floor_L_min: float = 0.6
-    meter_noise_L_min: float = 0.08
-    command_noise_V: float = 0.002
-    pressure_noise_MPa: float = 0.01
-    seed: int = 1
+    rate_Hz: Annotated[float, quantity("Hz", "Rows per second.")] = 25.0
+    meter_lag_s: Annotated[float, quantity("s", "First-order lag of the flow meter.", ge=0, le=1e6)] = 0.1
+    meter_floor_L_min: Annotated[float, quantity("L/min", "Flow below which it reads zero.", ge=0, le=1e6)] = 0.6
+    meter_noise_L_min: Annotated[float, quantity("L/min", "Standard deviation of its noise.", ge=0, le=1e6)] = 0.08
+    command_noise_V: Annotated[float, quantity("V", "Standard deviation of the command's noise.", ge=0, le=1e6)] = 0.002
+    pressure_noise_MPa: Annotated[
+        float, quantity("MPa", "Standard deviation of the pressures' noise.", ge=0, le=1e6)
+    ] = 0.01
+    seed: Annotated[int, Meta(description="Of the noise; the same seed gives the same bytes.")] = 1
 
     def __post_init__(self) -> None:
         if not 1 <= self.rate_Hz <= 1 / RECORD_S:

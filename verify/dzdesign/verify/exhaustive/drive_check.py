@@ -204,10 +204,10 @@ class CompiledDrive:
         main["drive.c"] = (programs_folder() / "drive.c").read_bytes()
         objects = [*self.objects(), compile_object(HOST, "drive.c", main, HOST.check_flags, "the check of the drive")]
         file = stored(prepared.content)
-        said = run_program(HOST, link_program(HOST, objects, "the drive"), [str(file)], "the drive")
-        if not said or len(said[0]) != 4:
-            raise RequirementError(f"the drive's check reported {said[:1]}, expected four numbers")
-        ticks, wrong, tick, field = said[0]
+        printed = run_program(HOST, link_program(HOST, objects, "the drive"), [str(file)], "the drive")
+        if not printed or len(printed[0]) != 4:
+            raise RequirementError(f"the drive's check reported {printed[:1]}, expected four numbers")
+        ticks, wrong, tick, field = printed[0]
         words = None
         if wrong:
             sample = (tick - 1) // prepared.ticks_per_sample - 1

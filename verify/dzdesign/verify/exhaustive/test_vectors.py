@@ -24,7 +24,7 @@ SPREAD = 40503
 #: Above every numerator of beta.
 KEY = 2**31
 #: What dz_beta() multiplies beta by, rounding down.
-SHOWN_BETA = 2**15
+BETA_UNIT = 2**15
 SCALARS = (
     "parts", "codes", "first_code", "code_step", "sound_from", "sound_to", "zero_place", "zero_code", "compare_limit",
     "a_low", "a_high", "b_low", "b_high", "turn", "reverse", "lowest", "safe_law", "safe_at_zero", "rows", "pairs",
@@ -106,7 +106,7 @@ class PreparedInputs:
         self._unit = betas.denominator
         key, law_of = np.unique(betas.law * KEY + betas.zero, return_inverse=True)
         both = np.stack(np.divmod(key, KEY))
-        self._shown_betas = both[0] * SHOWN_BETA // self._unit
+        self._beta_values = both[0] * BETA_UNIT // self._unit
         self._law_of = law_of
         self._corners = self._corner_numerators(both)
         self._codes = exact.code_max + 1
@@ -277,7 +277,7 @@ class PreparedInputs:
             "slant_at": self.differences.slant.astype("<i4"),
             "pairs_at": pairs,
             "places_at": places,
-            "betas_at": self._shown_betas[used].astype("<u2"),
+            "betas_at": self._beta_values[used].astype("<u2"),
         }
         content = b""
         for name, table in tables.items():

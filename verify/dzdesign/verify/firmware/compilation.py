@@ -116,8 +116,8 @@ def board_compiles(folder: Path, manifest: FirmwareManifest, include: Sequence[P
         return BoardCompiled(not_compiled=f"{compiler} is not on the path; install it, then `verify`")
     place = (folder / changed[0]).parent
     sources = sorted(name for name in manifest.files if (folder / name).parent == place and name.endswith(".c"))
-    own = [name for name in user_files(folder, manifest) if name.endswith(".c")]
-    sources += own
+    user_sources = [name for name in user_files(folder, manifest) if name.endswith(".c")]
+    sources += user_sources
     # Warnings in headers of a vendor are no concern here: -isystem.
     folders = [f"-I{folder / 'core'}", f"-I{place}", "-iquote", str(folder / USER_FOLDER)]
     folders += [word for path in include for word in ("-isystem", str(path))]
@@ -138,7 +138,7 @@ def board_compiles(folder: Path, manifest: FirmwareManifest, include: Sequence[P
         if done.returncode:
             text = f"{first_error(done.stderr)} ({Path(compiler).name})"
             return BoardCompiled(checks=(requirements.BOARD_FILES.check(holds=False, text=text),))
-    added = f" and {', '.join(own)}" if own else ""
+    added = f" and {', '.join(user_sources)}" if user_sources else ""
     text = f"one by one, with {', '.join(changed)} as you changed them{added} ({Path(compiler).name}); not linked, and "
     text += "what they do is not checked"
     return BoardCompiled(checks=(requirements.BOARD_FILES.check(holds=True, text=text),))

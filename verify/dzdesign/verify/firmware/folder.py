@@ -1,6 +1,6 @@
 """A firmware folder as it is given: its manifest, and that nothing in it leads elsewhere."""
 
-from functools import cache
+from functools import lru_cache
 from pathlib import Path
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, check_inside, read_bytes
@@ -42,10 +42,16 @@ def read_compensator(folder: Path) -> Compensator:
         If it is missing or none.
     """
     path = folder / "compensator.json"
-    return compensator_from_document(read_bytes(path, "compensator of the firmware"), str(path))
+    return _compensator(read_bytes(path, "compensator of the firmware"), str(path))
 
 
-@cache
+@lru_cache(maxsize=1)
+def _compensator(content: bytes, source: str) -> Compensator:
+    """Read a compensator once for all checks of a firmware; nothing changes one."""
+    return compensator_from_document(content, source)
+
+
+@lru_cache(maxsize=1)
 def _valve(content: str) -> ValveModel:
     return read_artefact(content.encode(), ValveModel, "compensator.json: valve")
 

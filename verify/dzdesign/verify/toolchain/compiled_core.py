@@ -127,8 +127,8 @@ class CompiledCore:
             file = stored(prepared)
             arguments = [str(file), *(["sample"] if sample else [])]
         program = link_program(machine, objects, f"the core {self._name} ({machine.name})")
-        said = run_program(machine, program, arguments, f"the core {self._name}")
-        return _findings(said, sha256_of(core.read_bytes()), f"the core {self._name} on the {machine.name}")
+        printed = run_program(machine, program, arguments, f"the core {self._name}")
+        return _findings(printed, sha256_of(core.read_bytes()), f"the core {self._name} on the {machine.name}")
 
 
 def _read(path: Path) -> bytes:
@@ -138,14 +138,14 @@ def _read(path: Path) -> bytes:
         raise InputError(f"{path}: can't be read: {error.strerror}; make it again with `dzdesign codegen`") from error
 
 
-def _findings(said: list[list[int]], object_sha256: str, what: str) -> Findings:
+def _findings(printed: list[list[int]], object_sha256: str, what: str) -> Findings:
     fields = 17
-    if not said or len(said[0]) != fields:
-        raise RequirementError(f"{what} reported {said[0][:3] if said else 'nothing'}, expected {fields} numbers")
-    high, low, *counts = said[0]
+    if not printed or len(printed[0]) != fields:
+        raise RequirementError(f"{what} reported {printed[0][:3] if printed else 'nothing'}, expected {fields} numbers")
+    high, low, *counts = printed[0]
     return Findings(
         outputs_hash=f"{high:08x}{low:08x}",
         **dict(zip(list(Findings.__dataclass_fields__)[1:16], counts, strict=True)),
-        at_zero=np.array(said[1] if len(said) > 1 else [], dtype=np.int64),
+        at_zero=np.array(printed[1] if len(printed) > 1 else [], dtype=np.int64),
         object_sha256=object_sha256,
     )

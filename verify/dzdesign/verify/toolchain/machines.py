@@ -24,8 +24,8 @@ logger = logging.getLogger(__name__)
 
 #: Of the core where its target's makefile says nothing else.
 HOST_FLAGS = ("-std=c99", "-O2")
-#: simavr colours what the UART says.
-COLOUR = re.compile(r"\x1b\[[0-9]*m")
+#: With which simavr marks what the UART sends.
+ESCAPES = re.compile(r"\x1b\[[0-9]*m")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -224,5 +224,5 @@ def run_program(machine: Machine, program: Path, arguments: list[str], what: str
         reason = f"signal {-done.returncode}" if done.returncode < 0 else f"exit status {done.returncode}"
         raise RequirementError(f"{what} on the {machine.name} ended with {reason}: {done.stderr.strip()[:200]}")
     # QEMU's semihosting writes to stderr where stdout is no terminal of its own.
-    said = COLOUR.sub("", done.stdout + "\n" + done.stderr).replace(" .", " ")
-    return [list(map(int, line.split())) for line in said.splitlines() if re.fullmatch(r"\s*\d[\d\s]*", line)]
+    printed = ESCAPES.sub("", done.stdout + "\n" + done.stderr).replace(" .", " ")
+    return [list(map(int, line.split())) for line in printed.splitlines() if re.fullmatch(r"\s*\d[\d\s]*", line)]
