@@ -20,16 +20,10 @@ from dzdesign.report.compensator_sides import valve_in
 def chain_of(files: Mapping[str, bytes], *, asked: tuple[str, ...] = ("",), sealed: bool = True) -> Chain:
     """Follow the chain from the evidence back to the valve, as far as the files go.
 
-    Parameters
-    ----------
-    files : mapping of str to bytes
-        By name, such as `read_artefact_folder` returns; of two of a kind the first one counts.
-    asked : tuple of str
-        How the names of the files begin that the report is asked for. What else lies there and belongs to another chain
-        is a stranger's: named, and no fault.
-    sealed : bool
-        False of evidence that `verify` has made this moment: no manifest states its hash yet, and what is wrong with
-        the files it has found itself, so that its own verdict stands.
+    Of two files of a kind the first one counts. `asked` is how the names of the files begin that the report is asked
+    for: what else lies there and belongs to another chain is a stranger's, named and no fault. Evidence that `verify`
+    has made this moment is not `sealed`: no manifest states its hash yet, and its own verdict stands whatever else lies
+    there.
 
     Raises
     ------

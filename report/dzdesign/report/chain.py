@@ -72,22 +72,9 @@ class Place:
 class Chain:
     """What a report is of; an artefact that was not found is None.
 
-    Attributes
-    ----------
-    evidence : Evidence or None
-    firmware : FirmwareManifest or None
-    compensator : Compensator or None
-    valve : ValveModel or None
-    assessment : Assessment or None
-    reproduction : Reproduction or None
-    places : mapping of str to Place
-        Where each was found, by these names.
-    curves : mapping of str to str
-        CSV files of the evidence whose hashes fit, by name.
-    faults : tuple of str
-        What does not fit: a file that was changed, or belongs to another chain. None of it is used.
-    missing : tuple of str
-        What is not there, and which command makes it.
+    `places` is where each was found, by these names; `curves` the CSV files of the evidence whose hashes fit. `faults`
+    do not fit (changed, or of another chain) and are not used; `missing` names what is not there, and which command
+    makes it.
     """
 
     evidence: Evidence | None = None

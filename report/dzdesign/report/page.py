@@ -28,22 +28,9 @@ LONGEST_WORD = 18
 class Section:
     """What a section holds, in the order in which it is shown.
 
-    Attributes
-    ----------
-    figures : tuple of ReportFigure
-    tables : tuple of Table
-    lines : tuple of str
-        Sentences of figures.
-    groups : tuple of (str, tuple of str)
-        Further sentences, each group under a heading of its own.
-    missing : str
-        What it lacks and which command makes that; empty if nothing.
-    optional : bool
-        Whether the page is whole without it.
-    note : str
-        What to do with it; what stands between backticks is a command.
-    of_valve : bool
-        Whether it is of one valve: of a lot setting, of its carrier.
+    `groups` are further lines, each group under a heading of its own. `missing` says what the section lacks and which
+    command makes it; the page is whole without an `optional` one. In a `note` a command stands between backticks. Of a
+    lot setting a section may be of one valve, the carrier.
     """
 
     figures: tuple[ReportFigure, ...] = ()
@@ -60,28 +47,10 @@ class Section:
 class Page:
     """What a page holds.
 
-    Attributes
-    ----------
-    title : str
-        Its first heading.
-    verdict : Headline
-        What it leads with.
-    figures : sequence of Figure
-        The numbers that matter.
-    headings : sequence of (str, str)
-        Anchor and heading of every section, in their order; ``provenance`` and ``warnings`` among them.
-    sections : mapping of str to Section
-        By anchor.
-    missing : sequence of str
-        What is not there or not used, and which command makes it.
-    law : LawAccount, optional
-        The derivation, for the section ``law``.
-    record : sequence of (str, str)
-        Who and what, in the engineer's words.
-    lot : sequence of Figure
-        Of a lot setting, before all others.
-    carrier : str
-        Of a lot setting: the one valve that `record` and `figures` are of.
+    `headings` has anchor and heading of every section, in their order, ``provenance`` and ``warnings`` among them;
+    `missing` what is not there or not used, and which command makes it; `record` who and what, in the engineer's words.
+    Of a lot setting `lot` stands before all other figures, and `carrier` is the one valve that `record` and `figures`
+    are of.
     """
 
     title: str

@@ -67,12 +67,7 @@ class Report:
 
 
 def report_of_folder(folder: Path) -> Report:
-    """Make the report of an artefact folder.
-
-    Parameters
-    ----------
-    folder : Path
-        Of `dzdesign demo`, of evidence, of firmware, or with valve.json or compensator.json.
+    """Make the report of an artefact folder: of demo, evidence or firmware, or with valve.json or compensator.json.
 
     Raises
     ------
@@ -83,19 +78,10 @@ def report_of_folder(folder: Path) -> Report:
 
 
 def with_report(files: Mapping[str, str | bytes], firmware: Path, output: Path) -> dict[str, str | bytes]:
-    """Return the files of an evidence folder with the report of them: of what `verify` used, and of nothing else.
+    """Return the files of an evidence folder, not written yet, with the report of what `verify` used alone.
 
     Its verdict is the evidence's own. Files that lie about, an assessment or a stranger's valve.json, have no part in
-    it; `dzdesign report` looks at them.
-
-    Parameters
-    ----------
-    files : mapping
-        Of the evidence folder, not written yet: name to content.
-    firmware : Path
-        The firmware folder that it is of; the valve.json that it was made from is looked for around it.
-    output : Path
-        The evidence folder.
+    it; `dzdesign report` looks at them. The valve.json that the firmware was made from is looked for around it.
     """
     name, place = Path(output).resolve().name, Path(firmware).resolve().name
     if name == place:  # in two folders of one name

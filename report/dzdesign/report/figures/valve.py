@@ -25,16 +25,7 @@ BRANCHES = (("rising", "opening", "^", "-", "blue"), ("falling", "closing", "v",
 
 
 def lines_figure(side: SideModel, name: str, both: bool) -> ReportFigure:
-    """Draw the straight parts that were fitted, and the knees that they give, one hue a pressure drop.
-
-    Parameters
-    ----------
-    side : SideModel
-    name : str
-        ``positive`` or ``negative``.
-    both : bool
-        Whether the valve has two sides.
-    """
+    """Draw the straight parts that were fitted, and the knees that they give, one hue a pressure drop."""
     figure, axes = titled_axes(3.5, name, both, right=0.65)
     rows, labels = [], []
     for index, test in enumerate(side.tests):
@@ -80,18 +71,7 @@ def _span(values: Sequence[float] | np.ndarray, unit: str, digits: int) -> str:
 
 
 def thresholds_figure(side: SideModel, guard: str, name: str, both: bool) -> ReportFigure:
-    """Draw knees and onsets with their errors, the certified staircase and the largest offset over the pressure drop.
-
-    Parameters
-    ----------
-    side : SideModel
-    guard : str
-        Threshold that is guarded.
-    name : str
-        ``positive`` or ``negative``.
-    both : bool
-        Whether the valve has two sides.
-    """
+    """Draw knees and onsets with their errors, the certified staircase and the largest offset over dP."""
     curve = side.guards[guard]
     dp = np.array([test.dp_MPa or 0.0 for test in side.tests])
     figure, axes = titled_axes(3.8, name, both, legend_rows=2)
@@ -146,21 +126,7 @@ def beta_figure(
 ) -> ReportFigure | None:
     """Draw beta between what the bounds allow and, where there is a compensator, its table of integers.
 
-    Parameters
-    ----------
-    side : SideModel
-    guard : str
-        Threshold that is guarded.
-    name : str
-        ``positive`` or ``negative``.
-    both : bool
-        Whether the valve has two sides.
-    compensator : Compensator or None
-
-    Returns
-    -------
-    ReportFigure or None
-        None of a valve tested at one pressure drop.
+    None of a valve tested at one pressure drop.
     """
     curve = side.guards[guard]
     if len(curve.beta) < 2:

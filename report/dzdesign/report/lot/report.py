@@ -22,12 +22,7 @@ IN_VERDICT, ANOMALIES_IN_VERDICT = 8, 3
 
 
 def report_of_lot(folder: Path) -> Report:
-    """Make the report of the folder of a batch.
-
-    Parameters
-    ----------
-    folder : Path
-        Finished or stopped.
+    """Make the report of the folder of a lot, finished or stopped.
 
     Raises
     ------
@@ -38,13 +33,7 @@ def report_of_lot(folder: Path) -> Report:
 
 
 def make_lot_report(lot: Lot) -> Report:
-    """Make the report of a lot.
-
-    Parameters
-    ----------
-    lot : Lot
-        Of `read_lot`.
-    """
+    """Make the report of a lot."""
     verdict = lot_headline(lot)
     spreads = spreads_of(lot.rows)
     missing = list(lot.missing)
@@ -70,12 +59,7 @@ def make_lot_report(lot: Lot) -> Report:
 
 
 def lot_headline(lot: Lot) -> Headline:
-    """Return the verdict: good only if every valve is calibrated and verified, and every file fits.
-
-    Parameters
-    ----------
-    lot : Lot
-    """
+    """Return the verdict: good only if every valve is calibrated and verified, and every file fits."""
     anomalies = lot.summary.anomalies if lot.summary else ()
     lines = [f"odd: {text}" for text in anomalies[:ANOMALIES_IN_VERDICT]]
     simulated = [row.name for row in lot.calibrated if "simulated" in row.warnings]
@@ -125,14 +109,7 @@ def _not_calibrated(lot: Lot) -> tuple[str, ...]:
 
 
 def key_figures_of_lot(lot: Lot, spreads: Sequence[Spread]) -> tuple[Figure, ...]:
-    """Return the numbers that matter.
-
-    Parameters
-    ----------
-    lot : Lot
-    spreads : sequence of Spread
-        Of `spreads_of`.
-    """
+    """Return the numbers that matter."""
     by_column = {spread.column: spread for spread in spreads}
     figures = [_counts(lot), _look(lot, spreads)]
     for column, label, note in (

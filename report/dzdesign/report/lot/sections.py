@@ -49,14 +49,7 @@ NOT_PROVED = (
 
 
 def sections_of(lot: Lot, spreads: Sequence[Spread]) -> dict[str, Section]:
-    """Return every section by its anchor.
-
-    Parameters
-    ----------
-    lot : Lot
-    spreads : sequence of Spread
-        Of `spreads_of`.
-    """
+    """Return every section by its anchor."""
     with lot_style():
         made = {
             "failed": _failed_section(lot),

@@ -141,14 +141,7 @@ def warnings_table(lot: Lot) -> Table | None:
 
 
 def holding_table(lot: Lot, setting: LotSettingSummary) -> Table:
-    """Return the valves that hold the lot setting down.
-
-    Parameters
-    ----------
-    lot : Lot
-    setting : LotSettingSummary
-        Of the lot.
-    """
+    """Return the valves that hold the lot setting down."""
     rows = {row.name: row for row in lot.rows}
 
     def figure_of(side: str, column: str, digits: int) -> Callable[[str], Cell]:
@@ -179,14 +172,7 @@ def holding_table(lot: Lot, setting: LotSettingSummary) -> Table:
 
 
 def valves_table(lot: Lot, far: Collection[str]) -> Table | None:
-    """Return the table in short: of a small lot every row, of a large one the valves that lie far; all of it as CSV.
-
-    Parameters
-    ----------
-    lot : Lot
-    far : collection of str
-        Valves far from the rest. Those that are not calibrated have no numbers.
-    """
+    """Return the table in short: of a small lot every row, of a large one the valves that lie far; all of it as CSV."""
     if not lot.rows:
         return None
     rows, caption = lot.rows, "All valves"
