@@ -227,8 +227,8 @@ class _Search:
             self.found[role] = KINDS[role].read(self.files[name], name)
         except InputError as error:
             # What the evidence rests on must not go missing without a word: its verdict would stand.
-            told = self.faults if role == "compensator" and self.found else self.unreadable
-            told.append(f"{KINDS[role].label}: {error}")
+            lines = self.faults if role == "compensator" and self.found else self.unreadable
+            lines.append(f"{KINDS[role].label}: {error}")
             return
         self.places[role] = _place(name, self.hashes[name], self.found[role])
 
