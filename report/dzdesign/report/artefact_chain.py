@@ -8,13 +8,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
-from dzdesign.core.artefact_types import THIS_TOOL, Artefact, SourceFile, to_json_bytes
+from dzdesign.core.artefact_types import Artefact, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.report.artefact_folder import VERIFICATION_NAME, is_of, listed_files
 from dzdesign.report.chain import KINDS, Chain, Place
-from dzdesign.report.compensator_sides import valve_in
 
 
 def chain_of(files: Mapping[str, bytes], *, asked: tuple[str, ...] = ("",), sealed: bool = True) -> Chain:
@@ -142,7 +141,7 @@ class _Search:
 
     def _valve(self, compensator: Compensator) -> None:
         """Take the valve's file; where it is not here, the valve that the compensator holds."""
-        held, place = valve_in(compensator), self.places["compensator"]
+        held, place = compensator.valve, self.places["compensator"]
         stated, named = place.made_from[0].sha256, place.made_from[0].source
         name = self._of_hash(stated)
         if name is None:
@@ -233,9 +232,6 @@ class _Search:
         self.places[role] = _place(name, self.hashes[name], self.found[role])
 
 
-def _place(name: str, sha256: str, artefact: Artefact | Compensator) -> Place:
-    if isinstance(artefact, Compensator):
-        source = SourceFile(source="valve.json", sha256=artefact.valve_sha256)
-        return Place(name=name, sha256=sha256, made_by=f"{THIS_TOOL.name} {THIS_TOOL.version}", made_from=(source,))
+def _place(name: str, sha256: str, artefact: Artefact) -> Place:
     tool = artefact.tool
     return Place(name=name, sha256=sha256, made_by=f"{tool.name} {tool.version}", made_from=artefact.made_from)

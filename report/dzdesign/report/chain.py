@@ -5,13 +5,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from dzdesign.assess.assessment import Assessment
-from dzdesign.core.artefact_files import TOOL, parse_document
 from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.core.artefact_types import Artefact, SourceFile, schema_of
+from dzdesign.core.artefact_types import THIS_TOOL, Artefact, SourceFile, schema_of
 from dzdesign.core.documents import written_by
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.compensator_file import SCHEMA as COMPENSATOR_SCHEMA
-from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.design.redesign_check import prove_derived
 from dzdesign.identify.valve.model import ValveModel
@@ -41,8 +38,8 @@ def _typed(label: str, kind: type[Artefact]) -> Kind:
 
 
 def _read_compensator(content: bytes, name: str) -> Compensator:
-    compensator = compensator_from_document(content, name)
-    if parse_document(content, name, (COMPENSATOR_SCHEMA,))["tool"] == TOOL:  # another may have chosen other tables
+    compensator = read_artefact(content, Compensator, name)
+    if compensator.tool == THIS_TOOL:  # another version may have chosen other tables
         prove_derived(compensator)
     return compensator
 
@@ -51,7 +48,7 @@ def _read_compensator(content: bytes, name: str) -> Compensator:
 KINDS = {
     "evidence": _typed("evidence", Evidence),
     "firmware": _typed("firmware", FirmwareManifest),
-    "compensator": Kind(label="compensator", schema=COMPENSATOR_SCHEMA, read=_read_compensator),
+    "compensator": Kind(label="compensator", schema=schema_of(Compensator), read=_read_compensator),
     "valve": _typed("valve", ValveModel),
     "assessment": _typed("assessment of recordings", Assessment),
     "reproduction": _typed("the paper's numbers", Reproduction),
