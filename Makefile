@@ -14,6 +14,10 @@ demo: $(STAMP)
 test: lint
 	$(BIN)/pytest --numprocesses auto --dist loadfile
 
+# The quick half of the tests, two minutes on two cores: before every commit. Slow ones are marked `slow`.
+quick: lint
+	$(BIN)/pytest -m "not slow" --numprocesses auto --dist loadfile
+
 # The tests once more, with the lines and branches of each file that no test runs in its own process.
 coverage: $(STAMP)
 	$(BIN)/pytest --numprocesses auto --dist loadfile --cov --cov-report=term

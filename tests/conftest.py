@@ -12,10 +12,11 @@ import pytest
 from dzdesign.core.artefact_files import to_json, write_folder
 from dzdesign.example import example_folder as bundled_folder
 from dzdesign.identify.reading.ramp_files import read_ramp_file
+from tests.support.wording import Wording
 
 
 def pytest_addoption(parser):
-    parser.addoption("--update-goldens", action="store_true", help="write tests/goldens anew, from its valve.json")
+    parser.addoption("--update-goldens", action="store_true", help="write tests/goldens anew")
     parser.addoption("--update-docs", action="store_true", help="write what commands print into the pages of docs/")
 
 
@@ -23,6 +24,12 @@ def pytest_addoption(parser):
 def page_of_a_file(monkeypatch):
     """Print as into a file, whatever the terminal or CI that runs the tests says of its width."""
     monkeypatch.delenv("COLUMNS", raising=False)
+
+
+@pytest.fixture
+def wording(request, tmp_path) -> Wording:
+    """Compare whole messages with tests/goldens/messages.txt: `wording("group: case", text)`."""
+    return Wording(request.config.getoption("--update-goldens"), tmp_path)
 
 
 @pytest.fixture(scope="session")

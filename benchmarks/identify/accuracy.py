@@ -94,7 +94,7 @@ def _rivals(name: str, bench: Bench, count: int, few: int, seed: int) -> Iterato
         yield from _rival_rows((name, rival), bench, threshold, count, seed)
     if few:
         try:
-            import piecewise_regression as _  # noqa: F401
+            import piecewise_regression as _  # noqa: F401  # pyright: ignore[reportMissingImports]: of `make bench`
         except ImportError:
             yield Row(what=f"{name}: piecewise-regression", value=float("nan"), note="not installed: extra 'bench'")
             return

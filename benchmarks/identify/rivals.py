@@ -29,7 +29,7 @@ def piecewise_regression(u: np.ndarray, q: np.ndarray) -> float:
     """Return the breakpoint that the package piecewise-regression finds, all readings taken as they are."""
     import warnings
 
-    import piecewise_regression as package
+    import piecewise_regression as package  # pyright: ignore[reportMissingImports]: of `make bench`
 
     # With a good start value and without its bootstrap restarts: the package at its fastest and luckiest.
     start = [float(u[q > 0.2 * q.max()].min())]

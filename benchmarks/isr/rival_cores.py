@@ -10,8 +10,10 @@ from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
 
+import sympy
 from contender import Contender
 
+from dzdesign.derivation import symbols
 from dzdesign.derivation.law import law
 from dzdesign.derivation.scaling import evaluate_line
 from dzdesign.design.compensator import Compensator
@@ -122,11 +124,10 @@ static const double beta_node[{len(betas)}] = {{
 
 
 def _naive_law(c: Compensator) -> str:
-    kappa, u_min0 = _double(c.positive.k_x_max_over_u_max), _double(c.positive.u_min0_over_u_max * c.u_max_V)
-    return {
-        "paper": f"(beta * ({kappa} - 1.0) + 1.0) * u_i + beta * {u_min0}",
-        "target": f"{kappa} * u_i + beta * {u_min0}",
-    }[c.law_name]
+    share, u_min0 = _double(c.positive.k_x_max_over_u_max), _double(c.positive.u_min0_over_u_max * c.u_max_V)
+    in_shares = law(c.law_name).output.subs(symbols.k, symbols.kappa * symbols.u_max / symbols.x_max)
+    # The numbers as symbols, so that none of them is computed beforehand.
+    return sympy.ccode(in_shares.subs({symbols.kappa: sympy.Symbol(share), symbols.u_min0: sympy.Symbol(u_min0)}))
 
 
 def _slope_table(c: Compensator, *, checked: bool) -> Contender:

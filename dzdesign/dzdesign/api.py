@@ -15,7 +15,7 @@ True
 
 from dzdesign.batch.arguments import BatchArguments
 from dzdesign.core.errors import DzdesignError, InputError, RequirementError
-from dzdesign.core.result_display import show_by
+from dzdesign.core.result_display import display_by
 from dzdesign.keywords import with_keywords
 from dzdesign.stages import assess as assess_stage
 from dzdesign.stages import batch as batch_stage
@@ -26,15 +26,14 @@ from dzdesign.stages import init as init_stage
 from dzdesign.stages import report as report_stage
 from dzdesign.stages import simulate as simulate_stage
 from dzdesign.stages import verify as verify_stage
-from dzdesign.terminal.notebook import WRITERS
-from dzdesign.terminal.summaries import SUMMARIES
+from dzdesign.terminal.notebook import heading_of, html_of, text_of
 
 __all__ = [
     "DzdesignError", "InputError", "RequirementError",
     "assess", "batch", "design", "generate", "identify", "init", "report", "simulate", "verify",
 ]  # fmt: skip
 
-show_by(WRITERS, SUMMARIES)
+display_by(heading=heading_of, text=text_of, html=html_of)
 
 init = with_keywords(init_stage.InitArguments, init_stage.init)
 identify = with_keywords(identify_stage.IdentifyArguments, identify_stage.identify)

@@ -13,7 +13,7 @@ from typing import Any, ForwardRef, ParamSpec, TypeVar, get_args
 
 from dzdesign.core.errors import InputError, nearest, quoted
 from dzdesign.core.options import Argument, arguments_of
-from dzdesign.terminal.progress import talking
+from dzdesign.terminal.progress import reporting
 
 P = ParamSpec("P")
 A = TypeVar("A")
@@ -56,7 +56,7 @@ def with_keywords(declaration: Callable[P, A], stage: Callable[[A], R]) -> Calla
         bound = signature.bind(*args, **kwargs)
         for key, value in bound.arguments.items():
             bound.arguments[key] = _checked(declared[key], value)
-        with talking(quiet=True, verbose=False):
+        with reporting(quiet=True, verbose=False):
             return stage(declaration(*bound.args, **bound.kwargs))
 
     plain = [each.replace(annotation=_plain(each.annotation)) for each in signature.parameters.values()]

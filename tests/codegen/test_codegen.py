@@ -110,8 +110,10 @@ def test_same_input_same_bytes(example_compensator, example_firmware):
 def test_core_compiles_strictly_with_every_compiler(example_valve, law_name, tmp_path):
     firmware = generate(design(example_valve, DesignOptions(law_name=law_name)), "f28335")
     write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
-    for compiler in find_compilers():
-        for source in sorted((tmp_path / "fw" / "core").glob("*.c")):
+    sources, compilers = sorted((tmp_path / "fw" / "core").glob("*.c")), find_compilers()
+    assert sources and compilers
+    for compiler in compilers:
+        for source in sources:
             check_strictly(source, compiler)
 
 

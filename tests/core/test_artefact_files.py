@@ -2,7 +2,6 @@
 
 import json
 import os
-import re
 import stat
 import sys
 from pathlib import Path
@@ -86,18 +85,20 @@ def test_a_place_where_no_file_can_go(tmp_path, name):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no device files")
-def test_a_device_is_not_replaced_by_a_file():
-    with pytest.raises(InputError, match="device"):
+def test_a_device_is_not_replaced_by_a_file(wording):
+    with pytest.raises(InputError) as caught:
         write_file(Path(os.devnull), "text")
+    wording("artefact files: a device", str(caught.value))
     assert not Path(os.devnull).is_file()
 
 
-def test_an_artefact_takes_the_place_of_its_own_kind_only(tmp_path):
+def test_an_artefact_takes_the_place_of_its_own_kind_only(tmp_path, wording):
     path = tmp_path / "out.json"
     for content in ("time_s,u_V\n", "[1]", '{"schema": "dzdesign.compensator/1"}', '{"schema": "valve"}', "[" * 5000):
         path.write_text(content)
-        with pytest.raises(InputError, match="left alone"):
+        with pytest.raises(InputError) as caught:
             write_file(path, "{}", "dzdesign.valve/1")
+        wording("artefact files: a file of another kind", str(caught.value))
         assert path.read_text() == content
     for content in ("", '{"schema": "dzdesign.valve/1"}', '{"schema": "dzdesign.valve/2"}'):
         path.write_text(content)
@@ -131,40 +132,44 @@ def test_what_a_person_added_stays(folder):
     assert not linked or ((folder / "link").is_symlink() and os.readlink(folder / "dangling") == "nowhere")
 
 
-def test_what_a_person_changed_is_not_overwritten(folder):
+def test_what_a_person_changed_is_not_overwritten(folder, wording):
     (folder / "core" / "a.c").write_text("int a = 1;\n")
     before = tree(folder)
-    with pytest.raises(InputError, match=r"a\.c' was changed since dzdesign wrote it"):
+    with pytest.raises(InputError) as caught:
         write_folder(folder, FILES, FIRMWARE)
+    wording("artefact files: a file that was changed", str(caught.value))
     assert tree(folder) == before
 
 
-def test_an_added_file_in_the_place_of_a_new_one_is_not_overwritten(folder):
+def test_an_added_file_in_the_place_of_a_new_one_is_not_overwritten(folder, wording):
     (folder / "new.c").write_text("mine")
     before = tree(folder)
-    with pytest.raises(InputError, match="stands where a new file goes"):
+    with pytest.raises(InputError) as caught:
         write_folder(folder, {**FILES, "new.c": "theirs"}, FIRMWARE)
+    wording("artefact files: a file where a new one goes", str(caught.value))
     assert tree(folder) == before
     assert [path.name for path in folder.parent.iterdir()] == ["firmware"]
 
 
-def test_a_folder_of_another_kind_is_not_replaced(folder):
+def test_a_folder_of_another_kind_is_not_replaced(folder, wording):
     before = tree(folder)
-    with pytest.raises(InputError, match=r"which dzdesign\.evidence/1 would replace"):
+    with pytest.raises(InputError) as caught:
         write_folder(folder, {"verification.json": "{}"}, EVIDENCE)
+    wording("artefact files: a folder of another kind", str(caught.value))
     assert tree(folder) == before
 
 
 @pytest.mark.parametrize(
     "manifest", [None, "no JSON", "[]", '{"schema": "other/1", "files": {}}', '{"schema": "dzdesign.x/1"}', "[" * 5000]
 )
-def test_a_folder_that_is_not_ours_is_left_alone(tmp_path, manifest):
+def test_a_folder_that_is_not_ours_is_left_alone(tmp_path, manifest, wording):
     (tmp_path / "thesis.tex").write_text("years of work")
     if manifest is not None:
         (tmp_path / MANIFEST_NAME).write_text(manifest)
     before = tree(tmp_path)
-    with pytest.raises(InputError, match="was not made by dzdesign"):
+    with pytest.raises(InputError) as caught:
         write_folder(tmp_path, FILES, FIRMWARE)
+    wording("artefact files: a folder that dzdesign did not make", str(caught.value))
     assert tree(tmp_path) == before
 
 
@@ -212,14 +217,12 @@ def test_a_link_to_a_folder_stays_a_link(folder):
     assert link.is_symlink() and (folder / "README.md").read_text() == "new\n"
 
 
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [("nowhere", "does not exist"), ("file/below", "does not exist"), (".", "is a folder"), ("a\0b", "file's name")],
-)
-def test_a_file_that_cannot_be_read(tmp_path, name, words):
+@pytest.mark.parametrize("name", ["nowhere", "file/below", ".", "a\0b"])
+def test_a_file_that_cannot_be_read(tmp_path, name, wording):
     (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match=words):
+    with pytest.raises(InputError) as caught:
         read_bytes(tmp_path / name, "ramp file")
+    wording(f"artefact files: reading {name!r}", str(caught.value))
 
 
 DOCUMENT = {"schema": "dzdesign.valve/1", "value": 1.5}
@@ -351,16 +354,11 @@ def test_quantities_that_are_none(text):
         parse_quantity(text, "voltage", "--option")
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("2,000 V", "--option is '2,000 V': '2,000' may be 2000 or 2.0; write 2000 or 2.0"),
-        ("-12,345V", "'12,345' may be 12345 or 12.345; write 12345 or 12.345"),
-    ],
-)
-def test_a_comma_before_three_digits_may_stand_between_thousands(text, words):
-    with pytest.raises(InputError, match=re.escape(words)):
+@pytest.mark.parametrize("text", ["2,000 V", "-12,345V"])
+def test_a_comma_before_three_digits_may_stand_between_thousands(text, wording):
+    with pytest.raises(InputError) as caught:
         parse_quantity(text, "voltage", "--option")
+    wording(f"quantity: {text}", str(caught.value))
 
 
 @pytest.mark.parametrize("unit", ["9**9**9**9", "V**9**9**9**9", "V" * 10_000, "(V)", "V; import os", "", "1 V"])

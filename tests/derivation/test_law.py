@@ -70,16 +70,35 @@ def test_unknown_law_names_the_nearest():
         law("papper")
 
 
-@pytest.mark.parametrize(("output", "complaint"), [(s.u_i**2, "not affine"), (s.u_i * FOREIGN, "foreign")])
-def test_a_law_checks_its_output(output, complaint):
+GAIN, OFFSET = s.k * s.x_max / s.u_max, s.beta * s.u_min0
+
+
+@pytest.mark.parametrize(
+    ("output", "rises_if", "complaint"),
+    [
+        (s.u_i**2, sympy.true, "not affine"),
+        (s.beta**2 * s.u_i + OFFSET, sympy.true, "not affine"),
+        (s.u_i * FOREIGN, sympy.true, "foreign"),
+        (GAIN * s.u_i, sympy.true, r"at zero command the output is 0, expected beta\*u_min0"),
+        ((s.beta * (GAIN - 1) + 1) * s.u_i + OFFSET, sympy.true, "not positive exactly if True"),
+        (GAIN * s.u_i + OFFSET, s.beta < 1, "not positive exactly if beta < 1"),
+    ],
+)
+def test_a_law_checks_what_it_states(output, rises_if, complaint):
     with pytest.raises(ValueError, match=complaint):
-        Law(name="wrong", equation="", output=output, note="")
+        Law(name="wrong", equation="", output=output, rises_if=rises_if, note="")
+
+
+def test_a_law_of_its_own_is_a_choice_of_the_account():
+    stated = Law(name="plain", equation="", output=s.u_i + OFFSET, note="No gain.")
+    assert [one.number for one in stated.statements] == [stated.stated_as] == ["plain"]
+    assert stated.statements[0].kind.is_given and stated.statements[0].members == (stated.output,)
 
 
 def test_a_law_with_a_fraction_is_not_lowered_to_floats():
-    halved = Law(name="halved", equation="", output=law("paper").output / 2, note="")
+    halved = Law(name="halved", equation="", output=s.k * s.x_max / s.u_max * s.u_i / 2 + s.beta * s.u_min0, note="")
     with pytest.raises(ValueError, match="integer coefficients"):
-        halved.evaluate_offset(1, 1)
+        halved.evaluate_gain(1, 1)
 
 
 # --- the plant ----------------------------------------------------------------------------------------------

@@ -83,15 +83,16 @@ def test_nothing_is_loaded_from_elsewhere(site, pages):
     loaded = {(path.name, what) for path, page in pages.items() for what in page.loads}
     assert [each for each in loaded if re.match(r"([a-z]+:)?//", each[1])] == []
     styles = "".join(path.read_text(encoding="utf-8") for path in site.rglob("*.css"))
-    assert re.findall(r"@import|url\(\s*['\"]?(?:https?:)?//[^)]*", styles) == []
+    assert styles and re.findall(r"@import|url\(\s*['\"]?(?:https?:)?//[^)]*", styles) == []
     assert list(site.rglob("*.woff*")) == [], "no web fonts"
 
 
 def test_every_link_leads_somewhere(site, pages):
-    broken = []
+    broken, tried = [], 0
     account = {"index.html", "derivation.tex", "derivation.json"}
     for path, page in pages.items():
         for link in page.links:
+            tried += 1
             target, _, place = unquote(link).partition("#")
             if re.match(r"[a-z]+:", target):
                 continue
@@ -100,7 +101,7 @@ def test_every_link_leads_somewhere(site, pages):
                 continue
             if not where.is_file() or (place and where in pages and place not in pages[where].places):
                 broken.append(f"{path.name}: {link}")
-    assert broken == []
+    assert broken == [] and tried > 500
 
 
 def test_make_docs_builds_the_account_that_the_pages_link_to():
@@ -207,11 +208,14 @@ def test_the_picture_of_the_readme_is_the_one_of_the_pages(site, request):
 
 def test_the_pages_name_no_file_that_is_not_there():
     """Paths of the repository in the pages, in CONTRIBUTING and in CHANGELOG."""
+    tried = 0
     for page in (*DOCS.rglob("*.md"), *ROOT.glob("C*.md")):
         text = page.read_text(encoding="utf-8")
         for path in re.findall(rf"`((?:{'|'.join(FOLDERS)})/[\w./-]+)`", text):
+            tried += 1
             made = path.startswith(("docs/_", "docs/derivation")) or "mychip" in path
             assert made or (ROOT / path).exists(), f"{page.name}: {path}"
+    assert tried > 80
 
 
 def test_the_citation_is_of_the_format_and_of_this_version():

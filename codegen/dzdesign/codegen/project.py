@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from dzdesign.codegen.banner import Banner, banner_of, board_lines
 from dzdesign.codegen.core.certificate_text import zero_command
-from dzdesign.codegen.core.files import CORE_HEADERS, CORE_SOURCES, core_files
+from dzdesign.codegen.core.files import CORE_HEADERS, CORE_SOURCES, Values, core_files
 from dzdesign.codegen.provenance import constants_of, origin_of
 from dzdesign.codegen.target import Target, folder_of
 from dzdesign.codegen.wiring import wiring_of
@@ -142,9 +142,9 @@ def generate(
     designed_for = compensator.request.target if compensator.request else None
     target = target_named(target_name or (designed_for.name if designed_for else DEFAULT_TARGET))
     if designed_for:
-        target_named(designed_for.name).check_is_described(designed_for)
+        target_named(designed_for.name).check_designed_for(designed_for)
     target.check_signals(compensator.signals)
-    note = target.check_designed_for(designed_for)
+    note = target.check_designed_for(designed_for) if designed_for else ""
     document = compensator_bytes or to_json(compensator_document(compensator)).encode()
     digest = sha256_of(document)
     core = {f"core/{name}": file for name, file in core_files(compensator, target.arithmetic).items()}
@@ -226,5 +226,5 @@ def _environment(package: str) -> "jinja2.Environment":
     )
 
 
-def _render(package: str, template: str, banner: Sequence[str], values: Mapping[str, object]) -> str:
+def _render(package: str, template: str, banner: Sequence[str], values: Values) -> str:
     return str(_environment(package).get_template(template).render(banner=banner, project="dzdesign", **values))

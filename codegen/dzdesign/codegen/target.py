@@ -145,33 +145,13 @@ class Target:
                     f"design it again with `dzdesign design --target {self.name}`"
                 )
 
-    def check_is_described(self, designed_for: TargetInputs) -> None:
-        """Refuse a compensator that says of this target what is not so.
+    def check_designed_for(self, designed_for: TargetInputs) -> str:
+        """Refuse a compensator whose codes are other voltages or times here than those that it was designed for.
 
         Parameters
         ----------
         designed_for : TargetInputs
-            As the compensator states it, under this target's name.
-
-        Raises
-        ------
-        InputError
-            With the first number that differs.
-        """
-        for what, said, has in _inputs_compared(designed_for, self.inputs()):
-            if said != has:
-                raise InputError(
-                    f"the compensator says that target {self.name} has {float(said):g} ({what}), but it has "
-                    f"{float(has):g}; design it again with `dzdesign design --target {self.name}`"
-                )
-
-    def check_designed_for(self, designed_for: TargetInputs | None) -> str:
-        """Refuse a compensator of another target whose codes are other voltages or times here.
-
-        Parameters
-        ----------
-        designed_for : TargetInputs or None
-            As the compensator states it; None if it does not.
+            Target, converter and timer as the compensator states them.
 
         Returns
         -------
@@ -183,21 +163,21 @@ class Target:
         InputError
             With the first number that differs.
         """
-        if designed_for is None:
-            return ""
-        theirs = designed_for.converter
+        theirs, other = designed_for.converter, designed_for.name != self.name
         word = f"the compensator was designed for target {designed_for.name}; {self.name} "
-        if self.takes_any_signals:
+        if self.takes_any_signals and other:
             word += f"takes its codes as they are: {theirs.levels} codes over {float(theirs.full_V):g} V, "
-            word += f"{designed_for.compare_max} counts at full drive"
-            return "" if designed_for.name == self.name else word
+            return f"{word}{designed_for.compare_max} counts at full drive"
         for what, asked, has in _inputs_compared(designed_for, self.inputs()):
             if asked != has:
-                raise InputError(
-                    f"the compensator was designed for target {designed_for.name} ({what}: {float(asked):g}), but "
-                    f"{self.name} has {float(has):g}; design it again with `dzdesign design --target {self.name}`"
+                stated = (
+                    f"was designed for target {designed_for.name} ({what}: {float(asked):g}), but {self.name} has"
+                    if other
+                    else f"says that target {self.name} has {float(asked):g} ({what}), but it has"
                 )
-        return "" if designed_for.name == self.name else word + "has the same converter and timer"
+                remedy = f"design it again with `dzdesign design --target {self.name}`"
+                raise InputError(f"the compensator {stated} {float(has):g}; {remedy}")
+        return f"{word}has the same converter and timer" if other else ""
 
 
 def _inputs_compared(one: TargetInputs, other: TargetInputs) -> tuple[tuple[str, Fraction | int, Fraction | int], ...]:

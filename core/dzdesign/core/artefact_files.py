@@ -7,14 +7,16 @@ import os
 import shutil
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path, PurePosixPath, PureWindowsPath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from dzdesign.core.artefact_types import Artefact, as_document
 from dzdesign.core.documents import parse_document, sha256_of, sha256_of_file, to_json
 from dzdesign.core.errors import InputError
 from dzdesign.core.folder_swap import alone_in, beside, bring_back, put_in_place
 from dzdesign.core.input_files import MOST_DOCUMENT, open_bytes, read_bytes
 from dzdesign.core.version import __version__
+
+if TYPE_CHECKING:
+    from dzdesign.core.artefact_types import Artefact
 
 __all__ = [
     "MANIFEST_NAME", "TOOL", "check_file_may_be_written", "check_folder_may_be_written", "check_inside",
@@ -319,7 +321,7 @@ def _keep(
 
 
 def write_folder(
-    folder: Path, files: Mapping[str, str | bytes], manifest: Artefact | Mapping[str, Any]
+    folder: Path, files: Mapping[str, str | bytes], manifest: "Artefact | Mapping[str, Any]"
 ) -> Mapping[str, bool]:
     """Write a folder whole or not at all; one that dzdesign made before is replaced, any other is left alone.
 
@@ -346,7 +348,12 @@ def write_folder(
     """
     contents = {name: text.encode() if isinstance(text, str) else text for name, text in files.items()}
     listing = {name: sha256_of(data) for name, data in contents.items()}
-    document = as_document(manifest) if isinstance(manifest, Artefact) else manifest
+    if isinstance(manifest, Mapping):
+        document = manifest
+    else:
+        from dzdesign.core.artefact_types import as_document  # here: msgspec costs a start that writes nothing
+
+        document = as_document(manifest)
     contents[MANIFEST_NAME] = to_json({**document, "files": listing}).encode()
     folder = Path(folder)
     staging: Path | None = None

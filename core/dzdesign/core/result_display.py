@@ -1,25 +1,32 @@
-"""A result that `print` sums up and a notebook shows as a table: the room says that it may be, the front door how."""
+"""A result that `print` sums up and a notebook shows as a page: the room says that it may be, the front door how."""
 
-from collections.abc import Callable, Mapping
-from typing import Any
-
-#: Name of a result's class -> what writes its HTML, and what sums it up; empty until `dzdesign.api` is imported.
-_WRITERS: dict[str, Callable[[Any], str]] = {}
-_SUMMARIES: dict[str, Callable[[Any], str]] = {}
+from collections.abc import Callable
+from dataclasses import dataclass
 
 
-def show_by(writers: Mapping[str, Callable[[Any], str]], summaries: Mapping[str, Callable[[Any], str]]) -> None:
-    """Say how results are shown.
+@dataclass(slots=True)
+class _Display:
+    """How results are displayed; nothing until `dzdesign.api` is imported."""
+
+    heading: Callable[[object], str] | None = None
+    text: Callable[[object], str] | None = None
+    html: Callable[[object], str] | None = None
+
+
+_DISPLAY = _Display()
+
+
+def display_by(
+    *, heading: Callable[[object], str], text: Callable[[object], str], html: Callable[[object], str]
+) -> None:
+    """Set how results are displayed.
 
     Parameters
     ----------
-    writers : mapping
-        Name of the class to a function that returns its HTML; every text that comes from a file is escaped in it.
-    summaries : mapping
-        Name of the class to a function that returns some lines of plain text; the first alone stands for the result.
+    heading, text, html : callable
+        Of a result: one line, some lines of plain text, and HTML in which every text from a file is escaped.
     """
-    _WRITERS.update(writers)
-    _SUMMARIES.update(summaries)
+    _DISPLAY.heading, _DISPLAY.text, _DISPLAY.html = heading, text, html
 
 
 class ShownInNotebooks:
@@ -29,15 +36,12 @@ class ShownInNotebooks:
 
     def __str__(self) -> str:
         """Return some lines for a person; `repr` of the fields would be pages."""
-        write = _SUMMARIES.get(type(self).__name__)
-        return write(self) if write else repr(self)
+        return _DISPLAY.text(self) if _DISPLAY.text else repr(self)
 
     def __repr__(self) -> str:
         """Return one line."""
-        write = _SUMMARIES.get(type(self).__name__)
-        return f"<{write(self).partition(chr(10))[0]}>" if write else f"<{type(self).__name__}>"
+        return f"<{_DISPLAY.heading(self) if _DISPLAY.heading else type(self).__name__}>"
 
     def _repr_html_(self) -> str | None:
-        """Return a table for a notebook, or None, whereupon the notebook shows the plain text."""
-        write = _WRITERS.get(type(self).__name__)
-        return write(self) if write else None
+        """Return a page for a notebook, or None, whereupon the notebook shows the plain text."""
+        return _DISPLAY.html(self) if _DISPLAY.html else None

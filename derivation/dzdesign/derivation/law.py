@@ -1,15 +1,20 @@
-"""The compensation law, stated once. Design, code generation and verification take it from here."""
+"""What a compensation law is, and the one of a name; each is stated once, in a file of `laws/`."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
+from importlib import import_module
 from typing import Any
 
 import sympy
+from sympy.core.relational import Relational
+from sympy.logic.boolalg import BooleanTrue
 
 from dzdesign.core.errors import InputError, nearest
+from dzdesign.derivation.account.statement import Kind, Statement
+from dzdesign.derivation.laws import LAW_NAMES
 from dzdesign.derivation.lowering import lower
-from dzdesign.derivation.symbols import beta, k, kappa, u_i, u_max, u_min0, x_max
+from dzdesign.derivation.symbols import beta, k, kappa, u_i, u_max, u_min0, u_O, x_max
 
 _LAW_SYMBOLS = {u_i, beta, k, x_max, u_max, u_min0}
 
@@ -21,31 +26,57 @@ class Law:
     Parameters
     ----------
     name : str
-        What `law` and the command line call it.
+        What `law` and the command line call it: the name of its file in `laws/`.
     equation : str
         The equation that states it.
     output : sympy.Expr
         The compensator's output u_O [V] in `u_i`, `beta`, `k`, `x_max`, `u_max` and `u_min0`.
+    rises_if : sympy relational, optional
+        What more command gives more drive on; always, unless given.
     note : str
         What the law does and does not achieve.
+    statements : tuple of Statement
+        What it is in the account of the paper; our choice, unless given.
+    stated_as : str
+        Number of the statement that ends its derivation in a report; the last of `statements`, unless given.
 
     Raises
     ------
     ValueError
-        If `output` is not affine in `u_i`, or names another symbol.
+        If `output` is not affine in `u_i` and in `beta`, is not beta u_min0 at zero command, which the certificate and
+        the firmware's zero band rest on, or names another symbol; if `rises_if` is not the sign of the gain.
     """
 
     name: str
     equation: str
     output: sympy.Expr
+    rises_if: Relational | BooleanTrue = sympy.true
     note: str
+    statements: tuple[Statement, ...] = ()
+    stated_as: str = ""
 
     def __post_init__(self) -> None:
+        for complaint in self._complaints():
+            raise ValueError(f"law {self.name}: {complaint}")
+        if not self.statements:
+            title = f"the law `{self.name}`"
+            stated = Statement(
+                number=self.name, title=title, kind=Kind.CHOICE, symbol=u_O, members=(self.output,), note=self.note
+            )
+            object.__setattr__(self, "statements", (stated,))
+        object.__setattr__(self, "stated_as", self.stated_as or self.statements[-1].number)
+
+    def _complaints(self) -> Iterator[str]:
         foreign = self.output.free_symbols - _LAW_SYMBOLS
         if foreign:
-            raise ValueError(f"law {self.name}: the output may not name {sorted(map(str, foreign))}")
-        if self.gain.has(u_i):
-            raise ValueError(f"law {self.name}: the output is not affine in u_i: {self.output}")
+            yield f"the output may not name {sorted(map(str, foreign))}"
+        if self.gain.has(u_i) or sympy.diff(self.gain, beta, 2) != 0:
+            yield f"the output is not affine in u_i and beta: {self.output}"
+        if sympy.expand(self.offset - beta * u_min0) != 0:
+            yield f"at zero command the output is {self.offset}, expected beta*u_min0"
+        margin = sympy.S.One if self.rises_if == sympy.true else self.rises_if.gts - self.rises_if.lts
+        if not sympy.cancel(self.gain / margin).is_positive:
+            yield f"the gain {self.gain} is not positive exactly if {self.rises_if}"
 
     @property
     def gain(self) -> sympy.Expr:
@@ -56,6 +87,10 @@ class Law:
     def offset(self) -> sympy.Expr:
         """Output at zero command [V]."""
         return self.output.subs(u_i, 0)
+
+    def gain_by_beta(self, power: int) -> sympy.Expr:
+        """Return the part of the gain that beta does not touch (0), or what beta multiplies in it (1)."""
+        return sympy.expand(self.gain).coeff(beta, power)
 
     def evaluate_gain(self, beta: Any, kappa: Any) -> Any:
         """Return the gain for numbers of any kind.
@@ -114,28 +149,6 @@ def _compiled_offset(law: Law) -> Callable[..., Any]:
     return lower(law.offset, (beta, u_min0))
 
 
-_LAWS = (
-    Law(
-        name="paper",
-        equation="(18)",
-        output=(beta * (k * x_max / u_max - 1) + 1) * u_i + beta * u_min0,
-        note="Eq. (18); Eq. (14) is its case beta = 1, which the selector (7) holds for dP <= dP0. "
-        "Off the reference its flow is not the target (16), unless beta = 1 or k x_max = u_max: "
-        "it exceeds the target by gamma_1 (1 - beta) (1 - k x_max/u_max) u_i / k.",
-    ),
-    Law(
-        name="target",
-        equation="from (16)",
-        output=k * x_max / u_max * u_i + beta * u_min0,
-        note="Gain of Eq. (14), offset of Eq. (18): its flow is the target (16) exactly wherever "
-        "beta u_min0 is the threshold. For beta < 1 and k x_max < u_max it gives less flow at full command "
-        "than Eq. (18), as long as the spool can open further than x_max.",
-    ),
-)
-
-LAW_NAMES = tuple(law.name for law in _LAWS)
-
-
 def law(name: str) -> Law:
     """Return the law of that name.
 
@@ -158,7 +171,9 @@ def law(name: str) -> Law:
     >>> law("paper").offset
     beta*u_min0
     """
-    for candidate in _LAWS:
-        if candidate.name == name:
-            return candidate
-    raise InputError(f"unknown law {name!r}{nearest(name, LAW_NAMES)}: choose one of {', '.join(LAW_NAMES)}")
+    if name not in LAW_NAMES:
+        raise InputError(f"unknown law {name!r}{nearest(name, LAW_NAMES)}: choose one of {', '.join(LAW_NAMES)}")
+    found: Law = import_module(f"dzdesign.derivation.laws.{name}").LAW
+    if found.name != name:
+        raise ValueError(f"laws/{name}.py states the law '{found.name}', expected the file's name")
+    return found

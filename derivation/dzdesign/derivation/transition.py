@@ -1,12 +1,12 @@
-"""The edge: over the first codes of command the drive runs from the closing threshold to the opening one.
+"""The transition: over the first codes of command the drive runs from the closing threshold to the opening one.
 
 Hysteresis parts the two: a single offset at the opening threshold leaks at zero command, one at the closing threshold
-leaves a dead zone on opening. With an edge the law is that of the opening threshold, u_O(beta_o), and below the edge's
-end u_e it is lowered in proportion to what is missing to it::
+leaves a dead zone on opening. With a transition the law is that of the opening threshold, u_O(beta_o), and below the
+transition's end u_t it is lowered in proportion to what is missing to it::
 
-    u_O = u_O(beta_o) - (beta_o - beta) u_min0 (1 - u_i/u_e)        for u_i < u_e
+    u_O = u_O(beta_o) - (beta_o - beta) u_min0 (1 - u_i/u_t)        for u_i < u_t
 
-so that zero command gives beta u_min0, the certified closing offset, and u_i = u_e the opening law, without a step.
+so that zero command gives beta u_min0, the certified closing offset, and u_i = u_t the opening law, without a step.
 """
 
 from functools import cache
@@ -19,15 +19,15 @@ from dzdesign.derivation.scaling import COMPARE_VALUE, mu
 from dzdesign.derivation.symbols import beta, n_full, u_max, u_min0, u_O
 
 beta_o = sympy.Symbol("beta_o", positive=True)  # beta of the opening threshold
-share = sympy.Symbol("share", nonnegative=True)  # u_i/u_e
-#: What the edge takes from the opening law below its end, V.
+share = sympy.Symbol("share", nonnegative=True)  # u_i/u_t
+#: What the transition takes from the opening law below its end, V.
 LOWERED_BY = (beta_o - beta) * u_min0 * (1 - share)
 
 
-def evaluate_edge(
-    *, beta_opening: Any, beta_closing: Any, u_min0_over_u_max: Any, share_of_edge: Any, n_full: Any
+def evaluate_transition(
+    *, beta_opening: Any, beta_closing: Any, u_min0_over_u_max: Any, share_of_transition: Any, n_full: Any
 ) -> Any:
-    """Return by how many counts the edge lowers the opening law, for numbers of any kind.
+    """Return by how many counts the transition lowers the opening law, for numbers of any kind.
 
     Parameters
     ----------
@@ -35,8 +35,8 @@ def evaluate_edge(
         Offsets of the two thresholds over the law's u_min0.
     u_min0_over_u_max : number or array
         The law's u_min0, dimensionless.
-    share_of_edge : number or array
-        u_i/u_e, from 0 to 1; beyond the edge there is nothing to lower.
+    share_of_transition : number or array
+        u_i/u_t, from 0 to 1; beyond the transition there is nothing to lower.
     n_full : number
         Compare value of full drive.
 
@@ -47,10 +47,10 @@ def evaluate_edge(
 
     Examples
     --------
-    >>> evaluate_edge(beta_opening=1, beta_closing=0, u_min0_over_u_max=1, share_of_edge=0, n_full=600)
+    >>> evaluate_transition(beta_opening=1, beta_closing=0, u_min0_over_u_max=1, share_of_transition=0, n_full=600)
     Fraction(600, 1)
     """
-    return _lowered()(beta_opening, beta_closing, u_min0_over_u_max, share_of_edge, n_full)
+    return _lowered()(beta_opening, beta_closing, u_min0_over_u_max, share_of_transition, n_full)
 
 
 @cache

@@ -7,7 +7,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.derivation.law import law
 from dzdesign.derivation.scaling import drive, evaluate_line
-from dzdesign.derivation.transition import evaluate_edge
+from dzdesign.derivation.transition import evaluate_transition
 from dzdesign.design.drive import RAMPED_CODES, Amplifier
 from dzdesign.design.lot import LotValve
 from dzdesign.design.request import DesignRequest
@@ -238,11 +238,11 @@ class Compensator(ShownInNotebooks):
         )
         counts = line.slope * from_zero + line.start
         if from_zero < self.edge_codes:
-            counts -= evaluate_edge(
+            counts -= evaluate_transition(
                 beta_opening=beta,
                 beta_closing=self.beta(dp_code, sign),
                 u_min0_over_u_max=side.u_min0_over_u_max,
-                share_of_edge=Fraction(from_zero, self.edge_codes),
+                share_of_transition=Fraction(from_zero, self.edge_codes),
                 n_full=signals.compare_max,
             )
         return counts

@@ -7,7 +7,9 @@ from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
-from dzdesign.derivation.law import law
+from dzdesign.derivation.law import Law, law
+from dzdesign.derivation.laws import LAW_NAMES
+from dzdesign.derivation.presentation.formulas import to_text
 from dzdesign.design.beta_table import STEP_CODES, OffsetCeiling, OffsetCurve, choose_beta_table, offset_ceiling
 from dzdesign.design.certificate import certify, guarded_curve, hold_below
 from dzdesign.design.compensator import Compensator, SideLaw
@@ -216,8 +218,14 @@ def prove_monotone(compensator: Compensator, sign: int) -> None:
     chosen, side = law(compensator.law_name), compensator.side(sign)
     numerators = side.law_numerators
     betas = [Fraction(end, compensator.beta_denominator) for end in (min(numerators), max(numerators))]
-    if min(chosen.evaluate_gain(beta, side.k_x_max_over_u_max) for beta in betas) <= 0:
+
+    def rises(candidate: Law) -> bool:
+        return all(candidate.evaluate_gain(beta, side.k_x_max_over_u_max) > 0 for beta in betas)
+
+    if not rises(chosen):
+        others = [name for name in LAW_NAMES if rises(law(name))]
         raise InputError(
-            f"law '{chosen.name}' would fall with rising command: beta (1 - k x_max/u_max) must stay below 1, but "
-            f"k x_max/u_max = {float(side.k_x_max_over_u_max):.3f}; use --law target"
+            f"law '{chosen.name}' would fall with rising command: it rises if {to_text(chosen.rises_if)}, but k x_max/"
+            f"u_max = {float(side.k_x_max_over_u_max):.3f} at beta = {float(max(betas)):.3f}"
+            + (f"; use --law {' or '.join(others)}" if others else "")
         )

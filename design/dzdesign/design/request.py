@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.core.options import AMPLIFIER, CONNECTIONS, LAW, Option, Text, arguments_of
+from dzdesign.derivation.laws import LAW_NAMES
 
 if TYPE_CHECKING:
     from dzdesign.design.signal_text import Converter
@@ -20,8 +21,8 @@ class DesignChoices:
 
     # fmt: off
     law: Annotated[Text, Option(
-        "Law: paper is Eq. (18), target meets Eq. (16).",
-        "LAW", LAW, "paper", choices="dzdesign.derivation.law:LAW_NAMES")] = None
+        f"Law: {' or '.join(LAW_NAMES)}; `dzdesign derive` states what each one does.",
+        "LAW", LAW, "paper", choices=LAW_NAMES)] = None
     guard: Annotated[Text, Option(
         "Threshold to protect: closing, mean or opening.",
         "G", LAW, "closing", choices="dzdesign.design.options:GUARDS")] = None

@@ -25,7 +25,7 @@ def print_lot(summary: LotSummary, folder: Path, report: Path | None) -> None:
     report : Path or None
         The lot's report, if there is one.
     """
-    from dzdesign.terminal.page import new_console, new_table, put_line
+    from dzdesign.terminal.page import new_console, new_table, put_line, put_table
 
     console = new_console()
     count = summary.calibrated
@@ -34,7 +34,7 @@ def print_lot(summary: LotSummary, folder: Path, report: Path | None) -> None:
     for column, at in summary.quantiles.items():
         values = (at.least, at.q05, at.median, at.q95, at.largest)
         table.add_row(_in_words(column), *(f"{value:.3f}" for value in values))
-    console.print(table)
+    put_table(console, table)
     for line in _setting_lines(summary):
         put_line(console, line)
     warned = sorted(summary.warnings.items(), key=lambda item: len(item[1]))

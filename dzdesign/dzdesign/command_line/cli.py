@@ -29,10 +29,10 @@ def main(argv: list[str] | None = None) -> int:
             return 0
         from dzdesign.command_line.invocation import parse
         from dzdesign.command_line.parser import command_module
-        from dzdesign.terminal.progress import talking
+        from dzdesign.terminal.progress import reporting
 
         call = parse(argv)
-        with talking(quiet=call.quiet, verbose=call.verbose):
+        with reporting(quiet=call.quiet, verbose=call.verbose):
             status: int = command_module(call.command).run(call.arguments, call.json)
             return status
     except RequirementError as error:

@@ -1,6 +1,5 @@
 """`dzdesign assess BEFORE... --after AFTER...`."""
 
-from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import one_line
 from dzdesign.stages.assess import AssessArguments, assess
 
@@ -15,6 +14,8 @@ def run(arguments: Arguments, json: bool) -> int:
     """Compare recordings; 1 if one with the compensator misses a limit, or a limit can't be checked."""
     found = assess(arguments)
     if json:
+        from dzdesign.core.artefact_types import to_json_bytes
+
         print(to_json_bytes(found).decode(), end="")
         return 0 if found.holds else 1
     from dzdesign.terminal.assessment_tables import print_assessment

@@ -45,7 +45,7 @@ def run(arguments: Arguments, json: bool) -> int:
         return 0
     from dzdesign.terminal.tables import print_firmware
 
-    print_firmware(firmware, os.fspath(arguments.output or ""))
+    print_firmware(firmware, folder=os.fspath(arguments.output or ""))
     return 0
 
 

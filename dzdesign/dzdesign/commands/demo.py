@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Annotated
 
 from dzdesign.core.artefact_files import check_folder_may_be_written, to_json
-from dzdesign.core.artefact_types import as_document
 from dzdesign.core.errors import InputError
 from dzdesign.core.options import AnyPath, Option
 from dzdesign.example import example_folder
@@ -32,7 +31,7 @@ class Arguments:
 def run(arguments: Arguments, json: bool) -> int:
     """Run the pipeline on the bundled ramp tests and print the closing table."""
     from dzdesign.derivation.account.account import verify_statements
-    from dzdesign.terminal.tables import print_demo
+    from dzdesign.terminal.verification_tables import print_demo
 
     folder, example = Path(arguments.folder), example_folder()
     for part in ("firmware", "evidence"):
@@ -60,6 +59,8 @@ def run(arguments: Arguments, json: bool) -> int:
         plant_source="plant.toml of the example",
     )
     if json:
+        from dzdesign.core.artefact_types import as_document
+
         print(to_json(as_document(verification.evidence)), end="")
     else:
         print_demo(valve, verification, os.fspath(folder))

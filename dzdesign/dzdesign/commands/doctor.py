@@ -150,7 +150,7 @@ def _lacking(programs: dict[str, dict[str, str] | None]) -> list[Tool]:
 
 
 def _print(document: dict[str, Any], programs: dict[str, dict[str, str] | None], missing: list[str]) -> None:
-    from dzdesign.terminal.page import new_console, new_table, put_line
+    from dzdesign.terminal.page import new_console, new_table, put_line, put_table
 
     console = new_console()
     put_line(console, f"dzdesign {document['dzdesign']}, Python {document['python']}, {document['system']}")
@@ -158,7 +158,7 @@ def _print(document: dict[str, Any], programs: dict[str, dict[str, str] | None],
     for tool in (*COMPILERS, *OPTIONAL):
         found = programs[tool.name] or {"version": "not found"}
         table.add_row(tool.name, found["version"] or "found", tool.purpose)
-    console.print(table)
+    put_table(console, table)
     versions = ", ".join(f"{name} {version or 'MISSING'}" for name, version in document["packages"].items())
     put_line(console, f"Python packages: {versions.replace('ziglang MISSING', 'ziglang (optional) not there')}")
     lacking = _lacking(programs)
@@ -166,7 +166,7 @@ def _print(document: dict[str, Any], programs: dict[str, dict[str, str] | None],
         table = new_table("How to get the rest", "program", *SYSTEMS.values(), words=(0, 1, 2, 3))
         for tool in lacking:
             table.add_row(tool.name, tool.debian, tool.macos, tool.windows)
-        console.print(table)
+        put_table(console, table)
     if missing:
         put_line(console, f"Missing packages: {sys.executable} -m pip install {' '.join(missing)}")
     if document["compiles"]:

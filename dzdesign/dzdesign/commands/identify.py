@@ -1,6 +1,5 @@
 """`dzdesign identify RAMP...`."""
 
-from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import one_line
 from dzdesign.stages.identify import IdentifyArguments, identify
 
@@ -16,6 +15,8 @@ def run(arguments: Arguments, json: bool) -> int:
     """Identify a valve and print its thresholds."""
     valve = identify(arguments)
     if json:
+        from dzdesign.core.artefact_types import to_json_bytes
+
         print(to_json_bytes(valve).decode(), end="")
         return 0
     from dzdesign.terminal.tables import print_valve

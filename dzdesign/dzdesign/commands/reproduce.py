@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from dzdesign.core.artefact_files import to_json
+from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.core.options import AnyPath, Option
 
@@ -28,8 +28,8 @@ def run(arguments: Arguments, json: bool) -> int:
         raise InputError("-o is empty, expected the name of a folder, such as reproduction")
     made = reproduce(Path(arguments.output))
     if json:
-        print(to_json(made.document), end="")
+        print(to_json_bytes(made).decode(), end="")
     else:
-        print_reproduction(made.rows, made.valves)
+        print_reproduction(made)
         print(f"Figures, parameters and artefacts: {arguments.output}")
-    return 0 if made.document["holds"] else 1
+    return 0 if made.holds else 1

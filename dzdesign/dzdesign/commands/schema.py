@@ -23,7 +23,7 @@ SCHEMAS: Mapping[str, tuple[str, str, str]] = MappingProxyType(
         "evidence": ("dzdesign.verify.evidence:Evidence", "verification.json", "verify"),
         "assessment": ("dzdesign.assess.assessment:Assessment", "assessment.json", "assess"),
         "batch": ("dzdesign.report.lot.summary:LotSummary", "batch.json", "batch"),
-        "reproduction": ("dzdesign.reproduce", "reproduction.json", "reproduce"),
+        "reproduction": ("dzdesign.report.reproduction:Reproduction", "reproduction.json", "reproduce"),
         "derivation": (
             "dzdesign.derivation.presentation.content:DerivationReport",
             "derivation.json",

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 from dzdesign.core.artefact_files import to_json
-from dzdesign.core.artefact_types import as_document
 from dzdesign.core.errors import one_line
 from dzdesign.stages.verify import VerifyArguments, verify
 
@@ -19,10 +18,12 @@ def run(arguments: Arguments, json: bool) -> int:
     """Verify a firmware and print every requirement; 1 if one does not hold."""
     verification = verify(arguments)
     if json:
+        from dzdesign.core.artefact_types import as_document
+
         print(to_json(as_document(verification.evidence)), end="")
         return 0 if verification.holds else 1
     from dzdesign.report.valve_report import REPORT_NAME
-    from dzdesign.terminal.tables import print_firmware_mutants, print_verification
+    from dzdesign.terminal.verification_tables import print_firmware_mutants, print_verification
 
     print_verification(verification)
     if mutants := verification.evidence.mutants:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.core.artefact_files import check_folder_may_be_written, read_bytes, sha256_of, write_folder
 from dzdesign.core.options import CHECKS, AnyPath, Option, Paths, paths_of
-from dzdesign.regeneration import with_regenerated
 from dzdesign.terminal.progress import say, stage_progress, with_bar
 
 if TYPE_CHECKING:
@@ -63,6 +62,7 @@ def verify(arguments: VerifyArguments, plant_source: str = "") -> "Verification"
     InputError
         If a file can't be read, or there is no C compiler. A requirement that does not hold is no error: see ``holds``.
     """
+    from dzdesign.regeneration import with_regenerated
     from dzdesign.report.valve_report import with_report
     from dzdesign.verify.closed_loop.plant import read_plant
     from dzdesign.verify.closed_loop.tolerances import read_tolerances

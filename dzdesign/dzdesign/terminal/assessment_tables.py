@@ -3,12 +3,11 @@
 from typing import TYPE_CHECKING
 
 from dzdesign.core.verdicts import DOES_NOT_HOLD, verdict_words
-from dzdesign.terminal.page import new_console, new_table, put_line
+from dzdesign.terminal.page import Table, new_console, new_table, put_line, put_table
 
 if TYPE_CHECKING:
     from dzdesign.assess.assessment import Assessment, PressureAssessment
     from dzdesign.assess.quantities import Reading
-    from dzdesign.terminal.page import Grid
 
 #: Decimals in the unit of a quantity.
 DECIMALS = {"%": 2, "L/min": 3, "L/min/V": 4}
@@ -22,7 +21,7 @@ def print_assessment(assessment: "Assessment") -> None:
         put_line(page, text)
 
     for item in _shown_pressures(assessment):
-        page.print(_table_of(item))
+        put_table(page, _table_of(item))
     for text in (*_not_observable(assessment), *_remarks(assessment)):
         say(text)
     say(f"{assessment.terms[0].upper()}{assessment.terms[1:]}:")
@@ -39,7 +38,7 @@ def print_assessment(assessment: "Assessment") -> None:
         say(text)
 
 
-def _table_of(item: "PressureAssessment") -> "Grid":
+def _table_of(item: "PressureAssessment") -> Table:
     from dzdesign.assess.quantities import QUANTITIES
 
     where = "pressure drop unknown" if item.dp_MPa is None else f"{item.dp_MPa:.2f} MPa"

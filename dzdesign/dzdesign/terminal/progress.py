@@ -1,21 +1,27 @@
-"""What a person is told on stderr while there is work: stages, bars after a second, and as much as they asked for."""
+"""Progress on stderr: stages, bars after a second, and as much of a log as was asked for."""
 
 import contextlib
 import os
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Sized
+from collections.abc import Iterable, Iterator, Sized
+from typing import TYPE_CHECKING, TypeVar
 
 from dzdesign.core.errors import clear_line
 
+if TYPE_CHECKING:
+    import threading
+
+    from rich.progress import Progress
+
 #: Work that is done sooner shows no bar, s.
 PATIENCE = 1.0
-#: Time between two looks at how far a stage is, s.
-REFRESH = 0.1
+
+T = TypeVar("T")
 
 
-class _Talk:
-    """How much is said by the command that runs; a process runs one."""
+class _Verbosity:
+    """How much the running command reports; a process runs one."""
 
     quiet = False
     verbose = False
@@ -23,8 +29,8 @@ class _Talk:
 
 
 @contextlib.contextmanager
-def talking(*, quiet: bool, verbose: bool) -> Iterator[None]:
-    """Say as much as a person asked for, while a command runs.
+def reporting(*, quiet: bool, verbose: bool) -> Iterator[None]:
+    """Report as much as was asked for, while a command runs.
 
     Parameters
     ----------
@@ -34,15 +40,15 @@ def talking(*, quiet: bool, verbose: bool) -> Iterator[None]:
         Also what the rooms log: files read and written, the solver's and the compilers' words; each with the time
         since the beginning.
     """
-    before = (_Talk.quiet, _Talk.verbose, _Talk.begin)
-    _Talk.quiet, _Talk.verbose, _Talk.begin = quiet, verbose, time.perf_counter()
+    before = (_Verbosity.quiet, _Verbosity.verbose, _Verbosity.begin)
+    _Verbosity.quiet, _Verbosity.verbose, _Verbosity.begin = quiet, verbose, time.perf_counter()
     try:
         with _logging() if verbose else contextlib.nullcontext():
             yield
             if verbose:
                 say("end")
     finally:
-        _Talk.quiet, _Talk.verbose, _Talk.begin = before
+        _Verbosity.quiet, _Verbosity.verbose, _Verbosity.begin = before
 
 
 @contextlib.contextmanager
@@ -73,18 +79,18 @@ def say(text: str) -> None:
     text : str
         One line.
     """
-    if not _Talk.quiet:
-        since = f"{time.perf_counter() - _Talk.begin:8.3f} s  " if _Talk.verbose else ""
+    if not _Verbosity.quiet:
+        since = f"{time.perf_counter() - _Verbosity.begin:8.3f} s  " if _Verbosity.verbose else ""
         print(f"dzdesign: {since}{clear_line(text)}", file=sys.stderr, flush=True)
 
 
 def is_watched() -> bool:
     """Tell whether a person sees stderr and wants to: a bar is drawn over itself, which a dumb terminal can't."""
-    return sys.stderr.isatty() and not _Talk.quiet and not _Talk.verbose and os.environ.get("TERM") != "dumb"
+    return sys.stderr.isatty() and not _Verbosity.quiet and not _Verbosity.verbose and os.environ.get("TERM") != "dumb"
 
 
 @contextlib.contextmanager
-def stage_progress() -> "Iterator[StageProgress]":
+def stage_progress() -> Iterator["StageProgress"]:
     """Give a `say` after which, once a stage has taken `PATIENCE`, a bar moves until the next stage, with the time."""
     stage = StageProgress()
     try:
@@ -94,57 +100,74 @@ def stage_progress() -> "Iterator[StageProgress]":
 
 
 class StageProgress:
-    """A `say` for the stages of long work; rich is driven by a thread of its own, as the work may be one call of C."""
+    """A `say` for the stages of long work; rich moves the bar by a thread, as the work may be one call of C."""
 
     def __init__(self) -> None:
-        self._end: Callable[[], None] | None = None
-        self._done, self._total = 0, None
+        self._timer: threading.Timer | None = None
+        self._bar: Progress | None = None
+        self._done = 0
+        self._total: int | None = None
 
     def __call__(self, text: str) -> None:
         """Begin a stage."""
-        self.end()
         say(text)
-        self._done, self._total = 0, None
+        self.begin(text)
+
+    def begin(self, text: str) -> None:
+        """Begin a stage of which nothing is told but by its bar.
+
+        Parameters
+        ----------
+        text : str
+            Beside the bar.
+        """
+        self.end()
         if is_watched():
             import threading
 
-            over = threading.Event()
-            thread = threading.Thread(target=self._show, args=(text, over), daemon=True)
-            thread.start()
-            self._end = lambda: (over.set(), thread.join())
+            self._timer = threading.Timer(PATIENCE, self._show, [text])
+            self._timer.daemon = True
+            self._timer.start()
 
-    def each(self, items: Iterable, total: int) -> Iterator:
+    def each(self, items: Iterable[T], total: int | None) -> Iterator[T]:
         """Return the items one by one: the bar of this stage knows its end then.
 
         Parameters
         ----------
         items : iterable
             Pieces of work, of about the same size.
-        total : int
-            How many.
+        total : int or None
+            How many; None: unknown.
         """
         self._total = total
         for self._done, item in enumerate(items):
+            if self._bar is not None:
+                self._bar.update(self._bar.task_ids[0], total=total, completed=self._done)
             yield item
 
     def end(self) -> None:
         """End the stage, if there is one: its bar is gone."""
-        if self._end:
-            self._end()
-        self._end = None
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer.join()
+        if self._bar is not None:
+            self._bar.stop()
+        self._timer = self._bar = self._total = None
+        self._done = 0
 
-    def _show(self, text: str, over: "threading.Event") -> None:  # noqa: F821
-        if over.wait(PATIENCE):
-            return
-        with _new_bar(known_end=False) as bar:
-            task = bar.add_task(text, total=None)
-            while not over.wait(REFRESH):
-                bar.update(task, total=self._total, completed=self._done)
+    def _show(self, text: str) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+        columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+        bar = Progress(*columns, console=Console(stderr=True), transient=True)
+        task = bar.add_task(text, total=self._total)
+        self._bar = bar
+        bar.update(task, total=self._total, completed=self._done)  # what `each` did before it saw the bar
+        bar.start()
 
 
-def with_bar(
-    items: Iterable, what: str, clock: Callable[[], float] = time.monotonic, total: int | None = None
-) -> Iterator:
+def with_bar(items: Iterable[T], what: str, total: int | None = None) -> Iterator[T]:
     """Return the items one by one, with a bar on stderr once that has taken `PATIENCE`; none if it is no terminal.
 
     Parameters
@@ -153,34 +176,9 @@ def with_bar(
         Pieces of work, of about the same size.
     what : str
         What is done with them.
-    clock : callable
-        Seconds, for the tests.
     total : int, optional
         How many there are, of an iterable that does not know.
     """
-    if not is_watched():
-        yield from items
-        return
-    start, bar = clock(), None
-    total = len(items) if isinstance(items, Sized) else total
-    try:
-        for done, item in enumerate(items):
-            if bar is None and done and clock() - start > PATIENCE:
-                bar = _new_bar(known_end=True)
-                task = bar.add_task(what, total=total)
-                bar.start()
-            if bar is not None:
-                bar.update(task, completed=done)
-            yield item
-    finally:
-        if bar is not None:
-            bar.stop()
-
-
-def _new_bar(*, known_end: bool) -> "Progress":  # noqa: F821
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-
-    clock = TimeRemainingColumn() if known_end else TimeElapsedColumn()
-    console = Console(stderr=True)
-    return Progress(TextColumn("{task.description}"), BarColumn(), clock, console=console, transient=True)
+    with stage_progress() as stage:
+        stage.begin(what)
+        yield from stage.each(items, len(items) if isinstance(items, Sized) else total)

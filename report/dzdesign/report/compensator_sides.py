@@ -4,7 +4,6 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.design.compensator import Compensator, SideLaw
 from dzdesign.design.compensator_file import compensator_document
 from dzdesign.identify.valve.model import ValveModel
-from dzdesign.verify.exhaustive.exact_law import ExactLaw
 
 SIGNS = {"positive": 1, "negative": -1}
 
@@ -20,17 +19,6 @@ def valve_in(compensator: Compensator) -> ValveModel:
     return read_artefact(compensator.valve_document.encode(), ValveModel, "compensator.json: valve")
 
 
-def exact_law_of(compensator: Compensator, sign: int) -> ExactLaw:
-    """Return the exact law of one sign of command."""
-    return ExactLaw(compensator, sign)
-
-
 def lot_sha256(compensator: Compensator) -> str:
     """Return the hash of the valves of a lot setting."""
     return str(compensator_document(compensator)["lot_sha256"])
-
-
-def code_MPa(compensator: Compensator) -> float:
-    """Return the pressure drop of one code, MPa."""
-    sensor = compensator.signals.pressure_a
-    return float(sensor.span_MPa) / (sensor.full_code - sensor.zero_code)

@@ -13,16 +13,15 @@ from dzdesign.verify.closed_loop.simulation import Bench
 LARGEST = 1e12
 Number = Annotated[float, Meta(ge=-LARGEST, le=LARGEST)]
 Hash = Annotated[str, Meta(pattern="^[0-9a-f]{64}$", max_length=64)]
+#: Bare valve, the paper's law, or the whole product.
+Driver = Literal["valve", "paper's law", "product"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
     """Our number for one of the paper's, one way."""
 
-    by: Annotated[
-        Literal["valve", "paper's law", "product"],
-        Meta(description="Bare valve, the paper's law, or the whole product."),
-    ]
+    by: Annotated[Driver, Meta(description="Bare valve, the paper's law, or the whole product.")]
     value: Annotated[Number | None, Meta(description="In the number's unit; null: not compared.")]
     difference: Annotated[Number | None, Meta(description="Ours less the printed one; null: no number is printed.")]
     allowed: Annotated[tuple[Number, Number] | None, Meta(description="Range required of it; null: none.")]

@@ -8,19 +8,18 @@ from pathlib import Path
 import pytest
 
 from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_files import sha256_of, to_json, write_folder
+from dzdesign.core.artefact_files import sha256_of, write_folder
+from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import RequirementError
 from dzdesign.derivation import law as laws
 from dzdesign.derivation import symbols as s
 from dzdesign.derivation.account.published import FIRST, VALVES
 from dzdesign.identify.plots.frame import plot_style, saved
-from dzdesign.reproduce import figures as paper_figures
-from dzdesign.reproduce import reasons as paper_reasons
-from dzdesign.reproduce import reproduction as reproduce
-from dzdesign.reproduce import rows as paper_rows
-from dzdesign.reproduce import valves as paper_valves
-from dzdesign.reproduce.runs import DIRECT, PRODUCT, Drive, run_valve
-from dzdesign.reproduce.valves import at_rest, recover_valves
+from dzdesign.report.reproduction import Reproduction
+from dzdesign.reproduce import chain, explanations, paper_figures, paper_numbers, recovered_valves, reproduction
+from dzdesign.reproduce.recovered_valves import at_rest, recover_valves
+from dzdesign.reproduce.valve_runs import DIRECT, PRODUCT, Drive, run_valve
 from dzdesign.verify.closed_loop.loop import ClosedLoop
 from dzdesign.verify.closed_loop.plant import read_plant
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
@@ -35,23 +34,23 @@ PAPER = laws.law("paper")
 @pytest.fixture(scope="module")
 def reproduced(tmp_path_factory):
     """The command as a user runs it: its folder, and the chains that it ran."""
-    folder, chains, run_chain = tmp_path_factory.mktemp("reproduce") / "out", [], reproduce.run_chain
+    folder, chains, run_chain = tmp_path_factory.mktemp("reproduce") / "out", [], chain.run_chain
 
     def recorded(valve, say):
         chains.append(run_chain(valve, say=say))
         return chains[-1]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(reproduce, "run_chain", recorded)
+        patch.setattr(reproduction, "run_chain", recorded)
         assert main(["reproduce", "-o", str(folder)]) == 0
     return folder, chains
 
 
 def again(reproduced, monkeypatch, folder, *arguments):
     """Run the command on the runs that are there, without its figures."""
-    chains = {chain.runs.valve.published.name: chain for chain in reproduced[1]}
-    monkeypatch.setattr(reproduce, "run_chain", lambda valve, say: chains[valve.published.name])
-    monkeypatch.setattr(paper_figures, "figure_files", lambda runs: {})
+    chains = {each.valve.valve: each for each in reproduced[1]}
+    monkeypatch.setattr(reproduction, "run_chain", lambda valve, say: chains[valve.published.name])
+    monkeypatch.setattr(reproduction, "figure_files", lambda runs: {})
     return main(["reproduce", "-o", str(folder / "again"), *arguments])
 
 
@@ -70,24 +69,26 @@ def test_every_valve_and_figure_is_there_with_its_origin(reproduced):
 
 
 def test_rounding_of_a_print_is_half_its_last_digit():
-    assert [paper_valves.half_digit(text) for text in ("15", "53.5", "0.95")] == pytest.approx([0.5, 0.05, 0.005])
+    assert [recovered_valves.half_digit(text) for text in ("15", "53.5", "0.95")] == pytest.approx([0.5, 0.05, 0.005])
 
 
 def test_what_was_fitted_and_what_is_predicted_is_told_apart(reproduced):
     document = json.loads((reproduced[0] / "reproduction.json").read_text())
     fitted = sum(len(valve["fitted_to"]) for valve in document["valves"])
-    assert sum(row["in_fit"] for row in document["rows"]) == fitted == 14
-    for row in document["rows"]:
-        assert row["why"] or row["holds"], f"{row['quantity']}: neither agrees nor says why not"
-        assert (row["tolerance"] != "") == (row["holds"] is not None)
+    assert sum(number["in_fit"] for number in document["numbers"]) == fitted == 14
+    for number in document["numbers"]:
+        assert number["why"] or number["holds"], f"{number['quantity']}: neither agrees nor says why not"
+        assert (number["tolerance"] != "") == (number["holds"] is not None)
 
 
 def test_the_document_fits_its_schema(reproduced):
     from tests.support.schema_checks import problems
 
-    document = json.loads((reproduced[0] / "reproduction.json").read_text())
+    content = (reproduced[0] / "reproduction.json").read_bytes()
+    assert to_json_bytes(read_artefact(content, Reproduction, "reproduction.json")) == content
+    document = json.loads(content)
     assert problems("reproduction", document) == []
-    del document["rows"][0]["outcomes"][0]["by"]
+    del document["numbers"][0]["outcomes"][0]["by"]
     assert problems("reproduction", document) != []
 
 
@@ -99,18 +100,18 @@ def test_the_page_shows_what_is_printed(reproduced, monkeypatch, tmp_path, capsy
     assert len(rows) > 10
     assert [row for row in rows if row not in printed] == []
     assert "39 numbers, of which 31 must agree: all do." in printed
-    onsets = [chain.runs.onset_percent(Drive(PRODUCT), dp_MPa) for chain in reproduced[1] for dp_MPa in (1.0, 5.0)]
+    onsets = [each.runs.onset_percent(Drive(PRODUCT), dp_MPa) for each in reproduced[1] for dp_MPa in (1.0, 5.0)]
     assert max(onsets) < 0.6, "the page says so"
 
 
 def test_same_valve_same_bytes(reproduced):
-    first = reproduce.run_chain(recover_valves()[1])
-    assert first.files == reproduced[1][1].files and first.document == reproduced[1][1].document
+    first = chain.run_chain(recover_valves()[1])
+    assert first.files == reproduced[1][1].files and first.valve == reproduced[1][1].valve
 
 
 def test_a_number_that_must_agree_and_does_not_is_exit_status_one(reproduced, monkeypatch, tmp_path, capsys):
     """Seeded: 'about 0.95' read as 0.950 exactly."""
-    monkeypatch.setattr(paper_rows, "READING", {**paper_reasons.READING, "about": 0.0})
+    monkeypatch.setattr(paper_numbers, "READING", {**explanations.READING, "about": 0.0})
     assert again(reproduced, monkeypatch, tmp_path) == 1
     out = capsys.readouterr().out
     assert "31 must agree: 2 DO NOT" in out and out.count("DOES NOT HOLD") == 2
@@ -128,7 +129,7 @@ def test_a_folder_of_somebody_else_is_left_alone(tmp_path, capsys):
 def test_figures_name_their_axes_with_units_and_are_the_same_bytes_again(reproduced):
     folder, chains = reproduced
     with plot_style():
-        for number, figure in paper_figures._figures([chain.runs for chain in chains]):
+        for number, figure in paper_figures._figures([each.runs for each in chains]):
             for axes in figure.axes:
                 assert re.search(r"\((V|ms)\)$", axes.get_xlabel()), number
             assert re.search(r"\((L/min|mm)\)$", figure.axes[0].get_ylabel()), number
@@ -142,9 +143,9 @@ def test_figures_name_their_axes_with_units_and_are_the_same_bytes_again(reprodu
 
 def test_the_plant_at_rest_is_the_compiled_plant(reproduced):
     """The fit's closed form against the compiled motion with its PWM: another way to the same flow."""
-    for chain in reproduced[1]:
+    for each in reproduced[1]:
         for dp_MPa in (1.0, 5.0):
-            rest, run = at_rest(chain.runs.valve.plant, dp_MPa), chain.runs.ramps[Drive(DIRECT), dp_MPa]
+            rest, run = at_rest(each.runs.valve.plant, dp_MPa), each.runs.ramps[Drive(DIRECT), dp_MPa]
             at = [4000, 7000, 9500]  # 100 records a second
             expected = [max(float(rest.flow_per_volt) * (10 * run.command[k] - float(rest.opens_V)), 0) for k in at]
             assert run.q_mean_L_min[at] == pytest.approx(expected, abs=0.01)
@@ -153,15 +154,15 @@ def test_the_plant_at_rest_is_the_compiled_plant(reproduced):
 def test_figures_that_no_valve_can_have_are_refused():
     impossible = replace(FIRST, flow1="60")  # more than the orifice passes at five times the pressure drop
     simulated = recover_valves()[0]
-    free = tuple(name for name in paper_valves.RECOVERED if name not in paper_valves.FROM_DISPLACEMENT)
+    free = tuple(name for name in recovered_valves.RECOVERED if name not in recovered_valves.FROM_DISPLACEMENT)
     with pytest.raises(RequirementError, match="first valve can't be recovered"):
-        paper_valves._recover(impossible, simulated.plant, free, 0.6)
+        recovered_valves._recover(impossible, simulated.plant, free, 0.6)
 
 
 def test_the_rounding_of_the_print_moves_a_parameter_as_far_as_is_said():
     simulated, first, _ = recover_valves()
     free = tuple(first.rounding)
-    moved = paper_valves._recover(replace(FIRST, dead_zone1_percent="51.74"), simulated.plant, free, 0.6)
+    moved = recovered_valves._recover(replace(FIRST, dead_zone1_percent="51.74"), simulated.plant, free, 0.6)
     change = moved.plant.pressure_force_N_MPa - first.plant.pressure_force_N_MPa
     assert 0 < abs(change) <= first.rounding["pressure_force_N_MPa"]
 
@@ -188,8 +189,8 @@ def seed(monkeypatch, output) -> None:
 def test_the_papers_numbers_catch_a_wrong_law(monkeypatch, error):
     if error != "none":
         seed(monkeypatch, WRONG[error])
-    rows = paper_rows.rows_of([run_valve(valve, ClosedLoop(valve.plant)) for valve in recover_valves()])
-    missed = [row.quantity for row in rows if row.holds is False]
+    numbers = paper_numbers.paper_numbers([run_valve(valve, ClosedLoop(valve.plant)) for valve in recover_valves()])
+    missed = [number.quantity for number in numbers if number.holds is False]
     assert bool(missed) == (error != "none"), missed
 
 
@@ -197,7 +198,6 @@ def test_the_closed_loop_catches_a_wrong_law_in_the_c(reproduced, monkeypatch, t
     """The C follows the wrong law faithfully at every input; only the plant behind it shows that flow is missing."""
     from dzdesign.codegen.project import generate
     from dzdesign.core.artefact_reading import read_artefact
-    from dzdesign.design.compensator_file import compensator_document
     from dzdesign.design.designing import design
     from dzdesign.identify.valve.model import ValveModel
 
@@ -205,25 +205,27 @@ def test_the_closed_loop_catches_a_wrong_law_in_the_c(reproduced, monkeypatch, t
     valve = read_artefact((reproduced[0] / "second_valve" / "valve.json").read_bytes(), ValveModel, "valve.json")
     seed(monkeypatch, WRONG["beta on all of Eq. (14)"])
     compensator = design(valve)
-    document = json.loads(to_json(compensator_document(compensator)))
     firmware = generate(compensator, "host")
     write_folder(tmp_path / "firmware", firmware.files, firmware.manifest)
     assert check_all_inputs(tmp_path / "firmware").holds
-    runs = run_valve(second, ClosedLoop(second.plant, tmp_path / "firmware", compensator), document)
+    runs = run_valve(second, ClosedLoop(second.plant, tmp_path / "firmware", compensator), compensator)
     missed = {
-        (row.quantity, row.dp_MPa, outcome.by)
-        for row in paper_rows._rows_of_valve(runs)
-        for outcome in row.outcomes
+        (number.quantity, number.dp_MPa, outcome.by)
+        for number in paper_numbers.numbers_of_valve(runs)
+        for outcome in number.outcomes
         if outcome.holds is False
     }
     assert ("largest flow with", 5.0, "product") in missed
 
 
 def test_published_numbers_stand_in_one_place():
-    """Whatever the rows print as published is what `published.py` holds, and nothing else does."""
+    """Whatever is printed as published is what `published.py` holds, and nothing else does."""
     printed = {value for valve in VALVES for name in valve.__slots__ if (value := getattr(valve, name))}
-    for source in ("valves", "row", "rows", "runs", "reasons"):
-        text = (Path(paper_rows.__file__).with_name(f"{source}.py")).read_text(encoding="utf-8")
+    sources = set(Path(paper_numbers.__file__).parent.glob("*.py"))
+    sources -= {Path(paper_figures.__file__)}  # widths of lines
+    assert len(sources) > 4
+    for source in sources:
+        text = source.read_text(encoding="utf-8")
         code = re.sub(r'"""[\s\S]*?"""|#.*', "", text)
         numbers = set(re.findall(r"(?<![\w.])\d+\.\d+(?![\w.])", code))
         assert numbers & {value for value in printed if "." in value} == set(), source

@@ -20,7 +20,9 @@ from dzdesign.report.lot.folder import read_lot
 from dzdesign.report.lot.reasons import reason_groups
 from dzdesign.report.lot.report import report_of_lot
 from dzdesign.report.lot.sections import HEADINGS
+from dzdesign.report.lot.setting_text import untested_lines
 from dzdesign.report.lot.spread import FAR, LEVELS, quantiles, spread_of
+from dzdesign.report.lot.summary import LotSettingSummary, SmallestMargin, UntestedPressures
 from dzdesign.report.lot.table import SideFigures
 from tests.support.page_reader import HOSTILE, Page
 from tests.support.schema_checks import overlooked, problems
@@ -418,6 +420,48 @@ def test_reasons_of_one_kind_stand_together():
     assert groups[0].what == "'ramp_dP1.csv' row …, column 'u_V': 'overload' is not a number"
     assert groups[0].advice == "correct it, or leave the cell blank" and groups[0].valves[1] == ("V0004", "4")
     assert groups[1].advice.startswith("a fault of dzdesign") and groups[2].what == "every input: 7 wrong; see there"
+
+
+# --- the lot setting in words -----------------------------------------------------------------------------------------
+
+
+def setting_with(untested, dp_MPa, dp_without_MPa=None):
+    """Return a lot setting in which a valve lacks a pressure drop."""
+    return LotSettingSummary(
+        file="lot_compensator.json", sha256="0" * 64, dp_MPa=dp_MPa, untested=(untested,),
+        dp_without_MPa=dp_without_MPa, carrier="V1", binding=("V8",), smallest_margin_V={}, without_binding=None,
+        checked=SmallestMargin(valves=3, worst="V8", dp_MPa=1.0, smallest_margin_V=0.0),
+    )  # fmt: skip
+
+
+V8 = UntestedPressures(name="V8", side="positive", dp_MPa=(2.0,), narrows=False, coarser_V=0.034, cost_percent=0.74)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({}, "about 34 mV under what a test would show, and V8 holds the lot setting down: that may cost each valve "
+             "up to 0.74 % of command"),
+        ({"cost_percent": 0.0}, "which costs nothing"),
+        ({"cost_percent": 0.0, "coarser_V": 0.0}, "that costs the lot setting nothing"),
+    ],
+)  # fmt: skip
+def test_what_lacks_between_two_tests_is_said_with_its_cost(change, said):
+    (line,) = untested_lines(setting_with(replace(V8, **change), (1.0003, 4.0)))
+    assert line.startswith("V8 was not tested at 2 MPa, as the lot was: ") and said in line
+    assert "without it" not in line and "holds for all" not in line
+
+
+@pytest.mark.parametrize(
+    ("dp_MPa", "wider", "said"),
+    [
+        ((2.0, 2.0), None, "holds for all at 2 MPa only; record what is missing"),
+        ((1.0, 2.0), (1.0, 4.0), "holds for all from 1 to 2 MPa, and without it from 1 to 4 MPa; record"),
+    ],
+)
+def test_what_a_valve_that_narrows_the_interval_costs_is_said(dp_MPa, wider, said):
+    (line,) = untested_lines(setting_with(replace(V8, narrows=True), dp_MPa, wider))
+    assert said in line
 
 
 # --- hostile text ----------------------------------------------------------------------------------------------------

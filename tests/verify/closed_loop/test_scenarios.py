@@ -79,11 +79,14 @@ def test_a_core_that_holds_its_offset_when_a_sensor_fails_leaks(firmware, exampl
     """The fallback for codes that are not sound, taken out of the C: seen at the end of a ramp, at a high pressure."""
     core = tmp_path / "fw" / "core"
     core.mkdir(parents=True)
+    names = []
     for path in (firmware / "core").iterdir():
+        names.append(path.name)
         # A difference far below what can be right is then taken for no pressure drop.
         text, count = re.subn(r"(?m)^#define REVERSE 40u", "#define REVERSE 5000u", path.read_text())
         assert count == (path.name == "dz_comp.c")
         (core / path.name).write_text(text)
+    assert "dz_comp.c" in names
     found = by_name(scene_of(core.parent, example_compensator, plant, dp_MPa=5.0))
     assert found["sensor ahead breaks, or the one behind shows full"].q_zero_L_min > 0.3
 

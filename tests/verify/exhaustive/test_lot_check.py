@@ -3,7 +3,6 @@
 import json
 from dataclasses import replace
 from fractions import Fraction
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,9 +20,7 @@ from dzdesign.design.lot_setting import Designed, common_setting
 from dzdesign.design.option_texts import options_of
 from dzdesign.design.redesign_check import prove_derived
 from dzdesign.identify.identification import identify
-from dzdesign.report.artefact_chain import Artefact, Chain
-from dzdesign.report.lot.setting_text import untested_lines
-from dzdesign.report.lot.summary import UntestedPressures
+from dzdesign.report.artefact_chain import Chain
 from dzdesign.report.sections.lot_setting import lot_costs, lot_figures, lot_section
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
@@ -288,35 +285,6 @@ def test_a_range_that_would_be_none_without_them_and_one_that_another_side_ends(
     assert without_narrow(both, lacking_in(both)) == (frozenset(), None)
 
 
-def untested(**changes):
-    each = UntestedPressures(
-        name="V8", side="positive", dp_MPa=(2.0,), narrows=False, coarser_V=0.034, cost_percent=0.74
-    )
-    return replace(each, **changes)
-
-
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        ({}, "about 34 mV under what a test would show, and V8 holds the lot setting down: that may cost each valve "
-             "up to 0.74 % of command; record what is missing"),
-        ({"cost_percent": 0.0}, "which costs nothing, as other valves hold the lot setting down"),
-        ({"cost_percent": 0.0, "coarser_V": 0.0}, "as the lot was: that costs the lot setting nothing"),
-    ],
-)  # fmt: skip
-def test_what_lacks_between_two_tests_is_said_with_its_cost(change, said):
-    setting = SimpleNamespace(untested=(untested(**change),), dp_MPa=(1.0003, 4.0), dp_without_MPa=None)
-    (line,) = untested_lines(setting)
-    assert line.startswith("V8 was not tested at 2 MPa, as the lot was: ") and said in line
-    assert "without it" not in line and "holds for all" not in line
-
-
-def test_a_range_that_no_valve_would_widen_is_said_alone():
-    each = untested(name="a", dp_MPa=(4.0,), narrows=True, coarser_V=0.0, cost_percent=0.0)
-    (line,) = untested_lines(SimpleNamespace(untested=(each,), dp_MPa=(2.0, 2.0), dp_without_MPa=None))
-    assert "so the lot setting holds for all at 2 MPa only; record what is missing" in line
-
-
 # ---- what a reader is told ----
 
 
@@ -341,9 +309,9 @@ def test_firmware_and_report_say_first_that_they_are_of_a_lot(common, batch, tmp
     report = (evidence / "report.html").read_text(encoding="utf-8")
     lot = json.loads((evidence / "verification.json").read_bytes())["inputs"][0]["lot"]
     head = report[: report.index('<section id="lot">')]
-    assert "<h1>Common setting of 4 valves: dead-zone compensator for f28335" in head
+    assert "<h1>Lot setting of 4 valves: dead-zone compensator for f28335" in head
     assert f"Worst valve of the lot: {lot['worst']}" in head and f"{1e3 * lot['smallest_margin_V']:.3f} mV" in head
-    costs = lot_costs(document)
+    costs = lot_costs(common.compensator)
     least = min(each.least_percent for each in costs)
     assert f"{least:.1f} to {costs[0].most_percent:.1f} %" in head
     carrier = head.index(f"Of one of these valves, {common.carrier}, the carrier")
@@ -353,10 +321,10 @@ def test_firmware_and_report_say_first_that_they_are_of_a_lot(common, batch, tmp
     assert document["lot_sha256"] in report[report.index('<section id="lot">') :]
 
 
-def test_what_it_costs_a_valve_is_the_command_before_its_own_bound(document, common):
+def test_what_it_costs_a_valve_is_the_command_before_its_own_bound(common):
     """Counted anew, code by code, by the compensator's own rounding: the least command at which the drive is there."""
     compensator, signals = common.compensator, common.compensator.signals
-    costs = {each.valve: each for each in lot_costs(document)}
+    costs = {each.valve: each for each in lot_costs(common.compensator)}
     assert set(costs) == set(KNEES)
     for valve in common.compensator.lot:
         shares = []
@@ -374,9 +342,6 @@ def test_an_old_common_file_without_its_lot_says_that_it_is_not_known(document):
     compensator = read(old)
     said = generate(compensator, "host").files["core/dz_comp.h"]
     assert "LOT SETTING of 4 valves, the file does not say which." in said
-    artefacts = {
-        "compensator": Artefact(role="compensator", name="compensator.json", sha256="0" * 64, document=old),
-    }
-    first, worst, cost = lot_figures(Chain(artefacts=artefacts))
+    first, worst, cost = lot_figures(Chain(compensator=compensator))
     assert first.value == "of 4 valves" and worst.value == "NOT CHECKED" and cost.value == "not known"
-    assert "run `dzdesign batch` again" in lot_section(old).missing
+    assert "run `dzdesign batch` again" in lot_section(compensator).missing

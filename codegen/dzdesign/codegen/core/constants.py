@@ -21,24 +21,12 @@ EXACT = "exact"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Constant:
-    """What a `#define` or a table is, and where it is from.
+    """What a `#define` or a table is, and where it is from: its fields are those of `FirmwareConstant`.
 
     Attributes
     ----------
-    symbol : str
-        Name in C.
-    value : int or tuple of (int, int)
-        The number, or a table's rows, start and change, as the C has them.
-    equation : str
-        What it is, with the equation of the paper where there is one.
-    engineering : str
-        What it stands for, in engineering units.
-    rounding : str
-        How the number came from that value.
     data : tuple of str
         Keys of compensator.json that it was computed from, dotted; none for what codegen chooses itself.
-    generator : str
-        Source file of dzdesign that computes it.
     """
 
     symbol: str

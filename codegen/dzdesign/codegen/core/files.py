@@ -17,17 +17,18 @@ from dzdesign.codegen.core.law_constants import (
     KAPPA_ROUNDING,
     U_MIN0_ROUNDING,
     LawConstants,
-    TableForm,
     equation_of,
-    table_form,
 )
 from dzdesign.codegen.core.misra import misra_lines
 from dzdesign.codegen.core.signal_constants import SignalConstants
+from dzdesign.codegen.core.table_form import TableForm, table_form
 from dzdesign.derivation.law import law
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.drive import RAMP_UNIT
 from dzdesign.design.signals import WEIGHT_SHIFT
 
+#: What a template prints: texts, and objects of `design` and of this room whose fields it prints.
+Values = Mapping[str, object]
 #: One file a sign of command, all from one template.
 CORE_SOURCES = {1: "dz_comp.c", -1: "dz_comp_negative.c"}
 CORE_HEADERS = ("dz_comp.h", "dz_drive.h")
@@ -46,13 +47,13 @@ class CoreFile:
     template : str
         Name of its template.
     values : mapping
-        What the template prints: texts, and objects of `design` and of this room whose fields it prints.
+        What the template prints.
     constants : tuple of Constant
         Those that are printed into it, for the manifest.
     """
 
     template: str
-    values: Mapping[str, object]
+    values: Values
     constants: tuple[Constant, ...]
 
 
@@ -148,7 +149,7 @@ def _drive_header(compensator: Compensator) -> CoreFile:
     return CoreFile(template="dz_drive.h.jinja", values=values, constants=constants)
 
 
-def _law_words(compensator: Compensator) -> dict[str, object]:
+def _law_words(compensator: Compensator) -> Values:
     """Return what source and header print of the law."""
     chosen = law(compensator.law_name)
     return {
@@ -161,7 +162,7 @@ def _law_words(compensator: Compensator) -> dict[str, object]:
     }
 
 
-def _drive_words(compensator: Compensator) -> dict[str, object]:
+def _drive_words(compensator: Compensator) -> Values:
     """Return what source and header print of the drive functions."""
     functions, signals = compensator.amplifier, compensator.signals
     return {
@@ -173,7 +174,7 @@ def _drive_words(compensator: Compensator) -> dict[str, object]:
     }
 
 
-def _signal_expressions(compensator: Compensator, sign: int) -> dict[str, object]:
+def _signal_expressions(compensator: Compensator, sign: int) -> Values:
     """Return the C that depends on which way the signals count."""
     signals, command = compensator.signals, compensator.signals.command
     towards = sorted(command.direction(sign) * (code - command.zero_code) for code in command.valid_codes)
@@ -187,7 +188,7 @@ def _signal_expressions(compensator: Compensator, sign: int) -> dict[str, object
     }
 
 
-def _arithmetic_expressions(of_law: LawConstants, suffix: str) -> dict[str, object]:
+def _arithmetic_expressions(of_law: LawConstants, suffix: str) -> Values:
     """Return the C that depends on the widths of the law's integers."""
     form = of_law.form
     high, low = divmod(form.linear << form.linear_shift, 1 << 32)
@@ -221,7 +222,7 @@ def _word_bits(compensator: Compensator, arithmetic: str) -> int:
     return 16 if arithmetic == "narrow" and signals.like_sensors and 2 * signals.code_max <= SHORT_MAX else 32
 
 
-def _table(table: Table, form: TableForm, of_law: LawConstants, suffix: str) -> dict[str, object]:
+def _table(table: Table, form: TableForm, of_law: LawConstants, suffix: str) -> Values:
     """Return a table's rows, the pressure drop from which each line of them goes, and its beta there."""
     compensator, name = of_law.compensator, table.symbol
     step, turn = compensator.beta_step_codes, -1 if form.falls else 1

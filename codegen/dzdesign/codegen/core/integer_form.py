@@ -13,14 +13,13 @@ can occur; where the target has 32-bit arithmetic only, it is an estimate and a 
 
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import pairwise
 from math import ceil, lcm
 from typing import NamedTuple
 
 from dzdesign.core.errors import InputError
 from dzdesign.derivation.law import law
 from dzdesign.derivation.scaling import Line, evaluate_line
-from dzdesign.derivation.transition import evaluate_edge
+from dzdesign.derivation.transition import evaluate_transition
 from dzdesign.design.compensator import Compensator
 
 INT32_MAX = 2**31 - 1
@@ -170,11 +169,11 @@ def _terms(compensator: Compensator, sign: int) -> _Terms:
     beta_unit = c.beta_denominator * c.beta_step_codes
     per_transition_code = Fraction(0)
     if c.edge_codes:  # what one unit of the gap lowers at zero command, over the transition's codes
-        lowered = evaluate_edge(
+        lowered = evaluate_transition(
             beta_opening=1,
             beta_closing=0,
             u_min0_over_u_max=side.u_min0_over_u_max,
-            share_of_edge=0,
+            share_of_transition=0,
             n_full=c.signals.compare_max,
         )
         per_transition_code = lowered / beta_unit / c.edge_codes
@@ -267,20 +266,6 @@ def _estimate(divisor: int, largest: int) -> Estimate:
     if (largest >> shift) * factor >= 1 << 32:
         raise InputError(f"a quotient of {largest} by {divisor} needs more than 32-bit arithmetic")
     return Estimate(shift=shift, factor=factor, corrections=ceil((1 << shift) / divisor + 2) - 1)
-
-
-def segments_of(table: tuple[int, ...], step: int) -> list[tuple[int, int]]:
-    """Return (start, slope) of each segment, ``start + slope * dp``: the fallback first, then one a node.
-
-    Between nodes n and n + 1 the table times `step` is ``T[n] step + (T[n+1] - T[n]) (dp - n step)``.
-    """
-    if not table:
-        return []
-    pairs = pairwise(table[:-2])
-    return [
-        (table[-1] * step, 0),
-        *((left * step - (right - left) * node * step, right - left) for node, (left, right) in enumerate(pairs)),
-    ]
 
 
 def _prove_widths(form: IntegerForm, compensator: Compensator, sign: int) -> None:

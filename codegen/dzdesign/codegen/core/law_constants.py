@@ -3,9 +3,12 @@
 from dataclasses import dataclass
 
 from dzdesign.codegen.core.constants import Define, Table
-from dzdesign.codegen.core.integer_form import IntegerForm, segments_of
+from dzdesign.codegen.core.integer_form import IntegerForm
+from dzdesign.codegen.core.table_form import TableForm, segments_of
 from dzdesign.codegen.telemetry.frame import beta_factor
 from dzdesign.derivation.law import Law, law
+from dzdesign.derivation.presentation.formulas import to_text
+from dzdesign.derivation.symbols import k
 from dzdesign.design.compensator import Compensator
 
 HERE = "codegen/dzdesign/codegen/core/integer_form.py"
@@ -18,34 +21,6 @@ SCALED = ("signals.compare_max", "signals.command", "beta_denominator", "beta_st
 def equation_of(chosen: Law) -> str:
     """Return where a law comes from, as a reader looks for it."""
     return f"Eq. {chosen.equation}" if chosen.equation.startswith("(") else chosen.equation.replace("(", "Eq. (")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TableForm:
-    """How the rows of a table stand in C: the changes' sign, and their type."""
-
-    change_sign: str
-    change_type: str
-
-    @property
-    def falls(self) -> bool:
-        """True if the C subtracts the changes."""
-        return self.change_sign == "-"
-
-    @property
-    def short(self) -> bool:
-        """True if a product with a change is one of 16 by 16 bits."""
-        return self.change_type == "uint16_t"
-
-
-def table_form(form: IntegerForm, step: int, arithmetic: str) -> TableForm:
-    """Choose the rows: signed where products of 32 bits are cheap, of one direction in 16 bits else."""
-    changes = [change for table in (form.table, form.zero_table) for _, change in segments_of(table, step)]
-    falls = max(changes) <= 0
-    short = (falls or min(changes) >= 0) and max(map(abs, changes)) < 1 << 16
-    if arithmetic == "narrow" and short:
-        return TableForm(change_sign="-" if falls else "+", change_type="uint16_t")
-    return TableForm(change_sign="+", change_type="int32_t")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -122,19 +97,21 @@ class LawConstants:
     def _factor(self) -> list[Define]:
         """Return what beta multiplies, by command and alone, and what the transition takes away."""
         c, form, side = self.compensator, self.form, self.compensator.side(self.sign)
-        equation = equation_of(law(c.law_name))
+        chosen = law(c.law_name)
+        equation = equation_of(chosen)
         kappa, u_min0 = side.k_x_max_over_u_max, side.u_min0_over_u_max
         kappa_key, u_min0_key = f"{self.key}.k_x_max_over_u_max", f"{self.key}.u_min0_over_u_max"
         u_min0_text = f"u_min0/u_max = {u_min0}, {U_MIN0_ROUNDING}"
         found = []
         size = ", its size" if self.narrow and form.slope < 0 else ""
         if form.slope:
+            factor = to_text(chosen.gain_by_beta(1)).replace("*", " ")
             found.append(
                 self._constant(
                     "FACTOR_SLOPE",
                     -form.slope if self.narrow and form.slope < 0 else form.slope,
                     f"{equation}, coefficient of beta * u_i in u_O{size}",
-                    f"k x_max/u_max - 1 = {self._per_volt(form.slope * self.unit):.6f}",
+                    f"{factor} = {self._per_volt(form.slope * self.unit):.6f}",
                     (kappa_key, *SCALED),
                     rounding=f"exact from k x_max/u_max = {kappa}, {KAPPA_ROUNDING}",
                     literal="uint32" if self.narrow else "int32",
@@ -170,9 +147,10 @@ class LawConstants:
         if not form.linear:
             return []
         total = form.linear << form.linear_shift
-        equation = f"{equation_of(law(c.law_name))}, coefficient of u_i alone in u_O"
+        chosen = law(c.law_name)
+        equation = f"{equation_of(chosen)}, coefficient of u_i alone in u_O"
         engineering = f"{self._per_volt(total):.6f}"
-        kappa = () if c.law_name == "paper" else (f"{self.key}.k_x_max_over_u_max",)
+        kappa = (f"{self.key}.k_x_max_over_u_max",) if chosen.gain_by_beta(0).has(k) else ()
         data = (*kappa, *SCALED)
         high, low = divmod(total, 1 << 32)
         if low == 0:

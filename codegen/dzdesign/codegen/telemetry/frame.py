@@ -9,9 +9,10 @@ reflected, nothing added at the end; of the octets of "123456789" it is 29B1h.
 
 import binascii
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Annotated
 
 from dzdesign.core.errors import InputError
 
@@ -28,25 +29,29 @@ TICKS_MODULUS = 1 << 32
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Field:
-    """One number of the payload: name in C and in Python, bits (16 or 32), and what it is."""
+class Number:
+    """One number of the payload: its bits (16 or 32), and what it is."""
 
-    name: str
     bits: int
     text: str
 
 
-FIELDS = (
-    Field(name="ticks", bits=32, text="PWM periods since the start, modulo 2^32"),
-    Field(name="origin", bits=16, text="first 16 bits of the SHA-256 of compensator.json"),
-    Field(name="u_adc", bits=16, text="code of the command"),
-    Field(name="p_a_adc", bits=16, text="code of pressure A"),
-    Field(name="p_b_adc", bits=16, text="code of pressure B"),
-    Field(name="beta", bits=16, text="beta(dP) times 2^15, rounded down"),
-    Field(name="compare_a", bits=16, text="PWM compare value of solenoid A"),
-    Field(name="compare_b", bits=16, text="of solenoid B; one of the two is 0"),
-    Field(name="status", bits=16, text="bits of the status word"),
-)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Frame:
+    """The numbers of the payload, in their order; names are those in C too."""
+
+    ticks: Annotated[int, Number(bits=32, text="PWM periods since the start, modulo 2^32")]
+    origin: Annotated[int, Number(bits=16, text="first 16 bits of the SHA-256 of compensator.json")]
+    u_adc: Annotated[int, Number(bits=16, text="code of the command")]
+    p_a_adc: Annotated[int, Number(bits=16, text="code of pressure A")]
+    p_b_adc: Annotated[int, Number(bits=16, text="code of pressure B")]
+    beta: Annotated[int, Number(bits=16, text="beta(dP) times 2^15, rounded down")]
+    compare_a: Annotated[int, Number(bits=16, text="PWM compare value of solenoid A")]
+    compare_b: Annotated[int, Number(bits=16, text="of solenoid B; one of the two is 0")]
+    status: Annotated[int, Number(bits=16, text="bits of the status word")]
+
+
+NUMBERS: Mapping[str, Number] = {name: hint.__metadata__[0] for name, hint in Frame.__annotations__.items()}
 #: The status word: what the hardware reports, in its low octet, and in the high one what dz_status() finds wrong.
 STATUS_BITS = {
     0x0001: "no usable sample in time",
@@ -60,10 +65,10 @@ STATUS_BITS = {
 }
 #: The output is in use; without it the trip zone holds the pin low, whatever the compare value.
 STATUS_RELEASED = 0x0080
-PAYLOAD_OCTETS = sum(field.bits // 8 for field in FIELDS)
+PAYLOAD_OCTETS = sum(number.bits // 8 for number in NUMBERS.values())
 FRAME_OCTETS = HEADER_OCTETS + PAYLOAD_OCTETS + CRC_OCTETS
 FRAME_BITS = FRAME_OCTETS * BITS_PER_OCTET
-_FORMAT = ">" + "".join({16: "H", 32: "I"}[field.bits] for field in FIELDS)
+_FORMAT = ">" + "".join({16: "H", 32: "I"}[number.bits] for number in NUMBERS.values())
 _START = struct.pack(">HBB", SYNC, VERSION, PAYLOAD_OCTETS)
 _SYNC = _START[:2]
 
@@ -85,21 +90,6 @@ class Link:
     tick_Hz: int
     frame_ticks: int
     baud: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Frame:
-    """The numbers of one frame, as `FIELDS` states them."""
-
-    ticks: int
-    origin: int
-    u_adc: int
-    p_a_adc: int
-    p_b_adc: int
-    beta: int
-    compare_a: int
-    compare_b: int
-    status: int
 
 
 def crc_of(octets: bytes | bytearray) -> int:
@@ -155,7 +145,7 @@ class FrameReader:
             numbers = struct.unpack_from(_FORMAT, held, HEADER_OCTETS)
             self.frames += 1
             del held[:FRAME_OCTETS]
-            yield Frame(**{field.name: number for field, number in zip(FIELDS, numbers, strict=True)})
+            yield Frame(**dict(zip(NUMBERS, numbers, strict=True)))
 
     def _skip(self, count: int) -> None:
         self.skipped += count
@@ -164,19 +154,21 @@ class FrameReader:
 
 def frame_context() -> dict[str, str]:
     """Return what the templates of a target print of the frame: sizes, the layout as a comment, the C of the fields."""
-    rows, at = [], HEADER_OCTETS
-    for field in FIELDS:
-        rows.append(f" *   {at:2d}  {field.bits // 8}  {field.name:9s} {field.text}")
-        at += field.bits // 8
+    layout, members, puts, at = [], [], [], HEADER_OCTETS
+    for name, number in NUMBERS.items():
+        layout.append(f" *   {at:2d}  {number.bits // 8}  {name:9s} {number.text}")
+        members.append(f"    uint{number.bits}_t {name}; /* {number.text} */")
+        puts.append(f"    at = put_{number.bits}(octets, at, frame->{name});")
+        at += number.bits // 8
     return {
         "frame_sync": f"0x{SYNC:04X}",
         "frame_version": str(VERSION),
         "frame_payload": str(PAYLOAD_OCTETS),
         "frame_octets": str(FRAME_OCTETS),
-        "frame_layout": "\n".join(rows),
+        "frame_layout": "\n".join(layout),
         "frame_crc_at": str(at),
-        "frame_members": "\n".join(f"    uint{field.bits}_t {field.name}; /* {field.text} */" for field in FIELDS),
-        "frame_puts": "\n".join(f"    at = put_{field.bits}(octets, at, frame->{field.name});" for field in FIELDS),
+        "frame_members": "\n".join(members),
+        "frame_puts": "\n".join(puts),
         "crc_polynomial": f"0x{CRC_POLYNOMIAL:04X}",
         "crc_start": f"0x{CRC_START:04X}",
         "status_released": f"0x{STATUS_RELEASED:04X}",

@@ -1,10 +1,11 @@
-"""What ties the law of `law.py` to the paper's equations; theorems 1 and 2: which flow it gives, and full command."""
+"""What ties the laws to the paper's equations; theorems 1 and 2: which flow they give, and full command."""
 
 import sympy
 
 from dzdesign.derivation.account.published import FIRST, SECOND, VALVES
-from dzdesign.derivation.account.statement import Case, Condition, Ground, Kind, Outcome, Statement, Value
+from dzdesign.derivation.account.statement import Condition, Ground, Kind, Outcome, Statement, Value
 from dzdesign.derivation.law import law
+from dzdesign.derivation.laws import LAW_NAMES
 from dzdesign.derivation.symbols import (
     K_0,
     K_1,
@@ -13,8 +14,6 @@ from dzdesign.derivation.symbols import (
     Q,
     Q_O_prime,
     W,
-    above,
-    below,
     beta,
     dP,
     dP0,
@@ -38,47 +37,10 @@ from dzdesign.derivation.symbols import (
     x_max,
 )
 
-_PAPER_LAW = law("paper")
-_TARGET_LAW = law("target")
 _DRIVE_LEFT_OVER = "with k x_max = u_max - u_min0, the command left above the threshold"
 
-#: What `law.py` states against what the paper derives.
-TIES = (
-    Statement(
-        number="L1",
-        title="the law `paper` is Eq. (18)",
-        kind=Kind.LAW,
-        symbol=u_O,
-        members=(_PAPER_LAW.output,),
-        grounds=(Ground(number="(18)"),),
-    ),
-    Statement(
-        number="L2",
-        title="the selector gives the law `paper`, at beta = 1 up to dP0: Eq. (14)",
-        kind=Kind.LAW,
-        symbol=u_O,
-        members=(sympy.Piecewise((_PAPER_LAW.output, dP1 > dP0), (_PAPER_LAW.output.subs(beta, 1), dP1 <= dP0)),),
-        grounds=(
-            Ground(number="u_O", at=((u_0, u_no),), where="with u_no for u_0"),
-            Ground(number="(7)"),
-            Ground(number="(13)"),
-        ),
-        eliminate=(u_no, u_0),
-        cases=(
-            Case(at=((dP1, dP0 - below),), where="dP <= dP0"),
-            Case(at=((dP1, dP0 + above),), where="dP > dP0"),
-        ),
-    ),
-    Statement(
-        number="L3",
-        title="the law `target`",
-        kind=Kind.CHOICE,
-        symbol=u_O,
-        members=(_TARGET_LAW.output,),
-        see=("T1d", "T1e"),
-        note=_TARGET_LAW.note,
-    ),
-)
+#: What the laws are in the paper's terms.
+TIES = tuple(statement for name in LAW_NAMES for statement in law(name).statements)
 
 
 def _flow(law_number: str, threshold: sympy.Symbol, pressure: sympy.Symbol) -> tuple[Ground, ...]:

@@ -38,7 +38,7 @@ def arrange(expression: sympy.Basic) -> sympy.Basic:
     if isinstance(expression, sympy.Add):
         return _sum(expression)
     if isinstance(expression, sympy.Mul | sympy.Pow):
-        return _product(_with_positive_sign(expression))
+        return _product(with_positive_sign(expression))
     if isinstance(expression, sympy.GreaterThan | sympy.LessThan | sympy.StrictGreaterThan | sympy.StrictLessThan):
         # What a condition is about stands on its left.
         expression = expression if _rank(expression.lhs) >= _rank(expression.rhs) else expression.reversed
@@ -77,8 +77,17 @@ def _term_key(term: sympy.Expr) -> tuple:
     )
 
 
-def _with_positive_sign(product: sympy.Expr) -> sympy.Expr:
-    """Turn -(a - b) c into (b - a) c."""
+def with_positive_sign(product: sympy.Expr) -> sympy.Expr:
+    """Turn -(a - b) c into (b - a) c; which of them SymPy gives may change from run to run.
+
+    Parameters
+    ----------
+    product : sympy.Expr
+
+    Returns
+    -------
+    sympy.Expr
+    """
     sums = [factor for factor in sympy.Mul.make_args(product) if isinstance(factor, sympy.Add)]
     if product.could_extract_minus_sign() and sums:
         return -product.xreplace({sums[0]: -sums[0]})

@@ -12,7 +12,7 @@ from sympy.printing.latex import LatexPrinter
 from sympy.printing.str import StrPrinter
 
 from dzdesign.derivation import symbols
-from dzdesign.derivation.presentation.arrangement import Root, arrange
+from dzdesign.derivation.presentation.arrangement import Root, arrange, with_positive_sign
 from dzdesign.derivation.symbols import QUANTITIES, Name
 
 _LOW_PARENTHESES = re.compile(r"\\left\(((?:(?!\\left|\\frac|\\sqrt|\\right).)*?) ?\\right\)")
@@ -163,7 +163,7 @@ def to_python(formula: sympy.Basic) -> str:
     -------
     str
     """
-    return _Python().doprint(formula)
+    return _Python().doprint(with_positive_sign(formula))
 
 
 @cache

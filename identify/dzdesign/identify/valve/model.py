@@ -42,7 +42,7 @@ class Warning_:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class ValveModel(Artefact, ShownInNotebooks):
+class ValveModel(ShownInNotebooks, Artefact):
     """An identified valve, as `dzdesign identify` writes it."""
 
     FILE_NAME: ClassVar[str] = "valve.json"

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dzdesign.design.compensator import Compensator
-from dzdesign.report.compensator_sides import code_MPa, laws_of
+from dzdesign.report.compensator_sides import laws_of
 from dzdesign.report.figures.figure import LIGHT, Curves, ReportFigure, new_figure, to_report_figure
 from dzdesign.report.sections.cells import whole
 from dzdesign.verify.evidence import InputCheck
@@ -91,7 +91,7 @@ def _grid_of(curves: Curves, compensator: Compensator, sign: int) -> _Grid:
     )
     return _Grid(
         u=100 * (codes - command.zero_code) / towards_full,
-        dp=dp_codes * code_MPa(compensator),
+        dp=dp_codes * float(compensator.signals.pressure_a.per_code_MPa),
         volts=volt * output,
         wrong=error != 0,
         fallen=status != 0,

@@ -1,8 +1,11 @@
 """Figure of the law in exact coefficients."""
 
+from fractions import Fraction
+
 from dzdesign.design.compensator import Compensator
-from dzdesign.report.compensator_sides import SIGNS, code_MPa, exact_law_of, laws_of, valve_in
+from dzdesign.report.compensator_sides import SIGNS, laws_of, valve_in
 from dzdesign.report.figures.figure import LIGHT, ReportFigure, csv_text, side_words, titled_axes, to_report_figure
+from dzdesign.verify.exhaustive.exact_law import ExactLaw
 
 
 def law_figure(compensator: Compensator, name: str, both: bool) -> ReportFigure:
@@ -16,14 +19,14 @@ def law_figure(compensator: Compensator, name: str, both: bool) -> ReportFigure:
     both : bool
         Whether the valve has two sides.
     """
-    exact = exact_law_of(compensator, SIGNS[name])
+    exact = ExactLaw(compensator, SIGNS[name])
     u_max, certificate = float(compensator.u_max_V), laws_of(compensator)[name].certificate
     low, high = map(float, certificate.dp_MPa)
     figure, axes = titled_axes(3.2, name, both)
     axes.plot([0, 100], [0, u_max], ":", color=LIGHT["soft"], lw=1.3, label="without compensator")
     rows = []
     for dp_MPa, dash, hue in ((low, "-", "blue"), (high, "--", "vermilion")):
-        corners = exact.corners(exact.betas(round(dp_MPa / code_MPa(compensator))))
+        corners = exact.corners(exact.betas(round(compensator.signals.dp_code(Fraction(dp_MPa)))))
         percent = [100 * away / exact.span for away, _ in corners]
         volts = [u_max * float(count) / exact.compare_max for _, count in corners]
         axes.plot(percent, volts, dash, color=LIGHT[hue], lw=1.8, label=f"at {dp_MPa:.2f} MPa")

@@ -7,7 +7,7 @@ import numpy as np
 from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.ramp_result import TestResult
 from dzdesign.identify.valve.side_model import SideModel
-from dzdesign.report.compensator_sides import code_MPa, laws_of
+from dzdesign.report.compensator_sides import laws_of
 from dzdesign.report.figures.figure import (
     CYCLE,
     LIGHT,
@@ -213,5 +213,5 @@ def _beta_table(compensator: Compensator, name: str) -> tuple[np.ndarray, np.nda
     """Return pressure drops (MPa) and betas at the nodes of the compensator's table, and its u_min0 (V)."""
     law = laws_of(compensator)[name]
     nodes = np.array(law.beta_numerators)
-    where = np.arange(nodes.size) * compensator.beta_step_codes * code_MPa(compensator)
+    where = np.arange(nodes.size) * compensator.beta_step_codes * float(compensator.signals.pressure_a.per_code_MPa)
     return where, nodes / compensator.beta_denominator, float(law.u_min0_over_u_max * compensator.u_max_V)

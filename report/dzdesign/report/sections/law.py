@@ -16,8 +16,6 @@ from dzdesign.derivation.presentation.report import closure, compose
 
 #: All that the laws rest on: sections of the account. Of the others some take a second to import.
 STATEMENTS = (*APPROACH, *AT_REFERENCE, *OFF_REFERENCE, *TIES, *TARGET)
-#: The statement of the account that ends the derivation of each law: Eq. (18), and that the other meets the target.
-STATED_AS = {"paper": "(18)", "target": "T1d"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,7 +68,7 @@ def account_of(law_name: str) -> LawAccount:
     law_name : str
         Of compensator.json.
     """
-    number = STATED_AS[law_name]
+    number = law(law_name).stated_as
     numbers = closure(STATEMENTS, [number])
     statements = [statement for statement in STATEMENTS if statement.number in numbers]
     content = compose(prove(statements), numbers)

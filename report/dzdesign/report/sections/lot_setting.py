@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import astuple, dataclass, fields
+from fractions import Fraction
 from functools import cache
 from itertools import pairwise
 
@@ -9,12 +10,13 @@ from dzdesign.core.verdicts import NOT_CHECKED
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.lot import LotSide
 from dzdesign.report.artefact_chain import Chain
-from dzdesign.report.compensator_sides import SIGNS, code_MPa, exact_law_of, laws_of, lot_sha256
+from dzdesign.report.compensator_sides import SIGNS, laws_of, lot_sha256
 from dzdesign.report.figures.figure import csv_text
 from dzdesign.report.page import Section
 from dzdesign.report.sections.cells import in_number_font, number, table_of
 from dzdesign.report.summary import Figure
 from dzdesign.verify.evidence import Evidence
+from dzdesign.verify.exhaustive.exact_law import ExactLaw
 
 #: Valves in the table of the page; all of them stand in the CSV.
 ROWS = 40
@@ -49,7 +51,7 @@ def lot_costs(compensator: Compensator) -> tuple[LotCost, ...]:
 
 
 def _costs_of_side(compensator: Compensator, name: str) -> Iterator[LotCost]:
-    exact = exact_law_of(compensator, SIGNS[name])
+    exact = ExactLaw(compensator, SIGNS[name])
     counts_per_V = exact.compare_max / float(compensator.u_max_V)
 
     @cache  # the valves of a lot are tested at the same few pressure drops
@@ -58,7 +60,7 @@ def _costs_of_side(compensator: Compensator, name: str) -> Iterator[LotCost]:
 
     for valve_name, side in _lot_sides(compensator, name):
         shares = [
-            (_share(corners_at(round(dp / code_MPa(compensator))), bound * counts_per_V), dp)
+            (_share(corners_at(round(compensator.signals.dp_code(Fraction(dp)))), bound * counts_per_V), dp)
             for dp, bound in zip(side.dp_MPa, side.lower_V, strict=True)
         ]
         (least, least_at), (most, most_at) = min(shares), max(shares)

@@ -21,13 +21,15 @@ from dzdesign.verify.firmware.folder import check_firmware_inside, read_compensa
 class Bench:
     """The sensors and the recorder of a bench."""
 
-    rate_Hz: Annotated[float, quantity("Hz", "Rows per second.", ge=1, le=1e4)] = 25.0
-    meter_lag_s: Annotated[float, quantity("s", "First-order lag of the flow meter.", ge=0, le=1e4)] = 0.1
+    rate_Hz: Annotated[float, quantity("Hz", "Rows per second.")] = 25.0
+    meter_lag_s: Annotated[float, quantity("s", "First-order lag of the flow meter.", ge=0, le=1e6)] = 0.1
     meter_floor_L_min: Annotated[float, quantity("L/min", "Flow below which it reads zero.", ge=0, le=1e6)] = 0.6
     meter_noise_L_min: Annotated[float, quantity("L/min", "Standard deviation of its noise.", ge=0, le=1e6)] = 0.08
-    command_noise_V: Annotated[float, quantity("V", "Standard deviation of the command's noise.", ge=0, le=1e4)] = 0.002
-    pressure_noise_MPa: Annotated[float, quantity("MPa", "The same of the pressure drop.", ge=0, le=1e3)] = 0.01
-    seed: Annotated[int, Meta(description="Of the noise; the same seed gives the same bytes.", ge=0, le=10**18)] = 1
+    command_noise_V: Annotated[float, quantity("V", "Standard deviation of the command's noise.", ge=0, le=1e6)] = 0.002
+    pressure_noise_MPa: Annotated[
+        float, quantity("MPa", "Standard deviation of the pressures' noise.", ge=0, le=1e6)
+    ] = 0.01
+    seed: Annotated[int, Meta(description="Of the noise; the same seed gives the same bytes.")] = 1
 
     def __post_init__(self) -> None:
         if not 1 <= self.rate_Hz <= 1 / RECORD_S:

@@ -11,8 +11,8 @@ from dzdesign.derivation.account.published import (
     SATURATED_FROM_V,
     U_MAX_V,
 )
-from dzdesign.reproduce.runs import DIRECT, PAPER, PRODUCT, Drive, ValveRuns
-from dzdesign.reproduce.valves import at_rest
+from dzdesign.reproduce.recovered_valves import at_rest
+from dzdesign.reproduce.valve_runs import DIRECT, PAPER, PRODUCT, Drive, ValveRuns
 
 #: What reading our own runs may cost: per cent of full command, share of a flow, L/min at zero command; and what
 #: "about" is taken to mean, as a share.

@@ -25,6 +25,7 @@ from dzdesign.derivation.account.published import (
     U_MAX_V,
     PublishedValve,
 )
+from dzdesign.report.reproduction import FittedFigure, Parameter
 from dzdesign.verify.closed_loop.plant import L_MIN, MPA, Plant
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ RECOVERED: Mapping[str, tuple[float, float]] = MappingProxyType(
         "overlap_mm": (0.1, LEAST_OVERLAP_MM),
     }
 )
-SOLVER = MappingProxyType(
+SOLVER: Mapping[str, int | float | str] = MappingProxyType(
     {
         "ipopt.print_level": 0,
         "ipopt.sb": "yes",
@@ -74,18 +75,6 @@ class Printed(NamedTuple):
     unit: str
     published: str
     at_rest: "casadi.SX"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FittedFigure:
-    """A printed figure that went into a fit: what it is, its unit, as printed, what the fit gives, and their distance
-    over half a unit of the last printed digit."""
-
-    name: str
-    unit: str
-    published: str
-    fitted: float
-    misfit: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,25 +104,16 @@ class RecoveredValve:
     at_bound: tuple[str, ...]
     level_L_min: float
 
-    def to_document(self) -> dict[str, Any]:
-        """Return the parameters, each marked as recovered or not, and the fit."""
+    def parameters(self) -> dict[str, Parameter]:
+        """Return the parameters of the plant, each marked as recovered or not."""
         return {
-            "valve": self.published.name,
-            "parameters": {
-                field.name: {
-                    "value": getattr(self.plant, field.name),
-                    "recovered": field.name in self.rounding,
-                    "origin": self._origin(field.name),
-                    "rounding": self.rounding.get(field.name),
-                }
-                for field in fields(Plant)
-            },
-            "fitted_to": [
-                {name: getattr(figure, name) for name in ("name", "unit", "published", "fitted", "misfit")}
-                for figure in self.figures
-            ],
-            "at_bound": list(self.at_bound),
-            "level_L_min": self.level_L_min,
+            field.name: Parameter(
+                value=getattr(self.plant, field.name),
+                recovered=field.name in self.rounding,
+                origin=self._origin(field.name),
+                rounding=self.rounding.get(field.name),
+            )
+            for field in fields(Plant)
         }
 
     def _origin(self, name: str) -> str:

@@ -8,8 +8,9 @@ import numpy as np
 from dzdesign.derivation.account.published import DP0_MPA, DP1_MPA, U_MAX_V
 from dzdesign.derivation.law import law
 from dzdesign.identify.plots.frame import finish, new_figure, plot_style, saved
-from dzdesign.reproduce.runs import DIRECT, PAPER, PRESSURES_MPA, PRODUCT, STEP_AT_S, Drive, ValveRuns
-from dzdesign.reproduce.valves import at_rest
+from dzdesign.report.reproduction import Driver
+from dzdesign.reproduce.recovered_valves import at_rest
+from dzdesign.reproduce.valve_runs import DIRECT, PAPER, PRESSURES_MPA, PRODUCT, STEP_AT_S, Drive, ValveRuns
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,7 +20,10 @@ if TYPE_CHECKING:
 COLOURS = dict(zip(PRESSURES_MPA, ("#0072B2", "#E69F00"), strict=True))
 BLACK, GREY = "#000000", "#6E6E6E"
 #: Lines say who drives.
-WITHOUT, WITH, NO_BETA = ":", "-", (0, (5, 2))
+Line = str | tuple[int, tuple[int, ...]]
+WITHOUT: Line = ":"
+WITH: Line = "-"
+NO_BETA: Line = (0, (5, 2))
 #: Records between two points of a line: a tenth of a second of a ramp of 100 s.
 EVERY = 10
 #: Command of Fig. 3's example, V.
@@ -65,7 +69,7 @@ def _titled(number: int, height: float, title: str, *more: str) -> "Figure":
     return new_figure(height, f"Fig. {number}, redrawn: {title}", *more)
 
 
-def _panels(number: int, title: str, draw: Callable[["Axes", str], None], drives: Sequence[str]) -> "Figure":
+def _panels(number: int, title: str, draw: Callable[["Axes", Driver], None], drives: Sequence[Driver]) -> "Figure":
     """Draw one panel per driver, with one scale."""
     figure = _titled(number, 4.8, title, MARKS)
     panels = np.atleast_1d(figure.subplots(1, len(drives), sharey=True))
@@ -78,22 +82,33 @@ def _panels(number: int, title: str, draw: Callable[["Axes", str], None], drives
     return finish(figure, 3)
 
 
-def _draw_ramp(axes: "Axes", runs: ValveRuns, drive: Drive, dp_MPa: float, line: object, label: str, **style) -> None:
+def _draw_ramp(
+    axes: "Axes",
+    runs: ValveRuns,
+    drive: Drive,
+    dp_MPa: float,
+    line: Line,
+    label: str,
+    *,
+    color: str | None = None,
+    width: float = 1.8,
+) -> None:
     """Draw the rising branch of a ramp."""
     run = runs.ramps[drive, dp_MPa]
     rising = slice(0, int(np.argmax(run.command)) + 1, EVERY)
-    style = {"color": COLOURS[dp_MPa], "lw": 1.8, **style}
-    axes.plot(U_MAX_V * run.command[rising], run.q_mean_L_min[rising], ls=line, label=label, **style)
+    axes.plot(
+        U_MAX_V * run.command[rising], run.q_mean_L_min[rising], ls=line, label=label, lw=width,
+        color=color or COLOURS[dp_MPa],
+    )  # fmt: skip
 
 
 def _mark(axes: "Axes", u_V: float, y: float, dp_MPa: float, marker: str, what: str, hollow: bool = False) -> None:
     """Mark a number that the paper prints, in the colour of its pressure drop; hollow marks show what is below them."""
-    style = (
-        {"mfc": "none", "mec": COLOURS[dp_MPa], "mew": 1.7, "ms": 11 if dp_MPa == DP0_MPA else 7}
-        if hollow
-        else {"mfc": COLOURS[dp_MPa], "mec": BLACK, "mew": 1.0, "ms": 7}
-    )
-    axes.plot(u_V, y, marker, ls="none", clip_on=False, zorder=6, label=f"printed: {what}", **style)
+    (line,) = axes.plot(u_V, y, marker, ls="none", clip_on=False, zorder=6, label=f"printed: {what}")
+    if hollow:
+        line.set(mfc="none", mec=COLOURS[dp_MPa], mew=1.7, ms=11 if dp_MPa == DP0_MPA else 7)
+    else:
+        line.set(mfc=COLOURS[dp_MPa], mec=BLACK, mew=1.0, ms=7)
 
 
 def _mark_without(axes: "Axes", runs: ValveRuns, dp_MPa: float) -> None:
@@ -195,7 +210,7 @@ def _with_and_without(runs: ValveRuns, number: int, title: str, with_beta_alone:
     """Figs. 7, 18, 19: without compensator and with it; Fig. 7 also ignoring beta."""
     valve = runs.valve.published
 
-    def draw(axes: "Axes", by: str) -> None:
+    def draw(axes: "Axes", by: Driver) -> None:
         for dp_MPa in PRESSURES_MPA:
             _draw_ramp(axes, runs, Drive(DIRECT), dp_MPa, WITHOUT, f"without, {dp_MPa:g} MPa")
             _draw_ramp(axes, runs, Drive(by), dp_MPa, WITH, f"with, {dp_MPa:g} MPa")
@@ -227,13 +242,13 @@ def _step(runs: ValveRuns) -> "Figure":
 
 
 def _beside_simulation(
-    simulated: ValveRuns, tested: ValveRuns, number: int, title: str, drives: Sequence[str]
+    simulated: ValveRuns, tested: ValveRuns, number: int, title: str, drives: Sequence[Driver]
 ) -> "Figure":
     """Figs. 16, 17: the simulated valve beside the first one."""
 
-    def draw(axes: "Axes", by: str) -> None:
+    def draw(axes: "Axes", by: Driver) -> None:
         for dp_MPa in PRESSURES_MPA:
-            _draw_ramp(axes, simulated, Drive(by), dp_MPa, NO_BETA, f"simulated valve, {dp_MPa:g} MPa", lw=1.4)
+            _draw_ramp(axes, simulated, Drive(by), dp_MPa, NO_BETA, f"simulated valve, {dp_MPa:g} MPa", width=1.4)
             _draw_ramp(axes, tested, Drive(by), dp_MPa, WITH, f"first valve, {dp_MPa:g} MPa")
             (_mark_without if by == DIRECT else _mark_with)(axes, tested, dp_MPa)
         _draw_floor(axes, tested)
@@ -245,7 +260,7 @@ def _effect_of_beta(runs: ValveRuns) -> "Figure":
     """Fig. 23: with and without beta at dP1."""
     dp_MPa = PRESSURES_MPA[1]
 
-    def draw(axes: "Axes", by: str) -> None:
+    def draw(axes: "Axes", by: Driver) -> None:
         _draw_ramp(axes, runs, Drive(by), dp_MPa, WITH, "with β")
         _draw_ramp(axes, runs, Drive(by, False), dp_MPa, NO_BETA, "without β", color=BLACK)
         _mark(axes, 0.0, float(runs.valve.published.zero_flow_without_beta), dp_MPa, "*", "zero command without β")

@@ -1,13 +1,15 @@
 """The ramps and steps of Sections 2 and 4 on a recovered valve: bare, with the paper's law, and with the product."""
 
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from dzdesign.derivation.account.published import DP0_MPA, DP1_MPA, DUTY_COMMAND_V, RAMP_S, U_MAX_V, PublishedValve
 from dzdesign.derivation.law import law
-from dzdesign.reproduce.valves import RecoveredValve
+from dzdesign.design.compensator import Compensator
+from dzdesign.report.reproduction import Driver
+from dzdesign.reproduce.recovered_valves import RecoveredValve
 from dzdesign.verify.closed_loop.loop import FLOW_SHARE, ClosedLoop, LoopRun, RampSequence, dead_zone
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S
 
@@ -16,14 +18,16 @@ PRESSURES_MPA = (float(DP0_MPA), float(DP1_MPA))
 STEP_AT_S, STEP_FOR_S = 0.05, 0.1
 #: The largest flow is reached where the flow comes this close to it.
 REACHED = 0.999
-#: Who drives the valve.
-DIRECT, PAPER, PRODUCT = "direct", "paper", "product"
+#: Who drives the valve: nobody between, the paper's law, or the product.
+DIRECT: Literal["valve"] = "valve"
+PAPER: Literal["paper's law"] = "paper's law"
+PRODUCT: Literal["product"] = "product"
 
 
 class Drive(NamedTuple):
     """What drives the valve, and whether it knows of beta."""
 
-    by: str
+    by: Driver
     with_beta: bool = True
 
 
@@ -103,7 +107,7 @@ def paper_drive(valve: PublishedValve, command: np.ndarray, dp_MPa: float, with_
     beta = u_min1 / u_min0 if with_beta and dp_MPa > DP0_MPA else 1.0  # Eqs. (5), (7)
     chosen = law("paper")
     drive = chosen.evaluate_gain(beta, 1 - u_min0) * command + chosen.evaluate_offset(beta, u_min0)
-    return np.clip(drive, 0.0, 1.0)
+    return np.asarray(np.clip(drive, 0.0, 1.0))
 
 
 def paper_duty_percent(valve: PublishedValve) -> float:
@@ -111,7 +115,7 @@ def paper_duty_percent(valve: PublishedValve) -> float:
     return 100 * float(paper_drive(valve, np.array([DUTY_COMMAND_V / U_MAX_V]), DP0_MPA)[0])
 
 
-def run_valve(valve: RecoveredValve, loop: ClosedLoop, document: dict[str, Any] | None = None) -> ValveRuns:
+def run_valve(valve: RecoveredValve, loop: ClosedLoop, compensator: Compensator | None = None) -> ValveRuns:
     """Run a recovered valve through the paper's ramps and its step.
 
     Parameters
@@ -120,8 +124,8 @@ def run_valve(valve: RecoveredValve, loop: ClosedLoop, document: dict[str, Any] 
         The valve.
     loop : ClosedLoop
         Of its plant.
-    document : dict, optional
-        compensator.json of the loop's firmware, if it has one: the product is run too.
+    compensator : Compensator, optional
+        Of the loop's firmware, if it has one: the product is run too.
     """
     command = RampSequence(ramp=float(RAMP_S)).command()
     ramps: dict[tuple[Drive, float], LoopRun] = {}
@@ -130,13 +134,13 @@ def run_valve(valve: RecoveredValve, loop: ClosedLoop, document: dict[str, Any] 
         for with_beta in (True, False):
             driven = loop.run(paper_drive(valve.published, command, dp_MPa, with_beta), dp_MPa)
             ramps[Drive(PAPER, with_beta), dp_MPa] = replace(driven, command=command)
-            if document:
+            if compensator:
                 ramps[Drive(PRODUCT, with_beta), dp_MPa] = _run_product(loop, command, dp_MPa, with_beta)
     duty = None
-    if document:
+    if compensator:
         at_duty = _run_product(loop, np.full(2, DUTY_COMMAND_V / U_MAX_V), PRESSURES_MPA[0], with_beta=True)
-        duty = 100 * float(at_duty.compare[-1]) / document["signals"]["compare_max"]
-    steps = _steps(valve, loop, document is not None)
+        duty = 100 * float(at_duty.compare[-1]) / compensator.signals.compare_max
+    steps = _steps(valve, loop, compensator is not None)
     return ValveRuns(valve=valve, ramps=ramps, steps=steps, product_duty_percent=duty)
 
 

@@ -1,0 +1,47 @@
+"""The paper's law, Eq. (18): the whole compensation signal times beta."""
+
+import sympy
+
+from dzdesign.derivation.account.statement import Case, Ground, Kind, Statement
+from dzdesign.derivation.law import Law
+from dzdesign.derivation.symbols import above, below, beta, dP0, dP1, k, u_0, u_i, u_max, u_min0, u_no, u_O, x_max
+
+_OUTPUT = (beta * (k * x_max / u_max - 1) + 1) * u_i + beta * u_min0
+
+LAW = Law(
+    name="paper",
+    equation="(18)",
+    output=_OUTPUT,
+    rises_if=beta * (1 - k * x_max / u_max) < 1,
+    note="Eq. (18); Eq. (14) is its case beta = 1, which the selector (7) holds for dP <= dP0. "
+    "Off the reference its flow is not the target (16), unless beta = 1 or k x_max = u_max: "
+    "it exceeds the target by gamma_1 (1 - beta) (1 - k x_max/u_max) u_i / k.",
+    stated_as="(18)",
+    statements=(
+        Statement(
+            number="L1",
+            title="the law `paper` is Eq. (18)",
+            kind=Kind.LAW,
+            symbol=u_O,
+            members=(_OUTPUT,),
+            grounds=(Ground(number="(18)"),),
+        ),
+        Statement(
+            number="L2",
+            title="the selector gives the law `paper`, at beta = 1 up to dP0: Eq. (14)",
+            kind=Kind.LAW,
+            symbol=u_O,
+            members=(sympy.Piecewise((_OUTPUT, dP1 > dP0), (_OUTPUT.subs(beta, 1), dP1 <= dP0)),),
+            grounds=(
+                Ground(number="u_O", at=((u_0, u_no),), where="with u_no for u_0"),
+                Ground(number="(7)"),
+                Ground(number="(13)"),
+            ),
+            eliminate=(u_no, u_0),
+            cases=(
+                Case(at=((dP1, dP0 - below),), where="dP <= dP0"),
+                Case(at=((dP1, dP0 + above),), where="dP > dP0"),
+            ),
+        ),
+    ),
+)

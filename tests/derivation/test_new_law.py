@@ -1,0 +1,88 @@
+"""A new law is one file: here one more goes into a copy of the room, and the whole chain runs with it."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+from tests.support.paths import GOLDENS, ROOT
+from tests.support.synthetic import needs_compiler
+
+LAW = '''"""All of Eq. (14) times beta."""
+
+from dzdesign.derivation.law import Law
+from dzdesign.derivation.symbols import beta, k, u_i, u_max, u_min0, x_max
+
+LAW = Law(
+    name="scaled",
+    equation="(14) times beta",
+    output=beta * (k * x_max / u_max * u_i + u_min0),
+    note="Less gain where the dead zone is smaller.",
+)
+'''
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("law")
+    shutil.copytree(ROOT / "derivation", folder / "derivation", ignore=shutil.ignore_patterns("__pycache__"))
+    laws = folder / "derivation/dzdesign/derivation/laws"
+    assert {path.stem for path in laws.glob("*.py")} == {"__init__", "paper", "target"}
+    (laws / "scaled.py").write_text(LAW, encoding="utf-8")
+    shutil.copy(GOLDENS / "valve.json", folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def run(folder):
+    """Run `dzdesign` with the room that has one law more."""
+    code = "import sys; from dzdesign.command_line.cli import main; sys.exit(main())"
+
+    def dzdesign(*words, status=0):
+        command = [sys.executable, "-c", code, *words]
+        environment = {**os.environ, "PYTHONPATH": str(folder / "derivation")}
+        done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+        assert done.returncode == status, done.stdout + done.stderr
+        return done.stdout + done.stderr
+
+    return dzdesign
+
+
+@pytest.fixture(scope="module")
+def firmware(run, folder):
+    run("design", "valve.json", "--law", "scaled", "-o", "compensator.json")
+    assert json.loads((folder / "compensator.json").read_text())["law"] == "scaled"
+    run("codegen", "compensator.json", "--target", "host", "-o", "firmware")
+    return folder / "firmware"
+
+
+def test_the_command_line_knows_the_law(run):
+    assert "scaled" in run("design", "--help")
+    assert "scaled" in run("completion", "bash")
+    assert "did you mean 'scaled'?" in run("design", "valve.json", "--law", "scaledd", status=2)
+
+
+def test_the_account_proves_it(run):
+    account = run("derive", "--equation", "scaled")
+    assert "the law `scaled`" in account
+    assert "u_O = beta*((k*x_max/u_max)*u_i + u_min0)" in account
+
+
+def test_the_firmware_says_which_law_it_is(firmware):
+    header = (firmware / "core/dz_comp.h").read_text()
+    assert "Eq. (14) times beta" in header
+    source = (firmware / "core/dz_comp.c").read_text()
+    assert "coefficient of beta * u_i in u_O: k x_max/u_max =" in source
+
+
+@needs_compiler
+def test_every_input_follows_it_and_the_report_derives_it(run, firmware, folder):
+    run("verify", "firmware", "-o", "evidence")
+    evidence = json.loads((folder / "evidence/verification.json").read_text())
+    assert evidence["holds"] is True
+    page = (folder / "evidence/report.html").read_text(encoding="utf-8")
+    assert "Less gain where the dead zone is smaller." in page
+    assert "<code>scaled</code>" in page

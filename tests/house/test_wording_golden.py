@@ -1,0 +1,36 @@
+"""The file of all messages: what compares with it sees a change, and no message is kept that no test asks for."""
+
+import re
+
+import pytest
+
+from tests.support.paths import TESTS
+from tests.support.wording import Wording, read_messages, write_messages
+
+
+def test_a_changed_text_is_seen_and_an_update_keeps_it(tmp_path):
+    path = tmp_path / "messages.txt"
+    write_messages({"b": "two\nlines", "a": "one"}, path)
+    assert read_messages(path) == {"a": "one", "b": "two\nlines"} and list(read_messages(path)) == ["a", "b"]
+    compare, update = (Wording(update, tmp_path, path) for update in (False, True))
+    compare("a", "one\n")
+    for name, text in (("a", "another"), ("c", "one")):
+        with pytest.raises(AssertionError):
+            compare(name, text)
+        update(name, f"{text} in {tmp_path}")
+        compare(name, f"{text} in FOLDER")
+
+
+def test_every_message_is_of_a_test():
+    """A name is ``group: case``; the group stands in the tests as it is written."""
+    groups = {name.partition(": ")[0] for name in read_messages()}
+    sources = "".join(path.read_text(encoding="utf-8") for path in TESTS.rglob("test_*.py"))
+    asked = set(re.findall(r"wording\(\s*f?[\"']([^:\"'{]+): ", sources))
+    assert groups and groups == asked
+
+
+def test_a_message_is_short_enough_to_be_read():
+    """Under 200 characters where it can be; what is longer names alternatives or several files."""
+    messages = read_messages()
+    long = {name for name, text in messages.items() if len(text) > 400}
+    assert long == set()
