@@ -37,9 +37,9 @@ def _line_terms(compensator: Compensator) -> tuple[Fraction, Fraction, Fraction]
     """Return p, q, r of ``counts = beta (p u + r) + q u``: Eq. (18) in counts, exactly."""
     lines = [
         evaluate_line(
-            law(compensator.law_name),
+            law(compensator.law),
             beta=beta,
-            kappa=compensator.positive.k_x_max_over_u_max,
+            kappa=compensator.positive.drive_range_over_u_max,
             u_min0_over_u_max=compensator.positive.u_min0_over_u_max,
             n_adc=compensator.signals.code_max,
             n_full=compensator.signals.compare_max,
@@ -50,7 +50,7 @@ def _line_terms(compensator: Compensator) -> tuple[Fraction, Fraction, Fraction]
 
 
 def _betas(compensator: Compensator) -> list[Fraction]:
-    return [Fraction(value, compensator.beta_denominator) for value in compensator.positive.beta_numerators]
+    return [Fraction(value, compensator.beta_denominator) for value in compensator.positive.beta]
 
 
 def _double(value: Fraction) -> str:

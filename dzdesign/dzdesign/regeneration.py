@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from dzdesign.core.artefact_files import read_bytes, sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL
 from dzdesign.core.errors import InputError, quoted
+from dzdesign.design.compensator import Compensator
 
 if TYPE_CHECKING:
     from dzdesign.design.firmware_manifest import FirmwareManifest
@@ -27,16 +28,18 @@ def with_regenerated(verification: "Verification", folder: Path) -> "Verificatio
     folder : Path
         Of the firmware.
     """
-    return verification.with_checks(regenerated(folder))
+    return verification.with_checks(regenerated(folder, verification.compensator))
 
 
-def regenerated(folder: Path) -> "Check":
+def regenerated(folder: Path, compensator: "Compensator | None" = None) -> "Check":
     """Tell whether every file is what `codegen` makes of compensator.json, but for those that are the user's.
 
     Parameters
     ----------
     folder : Path
         Of the firmware.
+    compensator : Compensator, optional
+        Of the folder; read there where it is not handed.
 
     Returns
     -------

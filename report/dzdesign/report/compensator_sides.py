@@ -1,6 +1,5 @@
 """Both sides of a compensator by their names, and the valve it holds."""
 
-from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.design.compensator import Compensator, SideLaw
 from dzdesign.design.compensator_file import compensator_document
 from dzdesign.identify.valve.model import ValveModel

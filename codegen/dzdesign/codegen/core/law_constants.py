@@ -55,7 +55,7 @@ class LawConstants:
         segments = segments_of(numerators, c.beta_step_codes)
         unit = form.scale_beta * c.beta_denominator
         low, high = (end(numerators[:-2]) / unit for end in (min, max))
-        key = "edge_beta" if form.zero_table and not at_zero else "beta"
+        key = "transition_beta" if form.zero_table and not at_zero else "beta"
         guard = c.side(self.sign).certificate.guard
         what = f"certified beta of the {guard} threshold" if at_zero else "beta of the law"
         return Table(
@@ -134,8 +134,8 @@ class LawConstants:
                     "TRANSITION_FACTOR",
                     form.transition,
                     "transition, coefficient of (beta - beta_zero) in u_O, for each code of command missing to its end",
-                    f"u_min0/{c.edge_codes} = {self._volts(form.transition * self.unit):.6g} V",
-                    (u_min0_key, "edge_codes", "u_max_V", *SCALED),
+                    f"u_min0/{c.transition_codes} = {self._volts(form.transition * self.unit):.6g} V",
+                    (u_min0_key, "transition_codes", "u_max_V", *SCALED),
                     rounding=f"exact from {u_min0_text}",
                 )
             )
@@ -197,13 +197,13 @@ class LawConstants:
 
     def _limit(self) -> Define:
         form, c = self.form, self.compensator
-        limit = c.amplifier.compare_limit
+        limit = c.drive_functions.compare_limit
         return self._constant(
             "QUOTIENT_LIMIT",
             form.largest,
             f"largest quotient whose compare value is DZ_COMPARE_LIMIT, ({limit} + 1) * {form.divisor} - 1",
             f"{limit / c.signals.compare_max * float(c.u_max_V):.4g} V",
-            ("amplifier.compare_limit", "signals.compare_max", "u_max_V"),
+            ("drive_functions.compare_limit", "signals.compare_max", "u_max_V"),
         )
 
     def _reciprocal(self) -> list[Define]:

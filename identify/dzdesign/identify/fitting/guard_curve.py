@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Annotated
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 from msgspec import Meta
@@ -13,7 +13,8 @@ from dzdesign.identify.fitting.bounds import staircase
 from dzdesign.identify.valve.quantity_types import PressureDrop, Ratio, Voltage, VoltageError
 
 #: Thresholds that a certificate may protect, from the safest on.
-GUARDS = ("closing", "mean", "opening")
+Guard = Literal["closing", "mean", "opening"]
+GUARDS: tuple[Guard, ...] = get_args(Guard)
 #: Numbers of the file are right to seven decimals; a comparison of two allows ten times that.
 ROUNDING_V = 1e-6
 

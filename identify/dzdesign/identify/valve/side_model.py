@@ -2,16 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
-from dzdesign.identify.fitting.guard_curve import GUARDS, ROUNDING_V, GuardCurve, OpeningCurve
+from dzdesign.identify.fitting.guard_curve import GUARDS, ROUNDING_V, Guard, GuardCurve, OpeningCurve
 from dzdesign.identify.valve.quantity_types import Flow, PressureDrop, Probability, Ratio, Voltage, VoltageError
 from dzdesign.identify.valve.ramp_result import TestResult
 
-TRENDS = ("decreasing", "flat", "increasing")
+Trend = Literal["decreasing", "flat", "increasing"]
+TRENDS: tuple[Trend, ...] = get_args(Trend)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,14 +34,14 @@ class BetaNodes:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Certificate:
+class BoundsBasis:
     """What the lower bounds rest on."""
 
     confidence: Annotated[
         float, quantity("1", "Confidence with which all bounds of a guard hold together.", ge=0.5, le=1)
     ]
     guard: Annotated[
-        Literal["closing", "mean", "opening"],
+        Guard,
         Meta(
             description="The threshold that is protected unless `design --guard` asks for another: the safest that was "
             "recorded."
@@ -72,7 +73,7 @@ class SideModel:
     ]
     k_V_mm: Annotated[float, quantity("V/mm", "k of Eq. (11), where --x-max was given.", ge=0, le=1e9)] | None
     trend: Annotated[
-        Literal["decreasing", "flat", "increasing"] | None,
+        Trend | None,
         Meta(description="How the threshold runs with the pressure drop; null where fewer than two were tested."),
     ]
     trend_change_V: Annotated[Voltage | None, Meta(description="Change of the threshold over the tested range.")]
@@ -84,7 +85,7 @@ class SideModel:
     valid_dp_MPa: Annotated[
         tuple[PressureDrop, PressureDrop] | None, quantity("MPa", "Tested interval; nothing is certified outside it.")
     ] = field(init=False)
-    certificate: Annotated[Certificate, Meta(description="What the lower bounds rest on.")]
+    certificate: Annotated[BoundsBasis, Meta(description="What the lower bounds rest on.")]
     active_constraints: Annotated[
         tuple[str, ...], Meta(description="Constraints of the fits that hold with equality, in words.")
     ]

@@ -204,7 +204,7 @@ def beta_figure(
 def _of_the_table(compensator: Compensator | None) -> str:
     if compensator is None:
         return ""
-    holds = compensator.below_reference == "hold"
+    holds = compensator.below_dp0 == "hold"
     held = " Up to dP0 the C holds what it has there, as the paper does." if holds else ""
     return f"{held} The table in the C is rounded down, so that it stays below the staircase."
 

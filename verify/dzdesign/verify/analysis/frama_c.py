@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dzdesign.core.errors import RequirementError
+from dzdesign.design.compensator import Compensator
 from dzdesign.verify.evidence import Check
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.firmware.folder import read_compensator
@@ -65,7 +66,7 @@ class Proof:
     alarms: tuple[Alarm, ...]
 
 
-def proof_check(folder: Path) -> Check:
+def proof_check(folder: Path, compensator: Compensator | None = None) -> Check:
     """Return the requirement that no input makes the core's C overflow, index beyond a table or shift too far.
 
     Returns
@@ -76,7 +77,7 @@ def proof_check(folder: Path) -> Check:
     if not shutil.which(PROGRAM):
         return UNDEFINED_BEHAVIOUR.check(holds=None, text=f"not run: {PROGRAM} not found; apt install frama-c-base")
     try:
-        proof = prove(folder)
+        proof = prove(folder, compensator or read_compensator(folder))
     except RequirementError as error:
         return UNDEFINED_BEHAVIOUR.check(holds=None, text=f"not run: {error}")
     if proof.alarms:
@@ -89,7 +90,7 @@ def proof_check(folder: Path) -> Check:
     return UNDEFINED_BEHAVIOUR.check(holds=not proof.alarms, text=f"{text}; Frama-C {proof.version}, -machdep x86_16")
 
 
-def prove(folder: Path, rows: int | None = None) -> Proof:
+def prove(folder: Path, compensator: Compensator, rows: int | None = None) -> Proof:
     """Analyse each side's core, and the drive.
 
     Each analysis gives the core every input, cut to pieces in another way. A place that one of them shows to be sound
@@ -99,6 +100,8 @@ def prove(folder: Path, rows: int | None = None) -> Proof:
     ----------
     folder : Path
         Firmware folder.
+    compensator : Compensator
+        Which it was made from.
     rows : int, optional
         So many codes of sensor B, from its first sound one on, in place of all: no proof, but a quick look.
 
@@ -107,7 +110,6 @@ def prove(folder: Path, rows: int | None = None) -> Proof:
     RequirementError
         If Frama-C fails or takes longer than `TIMEOUT_S`.
     """
-    compensator = read_compensator(folder)
     sources = sorted(path.name for path in (folder / "core").glob("*.[ch]"))
     alarms: set[Alarm] = set()
     functions: list[str] = []
@@ -144,7 +146,7 @@ def _pieces(law: ExactLaw, ending: str, tried: range) -> str:
     """Return pieces.h: the functions of a side, and the codes where the pieces of each input end; of B those tried."""
     a, b = _sound(law.a.valid_codes), _sound(law.b.valid_codes)
     commands = law.sound_commands
-    corners = {law.zero, law.full, law.zero + law.edge_codes, max(law.zero - law.edge_codes, 0)}
+    corners = {law.zero, law.full, law.zero + law.transition_codes, max(law.zero - law.transition_codes, 0)}
     ends = sorted({0, CODES, *_ends_of(commands), *corners, *(code + 1 for code in corners)})
     furthest = max(abs(code - law.zero) for code in (commands.start, commands.stop - 1))
     lines = [f"#define {function.upper()} dz_{function}{ending}" for function in ("comp", "beta", "status")]

@@ -7,9 +7,7 @@ from dzdesign.core.artefact_files import MANIFEST_NAME, check_inside, read_bytes
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.design.firmware_manifest import FirmwareManifest
-from dzdesign.identify.valve.model import ValveModel
 
 
 def read_firmware_manifest(folder: Path) -> FirmwareManifest:
