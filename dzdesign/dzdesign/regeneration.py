@@ -56,7 +56,7 @@ def regenerated(folder: Path, compensator: "Compensator | None" = None) -> "Chec
         return REGENERATED.check(holds=None, text=reason)
     content = read_bytes(folder / "compensator.json", "compensator")
     try:
-        expected = generate(read_compensator(folder), manifest.target, content).manifest
+        expected = generate(compensator or read_compensator(folder), manifest.target, content).manifest
     except InputError as error:
         return REGENERATED.check(holds=False, text=str(error))
     compared = {name: digest for name, digest in expected.files.items() if name not in expected.board}

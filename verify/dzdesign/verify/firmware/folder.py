@@ -1,6 +1,5 @@
 """A firmware folder as it is given: its manifest, and that nothing in it leads elsewhere."""
 
-from functools import lru_cache
 from pathlib import Path
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, check_inside, read_bytes
@@ -40,23 +39,7 @@ def read_compensator(folder: Path) -> Compensator:
         If it is missing or none.
     """
     path = folder / "compensator.json"
-    return _compensator(read_bytes(path, "compensator of the firmware"), str(path))
-
-
-@lru_cache(maxsize=1)
-def _compensator(content: bytes, source: str) -> Compensator:
-    """Read a compensator once for all checks of a firmware; nothing changes one."""
-    return compensator_from_document(content, source)
-
-
-@lru_cache(maxsize=1)
-def _valve(content: str) -> ValveModel:
-    return read_artefact(content.encode(), ValveModel, "compensator.json: valve")
-
-
-def valve_of(compensator: Compensator) -> ValveModel:
-    """Return the valve that a compensator was made from."""
-    return _valve(compensator.valve_document)
+    return read_artefact(read_bytes(path, "compensator of the firmware"), Compensator, str(path))
 
 
 def check_firmware_inside(folder: Path) -> None:
