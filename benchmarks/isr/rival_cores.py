@@ -124,8 +124,8 @@ static const double beta_node[{len(betas)}] = {{
 
 
 def _naive_law(c: Compensator) -> str:
-    share, u_min0 = _double(c.positive.k_x_max_over_u_max), _double(c.positive.u_min0_over_u_max * c.u_max_V)
-    in_shares = law(c.law_name).output.subs(symbols.k, symbols.kappa * symbols.u_max / symbols.x_max)
+    share, u_min0 = _double(c.positive.drive_range_over_u_max), _double(c.positive.u_min0_over_u_max * c.u_max_V)
+    in_shares = law(c.law).output.subs(symbols.k, symbols.kappa * symbols.u_max / symbols.x_max)
     # The numbers as symbols, so that none of them is computed beforehand.
     return sympy.ccode(in_shares.subs({symbols.kappa: sympy.Symbol(share), symbols.u_min0: sympy.Symbol(u_min0)}))
 

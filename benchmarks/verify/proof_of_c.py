@@ -8,7 +8,6 @@ from firmware import example_firmware
 from scoreboard import Row, print_rows, say
 
 from dzdesign.verify.analysis.frama_c import prove
-from dzdesign.verify.firmware.folder import read_compensator
 
 QUICK_ROWS = 20
 
@@ -22,7 +21,7 @@ def print_proof(quick: bool = False, seed: int = 0) -> list[Row]:
             example_firmware(firmware, target)
             say(f"{target}: Frama-C ...")
             start = perf_counter()
-            proof = prove(firmware, read_compensator(firmware), QUICK_ROWS if quick else None)
+            proof = prove(firmware, QUICK_ROWS if quick else None)
             seconds = perf_counter() - start
         note = f"{', '.join(proof.functions)} and the drive; {seconds:.0f} s, Frama-C {proof.version}"
         rows.append(Row(what=f"{target}: places left in doubt", value=len(proof.alarms), limit=0, note=note))

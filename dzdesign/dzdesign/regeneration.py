@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from dzdesign.core.artefact_files import read_bytes, sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL
 from dzdesign.core.errors import InputError, quoted
-from dzdesign.design.compensator import Compensator
 
 if TYPE_CHECKING:
     from dzdesign.design.firmware_manifest import FirmwareManifest
@@ -28,18 +27,16 @@ def with_regenerated(verification: "Verification", folder: Path) -> "Verificatio
     folder : Path
         Of the firmware.
     """
-    return verification.with_checks(regenerated(folder, verification.compensator))
+    return verification.with_checks(regenerated(folder))
 
 
-def regenerated(folder: Path, compensator: "Compensator | None" = None) -> "Check":
+def regenerated(folder: Path) -> "Check":
     """Tell whether every file is what `codegen` makes of compensator.json, but for those that are the user's.
 
     Parameters
     ----------
     folder : Path
         Of the firmware.
-    compensator : Compensator, optional
-        Of the folder; read there where it is not handed.
 
     Returns
     -------
@@ -56,7 +53,7 @@ def regenerated(folder: Path, compensator: "Compensator | None" = None) -> "Chec
         return REGENERATED.check(holds=None, text=reason)
     content = read_bytes(folder / "compensator.json", "compensator")
     try:
-        expected = generate(compensator or read_compensator(folder), manifest.target, content).manifest
+        expected = generate(read_compensator(folder), manifest.target, content).manifest
     except InputError as error:
         return REGENERATED.check(holds=False, text=str(error))
     compared = {name: digest for name, digest in expected.files.items() if name not in expected.board}

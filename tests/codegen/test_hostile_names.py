@@ -235,7 +235,7 @@ def test_a_manifest_that_names_what_lies_outside(place, name, key):
     folder = place / "firmware"
     digest = sha256_of(b"years of work")
     manifest_with(folder, lambda it: it["files"].update({name: digest}) if key == "files" else it["core"].append(name))
-    with pytest.raises(InputError, match="no file inside of the folder|expected text that is not empty"):
+    with pytest.raises(InputError, match=r"no file inside of the folder|expected text that is not empty"):
         read_firmware_manifest(folder)
     if key == "files":
         with pytest.raises(InputError, match="was not made by dzdesign"):

@@ -207,12 +207,11 @@ def test_an_honest_name_stays_and_many_are_counted():
 def hostile_compensator(target: str, names: list[str]):
     """The golden compensator of a valve whose recordings have these names."""
     compensator = golden_compensator(target)
-    valve = json.loads(compensator.valve_document)
-    valve["made_from"] = [{"source": name, "sha256": "0" * 64} for name in names]
-    for test in valve["sides"]["positive"]["tests"]:
-        test["source"] = names[0]
-        test["ramps"] = names
-    return replace(compensator, valve_document=to_json(valve))
+    side = compensator.valve.positive
+    tests = tuple(replace(test, source=names[0], ramps=tuple(names)) for test in side.tests)
+    made_from = tuple(SourceFile(source=name, sha256="0" * 64) for name in names)
+    valve = replace(compensator.valve, made_from=made_from, sides={"positive": replace(side, tests=tests)})
+    return replace(compensator, valve=valve)
 
 
 def without_banner(text: str) -> list[str]:

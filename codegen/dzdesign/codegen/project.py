@@ -143,7 +143,7 @@ def generate(
         target_named(designed_for.name).check_designed_for(designed_for)
     target.check_signals(compensator.signals)
     note = target.check_designed_for(designed_for) if designed_for else ""
-    document = compensator_bytes or to_json(compensator_document(compensator)).encode()
+    document = compensator_bytes or to_json_bytes(compensator)
     digest = sha256_of(document)
     core = {f"core/{name}": file for name, file in core_files(compensator, target.arithmetic).items()}
     banner = banner_of(compensator, digest)

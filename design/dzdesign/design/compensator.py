@@ -18,7 +18,7 @@ from dzdesign.design.drive_functions import RAMPED_CODES, DriveFunctions
 from dzdesign.design.lot_valves import LotValve
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import TargetInputs
-from dzdesign.identify.fitting.guard_curve import Guard
+from dzdesign.identify.valve.guard_curve import Guard
 from dzdesign.identify.valve.model import ValveModel
 
 #: What to do below the reference pressure drop: beta = 1 as in Eq. (7), or what the tests there say.
@@ -281,7 +281,7 @@ class Compensator(Artefact, ShownInNotebooks):
             n_adc=signals.command.span(sign),
             n_full=signals.compare_max,
         )
-        counts = line.slope * from_zero + line.start
+        counts: Fraction = line.slope * from_zero + line.start
         if from_zero < self.transition_codes:
             counts -= evaluate_transition(
                 beta_opening=beta,
@@ -294,7 +294,8 @@ class Compensator(Artefact, ShownInNotebooks):
 
     def drive(self, command_code: int, dp_code: int, sign: int = 1) -> Fraction:
         """Return u_O/u_max of the law at a code pair, exactly and before it is limited to 0...1."""
-        return drive(self.counts(command_code, dp_code, sign), self.signals.compare_max)
+        share: Fraction = drive(self.counts(command_code, dp_code, sign), self.signals.compare_max)
+        return share
 
     def compare(self, command_code: int, dp_code: int, sign: int = 1) -> int:
         """Return the PWM compare value: the law rounded to the nearest count (a half goes up), limited to the range."""

@@ -16,7 +16,7 @@ from dzdesign.design.costs import costs_of
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.quantise import Units, finest_units
 from dzdesign.design.signals import Signals
-from dzdesign.identify.fitting.guard_curve import GUARDS
+from dzdesign.identify.valve.guard_curve import GUARDS
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.side_model import SideModel
 
@@ -219,12 +219,12 @@ def prove_monotone(compensator: Compensator, sign: int) -> None:
     betas = [Fraction(end, compensator.beta_denominator) for end in (min(numerators), max(numerators))]
 
     def rises(candidate: Law) -> bool:
-        return all(candidate.evaluate_gain(beta, side.k_x_max_over_u_max) > 0 for beta in betas)
+        return all(candidate.evaluate_gain(beta, side.drive_range_over_u_max) > 0 for beta in betas)
 
     if not rises(chosen):
         others = [name for name in LAW_NAMES if rises(law(name))]
         raise InputError(
             f"law '{chosen.name}' would fall with rising command: it rises if {to_text(chosen.rises_if)}, but k x_max/"
-            f"u_max = {float(side.k_x_max_over_u_max):.3f} at beta = {float(max(betas)):.3f}"
+            f"u_max = {float(side.drive_range_over_u_max):.3f} at beta = {float(max(betas)):.3f}"
             + (f"; use --law {' or '.join(others)}" if others else "")
         )

@@ -80,7 +80,8 @@ def _numerators(nodes: Sequence[int], step: int, last: int) -> np.ndarray:
     """Return the table between its nodes, times their distance: whole numbers at every code from 0 to `last`."""
     index, past = np.divmod(np.arange(last + 1), step)
     table = np.array(nodes, dtype=np.int64)  # at most 2^31 times a step: far from 2^63
-    return table[index] * (step - past) + table[index + 1] * past
+    between: np.ndarray = table[index] * (step - past) + table[index + 1] * past
+    return between
 
 
 def prove_lot(compensator: Compensator) -> tuple[LotMargin, ...]:

@@ -221,7 +221,7 @@ def _near_the_least(
 def _limit(curve: OffsetCurve, dp_MPa: np.ndarray) -> np.ndarray:
     """Return in doubles what `offset_ceiling` limits the offset to, V: the curve and, where tested, its bound."""
     nodes, offset = (np.array([float(value) for value in values]) for values in (curve.dp_MPa, curve.offset_V))
-    value = np.interp(dp_MPa, nodes, offset)
+    value: np.ndarray = np.interp(dp_MPa, nodes, offset)
     if curve.hold_below_MPa is not None:
         hold = float(curve.hold_below_MPa)
         value = np.where(dp_MPa <= hold + NEAR_MPa, np.minimum(value, np.interp(hold, nodes, offset)), value)

@@ -15,6 +15,7 @@ from dzdesign.design.target_inputs import Count
 CODE_LIMIT = 65535
 #: Sensors of unlike scaling are brought to sensor A's counts by an integer weight over this power of two.
 WEIGHT_SHIFT = 12
+WEIGHT_UNIT = 1 << WEIGHT_SHIFT
 #: Differences of pressure codes fit 16 bits of the firmware, sign apart.
 LARGEST_DIFFERENCE = 32767
 
@@ -160,18 +161,18 @@ class Signals:
     @property
     def weight_b(self) -> int:
         """Weight of sensor B's codes over 2^`WEIGHT_SHIFT`, in codes of sensor A; exactly one for like sensors."""
-        return max(1, round(self.pressure_b.per_code_MPa / self.pressure_a.per_code_MPa * 2**WEIGHT_SHIFT))
+        return max(1, round(self.pressure_b.per_code_MPa / self.pressure_a.per_code_MPa * WEIGHT_UNIT))
 
     @property
     def like_sensors(self) -> bool:
         """True if both sensors count alike, so that the firmware needs no weight."""
-        return self.weight_b == 2**WEIGHT_SHIFT
+        return self.weight_b == WEIGHT_UNIT
 
     def difference(self, p_a_code: int, p_b_code: int, sign: int = 1) -> int:
         """Return the difference of two pressure codes, in codes of sensor A, as the firmware counts it."""
         a, b = p_a_code - self.pressure_a.zero_code, p_b_code - self.pressure_b.zero_code
         turn = -1 if sign < 0 and self.swapped else 1
-        return turn * (a * 2**WEIGHT_SHIFT - b * self.weight_b) >> WEIGHT_SHIFT
+        return turn * (a * WEIGHT_UNIT - b * self.weight_b) >> WEIGHT_SHIFT
 
     def largest_difference(self, sign: int) -> int:
         """Return the largest difference that sound codes make."""
@@ -184,7 +185,7 @@ class Signals:
         a, b = self.pressure_a, self.pressure_b
         low, high = a.error_MPa[0] - b.error_MPa[1], a.error_MPa[1] - b.error_MPa[0]
         # What the weight is off, at the sensor's largest code, and the shift that rounds down.
-        unlike = abs(b.per_code_MPa - a.per_code_MPa * self.weight_b / 2**WEIGHT_SHIFT) * self.code_max
+        unlike = abs(b.per_code_MPa - a.per_code_MPa * self.weight_b / WEIGHT_UNIT) * self.code_max
         if sign < 0 and self.swapped:
             low, high = -high, -low
         shift = 0 if self.like_sensors else a.per_code_MPa
@@ -192,11 +193,13 @@ class Signals:
 
     def dp_MPa(self, dp_code: int) -> Fraction:
         """Return the pressure drop that a difference of pressure codes stands for, exactly."""
-        return pressure_drop(dp_code, span=self.pressure_a.span_MPa, code_max=self._span_codes)
+        dp_MPa: Fraction = pressure_drop(dp_code, span=self.pressure_a.span_MPa, code_max=self._span_codes)
+        return dp_MPa
 
     def dp_code(self, dp_MPa: Fraction) -> Fraction:
         """Return the difference of pressure codes that a pressure drop makes, exactly (not rounded)."""
-        return pressure_drop_code(dp_MPa, span=self.pressure_a.span_MPa, code_max=self._span_codes)
+        code: Fraction = pressure_drop_code(dp_MPa, span=self.pressure_a.span_MPa, code_max=self._span_codes)
+        return code
 
     @property
     def _span_codes(self) -> int:

@@ -120,13 +120,13 @@ def _further_checks(
 
         with stage_progress() as stage:
             stage("comparing the machine code of other processors with the exact law, in simulators")
-            checks += machine_code_checks(folder, verification.evidence.inputs, verification.compensator)
+            checks += machine_code_checks(folder, verification.evidence.inputs)
     if arguments.proof:
         from dzdesign.verify.analysis.frama_c import proof_check
 
         with stage_progress() as stage:
             stage("reading the core's C for all inputs, with Frama-C: some minutes")
-            checks.append(proof_check(folder, verification.compensator))
+            checks.append(proof_check(folder))
     if not arguments.mutate:
         return checks, None
     from dzdesign.verify.analysis.mutation import (
@@ -137,7 +137,7 @@ def _further_checks(
         mutation_score,
     )
 
-    bench = MutationBench(folder, verification.compensator)
+    bench = MutationBench(folder)
     mutants = all_mutants(bench)
     say(f"checking the core with {len(mutants)} faults, one at a time")
     bench.check_original()

@@ -124,7 +124,7 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
 def print_firmware(firmware: "Firmware", console: "Console | None" = None, folder: str = "") -> None:
     """Print the files of a firmware, and in which folder they are."""
     console = console or new_console()
-    valves = json.loads(firmware.files["compensator.json"]).get("common_valves")
+    valves = len(json.loads(firmware.files["compensator.json"])["lot"])
     common = f", common setting of {valves} valves" if valves else ""
     place = f", in {folder}" if folder else ""
     put_line(console, f"Firmware for {firmware.manifest.target}, law {firmware.manifest.law}{common}{place}:")

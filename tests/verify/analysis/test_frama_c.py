@@ -8,7 +8,6 @@ import pytest
 from dzdesign.command_line.cli import main
 from dzdesign.verify.analysis import frama_c as proof
 from dzdesign.verify.analysis.frama_c import proof_check, prove
-from dzdesign.verify.firmware.folder import read_compensator
 from tests.support.core_variants import firmware
 
 needs_frama_c = pytest.mark.skipif(not shutil.which("frama-c"), reason="needs Frama-C: apt install frama-c-base")
@@ -28,8 +27,7 @@ def written(folder: Path, name: str, arithmetic: str) -> Path:
 @needs_frama_c
 @pytest.mark.parametrize(("name", "arithmetic"), [("plain", "wide"), ("bipolar, all options", "narrow")])
 def test_no_place_of_the_core_and_the_drive_is_left_in_doubt(name, arithmetic, tmp_path):
-    folder = written(tmp_path, name, arithmetic)
-    found = prove(folder, read_compensator(folder), FEW)
+    found = prove(written(tmp_path, name, arithmetic), FEW)
     assert found.alarms == ()
     assert ("dz_comp_negative" in found.functions) == name.startswith("bipolar")
 
@@ -53,7 +51,7 @@ def test_a_fault_is_seen(file, right, wrong, function, tmp_path):
     text = path.read_text()
     assert text.count(right) == 1
     path.write_text(text.replace(right, wrong))
-    assert function in {alarm.function for alarm in prove(folder, read_compensator(folder), FEW).alarms}
+    assert function in {alarm.function for alarm in prove(folder, FEW).alarms}
 
 
 def test_without_frama_c_the_requirement_is_not_checked(firmware_folder, tmp_path, monkeypatch, capsys):

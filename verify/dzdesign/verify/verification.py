@@ -39,8 +39,6 @@ class Verification(ShownInNotebooks):
     ----------
     evidence : Evidence
         Every requirement that was tried, with its figures; stored as verification.json.
-    compensator : Compensator
-        Which the firmware was made from.
     maps : tuple of InputMap
         What the core gives over its inputs, one a sign of command, to be drawn.
     loops : tuple of LoopComparison
@@ -48,7 +46,6 @@ class Verification(ShownInNotebooks):
     """
 
     evidence: Evidence
-    compensator: Compensator
     maps: tuple[InputMap, ...]
     loops: tuple[LoopComparison, ...]
 
@@ -161,7 +158,7 @@ def verify(
         monte_carlo=loop.monte_carlo,
         mutants=None,
     )
-    return Verification(evidence=evidence, compensator=compensator, maps=core.maps, loops=loop.loops)
+    return Verification(evidence=evidence, maps=core.maps, loops=loop.loops)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

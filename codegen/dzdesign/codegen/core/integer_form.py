@@ -168,7 +168,7 @@ def _terms(compensator: Compensator, sign: int) -> _Terms:
     without, whole = line(beta=0), line(beta=1)
     beta_unit = c.beta_denominator * c.beta_step_codes
     per_transition_code = Fraction(0)
-    if c.edge_codes:  # what one unit of the gap lowers at zero command, over the transition's codes
+    if c.transition_codes:  # what one unit of the gap lowers at zero command, over the transition's codes
         lowered = evaluate_transition(
             beta_opening=1,
             beta_closing=0,

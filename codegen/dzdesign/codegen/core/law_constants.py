@@ -97,10 +97,10 @@ class LawConstants:
     def _factor(self) -> list[Define]:
         """Return what beta multiplies, by command and alone, and what the transition takes away."""
         c, form, side = self.compensator, self.form, self.compensator.side(self.sign)
-        chosen = law(c.law_name)
+        chosen = law(c.law)
         equation = equation_of(chosen)
-        kappa, u_min0 = side.k_x_max_over_u_max, side.u_min0_over_u_max
-        kappa_key, u_min0_key = f"{self.key}.k_x_max_over_u_max", f"{self.key}.u_min0_over_u_max"
+        kappa, u_min0 = side.drive_range_over_u_max, side.u_min0_over_u_max
+        kappa_key, u_min0_key = f"{self.key}.drive_range_over_u_max", f"{self.key}.u_min0_over_u_max"
         u_min0_text = f"u_min0/u_max = {u_min0}, {U_MIN0_ROUNDING}"
         found = []
         size = ", its size" if self.narrow and form.slope < 0 else ""
@@ -147,10 +147,10 @@ class LawConstants:
         if not form.linear:
             return []
         total = form.linear << form.linear_shift
-        chosen = law(c.law_name)
+        chosen = law(c.law)
         equation = f"{equation_of(chosen)}, coefficient of u_i alone in u_O"
         engineering = f"{self._per_volt(total):.6f}"
-        kappa = (f"{self.key}.k_x_max_over_u_max",) if chosen.gain_by_beta(0).has(k) else ()
+        kappa = (f"{self.key}.drive_range_over_u_max",) if chosen.gain_by_beta(0).has(k) else ()
         data = (*kappa, *SCALED)
         high, low = divmod(total, 1 << 32)
         if low == 0:

@@ -212,6 +212,6 @@ def _of_the_table(compensator: Compensator | None) -> str:
 def _beta_table(compensator: Compensator, name: str) -> tuple[np.ndarray, np.ndarray, float]:
     """Return pressure drops (MPa) and betas at the nodes of the compensator's table, and its u_min0 (V)."""
     law = laws_of(compensator)[name]
-    nodes = np.array(law.beta_numerators)
+    nodes = np.array(law.beta)
     where = np.arange(nodes.size) * compensator.beta_step_codes * float(compensator.signals.pressure_a.per_code_MPa)
     return where, nodes / compensator.beta_denominator, float(law.u_min0_over_u_max * compensator.u_max_V)

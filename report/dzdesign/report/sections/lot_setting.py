@@ -61,7 +61,7 @@ def _costs_of_side(compensator: Compensator, name: str) -> Iterator[LotCost]:
     for valve_name, side in _lot_sides(compensator, name):
         shares = [
             (_share(corners_at(round(compensator.signals.dp_code(Fraction(dp)))), bound * counts_per_V), dp)
-            for dp, bound in zip(side.dp_MPa, side.lower_V, strict=True)
+            for dp, bound in zip(side.dp_MPa, side.u_lower_V, strict=True)
         ]
         (least, least_at), (most, most_at) = min(shares), max(shares)
         yield LotCost(

@@ -20,7 +20,6 @@ from typing import NamedTuple
 import numpy as np
 
 from dzdesign.core.errors import RequirementError
-from dzdesign.design.compensator import Compensator
 from dzdesign.verify.evidence import Check
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.firmware.folder import read_compensator
@@ -66,7 +65,7 @@ class Proof:
     alarms: tuple[Alarm, ...]
 
 
-def proof_check(folder: Path, compensator: Compensator | None = None) -> Check:
+def proof_check(folder: Path) -> Check:
     """Return the requirement that no input makes the core's C overflow, index beyond a table or shift too far.
 
     Returns
@@ -77,7 +76,7 @@ def proof_check(folder: Path, compensator: Compensator | None = None) -> Check:
     if not shutil.which(PROGRAM):
         return UNDEFINED_BEHAVIOUR.check(holds=None, text=f"not run: {PROGRAM} not found; apt install frama-c-base")
     try:
-        proof = prove(folder, compensator or read_compensator(folder))
+        proof = prove(folder)
     except RequirementError as error:
         return UNDEFINED_BEHAVIOUR.check(holds=None, text=f"not run: {error}")
     if proof.alarms:
@@ -90,7 +89,7 @@ def proof_check(folder: Path, compensator: Compensator | None = None) -> Check:
     return UNDEFINED_BEHAVIOUR.check(holds=not proof.alarms, text=f"{text}; Frama-C {proof.version}, -machdep x86_16")
 
 
-def prove(folder: Path, compensator: Compensator, rows: int | None = None) -> Proof:
+def prove(folder: Path, rows: int | None = None) -> Proof:
     """Analyse each side's core, and the drive.
 
     Each analysis gives the core every input, cut to pieces in another way. A place that one of them shows to be sound
@@ -100,8 +99,6 @@ def prove(folder: Path, compensator: Compensator, rows: int | None = None) -> Pr
     ----------
     folder : Path
         Firmware folder.
-    compensator : Compensator
-        Which it was made from.
     rows : int, optional
         So many codes of sensor B, from its first sound one on, in place of all: no proof, but a quick look.
 
@@ -110,6 +107,7 @@ def prove(folder: Path, compensator: Compensator, rows: int | None = None) -> Pr
     RequirementError
         If Frama-C fails or takes longer than `TIMEOUT_S`.
     """
+    compensator = read_compensator(folder)
     sources = sorted(path.name for path in (folder / "core").glob("*.[ch]"))
     alarms: set[Alarm] = set()
     functions: list[str] = []

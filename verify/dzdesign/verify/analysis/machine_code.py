@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dzdesign.core.errors import RequirementError
-from dzdesign.design.compensator import Compensator
 from dzdesign.verify.evidence import Check, InputCheck
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import SAMPLED_STRIDE, PreparedInputs
@@ -31,9 +30,7 @@ class MachineCheck:
         return not self.found.faults and self.found.outputs_hash == self.host_hash
 
 
-def check_on_machine(
-    folder: Path, machine: Machine, host: InputCheck, compensator: Compensator | None = None
-) -> MachineCheck:
+def check_on_machine(folder: Path, machine: Machine, host: InputCheck) -> MachineCheck:
     """Check one side's machine code for another processor.
 
     Parameters
@@ -45,8 +42,6 @@ def check_on_machine(
         host's second look at the pairs of pressures.
     host : InputCheck
         The host's check of that side.
-    compensator : Compensator, optional
-        Of the folder; read there where it is not handed.
 
     Raises
     ------
@@ -54,7 +49,7 @@ def check_on_machine(
         If the core does not compile or the program does not end there.
     """
     core = CompiledCore(folder, host.sign)
-    prepared = PreparedInputs(ExactLaw(compensator or read_compensator(folder), host.sign))
+    prepared = PreparedInputs(ExactLaw(read_compensator(folder), host.sign))
     if machine.small:
         sample = prepared.sample()
         found, host_hash = core.check(sample, machine), core.check(sample, sample=True).outputs_hash
@@ -63,9 +58,7 @@ def check_on_machine(
     return MachineCheck(machine=machine, sign=host.sign, found=found, host_hash=host_hash)
 
 
-def machine_code_checks(
-    folder: Path, inputs: tuple[InputCheck, ...], compensator: Compensator | None = None
-) -> list[Check]:
+def machine_code_checks(folder: Path, inputs: tuple[InputCheck, ...]) -> list[Check]:
     """Return one requirement a machine: its machine code is right at every input, or at a sample of them."""
     checks = []
     for machine in MACHINES:
@@ -75,7 +68,7 @@ def machine_code_checks(
             checks.append(MACHINE_CODE.check(name=name, holds=None, text=f"not run: {missing}"))
             continue
         try:
-            done = [check_on_machine(folder, machine, host, compensator) for host in inputs]
+            done = [check_on_machine(folder, machine, host) for host in inputs]
         except RequirementError as error:
             checks.append(MACHINE_CODE.check(name=name, holds=False, text=str(error)))
             continue

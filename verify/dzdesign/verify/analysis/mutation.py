@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 from dzdesign.core.errors import RequirementError
-from dzdesign.design.compensator import Compensator
 from dzdesign.verify.analysis.c_mutants import Mutant, mutants_of
 from dzdesign.verify.evidence import Check, MutantOutcome, MutationScore
 from dzdesign.verify.exhaustive.drive_check import CompiledDrive, PreparedDrive
@@ -37,8 +36,8 @@ RANDOM_TRIPLES = 2**24
 class MutationBench:
     """The checks that a mutant has to pass, prepared once."""
 
-    def __init__(self, folder: Path, compensator: Compensator | None = None) -> None:
-        self._compensator = compensator or read_compensator(folder)
+    def __init__(self, folder: Path) -> None:
+        self._compensator = read_compensator(folder)
         self._signs = self._compensator.signals.signs
         self._cores = {sign: CompiledCore(folder, sign) for sign in self._signs}
         prepared = {sign: PreparedInputs(ExactLaw(self._compensator, sign)) for sign in self._signs}

@@ -1,5 +1,6 @@
 """A firmware folder as it is given: its manifest, and that nothing in it leads elsewhere."""
 
+from functools import lru_cache
 from pathlib import Path
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, check_inside, read_bytes
@@ -39,7 +40,13 @@ def read_compensator(folder: Path) -> Compensator:
         If it is missing or none.
     """
     path = folder / "compensator.json"
-    return read_artefact(read_bytes(path, "compensator of the firmware"), Compensator, str(path))
+    return _compensator(read_bytes(path, "compensator of the firmware"), str(path))
+
+
+@lru_cache(maxsize=1)
+def _compensator(content: bytes, source: str) -> Compensator:
+    """Read a compensator once for all checks of a firmware; nothing changes one."""
+    return read_artefact(content, Compensator, source)
 
 
 def check_firmware_inside(folder: Path) -> None:
