@@ -23,6 +23,7 @@ from dzdesign.codegen.project import TARGET_NAMES, generate, target_named
 from dzdesign.codegen.target import folder_of
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import write_folder
+from dzdesign.core.artefact_types import SourceFile
 from dzdesign.core.errors import DzdesignError, InputError
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from tests.support.golden_firmware import GOLDENS, golden_compensator
