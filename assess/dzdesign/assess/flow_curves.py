@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.knees.linear_region import USEFUL_FLOW, find_straight_parts
 from dzdesign.identify.knees.gated_line import GATE, GatedLine, PreparedBranch, prepare_branch
+from dzdesign.identify.knees.linear_region import USEFUL_FLOW, find_straight_parts
 from dzdesign.identify.knees.noise import robust_sigma
 from dzdesign.identify.knees.prepared_tests import split_recordings
 from dzdesign.identify.knees.profile import flow_at_top, smooth_profile

@@ -28,7 +28,7 @@ from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.results import SideIdentification
 from dzdesign.identify.valve.guard_curve import GUARDS, Guard, GuardCurve, OpeningCurve
 from dzdesign.identify.valve.ramp_result import BRANCHES, TestResult
-from dzdesign.identify.valve.side_model import Certificate, Reference, SideModel
+from dzdesign.identify.valve.side_model import BoundsBasis, Reference, SideModel
 
 #: dP0 names the tested pressure drop within this share of it.
 REFERENCE_TOLERANCE = 0.1
@@ -118,7 +118,7 @@ def _side_model(
         trend_change_V=trend.change if several else None,
         trend_change_se_V=trend.change_se if several else None,
         trend_p=trend.p_value if several else None,
-        certificate=Certificate(
+        certificate=BoundsBasis(
             confidence=options.confidence,
             guard=guard,
             level_L_min=max(shape.level for item in described for shape in item.branches) / L_MIN,

@@ -17,7 +17,7 @@ from dzdesign.identify.identification import identify
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.test_record import LONGEST_NAME, LONGEST_TEXT, MOST_ENTRIES, checked_record
 from dzdesign.stages.identify import record_of
-from tests.support.page_reader import Page
+from tests.support.html_pages import Page
 from tests.support.schema_checks import problems
 from tests.support.synthetic import Truth, synthetic_ramp
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 from msgspec import Meta
@@ -14,7 +14,7 @@ from dzdesign.identify.valve.staircase import Direction, staircase
 
 Guard = Literal["closing", "mean", "opening"]
 #: Thresholds that a certificate may protect, from the safest on.
-GUARDS: tuple[Guard, ...] = ("closing", "mean", "opening")
+GUARDS: tuple[Guard, ...] = get_args(Guard)
 #: Numbers of the file are right to seven decimals; a comparison of two allows ten times that.
 ROUNDING_V = 1e-6
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, get_args
 
 from msgspec import Meta
 
@@ -12,7 +12,7 @@ from dzdesign.identify.valve.quantity_types import Flow, PressureDrop, Probabili
 from dzdesign.identify.valve.ramp_result import TestResult
 from dzdesign.identify.valve.staircase import Direction
 
-TRENDS = ("decreasing", "flat", "increasing")
+DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,7 +34,7 @@ class BetaNodes:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Certificate:
+class BoundsBasis:
     """What the lower bounds rest on."""
 
     confidence: Annotated[
@@ -85,7 +85,7 @@ class SideModel:
     valid_dp_MPa: Annotated[
         tuple[PressureDrop, PressureDrop] | None, quantity("MPa", "Tested interval; nothing is certified outside it.")
     ] = field(init=False)
-    certificate: Annotated[Certificate, Meta(description="What the lower bounds rest on.")]
+    certificate: Annotated[BoundsBasis, Meta(description="What the lower bounds rest on.")]
     active_constraints: Annotated[
         tuple[str, ...], Meta(description="Constraints of the fits that hold with equality, in words.")
     ]
@@ -104,7 +104,7 @@ class SideModel:
 
     def __post_init__(self) -> None:
         if self.trend is None and len(self.tests) != 1:
-            raise RuleError(f"trend is missing beside {len(self.tests)} tests, expected one of {', '.join(TRENDS)}")
+            raise RuleError(f"trend is missing beside {len(self.tests)} tests, expected one of {', '.join(DIRECTIONS)}")
         if self.certificate.guard not in self.guards or not set(self.guards) <= set(GUARDS):
             raise RuleError(
                 f"the guard is '{self.certificate.guard}' and there are curves of {', '.join(self.guards) or 'none'}, "
