@@ -9,7 +9,7 @@ import subprocess
 import pytest
 
 from dzdesign.verify.toolchain.host_compiler import STRICT, host_compiler
-from tests.support.page_runner import try_page
+from tests.support.documented_commands import try_page
 from tests.support.paths import ROOT
 from tests.support.synthetic import needs_compiler
 

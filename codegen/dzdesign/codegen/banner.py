@@ -1,6 +1,5 @@
 """The first lines of every generated file: what wrote it, from what, and whose recordings are behind it; no date."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -39,11 +38,11 @@ class Banner:
 
 def banner_of(compensator: Compensator, digest: str) -> Banner:
     """Return the banner of a compensator whose file has this SHA-256."""
-    valve = json.loads(compensator.valve_document)
+    valve = compensator.valve
     return Banner(
         digest=digest,
-        recordings=[str(entry["source"]) for entry in valve.get("made_from", ())],
-        simulated=any(warning["code"] == "simulated" for warning in valve.get("warnings", ())),
+        recordings=[file.source for file in valve.made_from],
+        simulated=any(warning.code == "simulated" for warning in valve.warnings),
         lot=lot_in_words(compensator),
     )
 

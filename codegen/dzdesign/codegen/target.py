@@ -9,9 +9,8 @@ from types import MappingProxyType
 
 from dzdesign.codegen.telemetry.frame import Link
 from dzdesign.core.errors import DzdesignError, InputError
-from dzdesign.design.request import TargetInputs
-from dzdesign.design.signal_text import Converter
 from dzdesign.design.signals import Signals
+from dzdesign.design.target_inputs import Converter, TargetInputs
 
 #: Products that the core may use: 32x32->64 bits, or none longer than 32 bits.
 ARITHMETICS = ("wide", "narrow")

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.signal_text import Converter
 from dzdesign.design.signals import CommandSignal, PressureSignal
+from dzdesign.design.target_inputs import Converter
 
 #: Shares of full command, of each sign, that the first power-up gives.
 TRIED = (Fraction(1, 10), Fraction(1, 2), Fraction(1))

@@ -3,6 +3,7 @@
 Light on imports: the command line reads the options here.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,7 +11,7 @@ from dzdesign.core.options import AMPLIFIER, CONNECTIONS, LAW, Option, Text, arg
 from dzdesign.derivation.laws import LAW_NAMES
 
 if TYPE_CHECKING:
-    from dzdesign.design.signal_text import Converter
+    from dzdesign.design.target_inputs import TargetInputs
 
 POLARITIES, NEGATIVE_DP = ("normal", "inverted"), ("same", "swapped")
 
@@ -31,7 +32,7 @@ class DesignChoices:
         "C", LAW, "0 %", "1 %")] = None
     below_dp0: Annotated[Text, Option(
         "Below dP0: hold beta = 1 as the paper does, or extend it to the tests there.",
-        "B", LAW, "hold", choices="dzdesign.design.compensator:BELOW_REFERENCE")] = None
+        "B", LAW, "hold", choices="dzdesign.design.compensator:BELOW_DP0")] = None
     output_max: Annotated[Text, Option("Largest drive, in percent of full drive.", "C", LAW, "100 %", "95 %")] = None
     accept: Annotated[Text, Option(
         "Design in spite of this warning: branch-order (default: refuse).",
@@ -73,19 +74,8 @@ DEFAULTS = {argument.name: argument.option.default for argument in arguments_of(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TargetInputs:
-    """What `design` needs to know of a target: its converter, its timer's counts, samples and PWM periods a second."""
-
-    name: str
-    converter: "Converter"
-    compare_max: int
-    sample_Hz: int
-    tick_Hz: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class DesignRequest:
     """The target that was designed for, and name and text of every option, a default where none was given."""
 
-    target: TargetInputs
-    options: tuple[tuple[str, str], ...]
+    target: "TargetInputs"
+    options: Mapping[str, str]

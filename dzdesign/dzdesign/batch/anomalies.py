@@ -59,7 +59,7 @@ def _shared_recordings(found: Sequence[ValveFolder], known: Collection[tuple[str
     """A bench that saves a recording under the wrong name gives a valve the firmware of another."""
     owners: dict[str, list[str]] = {}
     for each in found:
-        for source in each.manifest.made_from if each.designed else ():
+        for source in each.manifest.made_from if each.compensator else ():
             owners.setdefault(source.sha256, []).append(each.name)
     groups = dict.fromkeys(tuple(dict.fromkeys(names)) for names in owners.values())
     return [

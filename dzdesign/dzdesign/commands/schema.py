@@ -18,7 +18,7 @@ from dzdesign.core.options import Option, Text
 SCHEMAS: Mapping[str, tuple[str, str, str]] = MappingProxyType(
     {
         "valve": ("dzdesign.identify.valve.model:ValveModel", "valve.json", "identify"),
-        "compensator": ("dzdesign.design", "compensator.json", "design"),
+        "compensator": ("dzdesign.design.compensator:Compensator", "compensator.json", "design"),
         "firmware": ("dzdesign.design.firmware_manifest:FirmwareManifest", "manifest.json of a firmware", "codegen"),
         "evidence": ("dzdesign.verify.evidence:Evidence", "verification.json", "verify"),
         "assessment": ("dzdesign.assess.assessment:Assessment", "assessment.json", "assess"),

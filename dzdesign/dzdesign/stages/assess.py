@@ -72,11 +72,6 @@ class AssessArguments(RampArguments):
 def assess(arguments: AssessArguments) -> "Assessment":
     """Compare ramp tests without and with the compensator.
 
-    Parameters
-    ----------
-    arguments : AssessArguments
-        Of the stage.
-
     Raises
     ------
     InputError
@@ -132,13 +127,7 @@ def _read_set(name: str, patterns: Paths, columns: Table, arguments: AssessArgum
 
 
 def assess_options(arguments: AssessArguments) -> "AssessOptions":
-    """Return the engineer's choices, SI.
-
-    Parameters
-    ----------
-    arguments : AssessArguments
-        As written.
-    """
+    """Return the engineer's choices, SI."""
     from dzdesign.assess.limits import parse_limits
     from dzdesign.assess.options import AssessOptions
     from dzdesign.identify.options import IdentifyOptions

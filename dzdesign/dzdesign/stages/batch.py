@@ -11,11 +11,6 @@ if TYPE_CHECKING:
 def batch(arguments: BatchArguments) -> "LotSummary":
     """Calibrate many valves; an earlier run in the folder is continued.
 
-    Parameters
-    ----------
-    arguments : BatchArguments
-        Of the stage.
-
     Returns
     -------
     LotSummary

@@ -36,11 +36,6 @@ class GenerateArguments(DesignChoices):
 def generate(arguments: GenerateArguments) -> "Firmware":
     """Generate the C project of a compensator, whose numbers are derived again first.
 
-    Parameters
-    ----------
-    arguments : GenerateArguments
-        Of the stage.
-
     Raises
     ------
     InputError
@@ -50,8 +45,8 @@ def generate(arguments: GenerateArguments) -> "Firmware":
     from dzdesign.codegen.project import generate as generate_project
     from dzdesign.core.artefact_reading import read_artefact
     from dzdesign.core.artefact_types import schema_of
+    from dzdesign.design.compensator import SCHEMA as COMPENSATOR_SCHEMA
     from dzdesign.design.compensator import Compensator
-    from dzdesign.design.compensator_file import SCHEMA as COMPENSATOR_SCHEMA
     from dzdesign.design.designing import design as design_valve
     from dzdesign.design.firmware_manifest import FirmwareManifest
     from dzdesign.identify.valve.model import SCHEMA as VALVE_SCHEMA
@@ -77,10 +72,11 @@ def generate(arguments: GenerateArguments) -> "Firmware":
 
 
 def _read_compensator(content: bytes, source: str, choices: DesignChoices) -> "Compensator":
-    from dzdesign.design.compensator_file import compensator_from_document
+    from dzdesign.core.artefact_reading import read_artefact
+    from dzdesign.design.compensator import Compensator
     from dzdesign.design.redesign_check import refuse_unsaid
 
-    compensator = compensator_from_document(content, source)
+    compensator = read_artefact(content, Compensator, source)
     refuse_unsaid(compensator, source)
     return _proven(compensator, f"'{source}'", choices)
 

@@ -96,11 +96,6 @@ def _is_plain(value: object) -> bool:
 def identify(arguments: IdentifyArguments) -> "ValveModel":
     """Identify a valve from ramp tests.
 
-    Parameters
-    ----------
-    arguments : IdentifyArguments
-        Of the stage.
-
     Raises
     ------
     InputError

@@ -31,11 +31,6 @@ class InitArguments(ColumnArguments):
 def init(arguments: InitArguments) -> "Proposal":
     """Look at recordings and propose the options file.
 
-    Parameters
-    ----------
-    arguments : InitArguments
-        Of the stage.
-
     Returns
     -------
     Proposal

@@ -30,11 +30,6 @@ class ReportArguments:
 def report(arguments: ReportArguments) -> "Report":
     """Make the report of a folder of artefacts, or of a lot.
 
-    Parameters
-    ----------
-    arguments : ReportArguments
-        Of the stage.
-
     Returns
     -------
     Report

@@ -47,11 +47,6 @@ class SimulatedRamps:
 def simulate(arguments: SimulateArguments) -> SimulatedRamps:
     """Simulate ramp tests of a valve, marked as simulated.
 
-    Parameters
-    ----------
-    arguments : SimulateArguments
-        Of the stage.
-
     Raises
     ------
     InputError

@@ -15,7 +15,8 @@ from dzdesign.core.artefact_files import open_bytes
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.units import measures, si_factor
 from dzdesign.identify.constants import L_MIN, MPA
-from dzdesign.identify.knees.prepared_tests import DescribedTests, describe_tests
+from dzdesign.identify.knees.described_tests import DescribedTests
+from dzdesign.identify.knees.prepared_tests import describe_tests
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.sides import tests_of_side
 from dzdesign.identify.ramps.splitting import despiked
@@ -321,18 +322,19 @@ def look_at_sides(tests: Sequence[RampTest], u_max: float) -> tuple[dict[str, Se
     seen, refused = {}, {}
     options = IdentifyOptions(u_max=u_max)
     for name, sign in SIDES.items():
-        mine = tests_of_side(tests, sign, u_max)
-        if not mine:
+        of_side = tests_of_side(tests, sign, u_max)
+        if not of_side:
             continue
         try:
-            seen[name] = _seen(describe_tests(mine, options))
+            seen[name] = _seen(describe_tests(of_side, options))
         except InputError as error:
             refused[name] = str(error)
     return seen, refused
 
 
 def _seen(group: DescribedTests) -> SeenSide:
-    rates = [branch.rate for item in group.tests for branch in item.branches if branch and math.isfinite(branch.rate)]
+    rates = [shape.prepared.branch.rate for item in group.tests for shape in item.branches]
+    rates = [rate for rate in rates if math.isfinite(rate)]
     return SeenSide(
         dp_MPa=tuple(None if item.dp is None else item.dp / MPA for item in group.tests),
         ramps=sum(len(item.ramps) for item in group.tests),

@@ -14,12 +14,12 @@ from dzdesign.identify.data_quality.pressures import (
     about_stuck_recordings,
     about_typed_pressures,
 )
-from dzdesign.identify.data_quality.quality import most_serious_first
 from dzdesign.identify.data_quality.recordings import about_recordings
+from dzdesign.identify.data_quality.side_warnings import most_serious_first
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.sides import tests_of_side
 from dzdesign.identify.reading.ramp_test import RampTest
-from dzdesign.identify.side import IdentifiedSide, identify_side
+from dzdesign.identify.side import SideIdentification, identify_side
 from dzdesign.identify.valve.model import DECIMALS, SIDES, Meter, ValveModel, Warning_
 
 #: What ramps of several pressure drops show where a stuck sensor has made one test of them: no word on meter or valve.
@@ -27,11 +27,11 @@ ALSO_OF_A_MIXTURE = ("noise", "bend")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Identified:
+class Identification:
     """The model of a valve, and per side what it was found from."""
 
     model: ValveModel
-    sides: dict[str, IdentifiedSide]
+    sides: dict[str, SideIdentification]
 
 
 def identify(
@@ -64,12 +64,12 @@ def identify(
 
 def identify_sides(
     tests: Sequence[RampTest], options: IdentifyOptions | None = None, record: Mapping[str, str] | None = None
-) -> Identified:
+) -> Identification:
     """Identify a valve as `identify` does, and return beside it what each side was found from."""
     options = options or IdentifyOptions()
     if not tests:
         raise InputError("no ramp tests were given; expected at least one file")
-    sides: dict[str, IdentifiedSide] = {}
+    sides: dict[str, SideIdentification] = {}
     warnings: list[Warning_] = []
     for name, sign in SIDES.items():
         mine = tests_of_side(tests, sign, options.u_max)
@@ -111,7 +111,7 @@ def identify_sides(
         record=dict(record or {}),
     )
     model = rounded(model, DECIMALS)
-    return Identified(
+    return Identification(
         model=model, sides={name: replace(side, model=model.sides[name]) for name, side in sides.items()}
     )
 

@@ -11,17 +11,15 @@ from typing import Any
 from dzdesign.assess.assessment import Assessment
 from dzdesign.core.artefact_files import MANIFEST_NAME, TOOL, parse_document, sha256_of
 from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.core.artefact_types import THIS_TOOL, Artefact, SourceFile, schema_of, to_json_bytes
+from dzdesign.core.artefact_types import Artefact, SourceFile, schema_of, to_json_bytes
 from dzdesign.core.documents import written_by
 from dzdesign.core.errors import InputError
+from dzdesign.design.compensator import SCHEMA as COMPENSATOR_SCHEMA
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.compensator_file import SCHEMA as COMPENSATOR_SCHEMA
-from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.design.redesign_check import prove_derived
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.artefact_folder import VERIFICATION_NAME, is_of, listed_files
-from dzdesign.report.compensator_sides import valve_in
 from dzdesign.report.reproduction import Reproduction
 from dzdesign.verify.evidence import Evidence
 
@@ -48,7 +46,7 @@ def _typed(label: str, kind: type[Artefact]) -> Kind:
 
 
 def _read_compensator(content: bytes, name: str) -> Compensator:
-    compensator = compensator_from_document(content, name)
+    compensator = read_artefact(content, Compensator, name)
     if parse_document(content, name, (COMPENSATOR_SCHEMA,))["tool"] == TOOL:  # another may have chosen other tables
         prove_derived(compensator)
     return compensator
@@ -255,7 +253,7 @@ class _Search:
             else:
                 self._miss("valve")
             return
-        held, place = valve_in(self.found["compensator"]), self.places["compensator"]
+        held, place = self.found["compensator"].valve, self.places["compensator"]
         named = place.made_from[0].source
         name = self._of_hash(stated)
         if name is None:
@@ -346,9 +344,6 @@ class _Search:
         self.places[role] = _place(name, self.hashes[name], self.found[role])
 
 
-def _place(name: str, sha256: str, artefact: Artefact | Compensator) -> Place:
-    if isinstance(artefact, Compensator):
-        source = SourceFile(source="valve.json", sha256=artefact.valve_sha256)
-        return Place(name=name, sha256=sha256, made_by=f"{THIS_TOOL.name} {THIS_TOOL.version}", made_from=(source,))
+def _place(name: str, sha256: str, artefact: Artefact) -> Place:
     tool = artefact.tool
     return Place(name=name, sha256=sha256, made_by=f"{tool.name} {tool.version}", made_from=artefact.made_from)

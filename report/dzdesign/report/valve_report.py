@@ -129,11 +129,11 @@ def make_report(chain: Chain) -> Report:
         record=tuple(chain.valve.record.items()) if chain.valve else (),
         figures=figures,
         lot=lot,
-        carrier=carrier_of(compensator) if compensator and compensator.common_valves else "",
+        carrier=carrier_of(compensator) if compensator and compensator.lot else "",
         headings=[(name, heading) for name, heading in SECTIONS if name in sections],
         sections=sections,
         missing=chain.missing,
-        law=account_of(compensator.law_name) if compensator else None,
+        law=account_of(compensator.law) if compensator else None,
     )
     return Report(
         html=html,
@@ -159,14 +159,14 @@ def _sections(chain: Chain) -> dict[str, Section]:
         "warnings": warnings_section(chain.valve, compensator),
         "provenance": provenance_section(chain),
     }
-    if compensator and compensator.common_valves:
+    if compensator and compensator.lot:
         sections |= {name: replace(sections[name], of_valve=True) for name in OF_A_VALVE}
         sections["lot"] = lot_section(compensator)
     return sections
 
 
 def _title(chain: Chain) -> str:
-    count = chain.compensator.common_valves if chain.compensator else 0
+    count = len(chain.compensator.lot) if chain.compensator else 0
     what = f"Lot setting of {count} valves: dead-zone compensator" if count else "Dead-zone compensator"
     if chain.firmware:
         return f"{what} for {chain.firmware.target}, law “{chain.firmware.law}”"

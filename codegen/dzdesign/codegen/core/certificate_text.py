@@ -37,7 +37,7 @@ def certificate_lines(compensator: Compensator, sign: int) -> list[str]:
 def _counted(compensator: Compensator) -> str:
     """Return what the certificate's margin is left of."""
     rounding = "the converters' error and the rounding to counts"
-    if not compensator.amplifier.dither_counts:
+    if not compensator.drive_functions.dither_counts:
         return rounding
-    peak = compensator.amplifier.dither_counts / compensator.signals.compare_max * float(compensator.u_max_V)
+    peak = compensator.drive_functions.dither_counts / compensator.signals.compare_max * float(compensator.u_max_V)
     return f"{rounding} and the dither's peak of {1e3 * peak:.4g} mV, which dz_drive adds to it"

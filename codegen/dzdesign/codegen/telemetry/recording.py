@@ -20,7 +20,7 @@ from dzdesign.codegen.telemetry.frame import (
 from dzdesign.core.artefact_files import MANIFEST_NAME, TOOL, read_bytes, sha256_of
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
-from dzdesign.design.compensator_file import compensator_from_document
+from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.design.signals import PressureSignal
 
@@ -63,7 +63,7 @@ def scalings_of(folder: Path) -> Scalings:
     if target.link is None:
         raise InputError(f"the target {target.name} of '{folder}' sends no telemetry; f28335 does")
     content = read_bytes(folder / "compensator.json", "compensator file")
-    compensator = compensator_from_document(content, str(folder / "compensator.json"))
+    compensator = read_artefact(content, Compensator, str(folder / "compensator.json"))
     signals = compensator.signals
     return Scalings(
         link=target.link,

@@ -204,7 +204,7 @@ def beta_figure(
 def _of_the_table(compensator: Compensator | None) -> str:
     if compensator is None:
         return ""
-    holds = compensator.below_reference == "hold"
+    holds = compensator.below_dp0 == "hold"
     held = " Up to dP0 the C holds what it has there, as the paper does." if holds else ""
     return f"{held} The table in the C is rounded down, so that it stays below the staircase."
 
@@ -212,6 +212,6 @@ def _of_the_table(compensator: Compensator | None) -> str:
 def _beta_table(compensator: Compensator, name: str) -> tuple[np.ndarray, np.ndarray, float]:
     """Return pressure drops (MPa) and betas at the nodes of the compensator's table, and its u_min0 (V)."""
     law = laws_of(compensator)[name]
-    nodes = np.array(law.beta_numerators)
+    nodes = np.array(law.beta)
     where = np.arange(nodes.size) * compensator.beta_step_codes * float(compensator.signals.pressure_a.per_code_MPa)
     return where, nodes / compensator.beta_denominator, float(law.u_min0_over_u_max * compensator.u_max_V)

@@ -241,7 +241,7 @@ def _unfinished(folder: Path, found: UnfinishedLot, own_hash: tuple[str, str]) -
         warning_texts={
             warning.code: warning.text
             for each in reversed(valves)
-            for warning in (reversed(each.designed.valve.warnings) if each.designed else ())
+            for warning in (reversed(each.compensator.valve.warnings) if each.compensator else ())
         },
         faults=tuple(faults),
         missing=(

@@ -23,7 +23,7 @@ NOT_PROVED = (
 
 def warnings_section(valve: ValveModel | None, compensator: Compensator | None) -> Section:
     """Return the section on warnings, costs, signals, and what is not proved."""
-    accepted = dict(compensator.request.options).get("accept", "") if compensator and compensator.request else ""
+    accepted = compensator.options.get("accept", "") if compensator and compensator.options else ""
     codes = accepted.replace(",", " ").split()
     warnings = []
     for warning in valve.warnings if valve else ():

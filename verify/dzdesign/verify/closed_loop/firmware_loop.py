@@ -18,7 +18,6 @@ from dzdesign.verify.closed_loop.plant import Plant, plants_from_tests
 from dzdesign.verify.closed_loop.scenarios import Scene, run_scenarios
 from dzdesign.verify.closed_loop.tolerances import Tolerances, monte_carlo, scatter
 from dzdesign.verify.evidence import Check, IdentifiedPlant, MonteCarlo, PressureResult, ScenarioResult, Side
-from dzdesign.verify.firmware.folder import valve_of
 
 #: Shows how far a stage is: pieces and their number in, the pieces out.
 Watch = Callable[[Iterable[Any], int], Iterable[Any]]
@@ -67,7 +66,7 @@ def scenes_of(folder: Path, compensator: Compensator, plant: Plant | None) -> tu
     plant : Plant or None
         None: plants are made from the identified thresholds.
     """
-    valve = valve_of(compensator)
+    valve = compensator.valve
     scenes: list[Scene] = []
     for name, sign in SIGNS.items():
         if sign not in compensator.signals.signs:
@@ -134,7 +133,7 @@ def close_the_loop(
     return FirmwareLoop(
         checks=(
             plant_opens(results),
-            plant_is_the_valve(results, valve_of(compensator)),
+            plant_is_the_valve(results, compensator.valve),
             zero_flow,
             shut_after_scenarios(scenarios, zero_flow, plant_given=given),
         ),

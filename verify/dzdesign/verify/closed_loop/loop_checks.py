@@ -6,7 +6,6 @@ from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN
 from dzdesign.verify.evidence import Check, PressureResult, ScenarioResult
-from dzdesign.verify.firmware.folder import valve_of
 from dzdesign.verify.requirements import PLANT_IS_THE_VALVE, PLANT_OPENS, ZERO_FLOW, ZERO_FLOW_AFTER_SCENARIOS
 
 #: Share of full command by which the opening of a plant may differ from the identified valve's: rounding, a quick ramp.
@@ -54,7 +53,7 @@ def no_flow_at_zero(ramps: Sequence[PressureResult], compensator: Compensator, *
     """
     worst = max(ramps, key=lambda ramp: ramp.q_zero_L_min)
     guards = {sign: compensator.side(sign).certificate.guard for sign in compensator.signals.signs}
-    sides = valve_of(compensator).sides
+    sides = compensator.valve.sides
     identified = {1: sides.get("positive"), -1: sides.get("negative")}
     chosen = [guard for sign, guard in guards.items() if (side := identified[sign]) and side.certificate.guard != guard]
     if chosen:

@@ -52,7 +52,7 @@ def drive_samples(compensator: Compensator, seed: int, count: int) -> list[Codes
     """
     rng = np.random.default_rng(seed)
     signals = compensator.signals
-    zero, window = signals.command.zero_code, max(compensator.amplifier.window_codes, 4)
+    zero, window = signals.command.zero_code, max(compensator.drive_functions.window_codes, 4)
     low, high = signals.command.valid_codes
     corners = [0, low, high, signals.code_max, signals.code_max + 1, 65535, zero, signals.command.full_code]
     corners += [max(zero + sign * (window + step), 0) for sign in (1, -1) for step in (-1, 0, 1)]
@@ -91,8 +91,8 @@ def ramp_places(compensator: Compensator, seed: int, count: int) -> list[int]:
         Samples.
     """
     rng = np.random.default_rng([seed, 1])
-    amplifier, signals = compensator.amplifier, compensator.signals
-    if not any(amplifier.ramp_up + amplifier.ramp_down):
+    functions, signals = compensator.drive_functions, compensator.signals
+    if not any(functions.ramp_up + functions.ramp_down):
         return [STAYS] * count
     high = signals.command.span(1)
     low = -signals.command.span(-1) if len(signals.signs) == 2 else 0
@@ -112,16 +112,16 @@ def window_samples(compensator: Compensator) -> list[tuple[Codes, int]]:
     compensator : Compensator
         Its signals, its window, and its ramps.
     """
-    amplifier, command = compensator.amplifier, compensator.signals.command
+    functions, command = compensator.drive_functions, compensator.signals.command
     sensors = (compensator.signals.pressure_a, compensator.signals.pressure_b)
     p_a, p_b = (sum(sensor.valid_codes) // 2 for sensor in sensors)
-    ramps = any(amplifier.ramp_up + amplifier.ramp_down)
+    ramps = any(functions.ramp_up + functions.ramp_down)
     signs = compensator.signals.signs
     made = []
     for sign in signs:
         far = -sign * command.span(-sign) if len(signs) == 2 else 0
         for step in (-1, 0, 1):
-            for away in (far, sign * max(amplifier.window_codes + step, 0)):
+            for away in (far, sign * max(functions.window_codes + step, 0)):
                 code = command.zero_code + command.direction(1) * away
                 made.append(((code, p_a, p_b), away * STEP_UNIT if ramps else STAYS))
     return made

@@ -15,10 +15,9 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.lot import LotSide
+from dzdesign.design.lot_valves import LotSide
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import Differences
-from dzdesign.verify.firmware.folder import valve_of
 
 #: Whole numbers below this, and their differences, fit 64 bits with a sign.
 LARGEST = 2**62
@@ -41,7 +40,7 @@ class Staircase:
     """
 
     def __init__(self, bounds: LotSide) -> None:
-        pairs = zip(bounds.dp_MPa, bounds.lower_V, strict=True)
+        pairs = zip(bounds.dp_MPa, bounds.u_lower_V, strict=True)
         tests = sorted((Fraction(repr(dp)), Fraction(repr(bound))) for dp, bound in pairs)
         self.dp_MPa, values = [dp for dp, _ in tests], [bound for _, bound in tests]
         self.falling = bounds.trend == "decreasing"
@@ -61,7 +60,7 @@ def guarded_bounds(compensator: Compensator, sign: int) -> LotSide:
     InputError
         If its valve has none.
     """
-    side = valve_of(compensator).sides["positive" if sign > 0 else "negative"]
+    side = compensator.valve.sides["positive" if sign > 0 else "negative"]
     guard = compensator.side(sign).certificate.guard
     if guard not in side.guards:
         raise InputError(
@@ -184,7 +183,7 @@ def zero_command_margins(
     stairs = [Staircase(each) for each in bounds]
     drops = pressure_drops(exact, found, {dp for each in stairs for dp in each.dp_MPa})
     unit_V = exact.compensator.u_max_V / exact.compare_max
-    at_peak = at_zero + exact.compensator.amplifier.dither_counts
+    at_peak = at_zero + exact.compensator.drive_functions.dither_counts
     return [_margin(staircase, drops, at_peak, unit_V) for staircase in stairs]
 
 
