@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.core.artefact_files import check_folder_may_be_written, write_folder
 from dzdesign.core.errors import InputError
@@ -11,6 +11,9 @@ from dzdesign.core.option_readers import quantity, whole_number
 from dzdesign.core.options import AnyPath, Option, Texts, read_options, texts_of
 from dzdesign.core.units import parse_quantity
 from dzdesign.terminal.progress import say, stage_progress
+
+if TYPE_CHECKING:
+    from dzdesign.verify.closed_loop.simulation import SimulationManifest
 
 PRESSURE_DROPS = ("0.5 MPa", "1 MPa", "2 MPa", "3 MPa", "4 MPa", "5 MPa")
 
@@ -40,7 +43,7 @@ class SimulatedRamps:
     """Ramp tests of a simulated valve: name of each file to its bytes, and the manifest of their folder."""
 
     files: Mapping[str, bytes]
-    manifest: Mapping[str, Any]
+    manifest: "SimulationManifest"
 
 
 def simulate(arguments: SimulateArguments) -> SimulatedRamps:
