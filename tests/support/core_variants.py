@@ -14,7 +14,7 @@ from dzdesign.design.options import DesignOptions
 from dzdesign.design.signal_text import command_signal, parse_signal, pressure_signal
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import Converter
-from dzdesign.identify.fitting.guard_curve import OpeningCurve
+from dzdesign.identify.valve.guard_curve import OpeningCurve
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.side_model import SideModel
 from tests.support.golden_firmware import GOLDENS

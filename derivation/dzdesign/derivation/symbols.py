@@ -10,12 +10,12 @@ Eq. 11) and ``n_i`` (code of the command, which Eq. (29) calls u_i').
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import sympy
 
 #: A symbol, or a Laplace transform such as I(s).
-Name = sympy.Symbol | sympy.core.function.AppliedUndef
+Name: TypeAlias = sympy.Symbol | sympy.core.function.AppliedUndef
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

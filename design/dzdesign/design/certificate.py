@@ -11,7 +11,7 @@ from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.beta_table import STEP_CODES, OffsetCeiling, OffsetCurve, offset_ceiling
 from dzdesign.design.compensator import Certificate, Compensator
 from dzdesign.design.signals import Signals
-from dzdesign.identify.fitting.guard_curve import Guard, GuardCurve
+from dzdesign.identify.valve.guard_curve import Guard, GuardCurve
 from dzdesign.identify.valve.side_model import SideModel
 
 #: Of a loss in V: tenths of a microvolt.

@@ -18,7 +18,7 @@ from dzdesign.design.drive_functions import RAMPED_CODES, DriveFunctions
 from dzdesign.design.lot_valves import LotValve
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import TargetInputs
-from dzdesign.identify.fitting.guard_curve import Guard
+from dzdesign.identify.valve.guard_curve import Guard
 from dzdesign.identify.valve.model import ValveModel
 
 #: What to do below the reference pressure drop: beta = 1 as in Eq. (7), or what the tests there say.

@@ -16,7 +16,7 @@ from dzdesign.design.costs import costs_of
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.quantise import Units, finest_units
 from dzdesign.design.signals import Signals
-from dzdesign.identify.fitting.guard_curve import GUARDS
+from dzdesign.identify.valve.guard_curve import GUARDS
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.side_model import SideModel
 

@@ -14,7 +14,8 @@ from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, Sha256, quantity
 from dzdesign.identify.valve.quantity_types import PressureDrop, Voltage
-from dzdesign.identify.valve.side_model import SideModel, Trend
+from dzdesign.identify.valve.side_model import SideModel
+from dzdesign.identify.valve.staircase import Direction
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,7 +23,7 @@ class LotSide:
     """One sign of command of a valve: lower bounds of the guarded threshold."""
 
     trend: Annotated[
-        Trend | None,
+        Direction | None,
         Meta(description="How the threshold runs with the pressure drop; null where fewer than two were tested."),
     ]
     confidence: Annotated[float, quantity("1", "Confidence with which all bounds hold together.", ge=0.5, le=1)]

@@ -14,7 +14,7 @@ from dzdesign.design.request import DEFAULTS, NEGATIVE_DP, POLARITIES, DesignReq
 from dzdesign.design.signal_text import command_signal, parse_signal, pressure_signal
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import TargetInputs
-from dzdesign.identify.fitting.guard_curve import Guard
+from dzdesign.identify.valve.guard_curve import Guard
 
 
 def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:

@@ -9,7 +9,7 @@ from dzdesign.design.compensator import BELOW_DP0, BelowDp0
 from dzdesign.design.drive_functions import RAMP_UNIT, DriveFunctions
 from dzdesign.design.request import DesignRequest
 from dzdesign.design.signals import Signals
-from dzdesign.identify.fitting.guard_curve import GUARDS, Guard
+from dzdesign.identify.valve.guard_curve import GUARDS, Guard
 
 #: Largest transition, dither and window, of full command or drive.
 LARGEST_TRANSITION = Fraction(1, 10)

@@ -31,7 +31,7 @@ from dzdesign.design.lot_setting import lot_setting
 from dzdesign.report.artefact_chain import chain_of
 from dzdesign.report.artefact_folder import read_artefact_folder
 from dzdesign.report.lot.valve_folder import read_manifest
-from tests.support.dying_work import die_over_bad
+from tests.support.crashing_work import die_over_bad
 from tests.support.synthetic import needs_compiler
 
 SEED, COUNT = 7, 12

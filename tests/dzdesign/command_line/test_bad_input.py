@@ -538,7 +538,7 @@ def test_a_plant_that_is_not_there(refusal):
     [
         ("manifest.json", "{}", "has the schema 'None', expected dzdesign.firmware/1"),
         ("manifest.json", "no JSON", "is not JSON"),
-        ("manifest.json", '{"schema": "dzdesign.firmware/1"}', "lacks the key 'files'"),
+        ("manifest.json", '{"schema": "dzdesign.firmware/1"}', "lacks the key 'tool'"),
         ("manifest.json", '{"schema": "dzdesign.firmware/1", "files": []}', "'files' is [], expected an object"),
         ("compensator.json", '{"schema": "dzdesign.compensator/1"}', "lacks the key"),
         ("compensator.json", None, "compensator.json' does not exist"),
@@ -580,7 +580,7 @@ def test_a_core_that_somebody_edited_does_not_hold(bench, capsys):
     assert main(["verify", "firmware"]) == 1
     out = capsys.readouterr().out
     assert "DOES NOT HOLD  files as generated: changed or missing: core/dz_comp.c" in out
-    assert "holds  equals the exactly rounded law" in out
+    assert "HOLDS  equals the exactly rounded law" in out
 
 
 @needs_compiler

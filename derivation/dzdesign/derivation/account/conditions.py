@@ -37,7 +37,7 @@ def judge_condition(condition: Condition, differences: Sequence[sympy.Expr]) -> 
     -------
     Finding
     """
-    words = condition_words(condition)
+    words = _in_words(condition)
     if not differences:
         return Finding(Outcome.FOLLOWS, f"follows, also without {words}", flawed=True)
     alternatives = [_solved(alternative) for alternative in condition.any_of]
@@ -47,7 +47,7 @@ def judge_condition(condition: Condition, differences: Sequence[sympy.Expr]) -> 
     if not agree(differences[0], condition.discrepancy):
         return Finding(Outcome.DOES_NOT_FOLLOW, "does not follow, and the difference is another one", flawed=True)
     necessary = _is_necessary(condition, differences)
-    if condition.ruled_out_by and not any(holds_at(condition, index) for index in range(len(condition.any_of))):
+    if condition.ruled_out_by and not any(_is_published(condition, one) for one in condition.any_of):
         put_in = ", ".join(f"{symbol} = {sympy.sstr(value)}" for symbol, value in condition.ruled_out_by)
         only = "only if" if necessary else "if"
         return Finding(
@@ -60,17 +60,7 @@ def judge_condition(condition: Condition, differences: Sequence[sympy.Expr]) -> 
     return Finding(Outcome.FOLLOWS_IF, f"follows if {words} ({proved})", flawed=not necessary, necessary=necessary)
 
 
-def condition_words(condition: Condition) -> str:
-    """Return a condition as plain text.
-
-    Parameters
-    ----------
-    condition : Condition
-
-    Returns
-    -------
-    str
-    """
+def _in_words(condition: Condition) -> str:
     alternatives = (
         " and ".join(f"{sympy.sstr(equation.lhs)} = {sympy.sstr(equation.rhs)}" for equation in alternative)
         for alternative in condition.any_of
@@ -78,23 +68,10 @@ def condition_words(condition: Condition) -> str:
     return " or ".join(alternatives) + (f" {condition.words}" if condition.words else "")
 
 
-def holds_at(condition: Condition, index: int) -> bool:
-    """Return whether an alternative holds at the published values that may rule it out.
-
-    Parameters
-    ----------
-    condition : Condition
-    index : int
-        Which alternative.
-
-    Returns
-    -------
-    bool
-    """
+def _is_published(condition: Condition, alternative: Sequence[sympy.Eq]) -> bool:
+    """Whether an alternative holds at the published values that may rule it out."""
     published = dict(condition.ruled_out_by)
-    return all(
-        sympy.simplify((equation.lhs - equation.rhs).subs(published)) == 0 for equation in condition.any_of[index]
-    )
+    return all(sympy.simplify((equation.lhs - equation.rhs).subs(published)) == 0 for equation in alternative)
 
 
 def _solved(alternative: Sequence[sympy.Eq]) -> dict[sympy.Symbol, sympy.Expr] | None:

@@ -2,39 +2,8 @@
 
 import sympy
 
-from dzdesign.derivation.account.statement import Ground, Kind, Statement
-from dzdesign.derivation.symbols import (
-    K_0,
-    K_1,
-    Q_O,
-    C_d,
-    K_e,
-    Q,
-    Q_max,
-    Q_O_prime,
-    W,
-    beta,
-    dP,
-    dP0,
-    dP1,
-    f,
-    gamma_0,
-    gamma_1,
-    headroom,
-    k,
-    rho,
-    u_0,
-    u_i,
-    u_i_prime,
-    u_max,
-    u_min,
-    u_min0,
-    u_min1,
-    u_no,
-    u_O,
-    x,
-    x_max,
-)
+from dzdesign.derivation.account.statement import Ground, Kind
+from dzdesign.derivation.symbols import *
 
 #: The numbers of the paper's equations; the later ones stand in other modules.
 PAPER_NUMBERS = tuple(f"({number})" for number in range(1, 33))
@@ -43,55 +12,37 @@ _ORIFICE = C_d * W * sympy.sqrt(2 * dP / rho)
 
 #: Section 1 up to Eq. (7), with the readings of its figures that the rest needs.
 APPROACH = (
-    Statement(
-        number="(1)",
-        title="dead-zone model",
-        kind=Kind.PREMISE,
-        symbol=Q,
-        members=(
-            sympy.Piecewise(
-                (-_ORIFICE * x, sympy.And(-u_max <= u_i, u_i <= -u_min)),
-                (0, sympy.And(-u_min < u_i, u_i < u_min)),
-                (_ORIFICE * x, sympy.And(u_min <= u_i, u_i <= u_max)),
-            ),
+    Kind.PREMISE(
+        "(1)",
+        "dead-zone model",
+        Q,
+        sympy.Piecewise(
+            (-_ORIFICE * x, sympy.And(-u_max <= u_i, u_i <= -u_min)),
+            (0, sympy.And(-u_min < u_i, u_i < u_min)),
+            (_ORIFICE * x, sympy.And(u_min <= u_i, u_i <= u_max)),
         ),
         see=("T6d",),
         note="x is the opening of the edge, not the travel of the spool: x = 0 at the threshold. u_i is the valve's "
         "input; behind a compensator that is its output u_O.",
     ),
-    Statement(
-        number="Fig. 3, line",
-        title="target line through (0, 0) and (u_max, Q_max)",
-        kind=Kind.ASSUMPTION,
-        symbol=Q_O,
-        members=(Q_max / u_max * u_i,),
+    Kind.ASSUMPTION(
+        "Fig. 3, line",
+        "target line through (0, 0) and (u_max, Q_max)",
+        Q_O,
+        Q_max / u_max * u_i,
         see=("T7d",),
         note="Read off the figure and the text below Eq. (1); the abstract ends the line elsewhere.",
     ),
-    Statement(
-        number="K_e",
-        title="output flow gain: flow per command",
-        kind=Kind.DEFINITION,
-        symbol=K_e,
-        members=(Q_O / u_i,),
-        note="The words below Eq. (2).",
+    Kind.DEFINITION("K_e", "output flow gain: flow per command", K_e, Q_O / u_i, note="The words below Eq. (2)."),
+    Kind.PAPER(
+        "(2)", "flow gain of the target line", K_e, Q_max / u_max, grounds=("K_e", "Fig. 3, line"), eliminate=(Q_O,)
     ),
-    Statement(
-        number="(2)",
-        title="flow gain of the target line",
-        kind=Kind.PAPER,
-        symbol=K_e,
-        members=(Q_max / u_max,),
-        grounds=(Ground(number="K_e"), Ground(number="Fig. 3, line")),
-        eliminate=(Q_O,),
-    ),
-    Statement(
-        number="Q_max",
-        title="maximum flow (text below Eq. 2)",
-        kind=Kind.PAPER,
+    Kind.PAPER(
+        "Q_max",
+        "maximum flow (text below Eq. 2)",
+        Q_max,
+        _ORIFICE * x_max,
         scope="full command at or above the threshold",
-        symbol=Q_max,
-        members=(_ORIFICE * x_max,),
         grounds=(
             Ground(
                 number="(1)",
@@ -100,50 +51,39 @@ APPROACH = (
             ),
         ),
     ),
-    Statement(
-        number="(3)",
-        title="flow gain by the orifice equation",
-        kind=Kind.PAPER,
-        symbol=K_e,
-        members=(_ORIFICE * x_max / u_max,),
-        grounds=(Ground(number="(2)"), Ground(number="Q_max")),
+    Kind.PAPER(
+        "(3)",
+        "flow gain by the orifice equation",
+        K_e,
+        _ORIFICE * x_max / u_max,
+        grounds=("(2)", "Q_max"),
         eliminate=(Q_max,),
         see=("T7b",),
         note="With C_d constant (Assumption 2).",
     ),
-    Statement(
-        number="(4)",
-        title="threshold over pressure drop",
-        kind=Kind.PREMISE,
-        symbol=u_min,
-        members=(f(dP),),
+    Kind.PREMISE(
+        "(4)",
+        "threshold over pressure drop",
+        u_min,
+        f(dP),
         see=("T9b", "T9c"),
         note="f is fitted to the ramp tests by least squares. The temperature does not enter (Assumption 1).",
     ),
-    Statement(
-        number="(5)",
-        title="correction coefficient at dP1",
-        kind=Kind.PREMISE,
-        symbol=beta,
-        members=(u_min1 / u_min0,),
-        see=("T3b", "T9c"),
-    ),
-    Statement(
-        number="(6)",
-        title="compensation above the reference",
-        kind=Kind.PREMISE,
-        symbol=u_no,
-        members=(beta * u_0,),
+    Kind.PREMISE("(5)", "correction coefficient at dP1", beta, u_min1 / u_min0, see=("T3b", "T9c")),
+    Kind.PREMISE(
+        "(6)",
+        "compensation above the reference",
+        u_no,
+        beta * u_0,
         see=("T1c", "(6c)"),
         corrected_by="(6c)",
         note="The paper's choice. It scales the whole compensation signal; the target asks for less: (6c).",
     ),
-    Statement(
-        number="(7)",
-        title="selector",
-        kind=Kind.PREMISE,
-        symbol=u_no,
-        members=(sympy.Piecewise((beta * u_0, dP1 > dP0), (u_0, dP1 <= dP0)),),
+    Kind.PREMISE(
+        "(7)",
+        "selector",
+        u_no,
+        sympy.Piecewise((beta * u_0, dP1 > dP0), (u_0, dP1 <= dP0)),
         see=("T4b", "T4c"),
         note="Contains (6).",
     ),
@@ -151,43 +91,34 @@ APPROACH = (
 
 #: Section 1.1.
 AT_REFERENCE = (
-    Statement(
-        number="gamma_0",
-        title="flow per opening at dP0 (text below Eq. 8)",
-        kind=Kind.DEFINITION,
-        symbol=gamma_0,
-        members=(C_d * W * sympy.sqrt(2 * dP0 / rho),),
+    Kind.DEFINITION(
+        "gamma_0", "flow per opening at dP0 (text below Eq. 8)", gamma_0, C_d * W * sympy.sqrt(2 * dP0 / rho)
     ),
-    Statement(
-        number="(8)",
-        title="flow gain at the reference",
-        kind=Kind.PAPER,
-        symbol=K_0,
-        members=(C_d * W * x_max * sympy.sqrt(2 * dP0 / rho) / u_max, gamma_0 * x_max / u_max),
-        grounds=(
-            Ground(number="(3)", at=((K_e, K_0), (dP, dP0)), where="at dP = dP0"),
-            Ground(number="gamma_0"),
-        ),
+    Kind.PAPER(
+        "(8)",
+        "flow gain at the reference",
+        K_0,
+        C_d * W * x_max * sympy.sqrt(2 * dP0 / rho) / u_max,
+        gamma_0 * x_max / u_max,
+        grounds=(Ground(number="(3)", at=((K_e, K_0), (dP, dP0)), where="at dP = dP0"), "gamma_0"),
         eliminate=(gamma_0,),
         note="x_max does not depend on dP (Assumption 3).",
     ),
-    Statement(
-        number="(9)",
-        title="wanted flow at the reference",
-        kind=Kind.PAPER,
-        symbol=Q_O,
-        members=(K_0 * u_i,),
-        grounds=(Ground(number="Fig. 3, line"), Ground(number="(2)", at=((K_e, K_0),), where="at dP = dP0")),
+    Kind.PAPER(
+        "(9)",
+        "wanted flow at the reference",
+        Q_O,
+        K_0 * u_i,
+        grounds=("Fig. 3, line", Ground(number="(2)", at=((K_e, K_0),), where="at dP = dP0")),
         eliminate=(Q_max,),
         see=("T1a",),
     ),
-    Statement(
-        number="(10)",
-        title="opening that passes the wanted flow",
-        kind=Kind.PAPER,
+    Kind.PAPER(
+        "(10)",
+        "opening that passes the wanted flow",
+        x,
+        Q_O / (C_d * W * sympy.sqrt(2 * dP0 / rho)),
         scope="a command at or beyond the threshold",
-        symbol=x,
-        members=(Q_O / (C_d * W * sympy.sqrt(2 * dP0 / rho)),),
         grounds=(
             Ground(
                 number="(1)",
@@ -202,56 +133,51 @@ AT_REFERENCE = (
             ),
         ),
     ),
-    Statement(
-        number="(11)",
-        title="opening in proportion to the command beyond the threshold",
-        kind=Kind.ASSUMPTION,
-        symbol=u_i_prime,
-        members=(k * x,),
+    Kind.ASSUMPTION(
+        "(11)",
+        "opening in proportion to the command beyond the threshold",
+        u_i_prime,
+        k * x,
         see=("T2b", "T8a"),
         note="The paper calls it approximately linear; it holds up to the spool's stop.",
     ),
-    Statement(
-        number="Fig. 3, command",
-        title="command at which the valve passes the wanted flow",
-        kind=Kind.ASSUMPTION,
-        symbol=u_O,
-        members=(u_i_prime + u_min0,),
+    Kind.ASSUMPTION(
+        "Fig. 3, command",
+        "command at which the valve passes the wanted flow",
+        u_O,
+        u_i_prime + u_min0,
         note="Read off the figure: u_i' is the part of the command that opens the edge.",
     ),
-    Statement(
-        number="u_O",
-        title="output of the compensator: compensation signal plus input",
-        kind=Kind.DEFINITION,
-        symbol=u_O,
-        members=(u_0 + u_i,),
+    Kind.DEFINITION(
+        "u_O",
+        "output of the compensator: compensation signal plus input",
+        u_O,
+        u_0 + u_i,
         note="Eqs. (14) and (18) print u_0 on both sides; the left one is the output u_O.",
     ),
-    Statement(
-        number="(12)",
-        title="compensation signal in Fig. 3",
-        kind=Kind.PAPER,
-        symbol=u_0,
-        members=(u_i_prime + u_min0 - u_i,),
-        grounds=(Ground(number="Fig. 3, command"), Ground(number="u_O")),
+    Kind.PAPER(
+        "(12)",
+        "compensation signal in Fig. 3",
+        u_0,
+        u_i_prime + u_min0 - u_i,
+        grounds=("Fig. 3, command", "u_O"),
         eliminate=(u_O,),
     ),
-    Statement(
-        number="(13)",
-        title="compensation signal at the reference",
-        kind=Kind.PAPER,
-        symbol=u_0,
-        members=((k * x_max / u_max - 1) * u_i + u_min0,),
-        grounds=tuple(Ground(number=number) for number in ("(12)", "(11)", "(10)", "(9)", "(8)", "gamma_0")),
+    Kind.PAPER(
+        "(13)",
+        "compensation signal at the reference",
+        u_0,
+        (k * x_max / u_max - 1) * u_i + u_min0,
+        grounds=("(12)", "(11)", "(10)", "(9)", "(8)", "gamma_0"),
         eliminate=(u_i_prime, x, Q_O, K_0, gamma_0),
     ),
-    Statement(
-        number="(14)",
-        title="law at the reference",
-        kind=Kind.PAPER,
-        symbol=u_O,
-        members=(u_0 + u_i, k * x_max / u_max * u_i + u_min0),
-        grounds=(Ground(number="u_O"), Ground(number="(13)")),
+    Kind.PAPER(
+        "(14)",
+        "law at the reference",
+        u_O,
+        u_0 + u_i,
+        k * x_max / u_max * u_i + u_min0,
+        grounds=("u_O", "(13)"),
         eliminate=(u_0,),
         see=("T1a", "T2b"),
         note="Printed with u_0 on the left, which is the output u_O.",
@@ -260,33 +186,25 @@ AT_REFERENCE = (
 
 #: Section 1.2.
 OFF_REFERENCE = (
-    Statement(
-        number="gamma_1",
-        title="flow per opening at dP1 (text below Eq. 15)",
-        kind=Kind.DEFINITION,
-        symbol=gamma_1,
-        members=(C_d * W * sympy.sqrt(2 * dP1 / rho),),
+    Kind.DEFINITION(
+        "gamma_1", "flow per opening at dP1 (text below Eq. 15)", gamma_1, C_d * W * sympy.sqrt(2 * dP1 / rho)
     ),
-    Statement(
-        number="(15)",
-        title="flow gain off the reference",
-        kind=Kind.PAPER,
-        symbol=K_1,
-        members=(C_d * W * x_max * sympy.sqrt(2 * dP1 / rho) / u_max, gamma_1 * x_max / u_max),
-        grounds=(
-            Ground(number="(3)", at=((K_e, K_1), (dP, dP1)), where="at dP = dP1"),
-            Ground(number="gamma_1"),
-        ),
+    Kind.PAPER(
+        "(15)",
+        "flow gain off the reference",
+        K_1,
+        C_d * W * x_max * sympy.sqrt(2 * dP1 / rho) / u_max,
+        gamma_1 * x_max / u_max,
+        grounds=(Ground(number="(3)", at=((K_e, K_1), (dP, dP1)), where="at dP = dP1"), "gamma_1"),
         eliminate=(gamma_1,),
         see=("T7a", "T7c"),
         note="The published largest flows grow far more slowly with dP: T7a.",
     ),
-    Statement(
-        number="(16)",
-        title="wanted flow off the reference",
-        kind=Kind.PAPER,
-        symbol=Q_O_prime,
-        members=(K_1 * u_i,),
+    Kind.PAPER(
+        "(16)",
+        "wanted flow off the reference",
+        Q_O_prime,
+        K_1 * u_i,
         grounds=(
             Ground(number="Fig. 3, line", at=((Q_O, Q_O_prime),), where="at dP = dP1"),
             Ground(number="(2)", at=((K_e, K_1),), where="at dP = dP1"),
@@ -296,22 +214,22 @@ OFF_REFERENCE = (
         note="As a target. Fig. 3 draws the line at the reference; (16) takes it to hold at dP1 too. As a claim about "
         "the valve under Eq. (18) it does not follow: T1c.",
     ),
-    Statement(
-        number="(17)",
-        title="compensation signal off the reference",
-        kind=Kind.PAPER,
-        symbol=u_no,
-        members=(beta * u_0, beta * (k * x_max / u_max - 1) * u_i + beta * u_min0),
-        grounds=(Ground(number="(6)"), Ground(number="(13)")),
+    Kind.PAPER(
+        "(17)",
+        "compensation signal off the reference",
+        u_no,
+        beta * u_0,
+        beta * (k * x_max / u_max - 1) * u_i + beta * u_min0,
+        grounds=("(6)", "(13)"),
         eliminate=(u_0,),
     ),
-    Statement(
-        number="(18)",
-        title="law off the reference",
-        kind=Kind.PAPER,
-        symbol=u_O,
-        members=(u_no + u_i, (beta * k * x_max / u_max - beta + 1) * u_i + beta * u_min0),
-        grounds=(Ground(number="u_O", at=((u_0, u_no),), where="with u_no for u_0"), Ground(number="(17)")),
+    Kind.PAPER(
+        "(18)",
+        "law off the reference",
+        u_O,
+        u_no + u_i,
+        (beta * k * x_max / u_max - beta + 1) * u_i + beta * u_min0,
+        grounds=(Ground(number="u_O", at=((u_0, u_no),), where="with u_no for u_0"), "(17)"),
         eliminate=(u_no,),
         see=("T1b", "T1c", "T3a", "T4a"),
         note="Printed with u_0 on the left, which is the output u_O.",

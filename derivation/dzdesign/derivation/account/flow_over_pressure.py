@@ -3,39 +3,19 @@
 import sympy
 
 from dzdesign.derivation.account.published import DROP_ASSUMED, FIRST, SECOND, VALVES
-from dzdesign.derivation.account.statement import Condition, Ground, Kind, Outcome, Statement, Value
-from dzdesign.derivation.symbols import (
-    K_0,
-    K_1,
-    K_e,
-    Q_max,
-    Q_max0,
-    Q_max1,
-    dP0,
-    dP1,
-    gamma_0,
-    gamma_1,
-    n,
-    u_max,
-)
+from dzdesign.derivation.account.statement import Condition, Kind, Outcome, Value
+from dzdesign.derivation.symbols import *
 
 #: Theorem 7: flow over pressure drop.
 FLOW_OVER_PRESSURE = (
-    Statement(
-        number="exponent",
-        title="largest flow as a power of the pressure drop",
-        kind=Kind.DEFINITION,
-        symbol=Q_max1,
-        members=(Q_max0 * (dP1 / dP0) ** n,),
-    ),
-    Statement(
-        number="T7a",
-        title="exponent of the flow over the pressure drop",
-        kind=Kind.THEOREM,
+    Kind.DEFINITION("exponent", "largest flow as a power of the pressure drop", Q_max1, Q_max0 * (dP1 / dP0) ** n),
+    Kind.THEOREM(
+        "T7a",
+        "exponent of the flow over the pressure drop",
+        n,
+        sympy.log(Q_max1 / Q_max0) / sympy.log(dP1 / dP0),
         provided=(sympy.Ne(dP0, dP1),),
-        symbol=n,
-        members=(sympy.log(Q_max1 / Q_max0) / sympy.log(dP1 / dP0),),
-        grounds=(Ground(number="exponent"),),
+        grounds=("exponent",),
         values=tuple(
             Value(label=valve.name, at=valve.at(), unit="1", remark=DROP_ASSUMED if valve is SECOND else "")
             for valve in VALVES
@@ -43,13 +23,12 @@ FLOW_OVER_PRESSURE = (
         note="The orifice equation has 0.5. The published drop is 1 and 5 MPa; a supply that gives way, or a pressure "
         "drop taken with the valve's own passages, lowers the exponent.",
     ),
-    Statement(
-        number="T7b",
-        title="Eqs. (8) and (15): the flow gain grows with the root of the pressure drop",
-        kind=Kind.THEOREM,
-        symbol=K_1,
-        members=(K_0 * sympy.sqrt(dP1) / sympy.sqrt(dP0),),
-        grounds=tuple(Ground(number=number) for number in ("(15)", "gamma_1", "(8)", "gamma_0")),
+    Kind.THEOREM(
+        "T7b",
+        "Eqs. (8) and (15): the flow gain grows with the root of the pressure drop",
+        K_1,
+        K_0 * sympy.sqrt(dP1) / sympy.sqrt(dP0),
+        grounds=("(15)", "gamma_1", "(8)", "gamma_0"),
         eliminate=(gamma_1, K_0, gamma_0),
         values=(
             Value(label="K_1/K_0 by Eq. (15)", of=sympy.sqrt(dP1 / dP0), at=FIRST.at(), unit="1"),
@@ -67,13 +46,12 @@ FLOW_OVER_PRESSURE = (
             ),
         ),
     ),
-    Statement(
-        number="T7c",
-        title="Eq. (15) agrees with the published largest flows",
-        kind=Kind.THEOREM,
-        symbol=Q_max1,
-        members=(Q_max0 * sympy.sqrt(dP1 / dP0),),
-        grounds=(Ground(number="exponent"),),
+    Kind.THEOREM(
+        "T7c",
+        "Eq. (15) agrees with the published largest flows",
+        Q_max1,
+        Q_max0 * sympy.sqrt(dP1 / dP0),
+        grounds=("exponent",),
         condition=Condition(
             any_of=((sympy.Eq(n, sympy.Rational(1, 2)),),),
             witness=((dP0, sympy.S.One), (dP1, sympy.Integer(5))),
@@ -93,13 +71,12 @@ FLOW_OVER_PRESSURE = (
         note="The law does not need it: gamma cancels in Eqs. (13) and (18), only k, x_max and the thresholds remain. "
         "The identification leaves the slope of each pressure drop free.",
     ),
-    Statement(
-        number="T7d",
-        title="the abstract's target line, through (dP0, Q_max), has the flow gain (2)",
-        kind=Kind.THEOREM,
-        symbol=K_e,
-        members=(Q_max / dP0,),
-        grounds=(Ground(number="(2)"),),
+    Kind.THEOREM(
+        "T7d",
+        "the abstract's target line, through (dP0, Q_max), has the flow gain (2)",
+        K_e,
+        Q_max / dP0,
+        grounds=("(2)",),
         condition=Condition(
             any_of=((sympy.Eq(u_max, dP0),),),
             ruled_out_by=((u_max, sympy.Integer(10)), (dP0, sympy.Integer(1))),

@@ -2,37 +2,8 @@
 
 import sympy
 
-from dzdesign.derivation.account.statement import Case, Ground, Kind, Statement
-from dzdesign.derivation.symbols import (
-    Q_1,
-    Q_2,
-    C_d,
-    Q,
-    Q_max,
-    Q_scaled,
-    W,
-    dP,
-    dQ_dC_d,
-    dQ_dk,
-    dQ_dx_max,
-    guard,
-    headroom,
-    k,
-    q_x,
-    rest,
-    rho,
-    s_flow,
-    scale,
-    u_1,
-    u_2,
-    u_i,
-    u_max,
-    u_min,
-    u_O,
-    x,
-    x_max,
-    y,
-)
+from dzdesign.derivation.account.statement import Case, Ground, Kind
+from dzdesign.derivation.symbols import *
 
 _ORIFICE = C_d * W * sympy.sqrt(2 * dP / rho)
 
@@ -43,28 +14,24 @@ _REGIMES = (
 )
 #: Theorem 8: what can be identified from flow.
 IDENTIFIABILITY = (
-    Statement(
-        number="valve",
-        title="flow of a valve with a threshold and a stop",
-        kind=Kind.DEFINITION,
-        symbol=Q,
-        members=(
-            sympy.Piecewise(
-                (0, u_O < u_min),
-                (_ORIFICE * (u_O - u_min) / k, u_O < u_min + k * x_max),
-                (_ORIFICE * x_max, u_min + k * x_max <= u_O),
-            ),
+    Kind.DEFINITION(
+        "valve",
+        "flow of a valve with a threshold and a stop",
+        Q,
+        sympy.Piecewise(
+            (0, u_O < u_min),
+            (_ORIFICE * (u_O - u_min) / k, u_O < u_min + k * x_max),
+            (_ORIFICE * x_max, u_min + k * x_max <= u_O),
         ),
         note="Eqs. (1) and (11) up to the stop, for positive commands.",
     ),
-    Statement(
-        number="T8a",
-        title="the flow is the same for C_d lambda, k lambda and x_max / lambda",
-        kind=Kind.THEOREM,
-        symbol=Q_scaled,
-        members=(Q,),
+    Kind.THEOREM(
+        "T8a",
+        "the flow is the same for C_d lambda, k lambda and x_max / lambda",
+        Q_scaled,
+        Q,
         grounds=(
-            Ground(number="valve"),
+            "valve",
             Ground(
                 number="valve",
                 at=((Q, Q_scaled), (C_d, scale * C_d), (k, scale * k), (x_max, x_max / scale)),
@@ -76,12 +43,11 @@ IDENTIFIABILITY = (
         note="At every command and pressure drop, so no set of flow measurements tells these valves apart; nor C_d, W "
         "and rho, which enter as one product.",
     ),
-    Statement(
-        number="T8b",
-        title="the sensitivity to C_d is a combination of those to k and x_max",
-        kind=Kind.THEOREM,
-        symbol=dQ_dC_d,
-        members=((x_max * dQ_dx_max - k * dQ_dk) / C_d,),
+    Kind.THEOREM(
+        "T8b",
+        "the sensitivity to C_d is a combination of those to k and x_max",
+        dQ_dC_d,
+        (x_max * dQ_dx_max - k * dQ_dk) / C_d,
         grounds=(
             Ground(number="valve", derivative=(C_d, dQ_dC_d), where="differentiated by C_d"),
             Ground(number="valve", derivative=(k, dQ_dk), where="differentiated by k"),
@@ -92,63 +58,40 @@ IDENTIFIABILITY = (
         note="So (C_d, k, -x_max) is a null direction of the sensitivity matrix: its product with every row is zero, "
         "however many commands and pressure drops are measured.",
     ),
-    Statement(
-        number="S",
-        title="flow per command beyond the threshold",
-        kind=Kind.DEFINITION,
-        symbol=s_flow,
-        members=(_ORIFICE / k,),
-    ),
-    Statement(
-        number="travel",
-        title="command that full opening takes",
-        kind=Kind.DEFINITION,
-        symbol=q_x,
-        members=(k * x_max,),
-    ),
-    Statement(
-        number="T8c",
-        title="the flow depends on S, u_min and k x_max only",
-        kind=Kind.THEOREM,
-        symbol=Q,
-        members=(
-            sympy.Piecewise(
-                (0, u_O < u_min),
-                (s_flow * (u_O - u_min), u_O < u_min + q_x),
-                (s_flow * q_x, u_min + q_x <= u_O),
-            ),
+    Kind.DEFINITION("S", "flow per command beyond the threshold", s_flow, _ORIFICE / k),
+    Kind.DEFINITION("travel", "command that full opening takes", q_x, k * x_max),
+    Kind.THEOREM(
+        "T8c",
+        "the flow depends on S, u_min and k x_max only",
+        Q,
+        sympy.Piecewise(
+            (0, u_O < u_min), (s_flow * (u_O - u_min), u_O < u_min + q_x), (s_flow * q_x, u_min + q_x <= u_O)
         ),
-        grounds=(Ground(number="valve"), Ground(number="S"), Ground(number="travel")),
+        grounds=("valve", "S", "travel"),
         eliminate=(s_flow, q_x),
         cases=_REGIMES,
     ),
-    Statement(
-        number="straight part",
-        title="flow beyond the threshold",
-        kind=Kind.THEOREM,
+    Kind.THEOREM(
+        "straight part",
+        "flow beyond the threshold",
+        Q,
+        s_flow * (u_O - u_min),
         scope="u_O at or beyond the threshold, and the spool has not met its stop",
         within=u_min <= u_O,
-        symbol=Q,
-        members=(s_flow * (u_O - u_min),),
         grounds=(
-            Ground(
-                number="(1)",
-                at=((u_i, u_min + y), (u_max, u_min + y + headroom)),
-                where="at u_O = u_min + y",
-            ),
+            Ground(number="(1)", at=((u_i, u_min + y), (u_max, u_min + y + headroom)), where="at u_O = u_min + y"),
             Ground(number="opening", at=((u_O, u_min + y),), where="at u_O = u_min + y"),
-            Ground(number="S"),
+            "S",
         ),
         eliminate=(x, s_flow),
         cases=(Case(at=((u_O, u_min + y),), where="beyond the threshold, before the stop"),),
     ),
-    Statement(
-        number="T8d",
-        title="S from two samples on the straight part",
-        kind=Kind.THEOREM,
+    Kind.THEOREM(
+        "T8d",
+        "S from two samples on the straight part",
+        s_flow,
+        (Q_2 - Q_1) / (u_2 - u_1),
         provided=(sympy.Ne(u_1, u_2),),
-        symbol=s_flow,
-        members=((Q_2 - Q_1) / (u_2 - u_1),),
         grounds=(
             Ground(number="straight part", at=((Q, Q_2), (u_O, u_2)), where="at u_2"),
             Ground(number="straight part", at=((Q, Q_1), (u_O, u_1)), where="at u_1"),
@@ -156,32 +99,22 @@ IDENTIFIABILITY = (
         eliminate=(u_min,),
         note="With T8e and T8f: these three are determined, and by T8b nothing else is.",
     ),
-    Statement(
-        number="T8e",
-        title="u_min from the same two samples",
-        kind=Kind.THEOREM,
-        symbol=u_min,
-        members=(u_1 - Q_1 / s_flow, u_1 - Q_1 * (u_2 - u_1) / (Q_2 - Q_1)),
-        grounds=(
-            Ground(number="straight part", at=((Q, Q_1), (u_O, u_1)), where="at u_1"),
-            Ground(number="T8d"),
-        ),
+    Kind.THEOREM(
+        "T8e",
+        "u_min from the same two samples",
+        u_min,
+        u_1 - Q_1 / s_flow,
+        u_1 - Q_1 * (u_2 - u_1) / (Q_2 - Q_1),
+        grounds=(Ground(number="straight part", at=((Q, Q_1), (u_O, u_1)), where="at u_1"), "T8d"),
         eliminate=(s_flow,),
     ),
-    Statement(
-        number="T8f",
-        title="k x_max from a sample at the stop",
-        kind=Kind.THEOREM,
+    Kind.THEOREM(
+        "T8f",
+        "k x_max from a sample at the stop",
+        q_x,
+        Q_max / s_flow,
         scope="a command at or beyond the stop",
-        symbol=q_x,
-        members=(Q_max / s_flow,),
-        grounds=(
-            Ground(
-                number="T8c",
-                at=((Q, Q_max), (u_O, u_min + q_x + headroom)),
-                where="at the stop",
-            ),
-        ),
+        grounds=(Ground(number="T8c", at=((Q, Q_max), (u_O, u_min + q_x + headroom)), where="at the stop"),),
         note="Without such a sample k x_max is only known to be larger than the largest command beyond the threshold. "
         "Where x_max is known otherwise, k = (k x_max) / x_max.",
     ),

@@ -41,7 +41,7 @@ def agree(left: sympy.Expr, right: sympy.Expr) -> bool:
         difference = sympy.expand_log(difference)
     # A root and its symbol are two generators to `cancel`; writing each symbol as a square makes them one.
     squares = {symbol: sympy.Dummy(symbol.name, positive=True) ** 2 for symbol in _under_root(difference)}
-    return sympy.cancel(difference.xreplace(squares)) == 0
+    return bool(sympy.cancel(difference.xreplace(squares)) == 0)
 
 
 def _differ_at_a_point(left: sympy.Expr, right: sympy.Expr) -> bool:

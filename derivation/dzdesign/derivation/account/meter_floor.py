@@ -3,69 +3,34 @@
 import sympy
 
 from dzdesign.derivation.account.published import DROP_ASSUMED, FIRST, SECOND
-from dzdesign.derivation.account.statement import Ground, Kind, Statement, Value
-from dzdesign.derivation.symbols import (
-    C_d,
-    Q,
-    Q_floor,
-    Q_max0,
-    Q_max1,
-    W,
-    dP,
-    dP0,
-    dP1,
-    fall,
-    gamma_0,
-    k,
-    rho,
-    s_flow,
-    s_flow0,
-    s_flow1,
-    u_max,
-    u_min,
-    u_min0,
-    u_min1,
-    u_O,
-    u_seen,
-    u_seen0,
-    u_seen1,
-)
+from dzdesign.derivation.account.statement import Ground, Kind, Value
+from dzdesign.derivation.symbols import *
 
 _ORIFICE = C_d * W * sympy.sqrt(2 * dP / rho)
 
 #: Theorem 9: a meter that shows nothing below its floor.
 METER_FLOOR = (
-    Statement(
-        number="T9a",
-        title="command at which the meter first shows flow",
-        kind=Kind.THEOREM,
-        symbol=u_seen,
-        members=(u_min + Q_floor / s_flow, u_min + Q_floor * k / _ORIFICE),
-        grounds=(
-            Ground(number="straight part", at=((Q, Q_floor), (u_O, u_seen)), where="at the meter's floor"),
-            Ground(number="S"),
-        ),
+    Kind.THEOREM(
+        "T9a",
+        "command at which the meter first shows flow",
+        u_seen,
+        u_min + Q_floor / s_flow,
+        u_min + Q_floor * k / _ORIFICE,
+        grounds=(Ground(number="straight part", at=((Q, Q_floor), (u_O, u_seen)), where="at the meter's floor"), "S"),
         eliminate=(s_flow,),
         note="Above the threshold, and the more so the lower the pressure drop.",
     ),
-    Statement(
-        number="fall",
-        title="fall of the threshold as the meter shows it",
-        kind=Kind.DEFINITION,
-        symbol=fall,
-        members=(u_seen0 - u_seen1,),
-    ),
-    Statement(
-        number="T9b",
-        title="a constant threshold seems to fall",
-        kind=Kind.THEOREM,
-        symbol=fall,
-        members=(Q_floor * k / gamma_0 * (1 - sympy.sqrt(dP0) / sympy.sqrt(dP1)),),
+    Kind.DEFINITION("fall", "fall of the threshold as the meter shows it", fall, u_seen0 - u_seen1),
+    Kind.THEOREM(
+        "T9b",
+        "a constant threshold seems to fall",
+        fall,
+        Q_floor * k / gamma_0 * (1 - sympy.sqrt(dP0) / sympy.sqrt(dP1)),
         grounds=(
-            Ground(number="fall"),
+            "fall",
             Ground(number="T9a", at=((u_seen, u_seen0), (dP, dP0)), where="at dP0"),
             Ground(number="T9a", at=((u_seen, u_seen1), (dP, dP1)), where="at dP1, the same u_min"),
-            Ground(number="gamma_0"),
+            "gamma_0",
         ),
         eliminate=(u_seen0, u_seen1, gamma_0),
         positive_if=sympy.sqrt(dP1) > sympy.sqrt(dP0),
@@ -82,14 +47,13 @@ METER_FLOOR = (
         note="The numbers: the printed thresholds taken for the true ones, a floor of 0.6 L/min, and flow that grows "
         "with the root of the pressure drop.",
     ),
-    Statement(
-        number="T9c",
-        title="the same with the slopes that were measured",
-        kind=Kind.THEOREM,
-        symbol=fall,
-        members=(Q_floor * (1 / s_flow0 - 1 / s_flow1),),
+    Kind.THEOREM(
+        "T9c",
+        "the same with the slopes that were measured",
+        fall,
+        Q_floor * (1 / s_flow0 - 1 / s_flow1),
         grounds=(
-            Ground(number="fall"),
+            "fall",
             Ground(
                 number="straight part",
                 at=((Q, Q_floor), (u_O, u_seen0), (s_flow, s_flow0)),
@@ -113,13 +77,12 @@ METER_FLOOR = (
             for valve, fall_percent in ((FIRST, "2.2"), (SECOND, "1.0"))
         ),
     ),
-    Statement(
-        number="slope at dP1",
-        title="flow per command at dP1 from the two ends of the straight part",
-        kind=Kind.THEOREM,
+    Kind.THEOREM(
+        "slope at dP1",
+        "flow per command at dP1 from the two ends of the straight part",
+        s_flow1,
+        (Q_max1 - Q_floor) / (u_max - u_seen1),
         provided=(sympy.Ne(u_max, u_seen1),),
-        symbol=s_flow1,
-        members=((Q_max1 - Q_floor) / (u_max - u_seen1),),
         grounds=(
             Ground(
                 number="straight part",
@@ -134,12 +97,11 @@ METER_FLOOR = (
         ),
         eliminate=(u_min1,),
     ),
-    Statement(
-        number="T9d",
-        title="flow at zero command without beta, if the thresholds are the first flow seen",
-        kind=Kind.THEOREM,
-        symbol=Q,
-        members=(Q_floor + (Q_max1 - Q_floor) * (u_seen0 - u_seen1) / (u_max - u_seen1),),
+    Kind.THEOREM(
+        "T9d",
+        "flow at zero command without beta, if the thresholds are the first flow seen",
+        Q,
+        Q_floor + (Q_max1 - Q_floor) * (u_seen0 - u_seen1) / (u_max - u_seen1),
         grounds=(
             Ground(
                 number="straight part",
@@ -151,7 +113,7 @@ METER_FLOOR = (
                 at=((Q, Q_floor), (u_O, u_seen1), (s_flow, s_flow1), (u_min, u_min1)),
                 where="at dP1, where the meter starts",
             ),
-            Ground(number="slope at dP1"),
+            "slope at dP1",
         ),
         eliminate=(u_min1, s_flow1),
         values=(

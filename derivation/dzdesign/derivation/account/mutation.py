@@ -150,7 +150,7 @@ def _unit(name: Name) -> str:
 
 
 def _names(expression: sympy.Expr) -> set[Name]:
-    return expression.atoms(AppliedUndef) | expression.free_symbols
+    return set(expression.atoms(AppliedUndef) | expression.free_symbols)
 
 
 def _mutants(statement: Statement, neighbours: Mapping[str, list[Name]]) -> Iterator[tuple[Statement | None, str]]:
@@ -206,11 +206,11 @@ def _mutated_conditions(
                 yield replace(statement, condition=mutant), f"follows if {wrong_equation}"
 
 
-def _with(items: tuple, index: int, item: object) -> tuple:
+def _with(items: tuple[Any, ...], index: int, item: object) -> tuple[Any, ...]:
     return (*items[:index], item, *items[index + 1 :])
 
 
-def _without(items: tuple, index: int) -> tuple:
+def _without(items: tuple[Any, ...], index: int) -> tuple[Any, ...]:
     return (*items[:index], *items[index + 1 :])
 
 

@@ -7,8 +7,10 @@ of its members exactly. Where they do not, the difference is factored: it says o
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import sympy
+from sympy.core.relational import Relational
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.derivation.account.conditions import Finding, judge_condition
@@ -181,7 +183,7 @@ def judge(statement: Statement, earlier: Mapping[str, Statement], verdicts: Mapp
     Verdict
     """
 
-    def verdict(outcome: Outcome, words: str, flawed: bool = False, **found: object) -> Verdict:
+    def verdict(outcome: Outcome, words: str, flawed: bool = False, **found: Any) -> Verdict:
         expected = outcome is statement.expected and not flawed
         return Verdict(statement=statement, outcome=outcome, words=words, as_expected=expected, **found)
 
@@ -231,15 +233,16 @@ def _finding(statement: Statement, proofs: Sequence[CaseProof], differences: Seq
         return Finding(Outcome.DOES_NOT_FOLLOW, "does not follow")
     if statement.positive_if is None:
         return Finding(Outcome.FOLLOWS, "follows")
-    claim = sympy.sstr(statement.positive_if)
-    if all(_sign_agrees(statement, case, proof) for case, proof in zip(_cases(statement), proofs, strict=True)):
+    positive_if = statement.positive_if
+    claim = sympy.sstr(positive_if)
+    if all(_sign_agrees(positive_if, case, proof) for case, proof in zip(_cases(statement), proofs, strict=True)):
         return Finding(Outcome.FOLLOWS, f"follows; positive exactly if {claim}")
     return Finding(Outcome.DOES_NOT_FOLLOW, f"does not follow: positive not exactly if {claim}", flawed=True)
 
 
-def _sign_agrees(statement: Statement, case: Case, proof: CaseProof) -> bool:
+def _sign_agrees(positive_if: Relational, case: Case, proof: CaseProof) -> bool:
     """Whether the derived value is positive in just the cases in which the claim is true."""
-    claim = statement.positive_if.xreplace(dict(case.at))
+    claim = positive_if.xreplace(dict(case.at))
     if claim == sympy.true:
         return proof.derived.is_positive is True
     if claim == sympy.false:
@@ -270,9 +273,9 @@ def _proofs(statement: Statement, earlier: Mapping[str, Statement]) -> tuple[Cas
         needed |= {one for one, here in zip(statement.provided, provided, strict=True) if here in found.needed}
         derived = solution[statement.symbol]
         branches = [_branch(member, replacements, solution, chosen) for member in statement.members]
-        if None in branches:
+        members = [branch.xreplace(replacements) for branch in branches if branch is not None]
+        if len(members) < len(branches):
             return f"a case does not decide between the branches of {statement.number} itself"
-        members = [branch.xreplace(replacements) for branch in branches]
         published = [member.xreplace(solution) for member in members]
         differences = tuple(sympy.S.Zero if agree(derived, member) else derived - member for member in published)
         reached = derived if any(differences) else members[-1]

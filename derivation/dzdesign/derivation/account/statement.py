@@ -1,7 +1,9 @@
 """What a statement is: published or ours, with the grounds, cases and conditions that it is judged by."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Any
 
 import sympy
 from sympy.logic.boolalg import Boolean
@@ -26,6 +28,30 @@ class Kind(StrEnum):
     @property
     def is_given(self) -> bool:
         return self in (Kind.PREMISE, Kind.ASSUMPTION, Kind.DEFINITION, Kind.CHOICE)
+
+    def __call__(
+        self,
+        number: str,
+        title: str,
+        symbol: Name,
+        *members: sympy.Expr,
+        grounds: "Sequence[str | Ground]" = (),
+        **more: Any,
+    ) -> "Statement":
+        """State something of this kind: ``symbol = member = ... = member``.
+
+        Parameters
+        ----------
+        number, title : str
+        symbol : sympy.Symbol or applied function
+        *members : sympy.Expr
+        grounds : sequence of str or Ground
+            A statement that is used as it stands is given by its number.
+        **more
+            As `Statement` takes it.
+        """
+        used = tuple(Ground(number=one) if isinstance(one, str) else one for one in grounds)
+        return Statement(number=number, title=title, kind=self, symbol=symbol, members=members, grounds=used, **more)
 
 
 class Outcome(StrEnum):
@@ -260,7 +286,7 @@ class Statement:
     scope: str = ""
     within: Boolean = sympy.true
     provided: tuple[sympy.Ne, ...] = ()
-    expected: Outcome | None = None
+    expected: Outcome = None  # type: ignore[assignment]  # what is usual of its kind, by __post_init__
     corrected_by: str = ""
     see: tuple[str, ...] = ()
     values: tuple[Value, ...] = ()
@@ -273,7 +299,7 @@ class Statement:
         if self.kind.is_given == bool(self.grounds):
             wanted = "has no" if self.kind.is_given else "needs"
             raise ValueError(f"{self.number}: a statement of kind {self.kind} {wanted} grounds")
-        if self.expected is None:
+        if not self.expected:
             object.__setattr__(self, "expected", Outcome.GIVEN if self.kind.is_given else Outcome.FOLLOWS)
 
     @property

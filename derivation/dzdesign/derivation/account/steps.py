@@ -22,7 +22,7 @@ class Relation:
     right: sympy.Expr
 
     def has(self, name: Name) -> bool:
-        return self.left.has(name) or self.right.has(name)
+        return bool(self.left.has(name) or self.right.has(name))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,6 +72,7 @@ def derive_in_steps(
     remaining = list(relations)
     unknown, result = symbol, symbol
     steps: list[Step] = []
+    used: tuple[Ground, ...]
     while unknown is not None:
         if steps and unknown == symbol:  # it came back on the right: collect it
             used, solutions = (), sympy.solve(symbol - result, symbol)

@@ -58,9 +58,9 @@ def find_unit_error(statement: Statement) -> str:
         except pint.DimensionalityError as error:
             return f"a comparison of {_plain(error.units1)} with {_plain(error.units2)}"
         for branch in branches:
-            error = _error(left, branch)
-            if error:
-                return error
+            wrong = _error(left, branch)
+            if wrong:
+                return wrong
     return ""
 
 

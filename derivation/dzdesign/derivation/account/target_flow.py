@@ -3,39 +3,10 @@
 import sympy
 
 from dzdesign.derivation.account.published import FIRST, SECOND, VALVES
-from dzdesign.derivation.account.statement import Condition, Ground, Kind, Outcome, Statement, Value
+from dzdesign.derivation.account.statement import Condition, Ground, Kind, Outcome, Value
 from dzdesign.derivation.law import law
 from dzdesign.derivation.laws import LAW_NAMES
-from dzdesign.derivation.symbols import (
-    K_0,
-    K_1,
-    Q_O,
-    C_d,
-    Q,
-    Q_O_prime,
-    W,
-    beta,
-    dP,
-    dP0,
-    dP1,
-    drive_left,
-    gamma_0,
-    gamma_1,
-    headroom,
-    k,
-    rho,
-    u_0,
-    u_i,
-    u_i_prime,
-    u_max,
-    u_min,
-    u_min0,
-    u_min1,
-    u_no,
-    u_O,
-    x,
-    x_max,
-)
+from dzdesign.derivation.symbols import *
 
 _DRIVE_LEFT_OVER = "with k x_max = u_max - u_min0, the command left above the threshold"
 
@@ -68,26 +39,22 @@ _UNKNOWN_AT_DP1 = (x, u_i_prime, u_O, u_min1, gamma_1, K_1, Q_O_prime)
 
 #: Theorem 1: which flow the laws give.
 TARGET = (
-    Statement(
-        number="T1a",
-        title="at the reference the law (14) gives the wanted flow (9)",
-        kind=Kind.THEOREM,
+    Kind.THEOREM(
+        "T1a",
+        "at the reference the law (14) gives the wanted flow (9)",
+        Q,
+        Q_O,
         scope=_BEYOND,
-        symbol=Q,
-        members=(Q_O,),
         grounds=(*_flow("(14)", u_min0, dP0), *(Ground(number=number) for number in ("(9)", "(8)", "gamma_0"))),
         eliminate=(x, u_i_prime, u_O, Q_O, K_0, gamma_0),
     ),
-    Statement(
-        number="T1b",
-        title="flow that the law (18) gives off the reference",
-        kind=Kind.THEOREM,
+    Kind.THEOREM(
+        "T1b",
+        "flow that the law (18) gives off the reference",
+        Q,
+        Q_O_prime + gamma_1 * (1 - beta) * (1 - k * x_max / u_max) * u_i / k,
+        Q_O_prime * (beta + (1 - beta) * u_max / (k * x_max)),
         scope=_BEYOND,
-        symbol=Q,
-        members=(
-            Q_O_prime + gamma_1 * (1 - beta) * (1 - k * x_max / u_max) * u_i / k,
-            Q_O_prime * (beta + (1 - beta) * u_max / (k * x_max)),
-        ),
         grounds=(*_flow("(18)", u_min1, dP1), *_AT_DP1),
         eliminate=_UNKNOWN_AT_DP1,
         values=tuple(
@@ -101,13 +68,12 @@ TARGET = (
         ),
         note=f"Above the target wherever beta < 1 and k x_max < u_max. The numbers: {_DRIVE_LEFT_OVER}.",
     ),
-    Statement(
-        number="T1c",
-        title="the law (18) meets the target (16)",
-        kind=Kind.THEOREM,
+    Kind.THEOREM(
+        "T1c",
+        "the law (18) meets the target (16)",
+        Q,
+        Q_O_prime,
         scope=_BEYOND,
-        symbol=Q,
-        members=(Q_O_prime,),
         grounds=(*_flow("(18)", u_min1, dP1), *_AT_DP1),
         eliminate=_UNKNOWN_AT_DP1,
         condition=Condition(
@@ -119,58 +85,42 @@ TARGET = (
         expected=Outcome.DOES_NOT_FOLLOW,
         corrected_by="T1d",
     ),
-    Statement(
-        number="T1d",
-        title="the law `target` meets the target (16)",
-        kind=Kind.THEOREM,
+    Kind.THEOREM(
+        "T1d",
+        "the law `target` meets the target (16)",
+        Q,
+        Q_O_prime,
         scope=_BEYOND,
-        symbol=Q,
-        members=(Q_O_prime,),
         grounds=(*_flow("L3", u_min1, dP1), *_AT_DP1),
         eliminate=_UNKNOWN_AT_DP1,
     ),
-    Statement(
-        number="drive left",
-        title="drive that is not used",
-        kind=Kind.DEFINITION,
-        symbol=drive_left,
-        members=(u_max - u_O,),
-    ),
-    Statement(
-        number="T1e",
-        title="drive that the law `target` leaves unused at full command",
-        kind=Kind.THEOREM,
-        symbol=drive_left,
-        members=(u_max - k * x_max - beta * u_min0,),
-        grounds=(
-            Ground(number="drive left"),
-            Ground(number="L3", at=((u_i, u_max),), where="at u_i = u_max"),
-        ),
+    Kind.DEFINITION("drive left", "drive that is not used", drive_left, u_max - u_O),
+    Kind.THEOREM(
+        "T1e",
+        "drive that the law `target` leaves unused at full command",
+        drive_left,
+        u_max - k * x_max - beta * u_min0,
+        grounds=("drive left", Ground(number="L3", at=((u_i, u_max),), where="at u_i = u_max")),
         eliminate=(u_O,),
         values=tuple(Value(label=f"at 5 MPa, {valve.name}", at=valve.at(), unit="V") for valve in (FIRST, SECOND)),
         note="(1 - beta) u_min0 where k x_max = u_max - u_min0: the target asks for x_max and not for more, though at "
         "a lower threshold the same command could open further. In flow it is what T1b gives above the target.",
     ),
-    Statement(
-        number="(6c)",
-        title="compensation signal that meets the target (16), what (6) should read",
-        kind=Kind.CORRECTED,
-        symbol=u_no,
-        members=(u_0 - (1 - beta) * u_min0,),
+    Kind.CORRECTED(
+        "(6c)",
+        "compensation signal that meets the target (16), what (6) should read",
+        u_no,
+        u_0 - (1 - beta) * u_min0,
         grounds=(
             Ground(number="u_O", at=((u_0, u_no),), where="with u_no for u_0"),
             Ground(number="Fig. 3, command", at=((u_min0, u_min1),), where="at dP = dP1"),
-            Ground(number="(11)"),
-            Ground(
-                number="(10)",
-                at=((Q_O, Q_O_prime), (dP0, dP1)),
-                where="at dP = dP1",
-            ),
-            Ground(number="(16)"),
-            Ground(number="(15)"),
-            Ground(number="gamma_1"),
-            Ground(number="(5)"),
-            Ground(number="(13)"),
+            "(11)",
+            Ground(number="(10)", at=((Q_O, Q_O_prime), (dP0, dP1)), where="at dP = dP1"),
+            "(16)",
+            "(15)",
+            "gamma_1",
+            "(5)",
+            "(13)",
         ),
         eliminate=(u_O, u_i_prime, x, Q_O_prime, K_1, gamma_1, u_min1, u_0),
         note="Only the threshold is corrected, not the gain: this is the law `target`.",
@@ -179,21 +129,19 @@ TARGET = (
 
 #: Theorem 2: full command.
 FULL_COMMAND = (
-    Statement(
-        number="T2a",
-        title="output of the law (18) at full command",
-        kind=Kind.THEOREM,
-        symbol=u_O,
-        members=(u_max + beta * (k * x_max + u_min0 - u_max),),
+    Kind.THEOREM(
+        "T2a",
+        "output of the law (18) at full command",
+        u_O,
+        u_max + beta * (k * x_max + u_min0 - u_max),
         grounds=(Ground(number="(18)", at=((u_i, u_max),), where="at u_i = u_max"),),
     ),
-    Statement(
-        number="T2b",
-        title="full command gives full drive at every pressure drop",
-        kind=Kind.THEOREM,
-        symbol=u_O,
-        members=(u_max,),
-        grounds=(Ground(number="T2a"),),
+    Kind.THEOREM(
+        "T2b",
+        "full command gives full drive at every pressure drop",
+        u_O,
+        u_max,
+        grounds=("T2a",),
         condition=Condition(
             any_of=((sympy.Eq(k * x_max, u_max - u_min0),),),
             for_all=(beta,),

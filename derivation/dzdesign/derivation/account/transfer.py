@@ -4,54 +4,7 @@ import sympy
 
 from dzdesign.derivation.account.statement import Condition, Ground, Kind, Outcome, Statement
 from dzdesign.derivation.plant import PLANT_EQUATIONS, current_time_constant
-from dzdesign.derivation.symbols import (
-    G_0,
-    B_e,
-    C_d,
-    F_e,
-    F_eL,
-    G,
-    I_s,
-    K_a,
-    K_et,
-    K_fi,
-    K_i,
-    L_c,
-    Q,
-    Q_s,
-    R_c,
-    U_e,
-    U_i,
-    U_if,
-    W,
-    X_e,
-    a,
-    di_dt,
-    dP,
-    dv_dt,
-    dx_e_dt,
-    f_e,
-    f_eL,
-    headroom,
-    i,
-    i_init,
-    m_e,
-    r_p,
-    rho,
-    s,
-    t,
-    u_e,
-    u_i,
-    u_i_prime,
-    u_if,
-    u_max,
-    u_min,
-    v_init,
-    x,
-    x_e,
-    x_init,
-    x_ov,
-)
+from dzdesign.derivation.symbols import *
 
 _FLOW_PER_TRAVEL = C_d * W * sympy.sqrt(2 * dP / rho)
 
@@ -72,15 +25,7 @@ def _premise(number: str) -> Statement:
     title, note = _TITLES[number]
     equation = PLANT_EQUATIONS[number]
     see = {"(24)": ("T6d",)}.get(number, ())
-    return Statement(
-        number=number,
-        title=title,
-        kind=Kind.PREMISE,
-        symbol=equation.lhs,
-        members=(equation.rhs,),
-        see=see,
-        note=note,
-    )
+    return Kind.PREMISE(number, title, equation.lhs, equation.rhs, see=see, note=note)
 
 
 def _transformed(transform: sympy.Expr, order: int, *initial: sympy.Symbol) -> sympy.Expr:
@@ -138,12 +83,12 @@ def laplace(number: str, where: str = "under the Laplace transform") -> Ground:
 #: Section 2.1.
 SIMULATION_MODEL = (
     *(_premise(number) for number in PLANT_EQUATIONS),
-    Statement(
-        number="(25)",
-        title="amplifier and coil, transformed",
-        kind=Kind.PAPER,
-        symbol=U_e,
-        members=(K_a * (U_i - K_fi * I_s), (R_c + r_p) * I_s + I_s * L_c * s),
+    Kind.PAPER(
+        "(25)",
+        "amplifier and coil, transformed",
+        U_e,
+        K_a * (U_i - K_fi * I_s),
+        (R_c + r_p) * I_s + I_s * L_c * s,
         grounds=(laplace("(19)"), laplace("(21)"), laplace("(20)")),
         eliminate=(U_if, I_s),
         condition=Condition(
@@ -152,21 +97,14 @@ SIMULATION_MODEL = (
         expected=Outcome.FOLLOWS_IF,
         note="Printed without its middle, U_e(s).",
     ),
-    Statement(
-        number="(26)",
-        title="solenoid force, transformed",
-        kind=Kind.PAPER,
-        symbol=F_e,
-        members=(K_i * I_s,),
-        grounds=(laplace("(22)"),),
-    ),
-    Statement(
-        number="(27)",
-        title="motion, transformed",
-        kind=Kind.PAPER,
-        symbol=F_e,
-        members=(K_i * I_s, (m_e * s**2 + B_e * s + K_et) * X_e + F_eL),
-        grounds=(laplace("(23)"), Ground(number="(26)")),
+    Kind.PAPER("(26)", "solenoid force, transformed", F_e, K_i * I_s, grounds=(laplace("(22)"),)),
+    Kind.PAPER(
+        "(27)",
+        "motion, transformed",
+        F_e,
+        K_i * I_s,
+        (m_e * s**2 + B_e * s + K_et) * X_e + F_eL,
+        grounds=(laplace("(23)"), "(26)"),
         eliminate=(I_s,),
         condition=Condition(
             any_of=((sympy.Eq(x_init, 0), sympy.Eq(v_init, 0)),),
@@ -177,12 +115,11 @@ SIMULATION_MODEL = (
         expected=Outcome.FOLLOWS_IF,
         note="Printed without its left end, F_e(s).",
     ),
-    Statement(
-        number="(28)",
-        title="flow, transformed",
-        kind=Kind.PAPER,
-        symbol=Q_s,
-        members=(C_d * W * X_e * sympy.sqrt(2 * dP / rho),),
+    Kind.PAPER(
+        "(28)",
+        "flow, transformed",
+        Q_s,
+        C_d * W * X_e * sympy.sqrt(2 * dP / rho),
         grounds=(
             Ground(
                 number="(24)",
@@ -208,15 +145,12 @@ _RESISTANCE = R_c + r_p + K_a * K_fi
 
 #: Theorem 6.
 TRANSFER_FUNCTION = (
-    Statement(
-        number="T6a",
-        title="current loop, from command to coil current",
-        kind=Kind.THEOREM,
-        symbol=I_s,
-        members=(
-            K_a * U_i / (_RESISTANCE + L_c * s),
-            K_a / _RESISTANCE * U_i / (1 + current_time_constant() * s),
-        ),
+    Kind.THEOREM(
+        "T6a",
+        "current loop, from command to coil current",
+        I_s,
+        K_a * U_i / (_RESISTANCE + L_c * s),
+        K_a / _RESISTANCE * U_i / (1 + current_time_constant() * s),
         grounds=(
             Ground(number="(25)", member=0, where="left side"),
             Ground(number="(25)", member=1, where="right side"),
@@ -226,61 +160,46 @@ TRANSFER_FUNCTION = (
         note="Time constant L_c / (R_c + r_p + K_a K_fi): the feedback makes the coil faster by the factor "
         "1 + K_a K_fi / (R_c + r_p), and makes the current depend less on the coil's temperature by the same factor.",
     ),
-    Statement(
-        number="transfer function",
-        title="transfer function from command to flow",
-        kind=Kind.DEFINITION,
-        symbol=G,
-        members=(Q_s / U_i,),
-    ),
-    Statement(
-        number="T6b",
-        title="transfer function of Eqs. (19)-(24) without load force",
-        kind=Kind.THEOREM,
-        symbol=G,
-        members=(_FLOW_PER_TRAVEL * K_i * K_a / ((L_c * s + _RESISTANCE) * (m_e * s**2 + B_e * s + K_et)),),
+    Kind.DEFINITION("transfer function", "transfer function from command to flow", G, Q_s / U_i),
+    Kind.THEOREM(
+        "T6b",
+        "transfer function of Eqs. (19)-(24) without load force",
+        G,
+        _FLOW_PER_TRAVEL * K_i * K_a / ((L_c * s + _RESISTANCE) * (m_e * s**2 + B_e * s + K_et)),
         grounds=(
-            Ground(number="transfer function"),
-            Ground(number="(28)"),
+            "transfer function",
+            "(28)",
             Ground(number="(27)", member=1, at=((F_eL, sympy.S.Zero),), where="right side, F_eL = 0"),
-            Ground(number="(26)"),
-            Ground(number="T6a"),
+            "(26)",
+            "T6a",
         ),
         eliminate=(Q_s, X_e, F_e, I_s),
         expected=Outcome.FOLLOWS_IF,
         note="Third order. All coefficients of both factors are positive, so it is stable for every set of parameters.",
     ),
-    Statement(
-        number="T6c",
-        title="static gain from command to flow",
-        kind=Kind.THEOREM,
-        symbol=G_0,
-        members=(_FLOW_PER_TRAVEL * K_i * K_a / (_RESISTANCE * K_et),),
+    Kind.THEOREM(
+        "T6c",
+        "static gain from command to flow",
+        G_0,
+        _FLOW_PER_TRAVEL * K_i * K_a / (_RESISTANCE * K_et),
         grounds=(Ground(number="T6b", at=((G, G_0), (s, sympy.S.Zero)), where="at s = 0"),),
         expected=Outcome.FOLLOWS_IF,
         note="By the final value theorem, which the stability of T6b allows.",
     ),
-    Statement(
-        number="overlap",
-        title="opening of the edge: travel beyond the overlap",
-        kind=Kind.DEFINITION,
-        symbol=x,
-        members=(x_e - x_ov,),
-    ),
-    Statement(
-        number="T6d",
-        title="Eq. (24) is the dead-zone model (1) beyond the threshold",
-        kind=Kind.THEOREM,
+    Kind.DEFINITION("overlap", "opening of the edge: travel beyond the overlap", x, x_e - x_ov),
+    Kind.THEOREM(
+        "T6d",
+        "Eq. (24) is the dead-zone model (1) beyond the threshold",
+        Q,
+        _FLOW_PER_TRAVEL * x_e,
         scope="a command from the threshold to full command",
-        symbol=Q,
-        members=(_FLOW_PER_TRAVEL * x_e,),
         grounds=(
             Ground(
                 number="(1)",
                 at=((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom)),
                 where="beyond the threshold",
             ),
-            Ground(number="overlap"),
+            "overlap",
         ),
         eliminate=(x,),
         # Section 2.2: the simulated spool's dead zone is 54 % of its 1.8 mm.
@@ -294,20 +213,19 @@ TRANSFER_FUNCTION = (
         note="If the dead zone is overlap (our reading: 54 % of 1.8 mm, 0.97 mm), Eq. (24) lacks it; a preload within "
         "f_eL would be another explanation.",
     ),
-    Statement(
-        number="T6e",
-        title="flow across an edge with overlap, opened",
-        kind=Kind.CORRECTED,
+    Kind.CORRECTED(
+        "T6e",
+        "flow across an edge with overlap, opened",
+        Q,
+        _FLOW_PER_TRAVEL * (x_e - x_ov),
         scope="a command from the threshold to full command",
-        symbol=Q,
-        members=(_FLOW_PER_TRAVEL * (x_e - x_ov),),
         grounds=(
             Ground(
                 number="(1)",
                 at=((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom)),
                 where="beyond the threshold",
             ),
-            Ground(number="overlap"),
+            "overlap",
         ),
         eliminate=(x,),
     ),

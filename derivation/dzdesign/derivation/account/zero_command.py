@@ -3,39 +3,9 @@
 import sympy
 
 from dzdesign.derivation.account.published import FIRST, SECOND, SIMULATION
-from dzdesign.derivation.account.statement import Case, Condition, Ground, Kind, Outcome, Statement, Value
+from dzdesign.derivation.account.statement import Case, Condition, Ground, Kind, Outcome, Value
 from dzdesign.derivation.law import law
-from dzdesign.derivation.symbols import (
-    Q,
-    Q_max1,
-    Q_neg,
-    above,
-    beta,
-    dP,
-    dP0,
-    dP1,
-    excess,
-    f,
-    gamma_1,
-    guard,
-    headroom,
-    jump,
-    k,
-    slope,
-    u_above,
-    u_below,
-    u_dz,
-    u_i,
-    u_i_prime,
-    u_max,
-    u_min,
-    u_min0,
-    u_min1,
-    u_O,
-    x,
-    x_max,
-    y,
-)
+from dzdesign.derivation.symbols import *
 
 _PAPER_LAW = law("paper")
 _OFFSET = _PAPER_LAW.offset
@@ -47,26 +17,19 @@ _THREE_CASES = (
 
 #: Theorem 3: zero command.
 ZERO_COMMAND = (
-    Statement(
-        number="opening",
-        title="opening on both sides of the threshold",
-        kind=Kind.ASSUMPTION,
-        symbol=x,
-        members=(sympy.Piecewise(((u_O - u_min) / k, u_min <= u_O), (0, u_O < u_min)),),
+    Kind.ASSUMPTION(
+        "opening",
+        "opening on both sides of the threshold",
+        x,
+        sympy.Piecewise(((u_O - u_min) / k, u_min <= u_O), (0, u_O < u_min)),
         note="Eq. (11) with Fig. 3 beyond the threshold; closed before it, as Eq. (1) says.",
     ),
-    Statement(
-        number="T3a",
-        title="flow at zero command",
-        kind=Kind.THEOREM,
+    Kind.THEOREM(
+        "T3a",
+        "flow at zero command",
+        Q,
+        sympy.Piecewise((0, u_min1 > _OFFSET), (gamma_1 * (_OFFSET - u_min1) / k, u_min1 <= _OFFSET)),
         scope="beta u_min0 <= u_max",
-        symbol=Q,
-        members=(
-            sympy.Piecewise(
-                (0, u_min1 > _OFFSET),
-                (gamma_1 * (_OFFSET - u_min1) / k, u_min1 <= _OFFSET),
-            ),
-        ),
         grounds=(
             Ground(
                 number="(1)",
@@ -74,21 +37,20 @@ ZERO_COMMAND = (
                 where="at dP = dP1 and the law's output for u_i = 0, beta u_min0 (L1)",
             ),
             Ground(number="opening", at=((u_O, _OFFSET), (u_min, u_min1)), where="at the same command"),
-            Ground(number="gamma_1"),
+            "gamma_1",
         ),
         eliminate=(x, gamma_1),
         cases=_THREE_CASES,
         positive_if=u_min1 < _OFFSET,
         note="So zero command passes no flow exactly if beta u_min0 <= u_min(dP). Both laws have this offset.",
     ),
-    Statement(
-        number="largest flow",
-        title="largest flow at dP1 without compensator",
-        kind=Kind.THEOREM,
+    Kind.THEOREM(
+        "largest flow",
+        "largest flow at dP1 without compensator",
+        Q_max1,
+        gamma_1 * (u_max - u_min1) / k,
         scope="u_min1 <= u_max, and the spool has not met its stop",
         within=u_min1 <= u_max,
-        symbol=Q_max1,
-        members=(gamma_1 * (u_max - u_min1) / k,),
         grounds=(
             Ground(
                 number="(1)",
@@ -96,25 +58,22 @@ ZERO_COMMAND = (
                 where="at dP = dP1, full command",
             ),
             Ground(number="opening", at=((u_O, u_max), (u_min, u_min1)), where="at full command"),
-            Ground(number="gamma_1"),
+            "gamma_1",
         ),
         eliminate=(x, gamma_1),
         cases=(Case(at=((u_max, u_min1 + headroom),), where=""),),
         note="As long as the spool has not met its stop.",
     ),
-    Statement(
-        number="T3b",
-        title="flow at zero command without beta, for a threshold lower than at the reference",
-        kind=Kind.THEOREM,
+    Kind.THEOREM(
+        "T3b",
+        "flow at zero command without beta, for a threshold lower than at the reference",
+        Q,
+        gamma_1 * (u_min0 - u_min1) / k,
+        Q_max1 * (u_min0 - u_min1) / (u_max - u_min1),
         provided=(sympy.Ne(u_max, u_min1),),
         scope="u_min1 < u_min0, a threshold lower than at the reference",
         within=u_min1 < u_min0,
-        symbol=Q,
-        members=(gamma_1 * (u_min0 - u_min1) / k, Q_max1 * (u_min0 - u_min1) / (u_max - u_min1)),
-        grounds=(
-            Ground(number="T3a", at=((beta, sympy.S.One),), where="at beta = 1"),
-            Ground(number="largest flow"),
-        ),
+        grounds=(Ground(number="T3a", at=((beta, sympy.S.One),), where="at beta = 1"), "largest flow"),
         eliminate=(gamma_1,),
         cases=(Case(at=((u_min1, u_min0 - excess),), where="threshold lower than at the reference"),),
         see=("T9d",),
@@ -137,28 +96,26 @@ ZERO_COMMAND = (
             Value(label="second valve", at=SECOND.at(), unit="L/min"),
         ),
     ),
-    Statement(
-        number="beta(dP)",
-        title="correction coefficient from the fitted thresholds",
-        kind=Kind.THEOREM,
-        symbol=beta,
-        members=(f(dP1) / f(dP0),),
+    Kind.THEOREM(
+        "beta(dP)",
+        "correction coefficient from the fitted thresholds",
+        beta,
+        f(dP1) / f(dP0),
         grounds=(
-            Ground(number="(5)"),
+            "(5)",
             Ground(number="(4)", at=((u_min, u_min0), (dP, dP0)), where="at dP = dP0"),
             Ground(number="(4)", at=((u_min, u_min1), (dP, dP1)), where="at dP = dP1"),
         ),
         eliminate=(u_min0, u_min1),
     ),
-    Statement(
-        number="T3c",
-        title="with beta by Eq. (5), zero command stands at the threshold of the present pressure drop",
-        kind=Kind.THEOREM,
-        symbol=u_O,
-        members=(f(dP1),),
+    Kind.THEOREM(
+        "T3c",
+        "with beta by Eq. (5), zero command stands at the threshold of the present pressure drop",
+        u_O,
+        f(dP1),
         grounds=(
             Ground(number="(18)", at=((u_i, sympy.S.Zero),), where="at u_i = 0"),
-            Ground(number="beta(dP)"),
+            "beta(dP)",
             Ground(number="(4)", at=((u_min, u_min0), (dP, dP0)), where="at dP = dP0"),
         ),
         eliminate=(beta, u_min0),
@@ -168,32 +125,24 @@ ZERO_COMMAND = (
 
 #: Theorem 4: monotone, continuous, and what is left below the reference.
 SHAPE = (
-    Statement(
-        number="T4a",
-        title="slope of the law (18)",
-        kind=Kind.THEOREM,
-        symbol=slope,
-        members=(1 - beta * (1 - k * x_max / u_max),),
+    Kind.THEOREM(
+        "T4a",
+        "slope of the law (18)",
+        slope,
+        1 - beta * (1 - k * x_max / u_max),
         grounds=(Ground(number="(18)", derivative=(u_i, slope), where="differentiated by u_i"),),
         positive_if=beta * (1 - k * x_max / u_max) < 1,
         note="Holds for every beta <= 1. The law `target` always rises.",
     ),
-    Statement(
-        number="jump",
-        title="step of the output where dP passes dP0",
-        kind=Kind.DEFINITION,
-        symbol=jump,
-        members=(u_above - u_below,),
-    ),
-    Statement(
-        number="T4b",
-        title="the selector (7) is continuous at dP0",
-        kind=Kind.THEOREM,
+    Kind.DEFINITION("jump", "step of the output where dP passes dP0", jump, u_above - u_below),
+    Kind.THEOREM(
+        "T4b",
+        "the selector (7) is continuous at dP0",
+        jump,
+        sympy.S.Zero,
         scope="dP1 just above dP0",
-        symbol=jump,
-        members=(sympy.S.Zero,),
         grounds=(
-            Ground(number="jump"),
+            "jump",
             Ground(number="L2", at=((u_O, u_above), (dP1, dP0 + above)), where="just above dP0"),
             Ground(number="(14)", at=((u_O, u_below),), where="at dP0"),
         ),
@@ -207,12 +156,11 @@ SHAPE = (
         expected=Outcome.FOLLOWS_IF,
         note="beta is its limit from above. A beta fitted freely to tests need not be 1 there; ours is by constraint.",
     ),
-    Statement(
-        number="T4c",
-        title="dead zone that is left below the reference",
-        kind=Kind.THEOREM,
-        symbol=u_dz,
-        members=((u_min - u_min0) * u_max / (k * x_max),),
+    Kind.THEOREM(
+        "T4c",
+        "dead zone that is left below the reference",
+        u_dz,
+        (u_min - u_min0) * u_max / (k * x_max),
         grounds=(
             Ground(
                 number="(14)", at=((u_O, u_min), (u_i, u_dz)), where="where its output reaches the threshold, dP <= dP0"
@@ -228,13 +176,12 @@ SHAPE = (
         ),
         note="The threshold is higher at a lower pressure drop, and the paper holds u_0 there.",
     ),
-    Statement(
-        number="T4d",
-        title="the opposite command gives the opposite flow",
-        kind=Kind.THEOREM,
+    Kind.THEOREM(
+        "T4d",
+        "the opposite command gives the opposite flow",
+        Q_neg,
+        -Q,
         scope="|u_i| from the threshold to full command",
-        symbol=Q_neg,
-        members=(-Q,),
         grounds=(
             Ground(
                 number="(1)",
@@ -250,14 +197,13 @@ SHAPE = (
         eliminate=(Q,),
         note="So the law for negative commands is the mirror image, with its own parameters.",
     ),
-    Statement(
-        number="T4e",
-        title="no flow inside the dead zone, on either side",
-        kind=Kind.THEOREM,
+    Kind.THEOREM(
+        "T4e",
+        "no flow inside the dead zone, on either side",
+        Q,
+        sympy.S.Zero,
         scope="|u_i| below the threshold",
         within=(-u_min < u_i) & (u_i < u_min),
-        symbol=Q,
-        members=(sympy.S.Zero,),
         grounds=(Ground(number="(1)", at=((u_max, u_min + headroom),)),),
         cases=(
             Case(at=((u_i, y), (u_min, y + guard)), where="0 <= u_i < u_min"),

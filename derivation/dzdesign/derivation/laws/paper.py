@@ -2,7 +2,7 @@
 
 import sympy
 
-from dzdesign.derivation.account.statement import Case, Ground, Kind, Statement
+from dzdesign.derivation.account.statement import Case, Ground, Kind
 from dzdesign.derivation.law import Law
 from dzdesign.derivation.symbols import above, below, beta, dP0, dP1, k, u_0, u_i, u_max, u_min0, u_no, u_O, x_max
 
@@ -18,30 +18,15 @@ LAW = Law(
     "it exceeds the target by gamma_1 (1 - beta) (1 - k x_max/u_max) u_i / k.",
     stated_as="(18)",
     statements=(
-        Statement(
-            number="L1",
-            title="the law `paper` is Eq. (18)",
-            kind=Kind.LAW,
-            symbol=u_O,
-            members=(_OUTPUT,),
-            grounds=(Ground(number="(18)"),),
-        ),
-        Statement(
-            number="L2",
-            title="the selector gives the law `paper`, at beta = 1 up to dP0: Eq. (14)",
-            kind=Kind.LAW,
-            symbol=u_O,
-            members=(sympy.Piecewise((_OUTPUT, dP1 > dP0), (_OUTPUT.subs(beta, 1), dP1 <= dP0)),),
-            grounds=(
-                Ground(number="u_O", at=((u_0, u_no),), where="with u_no for u_0"),
-                Ground(number="(7)"),
-                Ground(number="(13)"),
-            ),
+        Kind.LAW("L1", "the law `paper` is Eq. (18)", u_O, _OUTPUT, grounds=("(18)",)),
+        Kind.LAW(
+            "L2",
+            "the selector gives the law `paper`, at beta = 1 up to dP0: Eq. (14)",
+            u_O,
+            sympy.Piecewise((_OUTPUT, dP1 > dP0), (_OUTPUT.subs(beta, 1), dP1 <= dP0)),
+            grounds=(Ground(number="u_O", at=((u_0, u_no),), where="with u_no for u_0"), "(7)", "(13)"),
             eliminate=(u_no, u_0),
-            cases=(
-                Case(at=((dP1, dP0 - below),), where="dP <= dP0"),
-                Case(at=((dP1, dP0 + above),), where="dP > dP0"),
-            ),
+            cases=(Case(at=((dP1, dP0 - below),), where="dP <= dP0"), Case(at=((dP1, dP0 + above),), where="dP > dP0")),
         ),
     ),
 )

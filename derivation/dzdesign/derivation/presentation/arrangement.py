@@ -6,6 +6,7 @@ with a term that is not subtracted.
 """
 
 from functools import cache
+from typing import Any
 
 import sympy
 from sympy.core.function import AppliedUndef
@@ -18,7 +19,7 @@ _PRESSURES = {dP, dP0, dP1}
 _HALF = sympy.Rational(1, 2)
 
 
-class Root(sympy.Function):
+class Root(sympy.Function):  # type: ignore[misc]
     """A square root that SymPy does not split into the roots of its factors."""
 
 
@@ -64,7 +65,7 @@ def _sum(expression: sympy.Add) -> sympy.Add:
     return sympy.Add(*terms, evaluate=False)
 
 
-def _term_key(term: sympy.Expr) -> tuple:
+def _term_key(term: sympy.Expr) -> tuple[Any, ...]:
     powers = [factor.as_base_exp() for factor in sympy.Mul.make_args(term)]
     varying = [_rank(name) for name in term.atoms(sympy.Symbol, AppliedUndef) if _varies(name)]
     return (

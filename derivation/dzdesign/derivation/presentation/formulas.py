@@ -18,7 +18,7 @@ from dzdesign.derivation.symbols import QUANTITIES, Name
 _LOW_PARENTHESES = re.compile(r"\\left\(((?:(?!\\left|\\frac|\\sqrt|\\right).)*?) ?\\right\)")
 
 
-class _Ascii(StrPrinter):
+class _Ascii(StrPrinter):  # type: ignore[misc]
     def _print_Relational(self, relation: Relational) -> str:
         sign = {"==": "="}.get(relation.rel_op, relation.rel_op)
         return f"{self._print(relation.lhs)} {sign} {self._print(relation.rhs)}"
@@ -28,7 +28,7 @@ class _Text(_Ascii):
     """ASCII that a person can read and a computer algebra system too, but for cases, one on a line."""
 
     def _print_Pow(self, expr: sympy.Pow, rational: bool = False) -> str:
-        return super()._print_Pow(expr, rational).replace("**", "^")
+        return str(super()._print_Pow(expr, rational)).replace("**", "^")
 
     def _print_Root(self, root: Root) -> str:
         return f"sqrt({self._print(root.args[0])})"
@@ -45,7 +45,7 @@ class _Text(_Ascii):
         return "otherwise" if when == sympy.true else f"if {self._print(when)}"
 
 
-class _Latex(LatexPrinter):
+class _Latex(LatexPrinter):  # type: ignore[misc]
     """LaTeX for math mode, with amsmath."""
 
     def _print_Root(self, root: Root) -> str:
@@ -55,7 +55,7 @@ class _Latex(LatexPrinter):
         return _chain([(self._print(side.lts), self._print(side)) for side in _ascending(expr)])
 
     def _print_Piecewise(self, expr: sympy.Piecewise) -> str:
-        return super()._print_Piecewise(expr).replace(r"\text{for}\:", r"\text{if }")
+        return str(super()._print_Piecewise(expr)).replace(r"\text{for}\:", r"\text{if }")
 
     def _deal_with_super_sub(self, string: str, style: str = "plain") -> str:
         bare = string.rstrip("'")
@@ -68,7 +68,7 @@ class _Python(_Ascii):
     """What SymPy reads back, by the names in `symbols.py`."""
 
     def _print_Symbol(self, symbol: sympy.Symbol) -> str:
-        return _python_names().get(symbol, symbol.name)
+        return _python_names().get(symbol, str(symbol.name))
 
     def _print_AppliedUndef(self, function: AppliedUndef) -> str:
         name = _python_names().get(function.func, function.func.__name__)
@@ -122,7 +122,7 @@ def to_text(formula: sympy.Basic) -> str:
     >>> to_text((s.k * s.x_max / s.u_max - 1) * s.u_i + s.u_min0)
     '(k*x_max/u_max - 1)*u_i + u_min0'
     """
-    return _Text({"order": "none", "full_prec": False}).doprint(arrange(formula))
+    return str(_Text({"order": "none", "full_prec": False}).doprint(arrange(formula)))
 
 
 @cache
@@ -163,7 +163,7 @@ def to_python(formula: sympy.Basic) -> str:
     -------
     str
     """
-    return _Python().doprint(with_positive_sign(formula))
+    return str(_Python().doprint(with_positive_sign(formula)))
 
 
 @cache

@@ -47,7 +47,7 @@ class TextWriter(Writer):
         return "\n".join(rows)
 
     def filters(self) -> dict[str, Callable[..., Any]]:
-        own = {"wrap": wrap, "head": head, "line": self.line, "labelled": labelled}
+        own: dict[str, Callable[..., Any]] = {"wrap": wrap, "head": head, "line": self.line, "labelled": labelled}
         return {**super().filters(), **own, "equations": equations, "figures": self.figures}
 
     def line(self, line: Line, indent: str) -> str:

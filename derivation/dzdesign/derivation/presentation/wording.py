@@ -135,7 +135,7 @@ def _sentences(verdict: Verdict, book: Mapping[str, Verdict]) -> Iterator[Words]
 def _scope(verdict: Verdict, book: Mapping[str, Verdict]) -> Iterator[Words]:
     """Say where a statement is proved, if not everywhere."""
     statement = verdict.statement
-    limits = [parse_prose(statement.scope, book)] if statement.scope else []
+    limits: list[Part] = [parse_prose(statement.scope, book)] if statement.scope else []
     limits += map(Formula, statement.provided)
     if limits:
         yield Words("Proved for ", Words.join(limits, " and "), ".")
@@ -145,7 +145,7 @@ def _scope(verdict: Verdict, book: Mapping[str, Verdict]) -> Iterator[Words]:
 
 def _condition(verdict: Verdict, condition: Condition) -> Words:
     alternatives = (Words.join((Formula(*one.args) for one in every), " and ") for every in condition.any_of)
-    words = Words(Words.join(alternatives, " or "), *([" ", parse_prose(condition.words)] if condition.words else []))
+    words = Words(Words.join(alternatives, " or "), " " if condition.words else "", parse_prose(condition.words))
     if verdict.outcome is not Outcome.DOES_NOT_FOLLOW:
         proved = ", and only then (proved)." if verdict.necessary else ". Whether only then is not proved."
         return Words("Follows if ", words, proved)
@@ -287,7 +287,7 @@ def _step(step: Step, before: Step | None, proof: CaseProof, book: Mapping[str, 
         for one in relations
         if one.left != one.right
     ]
-    return Words("With ", *([Words.join(others), " and "] if others else []), last, ", this is:")
+    return Words("With ", Words.join(others), " and " if others else "", last, ", this is:")
 
 
 def _solved(relation: Relation, step: Step) -> tuple[Part, ...]:

@@ -98,7 +98,7 @@ def write(kind: type[Writer], report: DerivationReport) -> str:
         **kind.SYNTAX,
     )
     environment.filters.update(kind({entry.number for entry in report.statements}).filters())
-    return environment.get_template(kind.TEMPLATE).render(content=report)
+    return str(environment.get_template(kind.TEMPLATE).render(content=report))
 
 
 def anchor(number: str) -> str:

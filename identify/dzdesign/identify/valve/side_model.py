@@ -2,17 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Literal, get_args
+from typing import Annotated, get_args
 
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
-from dzdesign.identify.fitting.guard_curve import GUARDS, ROUNDING_V, Guard, GuardCurve, OpeningCurve
+from dzdesign.identify.valve.guard_curve import GUARDS, ROUNDING_V, Guard, GuardCurve, OpeningCurve
 from dzdesign.identify.valve.quantity_types import Flow, PressureDrop, Probability, Ratio, Voltage, VoltageError
 from dzdesign.identify.valve.ramp_result import TestResult
+from dzdesign.identify.valve.staircase import Direction
 
-Trend = Literal["decreasing", "flat", "increasing"]
-TRENDS: tuple[Trend, ...] = get_args(Trend)
+DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,7 +73,7 @@ class SideModel:
     ]
     k_V_mm: Annotated[float, quantity("V/mm", "k of Eq. (11), where --x-max was given.", ge=0, le=1e9)] | None
     trend: Annotated[
-        Trend | None,
+        Direction | None,
         Meta(description="How the threshold runs with the pressure drop; null where fewer than two were tested."),
     ]
     trend_change_V: Annotated[Voltage | None, Meta(description="Change of the threshold over the tested range.")]
@@ -104,7 +104,7 @@ class SideModel:
 
     def __post_init__(self) -> None:
         if self.trend is None and len(self.tests) != 1:
-            raise RuleError(f"trend is missing beside {len(self.tests)} tests, expected one of {', '.join(TRENDS)}")
+            raise RuleError(f"trend is missing beside {len(self.tests)} tests, expected one of {', '.join(DIRECTIONS)}")
         if self.certificate.guard not in self.guards or not set(self.guards) <= set(GUARDS):
             raise RuleError(
                 f"the guard is '{self.certificate.guard}' and there are curves of {', '.join(self.guards) or 'none'}, "
