@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from dzdesign.core.artefact_files import to_json, write_folder
+from dzdesign.core.artefact_files import write_folder
 from dzdesign.example import example_folder as bundled_folder
 from dzdesign.identify.reading.ramp_files import read_ramp_file
 from tests.support.wording import Wording
@@ -67,9 +67,9 @@ def example_compensator(example_valve):
 @pytest.fixture(scope="session")
 def example_firmware(example_compensator):
     from dzdesign.codegen.project import generate
-    from dzdesign.design.compensator_file import compensator_document
+    from dzdesign.core.artefact_types import to_json_bytes
 
-    return generate(example_compensator, "f28335", to_json(compensator_document(example_compensator)).encode())
+    return generate(example_compensator, "f28335", to_json_bytes(example_compensator))
 
 
 @pytest.fixture
@@ -84,7 +84,6 @@ def reported_demo(example_valve, tmp_path_factory):
     """A folder as `dzdesign demo` leaves it, with quicker ramps: valve.json, compensator.json, firmware, evidence."""
     from dzdesign.codegen.project import generate
     from dzdesign.core.artefact_types import to_json_bytes
-    from dzdesign.design.compensator_file import compensator_document
     from dzdesign.design.designing import design
     from dzdesign.report.valve_report import with_report
     from dzdesign.verify.closed_loop.loop import RampSequence
@@ -93,7 +92,7 @@ def reported_demo(example_valve, tmp_path_factory):
     folder = tmp_path_factory.mktemp("reported")
     valve_json = to_json_bytes(example_valve)
     compensator = design(example_valve, default_options(), valve_json)
-    compensator_json = to_json(compensator_document(compensator))
+    compensator_json = to_json_bytes(compensator).decode()
     (folder / "valve.json").write_bytes(valve_json)
     (folder / "compensator.json").write_text(compensator_json, encoding="utf-8", newline="")
     firmware = generate(compensator, "f28335", compensator_json.encode())

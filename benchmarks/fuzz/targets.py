@@ -10,10 +10,11 @@ from pathlib import Path
 from dzdesign.assess.limits import parse_limits
 from dzdesign.codegen.telemetry.frame import FRAME_OCTETS, FrameReader
 from dzdesign.command_line.options_file import options_from_file
+from dzdesign.command_line.parser import arguments_of_command
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
 from dzdesign.core.units import SI_UNIT, parse_quantity
-from dzdesign.design.compensator_file import compensator_from_document
+from dzdesign.design.compensator import Compensator
 from dzdesign.design.signal_text import parse_signal
 from dzdesign.identify.reading.column_labels import find_columns, parse_columns
 from dzdesign.identify.reading.ramp_files import read_ramp_file
@@ -83,7 +84,12 @@ def _telemetry(data: bytes) -> None:
         raise ValueError(f"{held} octets are neither skipped, nor in a frame, nor held")
 
 
-KNOWN = ("u_max", "dp", "columns", "ramps", "confidence")
+OPTIONS = [
+    argument
+    for name in ("identify", "simulate")
+    for argument in arguments_of_command(name)
+    if not argument.is_positional
+]
 TARGETS = {
     "text": Target(run=_text, seeds=(CSV, CSV.replace(b",", b".").replace(b";", b","), gzip.compress(CSV, mtime=0))),
     "recording": Target(
@@ -93,11 +99,11 @@ TARGETS = {
         run=lambda data: read_artefact(data, ValveModel, "valve.json"), seeds=((GOLDENS / "valve.json").read_bytes(),)
     ),
     "compensator": Target(
-        run=lambda data: compensator_from_document(data, "compensator.json"),
+        run=lambda data: read_artefact(data, Compensator, "compensator.json"),
         seeds=((GOLDENS / "compensator.json").read_bytes(),),
     ),
     "options": Target(
-        run=_stored(lambda path: options_from_file(str(path), KNOWN, ("dp",), ("dp", "columns")), "options.toml"),
+        run=_stored(lambda path: options_from_file(str(path), OPTIONS), "options.toml"),
         seeds=(b"u-max = '10 V'\ndp = ['1 MPa', 2]\n[columns]\nu = 'AO0:V'\n",),
     ),
     "plant": Target(run=_stored(read_plant, "plant.toml"), seeds=(b"K_a = 4\nm_e_kg = 6e-2\nL_c_H = 0x10\n",)),

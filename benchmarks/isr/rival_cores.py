@@ -37,9 +37,9 @@ def _line_terms(compensator: Compensator) -> tuple[Fraction, Fraction, Fraction]
     """Return p, q, r of ``counts = beta (p u + r) + q u``: Eq. (18) in counts, exactly."""
     lines = [
         evaluate_line(
-            law(compensator.law_name),
+            law(compensator.law),
             beta=beta,
-            kappa=compensator.positive.k_x_max_over_u_max,
+            kappa=compensator.positive.drive_range_over_u_max,
             u_min0_over_u_max=compensator.positive.u_min0_over_u_max,
             n_adc=compensator.signals.code_max,
             n_full=compensator.signals.compare_max,
@@ -50,7 +50,7 @@ def _line_terms(compensator: Compensator) -> tuple[Fraction, Fraction, Fraction]
 
 
 def _betas(compensator: Compensator) -> list[Fraction]:
-    return [Fraction(value, compensator.beta_denominator) for value in compensator.positive.beta_numerators]
+    return [Fraction(value, compensator.beta_denominator) for value in compensator.positive.beta]
 
 
 def _double(value: Fraction) -> str:
@@ -124,8 +124,8 @@ static const double beta_node[{len(betas)}] = {{
 
 
 def _naive_law(c: Compensator) -> str:
-    share, u_min0 = _double(c.positive.k_x_max_over_u_max), _double(c.positive.u_min0_over_u_max * c.u_max_V)
-    in_shares = law(c.law_name).output.subs(symbols.k, symbols.kappa * symbols.u_max / symbols.x_max)
+    share, u_min0 = _double(c.positive.drive_range_over_u_max), _double(c.positive.u_min0_over_u_max * c.u_max_V)
+    in_shares = law(c.law).output.subs(symbols.k, symbols.kappa * symbols.u_max / symbols.x_max)
     # The numbers as symbols, so that none of them is computed beforehand.
     return sympy.ccode(in_shares.subs({symbols.kappa: sympy.Symbol(share), symbols.u_min0: sympy.Symbol(u_min0)}))
 

@@ -24,8 +24,8 @@ from rival_cores import rivals
 from scoreboard import keep_rows, markdown, markdown_rows, say
 from tried_inputs import RANDOM_INPUTS, SEED, Codes, expected_compares, tried_inputs
 
+from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.compensator_file import compensator_from_document
 
 KNOWN_LENGTHS = (0, 7, 300)
 
@@ -51,9 +51,9 @@ def main(arguments: list[str] | None = None) -> int:
         for index, contender in enumerate(contenders):
             say(f"{contender.name} ...")
             results.append(measure(contender, compensator, inputs, expected, Path(folder) / str(index)))
-    nodes, compare_max = len(compensator.positive.beta_numerators), compensator.signals.compare_max
+    nodes, compare_max = len(compensator.positive.beta), compensator.signals.compare_max
     print(
-        f"\nLaw `{compensator.law_name}`, {nodes} nodes of beta, compare 0..{compare_max}. Counts from its first "
+        f"\nLaw `{compensator.law}`, {nodes} nodes of beta, compare 0..{compare_max}. Counts from its first "
         f"instruction to its return, least-most over {len(inputs)} inputs: corners, edges of nodes, impossible codes, "
         f"{RANDOM_INPUTS} random (seed {SEED}). All compiled with -std=c99 -O2.\n"
     )
@@ -70,7 +70,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _compensator(path: Path | None) -> Compensator:
     if path:
-        return compensator_from_document(path.read_bytes(), str(path))
+        return read_artefact(path.read_bytes(), Compensator, str(path))
     from dzdesign.design.designing import design
     from dzdesign.example import example_folder
     from dzdesign.identify.identification import identify

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from dzdesign.codegen.project import generate
-from dzdesign.core.artefact_files import to_json, write_folder
+from dzdesign.core.artefact_files import write_folder
+from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.compensator_file import compensator_document
 from dzdesign.design.designing import design
 from dzdesign.example import example_folder
 from dzdesign.identify.identification import identify
@@ -16,6 +16,6 @@ def example_firmware(folder: Path, target: str = "f28335") -> Compensator:
     """Write the example's firmware to `folder` and return what it was made from."""
     ramps = example_folder() / "ramps"
     compensator = design(identify([read_ramp_file(ramp) for ramp in sorted(ramps.glob("*.csv.gz"))]))
-    firmware = generate(compensator, target, to_json(compensator_document(compensator)).encode())
+    firmware = generate(compensator, target, to_json_bytes(compensator))
     write_folder(folder, firmware.files, firmware.manifest)
     return compensator

@@ -13,7 +13,8 @@ from types import SimpleNamespace
 import casadi as ca
 import numpy as np
 
-from dzdesign.design.compensator_file import compensator_from_document
+from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.design.compensator import Compensator
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant, derivatives, orifice
 from dzdesign.verify.toolchain.host_compiler import load_library
 
@@ -51,7 +52,7 @@ def core_of(firmware: Path) -> Core:
     sources = {path.name: path.read_text() for path in sorted((firmware / "core").glob("dz_comp*.[ch]"))}
     library = load_library({**sources, "core.c": EXTERNAL}, "the core")
     library.dz_comp.restype = ctypes.c_uint16
-    signals = compensator_from_document((firmware / "compensator.json").read_bytes(), "compensator.json").signals
+    signals = read_artefact((firmware / "compensator.json").read_bytes(), Compensator, "compensator.json").signals
     code_max = signals.code_max
 
     def codes(command, dp_MPa, round_down):

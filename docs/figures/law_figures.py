@@ -82,7 +82,7 @@ def edge(example: Example) -> "Figure":
     command = np.arange(0, 130)
     for compensator, colour, line, name in (
         (example.compensator, BLUE, "--", "without an edge"),
-        (example.with_edge, GREEN, "-", 'with --edge "1 %"'),
+        (example.with_edge, GREEN, "-", 'with --transition "1 %"'),
     ):
         code = int(compensator.signals.dp_code(Fraction(test.dp_MPa)))
         drive = 10 * np.array([float(compensator.drive(int(each), code)) for each in command])
@@ -92,9 +92,10 @@ def edge(example: Example) -> "Figure":
         axes.annotate(
             f"{name}, {height:.3f} V", (3.15, height), (0, -11), textcoords="offset points", ha="right", fontsize=8
         )
-    end = 100 * example.with_edge.edge_codes / 4095
+    codes = example.with_edge.transition_codes
+    end = 100 * codes / 4095
     axes.axvline(end, color=GREY, ls=":", lw=1.2)
-    note(axes, f"edge's end: {example.with_edge.edge_codes} codes,\n{end:.2f} % of command", (1.55, 5.27), (end, 5.3))
+    note(axes, f"transition's end: {codes} codes,\n{end:.2f} % of command", (1.55, 5.27), (end, 5.3))
     axes.set(xlabel="command (% of full)", ylabel="drive at 1 MPa (V)", xlim=(0, 3.17))
     axes.legend(loc="upper left", bbox_to_anchor=(0.27, 0.95))
     return figure

@@ -43,7 +43,7 @@ def thresholds(example: Example) -> "Figure":
     for panel, shape, branch, name, colour in zip(
         axes, item.shapes, (test.rising, test.falling), names, (BLUE, ORANGE), strict=True
     ):
-        read = shape.read.branch
+        read = shape.prepared.branch
         panel.plot(read.u, read.q / L_MIN, ".", ms=2, color=GREY, alpha=0.35, label="samples")
         u = np.array([branch.knee_V, 6.3])
         panel.plot(u, (u - branch.knee_V) * shape.slope / L_MIN, color=colour, lw=1.8, label="straight part, extended")

@@ -19,8 +19,8 @@ P = ParamSpec("P")
 A = TypeVar("A")
 R = TypeVar("R")
 
-#: The section of a docstring that names the dataclass, in whose place its fields are put.
-PARAMETERS = re.compile(r"( *)Parameters\n *-+\n.*?(?=\n *\w+\n *-+\n|\s*\Z)", re.DOTALL)
+#: The heading of a section of a docstring, before which that of the parameters is put.
+SECTION = re.compile(r"( *)\w+\n *-+\n")
 
 
 def with_keywords(declaration: Callable[P, A], stage: Callable[[A], R]) -> Callable[P, R]:
@@ -62,7 +62,7 @@ def with_keywords(declaration: Callable[P, A], stage: Callable[[A], R]) -> Calla
     plain = [each.replace(annotation=_plain(each.annotation)) for each in signature.parameters.values()]
     result = inspect.signature(stage).return_annotation
     call.__signature__ = inspect.Signature(plain, return_annotation=result)  # type: ignore[attr-defined]
-    call.__doc__ = PARAMETERS.sub(lambda found: _parameters(declared, found[1]), stage.__doc__ or "", count=1)
+    call.__doc__ = SECTION.sub(lambda found: _parameters(declared, found[1]) + found[0], stage.__doc__ or "", count=1)
     return call
 
 
@@ -77,10 +77,9 @@ def _parameters(declared: Mapping[str, Argument], indent: str) -> str:
     lines = ["Parameters", "----------"]
     for argument in declared.values():
         optional = "" if argument.required else ", optional"
-        default = argument.option.default or (argument.default if isinstance(argument.default, str) else "")
-        lines += [f"{argument.name} : {_kind(argument)}{optional}", f"    {argument.option.help}"]
-        lines += [f"    Default: {default}."] if default else []
-    return "\n".join(f"{indent}{line}" for line in lines) + "\n"
+        default = argument.option.default or str(argument.default or "")
+        lines += [f"{argument.name} : {_kind(argument)}{optional}", f"    {argument.described(default)}"]
+    return "\n".join(f"{indent}{line}" for line in lines) + "\n\n"
 
 
 def _kind(argument: Argument) -> str:

@@ -11,8 +11,8 @@ from dzdesign import api
 from dzdesign.codegen.project import generate, targets, write_firmware
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import MANIFEST_NAME, to_json, write_folder
+from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
-from dzdesign.design.compensator_file import compensator_document
 from dzdesign.design.designing import design
 from dzdesign.report.valve_report import REPORT_NAME, report_of_folder, with_report
 from dzdesign.verify.closed_loop.loop import RampSequence
@@ -92,7 +92,7 @@ def test_what_was_filled_in_is_kept_and_said(compensator, cortex, tmp_path, caps
     (cortex / "cortex_m4/main.c").unlink()  # wanted anew
     mine = (cortex / "cortex_m4/dz_board.c").read_bytes()
     path = tmp_path / "compensator.json"
-    path.write_text(to_json(compensator_document(compensator)))
+    path.write_bytes(to_json_bytes(compensator))
     assert main(["codegen", str(path), "--target", "cortex-m4", "-o", str(cortex)]) == 0
     assert "kept as you changed it: cortex_m4/dz_board.c; for what is generated now" in capsys.readouterr().err
     assert (cortex / "cortex_m4/dz_board.c").read_bytes() == mine and (cortex / "cortex_m4/main.c").is_file()
@@ -316,7 +316,7 @@ def test_make_takes_renamed_copies_of_board_files_and_finds_what_lies_in_board(c
 
 def test_an_earlier_target_that_is_replaced_is_said_so(compensator, cortex, tmp_path, capsys):
     path = tmp_path / "compensator.json"
-    path.write_text(to_json(compensator_document(compensator)))
+    path.write_bytes(to_json_bytes(compensator))
     assert main(["codegen", str(path), "--target", "cortex-m4", "-o", str(cortex)]) == 0
     assert "replaced" not in capsys.readouterr().err
     assert main(["codegen", str(path), "--target", "host", "-o", str(cortex)]) == 0

@@ -10,10 +10,10 @@ import pytest
 
 from dzdesign.codegen.core.integer_form import integer_form
 from dzdesign.codegen.project import generate
-from dzdesign.core.artefact_files import to_json, write_folder
+from dzdesign.core.artefact_files import write_folder
+from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
-from dzdesign.design.compensator import SideLaw
-from dzdesign.design.compensator_file import compensator_document
+from dzdesign.design.compensator import SideLaw, Sides
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.quantise import finest_units
@@ -25,7 +25,7 @@ from tests.support.synthetic import needs_compiler, with_side
 
 def evaluate(form, compensator, command: int, dp_code: int) -> int:
     """Do in Python, with integers of any size, what the C is meant to do."""
-    step, codes = compensator.beta_step_codes, compensator.edge_codes
+    step, codes = compensator.beta_step_codes, compensator.transition_codes
     place = max(dp_code, 0) if dp_code >= -compensator.reverse_codes else (len(form.table) - 2) * step
     node, share = divmod(place, step)
 
@@ -52,16 +52,18 @@ def random_compensators(base, count: int, seed: int):
         unit = units.beta
         falling = np.sort(rng.integers(unit // 2, unit + 1, base.nodes(1)))[::-1]
         side = SideLaw(
-            k_x_max_over_u_max=Fraction(
+            drive_range_over_u_max=Fraction(
                 int(rng.integers(units.coefficient // 32, units.coefficient)), units.coefficient
             ),
             u_min0_over_u_max=Fraction(int(rng.integers(20, units.coefficient)), units.coefficient),
-            beta_numerators=tuple(int(value) for value in falling),
-            edge_numerators=tuple(int(value) + unit // 16 for value in falling) if edge else None,
+            beta=tuple(int(value) for value in falling),
+            transition_beta=tuple(int(value) + unit // 16 for value in falling) if edge else None,
             certificate=base.positive.certificate,
         )
         law_name = str(rng.choice(["paper", "target"]))
-        yield dataclasses.replace(base, law_name=law_name, positive=side, edge_codes=edge, beta_denominator=unit)
+        yield dataclasses.replace(
+            base, law=law_name, sides=Sides(positive=side), transition_codes=edge, beta_denominator=unit
+        )
 
 
 def test_integer_form_equals_the_exact_law_at_random_and_at_corners(example_compensator):
@@ -84,8 +86,8 @@ def test_whatever_units_design_takes_the_firmware_can_count_in(example_compensat
     signals = dataclasses.replace(
         example_compensator.signals, compare_max=compare_max, command=CommandSignal(full_code=span)
     )
-    amplifier = dataclasses.replace(example_compensator.amplifier, compare_limit=compare_max)
-    base = dataclasses.replace(example_compensator, signals=signals, amplifier=amplifier)
+    functions = dataclasses.replace(example_compensator.drive_functions, compare_limit=compare_max)
+    base = dataclasses.replace(example_compensator, signals=signals, drive_functions=functions)
     for compensator in random_compensators(base, 6, seed):
         form = integer_form(compensator)
         for command in (0, 1, 16, 31, 32, span // 3, span - 1, span):
@@ -101,14 +103,14 @@ def test_reciprocal_is_exact_for_every_quotient_that_can_occur(example_compensat
 
 
 def test_same_input_same_bytes(example_compensator, example_firmware):
-    again = generate(example_compensator, "f28335", to_json(compensator_document(example_compensator)).encode())
+    again = generate(example_compensator, "f28335", to_json_bytes(example_compensator))
     assert dict(again.files) == dict(example_firmware.files)
 
 
 @pytest.mark.parametrize("law_name", ["paper", "target"])
 @needs_compiler
 def test_core_compiles_strictly_with_every_compiler(example_valve, law_name, tmp_path):
-    firmware = generate(design(example_valve, DesignOptions(law_name=law_name)), "f28335")
+    firmware = generate(design(example_valve, DesignOptions(law=law_name)), "f28335")
     write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
     sources, compilers = sorted((tmp_path / "fw" / "core").glob("*.c")), find_compilers()
     assert sources and compilers
@@ -147,15 +149,15 @@ def test_names_from_users_do_not_reach_the_c(example_valve):
 
 def test_a_target_with_another_pwm_is_refused(example_compensator):
     signals = dataclasses.replace(example_compensator.signals, compare_max=30000)
-    amplifier = dataclasses.replace(example_compensator.amplifier, compare_limit=30000)
+    functions = dataclasses.replace(example_compensator.drive_functions, compare_limit=30000)
     with pytest.raises(InputError, match="60000"):
-        generate(dataclasses.replace(example_compensator, signals=signals, amplifier=amplifier), "f28335")
+        generate(dataclasses.replace(example_compensator, signals=signals, drive_functions=functions), "f28335")
 
 
 def test_scalings_too_rich_for_the_integers_are_refused(example_compensator):
     awkward = with_side(
         example_compensator,
-        k_x_max_over_u_max=Fraction(10**12 + 39, 3 * 10**12),
+        drive_range_over_u_max=Fraction(10**12 + 39, 3 * 10**12),
         u_min0_over_u_max=Fraction(7, 10**9 + 7),
     )
     with pytest.raises(InputError, match=r"bits|reciprocal"):
@@ -183,7 +185,7 @@ def test_core_and_hardware_link_as_one_program(example_firmware, tmp_path):
 
 def test_a_law_whose_divisor_cancels_needs_no_reciprocal(example_compensator):
     even = with_side(
-        dataclasses.replace(example_compensator, law_name="target"), k_x_max_over_u_max=Fraction(273 * 100, 65536)
+        dataclasses.replace(example_compensator, law="target"), drive_range_over_u_max=Fraction(273 * 100, 65536)
     )
     form = integer_form(even)
     assert form.divisor == 1

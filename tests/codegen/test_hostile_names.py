@@ -15,7 +15,10 @@ import pytest
 from dzdesign.codegen.project import TARGET_NAMES, generate
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import MANIFEST_NAME, check_inside, sha256_of, to_json, write_files, write_folder
+from dzdesign.core.artefact_types import THIS_TOOL, SourceFile
 from dzdesign.core.errors import InputError, one_line
+from dzdesign.design.firmware_manifest import FirmwareManifest, FirmwareOrigin
+from dzdesign.identify.valve.model import Warning_
 from dzdesign.verify.firmware.folder import read_firmware_manifest
 from tests.support.golden_firmware import FULL, golden_compensator
 
@@ -54,13 +57,18 @@ def with_names(names: list[str]):
     """Return the compensator with everything switched on, of a valve from recordings of these names."""
     names = [name for name in names if "\ud800" not in name]  # no JSON brings half a character
     compensator = golden_compensator("f28335", FULL)
-    valve = json.loads(compensator.valve_document)
-    valve["made_from"] = [{"source": name, "sha256": "0" * 64} for name in names]
-    for side in valve["sides"].values():
-        for test in side["tests"]:
-            test["source"] = names[0]
-    valve["warnings"] = [{"code": name, "text": name, "source": name} for name in names]
-    return replace(compensator, valve_document=json.dumps(valve), costs=tuple(names))
+    sides = {
+        name: replace(side, tests=tuple(replace(test, source=names[0]) for test in side.tests))
+        for name, side in compensator.valve.sides.items()
+    }
+    warnings = tuple(Warning_(code=name, text=name, source=name) for name in names)
+    valve = replace(compensator.valve, made_from=recordings(names), sides=sides, warnings=warnings)
+    return replace(compensator, valve=valve, costs=tuple(names))
+
+
+def recordings(names: list[str]) -> tuple[SourceFile, ...]:
+    """Return recordings of these names, as valve.json lists them."""
+    return tuple(SourceFile(source=name, sha256="0" * 64) for name in names)
 
 
 # C, and what builds it
@@ -125,9 +133,8 @@ def test_hostile_names_compile_without_a_warning(both, tmp_path):
 def test_every_other_target_prints_names_by_the_same_banner():
     for target in sorted(set(TARGET_NAMES) - {"f28335", "avr"}):
         compensator = golden_compensator(target)
-        valve = json.loads(compensator.valve_document)
-        valve["made_from"] = [{"source": name, "sha256": "0" * 64} for name in NAMES[:2]]
-        for name, text in generate(replace(compensator, valve_document=json.dumps(valve)), target).files.items():
+        valve = replace(compensator.valve, made_from=recordings(NAMES[:2]))
+        for name, text in generate(replace(compensator, valve=valve), target).files.items():
             if name != "compensator.json" and "Valve identified from" in text:
                 assert "Valve identified from: _int_evil_, _error_x" in text, (target, name)
 
@@ -200,9 +207,19 @@ OUTSIDE = [
 def place(tmp_path):
     """A folder of dzdesign's beside a file of somebody's."""
     (tmp_path / "secret").write_text("years of work")
-    write_folder(
-        tmp_path / "firmware", {"core/a.c": "int a;\n"}, {"schema": "dzdesign.firmware/1", "core": ["core/a.c"]}
+    digest = "0" * 64
+    manifest = FirmwareManifest(
+        tool=THIS_TOOL,
+        made_from=(),
+        target="host",
+        law="paper",
+        core=("core/a.c",),
+        board=(),
+        origin=FirmwareOrigin(compensator_json=digest, valve_json=digest, ramp_tests=()),
+        constants=(),
+        files={},
     )
+    write_folder(tmp_path / "firmware", {"core/a.c": "int a;\n"}, manifest)
     return tmp_path
 
 
@@ -218,7 +235,7 @@ def test_a_manifest_that_names_what_lies_outside(place, name, key):
     folder = place / "firmware"
     digest = sha256_of(b"years of work")
     manifest_with(folder, lambda it: it["files"].update({name: digest}) if key == "files" else it["core"].append(name))
-    with pytest.raises(InputError, match="no file inside of the folder"):
+    with pytest.raises(InputError, match=r"no file inside of the folder|expected text that is not empty"):
         read_firmware_manifest(folder)
     if key == "files":
         with pytest.raises(InputError, match="was not made by dzdesign"):

@@ -9,7 +9,7 @@ import subprocess
 import pytest
 
 from dzdesign.verify.toolchain.host_compiler import STRICT, host_compiler
-from tests.support.page_runner import try_page
+from tests.support.documented_commands import try_page
 from tests.support.paths import ROOT
 from tests.support.synthetic import needs_compiler
 
@@ -33,6 +33,7 @@ def clone(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.slow
 @needs_compiler
 @pytest.mark.skipif(shutil.which("bash") is None, reason="the page's commands need bash")
 def test_the_page_adds_a_target_that_goes_through_the_whole_chain(clone, request):

@@ -22,7 +22,8 @@ from dzdesign.codegen.cortex_m4 import target as cortex_m4
 from dzdesign.codegen.project import TARGET_NAMES, generate, target_named
 from dzdesign.codegen.target import folder_of
 from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_files import to_json, write_folder
+from dzdesign.core.artefact_files import write_folder
+from dzdesign.core.artefact_types import SourceFile
 from dzdesign.core.errors import DzdesignError, InputError
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from tests.support.golden_firmware import GOLDENS, golden_compensator
@@ -87,11 +88,12 @@ def test_the_wheel_generates_for_every_target(tmp_path):
         wheel.extractall(tmp_path / "installed")
     code = (
         "import sys, json, dzdesign; from dzdesign.codegen.project import generate, targets;"
-        "from dzdesign.design.compensator_file import compensator_from_document as read;"
+        "from dzdesign.core.artefact_reading import read_artefact;"
+        "from dzdesign.design.compensator import Compensator;"
         "from dataclasses import replace;"
-        "c = read(open(sys.argv[1], 'rb').read(), 'c');"
+        "c = read_artefact(open(sys.argv[1], 'rb').read(), Compensator, 'c');"
         "fit = lambda m: replace(c, signals=replace(c.signals, compare_max=m),"
-        " amplifier=replace(c.amplifier, compare_limit=m));"
+        " drive_functions=replace(c.drive_functions, compare_limit=m));"
         "print(json.dumps([dzdesign.__path__[0]] + [sorted(generate(fit(t.compare_max), t.name).files)"
         " for t in targets()]))"
     )
@@ -206,12 +208,11 @@ def test_an_honest_name_stays_and_many_are_counted():
 def hostile_compensator(target: str, names: list[str]):
     """The golden compensator of a valve whose recordings have these names."""
     compensator = golden_compensator(target)
-    valve = json.loads(compensator.valve_document)
-    valve["made_from"] = [{"source": name, "sha256": "0" * 64} for name in names]
-    for test in valve["sides"]["positive"]["tests"]:
-        test["source"] = names[0]
-        test["ramps"] = names
-    return replace(compensator, valve_document=to_json(valve))
+    side = compensator.valve.positive
+    tests = tuple(replace(test, source=names[0], ramps=tuple(names)) for test in side.tests)
+    made_from = tuple(SourceFile(source=name, sha256="0" * 64) for name in names)
+    valve = replace(compensator.valve, made_from=made_from, sides={"positive": replace(side, tests=tests)})
+    return replace(compensator, valve=valve)
 
 
 def without_banner(text: str) -> list[str]:

@@ -12,10 +12,12 @@ import pytest
 
 from dzdesign.codegen.project import target_named
 from dzdesign.command_line.cli import main
+from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.options import arguments_of
-from dzdesign.design.compensator_file import compensator_from_document
+from dzdesign.design.compensator import Compensator
 from dzdesign.design.request import DesignChoices
-from dzdesign.design.signal_text import Converter, command_signal, parse_signal
+from dzdesign.design.signal_text import command_signal, parse_signal
+from dzdesign.design.target_inputs import Converter
 from tests.support.golden_firmware import FULL, GOLDENS
 
 C2000 = ("f28335", "f280049c")
@@ -56,7 +58,7 @@ def step(text: str, number: int) -> str:
 
 
 def compensator_of(folder: Path):
-    return compensator_from_document((folder / "compensator.json").read_bytes(), "compensator.json")
+    return read_artefact((folder / "compensator.json").read_bytes(), Compensator, "compensator.json")
 
 
 # --- the commands of the first power-up -----------------------------------------------------------------------
@@ -196,7 +198,7 @@ def test_one_output_is_tried_where_there_is_one(firmware, target):
 def test_the_ramp_through_the_zero_window_changes_pins_where_the_drive_does(firmware, polarity):
     folder = firmware("f28335", "--command-signal", BOTH, "--zero-window", "2 %", "--polarity", polarity, both=True)
     compensator = compensator_of(folder)
-    window, zero = compensator.amplifier.window_codes, compensator.signals.command.zero_code
+    window, zero = compensator.drive_functions.window_codes, compensator.signals.command.zero_code
     assert window == 41
     assert f"zero window, codes {zero - window} to {zero + window}" in step(readme(folder, "f28335"), 7)
 
@@ -204,7 +206,7 @@ def test_the_ramp_through_the_zero_window_changes_pins_where_the_drive_does(firm
 @pytest.mark.parametrize("target", C2000)
 def test_a_dither_shows_in_the_compare_value(firmware, target):
     folder = firmware(target, "--dither", "150 Hz 1 %")
-    counts = compensator_of(folder).amplifier.dither_counts
+    counts = compensator_of(folder).drive_functions.dither_counts
     assert f"{counts} counts above and {counts} below" in step(readme(folder, target), 3)
     assert "dither" not in power_up(readme(firmware_again(folder, target), target))
 
@@ -246,7 +248,7 @@ def test_the_cortex_m4_says_what_its_numbers_are_made_for(firmware):
 
 
 def test_the_help_of_design_states_no_default_that_a_target_changes():
-    helps = {argument.name: argument.option.help for argument in arguments_of(DesignChoices)}
+    helps = {argument.name: argument.help for argument in arguments_of(DesignChoices)}
     for name in ("command_signal", "pressure_a", "pressure_b"):
         assert "the whole range of the converter)" in helps[name] or "the converter's whole range)" in helps[name]
         assert not re.search(r"0\.\.3 V|x 0\.3\b", helps[name])

@@ -49,6 +49,9 @@ class Curve:
 
     points: Annotated[tuple[Point, ...], Meta(description="At rising pressure.", min_length=1)]
     gain: Annotated[Fraction, quantity("L/min/MPa", "Slope at the first point.")]
+    spares: Annotated[
+        Mapping[Annotated[str, Meta(min_length=1, max_length=3)], int], Meta(description="Part to its number in stock.")
+    ] = field(default_factory=dict)
     range_MPa: Annotated[tuple[float, float], quantity("MPa", "First and last pressure.")] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -203,6 +206,12 @@ def test_a_missing_key_is_named_by_its_place(place):
     text = refusal(changed(*place, without=True))
     path = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in place)[1:]
     assert f"lacks the key '{path}'" in text and text.endswith(REMEDY)
+
+
+def test_a_key_that_does_not_fit_is_named():
+    assert "'spare.spares' has the key 'abcd', expected text of 1 to 3 characters" in refusal(
+        changed("spare", "spares", to={"a": 1, "abcd": 2})
+    )
 
 
 def test_the_fault_in_one_of_several_entries_of_a_mapping_is_found():

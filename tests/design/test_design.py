@@ -6,11 +6,12 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from dzdesign.core.artefact_files import to_json
+from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError, RequirementError
-from dzdesign.design.compensator_file import compensator_document, compensator_from_document
+from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
-from dzdesign.design.drive import Amplifier
+from dzdesign.design.drive_functions import DriveFunctions
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.signals import CommandSignal, Signals
 from dzdesign.identify.identification import identify
@@ -20,7 +21,7 @@ from tests.support.synthetic import Truth, signals_with_span, synthetic_ramp, wi
 def compensator_of(threshold_at, pressures=(0.5, 1.0, 2.0, 3.0, 5.0), law_name="paper", **options):
     tests = [synthetic_ramp(dp, Truth(knee_rising=threshold_at(dp), slope=4 * dp**0.5)) for dp in pressures]
     valve = identify(tests)
-    return valve, design(valve, DesignOptions(law_name=law_name, **options))
+    return valve, design(valve, DesignOptions(law=law_name, **options))
 
 
 THRESHOLDS = {
@@ -55,7 +56,7 @@ def test_beta_never_exceeds_one_up_to_the_reference(designed):
 
 def test_single_pressure_gives_a_constant_offset():
     _, compensator = compensator_of(lambda dp: 5.0, pressures=(1.0,))
-    assert len(set(compensator.positive.beta_numerators)) == 1
+    assert len(set(compensator.positive.beta)) == 1
     assert compensator.positive.certificate.dp_MPa[0] == compensator.positive.certificate.dp_MPa[1]
 
 
@@ -65,24 +66,24 @@ def test_law_paper_is_equation_18(example_compensator):
     for dp_code in (0, 205, 600, 1023, 4095):
         beta, share = c.beta(dp_code), Fraction(1234, 4095)
         side = c.positive
-        expected = (beta * side.k_x_max_over_u_max - beta + 1) * share + beta * side.u_min0_over_u_max
+        expected = (beta * side.drive_range_over_u_max - beta + 1) * share + beta * side.u_min0_over_u_max
         assert c.drive(1234, dp_code) == expected
 
 
 def test_law_target_keeps_the_gain(example_valve):
-    c = design(example_valve, DesignOptions(law_name="target"))
+    c = design(example_valve, DesignOptions(law="target"))
     rises = {c.drive(4095, code) - c.drive(0, code) for code in (0, 300, 1000)}
-    assert rises == {c.positive.k_x_max_over_u_max}
+    assert rises == {c.positive.drive_range_over_u_max}
 
 
 def test_halves_round_up():
     signals = Signals(command=CommandSignal(full_code=2), compare_max=1)
     _, compensator = compensator_of(lambda dp: 5.0, pressures=(1.0,))
     exact = with_side(
-        dataclasses.replace(compensator, signals=signals, amplifier=Amplifier(compare_limit=1)),
-        k_x_max_over_u_max=Fraction(1, 2),
+        dataclasses.replace(compensator, signals=signals, drive_functions=DriveFunctions(compare_limit=1)),
+        drive_range_over_u_max=Fraction(1, 2),
         u_min0_over_u_max=Fraction(1, 4),
-        beta_numerators=tuple(1 << 15 for _ in compensator.positive.beta_numerators),
+        beta=tuple(1 << 15 for _ in compensator.positive.beta),
     )
     # 1/4 + 1/4 = 1/2 of one count.
     assert exact.compare(1, 0) == 1
@@ -95,8 +96,8 @@ def test_failed_sensor_takes_the_smallest_beta(example_compensator):
 
 
 def test_document_round_trip(example_compensator):
-    text = to_json(compensator_document(example_compensator))
-    assert compensator_from_document(text.encode(), "compensator.json") == example_compensator
+    text = to_json_bytes(example_compensator).decode()
+    assert read_artefact(text.encode(), Compensator, "compensator.json") == example_compensator
 
 
 def with_curve(side, **changes):

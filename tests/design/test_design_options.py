@@ -39,7 +39,7 @@ def run(tmp_path, capsys):
     [
         (["--output-max", "40 %"], "the largest output is 40.0% of full drive, but the valve opens at"),
         (["--output-max", "0.0005 %"], "so nothing would ever flow"),
-        (["--edge", "7 %"], "choose one of 3.14 % (128 codes) at most"),
+        (["--transition", "7 %"], "choose one of 3.14 % (128 codes) at most"),
         (["--ramp-up", "0.1 ms"], "a ramp takes 0.0001 s, expected 0 (none), or from one sample"),
         (["--dither", "1 kHz 1 %"], "the dither's frequency is 1000 Hz, expected 100 to 300 Hz"),
         (["--dither", "150 Hz"], "expected 'off', or a frequency in Hz and the wave's peak"),
@@ -64,7 +64,7 @@ def test_the_drives_end_is_said_in_commands(valve_file, run):
 def test_the_peak_of_the_dither_is_said_to_be_in_the_tables_loss(valve_file, run):
     status, said, document = run(valve_file, "--dither", "300 Hz 1%")
     assert status == 0 and "of which 100.00 mV are the dither's peak" in said
-    assert 100 <= 2500 / 2 / document["amplifier"]["dither_ticks"] <= 300
+    assert 100 <= 2500 / 2 / document["drive_functions"]["dither_ticks"] <= 300
 
 
 @pytest.mark.parametrize(
@@ -127,7 +127,7 @@ class TestEditedCompensators:
         def edit(document):
             document["sides"]["positive"]["certificate"]["guard"] = guard
 
-        assert "expected closing, mean or opening" in refused(edit)
+        assert "expected 'closing', 'mean' or 'opening'" in refused(edit)
 
     @pytest.mark.parametrize(
         ("key", "value", "words"),
@@ -152,7 +152,7 @@ class TestEditedCompensators:
 
     def test_a_dither_that_the_certificate_did_not_count(self, refused):
         def edit(document):
-            document["amplifier"]["dither_counts"] = 600
+            document["drive_functions"]["dither_counts"] = 600
 
         assert "certificate does not hold" in refused(edit)
 

@@ -10,7 +10,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.beta_table import offset_ceiling
 from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.designing import design
-from dzdesign.design.lot_setting import Designed, _limit, common_setting
+from dzdesign.design.lot_setting import _limit, lot_setting
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.signal_text import command_signal, parse_signal
 from dzdesign.design.signals import Signals
@@ -28,7 +28,7 @@ def valve(knee, pressures=(1.0, 2.5, 5.0), *, seed=0):
 
 
 def designed(valve, options=None):
-    return Designed.of(design(valve, options))
+    return design(valve, options)
 
 
 @pytest.fixture(scope="module")
@@ -43,23 +43,23 @@ def rising():
 
 def highest_over(common, each, label="positive", sign=1):
     """Return by how much the common offset exceeds a valve's own exact ceiling, at worst, over u_max."""
-    own = each.own
-    curve = guarded_curve(each.valve.sides[label], own.side(sign).certificate.guard, own.below_reference)
+    own = each
+    curve = guarded_curve(each.valve.sides[label], own.side(sign).certificate.guard, own.below_dp0)
     limit = offset_ceiling(curve, own.signals, own.u_max_V, sign=sign).limit
     u_min0 = common.side(sign).u_min0_over_u_max
     return max(common.beta(code, sign) * u_min0 - top for code, top in enumerate(limit))
 
 
 def test_valves_of_opposite_trends_have_one_setting_under_both(falling, rising):
-    common = common_setting({"falling": falling, "rising": rising})
+    common = lot_setting({"falling": falling, "rising": rising})
     assert set(common.binding) == {"falling", "rising"}
     assert all(highest_over(common.compensator, each) <= 0 for each in (falling, rising))
-    assert highest_over(falling.own, rising) > 0 and highest_over(rising.own, falling) > 0  # neither own one would do
+    assert highest_over(falling, rising) > 0 and highest_over(rising, falling) > 0  # neither own one would do
 
 
 def test_of_valves_that_are_alike_it_is_their_own(falling):
-    common = common_setting({"a": falling, "b": falling}).compensator
-    assert common.positive == falling.own.positive
+    common = lot_setting({"a": falling, "b": falling}).compensator
+    assert common.positive == falling.positive
 
 
 def test_both_signs():
@@ -68,8 +68,8 @@ def test_both_signs():
     command = command_signal(parse_signal("-10..10 V x 0.15 + 1.5 V", "command"), _converter(signals), inverted=False)
     options = DesignOptions(signals=_with_command(signals, command))
     each = designed(read_artefact(content, ValveModel, "valve.json"), options)
-    common = common_setting({"a": each, "b": each}).compensator
-    assert (common.positive, common.negative) == (each.own.positive, each.own.negative)
+    common = lot_setting({"a": each, "b": each}).compensator
+    assert (common.positive, common.negative) == (each.positive, each.negative)
     assert highest_over(common, each, "negative", -1) <= 0
 
 
@@ -99,12 +99,12 @@ def test_the_doubles_find_the_exact_limit(falling, rising):
 def test_what_has_no_common_setting_is_told_why(falling, rising):
     low, high = (designed(valve(lambda dp: 5.4 - 0.05 * dp, pressures)) for pressures in ((0.5, 1.0), (2.0, 4.0)))
     with pytest.raises(InputError, match="no tested pressure drop in common"):
-        common_setting({"low": low, "high": high})
+        lot_setting({"low": low, "high": high})
     with pytest.raises(InputError, match="two valves or more"):
-        common_setting({"low": low})
-    other = designed(rising.valve, DesignOptions(law_name="target"))
-    with pytest.raises(InputError, match="another law_name"):
-        common_setting({"a": falling, "b": other})
-    edged = designed(falling.valve, DesignOptions(edge=Fraction(1, 50)))
-    with pytest.raises(InputError, match="with --edge"):
-        common_setting({"a": edged, "b": edged})
+        lot_setting({"low": low})
+    other = designed(rising.valve, DesignOptions(law="target"))
+    with pytest.raises(InputError, match="another law"):
+        lot_setting({"a": falling, "b": other})
+    edged = designed(falling.valve, DesignOptions(transition=Fraction(1, 50)))
+    with pytest.raises(InputError, match="with --transition"):
+        lot_setting({"a": edged, "b": edged})

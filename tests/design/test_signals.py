@@ -7,8 +7,9 @@ import pytest
 
 from dzdesign.core.errors import InputError
 from dzdesign.design.options import DesignOptions
-from dzdesign.design.signal_text import Converter, command_signal, parse_signal, pressure_signal
+from dzdesign.design.signal_text import command_signal, parse_signal, pressure_signal
 from dzdesign.design.signals import CommandSignal, PressureSignal, Signals
+from dzdesign.design.target_inputs import Converter
 
 ADC = Converter()
 
@@ -115,35 +116,35 @@ def test_sensors_too_unlike_are_refused():
 def test_the_amplifiers_integers():
     options = DesignOptions(
         signals=Signals(command=command("-10..10 V x 0.15 + 1.5 V")),
-        edge=Fraction(1, 100), ramp_up_s=(0.5, 0.8), dither_Hz=150.0, dither_peak=Fraction(1, 100),
+        transition=Fraction(1, 100), ramp_up_s=(0.5, 0.8), dither_Hz=150.0, dither_peak=Fraction(1, 100),
         output_max=Fraction(9, 10),
     )  # fmt: skip
-    amplifier = options.amplifier()
-    assert options.edge_codes() == 16  # 1 % of 2047 codes is 20: the power of two below
+    functions = options.drive_functions()
+    assert options.transition_codes() == 16  # 1 % of 2047 codes is 20: the power of two below
     # 0.5 s are 625 samples: 2047 codes * 65536 / 625; of negative commands 2048 codes in 1000.
-    assert amplifier.ramp_up == (round(2047 * 65536 / 625), round(2048 * 65536 / 1000)) and amplifier.ramp_down == (
+    assert functions.ramp_up == (round(2047 * 65536 / 625), round(2048 * 65536 / 1000)) and functions.ramp_down == (
         0,
         0,
     )
-    assert (amplifier.dither_counts, amplifier.dither_ticks) == (600, 8)  # 2500 Hz / 16 = 156 Hz
-    assert (amplifier.compare_limit, amplifier.window_codes) == (54000, 20)
-    assert DesignOptions().amplifier().window_codes == 0  # one sign has no other solenoid
+    assert (functions.dither_counts, functions.dither_ticks) == (600, 8)  # 2500 Hz / 16 = 156 Hz
+    assert (functions.compare_limit, functions.window_codes) == (54000, 20)
+    assert DesignOptions().drive_functions().window_codes == 0  # one sign has no other solenoid
 
 
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"edge": Fraction(1, 5)}, "the edge is 20.000%, expected 0 to 10%"),
-        ({"edge": Fraction(1, 10**5)}, "less than one code"),
+        ({"transition": Fraction(1, 5)}, "the transition is 20.000%, expected 0 to 10%"),
+        ({"transition": Fraction(1, 10**5)}, "less than one code"),
         ({"dither_Hz": 150.0}, "a dither needs both"),
         ({"dither_Hz": 50.0, "dither_peak": Fraction(1, 100)}, "expected 100 to 300 Hz"),
         ({"output_max": Fraction(0)}, "the largest output"),
         ({"ramp_up_s": (1e4, 0.0)}, "a ramp takes 10000 s"),
         ({"guard": "closed"}, "did you mean 'closing'"),
-        ({"below_reference": "hod"}, "did you mean 'hold'"),
+        ({"below_dp0": "hod"}, "did you mean 'hold'"),
     ],
 )
 def test_choices_that_cannot_be(options, words):
     with pytest.raises(InputError) as error:
-        DesignOptions(**options).edge_codes()
+        DesignOptions(**options).transition_codes()
     assert words in str(error.value)

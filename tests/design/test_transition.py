@@ -17,7 +17,7 @@ from dzdesign.design.options import DesignOptions
 from dzdesign.verify.closed_loop.loop import RampSequence
 from tests.support.synthetic import SHARED, needs_compiler
 
-EDGE = options_of({"edge": "1 %"}, target_named("f28335").inputs())
+EDGE = options_of({"transition": "1 %"}, target_named("f28335").inputs())
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +27,7 @@ def edged(example_valve):
 
 def test_the_edge_runs_from_the_certified_offset_to_the_opening_law_without_a_step(edged, example_valve):
     plain = design(example_valve)
-    codes = edged.edge_codes
+    codes = edged.transition_codes
     u_max = float(edged.u_max_V)
     for dp_code in range(0, 1100, 50):
         drives = [edged.drive(command, dp_code) for command in range(codes + 3)]
@@ -38,7 +38,7 @@ def test_the_edge_runs_from_the_certified_offset_to_the_opening_law_without_a_st
         assert len(set(rises[:codes])) == 1 and len(set(rises[codes:])) == 1  # two straight parts that meet
         # Beyond the edge the law goes on as a law of the opening threshold's beta, Eq. (18).
         side, beta, share = edged.positive, edged.law_beta(dp_code), Fraction(codes + 2, 4095)
-        law = (beta * side.k_x_max_over_u_max - beta + 1) * share + beta * side.u_min0_over_u_max
+        law = (beta * side.drive_range_over_u_max - beta + 1) * share + beta * side.u_min0_over_u_max
         assert drives[codes + 2] == law
 
 
@@ -46,7 +46,7 @@ def test_the_edge_ends_at_or_above_the_opening_threshold_at_every_test(edged, ex
     signals = edged.signals
     for test in example_valve.positive.tests:
         code = round(signals.dp_code(Fraction(repr(test.dp_MPa))))
-        assert float(edged.drive(edged.edge_codes, code)) * 10 > test.u_knee_rising_V
+        assert float(edged.drive(edged.transition_codes, code)) * 10 > test.u_knee_rising_V
 
 
 @needs_compiler
@@ -72,7 +72,7 @@ def test_no_leak_and_one_per_cent_of_dead_zone_on_valve_a(tmp_path, capsys):
     files = sorted(map(str, (SHARED / "valve_a").glob("*.csv.gz")))
     valve, firmware, evidence = (str(tmp_path / name) for name in ("valve.json", "firmware", "evidence"))
     assert main(["identify", *files, "--meter-lag", "0.1 s", "-o", valve]) == 0
-    assert main(["codegen", valve, "--edge", "1 %", "-o", firmware]) == 0
+    assert main(["codegen", valve, "--transition", "1 %", "-o", firmware]) == 0
     assert main(["verify", firmware, "-o", evidence, "--json"]) == 0
     out = capsys.readouterr().out
     document = json.loads(out[out.index("{\n") :])
@@ -83,12 +83,12 @@ def test_no_leak_and_one_per_cent_of_dead_zone_on_valve_a(tmp_path, capsys):
 
 def test_an_edge_needs_the_opening_branch(example_valve):
     side = dataclasses.replace(example_valve.positive, opening_curve=None)
-    with pytest.raises(InputError, match="leave out --edge"):
+    with pytest.raises(InputError, match="leave out --transition"):
         design(dataclasses.replace(example_valve, sides={"positive": side}), EDGE)
 
 
 def test_below_the_reference_beta_is_held_or_extended(example_valve):
-    held, extended = design(example_valve), design(example_valve, DesignOptions(below_reference="extend"))
+    held, extended = design(example_valve), design(example_valve, DesignOptions(below_dp0="extend"))
     below, above = (round(held.signals.dp_code(Fraction(dp))) for dp in (Fraction(6, 10), Fraction(3)))
     assert held.beta(below) <= 1 < extended.beta(below)
     assert held.compare(0, above) == pytest.approx(extended.compare(0, above), abs=2)
@@ -97,15 +97,16 @@ def test_below_the_reference_beta_is_held_or_extended(example_valve):
 def test_a_dither_stands_under_the_certified_bound_at_its_top(example_valve):
     plain = design(example_valve)
     dithered = design(example_valve, DesignOptions(dither_Hz=150.0, dither_peak=Fraction(1, 100)))
-    peak = dithered.amplifier.dither_counts
+    peak = dithered.drive_functions.dither_counts
     assert peak == 600
     for dp_code in range(150, 1000, 10):
         assert dithered.compare(0, dp_code) + peak <= plain.compare(0, dp_code) + 2
 
 
 def test_both_signs_need_both_sides(example_valve):
-    from dzdesign.design.signal_text import Converter, command_signal, parse_signal
+    from dzdesign.design.signal_text import command_signal, parse_signal
     from dzdesign.design.signals import Signals
+    from dzdesign.design.target_inputs import Converter
 
     both = command_signal(parse_signal("-10..10 V x 0.15 + 1.5 V", "--command-signal"), Converter())
     with pytest.raises(InputError, match="negative side was not tested"):

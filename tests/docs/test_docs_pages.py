@@ -6,7 +6,7 @@ import shutil
 import pytest
 
 from dzdesign.command_line.parser import build_parser
-from tests.support.page_runner import agrees, commands_of, try_page
+from tests.support.documented_commands import agrees, commands_of, try_page
 from tests.support.paths import ROOT
 from tests.support.synthetic import needs_compiler
 

@@ -8,7 +8,7 @@ import pytest
 
 from dzdesign.core.artefact_types import THIS_TOOL
 from dzdesign.report.lot.summary import FailedValve, LotSummary
-from dzdesign.terminal.notebook import valve_html
+from dzdesign.terminal.notebook import html_of
 from dzdesign.terminal.tables import print_compensator, print_scenarios, print_valve
 from tests.support.paths import ROOT
 
@@ -49,10 +49,10 @@ def test_numbers_of_the_law_are_put_into_words(example_valve, example_compensato
     first = design.index("warning: of sensor A a broken wire")
     assert first < design.index("law paper") < design.index("cost: ") and "cost: of sensor" not in design
     assert re.search(r"drive range of the law k x_max/u_max = \d+/\d+ = 0\.\d{5} \(from its offset", design)
-    nodes = len(example_compensator.positive.beta_numerators)
+    nodes = len(example_compensator.positive.beta)
     assert f"beta(dP): straight between {nodes} nodes, each a whole number of 1/32768" in design
     assert "both as shares of full command" in design
-    assert re.search(r"drive range of the valve k x_max/u_max = 0\.\d{4}: command", valve_html(example_valve))
+    assert re.search(r"drive range of the valve k x_max/u_max = 0\.\d{4}: command", html_of(example_valve))
 
 
 def test_no_output_calls_a_code_sound():
@@ -82,7 +82,7 @@ def test_every_word_of_the_outputs_is_in_the_glossary():
         "cost", "certificate", "guard", "edge", "over-compensation", "residual dead zone", "staircase", "offset",
         "drive", "code", "valid range", "compare value", "exactly rounded law", "monotone", "closed loop", "plant",
         "scenario", "mutant", "HOLDS", "DOES NOT HOLD", "NOT CHECKED", "SHA-256", "record", "calibrated",
-        "common setting", "saturates", "NOT VERIFIED", "THE FILES DO NOT BELONG TOGETHER", "SIMULATED",
+        "lot setting", "saturates", "NOT VERIFIED", "THE FILES DO NOT BELONG TOGETHER", "SIMULATED",
         "ACCEPTED", "THE EVIDENCE CONTRADICTS ITSELF", "EXCEEDED", "OVER-COMPENSATED", "board file",
     }  # fmt: skip
     assert said <= known, said - known

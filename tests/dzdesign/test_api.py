@@ -17,6 +17,7 @@ from nbclient import NotebookClient
 from dzdesign import api
 from dzdesign.command_line.cli import main
 from dzdesign.command_line.parser import arguments_of_command
+from dzdesign.design.compensator import Sides
 from dzdesign.identify.valve.model import ValveModel
 from tests.support.paths import ROOT
 from tests.support.synthetic import needs_compiler
@@ -211,7 +212,7 @@ def test_a_compensator_whose_certificate_does_not_follow_is_not_generated(exampl
     side = example_compensator.positive
     higher = replace(side, u_min0_over_u_max=side.u_min0_over_u_max * 17 / 16)
     with pytest.raises(api.InputError, match="certificate does not hold"):
-        api.generate(replace(example_compensator, positive=higher))
+        api.generate(replace(example_compensator, sides=Sides(positive=higher)))
 
 
 def test_what_a_notebook_shows_is_escaped(example_valve, example_compensator, example_firmware):
@@ -223,7 +224,8 @@ def test_what_a_notebook_shows_is_escaped(example_valve, example_compensator, ex
         warnings=(replace(example_valve.warnings[0], text=HOSTILE, source=HOSTILE),),
     )
     files = {**example_firmware.files, HOSTILE: "int x;"}
-    firmware = replace(example_firmware, files=files, manifest=replace(example_firmware.manifest, target=HOSTILE, law=HOSTILE))
+    manifest = replace(example_firmware.manifest, target=HOSTILE, law=HOSTILE)
+    firmware = replace(example_firmware, files=files, manifest=manifest)
     for result, count in ((valve, 3), (replace(example_compensator, costs=(HOSTILE,)), 1), (firmware, 3)):
         page = Tags(result._repr_html_())
         assert page.tags <= {"pre", "span"}

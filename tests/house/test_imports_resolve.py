@@ -75,7 +75,7 @@ def unresolved(source: str, third_parties: set[str]) -> Iterator[str]:
                 continue
             known = names_in(place) if place.is_file() else set()
             for alias in node.names:
-                if alias.name not in known and module_file(f"{node.module}.{alias.name}") is None:
+                if alias.name not in {"*", *known} and module_file(f"{node.module}.{alias.name}") is None:
                     yield f"line {node.lineno}: from {node.module} import {alias.name}"
 
 

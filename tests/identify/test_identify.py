@@ -9,13 +9,14 @@ import pytest
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
-from dzdesign.identify.fitting.bounds import find_trend, lower_bounds, staircase
+from dzdesign.identify.fitting.bounds import find_trend, lower_bounds
 from dzdesign.identify.identification import identify
 from dzdesign.identify.knees.characteristic import find_meter_floor
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.branches import bin_branch
 from dzdesign.identify.ramps.splitting import split_ramps, sweep_direction
 from dzdesign.identify.valve.model import ValveModel
+from dzdesign.identify.valve.staircase import staircase
 from tests.support.synthetic import L_MIN, MPA, Truth, synthetic_ramp
 
 PRESSURES = (0.5, 1.0, 2.0, 3.0, 5.0)

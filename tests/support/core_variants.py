@@ -11,9 +11,10 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
-from dzdesign.design.signal_text import Converter, command_signal, parse_signal, pressure_signal
+from dzdesign.design.signal_text import command_signal, parse_signal, pressure_signal
 from dzdesign.design.signals import Signals
-from dzdesign.identify.fitting.guard_curve import OpeningCurve
+from dzdesign.design.target_inputs import Converter
+from dzdesign.identify.valve.guard_curve import OpeningCurve
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.side_model import SideModel
 from tests.support.golden_firmware import GOLDENS
@@ -46,13 +47,13 @@ AMPLIFIER = {
 #: Name to the options of `design`; "signals" are those that differ from the target's own.
 VARIANTS = {
     "plain": {},
-    "target law": {"law_name": "target"},
-    "edge": {"edge": Fraction(1, 100)},
-    "target law, edge": {"law_name": "target", "edge": Fraction(1, 100)},
+    "target law": {"law": "target"},
+    "edge": {"transition": Fraction(1, 100)},
+    "target law, edge": {"law": "target", "transition": Fraction(1, 100)},
     "live zero": {"signals": UNLIKE | {"command": _command("4..20 mA on 149 ohm")}},
     "inverted": {"signals": {"command": _command("0..10 V x 0.3", inverted=True)}, **AMPLIFIER},
     "bipolar": {"signals": {"command": BOTH}},
-    "bipolar, all options": {"signals": UNLIKE | {"command": BOTH, "swapped": True}, "edge": Fraction(1, 100)}
+    "bipolar, all options": {"signals": UNLIKE | {"command": BOTH, "swapped": True}, "transition": Fraction(1, 100)}
     | AMPLIFIER,
 }  # fmt: skip
 NAMES = tuple(product(VARIANTS, TARGETS))

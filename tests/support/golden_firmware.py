@@ -12,14 +12,14 @@ from fractions import Fraction
 from pathlib import Path
 
 from dzdesign.codegen.project import generate, target_named, targets
-from dzdesign.core.artefact_files import to_json
 from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.compensator_file import compensator_document, compensator_from_document
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
-from dzdesign.design.signal_text import Converter, command_signal, parse_signal, pressure_signal
+from dzdesign.design.signal_text import command_signal, parse_signal, pressure_signal
 from dzdesign.design.signals import Signals
+from dzdesign.design.target_inputs import Converter
 from dzdesign.identify.valve.model import ValveModel
 from tests.support.paths import TESTS
 
@@ -48,7 +48,7 @@ def full_options(**changes) -> DesignOptions:
     )
     chosen = {
         "signals": signals,
-        "edge": Fraction(1, 100),
+        "transition": Fraction(1, 100),
         "ramp_up_s": (0.5, 0.8),
         "ramp_down_s": (0.4, 0.0),
         "dither_Hz": 150.0,
@@ -61,20 +61,20 @@ def full_options(**changes) -> DesignOptions:
 def golden_compensator(target_name: str, root: Path = GOLDENS) -> Compensator:
     """The fixed compensator, with the scalings of a target that has its own."""
     target = target_named(target_name)
-    compensator = compensator_from_document((root / INPUT).read_bytes(), INPUT)
+    compensator = read_artefact((root / INPUT).read_bytes(), Compensator, INPUT)
     if target.takes_any_signals or root == FULL:
         return compensator
     return replace(
         compensator,
         signals=replace(compensator.signals, compare_max=target.compare_max),
-        amplifier=replace(compensator.amplifier, compare_limit=target.compare_max),
+        drive_functions=replace(compensator.drive_functions, compare_limit=target.compare_max),
     )
 
 
 def golden_files(target_name: str, root: Path = GOLDENS) -> dict[str, str]:
     """Generate a target's files from the fixed compensator."""
     compensator = golden_compensator(target_name, root)
-    files = dict(generate(compensator, target_name, to_json(compensator_document(compensator)).encode()).files)
+    files = dict(generate(compensator, target_name, to_json_bytes(compensator)).files)
     del files[INPUT]
     return files
 
@@ -101,8 +101,8 @@ def update() -> None:
     every = tuple(target.name for target in targets())
     for root, names, options in ((GOLDENS, every, None), (FULL, FULL_TARGETS, full_options())):
         content = (root / "valve.json").read_bytes()
-        document = compensator_document(design(read_artefact(content, ValveModel, "valve.json"), options, content))
-        (root / INPUT).write_text(to_json(document), encoding="utf-8", newline="\n")
+        compensator = design(read_artefact(content, ValveModel, "valve.json"), options, content)
+        (root / INPUT).write_bytes(to_json_bytes(compensator))
         for folder in root.iterdir():
             if folder.is_dir() and folder.name != "schemas":
                 shutil.rmtree(folder)

@@ -65,7 +65,8 @@ def synthetic_ramp(
 
 def with_side(compensator, **changes):
     """Return the compensator with other fields of its positive side."""
-    return replace(compensator, positive=replace(compensator.positive, **changes))
+    positive = replace(compensator.positive, **changes)
+    return replace(compensator, sides=replace(compensator.sides, positive=positive))
 
 
 def signals_with_span(span_MPa: Fraction) -> Signals:

@@ -84,7 +84,7 @@ def test_a_seeded_fault_in_the_c_is_found(firmware_folder, fault):
 def test_a_missing_limit_is_found_where_the_law_reaches_full_drive(example_compensator, tmp_path):
     from dzdesign.codegen.project import generate
 
-    long_stroke = with_side(example_compensator, k_x_max_over_u_max=Fraction(3, 4))
+    long_stroke = with_side(example_compensator, drive_range_over_u_max=Fraction(3, 4))
     firmware = generate(long_stroke, "f28335")
     write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
     assert check_all_inputs(tmp_path / "fw").holds
@@ -96,8 +96,8 @@ def test_an_offset_above_the_bound_is_over_compensation(example_compensator, tmp
     """A wrong design, rightly coded: the C equals its law, and the law is refused."""
     from dzdesign.codegen.project import generate
 
-    raised = tuple(min(numerator + 60, 32768) for numerator in example_compensator.positive.beta_numerators)
-    greedy = with_side(example_compensator, beta_numerators=raised)
+    raised = tuple(min(numerator + 60, 32768) for numerator in example_compensator.positive.beta)
+    greedy = with_side(example_compensator, beta=raised)
     firmware = generate(greedy, "f28335")
     write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
     result = check_all_inputs(tmp_path / "fw")

@@ -9,7 +9,7 @@ from dzdesign.codegen.project import generate
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import MANIFEST_NAME, TOOL, sha256_of, to_json, write_folder
 from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.design.compensator_file import compensator_document
+from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.design.designing import design
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.valve_report import REPORT_NAME, report_of_folder, with_report
@@ -126,7 +126,7 @@ def spaced(copied):
     compensator = design(read_artefact(content, ValveModel, "valve.json"), default_options(), content)
     write_folder(copied / "firmware", *_made(compensator))
     (copied / "valve.json").write_bytes(content)
-    return json.loads(to_json(compensator_document(compensator)))
+    return json.loads(to_json_bytes(compensator))
 
 
 def _made(compensator):

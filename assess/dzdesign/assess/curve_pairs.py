@@ -96,7 +96,7 @@ def compare_curves(before: Sequence[RampTest], after: Sequence[RampTest], option
     pairs = tuple(
         CurvePair(side=side, before=one, after=other)
         for side in BOTH_SIDES
-        for one, other in pair_by_pressure(curves[side, "before"], curves[side, "after"])
+        for one, other in _paired(curves[side, "before"], curves[side, "after"])
     )
     if not any(pair.before and pair.after for pair in pairs):
         raise InputError(_no_pressure_in_common(pairs))
@@ -124,18 +124,10 @@ def _meter(of_sides: Mapping[tuple[Side, Set], Sequence[RampTest]], options: Ass
     )
 
 
-def pair_by_pressure(before: Sequence[PressureCurves], after: Sequence[PressureCurves]) -> list[Pair]:
-    """Pair curves whose pressure drops agree within `SAME_PRESSURE`, the nearest first; the others stay alone.
+def _paired(before: Sequence[PressureCurves], after: Sequence[PressureCurves]) -> list[Pair]:
+    """Pair curves whose pressure drops agree within `SAME_PRESSURE`, the nearest first; None stands for no partner.
 
-    Parameters
-    ----------
-    before, after : sequence of PressureCurves
-        Of one side.
-
-    Returns
-    -------
-    list
-        In the order of rising pressure drop; None stands for a missing partner.
+    The pairs come in the order of rising pressure drop.
     """
     distances = sorted(
         (relative_distance(one.dp, other.dp), row, column)

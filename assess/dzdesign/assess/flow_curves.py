@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.knees.linear_fits import USEFUL_FLOW, find_straight_parts
-from dzdesign.identify.knees.linear_region import GATE, GatedLine, ReadBranch, read_branch
+from dzdesign.identify.knees.gated_line import GATE, GatedLine, PreparedBranch, prepare_branch
+from dzdesign.identify.knees.linear_region import USEFUL_FLOW, find_straight_parts
 from dzdesign.identify.knees.noise import robust_sigma
 from dzdesign.identify.knees.prepared_tests import split_recordings
 from dzdesign.identify.knees.profile import flow_at_top, smooth_profile
@@ -43,7 +43,7 @@ class FlowCurve:
 
     Attributes
     ----------
-    read : ReadBranch
+    read : PreparedBranch
         Its samples and their course, smoothed over 0.1 % of u_max (V, m³/s).
     u, q, q_se : (C,) array
         Means over cells of `CELL` u_max without outliers, in the order of rising command: V, m³/s, standard error (NaN
@@ -58,7 +58,7 @@ class FlowCurve:
         Through the straight part; None where there is none, which `no_line` explains.
     """
 
-    read: ReadBranch
+    read: PreparedBranch
     u: np.ndarray
     q: np.ndarray
     q_se: np.ndarray
@@ -168,12 +168,12 @@ def _said(dp: float | None) -> str:
     return "an unknown pressure drop" if dp is None else f"{dp / 1e6:.3g} MPa"
 
 
-def _read(branch: Branch, item: PooledTest, u_max: float, floor: float) -> ReadBranch:
+def _read(branch: Branch, item: PooledTest, u_max: float, floor: float) -> PreparedBranch:
     y = at_nominal_pressure(branch, nominal_dp(item.test))
-    return read_branch(branch, y, u_max=u_max, floor=floor, source=item.test.source)
+    return prepare_branch(branch, y, u_max=u_max, floor=floor, source=item.test.source)
 
 
-def _curves(reads: Sequence[ReadBranch | None], options: IdentifyOptions) -> list[FlowCurve | None]:
+def _curves(reads: Sequence[PreparedBranch | None], options: IdentifyOptions) -> list[FlowCurve | None]:
     """Return a curve for each branch; straight parts are those of all together, or of each that has one by itself."""
     branches = {index: read for index, read in enumerate(reads) if read is not None}
     reasons: dict[int, str] = {}
@@ -202,7 +202,7 @@ def _curves(reads: Sequence[ReadBranch | None], options: IdentifyOptions) -> lis
     return [curves.get(index) for index in range(len(reads))]
 
 
-def _curve(read: ReadBranch, straight: tuple[GatedLine, float] | None, reason: str, u_max: float) -> FlowCurve:
+def _curve(read: PreparedBranch, straight: tuple[GatedLine, float] | None, reason: str, u_max: float) -> FlowCurve:
     """Average a branch over cells of the command, samples far off its smoothed course left out."""
     line, level = straight or (None, max(read.floor, USEFUL_FLOW * read.y_max))
     u, y = read.branch.u, read.y
@@ -216,7 +216,7 @@ def _curve(read: ReadBranch, straight: tuple[GatedLine, float] | None, reason: s
         return np.bincount(index, weights=values, minlength=filled.size) / n
 
     # Noise with a memory averages out no better than 1/colour of its samples would, white.
-    colour = line.colour if line else 1.0
+    colour = line.variance_inflation if line else 1.0
     small = np.interp(u, *read.profile) < 0.05 * read.y_max
     return FlowCurve(
         read=read,

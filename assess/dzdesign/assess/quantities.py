@@ -27,38 +27,30 @@ class Quantity:
     formula: Annotated[str, Meta(description="How it is computed.")]
 
 
+def _percent(name: str, formula: str) -> Quantity:
+    return Quantity(name=name, unit="%", formula=formula)
+
+
 QUANTITIES: dict[str, Quantity] = {
-    "dead_zone_opening": Quantity(
-        name="dead zone, opening",
-        unit="%",
-        formula="u_r(Q_L) / u_max: command at which the rising branch passes the level Q_L",
+    "dead_zone_opening": _percent(
+        "dead zone, opening", "u_r(Q_L) / u_max: command at which the rising branch passes the level Q_L"
     ),
-    "dead_zone_closing": Quantity(
-        name="dead zone, closing",
-        unit="%",
-        formula="u_f(Q_L) / u_max: command at which the falling branch passes the level Q_L",
+    "dead_zone_closing": _percent(
+        "dead zone, closing", "u_f(Q_L) / u_max: command at which the falling branch passes the level Q_L"
     ),
-    "knee_opening": Quantity(
-        name="knee, opening",
-        unit="%",
-        formula="zero of the line through the straight part of Q/sqrt(dP) on the rising branch, over u_max",
+    "knee_opening": _percent(
+        "knee, opening",
+        "zero of the line through the straight part of Q/sqrt(dP) on the rising branch, over u_max",
     ),
-    "knee_closing": Quantity(
-        name="knee, closing",
-        unit="%",
-        formula="the same on the falling branch",
+    "knee_closing": _percent("knee, closing", "the same on the falling branch"),
+    "hysteresis": _percent(
+        "hysteresis", "largest |u_r(Q) - u_f(Q)| / u_max at Q = 5, 10, ... 90 % of the largest flow"
     ),
-    "hysteresis": Quantity(
-        name="hysteresis",
-        unit="%",
-        formula="largest |u_r(Q) - u_f(Q)| / u_max at Q = 5, 10, ... 90 % of the largest flow",
-    ),
-    "linearity": Quantity(
-        name="linearity",
-        unit="%",
-        formula="largest |m(u) - (a + b u)| / Q_rated in the window of u; m is the mean of both branches, each "
-        "averaged over cells of 1 % of u_max (of single readings the noise would add to the largest), a + b u its "
-        "least-squares line there, Q_rated the largest flow BEFORE at this pressure drop",
+    "linearity": _percent(
+        "linearity",
+        "largest |m(u) - (a + b u)| / Q_rated in the window of u; m is the mean of both branches, each averaged over "
+        "cells of 1 % of u_max (of single readings the noise would add to the largest), a + b u its least-squares line "
+        "there, Q_rated the largest flow BEFORE at this pressure drop",
     ),
     "gain": Quantity(
         name="gain",
@@ -75,15 +67,11 @@ QUANTITIES: dict[str, Quantity] = {
         unit="L/min",
         formula="Q at the largest command, as recorded (its pressure drop may sag)",
     ),
-    "symmetry": Quantity(
-        name="symmetry",
-        unit="%",
-        formula="gain of the positive side over that of the negative side, less 1",
-    ),
+    "symmetry": _percent("symmetry", "gain of the positive side over that of the negative side, less 1"),
 }
 #: A quantity that compares both sets: it can be limited, and is read from no recording alone.
 LOSS = "largest_flow_loss"
-LOSS_OF_FLOW = Quantity(name="loss of largest flow", unit="%", formula="1 - largest flow AFTER / largest flow BEFORE")
+LOSS_OF_FLOW = _percent("loss of largest flow", "1 - largest flow AFTER / largest flow BEFORE")
 #: SI, or a share, to the unit of a quantity.
 IN_UNIT = {"%": 100.0, "L/min": 1 / L_MIN, "L/min/V": 1 / L_MIN}
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from dzdesign.assess.flow_curves import CELL, ZERO, FlowCurve, PressureCurves
 from dzdesign.assess.quantities import L_MIN, Reading, hidden, in_units, observed
-from dzdesign.identify.knees.linear_region import GATE, fit_line
+from dzdesign.identify.knees.gated_line import GATE, fit_line
 from dzdesign.identify.knees.noise import median
 from dzdesign.identify.knees.profile import crossing
 
@@ -215,7 +215,7 @@ def _gain(curves: PressureCurves) -> Reading:
     lines, errors = [line for line, _ in straight], []
     for line, u in straight:
         spread = float(np.var(u[line.kept & ~line.censored])) * int(np.sum(line.kept & ~line.censored))
-        errors.append(line.sigma * math.sqrt(line.colour / spread))
+        errors.append(line.sigma * math.sqrt(line.variance_inflation / spread))
     count = len(lines)
     return observed(
         sum(line.slope for line in lines) / count,

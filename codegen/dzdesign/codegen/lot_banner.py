@@ -4,25 +4,13 @@ from dataclasses import dataclass
 
 from dzdesign.codegen.comment_text import printable_name
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.lot_file import lot_document
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LotInWords:
-    """The same for a banner, for a README and for the words on a certificate.
+    """The same in one line of a banner, in a paragraph of Markdown and in a sentence beside the certificate."""
 
-    Attributes
-    ----------
-    carrier : str
-        The valve that compensator.json holds.
-    banner : str
-        One line.
-    readme : str
-        A paragraph of Markdown.
-    certificate : str
-        A sentence beside the carrier's certificate.
-    """
-
+    #: The valve that compensator.json holds.
     carrier: str
     banner: str
     readme: str
@@ -30,28 +18,19 @@ class LotInWords:
 
 
 def lot_in_words(compensator: Compensator) -> LotInWords | None:
-    """Return the words on a lot setting; None of a valve's own.
-
-    Parameters
-    ----------
-    compensator : Compensator
-        What the firmware is of.
-    """
-    count = compensator.common_valves
+    """Return the words on a lot setting; None of a valve's own."""
+    count = len(compensator.lot)
     if not count:
         return None
-    names = [printable_name(each.name) for each in compensator.lot if each.valve_sha256 == compensator.valve_sha256]
+    digest = compensator.valve_json_sha256
+    names = [printable_name(each.name) for each in compensator.lot if each.valve_sha256 == digest]
     carrier = f"Valve {names[0]}" if names else "One valve"
-    digest = lot_document(compensator.lot).get("lot_sha256")
-    known = f"lot SHA-256 {digest}" if digest else "the file does not say which"
     return LotInWords(
         carrier=carrier,
-        banner=f"LOT SETTING of {count} valves, {known}.",
+        banner=f"LOT SETTING of {count} valves, lot SHA-256 {compensator.lot_sha256}.",
         readme=f"**This is a lot setting of {count} valves**, not one valve's own.\n"
-        f"Lot SHA-256: {digest or 'not known'}. Recordings and certificate that these files name are those of one\n"
+        f"Lot SHA-256: {compensator.lot_sha256}. Recordings and certificate that these files name are those of one\n"
         f"of them, the carrier: {carrier[0].lower()}{carrier[1:]}. `../compensator.json` lists all under `lot`.",
         certificate=f"The certificate is that of one of the {count} valves of this lot setting, "
-        f"{carrier[0].lower()}{carrier[1:]}; of the others codegen proved the same under their own bounds."
-        if digest
-        else f"The certificate is that of one of the {count} valves of this lot setting.",
+        f"{carrier[0].lower()}{carrier[1:]}; of the others codegen proved the same under their own bounds.",
     )

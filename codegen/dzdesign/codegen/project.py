@@ -19,17 +19,15 @@ from dzdesign.core.artefact_files import (
     MANIFEST_NAME,
     read_bytes,
     sha256_of,
-    to_json,
     write_folder,
 )
 from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.core.artefact_types import THIS_TOOL, SourceFile
+from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.compensator_file import compensator_document
 from dzdesign.design.firmware_manifest import FirmwareManifest
-from dzdesign.design.signal_text import Converter
+from dzdesign.design.target_inputs import Converter
 
 if TYPE_CHECKING:
     import jinja2
@@ -139,13 +137,13 @@ def generate(
         If the target is unknown, its converter or PWM differs from those that the compensator was designed for, or the
         compensator says of the target that it was designed for what is not so.
     """
-    designed_for = compensator.request.target if compensator.request else None
+    designed_for = compensator.target
     target = target_named(target_name or (designed_for.name if designed_for else DEFAULT_TARGET))
     if designed_for:
         target_named(designed_for.name).check_designed_for(designed_for)
     target.check_signals(compensator.signals)
     note = target.check_designed_for(designed_for) if designed_for else ""
-    document = compensator_bytes or to_json(compensator_document(compensator)).encode()
+    document = compensator_bytes or to_json_bytes(compensator)
     digest = sha256_of(document)
     core = {f"core/{name}": file for name, file in core_files(compensator, target.arithmetic).items()}
     banner = banner_of(compensator, digest)
@@ -157,7 +155,7 @@ def generate(
         tool=THIS_TOOL,
         made_from=(SourceFile(source="compensator.json", sha256=digest),),
         target=target.name,
-        law=compensator.law_name,
+        law=compensator.law,
         core=tuple(sorted(core)),
         board=tuple(sorted(target.board)),
         origin=origin_of(compensator, digest),
@@ -181,15 +179,15 @@ def target_files(compensator: Compensator, target: Target, banner: Banner) -> di
     """
     signals = compensator.signals
     levels, full_V = signals.code_max + 1, target.adc_full_V
-    if target.takes_any_signals and compensator.request:  # a target without a converter of its own takes any
-        full_V = compensator.request.target.converter.full_V
+    if target.takes_any_signals and compensator.target:  # a target without a converter of its own takes any
+        full_V = compensator.target.converter.full_V
     values = {
         **target.context,
         "bipolar": len(signals.signs) == 2,
         "signals": signals,
         "u_max_V": f"{float(compensator.u_max_V):g}",
-        "drive": compensator.amplifier,
-        "limited": compensator.amplifier.compare_limit < signals.compare_max,
+        "drive": compensator.drive_functions,
+        "limited": compensator.drive_functions.compare_limit < signals.compare_max,
         "at_zero": {sign: zero_command(compensator, sign) for sign in signals.signs},
         "core_sources": (*(CORE_SOURCES[sign] for sign in signals.signs), "dz_drive.c"),
         "core_headers": CORE_HEADERS,

@@ -57,7 +57,7 @@ def read_artefact(
     document = parse_document(content, source, tuple(kinds))
     found = kinds[document["schema"]]
     command = written_by(document["schema"])
-    remedy = remedy or (f"make it again with `{command}`" if command else "make it again")
+    remedy = remedy or found.REMEDY or (f"make it again with `{command}`" if command else "make it again")
     try:
         artefact = convert(document, found, dec_hook=_decoded)
     except ValidationError as error:
@@ -109,14 +109,17 @@ def _sentence(error: ValidationError, document: dict[str, Any], kind: type[Artef
     match = MESSAGE.fullmatch(str(error))
     what, is_key, steps = (match["what"], match["is_key"], match["path"] or "") if match else (str(error), None, "")
     path: Path = [name or (int(index) if index else ANY_KEY) for name, index, _ in STEP.findall(steps)]
+    path = [*path, ANY_KEY] if is_key else path  # one of the keys of the mapping that the path leads to
     path = _with_keys(path, document, str(error), kind)
     if isinstance(error.__cause__, ValueError) and not isinstance(error.__cause__, _MisfitError):
         return f"'{source}': '{_written(path)}': {what}" if path else f"'{source}': {what}"
     if missing := MISSING_KEY.fullmatch(what):
         return f"'{source}' lacks the key '{_written([*path, missing[1]])}'"
+    schema = json_schema(kind)
     if is_key:
-        return f"'{source}': '{_written(path)}' has a key that does not fit ({what})"
-    expected = in_words(node_at(json_schema(kind), path))
+        expected = in_words({"type": "string", **node_at(schema, path[:-1]).get("propertyNames", {})})
+        return f"'{source}': '{_written(path[:-1])}' has the key {quoted(path[-1])}, expected {expected}"
+    expected = in_words(node_at(schema, path))
     return f"'{source}': '{_written(path)}' is {quoted(_value_at(document, path))}, expected {expected}"
 
 

@@ -46,12 +46,16 @@ class Tool:
     version: Annotated[str, Meta(description="Its version.")]
 
 
+#: A SHA-256 in hex; ``$`` alone would let a line break pass.
+Sha256 = Annotated[str, Meta(pattern="^[0-9a-f]{64}$", max_length=64)]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SourceFile:
     """A file that something was made from."""
 
     source: Annotated[str, Meta(description="File name.")]
-    sha256: Annotated[str, Meta(description="SHA-256 of its bytes.", pattern="^[0-9a-f]{64}$", max_length=64)]
+    sha256: Annotated[Sha256, Meta(description="SHA-256 of its bytes.")]
 
 
 #: What this program writes into the header of its artefacts.
@@ -63,6 +67,8 @@ class Artefact:
     """Header of every artefact; a subclass gives `FILE_NAME`, and `schema` as a ``Literal`` with its default."""
 
     FILE_NAME: ClassVar[str]
+    #: What to do about a bad file; by default to run the command again that writes it.
+    REMEDY: ClassVar[str] = ""
     schema: Annotated[str, Meta(description="Name and version of this schema.")]
     tool: Annotated[Tool, Meta(description="The program that wrote the file.")]
     made_from: Annotated[tuple[SourceFile, ...], Meta(description="The files that it was made from.")]

@@ -4,7 +4,8 @@ import hashlib
 import json
 import math
 from collections.abc import Iterable, Mapping
-from typing import Any, BinaryIO
+from io import BufferedReader
+from typing import Any
 
 from dzdesign.core.errors import QUOTED, InputError
 
@@ -27,7 +28,7 @@ def sha256_of(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-def sha256_of_file(file: BinaryIO) -> str:
+def sha256_of_file(file: BufferedReader) -> str:
     """Return the SHA-256 of a whole file in hex, read piece by piece; the file is at its beginning again then."""
     file.seek(0)
     digest = hashlib.file_digest(file, "sha256").hexdigest()
@@ -60,8 +61,8 @@ def _whole_number(text: str) -> int:
 def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     found = dict(pairs)
     if len(found) < len(pairs):
-        seen: set[str] = set()
-        twice = next(key for key, _ in pairs if key in seen or seen.add(key))
+        keys = [key for key, _ in pairs]
+        twice = next(key for key in keys if keys.count(key) > 1)
         raise ValueError(f"the key {twice[:40]!r} is there twice")
     return found
 
@@ -90,9 +91,11 @@ def parse_document(content: bytes, source: str, schemas: tuple[str, ...]) -> dic
             json.dumps(document, ensure_ascii=False).encode()
     except (ValueError, RecursionError) as error:
         raise InputError(f"'{source}' is not JSON ({error}); expected an artefact of schema {expected}") from error
-    found = document.get("schema") if isinstance(document, dict) else None
-    if found in schemas:
-        return document
+    found = None
+    if isinstance(document, dict):
+        found = document.get("schema")
+        if found in schemas:
+            return document
     same_kind = next((schema for schema in schemas if str(found).partition("/")[0] == schema.partition("/")[0]), None)
     command = written_by(same_kind) if same_kind else None
     remedy = f"make it again with `{command}` of this version" if command else "give another file"

@@ -4,17 +4,14 @@
 from a file: a file can be edited, and the firmware's header would go on promising what no longer holds.
 """
 
-from collections.abc import Sequence
 from dataclasses import fields
 from fractions import Fraction
 
-from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.beta_table import STEP_CODES, OffsetCeiling, OffsetCurve, offset_ceiling
 from dzdesign.design.compensator import Certificate, Compensator
 from dzdesign.design.signals import Signals
-from dzdesign.identify.fitting.guard_curve import GuardCurve
-from dzdesign.identify.valve.model import ValveModel
+from dzdesign.identify.valve.guard_curve import Guard, GuardCurve
 from dzdesign.identify.valve.side_model import SideModel
 
 #: Of a loss in V: tenths of a microvolt.
@@ -26,11 +23,11 @@ def certify(
     curve: OffsetCurve,
     ceiling: OffsetCeiling,
     *,
-    guard: str,
+    guard: Guard,
     signals: Signals,
     u_max_V: Fraction,
     u_min0: Fraction,
-    table: Sequence[int],
+    table: tuple[int, ...],
     denominator: int,
 ) -> Certificate:
     """Prove the certificate of one side, in exact arithmetic, at every pressure code.
@@ -49,7 +46,7 @@ def certify(
         Full command.
     u_min0 : Fraction
         Of the law, over u_max.
-    table : sequence of int
+    table : tuple of int
         Nodes of beta over `denominator`.
     denominator : int
         Unit of the nodes.
@@ -79,15 +76,14 @@ def prove_certificates(compensator: Compensator) -> None:
     InputError
         If one does not follow, with the first statement that differs.
     """
-    valve = read_artefact(compensator.valve_document.encode(), ValveModel, "compensator.json: valve")
-    signals, dither = compensator.signals, compensator.amplifier.dither_counts
+    signals, dither = compensator.signals, compensator.drive_functions.dither_counts
     for sign in signals.signs:
         name = "positive" if sign > 0 else "negative"
-        law, model = compensator.side(sign), valve.sides.get(name)
+        law, model = compensator.side(sign), compensator.valve.sides.get(name)
         if model is None:
             raise InputError(f"the compensator drives the {name} side, but its valve has none; design it again")
         stated = law.certificate
-        curve = guarded_curve(model, stated.guard, compensator.below_reference)
+        curve = guarded_curve(model, stated.guard, compensator.below_dp0)
         reserve = Fraction(dither, signals.compare_max)
         ceiling = offset_ceiling(curve, signals, compensator.u_max_V, sign=sign, reserve=reserve)
         try:
@@ -99,7 +95,7 @@ def prove_certificates(compensator: Compensator) -> None:
                 signals=signals,
                 u_max_V=compensator.u_max_V,
                 u_min0=law.u_min0_over_u_max,
-                table=law.beta_numerators,
+                table=law.beta,
                 denominator=compensator.beta_denominator,
             )
         except RequirementError as error:
@@ -119,7 +115,7 @@ def _words(value: object) -> str:
     return f"{float(value):.6g}" if isinstance(value, Fraction) else str(value)
 
 
-def guarded_curve(side: SideModel, guard: str, below_reference: str) -> OffsetCurve:
+def guarded_curve(side: SideModel, guard: str, below_dp0: str) -> OffsetCurve:
     """Return the certified offset of the threshold that is to be guarded.
 
     Raises
@@ -139,13 +135,13 @@ def guarded_curve(side: SideModel, guard: str, below_reference: str) -> OffsetCu
         offset_V=tuple(Fraction(repr(value)) * u_min0 for value in curve.beta),
         steps_V=tuple(Fraction(repr(step)) for step in curve.certified_steps_V),
         lowest_V=min(Fraction(repr(bound)) for bound in curve.u_lower_V),
-        hold_below_MPa=hold_below(side, below_reference),
+        hold_below_MPa=hold_below(side, below_dp0),
     )
 
 
-def hold_below(side: SideModel, below_reference: str) -> Fraction | None:
+def hold_below(side: SideModel, below_dp0: str) -> Fraction | None:
     """Return the pressure drop below which beta is held at 1, MPa; None where the tests are followed there."""
-    return Fraction(repr(side.reference.dp_MPa)) if below_reference == "hold" else None
+    return Fraction(repr(side.reference.dp_MPa)) if below_dp0 == "hold" else None
 
 
 def _curve_of(side: SideModel, guard: str) -> GuardCurve:

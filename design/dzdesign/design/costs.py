@@ -1,17 +1,16 @@
-"""What a design costs, in a person's words: dead zone that remains, flow at the edge, drive at full command."""
+"""What a design costs, in a person's words: dead zone that remains, flow at the transition, drive at full command."""
 
 from fractions import Fraction
 
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.drive import RAMP_UNIT
+from dzdesign.design.drive_functions import RAMP_UNIT
 from dzdesign.design.signal_descriptions import unseen_failures
-from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.ramp_result import TestResult
 from dzdesign.identify.valve.side_model import SideModel
 
 
-def costs_of(compensator: Compensator, valve: ValveModel) -> tuple[str, ...]:
+def costs_of(compensator: Compensator) -> tuple[str, ...]:
     """Return one line per test and per choice.
 
     Raises
@@ -19,7 +18,8 @@ def costs_of(compensator: Compensator, valve: ValveModel) -> tuple[str, ...]:
     InputError
         If the largest output does not open the valve.
     """
-    lines = list(hidden_failures(compensator, valve))
+    valve = compensator.valve
+    lines = list(hidden_failures(compensator))
     for sign in compensator.signals.signs:
         name = "positive" if sign > 0 else "negative"
         label = "" if compensator.negative is None else f"{name} side, "
@@ -40,13 +40,13 @@ def costs_of(compensator: Compensator, valve: ValveModel) -> tuple[str, ...]:
     return tuple(lines + _cost_of_options(compensator))
 
 
-def hidden_failures(compensator: Compensator, valve: ValveModel) -> tuple[str, ...]:
+def hidden_failures(compensator: Compensator) -> tuple[str, ...]:
     """Return one line for each failure of a signal that the firmware can't see; the first of `costs_of`."""
     lines = unseen_failures(compensator.signals)
     for sign in compensator.signals.signs:
         name = "positive" if sign > 0 else "negative"
         label = "" if compensator.negative is None else f"{name} side, "
-        if valve.sides[name].trend == "increasing":
+        if compensator.valve.sides[name].trend == "increasing":
             lines.append(
                 f"{label}the threshold grows with the pressure drop, so a pressure signal that reads too high raises "
                 "the offset: a broken wire of sensor B is not recognised unless it has a live zero; monitor the "
@@ -59,7 +59,7 @@ def _cost_of_test(compensator: Compensator, test: TestResult, sign: int) -> str:
     """Say what remains at one tested pressure drop."""
     signals, u_max = compensator.signals, float(compensator.u_max_V)
     code = round(signals.dp_code(Fraction(repr(test.dp_MPa))))
-    offset, at_edge, full, edge = _corners(compensator, code, sign)
+    offset, at_end, full, transition = _corners(compensator, code, sign)
     left = remaining_dead_zone(compensator, test, sign)
     parts = [f"{test.dp_MPa:.2f} MPa: offset {offset * u_max:.3f} V"]
     for name, knee in (("opening", test.u_knee_rising_V), ("closing", test.u_knee_falling_V)):
@@ -68,10 +68,10 @@ def _cost_of_test(compensator: Compensator, test: TestResult, sign: int) -> str:
         elif knee is not None:
             above = offset * u_max - knee
             parts.append(f"flow at zero command on {name}: the offset lies {above:.3f} V above the knee")
-    if edge and test.u_knee_falling_V is not None:
-        flow = test.slope_L_min_V * max(at_edge * u_max - test.u_knee_falling_V, 0.0)
-        parts.append(f"flow on closing at the edge's end {flow:.2f} L/min")
-    limit = compensator.amplifier.compare_limit / signals.compare_max
+    if transition and test.u_knee_falling_V is not None:
+        flow = test.slope_L_min_V * max(at_end * u_max - test.u_knee_falling_V, 0.0)
+        parts.append(f"flow on closing at the transition's end {flow:.2f} L/min")
+    limit = compensator.drive_functions.compare_limit / signals.compare_max
     if limit <= offset or limit <= (test.u_knee_rising_V or 0.0) / u_max:
         raise InputError(
             f"the largest output is {limit:.1%} of full drive, but the valve opens at "
@@ -79,7 +79,7 @@ def _cost_of_test(compensator: Compensator, test: TestResult, sign: int) -> str:
             "flow; give a larger --output-max"
         )
     if limit < full:
-        reached = edge + (1 - edge) * (limit - at_edge) / (full - at_edge)
+        reached = transition + (1 - transition) * (limit - at_end) / (full - at_end)
         parts.append(f"the largest drive, {limit:.2%}, is reached at {reached:.1%} of command")
     else:
         parts.append(f"drive at full command {full:.2%}")
@@ -104,26 +104,26 @@ def remaining_dead_zone(compensator: Compensator, test: TestResult, sign: int = 
         "opening" and "closing", those recorded: the share up to the knee; 0 where flow passes at zero command.
     """
     code = round(compensator.signals.dp_code(Fraction(repr(test.dp_MPa))))
-    offset, at_edge, full, edge = _corners(compensator, code, sign)
+    offset, at_end, full, transition = _corners(compensator, code, sign)
     knees = {"opening": test.u_knee_rising_V, "closing": test.u_knee_falling_V}
     shares = {name: knee / float(compensator.u_max_V) for name, knee in knees.items() if knee is not None}
-    return {name: max(_residual(knee, offset, at_edge, full, edge), 0.0) for name, knee in shares.items()}
+    return {name: max(_residual(knee, offset, at_end, full, transition), 0.0) for name, knee in shares.items()}
 
 
 def _corners(compensator: Compensator, dp_code: int, sign: int) -> tuple[float, float, float, float]:
-    """Return the drive at zero command, at the edge's end and at full command, over full, and the edge's share."""
+    """Return the drive at zero command, at the transition's end and at full command, and the transition's share."""
     command = compensator.signals.command
-    span, edge = command.span(sign), compensator.edge_codes
-    at = (command.zero_code + command.direction(sign) * from_zero for from_zero in (0, edge, span))
-    offset, at_edge, full = (float(compensator.drive(code, dp_code, sign)) for code in at)
-    return offset, at_edge, full, edge / span
+    span, transition = command.span(sign), compensator.transition_codes
+    at = (command.zero_code + command.direction(sign) * from_zero for from_zero in (0, transition, span))
+    offset, at_end, full = (float(compensator.drive(code, dp_code, sign)) for code in at)
+    return offset, at_end, full, transition / span
 
 
-def _residual(knee: float, offset: float, at_edge: float, full: float, edge: float) -> float:
-    """Return the command at which the drive reaches a threshold: two straight parts, with their corner at the edge."""
-    if knee <= at_edge and edge:
-        return edge * (knee - offset) / (at_edge - offset) if at_edge > offset else 0.0
-    return edge + (1 - edge) * (knee - at_edge) / (full - at_edge)
+def _residual(knee: float, offset: float, at_end: float, full: float, transition: float) -> float:
+    """Return the command at which the drive reaches a threshold: two straight parts, their corner at the transition."""
+    if knee <= at_end and transition:
+        return transition * (knee - offset) / (at_end - offset) if at_end > offset else 0.0
+    return transition + (1 - transition) * (knee - at_end) / (full - at_end)
 
 
 def _cost_of_side(compensator: Compensator, side: SideModel, sign: int) -> list[str]:
@@ -149,24 +149,24 @@ def _cost_of_side(compensator: Compensator, side: SideModel, sign: int) -> list[
 
 
 def _cost_of_options(compensator: Compensator) -> list[str]:
-    signals, amplifier = compensator.signals, compensator.amplifier
+    signals, functions = compensator.signals, compensator.drive_functions
     lines = []
-    if amplifier.dither_counts:
-        peak = amplifier.dither_counts / signals.compare_max
-        frequency = signals.tick_Hz / (2 * amplifier.dither_ticks)
+    if functions.dither_counts:
+        peak = functions.dither_counts / signals.compare_max
+        frequency = signals.tick_Hz / (2 * functions.dither_ticks)
         lines.append(
             f"dither of {frequency:.4g} Hz (half a wave is a whole number of PWM periods) and ±{peak:.2%} of full "
             "drive: the offset stands lower by that much, so that zero command stays shut at the wave's top"
         )
-    if compensator.edge_codes:
-        lines.append(f"the edge is a power of two in codes of command: {compensator.edge_codes}")
-    if amplifier.has_ramp:
+    if compensator.transition_codes:
+        lines.append(f"the transition is a power of two in codes of command: {compensator.transition_codes}")
+    if functions.has_ramp:
         lines.append(
             f"ramps: {_ramp_text(compensator)}; they hold for zero command too: the valve closes no faster than they "
             "let it"
         )
-    if amplifier.window_codes:
-        share = amplifier.window_codes / signals.command.span(1)
+    if functions.window_codes:
+        share = functions.window_codes / signals.command.span(1)
         lines.append(
             f"coming from the other sign a command must pass zero by {share:.2%} before its solenoid is driven: that "
             "much dead zone remains then, if the lines above say less"
@@ -175,7 +175,7 @@ def _cost_of_options(compensator: Compensator) -> list[str]:
 
 
 def _of_which_dither(compensator: Compensator) -> str:
-    counts = compensator.amplifier.dither_counts
+    counts = compensator.drive_functions.dither_counts
     if not counts:
         return ""
     peak = counts / compensator.signals.compare_max * float(compensator.u_max_V)
@@ -184,10 +184,10 @@ def _of_which_dither(compensator: Compensator) -> str:
 
 def _ramp_text(compensator: Compensator) -> str:
     """Say how long a command takes from zero to full and back, of each sign."""
-    signals, amplifier = compensator.signals, compensator.amplifier
+    signals, functions = compensator.signals, compensator.drive_functions
     parts = []
     for place, sign in enumerate(signals.signs):
-        for way, steps in (("up", amplifier.ramp_up), ("down", amplifier.ramp_down)):
+        for way, steps in (("up", functions.ramp_up), ("down", functions.ramp_down)):
             name = f"{'positive ' if sign > 0 else 'negative '}{way}" if compensator.negative is not None else way
             seconds = signals.command.span(sign) * RAMP_UNIT / (steps[place] * signals.sample_Hz) if steps[place] else 0
             parts.append(f"{name} {seconds:.4g} s" if seconds else f"{name} at once")

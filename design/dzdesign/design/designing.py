@@ -4,27 +4,26 @@ from dataclasses import replace
 from fractions import Fraction
 
 from dzdesign.core.artefact_files import sha256_of
-from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.core.artefact_types import to_json_bytes
+from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.derivation.law import Law, law
 from dzdesign.derivation.laws import LAW_NAMES
 from dzdesign.derivation.presentation.formulas import to_text
 from dzdesign.design.beta_table import STEP_CODES, OffsetCeiling, OffsetCurve, choose_beta_table, offset_ceiling
 from dzdesign.design.certificate import certify, guarded_curve, hold_below
-from dzdesign.design.compensator import Compensator, SideLaw
+from dzdesign.design.compensator import Compensator, SideLaw, Sides
 from dzdesign.design.costs import costs_of
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.quantise import Units, finest_units
 from dzdesign.design.signals import Signals
-from dzdesign.identify.fitting.guard_curve import GUARDS
+from dzdesign.identify.valve.guard_curve import GUARDS
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.side_model import SideModel
 
 #: Share of the sensor's span by which the difference may read negative before it counts as a failed sensor.
 REVERSE_SHARE = Fraction(1, 100)
-#: Standard errors by which the edge's end stands above the opening threshold.
-EDGE_ERRORS = 3
+#: Standard errors by which the transition's end stands above the opening threshold.
+OPENING_ERRORS = 3
 
 
 def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes: bytes | None = None) -> Compensator:
@@ -37,7 +36,7 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
     options : DesignOptions, optional
         Choices of the engineer.
     valve_bytes : bytes, optional
-        The file the valve was read from, for its hash; without it the hash is of the document as it would be written.
+        The file that the valve was read from, for its hash; without it the hash is of what `identify` would write.
 
     Raises
     ------
@@ -47,14 +46,11 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
         If a proof fails.
     """
     options = options or DesignOptions()
-    document = valve_bytes.decode() if valve_bytes is not None else to_json_bytes(valve).decode()
-    # The file's rounded numbers, so that the same valve gives the same firmware by whichever way it comes here.
-    valve = read_artefact(document.encode(), ValveModel, "valve.json")
     signals = options.signals
-    law(options.law_name)
+    law(options.law)
     u_max = Fraction(repr(valve.u_max_V))
-    edge_codes = options.edge_codes()
-    units = finest_units(signals, edge_codes)
+    transition_codes = options.transition_codes()
+    units = finest_units(signals, transition_codes)
     if len(signals.signs) == 2:
         _refuse_two_signs(valve, options.guard)
     laws = {}
@@ -62,26 +58,29 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
         name = "positive" if sign > 0 else "negative"
         side = valve.positive if sign > 0 else valve.sides[name]
         laws[name] = _side_law(side, options, u_max, sign, units)
+    digest = sha256_of(to_json_bytes(valve) if valve_bytes is None else valve_bytes)
+    request = options.request
     compensator = Compensator(
-        law_name=options.law_name,
-        below_reference=options.below_reference,
+        tool=THIS_TOOL,
+        made_from=(SourceFile(source=ValveModel.FILE_NAME, sha256=digest),),
+        target=request.target if request else None,
+        options=request.options if request else None,
+        law=options.law,
+        below_dp0=options.below_dp0,
         signals=signals,
         u_max_V=u_max,
-        positive=laws["positive"],
-        negative=laws.get("negative"),
+        sides=Sides(positive=laws["positive"], negative=laws.get("negative")),
         beta_denominator=units.beta,
         beta_step_codes=STEP_CODES,
         reverse_codes=int(REVERSE_SHARE * (signals.pressure_a.full_code - signals.pressure_a.zero_code)),
-        edge_codes=edge_codes,
-        amplifier=options.amplifier(),
+        transition_codes=transition_codes,
+        drive_functions=options.drive_functions(),
         costs=(),
-        valve_document=document,
-        valve_sha256=sha256_of(document.encode()),
-        request=options.request,
+        valve=valve,
     )
     for sign in signals.signs:
         prove_monotone(compensator, sign)
-    return replace(compensator, costs=costs_of(compensator, valve))
+    return replace(compensator, costs=costs_of(compensator))
 
 
 def _side_law(side: SideModel, options: DesignOptions, u_max: Fraction, sign: int, units: Units) -> SideLaw:
@@ -89,16 +88,16 @@ def _side_law(side: SideModel, options: DesignOptions, u_max: Fraction, sign: in
     signals = options.signals
     if "branch-order" not in options.accept:
         _refuse_crossed_branches(side)
-    certified = guarded_curve(side, options.guard, options.below_reference)
-    opening = _opening_curve(side, options) if options.edge else None
+    certified = guarded_curve(side, options.guard, options.below_dp0)
+    opening = _opening_curve(side, options) if options.transition else None
     reference = Fraction(repr(side.reference.dp_MPa))
     top = (opening or certified).at(reference)
     # Half a count less, because the compare value of the offset may be rounded up.
     u_min0 = over(top / u_max - Fraction(1, 2 * signals.compare_max), "down", units.coefficient)
     if u_min0 <= 0:
         raise InputError(f"u_min0 is {float(top):.4f} V, less than one count of the PWM: no dead zone")
-    above_one = side.trend == "increasing" or options.below_reference == "extend"
-    dither = Fraction(options.amplifier().dither_counts, signals.compare_max)
+    above_one = side.trend == "increasing" or options.below_dp0 == "extend"
+    dither = Fraction(options.drive_functions().dither_counts, signals.compare_max)
     ceiling = offset_ceiling(certified, signals, u_max, sign=sign, reserve=dither)
     if min(ceiling.limit) <= 0:
         raise InputError("the dither's peak leaves no offset under the certified one; make it smaller")
@@ -107,15 +106,15 @@ def _side_law(side: SideModel, options: DesignOptions, u_max: Fraction, sign: in
         return choose_beta_table(under, u_min0, side.trend, denominator=units.beta, above_one=above_one)
 
     beta = table(ceiling)
-    edge_beta = None
+    transition_beta = None
     if opening is not None:
         upper = table(_opening_ceiling(opening, signals, u_max, sign))
-        edge_beta = tuple(map(max, upper, beta))
+        transition_beta = tuple(map(max, upper, beta))
     return SideLaw(
-        k_x_max_over_u_max=over(travel(side, u_max, top), "nearest", units.coefficient),
+        drive_range_over_u_max=over(travel(side, u_max, top), "nearest", units.coefficient),
         u_min0_over_u_max=u_min0,
-        beta_numerators=beta,
-        edge_numerators=edge_beta,
+        beta=beta,
+        transition_beta=transition_beta,
         certificate=certify(
             side,
             certified,
@@ -163,24 +162,24 @@ def _refuse_two_signs(valve: ValveModel, guard: str) -> None:
 
 
 def _opening_curve(side: SideModel, options: DesignOptions) -> OffsetCurve:
-    """Return where the edge ends and the law goes on: the opening threshold, and its error on top.
+    """Return where the transition ends and the law goes on: the opening threshold, and its error on top.
 
     A law that starts above the threshold only shortens the dead zone that is left; one that starts below lengthens it.
     """
     opening = side.opening_curve
     if opening is None:
         raise InputError(
-            "an edge ends at the opening threshold, of which valve.json has no curve; record the rising branch with a "
-            "column of dP, make valve.json again, or leave out --edge"
+            "a transition ends at the opening threshold, of which valve.json has no curve; record the rising branch "
+            "with a column of dP, make valve.json again, or leave out --transition"
         )
     error = max(opening.u_se_V)
-    offset = [Fraction(repr(value)) + EDGE_ERRORS * Fraction(repr(error)) for value in opening.u_V]
+    offset = [Fraction(repr(value)) + OPENING_ERRORS * Fraction(repr(error)) for value in opening.u_V]
     return OffsetCurve(
         dp_MPa=tuple(Fraction(repr(value)) for value in opening.dp_MPa),
         offset_V=tuple(offset),
         steps_V=(),
         lowest_V=min(offset),
-        hold_below_MPa=hold_below(side, options.below_reference),
+        hold_below_MPa=hold_below(side, options.below_dp0),
     )
 
 
@@ -196,7 +195,7 @@ def travel(side: SideModel, u_max: Fraction, offset_V: Fraction) -> Fraction:
     Identification gives k x_max from the knee on. The law starts lower, at the guarded offset; without the difference
     full command would not reach full flow (u_O(u_max) = u_max exactly if k x_max = u_max - u_min0).
     """
-    reference = min(side.tests, key=lambda test: abs(test.dp_MPa - side.reference.dp_MPa))
+    reference = min(side.tests, key=lambda test: abs((test.dp_MPa or 0.0) - (side.reference.dp_MPa or 0.0)))
     knee = reference.u_knee_rising_V if reference.u_knee_rising_V is not None else reference.u_knee_falling_V
     below_knee = max(Fraction(repr(knee)) - offset_V, Fraction(0))
     travel = Fraction(repr(side.k_x_max_over_u_max)) + below_knee / u_max
@@ -213,19 +212,19 @@ def over(value: Fraction, rounding: str, unit: int) -> Fraction:
 def prove_monotone(compensator: Compensator, sign: int) -> None:
     """Prove that more command gives more drive, at every pressure: the gain is affine in beta, so its ends decide.
 
-    Inside the edge the drive rises faster still: what the edge takes away falls with the command.
+    Inside the transition the drive rises faster still: what the transition takes away falls with the command.
     """
-    chosen, side = law(compensator.law_name), compensator.side(sign)
-    numerators = side.law_numerators
+    chosen, side = law(compensator.law), compensator.side(sign)
+    numerators = side.law_beta
     betas = [Fraction(end, compensator.beta_denominator) for end in (min(numerators), max(numerators))]
 
     def rises(candidate: Law) -> bool:
-        return all(candidate.evaluate_gain(beta, side.k_x_max_over_u_max) > 0 for beta in betas)
+        return all(candidate.evaluate_gain(beta, side.drive_range_over_u_max) > 0 for beta in betas)
 
     if not rises(chosen):
         others = [name for name in LAW_NAMES if rises(law(name))]
         raise InputError(
             f"law '{chosen.name}' would fall with rising command: it rises if {to_text(chosen.rises_if)}, but k x_max/"
-            f"u_max = {float(side.k_x_max_over_u_max):.3f} at beta = {float(max(betas)):.3f}"
+            f"u_max = {float(side.drive_range_over_u_max):.3f} at beta = {float(max(betas)):.3f}"
             + (f"; use --law {' or '.join(others)}" if others else "")
         )

@@ -10,9 +10,8 @@ from typing import Annotated, ClassVar, Literal
 from msgspec import Meta
 
 from dzdesign.core.artefact_files import MANIFEST_NAME
-from dzdesign.core.artefact_types import Artefact, SourceFile
+from dzdesign.core.artefact_types import Artefact, Sha256, SourceFile
 
-Sha256 = Annotated[str, Meta(pattern="^[0-9a-f]{64}$", max_length=64)]
 Text = Annotated[str, Meta(min_length=1)]
 #: A number of the C fits 64 bits with sign: every sum of the core is proved to.
 Number = Annotated[int, Meta(ge=-(2**31), le=2**63 - 1)]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dzdesign.design.lot import LotSide, LotValve
+from dzdesign.design.lot_valves import LotSide, LotValve
 
 #: Tests nearer than this share are at one pressure drop of the lot: no bench sets it to a per cent.
 SAME = 0.05
@@ -93,7 +93,7 @@ def _coarser_V(side: LotSide, dp_MPa: float) -> float:
     """Return how far a bound between two tests lies under the straight line through theirs, V."""
     for low, high, bound in side.steps():
         if low < dp_MPa < high:
-            straight = np.interp(dp_MPa, side.dp_MPa, side.lower_V)
+            straight = np.interp(dp_MPa, side.dp_MPa, side.u_lower_V)
             return max(float(straight) - float(bound), 0.0) if side.trend in SLOPING else 0.0
     return 0.0
 

@@ -16,17 +16,16 @@ from math import ceil, floor
 
 import numpy as np
 
-from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.beta_table import OffsetCeiling, OffsetCurve, choose_beta_table, offset_ceiling, pressures_MPa
 from dzdesign.design.certificate import certify, guarded_curve, prove_certificates
-from dzdesign.design.compensator import Certificate, Compensator, SideLaw
+from dzdesign.design.compensator import Certificate, Compensator, SideLaw, Sides
 from dzdesign.design.costs import costs_of
 from dzdesign.design.designing import over, prove_monotone, travel
-from dzdesign.design.lot import LotMargin, LotValve, prove_lot
+from dzdesign.design.lot import LotMargin, prove_lot
+from dzdesign.design.lot_valves import LotValve
 from dzdesign.design.quantise import finest_units
 from dzdesign.design.signals import Signals
-from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.side_model import SideModel
 
 #: Of u_max: a ceiling that is nowhere this near to the least one can't be the least by a rounding error (1e-12).
@@ -34,24 +33,11 @@ CLEAR = 1e-6
 #: Pressure drops closer than this are one, MPa: where a double may fall on either side of a tested pressure drop.
 NEAR_MPa = 1e-9
 #: What all compensators of a batch must have in common.
-SHARED = ("law_name", "below_reference", "signals", "u_max_V", "beta_denominator", "edge_codes", "amplifier")
+SHARED = ("law", "below_dp0", "signals", "u_max_V", "beta_denominator", "transition_codes", "drive_functions")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Designed:
-    """A valve of the batch, as its file has it, and its own compensator."""
-
-    valve: ValveModel
-    own: Compensator
-
-    @classmethod
-    def of(cls, own: Compensator) -> "Designed":
-        """Return a compensator with the valve that it was designed from."""
-        return cls(valve=read_artefact(own.valve_document.encode(), ValveModel, "compensator.json: valve"), own=own)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CommonSetting:
+class LotSetting:
     """One compensator for all valves.
 
     Attributes
@@ -95,19 +81,19 @@ class _Side:
     nearness: Mapping[str, float]
 
 
-def common_setting(batch: Mapping[str, Designed]) -> CommonSetting:
+def lot_setting(batch: Mapping[str, Compensator]) -> LotSetting:
     """Return the largest setting, under one direction of the threshold, that is certified for every valve.
 
     Parameters
     ----------
-    batch : mapping of str to Designed
-        Name to valve and own compensator; two at least.
+    batch : mapping of str to Compensator
+        Name of a valve to its own compensator; two at least.
 
     Raises
     ------
     InputError
         If there is no such setting: valves designed with other options, without a common pressure drop, or with an
-        edge, whose end is no bound.
+        transition, whose end is no bound.
     RequirementError
         If a proof fails.
     """
@@ -119,18 +105,16 @@ def common_setting(batch: Mapping[str, Designed]) -> CommonSetting:
             laws = {side.sign: _law(side, carrier, first) for side in sides}
         except RequirementError:  # no table of that carrier's direction lies under the least ceiling
             continue
-        gain = sum(float(law.u_min0_over_u_max * sum(law.beta_numerators)) for law in laws.values())
+        gain = sum(float(law.u_min0_over_u_max * sum(law.beta)) for law in laws.values())
         if best is None or gain > best[0]:
             best = gain, carrier, laws
     if best is None:
         raise InputError("no law of one direction lies under the least guarded offset of all valves")
     _, carrier, laws = best
     compensator = replace(
-        batch[carrier].own,
-        positive=laws[1],
-        negative=laws.get(-1),
+        batch[carrier],
+        sides=Sides(positive=laws[1], negative=laws.get(-1)),
         costs=(),
-        common_valves=len(batch),
         lot=_lot(batch, first, sides),
     )
     for side in sides:
@@ -143,11 +127,11 @@ def common_setting(batch: Mapping[str, Designed]) -> CommonSetting:
         if any(name in side.exact for side in sides)
     }
     line = (
-        f"common setting of {len(batch)} valves: under the bounds of each, with that valve's own confidence; this file "
+        f"lot setting of {len(batch)} valves: under the bounds of each, with that valve's own confidence; this file "
         f"holds the valve {carrier}, for which the lines above are"
     )
-    compensator = replace(compensator, costs=(*costs_of(compensator, batch[carrier].valve), line))
-    return CommonSetting(
+    compensator = replace(compensator, costs=(*costs_of(compensator), line))
+    return LotSetting(
         compensator=compensator,
         carrier=carrier,
         dp_MPa=_common_interval(side.curves for side in sides),
@@ -157,28 +141,28 @@ def common_setting(batch: Mapping[str, Designed]) -> CommonSetting:
     )
 
 
-def _lot(batch: Mapping[str, Designed], first: Compensator, sides: Sequence[_Side]) -> tuple[LotValve, ...]:
+def _lot(batch: Mapping[str, Compensator], first: Compensator, sides: Sequence[_Side]) -> tuple[LotValve, ...]:
     """Return the valves with the bounds of the threshold that their compensators guard."""
     guards = {side.sign: first.side(side.sign).certificate.guard for side in sides}
     return tuple(
-        LotValve.of(name, each.own.valve_sha256, {side.sign: side.models[name] for side in sides}, guards)
+        LotValve.of(name, each.valve_json_sha256, {side.sign: side.models[name] for side in sides}, guards)
         for name, each in batch.items()
     )
 
 
-def _shared_design(batch: Mapping[str, Designed]) -> Compensator:
+def _shared_design(batch: Mapping[str, Compensator]) -> Compensator:
     """Return one compensator, whose options are those of all; refuse valves that were designed otherwise."""
     if len(batch) < 2:
-        raise InputError(f"a common setting needs two valves or more, got {len(batch)}")
-    name, first = next((name, each.own) for name, each in batch.items())
+        raise InputError(f"a lot setting needs two valves or more, got {len(batch)}")
+    name, first = next((name, each) for name, each in batch.items())
     for other, each in batch.items():
-        unlike = [field for field in SHARED if getattr(each.own, field) != getattr(first, field)]
-        if each.own.positive.certificate.guard != first.positive.certificate.guard:
+        unlike = [field for field in SHARED if getattr(each, field) != getattr(first, field)]
+        if each.positive.certificate.guard != first.positive.certificate.guard:
             unlike.append("guard")
         if unlike:
             raise InputError(f"{other} and {name} are designed with another {unlike[0]}, so no setting serves both")
-    if first.edge_codes:
-        raise InputError("with --edge the law follows each valve's opening threshold, so no setting serves all")
+    if first.transition_codes:
+        raise InputError("with --transition the law follows each valve's opening threshold, so no setting serves all")
     return first
 
 
@@ -195,14 +179,14 @@ def _common_interval(sides: Iterable[Mapping[str, OffsetCurve]]) -> tuple[float,
     return float(low), float(high)
 
 
-def _side(batch: Mapping[str, Designed], first: Compensator, sign: int) -> _Side:
+def _side(batch: Mapping[str, Compensator], first: Compensator, sign: int) -> _Side:
     """Find the least ceiling of one sign of command: in doubles over all valves, exactly over those near it."""
     label = "positive" if sign > 0 else "negative"
     signals, u_max = first.signals, first.u_max_V
-    reserve = Fraction(first.amplifier.dither_counts, signals.compare_max)
+    reserve = Fraction(first.drive_functions.dither_counts, signals.compare_max)
     models = {name: each.valve.sides[label] for name, each in batch.items()}
     guard = first.side(sign).certificate.guard
-    curves = {name: guarded_curve(model, guard, first.below_reference) for name, model in models.items()}
+    curves = {name: guarded_curve(model, guard, first.below_dp0) for name, model in models.items()}
     low, high = _common_interval([curves])
     least, near = _near_the_least(curves, signals, float(u_max), sign)
     exact = {
@@ -214,7 +198,7 @@ def _side(batch: Mapping[str, Designed], first: Compensator, sign: int) -> _Side
     certified = range(ceil(signals.dp_code(Fraction(repr(low)))), floor(signals.dp_code(Fraction(repr(high)))) + 1)
     ceiling = OffsetCeiling(limit=tuple(map(min, limits)), certified=certified)
     if min(ceiling.limit) <= 0:
-        raise InputError("one of the valves leaves no positive offset for a common setting")
+        raise InputError("one of the valves leaves no positive offset for a lot setting")
     return _Side(sign=sign, models=models, curves=curves, exact=exact, least=ceiling, nearness=least)
 
 
@@ -237,7 +221,7 @@ def _near_the_least(
 def _limit(curve: OffsetCurve, dp_MPa: np.ndarray) -> np.ndarray:
     """Return in doubles what `offset_ceiling` limits the offset to, V: the curve and, where tested, its bound."""
     nodes, offset = (np.array([float(value) for value in values]) for values in (curve.dp_MPa, curve.offset_V))
-    value = np.interp(dp_MPa, nodes, offset)
+    value: np.ndarray = np.interp(dp_MPa, nodes, offset)
     if curve.hold_below_MPa is not None:
         hold = float(curve.hold_below_MPa)
         value = np.where(dp_MPa <= hold + NEAR_MPa, np.minimum(value, np.interp(hold, nodes, offset)), value)
@@ -248,7 +232,7 @@ def _limit(curve: OffsetCurve, dp_MPa: np.ndarray) -> np.ndarray:
     return value
 
 
-def _carriers(batch: Mapping[str, Designed], sides: Sequence[_Side]) -> list[str]:
+def _carriers(batch: Mapping[str, Compensator], sides: Sequence[_Side]) -> list[str]:
     """Return, for each trend that a valve has, the valve of that trend whose own ceilings are nearest to the least."""
     nearest: dict[tuple[str | None, ...], tuple[float, str]] = {}
     for name in batch:
@@ -263,7 +247,7 @@ def _law(side: _Side, carrier: str, first: Compensator) -> SideLaw:
     model, u_max = side.models[carrier], first.u_max_V
     reference = Fraction(repr(model.reference.dp_MPa))
     top = min(curve.at(reference) for curve in side.curves.values())
-    scale = finest_units(first.signals, edge_codes=0).coefficient
+    scale = finest_units(first.signals, transition_codes=0).coefficient
     u_min0 = over(top / u_max - Fraction(1, 2 * first.signals.compare_max), "down", scale)
     if u_min0 <= 0:
         raise InputError("the least offset of all valves is less than one count of the PWM")
@@ -272,14 +256,14 @@ def _law(side: _Side, carrier: str, first: Compensator) -> SideLaw:
         u_min0,
         model.trend,
         denominator=first.beta_denominator,
-        above_one=model.trend == "increasing" or first.below_reference == "extend",
+        above_one=model.trend == "increasing" or first.below_dp0 == "extend",
     )
     # The longest travel: full command fully opens every valve.
     longest = max(travel(each, u_max, top) for each in side.models.values())
     law = SideLaw(
-        k_x_max_over_u_max=over(longest, "nearest", scale),
+        drive_range_over_u_max=over(longest, "nearest", scale),
         u_min0_over_u_max=u_min0,
-        beta_numerators=table,
+        beta=table,
         certificate=first.side(side.sign).certificate,
     )
     return replace(law, certificate=_certified(side, carrier, law, first))
@@ -287,7 +271,7 @@ def _law(side: _Side, carrier: str, first: Compensator) -> SideLaw:
 
 def _certified(side: _Side, name: str, law: SideLaw, first: Compensator) -> Certificate:
     """Prove the common law for one valve, on the whole interval that it was tested over."""
-    reserve = Fraction(first.amplifier.dither_counts, first.signals.compare_max)
+    reserve = Fraction(first.drive_functions.dither_counts, first.signals.compare_max)
     curve = side.curves[name]
     own = side.exact.get(name) or offset_ceiling(curve, first.signals, first.u_max_V, sign=side.sign, reserve=reserve)
     return certify(
@@ -298,6 +282,6 @@ def _certified(side: _Side, name: str, law: SideLaw, first: Compensator) -> Cert
         signals=first.signals,
         u_max_V=first.u_max_V,
         u_min0=law.u_min0_over_u_max,
-        table=law.beta_numerators,
+        table=law.beta,
         denominator=first.beta_denominator,
     )

@@ -3,14 +3,18 @@
 import re
 from collections.abc import Mapping
 from fractions import Fraction
+from typing import cast
 
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.options import flag_of
 from dzdesign.core.units import parse_quantity
+from dzdesign.design.compensator import BelowDp0
 from dzdesign.design.options import DesignOptions
-from dzdesign.design.request import DEFAULTS, NEGATIVE_DP, POLARITIES, DesignRequest, TargetInputs
+from dzdesign.design.request import DEFAULTS, NEGATIVE_DP, POLARITIES, DesignRequest
 from dzdesign.design.signal_text import command_signal, parse_signal, pressure_signal
 from dzdesign.design.signals import Signals
+from dzdesign.design.target_inputs import TargetInputs
+from dzdesign.identify.valve.guard_curve import Guard
 
 
 def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
@@ -51,7 +55,7 @@ def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
     )
     dither_Hz, dither_peak = _dither(text["dither"])
     return DesignOptions(
-        law_name=text["law"],
+        law=text["law"],
         signals=Signals(
             code_max=converter.code_max,
             compare_max=target.compare_max,
@@ -61,9 +65,9 @@ def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
             swapped=text["negative_dp"] == "swapped",
             **sensors,
         ),
-        guard=text["guard"],
-        below_reference=text["below_dp0"],
-        edge=_share(text["transition"], "--transition"),
+        guard=cast(Guard, text["guard"]),
+        below_dp0=cast(BelowDp0, text["below_dp0"]),
+        transition=_share(text["transition"], "--transition"),
         window=_share(text["zero_window"], "--zero-window"),
         ramp_up_s=_seconds(text["ramp_up"], "--ramp-up"),
         ramp_down_s=_seconds(text["ramp_down"], "--ramp-down"),
@@ -71,7 +75,7 @@ def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
         dither_peak=dither_peak,
         output_max=_share(text["output_max"], "--output-max"),
         accept=tuple(text["accept"].replace(",", " ").split()),
-        request=DesignRequest(target=target, options=tuple(text.items())),
+        request=DesignRequest(target=target, options=text),
     )
 
 

@@ -5,14 +5,14 @@ from fractions import Fraction
 from math import ceil, floor
 
 from dzdesign.core.errors import InputError, nearest
-from dzdesign.design.compensator import BELOW_REFERENCE
-from dzdesign.design.drive import RAMP_UNIT, Amplifier
+from dzdesign.design.compensator import BELOW_DP0, BelowDp0
+from dzdesign.design.drive_functions import RAMP_UNIT, DriveFunctions
 from dzdesign.design.request import DesignRequest
 from dzdesign.design.signals import Signals
-from dzdesign.identify.fitting.guard_curve import GUARDS
+from dzdesign.identify.valve.guard_curve import GUARDS, Guard
 
-#: Largest edge, dither and window, of full command or drive.
-LARGEST_EDGE = Fraction(1, 10)
+#: Largest transition, dither and window, of full command or drive.
+LARGEST_TRANSITION = Fraction(1, 10)
 LARGEST_DITHER = Fraction(1, 10)
 LARGEST_WINDOW = Fraction(1, 10)
 #: Frequencies that a proportional valve's dither has, Hz.
@@ -28,16 +28,16 @@ class DesignOptions:
 
     Attributes
     ----------
-    law_name : str
+    law : str
         ``paper`` (Eq. 18) or ``target`` (meets Eq. 16).
     signals : Signals
         Scalings of the converter and the PWM.
     guard : {"closing", "mean", "opening"}
         The threshold that the certificate must protect. Zero command comes after closing, so a valve of which no
         falling branch was recorded is refused unless "opening" is asked for.
-    below_reference : {"hold", "extend"}
+    below_dp0 : {"hold", "extend"}
         For dP <= dP0 hold beta = 1 (the paper, Eq. 7), or follow the tests there, beta above 1.
-    edge : Fraction
+    transition : Fraction
         Share of full command over which the drive runs from the closing to the opening threshold; 0: none.
     window : Fraction
         Of a command of both signs: share of full command that it must pass zero by before the other side is driven.
@@ -53,11 +53,11 @@ class DesignOptions:
         The target and the texts that these were read from, to be kept in compensator.json.
     """
 
-    law_name: str = "paper"
+    law: str = "paper"
     signals: Signals = field(default_factory=Signals)
-    guard: str = "closing"
-    below_reference: str = "hold"
-    edge: Fraction = Fraction(0)
+    guard: Guard = "closing"
+    below_dp0: BelowDp0 = "hold"
+    transition: Fraction = Fraction(0)
     window: Fraction = Fraction(1, 100)
     ramp_up_s: tuple[float, float] = (0.0, 0.0)
     ramp_down_s: tuple[float, float] = (0.0, 0.0)
@@ -70,7 +70,7 @@ class DesignOptions:
     def __post_init__(self) -> None:
         for what, given, known in (
             ("guard", self.guard, GUARDS),
-            ("choice below dP0", self.below_reference, BELOW_REFERENCE),
+            ("choice below dP0", self.below_dp0, BELOW_DP0),
         ):
             if given not in known:
                 raise InputError(
@@ -83,7 +83,7 @@ class DesignOptions:
                     f"{' or '.join(ACCEPTABLE)}: no other one stops a design"
                 )
         for what, share, limit in (
-            ("edge", self.edge, LARGEST_EDGE),
+            ("transition", self.transition, LARGEST_TRANSITION),
             ("dither", self.dither_peak, LARGEST_DITHER),
             ("zero window", self.window, LARGEST_WINDOW),
         ):
@@ -104,24 +104,25 @@ class DesignOptions:
                     f"{1 / self.signals.sample_Hz:g} s, to {LONGEST_RAMP_S:g} s"
                 )
 
-    def edge_codes(self) -> int:
-        """Return the codes of the edge: the largest power of two within its share of the shorter command."""
-        if not self.edge:
+    def transition_codes(self) -> int:
+        """Return the codes of the transition: the largest power of two within its share of the shorter command."""
+        if not self.transition:
             return 0
         span = min(self.signals.command.span(sign) for sign in self.signals.signs)
-        codes = int(self.edge * span)
+        codes = int(self.transition * span)
         if codes < 1:
             raise InputError(
-                f"an edge of {float(self.edge):.3%} is less than one code of the command, 1/{span}; give more"
+                f"a transition of {float(self.transition):.3%} is less than one code of the command, 1/{span}; "
+                "give more"
             )
         return 1 << (codes.bit_length() - 1)
 
-    def amplifier(self) -> Amplifier:
-        """Return the amplifier's options in the firmware's integers."""
+    def drive_functions(self) -> DriveFunctions:
+        """Return what the drive does around the law, in the firmware's integers."""
         signals, command = self.signals, self.signals.command
         spans = tuple(command.span(sign) if sign in signals.signs else 0 for sign in (1, -1))
         both = len(signals.signs) == 2
-        return Amplifier(
+        return DriveFunctions(
             window_codes=round(self.window * min(spans)) if both else 0,
             ramp_up=self._ramp(self.ramp_up_s, spans),
             ramp_down=self._ramp(self.ramp_down_s, spans),
@@ -154,7 +155,8 @@ class DesignOptions:
 
     def _ramp(self, seconds: tuple[float, float], spans: tuple[int, ...]) -> tuple[int, int]:
         """Return the steps a sample; at least one unit, so that a ramp never stands still."""
-        return tuple(
+        positive, negative = (
             max(1, round(RAMP_UNIT * span / (time * self.signals.sample_Hz))) if time and span else 0
             for time, span in zip(seconds, spans, strict=True)
         )
+        return positive, negative

@@ -23,7 +23,7 @@ class Units:
     coefficient: int
 
 
-def finest_units(signals: Signals, edge_codes: int) -> Units:
+def finest_units(signals: Signals, transition_codes: int) -> Units:
     """Return the finest units with which the law in counts fits the firmware's arithmetic.
 
     In counts the law is ``B (p c + o) / (D S K C E) * M``; what the PWM's range M has in common with the denominator
@@ -33,55 +33,55 @@ def finest_units(signals: Signals, edge_codes: int) -> Units:
     ----------
     signals : Signals
         Scalings: C codes of command, M counts of the PWM.
-    edge_codes : int
-        E, codes of the edge; 0 without one.
+    transition_codes : int
+        E, codes of the transition; 0 without one.
 
     Raises
     ------
     InputError
         If even the coarsest do not fit.
     """
-    units = _finest_that_fit(signals, edge_codes)
+    units = _finest_that_fit(signals, transition_codes)
     if units is not None:
         return units
     spans = " and ".join(str(signals.command.span(sign)) for sign in signals.signs)
     what = f"a full command of {spans} codes over {signals.compare_max} counts"
-    shorter = edge_codes
+    shorter = transition_codes
     while shorter and _finest_that_fit(signals, shorter) is None:
         shorter //= 2
     if shorter:
         share = shorter / min(signals.command.span(sign) for sign in signals.signs)
         raise InputError(
-            f"an edge of {edge_codes} codes of command, with {what}, needs more than 64-bit arithmetic; choose one of "
-            f"{100 * share + 0.01:.2f} % ({shorter} codes) at most"
+            f"a transition of {transition_codes} codes of command, with {what}, needs more than 64-bit arithmetic; "
+            f"choose one of {100 * share + 0.01:.2f} % ({shorter} codes) at most"
         )
     raise InputError(
         f"{what} needs more than 64-bit arithmetic; choose an attenuator whose full command has more factors in common "
-        "with the counts" + (", or leave out the edge" if edge_codes else "")
+        "with the counts" + (", or leave out the transition" if transition_codes else "")
     )
 
 
-def _finest_that_fit(signals: Signals, edge_codes: int) -> Units | None:
+def _finest_that_fit(signals: Signals, transition_codes: int) -> Units | None:
     spans = [signals.command.span(sign) for sign in signals.signs]
     finest, coarsest = sum((BETA_BITS[0], COEFFICIENT_BITS[0])), sum((BETA_BITS[1], COEFFICIENT_BITS[1]))
     for total in range(finest, coarsest - 1, -1):
         for coefficient in range(COEFFICIENT_BITS[0], COEFFICIENT_BITS[1] - 1, -1):
             beta = total - coefficient
             if BETA_BITS[1] <= beta <= BETA_BITS[0] and all(
-                _fits(span, signals.compare_max, edge_codes, beta, coefficient) for span in spans
+                _fits(span, signals.compare_max, transition_codes, beta, coefficient) for span in spans
             ):
                 return Units(beta=1 << beta, coefficient=1 << coefficient)
     return None
 
 
-def _fits(span: int, compare_max: int, edge_codes: int, beta_bits: int, coefficient_bits: int) -> bool:
+def _fits(span: int, compare_max: int, transition_codes: int, beta_bits: int, coefficient_bits: int) -> bool:
     """Tell whether table and factor fit with some divisor of what remains of the PWM's range moved to the table."""
-    edge = max(edge_codes, 1)
+    transition = max(transition_codes, 1)
     powers = STEP_CODES << (beta_bits + coefficient_bits)
-    shared = gcd(compare_max, powers * span * edge)
+    shared = gcd(compare_max, powers * span * transition)
     remains = compare_max // shared
     table = STEP_CODES << (beta_bits + 1)
-    factor = span * edge << coefficient_bits
+    factor = span * transition << coefficient_bits
     return any(
         table * moved < FACTOR_LIMIT and factor * (remains // moved) < FACTOR_LIMIT
         for moved in range(1, remains + 1)

@@ -3,11 +3,11 @@
 import re
 from dataclasses import dataclass
 from fractions import Fraction
-from math import floor
 
 from dzdesign.core.errors import InputError, quoted
 from dzdesign.core.units import parse_quantity, si_factor
 from dzdesign.design.signals import CommandSignal, PressureSignal
+from dzdesign.design.target_inputs import Converter
 
 #: A sound signal may pass its ends by as much as the field's 3.6 mA and 21 mA pass those of 4-20 mA.
 BELOW_LIVE_ZERO = Fraction(9, 10)
@@ -23,36 +23,6 @@ SIGNAL = re.compile(
 #: Beyond this it is none, and matching it would take the square of its length.
 LONGEST = 120
 EXAMPLE = "'0..10 V x 0.3', '-10..10 V x 0.15 + 1.5 V' or '4..20 mA on 150 ohm = 25 MPa'"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Converter:
-    """An analogue-digital converter: code = floor(levels V / full_V), limited to levels - 1.
-
-    Attributes
-    ----------
-    full_V : Fraction
-        Voltage at the pin that would be code `levels`.
-    levels : int
-        Number of codes.
-    """
-
-    full_V: Fraction = Fraction(3)
-    levels: int = 4096
-
-    @property
-    def code_max(self) -> int:
-        """Largest code."""
-        return self.levels - 1
-
-    def code(self, volts: Fraction) -> int:
-        """Return the code of a voltage at the pin."""
-        return min(max(floor(self.levels * volts / self.full_V), 0), self.code_max)
-
-    def ends(self, code: int) -> tuple[Fraction, Fraction]:
-        """Return the least voltage of a code, and the one that it stays below."""
-        step = self.full_V / self.levels
-        return code * step, (code + 1) * step
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -3,46 +3,52 @@
 from dataclasses import dataclass, field
 from fractions import Fraction
 from math import ceil, floor
+from typing import Annotated
 
+from msgspec import Meta
+
+from dzdesign.core.artefact_types import RuleError, quantity
 from dzdesign.core.errors import InputError
 from dzdesign.derivation.scaling import pressure_drop, pressure_drop_code
+from dzdesign.design.target_inputs import Count
 
 CODE_LIMIT = 65535
 #: Sensors of unlike scaling are brought to sensor A's counts by an integer weight over this power of two.
 WEIGHT_SHIFT = 12
+WEIGHT_UNIT = 1 << WEIGHT_SHIFT
 #: Differences of pressure codes fit 16 bits of the firmware, sign apart.
 LARGEST_DIFFERENCE = 32767
+
+Code = Annotated[int, Meta(ge=0, le=CODE_LIMIT)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommandSignal:
-    """Converter codes of the command (Eq. (29) with its 0-3 V taken as the attenuated 0-10 V).
+    """Converter codes of the command (Eq. (29) with its 0-3 V taken as the attenuated 0-10 V)."""
 
-    Attributes
-    ----------
-    zero_code, full_code : int
-        Codes of zero and of full positive command; the full one is the lower where the signal is reversed.
-    negative_full_code : int or None
-        Code of full negative command, on the other side of zero; None for a command of one sign.
-    valid_codes : tuple of int
-        First and last code of a valid signal: outside them the valve is de-energised.
-    """
-
-    zero_code: int = 0
-    full_code: int = 4095
-    negative_full_code: int | None = None
-    valid_codes: tuple[int, int] = (0, 4095)
+    zero_code: Annotated[Code, Meta(description="Code of zero command.")] = 0
+    full_code: Annotated[
+        Code, Meta(description="Code of full positive command; below that of zero where the signal is reversed.")
+    ] = 4095
+    negative_full_code: Annotated[
+        Code | None,
+        Meta(description="Code of full negative command, on the other side of zero; null: a command of one sign."),
+    ] = None
+    valid_codes: Annotated[
+        tuple[Code, Code],
+        Meta(description="First and last code of a valid signal: outside them the valve is de-energised."),
+    ] = (0, 4095)
 
     def __post_init__(self) -> None:
         if self.full_code == self.zero_code:
-            raise InputError(f"zero and full command have the same code, {self.zero_code}")
+            raise RuleError(f"zero and full command have the same code, {self.zero_code}")
         low, high = self.valid_codes
         for name in ("zero_code", "full_code", "negative_full_code"):
             code = getattr(self, name)
             if code is not None and not low <= code <= high:
-                raise InputError(f"the command's {name} is {code}, outside the valid codes {low} to {high}")
+                raise RuleError(f"the command's {name} is {code}, outside the valid codes {low} to {high}")
         if self.negative_full_code is not None and self.direction(-1) != -self.direction(1):
-            raise InputError(
+            raise RuleError(
                 f"full negative command has code {self.negative_full_code}, expected the other side of zero "
                 f"({self.zero_code}) than full positive command ({self.full_code})"
             )
@@ -69,37 +75,35 @@ class CommandSignal:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PressureSignal:
-    """Converter codes of one pressure sensor.
+    """Converter codes of one pressure sensor."""
 
-    Attributes
-    ----------
-    span_MPa : Fraction
-        Pressure at `full_code`; `zero_code` is no pressure.
-    zero_code, full_code : int
-        Codes of the ends of the span.
-    valid_codes : tuple of int
-        First and last code of a valid signal: outside them the smallest beta is used.
-    error_MPa : tuple of Fraction
-        Least and largest distance from the pressure that a code is taken for to one that may have made it.
-    """
-
-    span_MPa: Fraction = Fraction(20)
-    zero_code: int = 0
-    full_code: int = 4095
-    valid_codes: tuple[int, int] = (0, 4095)
-    error_MPa: tuple[Fraction, Fraction] = (-Fraction(20, 4096), Fraction(20, 4096))
+    span_MPa: Annotated[
+        Fraction, quantity("MPa", "Pressure at the code of full pressure; that of zero is no pressure.")
+    ] = field(default_factory=lambda: Fraction(20))
+    zero_code: Annotated[Code, Meta(description="Code of no pressure.")] = 0
+    full_code: Annotated[Code, Meta(description="Code of full pressure.")] = 4095
+    valid_codes: Annotated[
+        tuple[Code, Code],
+        Meta(description="First and last code of a valid signal: outside them the smallest beta is used."),
+    ] = (0, 4095)
+    error_MPa: Annotated[
+        tuple[Fraction, Fraction],
+        quantity(
+            "MPa", "Least and largest distance from the pressure that a code is taken for to one that may have made it."
+        ),
+    ] = field(default_factory=lambda: (-Fraction(20, 4096), Fraction(20, 4096)))
 
     def __post_init__(self) -> None:
         if self.span_MPa <= 0:
-            raise InputError(f"the sensor's span is {float(self.span_MPa):g} MPa, expected more than zero")
+            raise RuleError(f"the sensor's span is {float(self.span_MPa):g} MPa, expected more than zero")
         low, high = self.valid_codes
         if not low <= self.zero_code < self.full_code <= high:
-            raise InputError(
+            raise RuleError(
                 f"a pressure sensor has codes {self.zero_code} to {self.full_code}, expected them to rise inside the "
                 f"valid codes {low} to {high}"
             )
         if not self.error_MPa[0] <= 0 <= self.error_MPa[1]:
-            raise InputError("the error of a pressure's code must span zero")
+            raise RuleError("the error of a pressure's code must span zero")
 
     @property
     def per_code_MPa(self) -> Fraction:
@@ -109,52 +113,42 @@ class PressureSignal:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Signals:
-    """Exact scalings of a compensator's inputs and output.
+    """Exact scalings of a compensator's inputs and output."""
 
-    Attributes
-    ----------
-    code_max : int
-        Largest code of the converter.
-    compare_max : int
-        PWM compare value of full drive, u_O = u_max.
-    command : CommandSignal
-        The command.
-    pressure_a, pressure_b : PressureSignal
-        Pressures ahead of the metering edge and behind it, for positive command.
-    swapped : bool
-        True if the pressure drop of negative commands is the other way round, B less A.
-    sample_Hz, tick_Hz : int
-        Samples and PWM periods in a second.
-    """
-
-    code_max: int = 4095
-    compare_max: int = 60000
-    command: CommandSignal = field(default_factory=CommandSignal)
-    pressure_a: PressureSignal = field(default_factory=PressureSignal)
-    pressure_b: PressureSignal = field(default_factory=PressureSignal)
-    swapped: bool = False
-    sample_Hz: int = 1250
-    tick_Hz: int = 2500
+    code_max: Annotated[Count, Meta(description="Largest code of the converter.")] = 4095
+    compare_max: Annotated[Count, Meta(description="PWM compare value of full drive, u_O = u_max.")] = 60000
+    sample_Hz: Annotated[Count, quantity("Hz", "Samples a second.")] = 1250
+    tick_Hz: Annotated[Count, quantity("Hz", "PWM periods a second.")] = 2500
+    command: Annotated[CommandSignal, Meta(description="The command.")] = field(default_factory=CommandSignal)
+    pressure_a: Annotated[
+        PressureSignal, Meta(description="Sensor ahead of the metering edge, for positive command.")
+    ] = field(default_factory=PressureSignal)
+    pressure_b: Annotated[
+        PressureSignal, Meta(description="Sensor behind the metering edge, for positive command.")
+    ] = field(default_factory=PressureSignal)
+    swapped: Annotated[
+        bool, Meta(description="Whether the pressure drop of negative commands is the other way round, B less A.")
+    ] = False
 
     def __post_init__(self) -> None:
         for name in ("code_max", "compare_max", "sample_Hz", "tick_Hz"):
             if not 1 <= getattr(self, name) <= CODE_LIMIT:
-                raise InputError(f"{name} is {getattr(self, name)}, expected 1 to {CODE_LIMIT} (16 bits)")
+                raise RuleError(f"{name} is {getattr(self, name)}, expected 1 to {CODE_LIMIT} (16 bits)")
         if self.tick_Hz % self.sample_Hz:
-            raise InputError(
+            raise RuleError(
                 f"tick_Hz is {self.tick_Hz} and sample_Hz {self.sample_Hz}, "
                 "expected a whole number of PWM periods a sample"
             )
         for name in ("command", "pressure_a", "pressure_b"):
             low, high = getattr(self, name).valid_codes
             if not 0 <= low < high <= self.code_max:
-                raise InputError(
+                raise RuleError(
                     f"{name}: valid codes {low} to {high} are outside the converter's 0 to {self.code_max}"
                 )
         # Either way round: a failed sensor makes any difference of sound codes.
         a, b = self.pressure_a.valid_codes, self.pressure_b.valid_codes
         if max(self.difference(a[1], b[0]), -self.difference(a[0], b[1])) > LARGEST_DIFFERENCE:
-            raise InputError(
+            raise RuleError(
                 f"the sensors' spans of {float(self.pressure_a.span_MPa):g} and {float(self.pressure_b.span_MPa):g} "
                 "MPa are too unlike; choose sensors within a factor of seven"
             )
@@ -167,18 +161,18 @@ class Signals:
     @property
     def weight_b(self) -> int:
         """Weight of sensor B's codes over 2^`WEIGHT_SHIFT`, in codes of sensor A; exactly one for like sensors."""
-        return max(1, round(self.pressure_b.per_code_MPa / self.pressure_a.per_code_MPa * 2**WEIGHT_SHIFT))
+        return max(1, round(self.pressure_b.per_code_MPa / self.pressure_a.per_code_MPa * WEIGHT_UNIT))
 
     @property
     def like_sensors(self) -> bool:
         """True if both sensors count alike, so that the firmware needs no weight."""
-        return self.weight_b == 2**WEIGHT_SHIFT
+        return self.weight_b == WEIGHT_UNIT
 
     def difference(self, p_a_code: int, p_b_code: int, sign: int = 1) -> int:
         """Return the difference of two pressure codes, in codes of sensor A, as the firmware counts it."""
         a, b = p_a_code - self.pressure_a.zero_code, p_b_code - self.pressure_b.zero_code
         turn = -1 if sign < 0 and self.swapped else 1
-        return turn * (a * 2**WEIGHT_SHIFT - b * self.weight_b) >> WEIGHT_SHIFT
+        return turn * (a * WEIGHT_UNIT - b * self.weight_b) >> WEIGHT_SHIFT
 
     def largest_difference(self, sign: int) -> int:
         """Return the largest difference that sound codes make."""
@@ -191,7 +185,7 @@ class Signals:
         a, b = self.pressure_a, self.pressure_b
         low, high = a.error_MPa[0] - b.error_MPa[1], a.error_MPa[1] - b.error_MPa[0]
         # What the weight is off, at the sensor's largest code, and the shift that rounds down.
-        unlike = abs(b.per_code_MPa - a.per_code_MPa * self.weight_b / 2**WEIGHT_SHIFT) * self.code_max
+        unlike = abs(b.per_code_MPa - a.per_code_MPa * self.weight_b / WEIGHT_UNIT) * self.code_max
         if sign < 0 and self.swapped:
             low, high = -high, -low
         shift = 0 if self.like_sensors else a.per_code_MPa
@@ -199,11 +193,13 @@ class Signals:
 
     def dp_MPa(self, dp_code: int) -> Fraction:
         """Return the pressure drop that a difference of pressure codes stands for, exactly."""
-        return pressure_drop(dp_code, span=self.pressure_a.span_MPa, code_max=self._span_codes)
+        dp_MPa: Fraction = pressure_drop(dp_code, span=self.pressure_a.span_MPa, code_max=self._span_codes)
+        return dp_MPa
 
     def dp_code(self, dp_MPa: Fraction) -> Fraction:
         """Return the difference of pressure codes that a pressure drop makes, exactly (not rounded)."""
-        return pressure_drop_code(dp_MPa, span=self.pressure_a.span_MPa, code_max=self._span_codes)
+        code: Fraction = pressure_drop_code(dp_MPa, span=self.pressure_a.span_MPa, code_max=self._span_codes)
+        return code
 
     @property
     def _span_codes(self) -> int:

@@ -14,17 +14,7 @@ NAMED = 5
 
 
 def anomalies_of(found: Sequence[ValveFolder], folder: Path, valves: Sequence[Valve]) -> list[str]:
-    """Return sentences.
-
-    Parameters
-    ----------
-    found : sequence of ValveFolder
-        The lot as read back.
-    folder : Path
-        Of the lot.
-    valves : sequence of Valve
-        The lot as it was given, with the patterns of the recordings.
-    """
+    """Return sentences on a lot as read back from its folder, and as it was given, with patterns of recordings."""
     overlapping = _overlapping(valves)
     names = {each.name for each in found}
     return [*overlapping.values(), *_shared_recordings(found, overlapping), *_left_over(names, folder)]
@@ -59,7 +49,7 @@ def _shared_recordings(found: Sequence[ValveFolder], known: Collection[tuple[str
     """A bench that saves a recording under the wrong name gives a valve the firmware of another."""
     owners: dict[str, list[str]] = {}
     for each in found:
-        for source in each.manifest.made_from if each.designed else ():
+        for source in each.manifest.made_from if each.compensator else ():
             owners.setdefault(source.sha256, []).append(each.name)
     groups = dict.fromkeys(tuple(dict.fromkeys(names)) for names in owners.values())
     return [

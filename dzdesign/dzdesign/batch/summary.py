@@ -3,9 +3,10 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of, to_json
+from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile
 from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.design.compensator import Compensator
 from dzdesign.report.lot.spread import quantiles, spreads_of
 from dzdesign.report.lot.summary import (
     FailedValve,
@@ -20,31 +21,31 @@ from dzdesign.report.lot.table_rows import SIGNS, extra_dead_zone
 from dzdesign.report.lot.valve_folder import VALVES, ValveFolder
 
 if TYPE_CHECKING:
-    from dzdesign.design.lot_setting import CommonSetting, Designed
+    from dzdesign.design.lot_setting import LotSetting
 
 SETTING_NAME = "lot_compensator.json"
 
 
-def lot_setting_of(designed: "Mapping[str, Designed]") -> "tuple[CommonSetting | None, str | None]":
+def lot_setting_of(designed: "Mapping[str, Compensator]") -> "tuple[LotSetting | None, str | None]":
     """Return the lot setting of the calibrated valves, by name; or why there is none."""
-    from dzdesign.design.lot_setting import common_setting
+    from dzdesign.design.lot_setting import lot_setting
 
     try:
-        return common_setting(designed), None
+        return lot_setting(designed), None
     except (InputError, RequirementError) as error:
         return None, str(error)
 
 
-def designed_valves(valves: Sequence[ValveFolder]) -> "dict[str, Designed]":
+def designed_valves(valves: Sequence[ValveFolder]) -> "dict[str, Compensator]":
     """Return the calibrated valves with their compensators, by name."""
-    return {each.name: each.designed for each in valves if each.designed is not None}
+    return {each.name: each.compensator for each in valves if each.compensator is not None}
 
 
-def setting_files(setting: "CommonSetting") -> dict[str, bytes]:
+def setting_files(setting: "LotSetting") -> dict[str, bytes]:
     """Return the file of the lot setting."""
-    from dzdesign.design.compensator_file import compensator_document
+    from dzdesign.core.artefact_types import to_json_bytes
 
-    return {SETTING_NAME: to_json(compensator_document(setting.compensator)).encode()}
+    return {SETTING_NAME: to_json_bytes(setting.compensator)}
 
 
 def summary_of(
@@ -59,21 +60,8 @@ def summary_of(
 ) -> LotSummary:
     """Return what batch.json says of a finished lot.
 
-    Parameters
-    ----------
-    rows : sequence of TableRow
-    files : mapping of str to bytes
-        Of the table, by name.
-    verified : bool
-        Whether each valve's firmware was verified too.
-    setting : LotSettingSummary, optional
-        Of the calibrated valves.
-    why_no_setting : str, optional
-        The reason where there is none.
-    made_from : mapping of str to bytes
-        Manifest of each valve's folder, by name of the valve.
-    anomalies : sequence of str
-        What is odd in the lot.
+    `files` of the table and `made_from`, the manifest of each valve's folder by the valve's name, are contents; of lot
+    setting and reason why there is none exactly one is given.
     """
     warnings: dict[str, list[str]] = {}
     for row in rows:
@@ -99,15 +87,8 @@ def summary_of(
     )
 
 
-def setting_summary(setting: "CommonSetting", designed: "Mapping[str, Designed]") -> LotSettingSummary:
-    """Return what batch.json says of the lot setting.
-
-    Parameters
-    ----------
-    setting : CommonSetting
-    designed : mapping of str to Designed
-        The calibrated valves that it is of.
-    """
+def setting_summary(setting: "LotSetting", designed: "Mapping[str, Compensator]") -> LotSettingSummary:
+    """Return what batch.json says of the lot setting of these calibrated valves."""
     from dzdesign.design.lot_pressures import lacking_in, without_narrow
 
     lot = setting.compensator.lot
@@ -116,7 +97,7 @@ def setting_summary(setting: "CommonSetting", designed: "Mapping[str, Designed]"
     untested = []
     for each in lacking:
         coarser = each.coarser_V if each.name in setting.binding else 0.0
-        full = float(setting.compensator.side(each.sign).k_x_max_over_u_max * setting.compensator.u_max_V)
+        full = float(setting.compensator.side(each.sign).drive_range_over_u_max * setting.compensator.u_max_V)
         untested.append(
             UntestedPressures(
                 name=each.name,
@@ -149,7 +130,7 @@ def setting_summary(setting: "CommonSetting", designed: "Mapping[str, Designed]"
     )
 
 
-def _without_binding(setting: "CommonSetting", designed: "Mapping[str, Designed]") -> SettingOfOthers | None:
+def _without_binding(setting: "LotSetting", designed: "Mapping[str, Compensator]") -> SettingOfOthers | None:
     """Return what a lot setting costs if the valves that hold it down keep settings of their own.
 
     That setting is designed and proved like the other one. Leaving out other valves would change nothing: what holds

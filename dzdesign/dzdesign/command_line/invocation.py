@@ -94,13 +94,7 @@ def _meant_values(path: str, declared: tuple[Argument, ...]) -> dict[str, Value]
     """Return the options of a file that are for a command; the file may have those of every command."""
     every = [argument for name in COMMANDS for argument in arguments_of_command(name)]
     named = [argument for argument in every if not argument.is_positional and bool not in argument.kinds]
-    values = options_from_file(
-        path,
-        known={argument.name for argument in named},
-        repeatable={argument.name for argument in named if argument.is_repeatable},
-        tables={argument.name for argument in named if argument.is_table},
-        by_entry={argument.name for argument in named if argument.option.by_entry},
-    )
+    values = options_from_file(path, named)
     own = {argument.name: argument for argument in declared if argument in named}
     return {key: value for key, value in values.items() if key in own and _is_meant(value, own[key])}
 

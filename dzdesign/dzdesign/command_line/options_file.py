@@ -3,11 +3,12 @@
 import datetime
 import re
 import tomllib
-from collections.abc import Collection, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from dzdesign.core.artefact_files import read_bytes
 from dzdesign.core.errors import InputError, nearest, quoted
+from dzdesign.core.options import Argument
 
 #: Characters of a key to which the nearest known one is looked for.
 LONGEST_KEY = 80
@@ -29,27 +30,15 @@ class _AsWritten(float):
         return self.text
 
 
-def options_from_file(
-    path: str,
-    known: Collection[str],
-    repeatable: Collection[str],
-    tables: Collection[str] = (),
-    by_entry: Collection[str] = (),
-) -> dict[str, Value]:
+def options_from_file(path: str, declared: Iterable[Argument]) -> dict[str, Value]:
     """Read options; a key may be written ``meter-floor`` or ``meter_floor``, values as on the command line.
 
     Parameters
     ----------
     path : str
         TOML file.
-    known : collection of str
+    declared : iterable of Argument
         Options of all commands, so that one file serves every command.
-    repeatable : collection of str
-        Those of them that may be a list.
-    tables : collection of str
-        Those of them that may be a table of texts.
-    by_entry : collection of str
-        Those of them whose texts are for people: dates may stand there, and the table may be empty.
 
     Raises
     ------
@@ -61,6 +50,9 @@ def options_from_file(
         document = tomllib.loads(content.decode("utf-8-sig"), parse_float=_AsWritten)
     except (ValueError, RecursionError) as error:
         raise InputError(f"'{path}' is not TOML: {error}; expected lines such as u-max = \"10 V\"") from error
+    known: dict[str, list[Argument]] = {}
+    for argument in declared:
+        known.setdefault(argument.name, []).append(argument)
     options: dict[str, Value] = {}
     for key, value in document.items():
         name = key.replace("-", "_")
@@ -69,18 +61,19 @@ def options_from_file(
             raise InputError(f"'{path}': there is no option {quoted(key)}{hint}; see `dzdesign COMMAND --help`")
         if name in options:
             raise InputError(f"'{path}': option '{key}' is given twice, with - and with _; keep one")
-        if name in by_entry and value == {}:
-            continue
-        options[name] = _texts(path, key, value, name in repeatable, name in tables, name in by_entry)
+        free = any(argument.option.by_entry for argument in known[name])  # text for people: dates may stand there
+        if not (free and value == {}):
+            options[name] = _texts(path, key, value, known[name], free)
     return options
 
 
-def _texts(path: str, key: str, value: object, repeatable: bool, table: bool, free: bool) -> Value:
+def _texts(path: str, key: str, value: object, declared: list[Argument], free: bool) -> Value:
     """Return a value as text, or as the list or table of texts that it may be."""
-    if repeatable and isinstance(value, list):
+    items: list[object] = [value]
+    if isinstance(value, list) and any(argument.is_repeatable for argument in declared):
         items = value
-    else:
-        items = list(value.values()) if table and isinstance(value, dict) else [value]
+    elif isinstance(value, dict) and any(argument.is_table for argument in declared):
+        items = list(value.values())
     if not items or not all(_is_text(item, free) for item in items):
         raise InputError(f"'{path}': option '{key}' is {quoted(value)}, expected text such as \"1 MPa\" or a number")
     if isinstance(value, dict):

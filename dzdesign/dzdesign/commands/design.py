@@ -1,6 +1,5 @@
 """`dzdesign design VALVE.json`."""
 
-from dzdesign.core.artefact_files import to_json
 from dzdesign.core.errors import one_line
 from dzdesign.stages.design import DesignArguments, design
 
@@ -12,9 +11,9 @@ def run(arguments: Arguments, json: bool) -> int:
     """Design a compensator and print its law, certificate and costs."""
     compensator = design(arguments)
     if json:
-        from dzdesign.design.compensator_file import compensator_document
+        from dzdesign.core.artefact_types import to_json_bytes
 
-        print(to_json(compensator_document(compensator)), end="")
+        print(to_json_bytes(compensator).decode(), end="")
         return 0
     from dzdesign.terminal.tables import print_compensator
 

@@ -18,7 +18,7 @@ from dzdesign.core.options import Option, Text
 SCHEMAS: Mapping[str, tuple[str, str, str]] = MappingProxyType(
     {
         "valve": ("dzdesign.identify.valve.model:ValveModel", "valve.json", "identify"),
-        "compensator": ("dzdesign.design", "compensator.json", "design"),
+        "compensator": ("dzdesign.design.compensator:Compensator", "compensator.json", "design"),
         "firmware": ("dzdesign.design.firmware_manifest:FirmwareManifest", "manifest.json of a firmware", "codegen"),
         "evidence": ("dzdesign.verify.evidence:Evidence", "verification.json", "verify"),
         "assessment": ("dzdesign.assess.assessment:Assessment", "assessment.json", "assess"),
@@ -82,9 +82,8 @@ EXAMPLES = ("dzdesign schema", "dzdesign schema valve > valve.schema.json")
 class Arguments:
     """Arguments of `schema`."""
 
-    name: Annotated[
-        Text, Option("valve, compensator, firmware, ... (default: list them).", "NAME", choices=tuple(SCHEMAS))
-    ] = None
+    name: Annotated[Text, Option("NAME", choices=tuple(SCHEMAS))] = None
+    """valve, compensator, firmware, ... (default: list them)."""
 
 
 def run(arguments: Arguments, json: bool) -> int:

@@ -6,10 +6,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dzdesign.codegen.project import generate
-from dzdesign.core.artefact_files import sha256_of, to_json, write_folder
+from dzdesign.core.artefact_files import sha256_of, write_folder
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.derivation.account.published import DP0_MPA, RAMP_S, RECORDS_HZ, U_MAX_V
-from dzdesign.design.compensator_file import compensator_document
 from dzdesign.design.designing import design
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
@@ -55,7 +54,7 @@ def run_chain(valve: RecoveredValve, say: Callable[[str], None] = lambda _: None
         identified = identify(_read_all(ramps, Path(scratch)), identify_options(valve))
         valve_json = to_json_bytes(identified)
         compensator = design(identified, valve_bytes=valve_json)
-        compensator_json = to_json(compensator_document(compensator))
+        compensator_json = to_json_bytes(compensator).decode()
         firmware = generate(compensator, "host", compensator_json.encode())
         write_folder(Path(scratch) / "firmware", firmware.files, firmware.manifest)
         say(f"{name}: closed loop")

@@ -11,15 +11,10 @@ if TYPE_CHECKING:
 def batch(arguments: BatchArguments) -> "LotSummary":
     """Calibrate many valves; an earlier run in the folder is continued.
 
-    Parameters
-    ----------
-    arguments : BatchArguments
-        Of the stage.
-
     Returns
     -------
     LotSummary
-        Content of batch.json: counts, reasons, quantiles, the common setting.
+        Content of batch.json: counts, reasons, quantiles, the lot setting.
 
     Raises
     ------

@@ -5,7 +5,7 @@ from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from dzdesign.core.artefact_files import check_file_may_be_written, read_bytes, to_json, write_file
+from dzdesign.core.artefact_files import check_file_may_be_written, read_bytes, write_file
 from dzdesign.core.errors import InputError
 from dzdesign.core.options import AnyPath, Option, flag_of
 from dzdesign.design.request import DEFAULTS, DesignChoices
@@ -20,21 +20,18 @@ TARGETS = "dzdesign.codegen.project:TARGET_NAMES"
 #: Options that only a command of both signs has a use for.
 OF_BOTH_SIGNS = ("negative_dp", "zero_window")
 
-# fmt: off
-
 
 @dataclass(frozen=True)
 class DesignArguments(DesignChoices):
     """Arguments of `design`."""
 
-    valve: Annotated["ValveModel | AnyPath", Option("valve.json, made by `dzdesign identify`.", "VALVE.json")]
+    valve: Annotated["ValveModel | AnyPath", Option("VALVE.json")]
+    """valve.json, made by `dzdesign identify`."""
     _: KW_ONLY
-    output: Annotated[AnyPath | None, Option(
-        "File to write.", "FILE", command_default="compensator.json", short="-o")] = None
-    target: Annotated[str, Option(
-        "Microcontroller whose converter and timer the law is for; `codegen --list-targets` lists them.",
-        "NAME", choices=TARGETS)] = "f28335"
-# fmt: on
+    output: Annotated[AnyPath | None, Option("FILE", command_default="compensator.json", short="-o")] = None
+    """File to write."""
+    target: Annotated[str, Option("NAME", choices=TARGETS)] = "f28335"
+    """Microcontroller whose converter and timer the law is for; `codegen --list-targets` lists them."""
 
 
 def design_options(choices: DesignChoices, target: str) -> "DesignOptions":
@@ -65,7 +62,7 @@ def design_options(choices: DesignChoices, target: str) -> "DesignOptions":
         if "/" in (getattr(choices, name) or "")
     ]
     if useless:
-        command = dict(options.request.options)["command_signal"] if options.request else ""
+        command = options.request.options["command_signal"] if options.request else ""
         raise InputError(
             f"{useless[0]} is for a command of both signs, but {command!r} has one; leave it out, or give "
             "a --command-signal such as '-10..10 V x 0.15 + 1.5 V'"
@@ -76,11 +73,6 @@ def design_options(choices: DesignChoices, target: str) -> "DesignOptions":
 def design(arguments: DesignArguments) -> "Compensator":
     """Design the compensator of a valve, certified.
 
-    Parameters
-    ----------
-    arguments : DesignArguments
-        Of the stage.
-
     Raises
     ------
     InputError
@@ -89,7 +81,8 @@ def design(arguments: DesignArguments) -> "Compensator":
         If a proof fails.
     """
     from dzdesign.core.artefact_reading import read_artefact
-    from dzdesign.design.compensator_file import SCHEMA, compensator_document
+    from dzdesign.core.artefact_types import to_json_bytes
+    from dzdesign.design.compensator import SCHEMA
     from dzdesign.design.designing import design as design_valve
     from dzdesign.identify.valve.model import ValveModel
 
@@ -102,5 +95,5 @@ def design(arguments: DesignArguments) -> "Compensator":
         content = read_bytes(Path(arguments.valve), "valve file")
         compensator = design_valve(read_artefact(content, ValveModel, os.fspath(arguments.valve)), options, content)
     if arguments.output is not None:
-        write_file(Path(arguments.output), to_json(compensator_document(compensator)), SCHEMA)
+        write_file(Path(arguments.output), to_json_bytes(compensator), SCHEMA)
     return compensator

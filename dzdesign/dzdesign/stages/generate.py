@@ -15,31 +15,22 @@ if TYPE_CHECKING:
     from dzdesign.codegen.project import Firmware
     from dzdesign.design.compensator import Compensator
 
-# fmt: off
-
 
 @dataclass(frozen=True)
 class GenerateArguments(DesignChoices):
     """Arguments of `codegen`, in Python `generate`."""
 
-    compensator: Annotated["Compensator | AnyPath", Option(
-        "compensator.json, or a valve.json, which is designed first with the options of `design`.",
-        "COMPENSATOR.json")]
+    compensator: Annotated["Compensator | AnyPath", Option("COMPENSATOR.json")]
+    """compensator.json, or a valve.json, which is designed first with the options of `design`."""
     _: KW_ONLY
-    output: Annotated[AnyPath | None, Option(
-        "Folder to write, with the C project.", "DIR", command_default="firmware", short="-o")] = None
-    target: Annotated[Text, Option(
-        "Microcontroller (default: that of the design; of a VALVE.json f28335).", "NAME", choices=TARGETS)] = None
-# fmt: on
+    output: Annotated[AnyPath | None, Option("DIR", command_default="firmware", short="-o")] = None
+    """Folder to write, with the C project."""
+    target: Annotated[Text, Option("NAME", choices=TARGETS)] = None
+    """Microcontroller (default: that of the design; of a VALVE.json f28335)."""
 
 
 def generate(arguments: GenerateArguments) -> "Firmware":
     """Generate the C project of a compensator, whose numbers are derived again first.
-
-    Parameters
-    ----------
-    arguments : GenerateArguments
-        Of the stage.
 
     Raises
     ------
@@ -50,8 +41,8 @@ def generate(arguments: GenerateArguments) -> "Firmware":
     from dzdesign.codegen.project import generate as generate_project
     from dzdesign.core.artefact_reading import read_artefact
     from dzdesign.core.artefact_types import schema_of
+    from dzdesign.design.compensator import SCHEMA as COMPENSATOR_SCHEMA
     from dzdesign.design.compensator import Compensator
-    from dzdesign.design.compensator_file import SCHEMA as COMPENSATOR_SCHEMA
     from dzdesign.design.designing import design as design_valve
     from dzdesign.design.firmware_manifest import FirmwareManifest
     from dzdesign.identify.valve.model import SCHEMA as VALVE_SCHEMA
@@ -77,10 +68,11 @@ def generate(arguments: GenerateArguments) -> "Firmware":
 
 
 def _read_compensator(content: bytes, source: str, choices: DesignChoices) -> "Compensator":
-    from dzdesign.design.compensator_file import compensator_from_document
+    from dzdesign.core.artefact_reading import read_artefact
+    from dzdesign.design.compensator import Compensator
     from dzdesign.design.redesign_check import refuse_unsaid
 
-    compensator = compensator_from_document(content, source)
+    compensator = read_artefact(content, Compensator, source)
     refuse_unsaid(compensator, source)
     return _proven(compensator, f"'{source}'", choices)
 

@@ -28,8 +28,8 @@ def _valve_heading(valve: "ValveModel") -> str:
 
 
 def _compensator_heading(compensator: "Compensator") -> str:
-    target = f" for {compensator.request.target.name}" if compensator.request else ""
-    return f"Compensator{target}, law {compensator.law_name}, of a valve of {float(compensator.u_max_V):g} V"
+    target = f" for {compensator.target.name}" if compensator.target else ""
+    return f"Compensator{target}, law {compensator.law}, of a valve of {float(compensator.u_max_V):g} V"
 
 
 def _firmware_heading(firmware: "Firmware") -> str:

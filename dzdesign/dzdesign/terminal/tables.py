@@ -87,13 +87,11 @@ def _side_lines(side: "SideModel") -> tuple[str, ...]:
 
 def print_compensator(compensator: "Compensator", console: "Console | None" = None) -> None:
     """Print the law, the certificate and what the choices cost."""
-    from dzdesign.core.artefact_reading import read_artefact
     from dzdesign.derivation.law import law
     from dzdesign.design.costs import hidden_failures
     from dzdesign.design.signal_descriptions import signals_in_words
-    from dzdesign.identify.valve.model import ValveModel
 
-    chosen = law(compensator.law_name)
+    chosen = law(compensator.law)
     lines = [
         f"law {chosen.name} {chosen.equation}: u_O = {chosen.output}",
         *signals_in_words(compensator.signals, float(compensator.u_max_V)),
@@ -104,21 +102,20 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
         low, high = (float(end) for end in certificate.dp_MPa)
         label = "" if compensator.negative is None else "positive: " if sign > 0 else "negative: "
         lines += [
-            f"{label}drive range of the law k x_max/u_max = {_rational(side.k_x_max_over_u_max)} (from its offset, "
+            f"{label}drive range of the law k x_max/u_max = {_rational(side.drive_range_over_u_max)} (from its offset, "
             f"below the valve's knee, to full flow), offset at dP0 u_min0/u_max = {_rational(side.u_min0_over_u_max)}, "
-            f"both as shares of full command; beta(dP): straight between {len(side.beta_numerators)} nodes, each a "
+            f"both as shares of full command; beta(dP): straight between {len(side.beta)} nodes, each a "
             f"whole number of 1/{compensator.beta_denominator}",
             f"{label}certificate: the offset stays below the {100 * certificate.confidence:.6g}% lower bound of the "
             f"{certificate.guard} threshold {span_MPa(low, high, 3)}, at every pressure code; flow below "
             f"{certificate.level_L_min:.2f} L/min (meter's floor, its noise, or 0.5 % of the largest flow) counts as "
             "none",
         ]
-    if compensator.edge_codes:
-        share = compensator.edge_codes / compensator.signals.command.span(1)
+    if compensator.transition_codes:
+        share = compensator.transition_codes / compensator.signals.command.span(1)
         guard = compensator.positive.certificate.guard
-        lines.append(f"edge: from the {guard} to the opening threshold over the first {share:.2%} of command")
-    valve = read_artefact(compensator.valve_document.encode(), ValveModel, "compensator.json: valve")
-    hidden = hidden_failures(compensator, valve)
+        lines.append(f"transition: from the {guard} to the opening threshold over the first {share:.2%} of command")
+    hidden = hidden_failures(compensator)
     costs = [line for line in compensator.costs if line not in hidden]
     console = console or new_console()
     for line in (*(f"warning: {line}" for line in hidden), *lines, *(f"cost: {line}" for line in costs)):
@@ -128,7 +125,7 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
 def print_firmware(firmware: "Firmware", console: "Console | None" = None, folder: str = "") -> None:
     """Print the files of a firmware, and in which folder they are."""
     console = console or new_console()
-    valves = json.loads(firmware.files["compensator.json"]).get("common_valves")
+    valves = len(json.loads(firmware.files["compensator.json"])["lot"])
     common = f", common setting of {valves} valves" if valves else ""
     place = f", in {folder}" if folder else ""
     put_line(console, f"Firmware for {firmware.manifest.target}, law {firmware.manifest.law}{common}{place}:")

@@ -2,17 +2,14 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.constants import L_MIN, MPA
-from dzdesign.identify.data_quality.quality import find_warnings
+from dzdesign.identify.data_quality.side_warnings import find_warnings
 from dzdesign.identify.fitting.bounds import Trend, find_trend
 from dzdesign.identify.fitting.constrained_fits import KneeFit, fit_knees
-from dzdesign.identify.fitting.guard_curve import GUARDS, GuardCurve, OpeningCurve
 from dzdesign.identify.fitting.guarding import (
     COLUMNS,
     OrderedKnees,
@@ -24,12 +21,14 @@ from dzdesign.identify.fitting.guarding import (
     opening_curve,
     order_knees,
 )
-from dzdesign.identify.knees.prepared_tests import DescribedTest, DescribedTests, describe_tests
+from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
+from dzdesign.identify.knees.prepared_tests import describe_tests
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_test import RampTest
-from dzdesign.identify.valve.model import Warning_
+from dzdesign.identify.results import SideIdentification
+from dzdesign.identify.valve.guard_curve import GUARDS, Guard, GuardCurve, OpeningCurve
 from dzdesign.identify.valve.ramp_result import BRANCHES, TestResult
-from dzdesign.identify.valve.side_model import Certificate, Reference, SideModel
+from dzdesign.identify.valve.side_model import BoundsBasis, Reference, SideModel
 
 #: dP0 names the tested pressure drop within this share of it.
 REFERENCE_TOLERANCE = 0.1
@@ -37,17 +36,7 @@ REFERENCE_TOLERANCE = 0.1
 PAPER_DP0 = 1 * MPA
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class IdentifiedSide:
-    """What was found about one side, and what it was found from."""
-
-    model: SideModel
-    described: DescribedTests
-    knees: KneeFit
-    warnings: tuple[Warning_, ...]
-
-
-def identify_side(tests: Sequence[RampTest], options: IdentifyOptions) -> IdentifiedSide:
+def identify_side(tests: Sequence[RampTest], options: IdentifyOptions) -> SideIdentification:
     """Identify the side of positive commands.
 
     Parameters
@@ -65,7 +54,7 @@ def identify_side(tests: Sequence[RampTest], options: IdentifyOptions) -> Identi
     group = describe_tests(tests, options)
     trend, free, guarded = _fit_with_trend(group, options)
     model = _side_model(group, trend, free, guarded, options)
-    return IdentifiedSide(
+    return SideIdentification(
         model=model,
         described=group,
         knees=guarded.fit,
@@ -116,23 +105,23 @@ def _side_model(
     guard = next(name for name, column in COLUMNS.items() if column == guarded.column)
     guards, opening = _all_curves(group, free, {guard: (guarded, threshold, curve)}, trend, reference, options)
     slope = float(np.nanmean(knees.slope[reference]))
-    y_max = float(np.mean([shape.y_max for shape in described[reference].shapes if shape]))
+    y_max = float(np.mean([shape.y_max for shape in described[reference].branches]))
     k_x_max = y_max / slope  # Eq. (11) at full stroke: Q_max = slope (k x_max)
-    known = described[0].dp is not None
+    dp0 = described[reference].dp
     several = len(described) > 1
     return SideModel(
         tests=tuple(_test_result(group, knees, row, threshold) for row in range(len(described))),
-        reference=Reference(dp_MPa=described[reference].dp / MPA if known else None, u_min_V=guards[guard].u_min0_V),
+        reference=Reference(dp_MPa=None if dp0 is None else dp0 / MPA, u_min_V=guards[guard].u_min0_V),
         k_x_max_over_u_max=k_x_max / options.u_max,
         k_V_mm=k_x_max / (options.x_max * 1e3) if options.x_max else None,
         trend=trend.direction if several else None,
         trend_change_V=trend.change if several else None,
         trend_change_se_V=trend.change_se if several else None,
         trend_p=trend.p_value if several else None,
-        certificate=Certificate(
+        certificate=BoundsBasis(
             confidence=options.confidence,
             guard=guard,
-            level_L_min=max(shape.level for item in described for shape in item.shapes if shape) / L_MIN,
+            level_L_min=max(shape.level for item in described for shape in item.branches) / L_MIN,
         ),
         guards=guards,
         opening_curve=opening,
@@ -144,7 +133,7 @@ def _side_model(
 def _all_curves(
     group: DescribedTests,
     free: KneeFit,
-    found: dict[str, tuple[OrderedKnees, Threshold, GuardCurve]],
+    found: dict[Guard, tuple[OrderedKnees, Threshold, GuardCurve]],
     trend: Trend,
     reference: int,
     options: IdentifyOptions,
@@ -156,7 +145,7 @@ def _all_curves(
     """
     ((guard, (guarded, threshold, curve)),) = found.items()
     knees, thresholds = {guard: guarded}, {guard: threshold}
-    other = "opening" if guard == "closing" else "closing"
+    other: Guard = "opening" if guard == "closing" else "closing"
     if group.tests[0].shapes[COLUMNS[other]]:
         try:
             knees[other] = order_knees(group, free, trend.direction, COLUMNS[other], options, alone=True)
@@ -169,7 +158,7 @@ def _all_curves(
     further = {name: item for name, item in thresholds.items() if name != guard}
     dp = [item.dp for item in group.tests]
     curves = {guard: curve} | further_guards(further, dp, reference, trend.direction, options.u_max)
-    guards = {name: curves[name] for name in GUARDS if name in curves}
+    guards: dict[str, GuardCurve] = {name: curves[name] for name in GUARDS if name in curves}
     if "opening" not in knees:
         return guards, None
     return guards, opening_curve(knees["opening"], trend.direction, guards, options.u_max)
@@ -178,37 +167,40 @@ def _all_curves(
 def _test_result(group: DescribedTests, knees: KneeFit, row: int, guarded: Threshold) -> TestResult:
     """Return one row of valve.json's tests."""
     item = group.tests[row]
-    shapes = [shape for shape in item.shapes if shape]
+    rising, falling = item.shapes
     return TestResult(
         source=item.test.source,
         dp_MPa=None if item.dp is None else item.dp / MPA,
-        **_thresholds(group, knees, row, "rising"),
-        **_thresholds(group, knees, row, "falling"),
+        **_thresholds(item, knees, row),
+        straight_rising=rising.window if rising else None,
+        straight_falling=falling.window if falling else None,
         not_observable=_not_observable(group, row),
         u_guard_V=float(guarded.value[row]),
         u_guard_lower_V=float(guarded.bound[row]),
         slope_L_min_V=float(np.nanmean(knees.slope[row])) / L_MIN,
         q_max_L_min=item.q_max / L_MIN,
-        saturates=all(shape.saturates for shape in shapes),
-        noise_L_min=max(shape.sigma for shape in shapes) / L_MIN,
-        noise_variance_inflation=max(shape.colour for shape in shapes),
-        outliers=sum(shape.outliers for shape in shapes),
+        saturates=all(shape.saturates for shape in item.branches),
+        noise_L_min=max(shape.sigma for shape in item.branches) / L_MIN,
+        noise_variance_inflation=max(shape.variance_inflation for shape in item.branches),
+        outliers=sum(shape.outliers for shape in item.branches),
         ramps=item.ramps,
     )
 
 
-def _thresholds(group: DescribedTests, knees: KneeFit, row: int, branch: str) -> dict[str, Any]:
-    """Return the thresholds of one branch under their keys in valve.json; None where it was not recorded."""
-    column = BRANCHES.index(branch)
-    shape = group.tests[row].shapes[column]
-    found = {
-        "knee": (float(knees.knee[row, column]), float(knees.knee_se[row, column])) if shape else (None, None),
-        "level": (shape.tail.at_level, shape.tail.at_level_se) if shape else (None, None),
-        "onset": (shape.onset, shape.onset_se) if shape else (None, None),
-    }
-    values = {f"u_{name}_{branch}_V": value for name, (value, _) in found.items()}
-    errors = {f"u_{name}_{branch}_se_V": error for name, (_, error) in found.items()}
-    return {**values, **errors, f"straight_{branch}": shape.window if shape else None}
+def _thresholds(item: DescribedTest, knees: KneeFit, row: int) -> dict[str, float | None]:
+    """Return the thresholds of a test under their keys in valve.json; None where a branch was not recorded."""
+    values: dict[str, float | None] = {}
+    for column, (branch, shape) in enumerate(zip(BRANCHES, item.shapes, strict=True)):
+        knee, knee_se = knees.knee[row, column], knees.knee_se[row, column]
+        values |= {
+            f"u_knee_{branch}_V": float(knee) if shape else None,
+            f"u_knee_{branch}_se_V": float(knee_se) if shape else None,
+            f"u_level_{branch}_V": shape.tail.at_level if shape else None,
+            f"u_level_{branch}_se_V": shape.tail.at_level_se if shape else None,
+            f"u_onset_{branch}_V": shape.onset if shape else None,
+            f"u_onset_{branch}_se_V": shape.onset_se if shape else None,
+        }
+    return values
 
 
 def _not_observable(group: DescribedTests, row: int) -> dict[str, str]:

@@ -9,7 +9,6 @@ import pytest
 from dzdesign.codegen.core.constants import COLUMNS
 from dzdesign.codegen.project import TARGET_NAMES, generate
 from dzdesign.core.artefact_files import sha256_of
-from dzdesign.core.artefact_types import as_document
 from tests.support.core_variants import NAMES, firmware, variant
 from tests.support.golden_firmware import golden_compensator
 from tests.support.paths import ROOT
@@ -107,11 +106,11 @@ def test_every_entry_leads_to_its_datum(name, arithmetic):
     """Keys are followed in the documents, sources in this repository; the C's comment is the entry's text."""
     made, compensator = firmware(name, arithmetic), variant(name, arithmetic)
     document = json.loads(made.files["compensator.json"])
-    valve = json.loads(compensator.valve_document)
+    valve = document["valve"]
     origin = made.manifest.origin
     assert origin.compensator_json == sha256_of(made.files["compensator.json"].encode())
-    assert origin.valve_json == sha256_of(compensator.valve_document.encode())
-    assert [as_document(each) for each in origin.ramp_tests] == valve["made_from"]
+    assert origin.valve_json == compensator.valve_json_sha256
+    assert origin.ramp_tests == compensator.valve.made_from
     for entry in made.manifest.constants:
         for key, holder in [(key, document) for key in entry.compensator_json] + [
             (key, valve)
@@ -136,9 +135,9 @@ def test_a_datum_is_the_constants_value():
     signals = document["signals"]
     assert values["core/dz_comp_negative.c", "COMMAND_ZERO"] == signals["command"]["zero_code"]
     assert values["core/dz_comp.c", "PRESSURE_B_HIGH"] == signals["pressure_b"]["valid_codes"][1]
-    assert values["core/dz_comp.h", "DZ_COMPARE_LIMIT"] == document["amplifier"]["compare_limit"]
-    assert values["core/dz_drive.c", "DITHER_COUNTS"] == document["amplifier"]["dither_counts"]
-    assert values["core/dz_drive.c", "RAMP_UP_NEGATIVE"] == document["amplifier"]["ramp_up"][1]
+    assert values["core/dz_comp.h", "DZ_COMPARE_LIMIT"] == document["drive_functions"]["compare_limit"]
+    assert values["core/dz_drive.c", "DITHER_COUNTS"] == document["drive_functions"]["dither_counts"]
+    assert values["core/dz_drive.c", "RAMP_UP_NEGATIVE"] == document["drive_functions"]["ramp_up"][1]
 
 
 def test_the_engineering_values_are_those_of_the_constants():
@@ -151,6 +150,6 @@ def test_the_engineering_values_are_those_of_the_constants():
     assert said[core, "STEP_CODES"] == f"{64 * 20 / 4095:.4f} MPa"
     assert said[core, "HALF"] == f"{10 / 60000 / 2:.3g} V"
     assert said[core, "FACTOR_OFFSET"] == f"u_min0 = {10 * float(side.u_min0_over_u_max):.6f} V"
-    assert said[core, "FACTOR_SLOPE"] == f"k x_max/u_max - 1 = {float(side.k_x_max_over_u_max) - 1:.6f}"
+    assert said[core, "FACTOR_SLOPE"] == f"k x_max/u_max - 1 = {float(side.drive_range_over_u_max) - 1:.6f}"
     assert said[core, "COMMAND_HIGH_WORD"] == "1.000000"
-    assert said[core, "law_segment"] == f"beta {min(side.beta_numerators) / 32768:.6f} to 1.000000"
+    assert said[core, "law_segment"] == f"beta {min(side.beta) / 32768:.6f} to 1.000000"

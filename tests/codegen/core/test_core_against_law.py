@@ -43,12 +43,12 @@ def stated_compare(compensator, command: int, dp_code: int) -> int:
     values = {
         u_i: volts,
         beta: rational(compensator.beta(dp_code)),
-        k: rational(compensator.positive.k_x_max_over_u_max) * U_MAX_V / X_MAX_M,
+        k: rational(compensator.positive.drive_range_over_u_max) * U_MAX_V / X_MAX_M,
         x_max: X_MAX_M,
         u_max: U_MAX_V,
         u_min0: rational(compensator.positive.u_min0_over_u_max) * U_MAX_V,
     }
-    output = sympy.N(law(compensator.law_name).output.subs(values), DIGITS)
+    output = sympy.N(law(compensator.law).output.subs(values), DIGITS)
     counts = sympy.N(COMPARE_VALUE.subs({u_O: output, u_max: U_MAX_V, n_full: signals.compare_max}), DIGITS)
     nearest = int(sympy.floor(counts + sympy.Rational(1, 2) + TIE))  # a half goes up
     return min(max(nearest, 0), signals.compare_max)
@@ -78,7 +78,7 @@ def compensator(request, example_valve):
     from dzdesign.design.designing import design
     from dzdesign.design.options import DesignOptions
 
-    return design(example_valve, DesignOptions(law_name=request.param))
+    return design(example_valve, DesignOptions(law=request.param))
 
 
 @needs_compiler

@@ -9,8 +9,9 @@ from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
-from dzdesign.design.signal_text import Converter, command_signal, parse_signal, pressure_signal
+from dzdesign.design.signal_text import command_signal, parse_signal, pressure_signal
 from dzdesign.design.signals import Signals
+from dzdesign.design.target_inputs import Converter
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from tests.support.synthetic import needs_compiler
 
@@ -63,7 +64,7 @@ def test_two_sides_with_an_edge_and_unlike_sensors_equal_the_law_on_every_input(
         pressure_b=pressure_signal(parse_signal("0.5..4.5 V x 0.6 = 16 MPa", "--pressure-b"), converter, Fraction(20)),
         swapped=True,
     )
-    compensator = design(two_sided, DesignOptions(signals=signals, edge=Fraction(1, 100)))
+    compensator = design(two_sided, DesignOptions(signals=signals, transition=Fraction(1, 100)))
     folder = firmware_folder(compensator, target, tmp_path / "fw")
     for sign in (1, -1):
         result = check_all_inputs(folder, sign)

@@ -12,10 +12,11 @@ import pytest
 from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
-from dzdesign.design.compensator import Compensator
+from dzdesign.design.compensator import Compensator, Sides
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
-from dzdesign.design.signal_text import Converter, command_signal, parse_signal
+from dzdesign.design.signal_text import command_signal, parse_signal
+from dzdesign.design.target_inputs import Converter
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.exhaustive.drive_check import drive_samples as sequence
 from dzdesign.verify.exhaustive.exact_drive import STEP_UNIT, DriveModel
@@ -156,7 +157,7 @@ PRESSURES = (2400, 1500)  # sound on both sensors
 def test_noise_inside_the_window_never_changes_the_side(side):
     """A zero command with noise of one per cent, after each of the sides has been driven."""
     compensator = compensator_named("two solenoids alone")
-    window, zero = compensator.amplifier.window_codes, compensator.signals.command.zero_code
+    window, zero = compensator.drive_functions.window_codes, compensator.signals.command.zero_code
     assert window >= 0.0097 * compensator.signals.command.span(1)
     firmware, rng = Firmware(compensator), np.random.default_rng(2)
     firmware.sample(zero + side * 500, *PRESSURES)
@@ -170,7 +171,7 @@ def test_noise_inside_the_window_never_changes_the_side(side):
 
 def test_from_rest_noise_drives_neither():
     compensator = compensator_named("two solenoids alone")
-    firmware, window = Firmware(compensator), compensator.amplifier.window_codes
+    firmware, window = Firmware(compensator), compensator.drive_functions.window_codes
     for noise in range(-window, window + 1):
         firmware.sample(compensator.signals.command.zero_code + noise, *PRESSURES)
         firmware.tick()
@@ -211,7 +212,7 @@ def test_reversing_the_command_stops_at_zero_on_the_way():
 @pytest.mark.parametrize("name", ["everything", ONE_SIDE])
 def test_the_dither_has_its_frequency_and_its_peak(name):
     compensator = compensator_named(name)
-    amplifier, signals = compensator.amplifier, compensator.signals
+    functions, signals = compensator.drive_functions, compensator.signals
     firmware = Firmware(compensator)
     command = signals.command.zero_code + signals.command.direction(1) * 900
     for _ in range(2000):  # the ramps are over
@@ -221,14 +222,14 @@ def test_the_dither_has_its_frequency_and_its_peak(name):
         firmware.tick()
         seen.append(firmware.outputs[0])
     law = firmware.state.law
-    assert set(seen) == {law + amplifier.dither_counts, law - amplifier.dither_counts}
+    assert set(seen) == {law + functions.dither_counts, law - functions.dither_counts}
     rises = sum(later > earlier for earlier, later in pairwise(seen))
     asked = options_named(name)
-    exact = signals.tick_Hz / (2 * amplifier.dither_ticks)
+    exact = signals.tick_Hz / (2 * functions.dither_ticks)
     assert abs(rises - exact) <= 1
     assert abs(1 / exact - 1 / asked.dither_Hz) <= 1 / signals.tick_Hz, "to a PWM period"
-    assert amplifier.dither_counts == round(asked.dither_peak * signals.compare_max)
-    assert sum(seen[: 2 * amplifier.dither_ticks]) == 2 * amplifier.dither_ticks * law, "its mean is the law's"
+    assert functions.dither_counts == round(asked.dither_peak * signals.compare_max)
+    assert sum(seen[: 2 * functions.dither_ticks]) == 2 * functions.dither_ticks * law, "its mean is the law's"
 
 
 @pytest.mark.parametrize("side", [1, -1])
@@ -236,9 +237,8 @@ def test_zero_command_stays_under_the_certified_bound_at_the_waves_top(side):
     """The bound, in closed form: of all thresholds' lower bounds of the side's tests at these pressures the lowest."""
     compensator = compensator_named("everything")
     signals = compensator.signals
-    valve = read_artefact(compensator.valve_document.encode(), ValveModel, "valve.json")
-    tests = valve.sides["positive" if side > 0 else "negative"].tests
-    rising = valve.sides["positive" if side > 0 else "negative"].trend == "increasing"
+    tests = compensator.valve.sides["positive" if side > 0 else "negative"].tests
+    rising = compensator.valve.sides["positive" if side > 0 else "negative"].trend == "increasing"
     counts_in_V = signals.compare_max / float(compensator.u_max_V)
     firmware, tried = Firmware(compensator), 0
     for _ in range(2000):
@@ -252,11 +252,11 @@ def test_zero_command_stays_under_the_certified_bound_at_the_waves_top(side):
         if not tests[0].dp_MPa + 0.05 <= dp <= tests[-1].dp_MPa - 0.05:
             continue
         top = 0
-        for _ in range(2 * compensator.amplifier.dither_ticks):
+        for _ in range(2 * compensator.drive_functions.dither_ticks):
             firmware.tick()
             top = max(top, *firmware.outputs[:2])
         near = [t.u_guard_lower_V for t in tests if (t.dp_MPa <= dp if rising else t.dp_MPa >= dp)]
-        assert 0 < top == firmware.state.law + compensator.amplifier.dither_counts
+        assert 0 < top == firmware.state.law + compensator.drive_functions.dither_counts
         assert top <= max(near) * counts_in_V
         tried += 1
     assert tried >= 8
@@ -268,7 +268,7 @@ def test_an_unsound_command_lets_go_at_once_and_starts_from_rest():
     for _ in range(700):
         firmware.sample(4095, *PRESSURES)
     firmware.tick()
-    assert firmware.outputs[0] == compensator.amplifier.compare_limit
+    assert firmware.outputs[0] == compensator.drive_functions.compare_limit
     firmware.sample(65535, *PRESSURES)
     firmware.tick()
     assert firmware.outputs == (0, 0, 1) and firmware.state.ramped == firmware.state.side == 0
@@ -299,7 +299,8 @@ def test_what_the_firmwares_integers_cannot_hold_is_refused():
     with pytest.raises(InputError, match="whole number of PWM periods"):
         replace(plain.signals, sample_Hz=1200)
     signals = replace(plain.signals, code_max=65535, command=replace(plain.signals.command, valid_codes=(0, 65535)))
-    amplifier = replace(plain.amplifier, ramp_up=(1, 0))
+    functions = replace(plain.drive_functions, ramp_up=(1, 0))
     nodes = (32768,) * (signals.largest_difference(1) // plain.beta_step_codes + 2)
     with pytest.raises(InputError, match="32767 codes"):
-        replace(plain, signals=signals, amplifier=amplifier, positive=replace(plain.positive, beta_numerators=nodes))
+        sides = Sides(positive=replace(plain.positive, beta=nodes))
+        replace(plain, signals=signals, drive_functions=functions, sides=sides)

@@ -23,14 +23,15 @@ from dzdesign.batch.results import Results
 from dzdesign.batch.runners import run_local
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import sha256_of
+from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
 from dzdesign.design.beta_table import DECIMALS
-from dzdesign.design.compensator_file import compensator_from_document
-from dzdesign.design.lot_setting import common_setting
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.lot_setting import lot_setting
 from dzdesign.report.artefact_chain import chain_of
 from dzdesign.report.artefact_folder import read_artefact_folder
 from dzdesign.report.lot.valve_folder import read_manifest
-from tests.support.dying_work import die_over_bad
+from tests.support.crashing_work import die_over_bad
 from tests.support.synthetic import needs_compiler
 
 SEED, COUNT = 7, 12
@@ -221,7 +222,7 @@ def offsets_above_their_bounds(common, made: Path, names) -> list[str]:
 def test_the_common_setting_over_compensates_no_valve(lot, made, tmp_path, capsys):
     names = [row["name"] for row in rows(made) if row["status"] == "ok"]
     path = made / "lot_compensator.json"
-    common = compensator_from_document(path.read_bytes(), str(path))
+    common = read_artefact(path.read_bytes(), Compensator, str(path))
     assert offsets_above_their_bounds(common, made, names) == []
     for name in names:  # nor where the truth is known
         bench = lot_bench(int(name[1:]), SEED)
@@ -235,9 +236,9 @@ def test_a_setting_without_the_lowest_valve_over_compensates_it(made):
     """The check above sees what it must see: the valve that holds the setting down is the one that is hurt."""
     results = Results(made)
     names = [row["name"] for row in rows(made) if row["status"] == "ok"]
-    batch = {name: results.read(name, {}).designed for name in names}
-    binding = common_setting(batch).binding
-    higher = common_setting({name: each for name, each in batch.items() if name not in binding}).compensator
+    batch = {name: results.read(name, {}).compensator for name in names}
+    binding = lot_setting(batch).binding
+    higher = lot_setting({name: each for name, each in batch.items() if name not in binding}).compensator
     assert set(offsets_above_their_bounds(higher, made, names)) & set(binding)
 
 

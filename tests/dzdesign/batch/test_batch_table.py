@@ -16,7 +16,7 @@ from dzdesign.command_line.cli import main
 from dzdesign.report.lot.report import report_of_lot
 from dzdesign.report.lot.table import read_table, safe_cell, table_files
 from dzdesign.report.lot.valve_names import by_name
-from tests.support.page_reader import Page
+from tests.support.html_pages import Page
 from tests.support.synthetic_lots import lot_rows, write_lot_folder
 
 OPTIONS = ["--meter-lag", "0.1 s", "--target", "host"]

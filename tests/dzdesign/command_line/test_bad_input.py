@@ -372,15 +372,15 @@ COMPENSATORS = [
     (("u_max_V",), [10], "'u_max_V' has 1 items, expected 2"),
     (("u_max_V",), 10.0, "'u_max_V' is 10.0, expected a list"),
     (("u_max_V",), [-10, 1], "is not that of its valve"),
-    ((*POSITIVE, "k_x_max_over_u_max", 0), 10**70, "'sides.positive.k_x_max_over_u_max[0]' is 1000"),
-    ((*POSITIVE, "k_x_max_over_u_max", 0), -1, "k x_max/u_max must be positive"),
-    ((*POSITIVE, "k_x_max_over_u_max", 1), -(2**16), "expected a positive denominator"),
+    ((*POSITIVE, "drive_range_over_u_max", 0), 10**70, "'sides.positive.k_x_max_over_u_max[0]' is 1000"),
+    ((*POSITIVE, "drive_range_over_u_max", 0), -1, "k x_max/u_max must be positive"),
+    ((*POSITIVE, "drive_range_over_u_max", 1), -(2**16), "expected a positive denominator"),
     ((*POSITIVE, "u_min0_over_u_max"), [3, 2], "u_min0 is 1.500 of u_max, expected between 0 and 1"),
     ((*POSITIVE, "beta"), [1, 2], "beta has 2 nodes, expected 65"),
     ((*POSITIVE, "beta", 3), 0, "'sides.positive.beta[3]' is 0"),
     ((*POSITIVE, "beta", 3), 1.5, "'sides.positive.beta[3]' is 1.5, expected a whole number"),
-    ((*POSITIVE, "edge_beta"), [1, 2], "the edge's beta must have as many nodes"),
-    (("edge_codes",), 32, "an edge needs the opening threshold's beta"),
+    ((*POSITIVE, "transition_beta"), [1, 2], "the edge's beta must have as many nodes"),
+    (("transition_codes",), 32, "an edge needs the opening threshold's beta"),
     (("beta_denominator",), 3, "beta_denominator is 3, expected a power of two"),
     (("beta_step_codes",), 0, "'beta_step_codes' is 0"),
     (("below_dp0",), "held", "below_dp0 is 'held', expected hold or extend"),
@@ -393,7 +393,7 @@ COMPENSATORS = [
     (("signals", "command", "full_code"), 0, "zero and full command have the same code, 0"),
     (("signals", "command", "negative_full_code"), 9, "expected the other side of zero"),
     (("signals", "command", "valid_codes"), [0, 9], "full_code is 4095, outside the valid codes 0 to 9"),
-    (("amplifier", "dither_ticks"), 0, "'amplifier.dither_ticks' is 0"),
+    (("drive_functions", "dither_ticks"), 0, "'drive_functions.dither_ticks' is 0"),
     ((*POSITIVE, "certificate", "dp_MPa"), [[1, 1]], "'sides.positive.certificate.dp_MPa' has 1 items, expected 2"),
 ]
 
@@ -538,7 +538,7 @@ def test_a_plant_that_is_not_there(refusal):
     [
         ("manifest.json", "{}", "has the schema 'None', expected dzdesign.firmware/1"),
         ("manifest.json", "no JSON", "is not JSON"),
-        ("manifest.json", '{"schema": "dzdesign.firmware/1"}', "lacks the key 'files'"),
+        ("manifest.json", '{"schema": "dzdesign.firmware/1"}', "lacks the key 'tool'"),
         ("manifest.json", '{"schema": "dzdesign.firmware/1", "files": []}', "'files' is [], expected an object"),
         ("compensator.json", '{"schema": "dzdesign.compensator/1"}', "lacks the key"),
         ("compensator.json", None, "compensator.json' does not exist"),
@@ -580,7 +580,7 @@ def test_a_core_that_somebody_edited_does_not_hold(bench, capsys):
     assert main(["verify", "firmware"]) == 1
     out = capsys.readouterr().out
     assert "DOES NOT HOLD  files as generated: changed or missing: core/dz_comp.c" in out
-    assert "holds  equals the exactly rounded law" in out
+    assert "HOLDS  equals the exactly rounded law" in out
 
 
 @needs_compiler

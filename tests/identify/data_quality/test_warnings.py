@@ -13,12 +13,11 @@ from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import to_json
 from dzdesign.core.artefact_types import as_document, to_json_bytes
 from dzdesign.core.errors import InputError
-from dzdesign.design.compensator_file import compensator_document
 from dzdesign.design.designing import design
 from dzdesign.design.option_texts import options_of
 from dzdesign.design.options import DesignOptions
 from dzdesign.identify.data_quality import knee_errors
-from dzdesign.identify.data_quality.quality import MOST_SERIOUS_FIRST, most_serious_first
+from dzdesign.identify.data_quality.severity import MOST_SERIOUS_FIRST, most_serious_first
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes, read_ramp_file
@@ -86,7 +85,7 @@ class TestSimulated:
                 assert ("SIMULATED" in text) is simulated or name == "compensator.json", name
             shelf = {
                 "valve.json": to_json_bytes(valve),
-                "compensator.json": to_json(compensator_document(compensator)).encode(),
+                "compensator.json": to_json_bytes(compensator),
             }
             cautions = headline(chain_of(shelf)).cautions
             assert [text.startswith("SIMULATED") for text in cautions] == [True] * simulated
@@ -121,7 +120,7 @@ class TestBranchOrder:
         for valve, accepted in ((crossed, True), (identify([valve_at(dp) for dp in PRESSURES]), False)):
             shelf = {
                 "valve.json": to_json_bytes(valve),
-                "compensator.json": to_json(compensator_document(design(valve, options))).encode(),
+                "compensator.json": to_json_bytes(design(valve, options)),
             }
             said = [line for line in headline(chain_of(shelf)).cautions if line.startswith("ACCEPTED warning, branch-")]
             html = make_report(chain_of(shelf)).html
@@ -170,7 +169,7 @@ def test_a_side_that_the_firmware_leaves_out_is_said_from_identify_to_the_report
     for valve, said in ((both, True), (one, False)):
         shelf = {
             "valve.json": to_json_bytes(valve),
-            "compensator.json": to_json(compensator_document(design(valve))).encode(),
+            "compensator.json": to_json_bytes(design(valve)),
         }
         assert any("negative side" in text for text in headline(chain_of(shelf)).cautions) is said
 

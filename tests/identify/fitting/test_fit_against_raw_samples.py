@@ -20,11 +20,11 @@ from scipy.special import log_ndtr
 from dzdesign.core.errors import InputError
 from dzdesign.identify.fitting import casadi_problems as fit_problems
 from dzdesign.identify.fitting import constrained_fits as fit
-from dzdesign.identify.fitting.bounds import staircase
 from dzdesign.identify.knees import characteristic
 from dzdesign.identify.knees.prepared_tests import describe_tests
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.branches import Bins, bin_branch
+from dzdesign.identify.valve.staircase import staircase
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
 
 U_MAX = 10.0
@@ -181,7 +181,7 @@ class Shape:
     knee: float
     sigma: float
     y_max: float
-    colour: float = 1.0
+    variance_inflation: float = 1.0
     dropped: float = 0.0
 
 

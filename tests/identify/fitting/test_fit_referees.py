@@ -10,7 +10,7 @@ from scipy.special import log_ndtr, logsumexp
 
 from dzdesign.identify.fitting import constrained_fits as fit
 from dzdesign.identify.fitting.constrained_fits import fit_knees, fit_offset
-from dzdesign.identify.knees.linear_region import lay_line, read_branch
+from dzdesign.identify.knees.gated_line import lay_line, prepare_branch
 from dzdesign.identify.knees.prepared_tests import describe_tests
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.branches import bin_branch
@@ -179,10 +179,10 @@ def worst_tobit_error(seed, floor=0.6, dropping=0.0):
     group, _ = described(floor=floor, seed=seed)
     worst, cut, rng = 0.0, 0, np.random.default_rng(seed)
     for item in group.tests:
-        for branch in item.branches:
+        for branch in (shape.prepared.branch for shape in item.branches):
             q = np.where(rng.random(branch.q.size) < dropping, 0.0, branch.q)
             branch = replace(branch, q=q)
-            read = read_branch(branch, branch.q, u_max=U_MAX, floor=group.floor, source="")
+            read = prepare_branch(branch, branch.q, u_max=U_MAX, floor=group.floor, source="")
             line = lay_line(read, window)
             kept = line.kept
             bins = bin_branch(branch.u[kept], read.y[kept], line.censored[kept], U_MAX)

@@ -15,15 +15,15 @@ from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
-from dzdesign.design.compensator_file import compensator_from_document
+from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import DesignOptions, design
-from dzdesign.identify.fitting.bounds import staircase
-from dzdesign.identify.fitting.guard_curve import GUARDS
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes
 from dzdesign.identify.side import identify_side
+from dzdesign.identify.valve.guard_curve import GUARDS
 from dzdesign.identify.valve.model import ValveModel
+from dzdesign.identify.valve.staircase import staircase
 from tests.support.synthetic import L_MIN, MPA, Truth, needs_compiler, synthetic_ramp
 
 PRESSURES = (0.5, 1.0, 2.0, 4.0)
@@ -280,7 +280,7 @@ def test_verify_holds_the_core_against_the_bounds_of_its_own_guard(tmp_path, mon
     Path("compensator.json").write_bytes(content)
     assert main(["codegen", "compensator.json", "-o", "wrong"]) == 2
     assert "certificate does not hold" in capsys.readouterr().err
-    firmware = generate(compensator_from_document(content, "compensator.json"), "f28335", content)
+    firmware = generate(read_artefact(content, Compensator, "compensator.json"), "f28335", content)
     write_folder(Path("wrong"), firmware.files, firmware.manifest)
     assert main(["verify", "wrong"]) == 1
     out = capsys.readouterr().out

@@ -57,7 +57,7 @@ def test_without_the_question_a_bent_valve_loses_its_knee(monkeypatch):
     monkeypatch.setattr(straight_part, "STRAIGHT", 1e9)
     monkeypatch.setattr(straight_part, "ALONE", 1e9)
     monkeypatch.setattr(straight_part, "LARGEST_SHIFT", 1.0)
-    monkeypatch.setattr("dzdesign.identify.knees.linear_fits.LARGEST_SHIFT", 1.0)
+    monkeypatch.setattr("dzdesign.identify.knees.linear_region.LARGEST_SHIFT", 1.0)
     found = identify(ramps(bend=0.2), DECLARED).positive.tests
     assert min(test.u_knee_rising_V for test in found) < 5.4 - 0.05
 

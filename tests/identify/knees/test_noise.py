@@ -8,11 +8,11 @@ from scipy.signal import lfilter
 
 from dzdesign.identify.identification import identify
 from dzdesign.identify.knees.noise import (
-    colour_factor,
     measure_roughness,
     one_error_slower,
     shared_correlation,
     taken_by_parabola,
+    variance_inflation,
 )
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_test import RampTest
@@ -69,11 +69,12 @@ def test_what_a_parabola_takes_is_what_it_takes():
         assert np.mean(left) == pytest.approx(400 - taken_by_parabola(correlation, 400), rel=0.15)
 
 
-def test_white_noise_has_no_colour():
+def test_white_noise_inflates_nothing():
     rng, u = np.random.default_rng(SEED), np.linspace(6, 8, 1750)
     residual = rng.standard_normal(u.size)
-    assert colour_factor(0.0, measure_roughness(u, residual), residual.std()) == pytest.approx(1, abs=0.1)
-    assert colour_factor(0.9, measure_roughness(u, slow_noise(rng, 0.9, u.size)), 1.0) == pytest.approx(19, rel=0.2)
+    assert variance_inflation(0.0, measure_roughness(u, residual), residual.std()) == pytest.approx(1, abs=0.1)
+    slow = measure_roughness(u, slow_noise(rng, 0.9, u.size))
+    assert variance_inflation(0.9, slow, 1.0) == pytest.approx(19, rel=0.2)
 
 
 def ramp(dp_MPa, rng, correlation=0.0, bend=0.0):

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import norm
 
 from dzdesign.identify.knees.characteristic import _with_censored
-from dzdesign.identify.knees.linear_region import fit_line
+from dzdesign.identify.knees.gated_line import fit_line
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.side import identify_side
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp

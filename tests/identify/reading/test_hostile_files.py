@@ -21,8 +21,10 @@ from dzdesign.core.artefact_files import parse_document, read_bytes, write_file
 from dzdesign.core.artefact_types import as_document
 from dzdesign.core.errors import InputError
 from dzdesign.core.units import SI_UNIT, parse_quantity, si_factor
+from dzdesign.design.compensator import Compensator
 from dzdesign.design.signal_text import parse_signal
 from dzdesign.identify.reading.binary import reader_process
+from dzdesign.identify.reading.binary.reader_server import Request
 from dzdesign.identify.reading.ramp_files import read_ramp_file
 from dzdesign.identify.reading.text import encoding
 from tests.identify.reading.test_file_formats import GOOD
@@ -92,7 +94,7 @@ def test_a_reader_that_hangs_is_ended(tmp_path, monkeypatch):
     reader = reader_process.ReaderProcess()
     os.kill(reader.process.pid, 19)  # SIGSTOP
     with pytest.raises(EOFError, match="takes more than"):
-        reader.ask(reader_process.Request(place="", path="", format_name="TDMS"), 0.5)
+        reader.ask(Request(place="", path="", format_name="TDMS"), 0.5)
     reader.close()
 
 
@@ -247,9 +249,8 @@ JSON = st.recursive(
 
 @pytest.fixture(scope="module")
 def documents(example_valve, example_compensator):
-    from dzdesign.design.compensator_file import compensator_document
 
-    return {"valve": as_document(example_valve), "compensator": compensator_document(example_compensator)}
+    return {"valve": as_document(example_valve), "compensator": example_compensator}
 
 
 def places(value, way=()):
@@ -263,12 +264,11 @@ def places(value, way=()):
 @pytest.mark.parametrize("kind", ["valve", "compensator"])
 def test_a_changed_artefact(documents, kind):
     from dzdesign.core.artefact_reading import read_artefact
-    from dzdesign.design.compensator_file import compensator_from_document
     from dzdesign.identify.valve.model import ValveModel
 
     read = {
         "valve": lambda *file: read_artefact(file[0], ValveModel, file[1]),
-        "compensator": compensator_from_document,
+        "compensator": lambda *file: read_artefact(file[0], Compensator, file[1]),
     }[kind]
     sound = documents[kind]
     ways = list(places(sound))

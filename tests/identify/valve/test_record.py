@@ -17,7 +17,7 @@ from dzdesign.identify.identification import identify
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.test_record import LONGEST_NAME, LONGEST_TEXT, MOST_ENTRIES, checked_record
 from dzdesign.stages.identify import record_of
-from tests.support.page_reader import Page
+from tests.support.html_pages import Page
 from tests.support.schema_checks import problems
 from tests.support.synthetic import Truth, synthetic_ramp
 
@@ -54,7 +54,7 @@ def test_the_command_line_goes_before_the_file_entry_by_entry(here, capsys):
     assert problems("valve", found) == []
     valve = api.identify("ramp.csv", record={**said, "date": tomllib.loads("d = 2026-01-31")["d"]}, output="api.json")
     assert Path("api.json").read_bytes() == Path("valve.json").read_bytes()
-    assert "<td" in valve._repr_html_() and "HLP 46" in valve._repr_html_()
+    assert "<pre" in valve._repr_html_() and "HLP 46" in valve._repr_html_()
 
 
 def test_no_number_hangs_on_it(here):

@@ -24,7 +24,7 @@ from dzdesign.report.lot.setting_text import untested_lines
 from dzdesign.report.lot.spread import FAR, LEVELS, quantiles, spread_of
 from dzdesign.report.lot.summary import LotSettingSummary, SmallestMargin, UntestedPressures
 from dzdesign.report.lot.table import SideFigures
-from tests.support.page_reader import HOSTILE, Page
+from tests.support.html_pages import HOSTILE, Page
 from tests.support.schema_checks import overlooked, problems
 from tests.support.synthetic_lots import lot_rows, with_figures, write_lot_folder
 

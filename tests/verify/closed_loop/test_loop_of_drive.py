@@ -65,7 +65,8 @@ def test_a_dither_that_the_certificate_does_not_count_is_seen_at_the_waves_top(t
     """Seeded: ten per cent of dither on an offset that was certified without. Flow passes at the wave's top only."""
 
     def uncounted(compensator):
-        return replace(compensator, amplifier=replace(compensator.amplifier, dither_counts=6000, dither_ticks=12))
+        functions = replace(compensator.drive_functions, dither_counts=6000, dither_ticks=12)
+        return replace(compensator, drive_functions=functions)
 
     _, counted = compared(tmp_path / "counted", dither_Hz=104.0, dither_peak=Fraction(10, 100))
     assert counted.result.q_zero_L_min == 0

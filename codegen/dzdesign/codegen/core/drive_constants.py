@@ -2,7 +2,7 @@
 
 from dzdesign.codegen.core.constants import Define
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.drive import RAMP_UNIT
+from dzdesign.design.drive_functions import RAMP_UNIT
 
 HERE = "codegen/dzdesign/codegen/core/drive_constants.py"
 OPTIONS, SIGNALS = "design/dzdesign/design/options.py", "design/dzdesign/design/signals.py"
@@ -18,7 +18,7 @@ STATUS_BITS = {
 
 def interface_constants(compensator: Compensator) -> list[Define]:
     """Return the ends of inputs and output."""
-    signals, limit = compensator.signals, compensator.amplifier.compare_limit
+    signals, limit = compensator.signals, compensator.drive_functions.compare_limit
     u_max_V = float(compensator.u_max_V)
     share = limit / signals.compare_max
     return [
@@ -26,7 +26,7 @@ def interface_constants(compensator: Compensator) -> list[Define]:
                  engineering=f"{u_max_V:g} V, 100 % duty", data=("signals.compare_max", "u_max_V"), generator=SIGNALS),
         Define(symbol="DZ_COMPARE_LIMIT", value=limit, equation="largest compare value that is put out",
                  engineering=f"{share * u_max_V:.4g} V, {share:.1%} duty", rounding="rounded down",
-                 data=("amplifier.compare_limit", "signals.compare_max", "u_max_V"), generator=OPTIONS),
+                 data=("drive_functions.compare_limit", "signals.compare_max", "u_max_V"), generator=OPTIONS),
         Define(symbol="DZ_ADC_CODE_MAX", value=signals.code_max, equation="largest code of the converter",
                  engineering="the top of its range, right-justified", data=("signals.code_max",), generator=SIGNALS),
     ]  # fmt: skip
@@ -54,7 +54,7 @@ def drive_interface_constants(compensator: Compensator) -> list[Define]:
 
 def drive_constants(compensator: Compensator) -> list[Define]:
     """Return what the drive functions need; nothing where all are off."""
-    functions, bipolar = compensator.amplifier, compensator.negative is not None
+    functions, bipolar = compensator.drive_functions, compensator.negative is not None
     found = []
     if bipolar or functions.has_ramp:
         found.append(
@@ -73,7 +73,7 @@ def drive_constants(compensator: Compensator) -> list[Define]:
 
 
 def _window(compensator: Compensator) -> Define:
-    codes, span = compensator.amplifier.window_codes, compensator.signals.command.span(1)
+    codes, span = compensator.drive_functions.window_codes, compensator.signals.command.span(1)
     return Define(
         symbol="WINDOW_CODES",
         value=codes,
@@ -81,16 +81,16 @@ def _window(compensator: Compensator) -> Define:
         equation="codes by which the command must pass zero before the other solenoid is driven",
         engineering=f"{codes / span:.2%} of command, {codes / span * float(compensator.u_max_V):.4g} V",
         rounding="rounded to nearest",
-        data=("amplifier.window_codes", "signals.command", "u_max_V"),
+        data=("drive_functions.window_codes", "signals.command", "u_max_V"),
         generator=OPTIONS,
     )
 
 
 def _ramps(compensator: Compensator) -> list[Define]:
-    signals, functions = compensator.signals, compensator.amplifier
+    signals, functions = compensator.signals, compensator.drive_functions
     found = [
         Define(symbol="RAMP_UNIT", value=RAMP_UNIT, literal="int32", equation="unit of the ramped command",
-                 engineering=f"1/{RAMP_UNIT} code of command", generator="design/dzdesign/design/drive.py")
+                 engineering=f"1/{RAMP_UNIT} code of command", generator="design/dzdesign/design/drive_functions.py")
     ]  # fmt: skip
     for way, name, steps in (("up", "away from zero", functions.ramp_up), ("down", "to zero", functions.ramp_down)):
         for place, sign in enumerate(signals.signs):
@@ -105,7 +105,7 @@ def _ramps(compensator: Compensator) -> list[Define]:
                     equation=f"largest change of a {side} command {name} in a sample, over RAMP_UNIT",
                     engineering=seconds,
                     rounding="rounded to nearest, 1 or more" if step else "larger than any change",
-                    data=(f"amplifier.ramp_{way}", "signals.command", "signals.sample_Hz"),
+                    data=(f"drive_functions.ramp_{way}", "signals.command", "signals.sample_Hz"),
                     generator=OPTIONS,
                 )
             )
@@ -113,18 +113,18 @@ def _ramps(compensator: Compensator) -> list[Define]:
 
 
 def _dither(compensator: Compensator) -> list[Define]:
-    signals, functions = compensator.signals, compensator.amplifier
+    signals, functions = compensator.signals, compensator.drive_functions
     ticks, counts = functions.dither_ticks, functions.dither_counts
     share = counts / signals.compare_max
     return [
         Define(symbol="DITHER_COUNTS", value=counts, equation="half the height of the dither's square wave",
                  engineering=f"{share:.3%} of full drive, {share * float(compensator.u_max_V):.4g} V",
-                 rounding="rounded to nearest", data=("amplifier.dither_counts", "signals.compare_max", "u_max_V"),
-                 generator=OPTIONS),
+                 rounding="rounded to nearest", generator=OPTIONS,
+                 data=("drive_functions.dither_counts", "signals.compare_max", "u_max_V")),
         Define(symbol="DITHER_TICKS", value=ticks, equation="half the dither's period, PWM periods",
                  engineering=f"{1e3 * ticks / signals.tick_Hz:.4g} ms", rounding="rounded to nearest, 1 or more",
-                 data=("amplifier.dither_ticks", "signals.tick_Hz"), generator=OPTIONS),
+                 data=("drive_functions.dither_ticks", "signals.tick_Hz"), generator=OPTIONS),
         Define(symbol="DITHER_PERIOD", value=2 * ticks, equation="the dither's period, PWM periods",
                  engineering=f"{signals.tick_Hz / (2 * ticks):g} Hz",
-                 data=("amplifier.dither_ticks", "signals.tick_Hz"), generator=HERE),
+                 data=("drive_functions.dither_ticks", "signals.tick_Hz"), generator=HERE),
     ]  # fmt: skip

@@ -24,7 +24,7 @@ from dzdesign.codegen.core.signal_constants import SignalConstants
 from dzdesign.codegen.core.table_form import TableForm, table_form
 from dzdesign.derivation.law import law
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.drive import RAMP_UNIT
+from dzdesign.design.drive_functions import RAMP_UNIT
 from dzdesign.design.signals import WEIGHT_SHIFT
 
 #: What a template prints: texts, and objects of `design` and of this room whose fields it prints.
@@ -40,17 +40,7 @@ TABLE_COLUMNS = 2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CoreFile:
-    """One file of the core.
-
-    Attributes
-    ----------
-    template : str
-        Name of its template.
-    values : mapping
-        What the template prints.
-    constants : tuple of Constant
-        Those that are printed into it, for the manifest.
-    """
+    """One file of the core: its template, what this prints, and the constants among it, for the manifest."""
 
     template: str
     values: Values
@@ -60,12 +50,7 @@ class CoreFile:
 def core_files(compensator: Compensator, arithmetic: str) -> dict[str, CoreFile]:
     """Return every file of the core, by its name.
 
-    Parameters
-    ----------
-    compensator : Compensator
-        The law in rationals.
-    arithmetic : {"wide", "narrow"}
-        Products of 32 by 32 to 64 bits, or arithmetic of 32 bits only.
+    The arithmetic is "wide", with products of 32 by 32 to 64 bits, or "narrow", of 32 bits only.
     """
     sources = {CORE_SOURCES[sign]: _law_source(compensator, sign, arithmetic) for sign in compensator.signals.signs}
     return {
@@ -85,7 +70,7 @@ def _law_source(compensator: Compensator, sign: int, arithmetic: str) -> CoreFil
     signals, steps, integers = of_signals.signals(), of_signals.steps(), of_law.arithmetic()
     rows = table_form(form, step, arithmetic)
     tables = [of_law.table(False, rows)] + ([of_law.table(True, rows)] if form.zero_table else [])
-    side, transition = compensator.side(sign), compensator.edge_codes
+    side, transition = compensator.side(sign), compensator.transition_codes
     suffix = "" if sign > 0 else "_negative"
     values = {
         **_law_words(compensator),
@@ -101,7 +86,7 @@ def _law_source(compensator: Compensator, sign: int, arithmetic: str) -> CoreFil
         "rows": rows,
         "unit": of_law.unit,
         "guard": side.certificate.guard,
-        "kappa_text": f"{_rational(side.k_x_max_over_u_max)}, {KAPPA_ROUNDING}",
+        "kappa_text": f"{_rational(side.drive_range_over_u_max)}, {KAPPA_ROUNDING}",
         "u_min0_text": f"{_rational(side.u_min0_over_u_max)}, {U_MIN0_ROUNDING}",
         "transition_share": f"{transition / compensator.signals.command.span(sign):.2%}",
         "segment_count": len(tables[0].value) - 1,
@@ -151,20 +136,20 @@ def _drive_header(compensator: Compensator) -> CoreFile:
 
 def _law_words(compensator: Compensator) -> Values:
     """Return what source and header print of the law."""
-    chosen = law(compensator.law_name)
+    chosen = law(compensator.law)
     return {
         "signals": compensator.signals,
         "u_max_V": f"{float(compensator.u_max_V):g}",
         "bipolar": compensator.negative is not None,
         "law_text": str(chosen.output).replace("**", "^"),
         "law_equation": equation_of(chosen),
-        "transition_codes": compensator.edge_codes,
+        "transition_codes": compensator.transition_codes,
     }
 
 
 def _drive_words(compensator: Compensator) -> Values:
     """Return what source and header print of the drive functions."""
-    functions, signals = compensator.amplifier, compensator.signals
+    functions, signals = compensator.drive_functions, compensator.signals
     return {
         "bipolar": compensator.negative is not None,
         "ramp": functions.has_ramp,

@@ -113,16 +113,16 @@ def integer_form(compensator: Compensator, sign: int = 1) -> IntegerForm:
     divisor, shift, common = _denominator(terms)
     slope, offset, linear, transition = (int(value * common) for value in terms)
     span = c.signals.command.span(sign)
-    scale_beta = _share((slope, offset, transition), (abs(slope) * span, abs(offset), transition * c.edge_codes))
+    scale_beta = _share((slope, offset, transition), (abs(slope) * span, abs(offset), transition * c.transition_codes))
     linear, linear_shift = _odd_part(linear)
     asked = _largest_quotient(compensator, sign, divisor)
     if asked > INT32_MAX:
         raise InputError(f"the law's quotient by {divisor} needs more than 31 bits; choose other scalings")
-    largest = (c.amplifier.compare_limit + 1) * divisor - 1
+    largest = (c.drive_functions.compare_limit + 1) * divisor - 1
     reciprocal, reciprocal_shift = _exact_reciprocal(divisor, largest)
     form = IntegerForm(
-        table=_table(side.law_numerators, scale_beta),
-        zero_table=_table(side.beta_numerators, scale_beta) if c.edge_codes else (),
+        table=_table(side.law_beta, scale_beta),
+        zero_table=_table(side.beta, scale_beta) if c.transition_codes else (),
         scale_beta=scale_beta,
         slope=slope // scale_beta,
         offset=offset // scale_beta,
@@ -157,9 +157,9 @@ def _terms(compensator: Compensator, sign: int) -> _Terms:
 
     def line(beta: int) -> Line:
         return evaluate_line(
-            law(c.law_name),
+            law(c.law),
             beta=beta,
-            kappa=side.k_x_max_over_u_max,
+            kappa=side.drive_range_over_u_max,
             u_min0_over_u_max=side.u_min0_over_u_max,
             n_adc=c.signals.command.span(sign),
             n_full=c.signals.compare_max,
@@ -168,7 +168,7 @@ def _terms(compensator: Compensator, sign: int) -> _Terms:
     without, whole = line(beta=0), line(beta=1)
     beta_unit = c.beta_denominator * c.beta_step_codes
     per_transition_code = Fraction(0)
-    if c.edge_codes:  # what one unit of the gap lowers at zero command, over the transition's codes
+    if c.transition_codes:  # what one unit of the gap lowers at zero command, over the transition's codes
         lowered = evaluate_transition(
             beta_opening=1,
             beta_closing=0,
@@ -176,7 +176,7 @@ def _terms(compensator: Compensator, sign: int) -> _Terms:
             share_of_transition=0,
             n_full=c.signals.compare_max,
         )
-        per_transition_code = lowered / beta_unit / c.edge_codes
+        per_transition_code = lowered / beta_unit / c.transition_codes
     return _Terms(
         per_command=(whole.slope - without.slope) / beta_unit,
         constant=(whole.start - without.start) / beta_unit,
@@ -218,7 +218,7 @@ def _largest_quotient(compensator: Compensator, sign: int, divisor: int) -> int:
     codes = [index * c.beta_step_codes for index in range(c.nodes(sign) - 1)]
     codes += [c.signals.largest_difference(sign), -c.reverse_codes - 1]
     # Along the command it is straight but for the transition's end.
-    corners = {0, min(c.edge_codes, command.span(sign)), command.span(sign)}
+    corners = {0, min(c.transition_codes, command.span(sign)), command.span(sign)}
     commands = [command.zero_code + command.direction(sign) * corner for corner in corners]
     values = [c.drive(code, dp_code, sign) for dp_code in codes for code in commands]
     if min(values) < 0:
@@ -276,7 +276,7 @@ def _prove_widths(form: IntegerForm, compensator: Compensator, sign: int) -> Non
     gap = beta if form.zero_table else 0
     inner = max(abs(form.offset), abs(form.slope * span + form.offset))
     straight = form.linear * span << form.linear_shift
-    lowering = form.transition * compensator.edge_codes
+    lowering = form.transition * compensator.transition_codes
     checks = {
         "the interpolated table": (beta, INT32_MAX),
         "slope times command": (abs(form.slope) * span, INT32_MAX),

@@ -55,7 +55,7 @@ class LawConstants:
         segments = segments_of(numerators, c.beta_step_codes)
         unit = form.scale_beta * c.beta_denominator
         low, high = (end(numerators[:-2]) / unit for end in (min, max))
-        key = "edge_beta" if form.zero_table and not at_zero else "beta"
+        key = "transition_beta" if form.zero_table and not at_zero else "beta"
         guard = c.side(self.sign).certificate.guard
         what = f"certified beta of the {guard} threshold" if at_zero else "beta of the law"
         return Table(
@@ -97,10 +97,10 @@ class LawConstants:
     def _factor(self) -> list[Define]:
         """Return what beta multiplies, by command and alone, and what the transition takes away."""
         c, form, side = self.compensator, self.form, self.compensator.side(self.sign)
-        chosen = law(c.law_name)
+        chosen = law(c.law)
         equation = equation_of(chosen)
-        kappa, u_min0 = side.k_x_max_over_u_max, side.u_min0_over_u_max
-        kappa_key, u_min0_key = f"{self.key}.k_x_max_over_u_max", f"{self.key}.u_min0_over_u_max"
+        kappa, u_min0 = side.drive_range_over_u_max, side.u_min0_over_u_max
+        kappa_key, u_min0_key = f"{self.key}.drive_range_over_u_max", f"{self.key}.u_min0_over_u_max"
         u_min0_text = f"u_min0/u_max = {u_min0}, {U_MIN0_ROUNDING}"
         found = []
         size = ", its size" if self.narrow and form.slope < 0 else ""
@@ -134,8 +134,8 @@ class LawConstants:
                     "TRANSITION_FACTOR",
                     form.transition,
                     "transition, coefficient of (beta - beta_zero) in u_O, for each code of command missing to its end",
-                    f"u_min0/{c.edge_codes} = {self._volts(form.transition * self.unit):.6g} V",
-                    (u_min0_key, "edge_codes", "u_max_V", *SCALED),
+                    f"u_min0/{c.transition_codes} = {self._volts(form.transition * self.unit):.6g} V",
+                    (u_min0_key, "transition_codes", "u_max_V", *SCALED),
                     rounding=f"exact from {u_min0_text}",
                 )
             )
@@ -147,10 +147,10 @@ class LawConstants:
         if not form.linear:
             return []
         total = form.linear << form.linear_shift
-        chosen = law(c.law_name)
+        chosen = law(c.law)
         equation = f"{equation_of(chosen)}, coefficient of u_i alone in u_O"
         engineering = f"{self._per_volt(total):.6f}"
-        kappa = (f"{self.key}.k_x_max_over_u_max",) if chosen.gain_by_beta(0).has(k) else ()
+        kappa = (f"{self.key}.drive_range_over_u_max",) if chosen.gain_by_beta(0).has(k) else ()
         data = (*kappa, *SCALED)
         high, low = divmod(total, 1 << 32)
         if low == 0:
@@ -197,13 +197,13 @@ class LawConstants:
 
     def _limit(self) -> Define:
         form, c = self.form, self.compensator
-        limit = c.amplifier.compare_limit
+        limit = c.drive_functions.compare_limit
         return self._constant(
             "QUOTIENT_LIMIT",
             form.largest,
             f"largest quotient whose compare value is DZ_COMPARE_LIMIT, ({limit} + 1) * {form.divisor} - 1",
             f"{limit / c.signals.compare_max * float(c.u_max_V):.4g} V",
-            ("amplifier.compare_limit", "signals.compare_max", "u_max_V"),
+            ("drive_functions.compare_limit", "signals.compare_max", "u_max_V"),
         )
 
     def _reciprocal(self) -> list[Define]:

@@ -116,7 +116,7 @@ class SignalConstants:
     def steps(self) -> list[Define]:
         """Return what finds a segment of the tables, and the transition's length."""
         c = self.compensator
-        step, transition = c.beta_step_codes, c.edge_codes
+        step, transition = c.beta_step_codes, c.transition_codes
         width = f"{float(c.signals.dp_MPa(step)):.4f} MPa"
         data = ("beta_step_codes",)
         found = [
@@ -131,7 +131,8 @@ class SignalConstants:
             found.append(
                 Define(symbol="TRANSITION_CODES", value=transition,
                      equation="codes of command that the transition takes, u_transition",
-                         engineering=f"{share:.2%} of command, {share * float(c.u_max_V):.4g} V", data=("edge_codes",),
+                         engineering=f"{share:.2%} of command, {share * float(c.u_max_V):.4g} V",
+                         data=("transition_codes",),
                          rounding="the power of two below what was asked for",
                          generator="design/dzdesign/design/options.py")
             )  # fmt: skip

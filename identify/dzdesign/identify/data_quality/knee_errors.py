@@ -9,8 +9,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from dzdesign.identify.knees.characteristic import BranchShape
-from dzdesign.identify.knees.prepared_tests import DescribedTest
+from dzdesign.identify.knees.branch_shape import BranchShape
+from dzdesign.identify.knees.described_tests import DescribedTest
 from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.ramp_result import TestResult
 from dzdesign.identify.valve.side_model import SideModel
@@ -41,9 +41,8 @@ def about_errors(
     """
     if all(test.u_knee_se_V <= NOISY * u_max for test in side.tests):
         return
-    shapes = [[shape for shape in item.shapes if shape] for item in tests]
-    left = _left_without_the_bend([shape for group in shapes for shape in group if _has_noise(shape)])
-    for test, group in zip(side.tests, shapes, strict=True):
+    left = _left_without_the_bend([shape for item in tests for shape in item.branches if _has_noise(shape)])
+    for test, group in zip(side.tests, (item.branches for item in tests), strict=True):
         if test.u_knee_se_V <= NOISY * u_max:
             continue
         if not any(map(_has_noise, group)):
@@ -65,15 +64,15 @@ def _left_without_the_bend(shapes: Sequence[BranchShape]) -> float:
     if len(shapes) < 2 or count < FEWEST_PARTS:
         return 1.0
     departures = np.array([_departures(shape, count) for shape in shapes])
-    own = departures - departures.mean(axis=0)
+    not_common = departures - departures.mean(axis=0)
     every = float(np.sum(departures**2)) * (len(shapes) - 1) / len(shapes)
-    return min(float(np.sqrt(np.sum(own**2) / every)), 1.0) if every > 0 else 1.0
+    return min(float(np.sqrt(np.sum(not_common**2) / every)), 1.0) if every > 0 else 1.0
 
 
 def _departures(shape: BranchShape, count: int) -> np.ndarray:
     """Return the means of the departures from a branch's line in parts of it, over the flow of the straight part."""
     line, seen = shape.line, shape.line.kept & ~shape.line.censored
-    u, y = shape.read.branch.u[seen], shape.read.y[seen]
+    u, y = shape.prepared.branch.u[seen], shape.prepared.y[seen]
     order = np.argsort(u, kind="stable")
     residual = (y - line.slope * (u - line.knee))[order] / (line.slope * np.ptp(u))
     return np.array([part.mean() for part in np.array_split(residual, count)])

@@ -41,6 +41,34 @@ FALLS, GROWS_TOO_LITTLE, GROWS_TOO_MUCH = 0.9, 2.5, 1.75
 WHAT_FOLLOWS = "Thresholds may be assigned to wrong pressure drops, so the certificate may not hold"
 
 
+def about_mixed_pressures(tests: Sequence[RampTest]) -> tuple[Warning_, ...]:
+    """Return what tells that recordings of several pressure drops pass for one: a stuck sensor, or else their flows.
+
+    Parameters
+    ----------
+    tests : sequence of RampTest
+        Of one side, its commands and flows positive.
+    """
+    return tuple(about_a_stuck_sensor(tests)) or tuple(about_mixtures(tests))
+
+
+def about_single_pressures(tests: Sequence[RampTest], mixed: Sequence[Warning_]) -> tuple[Warning_, ...]:
+    """Return what is weak in the pressure drop of single recordings; of a stuck one not that it was typed in.
+
+    Parameters
+    ----------
+    tests : sequence of RampTest
+        Of one side, its commands and flows positive.
+    mixed : sequence of Warning_
+        Of `about_mixed_pressures`: beside a stuck sensor there is nothing more to say.
+    """
+    if any(item.code == "pressure-stuck" for item in mixed):
+        return ()
+    stuck = tuple(about_stuck_recordings(tests))
+    known = {item.source for item in stuck}
+    return (*stuck, *(item for item in about_typed_pressures(tests) if item.source not in known))
+
+
 def about_a_stuck_sensor(tests: Sequence[RampTest]) -> Iterator[Warning_]:
     """Yield a warning if the recordings of one side show one pressure drop, noise aside, and must have several.
 
@@ -114,9 +142,9 @@ def about_stuck_recordings(tests: Sequence[RampTest]) -> Iterator[Warning_]:
     """
     scatters = any(_scatters(test) for test in tests)
     for test in sorted(tests, key=lambda test: test.source):
-        if not is_one_number(test):
+        dp = _one_number(test)
+        if dp is None:
             continue
-        dp = float(test.dp[0])
         stated = contradicts(test.source.rpartition("/")[2], dp)
         signs = ["that of other recordings scatters"] if scatters and test.u.size >= ROWS else []
         signs += [f"the file's name says {stated}"] if stated else []
@@ -142,31 +170,25 @@ def about_typed_pressures(tests: Sequence[RampTest]) -> Iterator[Warning_]:
         Of one side, its commands and flows positive.
     """
     recorded = [test for test in tests if test.dp is not None and not test.dp_is_declared]
-    if not all(is_one_number(test) for test in recorded):
-        return
-    for test in sorted(recorded, key=lambda test: (float(test.dp[0]), test.source)):
+    typed = [(dp, test.source) for test in recorded if (dp := _one_number(test)) is not None]
+    for dp, source in sorted(typed) if len(typed) == len(recorded) else ():
         yield Warning_(
             code="declared-pressure",
             text=(
-                f"the pressure drop is {float(test.dp[0]) / MPA:.6g} MPa in every row: typed in, not measured "
+                f"the pressure drop is {dp / MPA:.6g} MPa in every row: typed in, not measured "
                 "(or the sensor is too coarse to show anything): if it sags under flow, the knee is found too low "
                 "(21 mV for 5 % on a 10 V valve like the example's). Record what a sensor reads"
             ),
-            source=test.source,
+            source=source,
         )
 
 
-def is_one_number(test: RampTest) -> bool:
-    """Tell whether a recorded pressure drop is one number to the last digit.
-
-    Parameters
-    ----------
-    test : RampTest
-        One whose pressure drop was declared, or is unknown, says nothing.
-    """
+def _one_number(test: RampTest) -> float | None:
+    """Return a recorded pressure drop (Pa) that is one number to the last digit; None if it is not, or was declared."""
     if test.dp is None or test.dp_is_declared or test.dp.size < 2:
-        return False
-    return float(np.ptp(test.dp)) <= ONE_NUMBER * abs(float(test.dp[0]))
+        return None
+    first = float(test.dp[0])
+    return first if float(np.ptp(test.dp)) <= ONE_NUMBER * abs(first) else None
 
 
 def _scatters(test: RampTest) -> bool:
@@ -212,7 +234,9 @@ def _at_one_pressure(tests: Sequence[RampTest]) -> Iterator[tuple[float, list[Ra
     """
     steady = []
     for test in tests:
-        shut = test.dp[test.u <= SHUT * test.u.max()] if test.dp is not None else np.empty(0)
+        if test.dp is None:
+            continue
+        shut = test.dp[test.u <= SHUT * test.u.max()]
         low, dp, high = np.quantile(shut, [0.05, 0.5, 0.95]) if shut.size else (0.0, 0.0, 0.0)
         if 0 < high < APART * low:
             at_nominal = np.sqrt(dp / np.maximum(test.dp, SMALL_FLOW * dp))

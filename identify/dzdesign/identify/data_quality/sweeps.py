@@ -5,8 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from dzdesign.identify.constants import L_MIN
-from dzdesign.identify.knees.characteristic import BranchShape
-from dzdesign.identify.knees.prepared_tests import DescribedTest
+from dzdesign.identify.knees.branch_shape import BranchShape
+from dzdesign.identify.knees.described_tests import DescribedTest
 from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.ramp_result import TestResult
 from dzdesign.identify.valve.side_model import SideModel
@@ -102,7 +102,7 @@ def _about_the_command(test: TestResult, item: DescribedTest, guard: str, u_max:
             text=f"the command reaches {top:.2f} V of {u_max:g} V, so k x_max is too small",
             source=test.source,
         )
-    lowest = float(item.branches[1 if guard == "closing" else 0].u.min())
+    lowest = float(item.branch(1 if guard == "closing" else 0).prepared.branch.u.min())
     if lowest > test.u_guard_V:
         yield Warning_(
             code="edge-not-swept",
@@ -116,10 +116,12 @@ def _about_the_command(test: TestResult, item: DescribedTest, guard: str, u_max:
 
 
 def _about_the_flow(test: TestResult, item: DescribedTest) -> Iterator[Warning_]:
-    shapes = [shape for shape in item.shapes if shape]
+    shapes = item.branches
     largest, at_top, noise = (
         float(np.mean(values))
-        for values in zip(*((shape.read.profile[1].max(), shape.y_max, shape.sigma) for shape in shapes), strict=True)
+        for values in zip(
+            *((shape.prepared.profile[1].max(), shape.y_max, shape.sigma) for shape in shapes), strict=True
+        )
     )
     if largest - at_top > max(FLOW_FALLS * largest, FALL_SIGNIFICANCE * noise):
         yield Warning_(
@@ -158,5 +160,5 @@ def _about_the_flow(test: TestResult, item: DescribedTest) -> Iterator[Warning_]
 
 def _missing_at_full_drive(shape: BranchShape) -> float:
     """Return which share of the largest flow is missing at the law's full drive, where the line would reach it."""
-    u, y = shape.read.profile
+    u, y = shape.prepared.profile
     return 1.0 - float(np.interp(shape.knee + shape.y_max / shape.slope, u, y)) / shape.y_max

@@ -1,9 +1,11 @@
-"""From thresholds with errors to what can be certified: trend, simultaneous lower bounds, staircase."""
+"""From thresholds with errors to what can be certified: trend and simultaneous lower bounds."""
 
 import math
 from dataclasses import dataclass
 
 import numpy as np
+
+from dzdesign.identify.valve.staircase import Direction
 
 #: Probability, of a flat valve, of a change as large as the one found: a trend is called only below this.
 TREND_SIGNIFICANCE = 0.01
@@ -19,14 +21,14 @@ class Trend:
 
     Attributes
     ----------
-    direction : {"decreasing", "increasing", "flat"}
+    direction : {"decreasing", "flat", "increasing"}
     change, change_se : float
         Over the tested range, by a weighted straight line, and the standard error, V; NaN from one test.
     p_value : float
         Probability of so large a change, either way, if the threshold were flat (Student); NaN from one test.
     """
 
-    direction: str
+    direction: Direction
     change: float
     change_se: float
     p_value: float
@@ -57,7 +59,7 @@ def find_trend(dp: np.ndarray, threshold: np.ndarray, se: np.ndarray, u_max: flo
     change_se = float(np.ptp(dp) / np.sqrt(spread))
     p_value = float(2 * stdtr(DEGREES_OF_FREEDOM, -abs(change) / change_se))
     flat = abs(change) < budget or p_value > TREND_SIGNIFICANCE
-    direction = "flat" if flat else "decreasing" if change < 0 else "increasing"
+    direction: Direction = "flat" if flat else "decreasing" if change < 0 else "increasing"
     return Trend(direction=direction, change=change, change_se=change_se, p_value=p_value)
 
 
@@ -90,39 +92,5 @@ def lower_bounds(threshold: np.ndarray, se: np.ndarray, confidence: float, budge
     from scipy.special import stdtrit
 
     quantile = stdtrit(DEGREES_OF_FREEDOM, 1 - (1 - confidence) / threshold.size)
-    return threshold - quantile * se - budget
-
-
-def staircase(bound: np.ndarray, trend: str) -> tuple[np.ndarray, np.ndarray]:
-    """Turn bounds at the tests into bounds on the whole interval, by monotonicity alone.
-
-    A threshold that falls with the pressure drop is, anywhere between two tests, at least the upper test's bound; one
-    that rises, at least the lower test's. Chords between the bounds would not be safe: a convex threshold lies below
-    its chords.
-
-    Parameters
-    ----------
-    bound : (T,) array
-        Lower bounds at the tests, in the order of rising pressure drop.
-    trend : {"decreasing", "increasing", "flat"}
-        "flat" assumes no direction: the lowest bound holds everywhere.
-
-    Returns
-    -------
-    tuple
-        steps : (T - 1,) array, bound on each closed interval between neighbouring tests; ceiling : (T,) array, the
-        largest offset at each test such that straight chords stay under the steps on both sides.
-    """
-    if trend == "decreasing":
-        tightened = np.maximum.accumulate(bound[::-1])[::-1]
-        steps = tightened[1:]
-    elif trend == "increasing":
-        tightened = np.maximum.accumulate(bound)
-        steps = tightened[:-1]
-    else:
-        tightened = np.full_like(bound, bound.min())
-        steps = tightened[1:]
-    ceiling = tightened.copy()
-    ceiling[:-1] = np.minimum(ceiling[:-1], steps)
-    ceiling[1:] = np.minimum(ceiling[1:], steps)
-    return steps, ceiling
+    bounds: np.ndarray = threshold - quantile * se - budget
+    return bounds

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dzdesign.identify.knees.characteristic import BranchShape
+from dzdesign.identify.knees.branch_shape import BranchShape
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 ONE_AT_A_TIME = Lock()
 #: Unknowns and constraints are in standard errors, so nothing is left to scale. Bounds are not relaxed, or knees would
 #: run the wrong way. Slack times multiplier is met as tightly as the rest: IPOPT's own 1e-4 leaves knees 1e-5 V off.
-IPOPT = {
+Settings = dict[str, bool | int | float | str]
+IPOPT: Settings = {
     "print_time": False,
     "ipopt.print_level": 0,
     "ipopt.sb": "yes",
@@ -31,7 +32,7 @@ IPOPT = {
     "ipopt.nlp_scaling_method": "none",
 }
 #: For a convex problem of a few unknowns in mV: to a millionth of a microvolt, and no bound overstepped.
-EXACT = {"ipopt.tol": 1e-12, "ipopt.bound_relax_factor": 0.0, "ipopt.mu_strategy": "adaptive"}
+EXACT: Settings = {"ipopt.tol": 1e-12, "ipopt.bound_relax_factor": 0.0, "ipopt.mu_strategy": "adaptive"}
 #: Numbers of a branch beside its censored bins: see `branch_numbers`.
 NUMBERS = 9
 #: Standard deviations from which the normal distribution's tail is a continued fraction, exact to 1e-13 with this many

@@ -1,7 +1,7 @@
 """The constrained fits in CasADi: knees and slopes of all ramp tests jointly; the offset curve under its bounds."""
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -10,7 +10,8 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.fitting.casadi_problems import ONE_AT_A_TIME, branch_numbers, offset_solver, solver_with_numbers
-from dzdesign.identify.knees.characteristic import BranchShape
+from dzdesign.identify.knees.branch_shape import BranchShape
+from dzdesign.identify.valve.staircase import Direction
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -47,11 +48,11 @@ class KneeFit:
 
 
 def fit_knees(
-    shapes: list[tuple[BranchShape | None, BranchShape | None]],
+    shapes: Sequence[tuple[BranchShape | None, BranchShape | None]],
     *,
     floor: float,
     u_max: float,
-    trend: str,
+    trend: Direction,
     ordered: int = 1,
 ) -> KneeFit:
     """Fit knees and slopes of all ramp tests jointly, the knees monotone in the pressure drop.
@@ -77,47 +78,47 @@ def fit_knees(
     InputError
         If the solver does not converge.
     """
-    where = [(row, column) for row, pair in enumerate(shapes) for column, shape in enumerate(pair) if shape]
-    mine = [shapes[row][column] for row, column in where]
-    scales = [_expected_errors(shape) for shape in mine]
-    numbers = [branch_numbers(shape, scale, floor, u_max) for shape, scale in zip(mine, scales, strict=True)]
-    chain = tuple(index for index, (_, column) in enumerate(where) if column == ordered and trend != "flat")
-    order = _order_knees(mine, scales, chain if len(chain) > 1 else (), increasing=trend == "increasing")
+    placed = [(row, column, shape) for row, pair in enumerate(shapes) for column, shape in enumerate(pair) if shape]
+    branches = [shape for _, _, shape in placed]
+    scales = [_expected_errors(shape) for shape in branches]
+    numbers = [branch_numbers(shape, scale, floor, u_max) for shape, scale in zip(branches, scales, strict=True)]
+    chain = tuple(index for index, (_, column, _) in enumerate(placed) if column == ordered and trend != "flat")
+    order = _order_knees(branches, scales, chain if len(chain) > 1 else (), increasing=trend == "increasing")
     with ONE_AT_A_TIME:
         solver, known = solver_with_numbers(numbers, order.chain, order.steps)
         solution = solver(x0=order.start, p=known, lbg=0.0, ubg=np.inf)
-        said = solver.stats()
+        outcome = solver.stats()
         best, slack = np.asarray(solution["x"]).ravel(), np.asarray(solution["g"]).ravel() * order.unit
         hessian = _hessian_of_cost(solver, best, known)
-    _log("knees", said)
-    if not said["success"]:
+    _log("knees", outcome)
+    if not outcome["success"]:
         raise InputError(
-            f"the joint fit did not converge ({said['return_status']}); "
+            f"the joint fit did not converge ({outcome['return_status']}); "
             "look at the ramp tests, and leave out the one that is unlike the others"
         )
     variance = np.diag(np.linalg.inv(hessian))
     knee, knee_se, slope = (np.full((len(shapes), 2), np.nan) for _ in range(3))
-    for index, ((row, column), shape, (slope_scale, knee_scale)) in enumerate(zip(where, mine, scales, strict=True)):
-        last = len(where) + index
+    for index, ((row, column, shape), (slope_scale, knee_scale)) in enumerate(zip(placed, scales, strict=True)):
+        last = len(placed) + index
         knee[row, column] = shape.knee + best[last] * knee_scale
-        knee_se[row, column] = np.sqrt(variance[last] * shape.colour) * knee_scale
+        knee_se[row, column] = np.sqrt(variance[last] * shape.variance_inflation) * knee_scale
         slope[row, column] = (1 + best[index] * slope_scale) * shape.slope
     return KneeFit(
         knee=knee,
         knee_se=knee_se,
         slope=slope,
         active=tuple(
-            f"{'falling' if ordered else 'rising'} knee of test {where[index][0] + 1} to {where[following][0] + 1}"
+            f"{'falling' if ordered else 'rising'} knee of test {placed[index][0] + 1} to {placed[following][0] + 1}"
             for (index, following), gap in zip(pairwise(order.chain), slack, strict=True)
             if gap < ACTIVE * u_max
         ),
-        iterations=int(said["iter_count"]),
+        iterations=int(outcome["iter_count"]),
     )
 
 
-def _log(name: str, said: Mapping[str, Any]) -> None:
-    status, seconds = said["return_status"], said.get("t_wall_total", 0.0)
-    logger.debug("%s: %s after %d iterations, %.3f s", name, status, said.get("iter_count", 0), seconds)
+def _log(name: str, outcome: Mapping[str, Any]) -> None:
+    status, seconds = outcome["return_status"], outcome.get("t_wall_total", 0.0)
+    logger.debug("%s: %s after %d iterations, %.3f s", name, status, outcome.get("iter_count", 0), seconds)
 
 
 def _hessian_of_cost(solver: "ca.Function", at: np.ndarray, known: np.ndarray) -> np.ndarray:
@@ -157,12 +158,12 @@ def _order_knees(
     start = np.zeros(2 * len(shapes))
     if not chain:
         return _Order(chain, start, np.zeros(0), np.zeros((0, 3)))
-    mine, slots = [shapes[index] for index in chain], np.array(chain)
+    chained, slots = [shapes[index] for index in chain], np.array(chain)
     slope_scale, knee_scale = np.array([scales[index] for index in chain]).T
-    steeper, later = _ordered_start(mine, increasing=increasing)
+    steeper, later = _ordered_start(chained, increasing=increasing)
     start[slots], start[len(shapes) + slots] = steeper / slope_scale, later / knee_scale
     unit = np.maximum(knee_scale[1:], knee_scale[:-1])  # a standard error, of the worse of the two
-    steps = np.array([np.diff([shape.knee for shape in mine]), knee_scale[1:], -knee_scale[:-1]]) / unit
+    steps = np.array([np.diff([shape.knee for shape in chained]), knee_scale[1:], -knee_scale[:-1]]) / unit
     return _Order(chain, start, unit, (steps if increasing else -steps).T)
 
 
@@ -241,14 +242,14 @@ def fit_offset(
     with ONE_AT_A_TIME:
         solver = offset_solver(guard.size)
         solution = solver(x0=0.1, p=known, lbx=0.0, lbg=low, ubg=high)
-        said = solver.stats()
+        outcome = solver.stats()
         slack = np.maximum(np.asarray(solution["x"]).ravel(), 0.0) / 1e3
-    _log("offset", said)
+    _log("offset", outcome)
     found = ceiling - slack
     wrong_way = {"decreasing": np.diff(found), "increasing": -np.diff(found), "flat": np.abs(np.diff(found))}[trend]
-    if not said["success"] or np.any(wrong_way > 2 * ACTIVE * u_max):
+    if not outcome["success"] or np.any(wrong_way > 2 * ACTIVE * u_max):
         raise InputError(
-            f"beta(dP) could not be fitted under its bounds ({said['return_status']}); "
+            f"beta(dP) could not be fitted under its bounds ({outcome['return_status']}); "
             "check that the ramp tests belong to one valve"
         )
     return OffsetFit(u_min0=float(found[reference]), beta=found / found[reference], active=slack < ACTIVE * u_max)

@@ -8,14 +8,15 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.constants import MPA
-from dzdesign.identify.fitting.bounds import excess_departure, lower_bounds, staircase
+from dzdesign.identify.fitting.bounds import excess_departure, lower_bounds
 from dzdesign.identify.fitting.constrained_fits import KneeFit, fit_knees, fit_offset
-from dzdesign.identify.fitting.guard_curve import GuardCurve, OpeningCurve
-from dzdesign.identify.knees.prepared_tests import DescribedTests
+from dzdesign.identify.knees.described_tests import DescribedTests
 from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.valve.guard_curve import Guard, GuardCurve, OpeningCurve
+from dzdesign.identify.valve.staircase import Direction, staircase
 
 #: Branch (column of the fit) whose threshold a guard protects; "mean" is of both.
-COLUMNS = {"opening": 0, "closing": 1}
+COLUMNS: dict[Guard, int] = {"opening": 0, "closing": 1}
 #: Standard errors by which the tail's zero must lie below the knee, in one test or in all together, to be taken for a
 #: soft edge. At 3 one sharp valve in a hundred was, and beta(5 MPa) scattered by 7e-4 instead of 2.6e-4; which soft
 #: edges are found hardly changes (a width of 0.6 V always is, with any meter).
@@ -66,7 +67,13 @@ class Threshold:
 
 
 def order_knees(
-    group: DescribedTests, free: KneeFit, direction: str, column: int, options: IdentifyOptions, *, alone: bool = False
+    group: DescribedTests,
+    free: KneeFit,
+    direction: Direction,
+    column: int,
+    options: IdentifyOptions,
+    *,
+    alone: bool = False,
 ) -> OrderedKnees:
     """Fit the knees again under the trend's direction, and see how far they depart from it.
 
@@ -99,7 +106,7 @@ def order_knees(
         return OrderedKnees(column=column, fit=free, departure=departure)
     shapes = [item.shapes for item in group.tests]
     if alone:
-        shapes = [tuple(shape if place == column else None for place, shape in enumerate(pair)) for pair in shapes]
+        shapes = [(None, falling) if column else (rising, None) for rising, falling in shapes]
     fit = fit_knees(shapes, floor=group.floor, u_max=options.u_max, trend=direction, ordered=column)
     departure = excess_departure(np.abs(knee - fit.knee[:, column]), knee_se, budget)
     return OrderedKnees(column=column, fit=fit, departure=departure)
@@ -107,13 +114,14 @@ def order_knees(
 
 def bound_threshold(group: DescribedTests, knees: OrderedKnees, options: IdentifyOptions) -> Threshold:
     """Bound the knee, or the tail's zero where that lies below the knee by more than its error: a soft edge."""
-    shapes = [item.shapes[knees.column] for item in group.tests]
+    shapes = [item.branch(knees.column) for item in group.tests]
     knee, knee_se = knees.knee, knees.knee_se
     zero = np.array([shape.tail.zero for shape in shapes])
     zero_se = np.array([shape.tail.zero_se for shape in shapes])
     shared = knees.departure.max() + _lag_budget(group, knees.column)
     # What was subtracted as the meter's zero has an error of its own, which moves all readings of a test together.
-    subtracted = np.array([se * math.sqrt(shape.colour) for se, shape in zip(group.zero_se, shapes, strict=True)])
+    inflations = [shape.variance_inflation for shape in shapes]
+    subtracted = np.array([se * math.sqrt(factor) for se, factor in zip(group.zero_se, inflations, strict=True)])
     knee_se = np.hypot(knee_se, subtracted / [shape.slope for shape in shapes])
     zero_se = np.hypot(zero_se, subtracted / [shape.tail.slope for shape in shapes])
     # A zero error of the meter moves each zero by the error over the slope of the line that was extrapolated.
@@ -137,7 +145,7 @@ def _lag_budget(group: DescribedTests, column: int) -> float:
     """Return by how much an error of a lag that was found may have moved the guarded thresholds, V."""
     if group.lag.origin != "identified":
         return 0.0
-    rates = [item.branches[column].rate for item in group.tests]
+    rates = [item.branch(column).prepared.branch.rate for item in group.tests]
     return LAG_ERRORS * group.lag.se * float(np.nanmax(rates))
 
 
@@ -153,7 +161,7 @@ def mean_threshold(one: Threshold, other: Threshold) -> Threshold:
 
 
 def fit_guard_curve(
-    threshold: Threshold, dp: Sequence[float | None], reference: int, direction: str, u_max: float
+    threshold: Threshold, dp: Sequence[float | None], reference: int, direction: Direction, u_max: float
 ) -> tuple[GuardCurve, np.ndarray]:
     """Fit the law's offset under the staircase of one threshold's bounds.
 
@@ -182,11 +190,11 @@ def fit_guard_curve(
     """
     steps, ceiling = staircase(threshold.bound, direction)
     offset = fit_offset(threshold.value, threshold.se, ceiling, reference, u_max=u_max, trend=direction)
-    known = dp[0] is not None
+    nodes = tuple(value / MPA for value in dp if value is not None)
     curve = GuardCurve(
         u_min0_V=offset.u_min0,
-        beta_dp_MPa=tuple(value / MPA for value in dp) if known else (),
-        beta=tuple(float(value) for value in offset.beta) if known else (),
+        beta_dp_MPa=nodes,
+        beta=tuple(float(value) for value in offset.beta) if nodes else (),
         certified_steps_V=tuple(float(step) for step in steps),
         u_lower_V=tuple(float(value) for value in threshold.bound),
         u_threshold_V=tuple(float(value) for value in threshold.value),
@@ -195,7 +203,7 @@ def fit_guard_curve(
 
 
 def opening_curve(
-    rising: OrderedKnees, direction: str, guards: Mapping[str, GuardCurve], u_max: float
+    rising: OrderedKnees, direction: Direction, guards: Mapping[str, GuardCurve], u_max: float
 ) -> OpeningCurve | None:
     """Return where useful flow begins on opening, from the knees of the rising branch; None where dP is unknown.
 
@@ -217,22 +225,22 @@ def opening_curve(
     if direction == "flat":
         knee = np.full_like(knee, np.average(knee, weights=np.maximum(se, FINEST_ERROR * u_max) ** -2))
     # The larger of two curves that run one way runs that way too.
-    highest = np.max([knee, *(curve.u_offset_V for curve in guards.values())], axis=0)
+    highest = np.max([knee, *(np.array(curve.u_offset_V) for curve in guards.values())], axis=0)
     return OpeningCurve(dp_MPa=dp, u_V=tuple(map(float, highest)), u_se_V=tuple(map(float, se)))
 
 
 def further_guards(
-    thresholds: Mapping[str, Threshold],
+    thresholds: Mapping[Guard, Threshold],
     dp: Sequence[float | None],
     reference: int,
-    direction: str,
+    direction: Direction,
     u_max: float,
-) -> dict[str, GuardCurve]:
+) -> dict[Guard, GuardCurve]:
     """Fit the curves of further thresholds; one whose bounds leave no positive offset is left out.
 
     `design` then refuses that guard and says which there are, so nothing is lost without a word.
     """
-    curves = {}
+    curves: dict[Guard, GuardCurve] = {}
     for name, threshold in thresholds.items():
         try:
             curves[name], _ = fit_guard_curve(threshold, dp, reference, direction, u_max)

@@ -2,15 +2,15 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from dzdesign.identify.knees.linear_fits import find_straight_parts
-from dzdesign.identify.knees.linear_region import GATE, GatedLine, ReadBranch, colour_of_blocks, fit_line
-from dzdesign.identify.knees.noise import colour_factor, measure_roughness, robust_sigma
+from dzdesign.identify.knees.branch_shape import BranchShape, Tail
+from dzdesign.identify.knees.gated_line import GATE, GatedLine, PreparedBranch, fit_line, inflation_by_blocks
+from dzdesign.identify.knees.linear_region import find_straight_parts
+from dzdesign.identify.knees.noise import measure_roughness, robust_sigma, variance_inflation
 from dzdesign.identify.knees.profile import crossing, flow_at_top, hole_within, smooth_profile
-from dzdesign.identify.ramps.branches import Bins, bin_branch
+from dzdesign.identify.ramps.branches import bin_branch
 
 #: Standard deviations of a shut reading above which the mean of a bin is flow.
 FIRST_SEEN = 5.0
@@ -24,91 +24,14 @@ TAIL_LEVELS = 3
 TAIL_ROUNDS = 8
 
 
-@dataclass(frozen=True, slots=True)
-class Tail:
-    """What the meter sees of the edge: a line through the first flows that count.
-
-    Attributes
-    ----------
-    zero, zero_se : float
-        Its zero and the standard error, V.
-    slope : float
-        m³/(s V).
-    at_level, at_level_se : float
-        Command at which it reaches the flow that counts as flow, and the standard error, V.
-    hole : tuple of float or None
-        Commands between which rows are missing, if flow begins there, V: then `zero` is the lower of them.
-    """
-
-    zero: float
-    zero_se: float
-    slope: float
-    at_level: float
-    at_level_se: float
-    hole: tuple[float, float] | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BranchShape:
-    """One branch of one ramp test, described.
-
-    Attributes
-    ----------
-    rising : bool
-        Direction of the command.
-    bins : Bins
-        Sufficient statistics of the knee window, outliers left out (V, m³/s at the nominal pressure drop).
-    y_max : float
-        Largest flow at the nominal pressure drop, m³/s.
-    slope, knee : float
-        Start values: the straight line over the knee window, m³/(s V), and its zero, V.
-    sigma : float
-        Robust standard deviation of one sample about the line, m³/s.
-    colour : float
-        Long-run variance over variance of one sample (1 for white noise, more for coloured noise or a bent line).
-    window : tuple of float
-        Flows between which the characteristic was found straight, over the largest flow.
-    level : float
-        Flow that counts as flow, m³/s: the meter's floor, its noise or `USEFUL_FLOW`, whichever is largest.
-    tail : Tail
-        The first flows that count.
-    onset, onset_se : float
-        Where the valve opens (or closes), as far as the meter shows it, and the standard error, V.
-    saturates : bool
-        True if the flow at full command lies clearly below the straight line.
-    outliers : int
-        Samples gated out of the window.
-    dropped : float
-        Share of the samples that drop out: that read below the floor where no flow below it is credible.
-    read, line : ReadBranch, GatedLine
-        The samples that all this was read from, and which of them the line rests on.
-    """
-
-    rising: bool
-    bins: Bins
-    y_max: float
-    slope: float
-    knee: float
-    sigma: float
-    colour: float
-    window: tuple[float, float]
-    level: float
-    tail: Tail
-    onset: float
-    onset_se: float
-    saturates: bool
-    outliers: int
-    dropped: float
-    read: ReadBranch
-    line: GatedLine
-
-
-def describe_branches(reads: Sequence[ReadBranch], *, u_max: float, window: tuple[float, float]) -> list[BranchShape]:
+def describe_branches(
+    reads: Sequence[PreparedBranch], *, u_max: float, window: tuple[float, float]
+) -> list[BranchShape]:
     """Describe all branches of a valve: where the straight part lies, its line, its noise, and the tail below it.
 
     Parameters
     ----------
-    reads : sequence of ReadBranch
+    reads : sequence of PreparedBranch
         All branches of all ramp tests: one meter has read them, so they tell its noise together.
     u_max : float
         Full command, V.
@@ -128,7 +51,7 @@ def describe_branches(reads: Sequence[ReadBranch], *, u_max: float, window: tupl
 
 
 def _describe(
-    read: ReadBranch, line: GatedLine, level: float, noise: float, correlation: float, u_max: float
+    read: PreparedBranch, line: GatedLine, level: float, noise: float, correlation: float, u_max: float
 ) -> BranchShape:
     branch = read.branch
     tail = _find_tail(read, level, line, noise, correlation, u_max)
@@ -140,7 +63,7 @@ def _describe(
         slope=line.slope,
         knee=line.knee,
         sigma=line.sigma,
-        colour=line.colour,
+        variance_inflation=line.variance_inflation,
         window=line.window,
         level=level,
         tail=tail,
@@ -149,7 +72,7 @@ def _describe(
         saturates=read.y_max < 0.93 * line.slope * (branch.u.max() - line.knee),
         outliers=line.outliers,
         dropped=line.dropped,
-        read=read,
+        prepared=read,
         line=line,
     )
 
@@ -178,8 +101,8 @@ def find_meter_floor(u: np.ndarray, q: np.ndarray, u_max: float) -> float | None
     expected = density * (readings - lowest)
     gap = np.flatnonzero((np.arange(readings.size) < 0.1 * expected) & (expected > 20))
     floor = float(readings[gap[-1]]) if gap.size else 0.0
-    swept = (crossing(u_profile, q_profile, flow) for flow in (lowest, floor))
-    return None if floor and hole_within(u_profile, *swept, u_max) else floor
+    low, high = (crossing(u_profile, q_profile, flow) for flow in (lowest, floor))
+    return None if floor and hole_within(u_profile, low, high, u_max) else floor
 
 
 def _without_outliers(u: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -223,7 +146,7 @@ def _with_censored(
     return u_all, y_all
 
 
-def _find_onset(read: ReadBranch, tail: Tail, level: float, noise: float) -> tuple[float, float]:
+def _find_onset(read: PreparedBranch, tail: Tail, level: float, noise: float) -> tuple[float, float]:
     """Return where flow starts and the standard error, V: the first flow seen, or the tail's zero if that is lower.
 
     Of a noisy meter the first flow seen comes late, and the tail tells more; a quiet one shows flows far too small to
@@ -239,7 +162,7 @@ def _find_onset(read: ReadBranch, tail: Tail, level: float, noise: float) -> tup
 
 
 def _find_tail(
-    read: ReadBranch, level: float, line: GatedLine, noise: float, correlation: float, u_max: float
+    read: PreparedBranch, level: float, line: GatedLine, noise: float, correlation: float, u_max: float
 ) -> Tail:
     """Extrapolate the first flow seen to zero: the valve opens (or closes) no later than this, as far as can be seen.
 
@@ -262,11 +185,12 @@ def _find_tail(
             sigma = math.sqrt(np.sum(residual**2) / (u_tail.size - 2))
             sigma = sigma if seen.sum() == tail.sum() else max(sigma, line.sigma)  # what was filled in does not scatter
             roughness = measure_roughness(u_tail, residual)
-            colour = max(colour_of_blocks(residual, max(sigma, 1e-12)), colour_factor(correlation, roughness, sigma))
+            by_blocks = inflation_by_blocks(residual, max(sigma, 1e-12))
+            inflation = max(by_blocks, variance_inflation(correlation, roughness, sigma))
             spread = np.sum((u_tail - u_tail.mean()) ** 2)
             at_level = onset + level / tail_slope
             errors = [
-                sigma * math.sqrt((1 / u_tail.size + (u_tail.mean() - at) ** 2 / spread) * colour) / tail_slope
+                sigma * math.sqrt((1 / u_tail.size + (u_tail.mean() - at) ** 2 / spread) * inflation) / tail_slope
                 for at in (onset, at_level)
             ]
             return Tail(onset, errors[0], tail_slope, at_level, errors[1])

@@ -13,7 +13,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.constants import FULL_SWEEP
-from dzdesign.identify.knees.linear_region import lay_line, read_branch
+from dzdesign.identify.knees.gated_line import lay_line, prepare_branch
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.branches import at_nominal_pressure
 from dzdesign.identify.ramps.pooling import group_by_pressure
@@ -83,7 +83,7 @@ def _knees(group: Sequence[Ramp], rising: bool, options: IdentifyOptions) -> tup
             y = at_nominal_pressure(branch, nominal_dp(ramp.test))
             floor = options.meter_floor or 0.0
             try:
-                read = read_branch(branch, y, u_max=options.u_max, floor=floor, source=ramp.test.source)
+                read = prepare_branch(branch, y, u_max=options.u_max, floor=floor, source=ramp.test.source)
                 line = lay_line(read, options.knee_window)
             except InputError:
                 continue

@@ -122,7 +122,7 @@ def one_error_slower(correlation: float, roughness: Sequence[Roughness]) -> floa
     return max(correlation, 1 - max(slower, LONGEST_MEMORY / longest))
 
 
-def colour_factor(correlation: float, roughness: Roughness, sigma: float) -> float:
+def variance_inflation(correlation: float, roughness: Roughness, sigma: float) -> float:
     """Return the variance of a line's parameters over what white noise of the residuals' size would give.
 
     Parameters

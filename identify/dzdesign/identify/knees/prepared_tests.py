@@ -1,20 +1,23 @@
 """Ramp tests made comparable: zero error out, branches apart, at the nominal pressure drop, in order, described."""
 
+import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.constants import FULL_SWEEP, L_MIN
-from dzdesign.identify.knees.characteristic import BranchShape, describe_branches, find_meter_floor
-from dzdesign.identify.knees.linear_region import ReadBranch, read_branch
-from dzdesign.identify.knees.meter_lag import MeterLag, find_lag
+from dzdesign.identify.knees.branch_shape import BranchShape
+from dzdesign.identify.knees.characteristic import describe_branches, find_meter_floor
+from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
+from dzdesign.identify.knees.gated_line import PreparedBranch, prepare_branch
+from dzdesign.identify.knees.meter_lag import find_lag
 from dzdesign.identify.knees.noise import robust_sigma
 from dzdesign.identify.knees.profile import flow_at_top, smooth_profile
 from dzdesign.identify.knees.refusals import refuse_a_jump, refuse_a_shut_valve, refuse_a_wrong_pressure
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.ramps.branches import Branch, at_nominal_pressure
+from dzdesign.identify.ramps.branches import at_nominal_pressure
 from dzdesign.identify.ramps.pooling import PooledTest, pool_ramps
 from dzdesign.identify.ramps.splitting import Ramp, despiked, nominal_dp, split_ramps
 from dzdesign.identify.reading.ramp_test import RampTest
@@ -27,47 +30,6 @@ AT_REST, FEWEST_AT_REST = (0.01, 0.03, 0.1), 20
 FIRST_FLOW, FAR_BELOW = 0.2, 0.5
 #: A reading at rest below this share of the largest flow is no zero error.
 ZERO_SHARE = 2e-3
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DescribedTest:
-    """One ramp test with its nominal pressure drop (Pa, None if unknown), its branches and their shapes.
-
-    `ramps` are the ramps in it, `files` the source and SHA-256 of every file in it.
-    """
-
-    test: RampTest
-    dp: float | None
-    branches: tuple[Branch | None, Branch | None]
-    shapes: tuple[BranchShape | None, BranchShape | None]
-    q_max: float
-    ramps: tuple[str, ...]
-    files: tuple[tuple[str, str], ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DescribedTests:
-    """All ramp tests of a valve, in the order of rising pressure drop.
-
-    Attributes
-    ----------
-    tests : tuple of DescribedTest
-        All with the same branches.
-    floor : float
-        Meter floor, given or found, m³/s.
-    lag : MeterLag
-        Of the meter, declared or found.
-    zero_L_min : dict
-        Source -> flow read at zero command, where it is not zero; it has been subtracted.
-    zero_se : tuple of float
-        Standard error of what was subtracted from each of `tests`, as of white noise, m³/s; 0 where nothing was.
-    """
-
-    tests: tuple[DescribedTest, ...]
-    floor: float
-    lag: MeterLag
-    zero_L_min: dict[str, float]
-    zero_se: tuple[float, ...]
 
 
 def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> DescribedTests:
@@ -153,7 +115,7 @@ def _without_filling(test: RampTest, at_rest: np.ndarray) -> np.ndarray:
 
 
 def _error_of_median(values: np.ndarray) -> float:
-    return robust_sigma(values) / np.sqrt(values.size)
+    return robust_sigma(values) / math.sqrt(values.size)
 
 
 def split_recordings(tests: Sequence[RampTest], options: IdentifyOptions, lag: float) -> list[Ramp]:
@@ -186,14 +148,14 @@ def split_recordings(tests: Sequence[RampTest], options: IdentifyOptions, lag: f
                 f"'{test.source}': the time stands still at {test.time[0]:g} s, so the meter's lag can't be taken out; "
                 "correct the column of time, or leave out --meter-lag"
             )
-        mine = split_ramps(test, lag)
-        if np.ptp(test.u) < SMALLEST_SWEEP * options.u_max or not any(ramp.branches for ramp in mine):
+        found = split_ramps(test, lag)
+        if np.ptp(test.u) < SMALLEST_SWEEP * options.u_max or not any(ramp.branches for ramp in found):
             raise _no_ramp(test)
-        for ramp in mine:
+        for ramp in found:
             refuse_a_wrong_pressure(test.source, ramp.dp)
-        for item in pool_ramps(mine) if top >= FULL_SWEEP * highest else ():  # a fragment may well see no flow
+        for item in pool_ramps(found) if top >= FULL_SWEEP * highest else ():  # a fragment may well see no flow
             refuse_a_shut_valve(item.test.source, item.branches, options.u_max)
-        ramps += mine
+        ramps += found
     return ramps
 
 
@@ -228,23 +190,22 @@ def found_floor(pooled: list[PooledTest], options: IdentifyOptions) -> float:
     return max((floor for floor in floors if floor is not None), default=0.0)
 
 
-def _read(item: PooledTest, floor: float, u_max: float) -> Iterator[ReadBranch]:
+def _read(item: PooledTest, floor: float, u_max: float) -> Iterator[PreparedBranch]:
     """Bring the flows of a test's branches to its nominal pressure drop."""
     dp = nominal_dp(item.test)
     for branch in filter(None, item.branches):
         y = at_nominal_pressure(branch, dp)
-        yield read_branch(branch, y, u_max=u_max, floor=floor, source=item.test.source)
+        yield prepare_branch(branch, y, u_max=u_max, floor=floor, source=item.test.source)
 
 
 def _describe(item: PooledTest, shapes: Iterator[BranchShape], u_max: float) -> DescribedTest:
     """Put a test together; `shapes` gives those of its branches next."""
-    mine = tuple(next(shapes) if branch else None for branch in item.branches)
+    rising, falling = (next(shapes) if branch else None for branch in item.branches)
     q_max = max(flow_at_top(*smooth_profile(branch.u, branch.q, u_max)) for branch in item.branches if branch)
     return DescribedTest(
         test=item.test,
         dp=nominal_dp(item.test),
-        branches=item.branches,
-        shapes=mine,
+        shapes=(rising, falling),
         q_max=q_max,
         ramps=item.ramps,
         files=item.files,

@@ -6,7 +6,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.constants import L_MIN, LARGEST_DP, MPA, SMALLEST_DP
-from dzdesign.identify.knees.linear_region import ReadBranch
+from dzdesign.identify.knees.gated_line import PreparedBranch
 from dzdesign.identify.knees.noise import robust_sigma
 from dzdesign.identify.knees.profile import crossing, flow_at_top, smooth_profile
 from dzdesign.identify.ramps.branches import Branch
@@ -78,7 +78,7 @@ def refuse_a_shut_valve(source: str, branches: Sequence[Branch | None], u_max: f
         )
 
 
-def refuse_a_jump(read: ReadBranch, u_max: float) -> None:
+def refuse_a_jump(read: PreparedBranch, u_max: float) -> None:
     """Refuse a flow that jumps past its straight part: the line would be laid through the jump, volts too high.
 
     A meter whose floor lies above half of the largest flow makes such a jump wherever the flow happens to reach it, and
@@ -87,7 +87,7 @@ def refuse_a_jump(read: ReadBranch, u_max: float) -> None:
 
     Parameters
     ----------
-    read : ReadBranch
+    read : PreparedBranch
         One branch.
     u_max : float
         Full command, V.

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from dzdesign.core.errors import one_line
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.figure import Figure
 
 #: No text below 8 pt, on a page as wide as the figure.
@@ -56,10 +57,10 @@ def new_figure(height: float, *title: str) -> "Figure":
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    figure = Figure(figsize=(WIDTH, height), layout=ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.06))
     FigureCanvasAgg(figure)
-    figure.get_layout_engine().set(w_pad=0.08, h_pad=0.06)
     # What can't be printed can't stand in XML either, and half a character ends the drawing.
     title = tuple(one_line(line) for line in title)
     lines = [part for line in title for part in textwrap.wrap(line, TITLE_WIDTH, max_lines=2, placeholder=" ...")]
@@ -77,18 +78,20 @@ def finish(figure: "Figure", rows: int) -> "Figure":
     rows : int
         Of the legend.
     """
-    entries: dict[str, object] = {}
+    entries: dict[str, Artist] = {}
     for axes in figure.axes:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
     columns = -(-len(entries) // rows)
     legend = figure.legend(
-        entries.values(), entries.keys(), loc="outside lower center", ncols=columns, columnspacing=1.2
+        list(entries.values()), list(entries), loc="outside lower center", ncols=columns, columnspacing=1.2
     )
-    for handle, label in zip(legend.legend_handles, entries, strict=True):
-        if label.startswith("samples"):  # as small and light as in the panels nobody would tell them apart
-            handle.set(markersize=5, alpha=1)
-    figure.get_layout_engine().execute(figure)
+    for marker, label in zip(legend.legend_handles, entries, strict=True):
+        if marker and label.startswith("samples"):  # as small and light as in the panels nobody would tell them apart
+            marker.set(markersize=5, alpha=1)
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
     figure.set_layout_engine(None)  # SVG and PNG are then laid out alike
     return figure
 

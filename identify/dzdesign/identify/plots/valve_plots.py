@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dzdesign.identify.constants import L_MIN
-from dzdesign.identify.identification import Identified
-from dzdesign.identify.knees.characteristic import BranchShape
-from dzdesign.identify.knees.prepared_tests import DescribedTest
+from dzdesign.identify.knees.branch_shape import BranchShape
+from dzdesign.identify.knees.described_tests import DescribedTest
 from dzdesign.identify.plots.frame import finish, new_figure, plot_style, saved
-from dzdesign.identify.side import IdentifiedSide
+from dzdesign.identify.results import Identification, SideIdentification
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.ramp_result import TestResult
 from dzdesign.identify.valve.side_model import SideModel
@@ -32,12 +31,12 @@ COLOURS, MARKERS, NAMES = ("#0072B2", "#E69F00"), ("^", "v"), ("opening", "closi
 BLACK, GREEN, PURPLE, GREY = "#000000", "#009E73", "#A0467A", "#6E6E6E"
 
 
-def plot_files(found: Identified) -> dict[str, bytes]:
+def plot_files(found: Identification) -> dict[str, bytes]:
     """Draw an identified valve, each plot as SVG and as PNG; the same valve gives the same bytes.
 
     Parameters
     ----------
-    found : Identified
+    found : Identification
         Of `identify_sides`.
 
     Returns
@@ -54,12 +53,12 @@ def plot_files(found: Identified) -> dict[str, bytes]:
     return files
 
 
-def draw_figures(found: Identified) -> Iterator[tuple[str, "Figure"]]:
+def draw_figures(found: Identification) -> Iterator[tuple[str, "Figure"]]:
     """Return each plot's name and figure, one after the other.
 
     Parameters
     ----------
-    found : Identified
+    found : Identification
         Of `identify_sides`.
     """
     for name, side in found.sides.items():
@@ -85,40 +84,42 @@ def _flow_names(tests: tuple[TestResult, ...]) -> list[str]:
 # Flow over command ---------------------------------------------------------------------------------------------------
 
 
-def _flow_figure(valve: ValveModel, side: IdentifiedSide, row: int) -> "Figure":
+def _flow_figure(valve: ValveModel, side: SideIdentification, row: int) -> "Figure":
     """Draw one ramp test: the whole range, its edge enlarged, and the residuals about the straight lines."""
     item, test = side.described.tests[row], side.model.tests[row]
     figure = new_figure(6.6, *_flow_title(side.model, test))
-    panels = figure.subplot_mosaic([["flow", "edge"], ["residual", "edge"]], height_ratios=(2, 1), width_ratios=(3, 2))
+    panels: dict[str, Axes] = figure.subplot_mosaic(
+        [["flow", "edge"], ["residual", "edge"]], height_ratios=(2, 1), width_ratios=(3, 2)
+    )
     flow, edge, residual = (panels[name] for name in ("flow", "edge", "residual"))
     branches = [
-        (column, shape, _knees(test)[column], side.knees.slope[row, column])
-        for column, shape in enumerate(item.shapes)
-        if shape
+        (column, shape, knee, onset, side.knees.slope[row, column])
+        for column, (shape, knee, onset) in enumerate(zip(item.shapes, _knees(test), _onsets(test), strict=True))
+        if shape and knee is not None and onset is not None
     ]
-    whole = (0.0, max(shape.read.branch.u.max() for _, shape, _, _ in branches))
+    whole = (0.0, max(shape.prepared.branch.u.max() for _, shape, *_ in branches))
     near, flows = _edge_limits(valve, test, item)
     for axes, limits, size in ((flow, whole, 4.5), (edge, near, 7)):
-        for column, shape, _, _ in branches:
+        for column, shape, *_ in branches:
             _draw_samples(axes, shape, column, *limits)
-        for column, shape, knee, slope in branches:
+        for column, shape, knee, _, slope in branches:
             _draw_line(axes, shape, column, knee, slope / L_MIN)
-        for column, _, knee, _ in branches:
+        for column, _, knee, *_ in branches:
             axes.plot(knee, 0, MARKERS[column], ms=size, color=COLOURS[column], mec=BLACK, mew=0.8,
                       label=f"knee {NAMES[column]}", zorder=5)  # fmt: skip
-        for column, _, _, _ in branches:  # hollow and larger: a knee at the same command shows inside it
-            axes.plot(_onsets(test)[column], 0, MARKERS[column], ms=1.8 * size, mfc="none", mec=COLOURS[column],
+        for column, _, _, onset, _ in branches:  # hollow and larger: a knee at the same command shows inside it
+            axes.plot(onset, 0, MARKERS[column], ms=1.8 * size, mfc="none", mec=COLOURS[column],
                       mew=1.6, label=f"onset {NAMES[column]}", zorder=6)  # fmt: skip
         axes.axvline(test.u_guard_lower_V, color=BLACK, ls="-.", lw=1.2, label="certified bound")
         if valve.meter.floor_L_min > 0:
             axes.axhline(valve.meter.floor_L_min, color=GREY, ls=":", lw=1.5, label="meter's floor")
-    for column, shape, knee, slope in branches:
+    for column, shape, knee, _, slope in branches:
         _draw_residuals(residual, shape, column, knee, slope)
     at = "" if test.dp_MPa is None else f" at {test.dp_MPa:.3f} MPa"
-    top = max(shape.y_max for _, shape, _, _ in branches) / L_MIN  # a spike beyond it would flatten all the rest
+    top = max(shape.y_max for _, shape, *_ in branches) / L_MIN  # a spike beyond it would flatten all the rest
     flow.set(ylabel=f"flow Q{at} (L/min)", title="whole range", xlim=whole, ylim=(-0.08 * top, 1.1 * top))
     edge.set(xlabel="command u (V)", ylabel=f"flow Q{at} (L/min)", title="the edge, enlarged", xlim=near, ylim=flows)
-    sigma = " / ".join(f"{shape.sigma / L_MIN:.2g}" for _, shape, _, _ in branches)
+    sigma = " / ".join(f"{shape.sigma / L_MIN:.2g}" for _, shape, *_ in branches)
     residual.set(xlabel="command u (V)", ylabel="residual (σ)", xlim=whole)
     residual.set(ylim=(-1.15 * RESIDUAL_EDGE, 1.15 * RESIDUAL_EDGE), yticks=(-6, -3, 0, 3, 6))
     residual.set_title(f"about the straight lines, in their windows; σ = {sigma} L/min")
@@ -159,7 +160,7 @@ def _edge_limits(
     marks = [u for u in (*_knees(test), *_onsets(test), test.u_guard_lower_V) if u is not None]
     room = max(0.5 * (max(marks) - min(marks)), 0.01 * valve.u_max_V)
     low, high = max(min(marks) - room, 0.0), max(marks) + room
-    noise = max(shape.sigma for shape in item.shapes if shape) / L_MIN
+    noise = max(shape.sigma for shape in item.branches) / L_MIN
     first_knee = min(u for u in _knees(test) if u is not None)
     top = max(1.1 * test.slope_L_min_V * (high - first_knee), 2 * valve.meter.floor_L_min, 6 * noise)
     return (low, high), (-0.15 * top, top)
@@ -172,15 +173,15 @@ def _thinned(points: np.ndarray) -> np.ndarray:
 
 def _draw_samples(axes: "Axes", shape: BranchShape, column: int, low: float, high: float) -> None:
     """Draw the samples of a branch between two commands, at the nominal pressure drop."""
-    u = shape.read.branch.u
+    u = shape.prepared.branch.u
     at = _thinned(np.flatnonzero((u >= low) & (u <= high)))
-    axes.plot(u[at], shape.read.y[at] / L_MIN, MARKERS[column], ms=4 if at.size < 300 else 2, color=COLOURS[column],
+    axes.plot(u[at], shape.prepared.y[at] / L_MIN, MARKERS[column], ms=4 if at.size < 300 else 2, color=COLOURS[column],
               alpha=0.35, mew=0, rasterized=True, label=f"samples {NAMES[column]}", zorder=2)  # fmt: skip
 
 
 def _draw_line(axes: "Axes", shape: BranchShape, column: int, knee: float, slope: float) -> None:
     """Draw the straight line (V, L/min/V): solid where samples bear it, dashed from there to its zero, the knee."""
-    inside = shape.read.branch.u[shape.line.inside]
+    inside = shape.prepared.branch.u[shape.line.inside]
     ends = np.array([inside.min(), inside.max()])
     reach = np.array([knee, max(ends[0], knee)])
     axes.plot(ends, slope * (ends - knee), "-", color=COLOURS[column], lw=2, label=f"line {NAMES[column]}", zorder=4)
@@ -189,8 +190,8 @@ def _draw_line(axes: "Axes", shape: BranchShape, column: int, knee: float, slope
 
 def _draw_residuals(axes: "Axes", shape: BranchShape, column: int, knee: float, slope: float) -> None:
     """Draw how far the window's samples lie from the line, over sigma; gated ones are marked, all of them."""
-    line, u = shape.line, shape.read.branch.u
-    miss = np.clip((shape.read.y - slope * (u - knee)) / shape.sigma, -RESIDUAL_EDGE, RESIDUAL_EDGE)
+    line, u = shape.line, shape.prepared.branch.u
+    miss = np.clip((shape.prepared.y - slope * (u - knee)) / shape.sigma, -RESIDUAL_EDGE, RESIDUAL_EDGE)
     used = _thinned(np.flatnonzero(line.kept & ~line.censored))
     gated = np.flatnonzero(line.inside & ~line.kept)
     axes.plot(u[used], miss[used], MARKERS[column], ms=4 if used.size < 300 else 2, color=COLOURS[column],
@@ -233,10 +234,10 @@ def _thresholds_figure(side: SideModel) -> "Figure":
     )
     axes = figure.subplots()
     for column, name in enumerate(NAMES):
-        if _knees(side.tests[0])[column] is not None:
-            knee = [_knees(test)[column] for test in side.tests]
-            error = [test.u_knee_se_V for test in side.tests]
-            axes.errorbar(dp, knee, yerr=error, fmt=MARKERS[column], ls="", ms=5, capsize=5, color=COLOURS[column],
+        knees = [knee for test in side.tests if (knee := _knees(test)[column]) is not None]
+        if knees:
+            errors = [test.u_knee_se_V for test in side.tests]
+            axes.errorbar(dp, knees, yerr=errors, fmt=MARKERS[column], ls="", ms=5, capsize=5, color=COLOURS[column],
                           mec=BLACK, mew=0.6, label=f"knee {name} ± s.e.", zorder=4)  # fmt: skip
     axes.vlines(dp, bound, guard, color=GREY, lw=7, alpha=0.35, label="from lower bound to threshold", zorder=1)
     axes.plot(dp, guard, "s", ms=8.5, mfc="none", mec=BLACK, mew=1.2, label="guarded threshold", zorder=5)
@@ -266,7 +267,7 @@ def _beta_figure(side: SideModel) -> "Figure":
     axes.plot(dp, bound, "_", ms=14, mew=2, color=BLACK, label="lower bound / u_min0, at the test", zorder=5)
     axes.stairs(steps, dp, baseline=None, color=GREEN, lw=2, label="certified staircase / u_min0", zorder=3)
     axes.plot(dp, beta, "D--", ms=5, lw=1.6, color=PURPLE, label="β(dP), straight between its nodes", zorder=4)
-    axes.plot(side.reference.dp_MPa, 1, "o", ms=13, mfc="none", mec=BLACK, mew=1.2, label="dP0, where β = 1")
+    axes.plot(side.reference.dp_MPa or 0.0, 1, "o", ms=13, mfc="none", mec=BLACK, mew=1.2, label="dP0, where β = 1")
     low = axes.get_ylim()[0]
     axes.stairs(steps, dp, baseline=low, fill=True, color=GREEN, alpha=0.12, label="allowed by all bounds together")
     axes.set(ylabel="β (no unit)", ylim=(low, None))

@@ -12,8 +12,7 @@ from dzdesign.identify.constants import BIN_WIDTH
 class Branch:
     """Samples of one direction, on one side of zero: command u in V, dp in Pa or None, flow q in m³/s, all (N,).
 
-    `rate` is the pace of the command, V/s, always positive; of several ramps
-    the fastest; NaN if it is not known.
+    `rate` is the pace of the command, V/s, always positive; of several ramps the fastest; NaN if it is not known.
     """
 
     rising: bool
@@ -26,7 +25,10 @@ class Branch:
 def at_nominal_pressure(branch: Branch, dp: float | None) -> np.ndarray:
     """Return a branch's flow brought to one pressure drop (Pa), m³/s; as it is where the pressure is not known."""
     # Eq. (1): Q grows as sqrt(dP); below a tenth of the nominal pressure the ratio would only carry noise.
-    return branch.q if dp is None else branch.q * np.sqrt(dp / np.maximum(branch.dp, 0.1 * dp))
+    if dp is None or branch.dp is None:
+        return branch.q
+    flow: np.ndarray = branch.q * np.sqrt(dp / np.maximum(branch.dp, 0.1 * dp))
+    return flow
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

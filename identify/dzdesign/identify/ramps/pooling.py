@@ -100,9 +100,9 @@ def _name(group: list[Ramp], every: bool = False) -> str:
     """Return the files of a group of ramps, and which ramps of a file if not all are in it, or if `every` is set."""
     names = []
     for file in dict.fromkeys((ramp.test.source, ramp.test.sha256) for ramp in group):
-        mine = [ramp for ramp in group if (ramp.test.source, ramp.test.sha256) == file]
-        some = len(mine) < mine[0].of or (every and mine[0].of > 1)
-        numbers = ", ".join(str(ramp.number) for ramp in mine)
-        names.append(f"{file[0]} (ramp{'s' if len(mine) > 1 else ''} {numbers})" if some else file[0])
+        of_file = [ramp for ramp in group if (ramp.test.source, ramp.test.sha256) == file]
+        not_all = len(of_file) < of_file[0].of or (every and of_file[0].of > 1)
+        numbers = ", ".join(str(ramp.number) for ramp in of_file)
+        names.append(f"{file[0]} (ramp{'s' if len(of_file) > 1 else ''} {numbers})" if not_all else file[0])
     more = len(names) - NAMED_FILES
     return ", ".join(names[:NAMED_FILES]) + (f" and {more} more" if more > 0 else "")

@@ -25,14 +25,14 @@ def tests_of_side(tests: Sequence[RampTest], sign: int, u_max: float) -> list[Ra
     u_max : float
         Full command, V.
     """
-    mine = []
+    found = []
     for test in tests:
         both = [_reaches(test, side, u_max) for side in (1, -1)]
         # What shows neither side is refused with the positive one.
         if both[0 if sign > 0 else 1] or (sign > 0 and not any(both)):
-            own = _without_the_other(test, sign, u_max) if all(both) else test
-            mine.append(_mirrored(own) if sign < 0 else own)
-    return mine
+            one = _without_the_other(test, sign, u_max) if all(both) else test
+            found.append(_mirrored(one) if sign < 0 else one)
+    return found
 
 
 def _reaches(test: RampTest, sign: int, u_max: float) -> bool:
@@ -41,9 +41,7 @@ def _reaches(test: RampTest, sign: int, u_max: float) -> bool:
 
 def _without_the_other(test: RampTest, sign: int, u_max: float) -> RampTest:
     """Leave out the other side: its flow and, in some recordings, its pressure drop have the other sign."""
-    own = sign * test.u >= -AT_REST * u_max
-    dp = None if test.dp is None else test.dp[own]
-    return replace(test, time=test.time[own], u=test.u[own], q=test.q[own], dp=dp)
+    return test.part(sign * test.u >= -AT_REST * u_max)
 
 
 def _mirrored(test: RampTest) -> RampTest:

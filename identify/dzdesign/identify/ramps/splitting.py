@@ -8,7 +8,7 @@ the jump back of a saw-tooth and no branch. Which ramps are one test is said by 
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -92,12 +92,12 @@ def split_ramps(test: RampTest, lag: float) -> list[Ramp]:
     groups: list[list[int]] = []
     for index in range(0, len(sweeps), 2):
         pair = [index, index + 1][: len(sweeps) - index]
-        levels = [nominal_dp(_part(test, sweeps[one][0])) for one in pair]
-        apart = len(pair) == 2 and test.dp is not None and abs(levels[1] - levels[0]) > TWO_PRESSURES * max(levels)
+        levels = [nominal_dp(test.part(sweeps[one][0])) or 0.0 for one in pair]
+        apart = max(levels) - min(levels) > TWO_PRESSURES * max(levels)
         groups += [[one] for one in pair] if apart else [pair]
     ramps = []
     for number, group in enumerate(groups, start=1):
-        whole = _part(test, slice(sweeps[group[0]][0].start, sweeps[group[-1]][0].stop))
+        whole = test.part(slice(sweeps[group[0]][0].start, sweeps[group[-1]][0].stop))
         branches = tuple(
             _branch(test, u, known, *sweeps[one]) for one in group if pace[one] <= FASTEST * slowest and sweeps[one][1]
         )
@@ -136,7 +136,7 @@ def lagged_command(time: np.ndarray, u: np.ndarray, lag: float) -> np.ndarray:
     if lag <= 0:
         return u
     clock = _spread(time)
-    return np.interp(clock - lag, clock, u)
+    return np.asarray(np.interp(clock - lag, clock, u))
 
 
 def _spread(time: np.ndarray) -> np.ndarray:
@@ -156,20 +156,15 @@ def _without_command_spikes(test: RampTest) -> RampTest:
     away = np.abs(test.u - despiked(test.u))
     usual = float(np.median(np.abs(np.diff(test.u))))
     kept = away <= max(SPIKE * np.ptp(despiked(test.u)), SPIKE_STEPS * usual)
-    return test if kept.all() else _part(test, kept)
-
-
-def _part(test: RampTest, rows: slice | np.ndarray) -> RampTest:
-    dp = None if test.dp is None else test.dp[rows]
-    return replace(test, time=test.time[rows], u=test.u[rows], q=test.q[rows], dp=dp)
+    return test if kept.all() else test.part(kept)
 
 
 def _branch(test: RampTest, u: np.ndarray, known: np.ndarray, rows: slice, direction: int) -> Branch:
-    mine = np.zeros(u.size, dtype=bool)
-    mine[rows] = True
-    mine &= known & (u >= 0)
-    dp = None if test.dp is None else test.dp[mine]
-    return Branch(rising=direction > 0, u=u[mine], q=test.q[mine], dp=dp, rate=_rate(test.time[mine], u[mine]))
+    inside = np.zeros(u.size, dtype=bool)
+    inside[rows] = True
+    inside &= known & (u >= 0)
+    part, u = test.part(inside), u[inside]
+    return Branch(rising=direction > 0, u=u, q=part.q, dp=part.dp, rate=_rate(part.time, u))
 
 
 def _rate(time: np.ndarray, u: np.ndarray) -> float:
@@ -236,14 +231,14 @@ def sweep_direction(u: np.ndarray) -> np.ndarray:
     direction = np.zeros(u.size, dtype=int)
     low = high = start = 0
     heading = 0
-    thinned = thinned.tolist()  # one number after the other: a list is several times faster than an array
-    for index, value in enumerate(thinned):
-        low = index if value < thinned[low] else low
-        high = index if value > thinned[high] else high
-        if heading >= 0 and thinned[high] - value > threshold:
+    values = thinned.tolist()  # one number after the other: a list is several times faster than an array
+    for index, value in enumerate(values):
+        low = index if value < values[low] else low
+        high = index if value > values[high] else high
+        if heading >= 0 and values[high] - value > threshold:
             direction[start * step : high * step] = 1
             heading, start, low = -1, high, index
-        elif heading <= 0 and value - thinned[low] > threshold:
+        elif heading <= 0 and value - values[low] > threshold:
             direction[start * step : low * step] = -1
             heading, start, high = 1, low, index
     direction[start * step :] = heading

@@ -1,6 +1,6 @@
 """`RampTest`: one recorded ramp test, as all rooms of identify take it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -49,3 +49,8 @@ class RampTest:
             if array.shape != self.time.shape or array.ndim != 1:
                 raise ValueError("the columns of a ramp test are vectors of one length")
             array.flags.writeable = False
+
+    def part(self, rows: slice | np.ndarray) -> "RampTest":
+        """Return the recording with some of its rows."""
+        dp = None if self.dp is None else self.dp[rows]
+        return replace(self, time=self.time[rows], u=self.u[rows], q=self.q[rows], dp=dp)

@@ -2,16 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Literal
+from typing import Annotated, get_args
 
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
-from dzdesign.identify.fitting.guard_curve import GUARDS, ROUNDING_V, GuardCurve, OpeningCurve
+from dzdesign.identify.valve.guard_curve import GUARDS, ROUNDING_V, Guard, GuardCurve, OpeningCurve
 from dzdesign.identify.valve.quantity_types import Flow, PressureDrop, Probability, Ratio, Voltage, VoltageError
 from dzdesign.identify.valve.ramp_result import TestResult
+from dzdesign.identify.valve.staircase import Direction
 
-TRENDS = ("decreasing", "flat", "increasing")
+DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,14 +34,14 @@ class BetaNodes:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Certificate:
+class BoundsBasis:
     """What the lower bounds rest on."""
 
     confidence: Annotated[
         float, quantity("1", "Confidence with which all bounds of a guard hold together.", ge=0.5, le=1)
     ]
     guard: Annotated[
-        Literal["closing", "mean", "opening"],
+        Guard,
         Meta(
             description="The threshold that is protected unless `design --guard` asks for another: the safest that was "
             "recorded."
@@ -72,7 +73,7 @@ class SideModel:
     ]
     k_V_mm: Annotated[float, quantity("V/mm", "k of Eq. (11), where --x-max was given.", ge=0, le=1e9)] | None
     trend: Annotated[
-        Literal["decreasing", "flat", "increasing"] | None,
+        Direction | None,
         Meta(description="How the threshold runs with the pressure drop; null where fewer than two were tested."),
     ]
     trend_change_V: Annotated[Voltage | None, Meta(description="Change of the threshold over the tested range.")]
@@ -84,7 +85,7 @@ class SideModel:
     valid_dp_MPa: Annotated[
         tuple[PressureDrop, PressureDrop] | None, quantity("MPa", "Tested interval; nothing is certified outside it.")
     ] = field(init=False)
-    certificate: Annotated[Certificate, Meta(description="What the lower bounds rest on.")]
+    certificate: Annotated[BoundsBasis, Meta(description="What the lower bounds rest on.")]
     active_constraints: Annotated[
         tuple[str, ...], Meta(description="Constraints of the fits that hold with equality, in words.")
     ]
@@ -103,7 +104,7 @@ class SideModel:
 
     def __post_init__(self) -> None:
         if self.trend is None and len(self.tests) != 1:
-            raise RuleError(f"trend is missing beside {len(self.tests)} tests, expected one of {', '.join(TRENDS)}")
+            raise RuleError(f"trend is missing beside {len(self.tests)} tests, expected one of {', '.join(DIRECTIONS)}")
         if self.certificate.guard not in self.guards or not set(self.guards) <= set(GUARDS):
             raise RuleError(
                 f"the guard is '{self.certificate.guard}' and there are curves of {', '.join(self.guards) or 'none'}, "

@@ -3,22 +3,13 @@
 from fractions import Fraction
 
 from dzdesign.design.compensator import Compensator
-from dzdesign.report.compensator_sides import SIGNS, laws_of, valve_in
+from dzdesign.report.compensator_sides import SIGNS, laws_of
 from dzdesign.report.figures.figure import LIGHT, ReportFigure, csv_text, side_words, titled_axes, to_report_figure
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 
 
 def law_figure(compensator: Compensator, name: str, both: bool) -> ReportFigure:
-    """Draw the compensator's output over the command at the ends of the tested interval, and the threshold's bound.
-
-    Parameters
-    ----------
-    compensator : Compensator
-    name : str
-        ``positive`` or ``negative``.
-    both : bool
-        Whether the valve has two sides.
-    """
+    """Draw the compensator's output over the command at the ends of the tested interval, and the threshold's bound."""
     exact = ExactLaw(compensator, SIGNS[name])
     u_max, certificate = float(compensator.u_max_V), laws_of(compensator)[name].certificate
     low, high = map(float, certificate.dp_MPa)
@@ -31,7 +22,7 @@ def law_figure(compensator: Compensator, name: str, both: bool) -> ReportFigure:
         volts = [u_max * float(count) / exact.compare_max for _, count in corners]
         axes.plot(percent, volts, dash, color=LIGHT[hue], lw=1.8, label=f"at {dp_MPa:.2f} MPa")
         rows += [[round(dp_MPa, 4), round(x, 4), round(y, 6)] for x, y in zip(percent, volts, strict=True)]
-    bound = min(valve_in(compensator).sides[name].guards[certificate.guard].u_lower_V)
+    bound = min(compensator.valve.sides[name].guards[certificate.guard].u_lower_V)
     axes.axhline(bound, color=LIGHT["green"], lw=1.2, ls="-.", label="least lower bound of the threshold")
     axes.set(xlabel="command u_i (% of full)", ylabel="output u_O (V)", xlim=(0, 100), ylim=(0, None))
     axes.legend(loc="lower right")

@@ -12,7 +12,6 @@ from dzdesign.report.lot.valve_names import by_name
 
 if TYPE_CHECKING:
     from dzdesign.design.compensator import Compensator
-    from dzdesign.design.lot_setting import Designed
     from dzdesign.identify.valve.side_model import SideModel
 
 SIGNS = {"positive": 1, "negative": -1}
@@ -23,26 +22,20 @@ def table_rows(
     lot_law: "Compensator | None" = None,
     records: Mapping[str, Mapping[str, str]] | None = None,
 ) -> list[TableRow]:
-    """Return the rows, in the order of the names.
+    """Return the rows of valves as read back, in the order of the names.
 
-    Parameters
-    ----------
-    valves : sequence of ValveFolder
-        As read back.
-    lot_law : Compensator, optional
-        The lot setting, for the cost of it at each valve.
-    records : mapping, optional
-        Name to the record that the valve was given, for those without a valve.json that has it.
+    `lot_law` is the lot setting, for the cost of it at each valve; `records` what each valve was given as its record,
+    for those without a valve.json that has it.
     """
-    both = any(each.designed and each.designed.own.negative for each in valves)
+    both = any(each.compensator and each.compensator.negative for each in valves)
     sides = tuple(SIGNS) if both else ("",)
     return [
         TableRow(
             name=each.name,
             status=each.manifest.status,
             reason=each.manifest.reason,
-            sides={side: _figures(each.designed, SIGNS.get(side, 1), lot_law) for side in sides},
-            warnings=tuple(dict.fromkeys(w.code for w in each.designed.valve.warnings)) if each.designed else (),
+            sides={side: _figures(each.compensator, SIGNS.get(side, 1), lot_law) for side in sides},
+            warnings=tuple(dict.fromkeys(w.code for w in each.compensator.valve.warnings)) if each.compensator else (),
             hashes=_hashes(each),
             record=_record(each, (records or {}).get(each.name, {})),
         )
@@ -57,19 +50,19 @@ def _hashes(valve: ValveFolder) -> dict[str, str]:
 
 def _record(valve: ValveFolder, given: Mapping[str, str]) -> Mapping[str, str]:
     """Return a valve's record: of its valve.json, or as it was given if that can be a record."""
-    if valve.designed:
-        return valve.designed.valve.record
+    if valve.compensator:
+        return valve.compensator.valve.record
     try:
         return checked_record(given.items(), "the record")
     except InputError:  # such a valve has failed, and says why itself
         return {}
 
 
-def _figures(designed: "Designed | None", sign: int, lot_law: "Compensator | None") -> SideFigures:
+def _figures(designed: "Compensator | None", sign: int, lot_law: "Compensator | None") -> SideFigures:
     """Return the columns of one side; numbers as valve.json has them."""
-    if designed is None or (sign < 0 and designed.own.negative is None):
+    if designed is None or (sign < 0 and designed.negative is None):
         return SideFigures()
-    own, side = designed.own, _side(designed, sign)
+    own, side = designed, _side(designed, sign)
     test = min(side.tests, key=lambda test: abs((test.dp_MPa or 0.0) - (side.reference.dp_MPa or 0.0)))
     left = {
         branch: round(100 * max(values), 5)
@@ -94,7 +87,7 @@ def _figures(designed: "Designed | None", sign: int, lot_law: "Compensator | Non
     )
 
 
-def _side(designed: "Designed", sign: int) -> "SideModel":
+def _side(designed: "Compensator", sign: int) -> "SideModel":
     return designed.valve.sides["positive" if sign > 0 else "negative"]
 
 
@@ -106,21 +99,12 @@ def _remaining(law: "Compensator", side: "SideModel", sign: int) -> dict[str, li
     return {branch: [each[branch] for each in left] for branch in left[0]}
 
 
-def extra_dead_zone(designed: "Designed", lot_law: "Compensator", sign: int) -> float:
+def extra_dead_zone(designed: "Compensator", lot_law: "Compensator", sign: int) -> float:
     """Return how much more dead zone the lot setting leaves than a valve's own, in percent of command.
 
     At the pressure drop of its tests where that is most, on opening; on closing where no opening was recorded.
-
-    Parameters
-    ----------
-    designed : Designed
-        The valve and its own compensator.
-    lot_law : Compensator
-        The lot setting.
-    sign : {1, -1}
-        Of the command.
     """
     side = _side(designed, sign)
     branch = "opening" if side.tests[0].u_knee_rising_V is not None else "closing"
-    with_lot, with_own = (_remaining(law, side, sign)[branch] for law in (lot_law, designed.own))
+    with_lot, with_own = (_remaining(law, side, sign)[branch] for law in (lot_law, designed))
     return round(100 * max(lot - own for lot, own in zip(with_lot, with_own, strict=True)), 5)

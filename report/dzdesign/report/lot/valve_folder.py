@@ -11,8 +11,7 @@ from dzdesign.core.artefact_files import MANIFEST_NAME, read_bytes, sha256_of
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import Artefact
 from dzdesign.core.errors import InputError
-from dzdesign.design.compensator_file import compensator_from_document
-from dzdesign.design.lot_setting import Designed
+from dzdesign.design.compensator import Compensator
 from dzdesign.report.lot.summary import AGAIN, OK, Sha256, Status
 
 #: Folder of a lot in which each valve has its own.
@@ -45,7 +44,7 @@ class ValveFolder:
     """A valve of a lot, as its folder has it: its manifest and, where it was calibrated, valve and compensator."""
 
     manifest: ValveManifest
-    designed: Designed | None = None
+    compensator: Compensator | None = None
 
     @property
     def name(self) -> str:
@@ -80,4 +79,4 @@ def read_valve_folder(folder: Path) -> ValveFolder:
     content = read_bytes(path, "compensator of the lot")
     if sha256_of(content) != manifest.files.get(path.name):
         raise InputError(f"'{path}' was changed; take the valve's folder away and {AGAIN}")
-    return ValveFolder(manifest=manifest, designed=Designed.of(compensator_from_document(content, str(path))))
+    return ValveFolder(manifest=manifest, compensator=read_artefact(content, Compensator, str(path)))

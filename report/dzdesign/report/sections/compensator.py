@@ -5,7 +5,7 @@ from fractions import Fraction
 
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareConstant, FirmwareManifest
-from dzdesign.report.compensator_sides import laws_of, valve_in
+from dzdesign.report.compensator_sides import laws_of
 from dzdesign.report.figures.figure import csv_text
 from dzdesign.report.figures.law import law_figure
 from dzdesign.report.page import Section
@@ -20,15 +20,15 @@ def law_section(compensator: Compensator | None) -> Section:
     """Return the section on the law; its derivation is added by the page."""
     if compensator is None:
         return Section(missing="No compensator is here: `dzdesign design` makes compensator.json.")
-    laws, valve = laws_of(compensator), valve_in(compensator)
-    lines = [f"Up to dP0: {BELOW_DP0[compensator.below_reference]}."]
+    laws, valve = laws_of(compensator), compensator.valve
+    lines = [f"Up to dP0: {BELOW_DP0[compensator.below_dp0]}."]
     for name, side in laws.items():
-        kappa, u_min0 = side.k_x_max_over_u_max, side.u_min0_over_u_max
+        kappa, u_min0 = side.drive_range_over_u_max, side.u_min0_over_u_max
         lines.append(
             f"{name.capitalize()} commands: drive range of the law k x_max/u_max = {_exact(kappa)}, from its offset to "
             f"full flow; the valve's, {valve.sides[name].k_x_max_over_u_max:.4f}, counts from the knee, which lies "
             f"higher; offset at dP0 u_min0/u_max = {_exact(u_min0)}, both as shares of full command; β is straight "
-            f"between {len(side.beta_numerators)} nodes, {compensator.beta_step_codes} pressure codes apart, each a "
+            f"between {len(side.beta)} nodes, {compensator.beta_step_codes} pressure codes apart, each a "
             f"whole number of 1/{compensator.beta_denominator}."
         )
     return Section(figures=tuple(law_figure(compensator, name, len(laws) > 1) for name in laws), lines=tuple(lines))
@@ -99,8 +99,8 @@ def rounding_table(compensator: Compensator) -> Table:
         offset = side.u_min0_over_u_max * u_max
         node = offset / compensator.beta_denominator
         of = f" ({name})" if len(laws_of(compensator)) > 1 else ""
-        if not compensator.edge_codes:  # which counts from the opening threshold, the valve's curve does not
-            wanted = Fraction(repr(valve_in(compensator).sides[name].guards[certificate.guard].u_min0_V))
+        if not compensator.transition_codes:  # which counts from the opening threshold, the valve's curve does not
+            wanted = Fraction(repr(compensator.valve.sides[name].guards[certificate.guard].u_min0_V))
             volts = (f"{float(offset):.6f} V", f"{float(wanted):.6f} V")
             rows.append(("u_min0" + of, *volts, 1e3 * float(offset - wanted)))
         rows += [

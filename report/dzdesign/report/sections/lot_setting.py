@@ -8,9 +8,9 @@ from itertools import pairwise
 
 from dzdesign.core.verdicts import NOT_CHECKED
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.lot import LotSide
-from dzdesign.report.artefact_chain import Chain
-from dzdesign.report.compensator_sides import SIGNS, laws_of, lot_sha256
+from dzdesign.design.lot_valves import LotSide
+from dzdesign.report.chain import Chain
+from dzdesign.report.compensator_sides import SIGNS, laws_of
 from dzdesign.report.figures.figure import csv_text
 from dzdesign.report.page import Section
 from dzdesign.report.sections.cells import in_number_font, number, table_of
@@ -40,7 +40,7 @@ class LotCost:
 
 def carrier_of(compensator: Compensator) -> str:
     """Return the name, in the lot, of the valve that the file of a lot setting holds."""
-    names = (each.name for each in compensator.lot if each.valve_sha256 == compensator.valve_sha256)
+    names = (each.name for each in compensator.lot if each.valve_sha256 == compensator.valve_json_sha256)
     return next(names, "the valve in compensator.json")
 
 
@@ -61,7 +61,7 @@ def _costs_of_side(compensator: Compensator, name: str) -> Iterator[LotCost]:
     for valve_name, side in _lot_sides(compensator, name):
         shares = [
             (_share(corners_at(round(compensator.signals.dp_code(Fraction(dp)))), bound * counts_per_V), dp)
-            for dp, bound in zip(side.dp_MPa, side.lower_V, strict=True)
+            for dp, bound in zip(side.dp_MPa, side.u_lower_V, strict=True)
         ]
         (least, least_at), (most, most_at) = min(shares), max(shares)
         yield LotCost(
@@ -90,11 +90,11 @@ def _share(corners: list[tuple[float, float]], counts: float) -> float:
 def lot_figures(chain: Chain) -> tuple[Figure, ...]:
     """Return what the page of a lot setting leads with; none of a valve's own."""
     compensator = chain.compensator
-    if compensator is None or not compensator.common_valves:
+    if compensator is None or not compensator.lot:
         return ()
     first = Figure(
         label="Lot setting",
-        value=f"of {compensator.common_valves} valves",
+        value=f"of {len(compensator.lot)} valves",
         note=f"one law for all; the file holds one of them, {carrier_of(compensator)}, its carrier",
     )
     return (first, _worst(chain.evidence), _cost(lot_costs(compensator)))
@@ -133,7 +133,7 @@ def _cost(costs: tuple[LotCost, ...]) -> Figure:
 
 def lot_section(compensator: Compensator) -> Section:
     """Return the section on the lot of a lot setting."""
-    count, costs = compensator.common_valves, lot_costs(compensator)
+    count, costs = len(compensator.lot), lot_costs(compensator)
     if not costs:
         return Section(missing=f"The file is of {count} valves and names none but one; run `dzdesign batch` again.")
     sides = {(valve, name): side for name in SIGNS for valve, side in _lot_sides(compensator, name)}
@@ -148,7 +148,7 @@ def lot_section(compensator: Compensator) -> Section:
         ("valve", lambda one: one.valve),
         ("commands", lambda one: one.side),
         ("tested (MPa)", lambda one: in_number_font(_from_to(side_of(one).dp_MPa))),
-        ("least bound (V)", lambda one: number(min(side_of(one).lower_V), 3)),
+        ("least bound (V)", lambda one: number(min(side_of(one).u_lower_V), 3)),
         ("confidence (%)", lambda one: in_number_font(f"{100 * side_of(one).confidence:.6g}")),
         ("cost, least (%)", lambda one: number(one.least_percent, 2)),
         ("cost, most (%)", lambda one: number(one.most_percent, 2)),
@@ -161,7 +161,7 @@ def lot_section(compensator: Compensator) -> Section:
     )
     return Section(
         lines=(
-            f"One setting for {count} valves, each with bounds of its own; lot SHA-256 {lot_sha256(compensator)}.",
+            f"One setting for {count} valves, each with bounds of its own; lot SHA-256 {compensator.lot_sha256}.",
             f"All else in this report that is of one valve (recordings, thresholds, β, certificate, closed loop) is of "
             f"{carrier_of(compensator)}, the carrier.",
             "Cost: the share of the command that passes before the drive reaches the valve's own lower bound, at its "

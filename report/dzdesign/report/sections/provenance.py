@@ -3,7 +3,7 @@
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.signal_descriptions import signals_in_words
 from dzdesign.identify.valve.model import ValveModel
-from dzdesign.report.artefact_chain import KINDS, Chain
+from dzdesign.report.chain import KINDS, Chain
 from dzdesign.report.page import Section
 from dzdesign.report.sections.cells import Cell, Table, table_of, whole
 
@@ -23,7 +23,7 @@ NOT_PROVED = (
 
 def warnings_section(valve: ValveModel | None, compensator: Compensator | None) -> Section:
     """Return the section on warnings, costs, signals, and what is not proved."""
-    accepted = dict(compensator.request.options).get("accept", "") if compensator and compensator.request else ""
+    accepted = compensator.options.get("accept", "") if compensator and compensator.options else ""
     codes = accepted.replace(",", " ").split()
     warnings = []
     for warning in valve.warnings if valve else ():

@@ -68,11 +68,6 @@ class Proof:
 def proof_check(folder: Path) -> Check:
     """Return the requirement that no input makes the core's C overflow, index beyond a table or shift too far.
 
-    Parameters
-    ----------
-    folder : Path
-        Firmware folder.
-
     Returns
     -------
     Check
@@ -149,7 +144,7 @@ def _pieces(law: ExactLaw, ending: str, tried: range) -> str:
     """Return pieces.h: the functions of a side, and the codes where the pieces of each input end; of B those tried."""
     a, b = _sound(law.a.valid_codes), _sound(law.b.valid_codes)
     commands = law.sound_commands
-    corners = {law.zero, law.full, law.zero + law.edge_codes, max(law.zero - law.edge_codes, 0)}
+    corners = {law.zero, law.full, law.zero + law.transition_codes, max(law.zero - law.transition_codes, 0)}
     ends = sorted({0, CODES, *_ends_of(commands), *corners, *(code + 1 for code in corners)})
     furthest = max(abs(code - law.zero) for code in (commands.start, commands.stop - 1))
     lines = [f"#define {function.upper()} dz_{function}{ending}" for function in ("comp", "beta", "status")]

@@ -18,7 +18,6 @@ from dzdesign.verify.closed_loop.plant import Plant, plants_from_tests
 from dzdesign.verify.closed_loop.scenarios import Scene, run_scenarios
 from dzdesign.verify.closed_loop.tolerances import Tolerances, monte_carlo, scatter
 from dzdesign.verify.evidence import Check, IdentifiedPlant, MonteCarlo, PressureResult, ScenarioResult, Side
-from dzdesign.verify.firmware.folder import valve_of
 
 #: Shows how far a stage is: pieces and their number in, the pieces out.
 Watch = Callable[[Iterable[Any], int], Iterable[Any]]
@@ -29,19 +28,7 @@ SIGNS: dict[Side, int] = {"positive": 1, "negative": -1}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FirmwareLoop:
-    """What the closed loop showed; nothing of it where there was no core to close it with.
-
-    Attributes
-    ----------
-    checks : tuple of Check
-    plants : tuple of IdentifiedPlant
-        Of each pressure drop.
-    loops : tuple of LoopComparison
-        Ramps without and with the compensator.
-    scenarios : tuple of ScenarioResult
-    monte_carlo : MonteCarlo or None
-        The series of plants, where tolerances were given.
-    """
+    """What the closed loop showed; nothing of it where there was no core to close it with."""
 
     checks: tuple[Check, ...] = ()
     plants: tuple[IdentifiedPlant, ...] = ()
@@ -58,16 +45,9 @@ class FirmwareLoop:
 def scenes_of(folder: Path, compensator: Compensator, plant: Plant | None) -> tuple[Scene, ...]:
     """Return the compensated loop of each side at every tested pressure drop.
 
-    Parameters
-    ----------
-    folder : Path
-        Of the firmware.
-    compensator : Compensator
-        What it was made from.
-    plant : Plant or None
-        None: plants are made from the identified thresholds.
+    Without a plant there is one for each pressure drop, made from the identified thresholds.
     """
-    valve = valve_of(compensator)
+    valve = compensator.valve
     scenes: list[Scene] = []
     for name, sign in SIGNS.items():
         if sign not in compensator.signals.signs:
@@ -95,23 +75,7 @@ def close_the_loop(
     say: Callable[[str], None],
     watch: Watch,
 ) -> FirmwareLoop:
-    """Run the ramps, the scenarios and, where tolerances are given, the series of plants.
-
-    Parameters
-    ----------
-    scenes : tuple of Scene
-        Of `scenes_of`.
-    compensator : Compensator
-        What the firmware was made from.
-    plant : Plant or None
-        The one that was given.
-    sequence : RampSequence
-        The command over time.
-    tolerances : Tolerances or None
-        About the plant that was given.
-    say, watch : callable
-        As `dzdesign.verify.verification.verify` takes them.
-    """
+    """Run the ramps, the scenarios and, where tolerances are given, the series of plants."""
     given = plant is not None
     say("running the closed loop")
     with ThreadPoolExecutor(WORKERS) as pool:
@@ -134,7 +98,7 @@ def close_the_loop(
     return FirmwareLoop(
         checks=(
             plant_opens(results),
-            plant_is_the_valve(results, valve_of(compensator)),
+            plant_is_the_valve(results, compensator.valve),
             zero_flow,
             shut_after_scenarios(scenarios, zero_flow, plant_given=given),
         ),

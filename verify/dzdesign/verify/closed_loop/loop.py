@@ -10,7 +10,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.drive import RAMP_UNIT
+from dzdesign.design.drive_functions import RAMP_UNIT
 from dzdesign.design.signals import Signals
 from dzdesign.verify.closed_loop.motion import motion_header, numbers_of
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
@@ -28,7 +28,7 @@ BACK_PRESSURE_MPA = 1.0
 FLOW_SHARE = 1e-3
 #: Flow at zero command below this is none: the edge is shut, only the last bits of a number remain.
 NO_FLOW_L_MIN = 1e-9
-#: The command's ramps are longer than the amplifier's own by this factor.
+#: The command's ramps are longer than the drive's own by this factor.
 RAMP_RESERVE = 1.1
 #: No contraction to fused products: every processor gives the same digits.
 FLOATING = ("-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
@@ -83,10 +83,10 @@ class LoopComparison:
 
 
 def _slowest_ramp_s(compensator: Compensator, sign: int) -> float:
-    """Return the time that the amplifier's own ramps take from zero to full command or back, at most; 0: none."""
-    amplifier, signals = compensator.amplifier, compensator.signals
+    """Return the time that the drive's own ramps take from zero to full command or back, at most; 0: none."""
+    functions, signals = compensator.drive_functions, compensator.signals
     units, side = signals.command.span(sign) * RAMP_UNIT, 0 if sign > 0 else 1
-    steps = [ramp[side] for ramp in (amplifier.ramp_up, amplifier.ramp_down) if ramp[side]]
+    steps = [ramp[side] for ramp in (functions.ramp_up, functions.ramp_down) if ramp[side]]
     return max((units / step / signals.sample_Hz * RAMP_RESERVE for step in steps), default=0.0)
 
 
@@ -131,7 +131,7 @@ class ClosedLoop:
             np.array([full, *(sensor.full_code for sensor in sensors)], dtype=np.int32),
             np.array([1.0, *(float(sensor.span_MPa) for sensor in sensors)]),
         )
-        #: Of the amplifier's own ramps on this side, from zero to full command or back, s; 0: none.
+        #: Of the drive's own ramps on this side, from zero to full command or back, s; 0: none.
         self.slowest_ramp_s = _slowest_ramp_s(compensator, sign) if compensator else 0.0
         self._has_core = firmware is not None
         self._plant = numbers_of(plant, self._signals.compare_max)

@@ -44,17 +44,17 @@ class DriveModel:
 
     def sample(self, command: int, p_a: int, p_b: int) -> None:
         """Take new codes."""
-        signals, amplifier = self.compensator.signals, self.compensator.amplifier
+        signals, functions = self.compensator.signals, self.compensator.drive_functions
         low, high = signals.command.valid_codes
         if not low <= command <= high:
             self.status = self._status(command, p_a, p_b, 1)
             self.law, self.side, self.position = 0, 0 if self.both else 1, Fraction(0)
             return
         away = signals.command.direction(1) * (command - signals.command.zero_code)
-        if any(amplifier.ramp_up + amplifier.ramp_down):
+        if any(functions.ramp_up + functions.ramp_down):
             self._ramp(away)
             away = int(self.position)  # towards zero: never more command than the ramp has reached
-        if self.both and abs(away) > amplifier.window_codes:
+        if self.both and abs(away) > functions.window_codes:
             self.side = 1 if away > 0 else -1
         code = signals.command.zero_code + signals.command.direction(1) * away
         self.status = self._status(command, p_a, p_b, self.side or 1)
@@ -62,14 +62,14 @@ class DriveModel:
 
     def _ramp(self, asked: int) -> None:
         """Move towards what is asked, within the step of the side and the direction, and stop at zero on the way."""
-        amplifier = self.compensator.amplifier
+        functions = self.compensator.drive_functions
         goal = Fraction(asked)
         if self.position * goal < 0:
             goal = Fraction(0)
         negative = self.position < 0 or (self.position == 0 and goal < 0)
         if not self.both:
             goal, negative = max(goal, Fraction(0)), False
-        limits = amplifier.ramp_up if abs(goal) > abs(self.position) else amplifier.ramp_down
+        limits = functions.ramp_up if abs(goal) > abs(self.position) else functions.ramp_down
         step = Fraction(limits[int(negative)], STEP_UNIT)
         way = goal - self.position
         if step and abs(way) > step:
@@ -95,14 +95,14 @@ class DriveModel:
 
     def tick(self) -> None:
         """Go one PWM period on."""
-        amplifier = self.compensator.amplifier
+        functions = self.compensator.drive_functions
         compare = self.law
-        if amplifier.dither_counts:
-            self.tick_of_wave = (self.tick_of_wave + 1) % (2 * amplifier.dither_ticks)
+        if functions.dither_counts:
+            self.tick_of_wave = (self.tick_of_wave + 1) % (2 * functions.dither_ticks)
             if compare:
-                up = self.tick_of_wave < amplifier.dither_ticks
-                compare += amplifier.dither_counts if up else -amplifier.dither_counts
-        compare = min(max(compare, 0), amplifier.compare_limit)
+                up = self.tick_of_wave < functions.dither_ticks
+                compare += functions.dither_counts if up else -functions.dither_counts
+        compare = min(max(compare, 0), functions.compare_limit)
         self.compare_a, self.compare_b = (compare, 0) if self.side > 0 else (0, compare if self.side < 0 else 0)
 
     @property

@@ -36,22 +36,14 @@ class BetaNumerators(NamedTuple):
 
 
 class ExactLaw:
-    """The law of one side of a compensator on integer codes.
-
-    Parameters
-    ----------
-    compensator : Compensator
-        Its coefficients, tables and signals.
-    sign : {1, -1}
-        Sign of the command.
-    """
+    """The law of one side of a compensator on integer codes."""
 
     def __init__(self, compensator: Compensator, sign: int = 1) -> None:
         signals, side, command = compensator.signals, compensator.side(sign), compensator.signals.command
         self.compensator, self.sign = compensator, sign
         self.side: Side = "positive" if sign > 0 else "negative"
         self.code_max, self.compare_max = signals.code_max, signals.compare_max
-        self.compare_limit = compensator.amplifier.compare_limit
+        self.compare_limit = compensator.drive_functions.compare_limit
         self.zero = command.zero_code
         self.along, self.span = command.direction(sign), command.span(sign)
         self.full = self.zero + self.along * self.span
@@ -59,10 +51,10 @@ class ExactLaw:
         self.a, self.b = signals.pressure_a, signals.pressure_b
         self.reverse = compensator.reverse_codes
         self.turn = -1 if sign < 0 and signals.swapped else 1
-        self.edge_codes = compensator.edge_codes
-        self._law = law(compensator.law_name)
-        self._kappa, self._u_min0 = side.k_x_max_over_u_max, side.u_min0_over_u_max
-        self._zero_nodes, self._law_nodes = side.beta_numerators, side.law_numerators
+        self.transition_codes = compensator.transition_codes
+        self._law = law(compensator.law)
+        self._kappa, self._u_min0 = side.drive_range_over_u_max, side.u_min0_over_u_max
+        self._zero_nodes, self._law_nodes = side.beta, side.law_beta
         self._denominator, self._step = compensator.beta_denominator, compensator.beta_step_codes
         self._weight = max(1, round(self.b.per_code_MPa / self.a.per_code_MPa * WEIGHT_UNIT))
 
@@ -113,8 +105,8 @@ class ExactLaw:
             n_full=self.compare_max,
         )
         corners = [(0, betas.zero * self._u_min0 * self.compare_max)]
-        if self.edge_codes:
-            corners.append((self.edge_codes, line.slope * self.edge_codes + line.start))
+        if self.transition_codes:
+            corners.append((self.transition_codes, line.slope * self.transition_codes + line.start))
         return [*corners, (self.span, line.slope * self.span + line.start)]
 
     def compare_value(self, command_code: int, corners: list[tuple[int, Fraction]]) -> int:

@@ -61,15 +61,6 @@ class InputMap:
 def map_inputs(folder: Path, compensator: Compensator, sign: int = 1) -> InputMap:
     """Call one side of the compiled core over the grid.
 
-    Parameters
-    ----------
-    folder : Path
-        Firmware folder.
-    compensator : Compensator
-        What it was made from.
-    sign : {1, -1}
-        Sign of the commands.
-
     Raises
     ------
     RequirementError
@@ -94,7 +85,7 @@ def map_inputs(folder: Path, compensator: Compensator, sign: int = 1) -> InputMa
     compare = np.array(values)
     a_MPa = float(exact.a.span_MPa) / (exact.a.full_code - exact.a.zero_code)
     volt = float(compensator.u_max_V) / exact.compare_max
-    peak = compensator.amplifier.dither_counts
+    peak = compensator.drive_functions.dither_counts
     return InputMap(
         side=exact.side,
         command_codes=tuple(commands),

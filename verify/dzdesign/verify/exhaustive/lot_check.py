@@ -1,4 +1,4 @@
-"""A common setting against every valve of its lot: the core's drive at zero command under each valve's own bounds.
+"""A lot setting against every valve of its lot: the core's drive at zero command under each valve's own bounds.
 
 The input check need not be repeated for each valve: the integers that the core gives at zero command are the same, one
 a difference of pressure codes. Each valve has its staircase of bounds, argued from its ramp tests as in `zero_command`.
@@ -20,15 +20,6 @@ from dzdesign.verify.requirements import LOT
 
 def check_lot(exact: ExactLaw, found: Differences, at_zero: np.ndarray) -> LotCheck | None:
     """Compare the drive at zero command with the bounds of every valve of the lot; None of a valve's own setting.
-
-    Parameters
-    ----------
-    exact : ExactLaw
-        The side's law, of a compensator with its lot.
-    found : Differences
-        All differences.
-    at_zero : (D,) array
-        Compare values that the core gives at zero command.
 
     Raises
     ------
@@ -65,22 +56,11 @@ def check_lot(exact: ExactLaw, found: Differences, at_zero: np.ndarray) -> LotCh
 
 
 def lot_checked(inputs: Sequence[InputCheck], compensator: Compensator) -> list[Check]:
-    """Tell whether the core of a common setting over-compensates any valve of its lot; nothing of a valve's own.
-
-    Parameters
-    ----------
-    inputs : sequence of InputCheck
-        One a sign of command.
-    compensator : Compensator
-        With its lot.
-    """
-    count = compensator.common_valves
-    if not count:
-        return []
+    """Tell whether the core of a lot setting over-compensates any valve of its lot; nothing of a valve's own."""
+    count = len(compensator.lot)
     found = [each.lot for each in inputs if each.lot is not None]
     if not found:
-        text = f"compensator.json is of {count} valves and holds the bounds of one; run `dzdesign batch` again, and "
-        return [LOT.check(holds=None, text=f"{text}make the firmware from its lot_compensator.json")]
+        return []
     worst = min(found, key=lambda each: each.smallest_margin_V)
     least, most = (f"{100 * ends:.6g}" for ends in worst.confidence)
     over = list(dict.fromkeys(name for each in found for name in each.over_compensated))

@@ -4,15 +4,16 @@ import contextlib
 from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
-from dzdesign.core.artefact_files import TOOL, parse_document, sha256_of, to_json
+from dzdesign.core.artefact_files import sha256_of
+from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.artefact_types import THIS_TOOL
 from dzdesign.core.errors import InputError
 from dzdesign.core.units import span_MPa
 from dzdesign.design.certificate import prove_certificates
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.redesign_check import prove_derived
-from dzdesign.identify.valve.model import SCHEMA
+from dzdesign.identify.valve.model import SCHEMA, ValveModel
 from dzdesign.verify.evidence import Check
 from dzdesign.verify.requirements import CERTIFICATE, LAW, VALVE
 
@@ -29,38 +30,40 @@ def certificate_follows(compensator: Compensator) -> Check:
     except InputError as error:
         return CERTIFICATE.check(holds=False, text=str(error))
     certificate = compensator.positive.certificate
-    common = f"of {compensator.common_valves} valves the one in compensator.json: " if compensator.common_valves else ""
+    valves = len(compensator.lot)
+    common = f"of {valves} valves the one in compensator.json: " if valves else ""
     text = f"{common}the {certificate.guard} threshold's {100 * certificate.confidence:.6g}% lower bound, "
     low, high = map(float, certificate.dp_MPa)
     text += f"{span_MPa(low, high)}, proved again at every difference of pressure codes"
     return CERTIFICATE.check(holds=True, text=text)
 
 
-def law_follows(compensator: Compensator, document: dict[str, Any]) -> Check:
+def law_follows(compensator: Compensator) -> Check:
     """Tell whether designing again gives the same numbers, which a file without its options does not let anyone do.
+
+    Another version of dzdesign may have chosen other tables, and none the worse.
 
     Parameters
     ----------
     compensator : Compensator
-    document : dict
-        Its file. Another version of dzdesign may have chosen other tables, and none the worse.
+        As it was read.
     """
-    if compensator.request is None:
+    if compensator.target is None:
         text = "compensator.json does not say for which target and with which options it was designed, so no number of "
         return LAW.check(holds=None, text=f"{text}it can be derived again; make it again with `dzdesign design`")
     try:
         prove_derived(compensator)
     except InputError as error:
-        version = document.get("tool", {}).get("version")
-        known = version == TOOL["version"]
-        text = str(error) if known else f"designed by dzdesign {version}, and this is {TOOL['version']}: {error}"
+        version = compensator.tool.version
+        known = version == THIS_TOOL.version
+        text = str(error) if known else f"designed by dzdesign {version}, and this is {THIS_TOOL.version}: {error}"
         return LAW.check(holds=False if known else None, text=text)
-    target = compensator.request.target.name
+    target = compensator.target.name
     text = f"designed again from the valve and the options in compensator.json, for {target}: every number the same"
     return LAW.check(holds=True, text=text)
 
 
-def valve_follows(folder: Path, document: dict[str, Any]) -> list[Check]:
+def valve_follows(folder: Path, compensator: Compensator) -> list[Check]:
     """Tell whether the valve in a compensator is that of the file it names; nothing where that file is not at hand.
 
     The name alone says nothing: a valve.json of another hash and another content is a stranger's.
@@ -69,19 +72,19 @@ def valve_follows(folder: Path, document: dict[str, Any]) -> list[Check]:
     ----------
     folder : Path
         Of the firmware; valve.json is looked for in it, beside it and in the folders beside it.
-    document : dict
-        compensator.json.
+    compensator : Compensator
+        Of that firmware.
     """
-    source, valve = document["made_from"][0], document["valve"]
-    stated = source["sha256"]
+    (source,), valve = compensator.made_from, compensator.valve
+    stated = source.sha256
     around = tuple(_valves_around(folder))
-    named = (each for each in around if each.name == source["source"] and each.sha256 != stated)
+    named = (each for each in around if each.name == source.source and each.sha256 != stated)
     other = "".join(
         f"{each.name} beside the firmware is ANOTHER valve, SHA-256 {each.sha256}, and not used; "
         for each in named
         if each.valve != valve
     )
-    if stated == sha256_of(to_json(valve).encode()):  # as `identify` writes it: no file is needed
+    if stated == compensator.valve_sha256:  # as `identify` writes it: no file is needed
         text = f"the valve that compensator.json holds has, as `identify` writes it, the SHA-256 {stated} in made_from"
         return [VALVE.check(holds=True, text=other + text)]
     for each in around:
@@ -103,10 +106,10 @@ class _ValveFile:
         self.name, self.sha256, self._content = name, sha256_of(content), content
 
     @cached_property
-    def valve(self) -> dict[str, Any] | None:
+    def valve(self) -> ValveModel | None:
         """The valve, or None if it can't be read."""
         with contextlib.suppress(InputError):
-            return parse_document(self._content, self.name, (SCHEMA,))
+            return read_artefact(self._content, ValveModel, self.name)
         return None
 
 

@@ -7,9 +7,7 @@ from dzdesign.core.artefact_files import MANIFEST_NAME, check_inside, read_bytes
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.compensator_file import compensator_from_document
 from dzdesign.design.firmware_manifest import FirmwareManifest
-from dzdesign.identify.valve.model import ValveModel
 
 
 def read_firmware_manifest(folder: Path) -> FirmwareManifest:
@@ -48,17 +46,7 @@ def read_compensator(folder: Path) -> Compensator:
 @lru_cache(maxsize=1)
 def _compensator(content: bytes, source: str) -> Compensator:
     """Read a compensator once for all checks of a firmware; nothing changes one."""
-    return compensator_from_document(content, source)
-
-
-@lru_cache(maxsize=1)
-def _valve(content: str) -> ValveModel:
-    return read_artefact(content.encode(), ValveModel, "compensator.json: valve")
-
-
-def valve_of(compensator: Compensator) -> ValveModel:
-    """Return the valve that a compensator was made from."""
-    return _valve(compensator.valve_document)
+    return read_artefact(content, Compensator, source)
 
 
 def check_firmware_inside(folder: Path) -> None:

@@ -9,7 +9,6 @@ from dzdesign.core.artefact_types import SourceFile
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.verify.evidence import Check
-from dzdesign.verify.firmware.folder import valve_of
 from dzdesign.verify.requirements import MANIFEST
 
 COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
@@ -23,32 +22,22 @@ Value = int | tuple[tuple[int, ...], ...] | str
 
 
 def manifest_follows(folder: Path, manifest: FirmwareManifest, compensator: Compensator) -> Check:
-    """Tell whether the manifest says what is in the folder; its words on a constant are not read.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the firmware.
-    manifest : FirmwareManifest
-        Of `read_firmware_manifest`.
-    compensator : Compensator
-        The folder's compensator.json.
-    """
+    """Tell whether the manifest says what is in the folder; its words on a constant are not read."""
     faults = [*_faults_of_origin(folder, manifest, compensator), *_faults_of_constants(folder, manifest)]
     if faults:
         more = f", and {len(faults) - 1} more" if len(faults) > 1 else ""
         return MANIFEST.check(holds=False, text=f"{faults[0]}{more}; make the firmware again with `dzdesign codegen`")
     text = f"law, target, hashes and {len(manifest.constants)} constants in {len(manifest.core)} files as it says"
-    if compensator.request and compensator.request.target.name != manifest.target:  # both may count alike
-        text += f"; the compensator was designed for {compensator.request.target.name}, this is for {manifest.target}"
+    if compensator.target and compensator.target.name != manifest.target:  # both may count alike
+        text += f"; the compensator was designed for {compensator.target.name}, this is for {manifest.target}"
     return MANIFEST.check(holds=True, text=text)
 
 
 def _faults_of_origin(folder: Path, manifest: FirmwareManifest, compensator: Compensator) -> Iterator[str]:
     """Yield what the manifest says of the compensator and the valve, and is otherwise."""
     digest = sha256_of((folder / "compensator.json").read_bytes())
-    if manifest.law != compensator.law_name:
-        yield f"the manifest's law is {manifest.law}, the compensator's {compensator.law_name}"
+    if manifest.law != compensator.law:
+        yield f"the manifest's law is {manifest.law}, the compensator's {compensator.law}"
     targets = {name.partition("/")[0].replace("_", "-") for name in manifest.files if "/" in name} - {"core"}
     if targets != {manifest.target}:
         there = " and ".join(sorted(targets)) or "no target"
@@ -56,8 +45,8 @@ def _faults_of_origin(folder: Path, manifest: FirmwareManifest, compensator: Com
     for key, stated, value in (
         ("made_from", manifest.made_from, (SourceFile(source="compensator.json", sha256=digest),)),
         ("origin.compensator_json", manifest.origin.compensator_json, digest),
-        ("origin.valve_json", manifest.origin.valve_json, compensator.valve_sha256),
-        ("origin.ramp_tests", manifest.origin.ramp_tests, valve_of(compensator).made_from),
+        ("origin.valve_json", manifest.origin.valve_json, compensator.valve_json_sha256),
+        ("origin.ramp_tests", manifest.origin.ramp_tests, compensator.valve.made_from),
     ):
         if stated != value:
             yield f"the manifest's {key} is not that of compensator.json"
@@ -86,11 +75,6 @@ def _text(path: Path) -> str:
 
 def constants_in(text: str) -> Iterator[tuple[str, Value]]:
     """Yield name and value of the constants in C: of a table its rows, of what is no number its text.
-
-    Parameters
-    ----------
-    text : str
-        Of a file of the core.
 
     Examples
     --------

@@ -3,17 +3,18 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Annotated
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
-from dzdesign.identify.fitting.bounds import staircase
 from dzdesign.identify.valve.quantity_types import PressureDrop, Ratio, Voltage, VoltageError
+from dzdesign.identify.valve.staircase import Direction, staircase
 
+Guard = Literal["closing", "mean", "opening"]
 #: Thresholds that a certificate may protect, from the safest on.
-GUARDS = ("closing", "mean", "opening")
+GUARDS: tuple[Guard, ...] = get_args(Guard)
 #: Numbers of the file are right to seven decimals; a comparison of two allows ten times that.
 ROUNDING_V = 1e-6
 
@@ -66,7 +67,7 @@ class GuardCurve:
         """Offset beta u_min0 at the tests, V."""
         return tuple(share * self.u_min0_V for share in self.beta) or (self.u_min0_V,)
 
-    def check_staircase(self, trend: str) -> None:
+    def check_staircase(self, trend: Direction) -> None:
         """Check that the steps follow from the tests' bounds under a trend.
 
         Raises
@@ -105,7 +106,7 @@ class OpeningCurve:
                 f"{len(self.dp_MPa)} pressure drops, expected as many, at least one, and rising pressure drops"
             )
 
-    def check_order(self, trend: str, guards: Sequence[GuardCurve]) -> None:
+    def check_order(self, trend: Direction, guards: Sequence[GuardCurve]) -> None:
         """Check that it runs the way of the trend, and nowhere below the offset of a guard's curve.
 
         Raises

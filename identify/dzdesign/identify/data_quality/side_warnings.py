@@ -1,6 +1,6 @@
-"""The quality gate that speaks: what is weak in the data, with the numbers and what to do."""
+"""Warnings about one side, after its identification: what is weak, with the numbers and what to do."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.data_quality.knee_errors import about_errors
 from dzdesign.identify.data_quality.pressures import about_flow_gains
 from dzdesign.identify.data_quality.sweeps import about_sweeps
-from dzdesign.identify.knees.prepared_tests import DescribedTest, DescribedTests
+from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.ramp_result import TestResult
@@ -30,31 +30,6 @@ SMALL_SHIFT = 5e-5
 READINGS_A_LEVEL = 5
 #: A leak below this share of the largest flow is not worth a word.
 LEAK_SHARE = 1e-3
-
-
-#: Codes of warnings, the most serious first: what stops `design`, what makes the numbers worthless, what may let flow
-#: pass at zero command, what can't be said, what costs performance, and what is only to be known.
-MOST_SERIOUS_FIRST = (
-    "branch-order", "one-branch",
-    "simulated", "flow-contradicts-dp", "pressure-stuck", "time-unit", "missing-samples", "side-refused", "two-sides",
-    "coarse-flow", "meter-clipped", "edge-not-swept", "gap", "not-monotone", "leak", "meter-zero", "onset-hidden",
-    "lag-large", "lag-unknown", "clock",
-    "no-pressure", "one-pressure", "declared-pressure",
-    "flow-falls", "not-full-command", "curved", "bend", "noise", "coarse-levels", "soft-edge", "outliers",
-    "pressure-sag", "no-saturation", "flat-trend", "thinned",
-)  # fmt: skip
-
-
-def most_serious_first(warnings: Sequence[Warning_]) -> tuple[Warning_, ...]:
-    """Return warnings by `MOST_SERIOUS_FIRST`; those of one code stay as they stand.
-
-    Parameters
-    ----------
-    warnings : sequence of Warning_
-        In any order.
-    """
-    rank = {code: place for place, code in enumerate(MOST_SERIOUS_FIRST)}
-    return tuple(sorted(warnings, key=lambda warning: rank.get(warning.code, len(rank))))
 
 
 def find_warnings(
@@ -115,7 +90,8 @@ def _about_steps(side: SideModel, tests: tuple[DescribedTest, ...], options: Ide
 
 
 def _about_the_lag(group: DescribedTests, options: IdentifyOptions) -> Iterator[Warning_]:
-    rates = [branch.rate for item in group.tests for branch in item.branches if branch and branch.rate > 0]
+    rates = [shape.prepared.branch.rate for item in group.tests for shape in item.branches]
+    rates = [rate for rate in rates if rate > 0]
     fastest, lag = max(rates, default=0.0), group.lag
     if not rates:
         yield Warning_(
@@ -195,7 +171,7 @@ def _about_pressure(side: SideModel, tests: tuple[DescribedTest, ...]) -> Iterat
             ),
             source=side.tests[0].source,
         )
-    elif side.trend == "flat":
+    elif side.trend == "flat" and side.trend_change_V is not None and side.trend_change_se_V is not None:
         yield Warning_(
             code="flat-trend",
             text=(
@@ -217,9 +193,10 @@ def _about_pressure(side: SideModel, tests: tuple[DescribedTest, ...]) -> Iterat
 
 def _sag(item: DescribedTest) -> float:
     """Return the share of the pressure drop that is lost at full command."""
-    if item.dp is None:
+    test = item.test
+    if item.dp is None or test.dp is None:
         return 0.0
-    return 1 - float(np.median(item.test.dp[item.test.u >= 0.97 * item.test.u.max()])) / item.dp
+    return 1 - float(np.median(test.dp[test.u >= 0.97 * test.u.max()])) / item.dp
 
 
 def _about_declarations(tests: tuple[DescribedTest, ...]) -> Iterator[Warning_]:
@@ -248,9 +225,8 @@ def _about_the_edge(side: SideModel, group: DescribedTests, u_max: float) -> Ite
             source=None,
         )
     for test, item in zip(side.tests, group.tests, strict=True):
-        knee = test.u_knee_falling_V if test.u_knee_falling_V is not None else test.u_knee_rising_V
-        shape = item.shapes[1] or item.shapes[0]
-        if knee - test.u_guard_V > SOFT_EDGE * u_max and not shape.tail.hole:
+        knee = test.u_knee_rising_V if test.u_knee_falling_V is None else test.u_knee_falling_V
+        if knee is not None and knee - test.u_guard_V > SOFT_EDGE * u_max and not item.closing_branch.tail.hole:
             yield Warning_(
                 code="soft-edge",
                 text=(
@@ -274,7 +250,7 @@ def _about_the_edge(side: SideModel, group: DescribedTests, u_max: float) -> Ite
 
 def _leak_in_overlap(item: DescribedTest, threshold: float) -> float:
     """Return by how much the flow inside the overlap exceeds that near zero, m³/s; zero within its error."""
-    branch = item.branches[1] or item.branches[0]
+    branch = item.closing_branch.prepared.branch
     near_zero = branch.q[branch.u < 0.3 * threshold]
     inside = branch.q[(branch.u > OVERLAP[0] * threshold) & (branch.u < OVERLAP[1] * threshold)]
     if min(near_zero.size, inside.size) < 20:

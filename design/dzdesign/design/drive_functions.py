@@ -1,0 +1,70 @@
+"""What the drive does around the law: side by side, ramps, dither, a largest output. All off by default."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from msgspec import Meta
+
+from dzdesign.core.artefact_types import RuleError
+
+#: Ramps count in codes of command over this, a sample.
+RAMP_UNIT = 1 << 16
+#: Codes of command from zero on that a ramp counts in 32 bits.
+RAMPED_CODES = (1 << 31) // RAMP_UNIT - 1
+
+Step = Annotated[int, Meta(ge=0, le=2**30)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveFunctions:
+    """What the drive does around the law, as the integers that the firmware uses."""
+
+    window_codes: Annotated[
+        int,
+        Meta(
+            description="Of a command of both signs: codes by which it must pass zero before the other solenoid is "
+            "driven. Until then the one that was driven stays at its offset: noise about zero does not throw the spool "
+            "from side to side.",
+            ge=0,
+            le=4095,
+        ),
+    ] = 0
+    ramp_up: Annotated[
+        tuple[Step, Step],
+        Meta(
+            description="Largest change of the command a sample, away from zero, in 1/65536 of a code: of positive, "
+            "then of negative command. 0: no limit."
+        ),
+    ] = (0, 0)
+    ramp_down: Annotated[tuple[Step, Step], Meta(description="The same, back to zero.")] = (0, 0)
+    dither_counts: Annotated[
+        int,
+        Meta(
+            description="Half the height of a square wave on the compare value; the certificate counts it as offset. "
+            "0: none.",
+            ge=0,
+            le=65535,
+        ),
+    ] = 0
+    dither_ticks: Annotated[int, Meta(description="PWM periods of half a wave.", ge=1, le=32767)] = 1
+    compare_limit: Annotated[int, Meta(description="Largest compare value.", ge=0, le=65535)] = 60000
+
+    def __post_init__(self) -> None:
+        for name, value, limit in (
+            ("window_codes", self.window_codes, 4095),
+            ("dither_counts", self.dither_counts, 65535),
+            ("compare_limit", self.compare_limit, 65535),
+            *(("ramp_up", value, 2**30) for value in self.ramp_up),
+            *(("ramp_down", value, 2**30) for value in self.ramp_down),
+        ):
+            if not 0 <= value <= limit:
+                raise RuleError(f"{name} is {value}, expected 0 to {limit}")
+        if not 1 <= self.dither_ticks <= 32767:
+            raise RuleError(
+                f"dither_ticks is {self.dither_ticks}, expected 1 to 32767 PWM periods: a wave is twice that"
+            )
+
+    @property
+    def has_ramp(self) -> bool:
+        """True if any of the ramps limits the command."""
+        return any(self.ramp_up + self.ramp_down)

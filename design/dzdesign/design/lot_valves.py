@@ -1,0 +1,83 @@
+"""The valves of a lot: of each, what its ramp tests bounded the guarded threshold to.
+
+The certificate of a compensator's file is for the valve in it. A lot setting is of many, so its file holds of each what
+`verify` needs to see that none is over-compensated: name, hash of valve.json, and the guarded threshold's bounds.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import accumulate, pairwise
+from typing import Annotated
+
+from msgspec import Meta
+
+from dzdesign.core.artefact_types import RuleError, Sha256, quantity
+from dzdesign.identify.valve.quantity_types import PressureDrop, Voltage
+from dzdesign.identify.valve.side_model import SideModel
+from dzdesign.identify.valve.staircase import Direction
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LotSide:
+    """One sign of command of a valve: lower bounds of the guarded threshold."""
+
+    trend: Annotated[
+        Direction | None,
+        Meta(description="How the threshold runs with the pressure drop; null where fewer than two were tested."),
+    ]
+    confidence: Annotated[float, quantity("1", "Confidence with which all bounds hold together.", ge=0.5, le=1)]
+    dp_MPa: Annotated[tuple[PressureDrop, ...], quantity("MPa", "Tested pressure drops, rising.")]
+    u_lower_V: Annotated[tuple[Voltage, ...], quantity("V", "Lower bound of the threshold at each.")]
+
+    def __post_init__(self) -> None:
+        if not self.dp_MPa or len(self.dp_MPa) != len(self.u_lower_V):
+            raise RuleError(f"{len(self.dp_MPa)} pressure drops have {len(self.u_lower_V)} bounds, expected one each")
+        if any(left >= right for left, right in pairwise(self.dp_MPa)):
+            raise RuleError("the pressure drops of a valve do not rise from test to test")
+
+    @classmethod
+    def of(cls, side: SideModel, guard: str) -> "LotSide":
+        """Return the bounds of an identified side."""
+        return cls(
+            trend=side.trend,
+            confidence=side.certificate.confidence,
+            dp_MPa=side.guards[guard].beta_dp_MPa,
+            u_lower_V=side.guards[guard].u_lower_V,
+        )
+
+    def steps(self) -> Iterator[tuple[Fraction, Fraction, Fraction]]:
+        """Yield from where to where (MPa) which bound holds (V): straight from the tests, the threshold being monotone.
+
+        A threshold that falls with dP is, below a test, at least that test's bound.
+        """
+        pressures = [Fraction(repr(dp)) for dp in self.dp_MPa]
+        bounds = [Fraction(repr(bound)) for bound in self.u_lower_V]
+        if self.trend == "decreasing":
+            best = list(accumulate(reversed(bounds[1:]), max))[::-1]
+        elif self.trend == "increasing":
+            best = list(accumulate(bounds[:-1], max))
+        else:
+            best = [min(bounds)] * (len(bounds) - 1)
+        if not best:
+            yield pressures[0], pressures[0], bounds[0]
+        for (low, high), bound in zip(pairwise(pressures), best, strict=True):
+            yield low, high, bound
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LotValve:
+    """A valve of the lot."""
+
+    name: Annotated[str, Meta(description="By which it stands in the table of the batch.")]
+    valve_sha256: Annotated[Sha256, Meta(description="SHA-256 of its valve.json.")]
+    positive: Annotated[LotSide, Meta(description="Bounds of positive commands.")]
+    negative: Annotated[
+        LotSide | None, Meta(description="Bounds of negative commands; null: the setting drives none.")
+    ] = None
+
+    @classmethod
+    def of(cls, name: str, valve_sha256: str, sides: Mapping[int, SideModel], guards: Mapping[int, str]) -> "LotValve":
+        """Return a valve's part; `sides` and `guards` by the sign of command."""
+        bounds = {sign: LotSide.of(side, guards[sign]) for sign, side in sides.items()}
+        return cls(name=name, valve_sha256=valve_sha256, positive=bounds[1], negative=bounds.get(-1))

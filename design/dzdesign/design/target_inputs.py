@@ -1,0 +1,58 @@
+"""What `design` needs to know of a target: its analogue-digital converter, its timer, how often it samples."""
+
+from dataclasses import dataclass, field
+from fractions import Fraction
+from math import floor
+from typing import Annotated
+
+from msgspec import Meta
+
+from dzdesign.core.artefact_types import RuleError, quantity
+
+Count = Annotated[int, Meta(ge=1, le=65535)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Converter:
+    """An analogue-digital converter: code = floor(levels V / full_V), limited to levels - 1."""
+
+    full_V: Annotated[Fraction, quantity("V", "Voltage at the pin that would be the code `levels`.")] = field(
+        default_factory=lambda: Fraction(3)
+    )
+    levels: Annotated[int, Meta(description="Number of codes.", ge=2, le=65536)] = 4096
+
+    def __post_init__(self) -> None:
+        if self.full_V <= 0:
+            raise RuleError(f"the converter's full_V is {float(self.full_V):g} V, expected more than zero")
+
+    @property
+    def code_max(self) -> int:
+        """Largest code."""
+        return self.levels - 1
+
+    def code(self, volts: Fraction) -> int:
+        """Return the code of a voltage at the pin."""
+        return min(max(floor(self.levels * volts / self.full_V), 0), self.code_max)
+
+    def ends(self, code: int) -> tuple[Fraction, Fraction]:
+        """Return the least voltage of a code, and the one that it stays below."""
+        step = self.full_V / self.levels
+        return code * step, (code + 1) * step
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TargetInputs:
+    """The target's converter and timer, which the law's integers are for."""
+
+    name: Annotated[
+        str,
+        Meta(
+            description="Microcontroller, as `codegen --list-targets` names it.",
+            pattern="^[a-z][a-z0-9]*(-[a-z0-9]+)*$",
+            max_length=60,
+        ),
+    ]
+    converter: Annotated[Converter, Meta(description="Its analogue-digital converter.")]
+    compare_max: Annotated[Count, Meta(description="Counts of full drive.")]
+    sample_Hz: Annotated[Count, quantity("Hz", "Samples a second.")]
+    tick_Hz: Annotated[Count, quantity("Hz", "PWM periods a second.")]

@@ -1,0 +1,83 @@
+"""`DescribedTests`: ramp tests made comparable and described, as fits, warnings and plots take them."""
+
+from dataclasses import dataclass
+
+from dzdesign.identify.knees.branch_shape import BranchShape
+from dzdesign.identify.knees.meter_lag import MeterLag
+from dzdesign.identify.reading.ramp_test import RampTest
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DescribedTest:
+    """One ramp test.
+
+    Attributes
+    ----------
+    test : RampTest
+        Its samples.
+    dp : float or None
+        Nominal pressure drop, Pa; None if it is unknown.
+    shapes : tuple of BranchShape or None
+        Of its rising and its falling branch; None where there is none.
+    q_max : float
+        Largest flow, m³/s.
+    ramps : tuple of str
+        The ramps in it.
+    files : tuple of (str, str)
+        Source and SHA-256 of every file in it.
+    """
+
+    test: RampTest
+    dp: float | None
+    shapes: tuple[BranchShape | None, BranchShape | None]
+    q_max: float
+    ramps: tuple[str, ...]
+    files: tuple[tuple[str, str], ...]
+
+    @property
+    def branches(self) -> list[BranchShape]:
+        """The branches that there are."""
+        return [shape for shape in self.shapes if shape]
+
+    def branch(self, column: int) -> BranchShape:
+        """Return the rising (0) or falling (1) branch.
+
+        Raises
+        ------
+        ValueError
+            If there is none.
+        """
+        shape = self.shapes[column]
+        if shape is None:
+            raise ValueError(f"'{self.test.source}' has no {('rising', 'falling')[column]} branch")
+        return shape
+
+    @property
+    def closing_branch(self) -> BranchShape:
+        """The falling branch, or the rising one where there is no other: the one that a certificate guards."""
+        return self.branches[-1]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DescribedTests:
+    """All ramp tests of a valve, in the order of rising pressure drop.
+
+    Attributes
+    ----------
+    tests : tuple of DescribedTest
+        All with the same branches.
+    floor : float
+        Meter floor, given or found, m³/s.
+    lag : MeterLag
+        Of the meter, declared or found.
+    zero_L_min : dict
+        Source -> flow read at zero command, where it is not zero; it has been subtracted.
+    zero_se : tuple of float
+        Standard error of what was subtracted from each of `tests`, as of white noise, m³/s; 0 where nothing was.
+    """
+
+    tests: tuple[DescribedTest, ...]
+    floor: float
+    lag: MeterLag
+    zero_L_min: dict[str, float]
+    zero_se: tuple[float, ...]
