@@ -71,6 +71,7 @@ def test_the_firmware_says_which_law_it_is(firmware):
     assert "coefficient of beta * u_i in u_O: k x_max/u_max =" in source
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_every_input_follows_it_and_the_report_derives_it(run, firmware, folder):
     run("verify", "firmware", "-o", "evidence")

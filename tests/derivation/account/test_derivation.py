@@ -100,6 +100,7 @@ def test_a_derivation_can_be_read_to_its_end(statement, verdicts):
         assert named <= {ground.number for ground in statement.grounds}
 
 
+@pytest.mark.slow
 def test_every_change_of_meaning_is_caught(verdicts):
     scores = score_mutations(list(verdicts.values())).statements
     assert [score.number for score in scores] == [statement.number for statement in STATEMENTS]
