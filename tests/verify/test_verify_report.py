@@ -2,12 +2,14 @@
 
 import json
 import shutil
+from collections import Counter
 from dataclasses import replace
 
 import pytest
 
 from dzdesign.codegen.project import generate
 from dzdesign.command_line.cli import main
+from dzdesign.core import artefact_reading
 from dzdesign.core.artefact_files import MANIFEST_NAME, TOOL, sha256_of, to_json, write_folder
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import to_json_bytes
@@ -206,3 +208,19 @@ def test_another_valve_under_the_hash_of_the_file_is_found(copied):
 @pytest.mark.parametrize(("target", "said"), [("f28335", True), ("cortex-m4", False), ("host", False)])
 def test_the_headers_of_ti_are_named_where_they_make_sense(target, said):
     assert any("--c2000ware" in line for line in not_tried(evidence_with(target=target))) is said
+
+
+# ---- read once ----
+
+
+def test_verify_reads_valve_json_once(copied, tmp_path, monkeypatch):
+    """And compensator.json, which holds the valve, once for all checks and once for the report."""
+    read = Counter()
+    convert = artefact_reading.convert
+    monkeypatch.setattr(
+        artefact_reading,
+        "convert",
+        lambda document, kind, **how: read.update([kind.__name__]) or convert(document, kind, **how),
+    )
+    assert main(["verify", str(copied / "firmware"), "-o", str(tmp_path / "evidence")]) == 0
+    assert read["ValveModel"] == 1 and read["Compensator"] == 2 and read["Evidence"] == 1
