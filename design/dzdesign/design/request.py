@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
-from dzdesign.core.options import AMPLIFIER, CONNECTIONS, LAW, Option, Text, arguments_of
+from dzdesign.core.options import CONNECTIONS, DRIVE, LAW, Option, Text, arguments_of
 from dzdesign.derivation.laws import LAW_NAMES
 
 if TYPE_CHECKING:
@@ -58,14 +58,14 @@ class DesignChoices:
         "D", CONNECTIONS, "same", choices=NEGATIVE_DP)] = None
     zero_window: Annotated[Text, Option(
         "Command of both signs: share by which it must pass zero before the other solenoid is driven.",
-        "C", AMPLIFIER, "1 %", "1 %")] = None
+        "C", DRIVE, "1 %", "1 %")] = None
     ramp_up: Annotated[Text, Option(
         'Time from zero to full command, such as "0.5 s", or "0.5 s / 0.8 s" for positive and negative commands.',
-        "T", AMPLIFIER, "0 s", "0.5 s")] = None
-    ramp_down: Annotated[Text, Option("Time from full command to zero.", "T", AMPLIFIER, "0 s", "0.5 s")] = None
+        "T", DRIVE, "0 s", "0.5 s")] = None
+    ramp_down: Annotated[Text, Option("Time from full command to zero.", "T", DRIVE, "0 s", "0.5 s")] = None
     dither: Annotated[Text, Option(
         'Square wave on the output, such as "150 Hz 1 %", plus and minus 1 % of full drive.',
-        "D", AMPLIFIER, "off", "150 Hz 1 %")] = None
+        "D", DRIVE, "off", "150 Hz 1 %")] = None
     # fmt: on
 
 
