@@ -18,6 +18,13 @@ FORBIDDEN = {
     "verify": {"codegen"},  # the checker shares no code with what it checks
     "assess": {"derivation", "design", "codegen", "verify"},
 }
+#: Of a room, its sub-rooms and modules from the ground up: a module imports only those on its floor or below. What is
+#: not named stands on top.
+FLOORS = {
+    "identify": (
+        "constants", "options", "valve", "reading", "ramps", "knees", "fitting", "data_quality", "results", "plots",
+    ),
+}  # fmt: skip
 MOST_MODULES = 25
 
 
@@ -67,6 +74,23 @@ def against_the_order(graph: Mapping[str, set[str]]) -> list[str]:
     return wrong
 
 
+def against_the_floors(graph: Mapping[str, set[str]], room: str) -> list[str]:
+    """Return the imports inside a room that run upwards."""
+    floors = FLOORS[room]
+
+    def floor(name: str) -> int:
+        part = name.split(".")[2] if name.count(".") > 1 else ""
+        return floors.index(part) if part in floors else len(floors)
+
+    inside = {name: needed for name, needed in graph.items() if name.startswith(f"dzdesign.{room}.")}
+    return [
+        f"{name} imports {other}"
+        for name, needed in inside.items()
+        for other in sorted(needed & inside.keys())
+        if floor(other) > floor(name)
+    ]
+
+
 def circle(graph: Mapping[str, set[str]]) -> list[str]:
     """Return the modules of an import circle, or nothing."""
     try:
@@ -85,6 +109,28 @@ def test_the_whole_tree_is_seen():
 
 def test_a_room_imports_only_the_rooms_before_it():
     assert against_the_order(import_graph()) == []
+
+
+@pytest.mark.parametrize("room", FLOORS)
+def test_inside_a_room_imports_run_down(room):
+    graph = import_graph()
+    for name in FLOORS[room]:  # a floor that nobody stands on is a misspelled one
+        assert any(module.startswith(f"dzdesign.{room}.{name}") for module in graph)
+    assert against_the_floors(graph, room) == []
+
+
+@pytest.mark.parametrize(
+    ("module", "line"),
+    [
+        ("dzdesign.identify.reading.clock", "from dzdesign.identify.ramps.branches import Branch"),
+        ("dzdesign.identify.valve.model", "def f():\n    from dzdesign.identify.fitting import bounds"),
+        ("dzdesign.identify.plots.frame", "from dzdesign.identify.identification import identify"),
+    ],
+)
+def test_a_seeded_import_upwards_is_found(module, line):
+    graph = import_graph()
+    graph[module] |= set(imports(line, graph))
+    assert [found for found in against_the_floors(graph, "identify") if module in found]
 
 
 def test_there_is_no_import_circle():

@@ -23,22 +23,9 @@ ONE_AT_A_TIME = Lock()
 class Task:
     """All that a worker needs to calibrate one valve; it may share no file with the client.
 
-    Attributes
-    ----------
-    name : str
-        Of the valve.
-    recordings : tuple of (str, bytes)
-        Name and content of each file.
-    identify, design : mapping
-        Options of the two commands, as they are written there; what is not given is missing.
-    target : str
-        Of the firmware.
-    verify : bool
-        Whether the firmware is verified.
-    plant : (str, bytes) or None
-        Name and content of the plant's file, for the verification.
-    refused : str
-        Why it can't be calibrated at all: its recordings can't be read.
+    Recordings and plant are name and content of a file; the options of `identify` and `design` are as they are written
+    on the command line, what is not given is missing. `refused` says why it can't be calibrated at all: its recordings
+    can't be read.
     """
 
     name: str
@@ -69,18 +56,9 @@ class Task:
     def outcome(
         self, status: Status, reason: str = "", files: Mapping[str, bytes] | None = None, *, again: bool = False
     ) -> "Outcome":
-        """Return what came of it.
+        """Return what came of it; `files` by their path in the valve's folder.
 
-        Parameters
-        ----------
-        status : {"ok", "failed", "does not hold"}
-            "does not hold": a requirement of its verification.
-        reason : str
-            Why it is not ok.
-        files : mapping of str to bytes, optional
-            Path in the valve's folder to content.
-        again : bool
-            Whether the next run tries it again, as that may end otherwise.
+        The next run tries it `again` where that may end otherwise.
         """
         manifest = ValveManifest(
             tool=THIS_TOOL,

@@ -164,15 +164,7 @@ def _jobs(args: BatchArguments) -> int:
 
 
 def useful_jobs(jobs: int, waiting: int) -> int:
-    """Return so many processes as have something to do: a thousand of them would fill a machine and never begin.
-
-    Parameters
-    ----------
-    jobs : int
-        That are asked for.
-    waiting : int
-        Valves to calibrate.
-    """
+    """Return as many of the processes asked for as the waiting valves keep busy: a thousand would fill a machine."""
     most = MOST_A_PROCESSOR * (os.cpu_count() or 1)
     if jobs > most and waiting > most:
         say(f"--jobs {jobs}: {most} processes, as this machine has {os.cpu_count() or 1} processors")

@@ -11,21 +11,19 @@ from dzdesign.terminal.progress import stage_progress
 
 EXAMPLES = ("dzdesign derive --equation 18", "dzdesign derive --format html -o derivation.html")
 
-# fmt: off
-
 
 @dataclass(frozen=True, kw_only=True)
 class Arguments:
     """Arguments of `derive`."""
 
-    format: Annotated[str, Option(
-        "Format: text, json, latex or html.", "F",
-        choices="dzdesign.derivation.presentation.report:FORMATS")] = "text"
-    equation: Annotated[Texts, Option(
-        "Number of an equation, such as 18 or T3b: print this one and what it rests on. Repeatable.", "N")] = ()
-    mutate: Annotated[bool, Option("Instead, make every equation wrong, and count what is caught.")] = False
-    output: Annotated[AnyPath | None, Option("File to write (default: standard output).", "FILE", short="-o")] = None
-# fmt: on
+    format: Annotated[str, Option("F", choices="dzdesign.derivation.presentation.report:FORMATS")] = "text"
+    """Format: text, json, latex or html."""
+    equation: Annotated[Texts, Option("N")] = ()
+    """Number of an equation, such as 18 or T3b: print this one and what it rests on. Repeatable."""
+    mutate: Annotated[bool, Option()] = False
+    """Instead, make every equation wrong, and count what is caught."""
+    output: Annotated[AnyPath | None, Option("FILE", short="-o")] = None
+    """File to write (default: standard output)."""
 
 
 def run(arguments: Arguments, json: bool) -> int:

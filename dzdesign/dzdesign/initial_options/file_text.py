@@ -7,7 +7,7 @@ from dzdesign.core.errors import one_line
 from dzdesign.core.units import SPELLINGS
 
 if TYPE_CHECKING:
-    from dzdesign.identify.first_look import GuessedColumns
+    from dzdesign.identify.reading.guessed_columns import GuessedColumns
     from dzdesign.initial_options.look import Look
 
 #: Who and what; last in the file, for in TOML a table ends where the next one begins.

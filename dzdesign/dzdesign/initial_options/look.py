@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from dzdesign.identify.first_look import GuessedColumns, SeenSide
+    from dzdesign.identify.first_look import SeenSide
+    from dzdesign.identify.reading.guessed_columns import GuessedColumns
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -12,7 +12,8 @@ from dzdesign.stages.recordings import expand, read_recordings
 from dzdesign.terminal.progress import say, stage_progress, with_bar
 
 if TYPE_CHECKING:
-    from dzdesign.identify.first_look import GuessedColumns, SeenSide
+    from dzdesign.identify.first_look import SeenSide
+    from dzdesign.identify.reading.guessed_columns import GuessedColumns
     from dzdesign.identify.reading.ramp_test import RampTest
     from dzdesign.identify.valve.model import Warning_
 
@@ -65,8 +66,9 @@ def _look(
     skip_rows: int | None,
 ) -> tuple[Look, list[str]]:
     """Return what was seen, and what is open."""
-    from dzdesign.identify.first_look import guess_columns, look_at_sides, proposed_u_max
+    from dzdesign.identify.first_look import look_at_sides, proposed_u_max
     from dzdesign.identify.reading.column_labels import parse_columns
+    from dzdesign.identify.reading.guessed_columns import guess_columns
 
     given = parse_columns(declared_columns) if declared_columns else {}
     guesses = [guess_columns(path, skip_rows) for path in with_bar(paths, "looking at columns")]
@@ -132,8 +134,8 @@ def _pressures_by_names(lacking: list[str], *, alone: bool) -> tuple[dict[str, s
 
 
 def _is_in_per_cent(guesses: "list[GuessedColumns]", columns: dict[str, str]) -> bool:
-    from dzdesign.identify.first_look import is_per_cent
     from dzdesign.identify.reading.column_labels import PER_CENT
+    from dzdesign.identify.reading.guessed_columns import is_per_cent
 
     if "u" in columns:  # a label that was chosen ends in its unit: Sollwert [%]
         return columns["u"].rstrip(" ])").endswith(PER_CENT)

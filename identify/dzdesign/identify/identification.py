@@ -1,37 +1,25 @@
 """`identify`: ramp tests in, `ValveModel` out, each side of the valve on its own."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from dzdesign.core.artefact_reading import rounded
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile
 from dzdesign.core.errors import InputError
 from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.data_quality.clipped_meter import without_clipping
-from dzdesign.identify.data_quality.pressures import (
-    about_a_stuck_sensor,
-    about_mixtures,
-    about_stuck_recordings,
-    about_typed_pressures,
-)
+from dzdesign.identify.data_quality.pressures import about_mixed_pressures, about_single_pressures
 from dzdesign.identify.data_quality.recordings import about_recordings
-from dzdesign.identify.data_quality.side_warnings import most_serious_first
+from dzdesign.identify.data_quality.severity import most_serious_first
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.sides import tests_of_side
 from dzdesign.identify.reading.ramp_test import RampTest
-from dzdesign.identify.side import SideIdentification, identify_side
+from dzdesign.identify.results import Identification, SideIdentification
+from dzdesign.identify.side import identify_side
 from dzdesign.identify.valve.model import DECIMALS, SIDES, Meter, ValveModel, Warning_
 
 #: What ramps of several pressure drops show where a stuck sensor has made one test of them: no word on meter or valve.
 ALSO_OF_A_MIXTURE = ("noise", "bend")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Identification:
-    """The model of a valve, and per side what it was found from."""
-
-    model: ValveModel
-    sides: dict[str, SideIdentification]
 
 
 def identify(
@@ -72,15 +60,14 @@ def identify_sides(
     sides: dict[str, SideIdentification] = {}
     warnings: list[Warning_] = []
     for name, sign in SIDES.items():
-        mine = tests_of_side(tests, sign, options.u_max)
-        if not mine:
+        of_side = tests_of_side(tests, sign, options.u_max)
+        if not of_side:
             continue
-        stuck = tuple(about_a_stuck_sensor(mine))
-        mixed = stuck or tuple(about_mixtures(mine))
-        pressures = stuck or (*mixed, *_about_single_pressures(mine))
-        mine, own, clipped = without_clipping(mine, options)
+        mixed = about_mixed_pressures(of_side)
+        pressures = (*mixed, *about_single_pressures(of_side, mixed))
+        of_side, side_options, clipped = without_clipping(of_side, options)
         try:
-            sides[name] = identify_side(mine, own)
+            sides[name] = identify_side(of_side, side_options)
         except InputError as error:
             # Ramps of several pressures taken for one test may be refused for any reason: the cause is this.
             reason = f"{error}; it may be that {mixed[0].text}" if mixed else str(error)
@@ -89,8 +76,8 @@ def identify_sides(
             warnings.append(Warning_(code="side-refused", text=f"the {name} side is missing: {reason}", source=None))
             continue
         prefix = f"{name} side: " if len(sides) > 1 else ""
-        own_words = [item for item in sides[name].warnings if not mixed or item.code not in ALSO_OF_A_MIXTURE]
-        warnings += [replace(item, text=prefix + item.text) for item in (*pressures, *clipped, *own_words)]
+        found = [item for item in sides[name].warnings if not mixed or item.code not in ALSO_OF_A_MIXTURE]
+        warnings += [replace(item, text=prefix + item.text) for item in (*pressures, *clipped, *found)]
     lag = next(iter(sides.values())).described.lag
     files = dict.fromkeys(file for side in sides.values() for item in side.described.tests for file in item.files)
     model = ValveModel(
@@ -114,13 +101,6 @@ def identify_sides(
     return Identification(
         model=model, sides={name: replace(side, model=model.sides[name]) for name, side in sides.items()}
     )
-
-
-def _about_single_pressures(mine: Sequence[RampTest]) -> list[Warning_]:
-    """Return what is weak in the pressure drop of single recordings; of a stuck one not that it was typed in."""
-    stuck = list(about_stuck_recordings(mine))
-    known = {item.source for item in stuck}
-    return stuck + [item for item in about_typed_pressures(mine) if item.source not in known]
 
 
 def _about_two_sides() -> Warning_:

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,8 +25,8 @@ from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTest
 from dzdesign.identify.knees.prepared_tests import describe_tests
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.results import SideIdentification
 from dzdesign.identify.valve.guard_curve import GUARDS, Guard, GuardCurve, OpeningCurve
-from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.ramp_result import BRANCHES, TestResult
 from dzdesign.identify.valve.side_model import BoundsBasis, Reference, SideModel
 
@@ -35,16 +34,6 @@ from dzdesign.identify.valve.side_model import BoundsBasis, Reference, SideModel
 REFERENCE_TOLERANCE = 0.1
 #: dP0 of the paper, taken where the user names none: the test nearest to it.
 PAPER_DP0 = 1 * MPA
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SideIdentification:
-    """What was found about one side, and what it was found from."""
-
-    model: SideModel
-    described: DescribedTests
-    knees: KneeFit
-    warnings: tuple[Warning_, ...]
 
 
 def identify_side(tests: Sequence[RampTest], options: IdentifyOptions) -> SideIdentification:

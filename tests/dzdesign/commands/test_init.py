@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dzdesign.command_line.cli import main
-from dzdesign.identify.first_look import guess_columns
+from dzdesign.identify.reading.guessed_columns import guess_columns
 from dzdesign.identify.reading.named_pressure import pressure_in_name
 from tests.support.synthetic import L_MIN, MPA, Truth, synthetic_ramp
 

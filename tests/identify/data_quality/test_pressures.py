@@ -7,7 +7,7 @@ import pytest
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.data_quality.pressures import about_mixtures
-from dzdesign.identify.data_quality.side_warnings import MOST_SERIOUS_FIRST
+from dzdesign.identify.data_quality.severity import MOST_SERIOUS_FIRST
 from dzdesign.identify.identification import identify
 from tests.support.synthetic import MPA, Truth, synthetic_ramp
 

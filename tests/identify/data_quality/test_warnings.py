@@ -17,7 +17,7 @@ from dzdesign.design.designing import design
 from dzdesign.design.option_texts import options_of
 from dzdesign.design.options import DesignOptions
 from dzdesign.identify.data_quality import knee_errors
-from dzdesign.identify.data_quality.side_warnings import MOST_SERIOUS_FIRST, most_serious_first
+from dzdesign.identify.data_quality.severity import MOST_SERIOUS_FIRST, most_serious_first
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes, read_ramp_file

@@ -24,6 +24,7 @@ from dzdesign.core.units import SI_UNIT, parse_quantity, si_factor
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.signal_text import parse_signal
 from dzdesign.identify.reading.binary import reader_process
+from dzdesign.identify.reading.binary.reader_server import Request
 from dzdesign.identify.reading.ramp_files import read_ramp_file
 from dzdesign.identify.reading.text import encoding
 from tests.identify.reading.test_file_formats import GOOD
@@ -93,7 +94,7 @@ def test_a_reader_that_hangs_is_ended(tmp_path, monkeypatch):
     reader = reader_process.ReaderProcess()
     os.kill(reader.process.pid, 19)  # SIGSTOP
     with pytest.raises(EOFError, match="takes more than"):
-        reader.ask(reader_process.Request(place="", path="", format_name="TDMS"), 0.5)
+        reader.ask(Request(place="", path="", format_name="TDMS"), 0.5)
     reader.close()
 
 

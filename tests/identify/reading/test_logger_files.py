@@ -10,7 +10,7 @@ import pytest
 
 from dzdesign.command_line.cli import main
 from dzdesign.core.errors import InputError
-from dzdesign.identify.first_look import guess_columns
+from dzdesign.identify.reading.guessed_columns import guess_columns
 from dzdesign.identify.reading.ramp_files import read_ramp_file
 from dzdesign.identify.reading.text import table_reader
 from tests.dzdesign.command_line.test_bad_input import csv

@@ -22,7 +22,7 @@ from dzdesign.design.lot_setting import lot_setting
 from dzdesign.design.option_texts import options_of
 from dzdesign.design.redesign_check import prove_derived
 from dzdesign.identify.identification import identify
-from dzdesign.report.artefact_chain import Chain
+from dzdesign.report.chain import Chain
 from dzdesign.report.sections.lot_setting import lot_costs, lot_figures, lot_section
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from dzdesign.verify.exhaustive.exact_law import ExactLaw

@@ -282,11 +282,5 @@ class Evidence(Artefact):
         return "; ".join(parts) or "Every requirement holds."
 
     def with_checks(self, *checks: Check) -> "Evidence":
-        """Return the evidence with further requirements.
-
-        Parameters
-        ----------
-        *checks : Check
-            In their order.
-        """
+        """Return the evidence with further requirements."""
         return replace(self, checks=(*self.checks, *checks))

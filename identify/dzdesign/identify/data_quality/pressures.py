@@ -41,6 +41,34 @@ FALLS, GROWS_TOO_LITTLE, GROWS_TOO_MUCH = 0.9, 2.5, 1.75
 WHAT_FOLLOWS = "Thresholds may be assigned to wrong pressure drops, so the certificate may not hold"
 
 
+def about_mixed_pressures(tests: Sequence[RampTest]) -> tuple[Warning_, ...]:
+    """Return what tells that recordings of several pressure drops pass for one: a stuck sensor, or else their flows.
+
+    Parameters
+    ----------
+    tests : sequence of RampTest
+        Of one side, its commands and flows positive.
+    """
+    return tuple(about_a_stuck_sensor(tests)) or tuple(about_mixtures(tests))
+
+
+def about_single_pressures(tests: Sequence[RampTest], mixed: Sequence[Warning_]) -> tuple[Warning_, ...]:
+    """Return what is weak in the pressure drop of single recordings; of a stuck one not that it was typed in.
+
+    Parameters
+    ----------
+    tests : sequence of RampTest
+        Of one side, its commands and flows positive.
+    mixed : sequence of Warning_
+        Of `about_mixed_pressures`: beside a stuck sensor there is nothing more to say.
+    """
+    if any(item.code == "pressure-stuck" for item in mixed):
+        return ()
+    stuck = tuple(about_stuck_recordings(tests))
+    known = {item.source for item in stuck}
+    return (*stuck, *(item for item in about_typed_pressures(tests) if item.source not in known))
+
+
 def about_a_stuck_sensor(tests: Sequence[RampTest]) -> Iterator[Warning_]:
     """Yield a warning if the recordings of one side show one pressure drop, noise aside, and must have several.
 

@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dzdesign.identify.constants import L_MIN
-from dzdesign.identify.identification import Identification
 from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.knees.described_tests import DescribedTest
 from dzdesign.identify.plots.frame import finish, new_figure, plot_style, saved
-from dzdesign.identify.side import SideIdentification
+from dzdesign.identify.results import Identification, SideIdentification
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.ramp_result import TestResult
 from dzdesign.identify.valve.side_model import SideModel

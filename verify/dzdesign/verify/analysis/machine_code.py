@@ -59,15 +59,7 @@ def check_on_machine(folder: Path, machine: Machine, host: InputCheck) -> Machin
 
 
 def machine_code_checks(folder: Path, inputs: tuple[InputCheck, ...]) -> list[Check]:
-    """Return one requirement a machine: its machine code is right at every input, or at a sample of them.
-
-    Parameters
-    ----------
-    folder : Path
-        Firmware folder.
-    inputs : tuple of InputCheck
-        The host's checks, one a sign of command.
-    """
+    """Return one requirement a machine: its machine code is right at every input, or at a sample of them."""
     checks = []
     for machine in MACHINES:
         name = f"machine code of the {machine.name}"

@@ -22,15 +22,6 @@ def check_all_inputs(folder: Path, sign: int = 1, compensator: Compensator | Non
     every input is tried once, and with it every pair of sound pressure codes of which there are no more than commands;
     at zero command, where it matters most, all pairs that the law follows are tried, and all that are not sound.
 
-    Parameters
-    ----------
-    folder : Path
-        Firmware folder: ``core/`` and ``compensator.json``.
-    sign : {1, -1}
-        Sign of the commands that the side is for.
-    compensator : Compensator, optional
-        The folder's, where it has been read.
-
     Raises
     ------
     RequirementError
@@ -43,15 +34,6 @@ def check_all_inputs(folder: Path, sign: int = 1, compensator: Compensator | Non
 
 def input_check(prepared: PreparedInputs, core: CompiledCore, found: Findings) -> InputCheck:
     """Return what was found, with the bound at zero command.
-
-    Parameters
-    ----------
-    prepared : PreparedInputs
-        What was tried.
-    core : CompiledCore
-        What it was tried on.
-    found : Findings
-        What the machine reported.
 
     Raises
     ------
@@ -87,15 +69,7 @@ def input_check(prepared: PreparedInputs, core: CompiledCore, found: Findings) -
 
 
 def first_wrong(prepared: PreparedInputs, found: Findings) -> str | None:
-    """Return the first wrong value in words, or None.
-
-    Parameters
-    ----------
-    prepared : PreparedInputs
-        What was tried: everything.
-    found : Findings
-        What the machine reported.
-    """
+    """Return the first wrong value in words, or None."""
     if not found.wrong:
         return None
     return (
@@ -106,15 +80,7 @@ def first_wrong(prepared: PreparedInputs, found: Findings) -> str | None:
 
 
 def input_checks(inputs: InputCheck, *, both_signs: bool) -> list[Check]:
-    """Return one requirement for each property that was compared; where there are two sides each says which.
-
-    Parameters
-    ----------
-    inputs : InputCheck
-        Of one side.
-    both_signs : bool
-        Whether the firmware has two sides.
-    """
+    """Return one requirement for each property that was compared; where there are two sides each says which."""
     margin_mV = 1e3 * inputs.smallest_margin_V
     found = (
         (

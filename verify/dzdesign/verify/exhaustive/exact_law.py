@@ -36,15 +36,7 @@ class BetaNumerators(NamedTuple):
 
 
 class ExactLaw:
-    """The law of one side of a compensator on integer codes.
-
-    Parameters
-    ----------
-    compensator : Compensator
-        Its coefficients, tables and signals.
-    sign : {1, -1}
-        Sign of the command.
-    """
+    """The law of one side of a compensator on integer codes."""
 
     def __init__(self, compensator: Compensator, sign: int = 1) -> None:
         signals, side, command = compensator.signals, compensator.side(sign), compensator.signals.command

@@ -69,15 +69,7 @@ class Findings:
 
 
 class CompiledCore:
-    """One side of the core.
-
-    Parameters
-    ----------
-    folder : Path
-        Firmware folder with ``core/dz_comp.c`` and ``core/dz_comp.h``.
-    sign : {1, -1}
-        Sign of the command.
-    """
+    """One side of the core."""
 
     def __init__(self, folder: Path, sign: int = 1) -> None:
         self._name, self._ending = SOURCES[sign]
@@ -97,15 +89,6 @@ class CompiledCore:
 
     def check(self, prepared: bytes, machine: Machine = HOST, *, sample: bool = False) -> Findings:
         """Try what was prepared on a machine.
-
-        Parameters
-        ----------
-        prepared : bytes
-            `PreparedInputs.everything` or `PreparedInputs.sample`.
-        machine : Machine
-            Where.
-        sample : bool
-            True if it is the sample.
 
         Raises
         ------

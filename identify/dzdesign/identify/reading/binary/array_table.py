@@ -10,7 +10,8 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.reading.binary.file_format import FileFormat
-from dzdesign.identify.reading.binary.reader_process import ListedColumn, list_columns, read_columns
+from dzdesign.identify.reading.binary.reader_process import list_columns, read_columns
+from dzdesign.identify.reading.binary.reader_server import ListedColumn
 from dzdesign.identify.reading.table import Table
 
 

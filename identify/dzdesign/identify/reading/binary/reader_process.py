@@ -5,8 +5,6 @@ write to the terminal, and no `except` catches that. So it works in another proc
 bound; when that ends, this one says so in a sentence. One such process serves all files, until one of them ends it.
 Rejected: to check each format before its library reads it, which is to write five readers more; and the pools of
 `concurrent.futures` and loky, whose processes import from the working folder while they start.
-
-A request is a line of JSON, and so is its answer, which samples as float64 may follow.
 """
 
 import atexit
@@ -19,7 +17,6 @@ import sys
 import tempfile
 import threading
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack
 from pathlib import Path
 from typing import IO, BinaryIO, final
 
@@ -27,47 +24,19 @@ import msgspec
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.identify.reading.binary.reader_server import MOST_FOUND, Answer, ListedColumn, Request
 from dzdesign.identify.reading.table import QUOTED_CHARACTERS, unreadable
 
-#: Memory that reading may take beyond what the libraries themselves need: this, and so many times the file's size.
-SPARE_BYTES, MOST_TIMES = 1 << 30, 64
-#: Columns that are looked at; and rows, beyond which a file says more of itself than it can hold: a reading of a meter
-#: has noise, and does not pack into a quarter of a bit.
-MOST_FOUND, SPARE_ROWS, ROWS_PER_BYTE = 4096, 1_000_000, 32
+#: Rows, beyond which a file says more of itself than it can hold: a reading of a meter has noise, and does not pack
+#: into a quarter of a bit.
+SPARE_ROWS, ROWS_PER_BYTE = 1_000_000, 32
 #: One answer takes no longer than this, s, and what the file's size at so many bytes a second adds.
 PATIENCE_S, SLOWEST_BYTES_S = 60.0, 2e6
 #: The other process imports from where this one does, but never from the working folder.
 START = (
     "import sys; sys.path[:] = sys.argv[1:]; "
-    "from dzdesign.identify.reading.binary.reader_process import serve; serve()"
+    "from dzdesign.identify.reading.binary.reader_server import serve; serve()"
 )
-
-
-class Request(msgspec.Struct, frozen=True, kw_only=True):
-    """What the other process is asked: the columns of a file, or the samples of those with some numbers."""
-
-    place: str
-    path: str
-    format_name: str
-    numbers: tuple[int, ...] = ()
-
-
-class ListedColumn(msgspec.Struct, frozen=True, kw_only=True):
-    """A column as its file lists it: see `FileColumn`."""
-
-    group: str
-    name: str
-    unit: str
-    size: int
-
-
-class Answer(msgspec.Struct, frozen=True, kw_only=True):
-    """What the other process answers: columns, the sizes of those that follow, or why the file can't be read."""
-
-    columns: tuple[ListedColumn, ...] = ()
-    sizes: tuple[int, ...] = ()
-    refused: str = ""
-    failed: str = ""
 
 
 def list_columns(file: BinaryIO, path: Path, format_name: str) -> tuple[ListedColumn, ...]:
@@ -229,79 +198,3 @@ def _close_idle() -> None:
         reader = _idle.pop()
         if reader.owner == os.getpid():
             reader.close()
-
-
-# what follows runs in the other process
-
-
-def serve() -> None:
-    """Answer requests on standard input until it ends."""
-    import warnings
-
-    warnings.simplefilter("ignore")
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that asks
-    answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # a library that prints does not answer
-    for line in sys.stdin.buffer:
-        arrays: list[np.ndarray] = []
-        try:
-            answer, arrays = _read(msgspec.json.decode(line, type=Request))
-        except InputError as error:
-            answer = Answer(refused=str(error))
-        except Exception as error:  # each library raises kinds of its own; all mean "no whole file of this format"
-            answer = Answer(failed=str(error) or type(error).__name__)
-        answers.write(msgspec.json.encode(answer) + b"\n")
-        for array in arrays:
-            answers.write(array.data)
-        answers.flush()
-
-
-def _read(request: Request) -> tuple[Answer, list[np.ndarray]]:
-    from itertools import islice
-
-    from dzdesign.identify.reading.binary.file_format import NUMBER_KINDS
-    from dzdesign.identify.reading.binary.registry import file_formats
-
-    path = Path(request.path)
-    find = next(item.columns for item in file_formats() if item.name == request.format_name)
-    _bound_memory(SPARE_BYTES + MOST_TIMES * os.path.getsize(request.place))
-    with open(request.place, "rb") as file, ExitStack() as stack:
-        found = list(islice(find(file, path, stack), MOST_FOUND + 1))
-        if not request.numbers:
-            listed = (
-                ListedColumn(group=column.group, name=column.name, unit=column.unit, size=int(column.size))
-                for column in found
-            )
-            return Answer(columns=tuple(listed)), []
-        arrays = []
-        for column in (found[number] for number in request.numbers):
-            samples = column.read()
-            if column.kind not in NUMBER_KINDS:
-                first = str(samples[:1])[:QUOTED_CHARACTERS]
-                raise InputError(
-                    f"'{path}' column '{column.name}' holds no numbers (first: '{first}'); give another column by "
-                    "--columns, or save it as numbers"
-                )
-            arrays.append(np.ascontiguousarray(samples, dtype=np.float64))
-        return Answer(sizes=tuple(array.size for array in arrays)), arrays
-
-
-def _bound_memory(spare: int) -> None:
-    """Let this process have no more memory than it has now and `spare`, where the system can say so (Linux)."""
-    now = _memory()
-    if not now:
-        return
-    import resource
-
-    _, hard = resource.getrlimit(resource.RLIMIT_DATA)
-    most = now + spare if hard == resource.RLIM_INFINITY else min(now + spare, hard)
-    resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
-
-
-def _memory() -> int:
-    """Return the bytes of memory that this process has of its own; 0 where the system does not say."""
-    try:
-        status = Path("/proc/self/status").read_text()
-    except OSError:
-        return 0
-    return next(int(line.split()[1]) << 10 for line in status.splitlines() if line.startswith("VmData:"))

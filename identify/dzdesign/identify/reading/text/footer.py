@@ -9,7 +9,8 @@ from typing import final
 from dzdesign.core.errors import InputError
 from dzdesign.identify.reading.table import QUOTED_CHARACTERS, clean_label
 from dzdesign.identify.reading.text.cells import is_number
-from dzdesign.identify.reading.text.header import MOST_LINES, Header
+from dzdesign.identify.reading.text.header import Header
+from dzdesign.identify.reading.text.header_search import MOST_LINES
 
 #: What the first cell of a row of statistics says, in English and German, without what stands in brackets behind it.
 STATISTIC = re.compile(

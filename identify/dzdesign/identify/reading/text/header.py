@@ -1,8 +1,4 @@
-"""The header of a table of text: which line it is, the labels, and a row of units below it.
-
-A logger writes about itself above the table: operator, date, a line a channel. Rows of numbers tell where the table
-begins, and the header is the line above them that has as many cells and reads best as labels of a ramp test.
-"""
+"""The header of a table of text: its labels, and a row of units below it."""
 
 import logging
 import re
@@ -12,33 +8,33 @@ from pathlib import Path
 from typing import final
 
 from dzdesign.core.errors import InputError
-from dzdesign.core.units import measures
-from dzdesign.identify.reading.column_labels import TELLING, is_telling, split_label
 from dzdesign.identify.reading.table import QUOTED_CHARACTERS, clean_label
 from dzdesign.identify.reading.text.cells import BLANKS, cells_of, is_number, labels_of
+from dzdesign.identify.reading.text.header_search import (
+    COMMENT,
+    LONGEST_HEADER,
+    LONGEST_LINE,
+    MOST_COLUMNS,
+    MOST_LINES,
+    Line,
+    bare_unit,
+    best_header,
+    could_be_labels,
+    is_row_of_numbers,
+    is_row_of_units,
+    usual_separator,
+)
 
-#: A recording has some ten columns; a header beyond this is no table, and would take minutes to be searched.
-MOST_COLUMNS, LONGEST_HEADER = 4096, 1 << 20
-#: Lines in which the header is looked for, and the longest of them.
-MOST_LINES, LONGEST_LINE = 1000, 1 << 16
-#: Rows of numbers, one after the other, that are a table and no lines of a preamble; and their share of numbers.
-FEWEST_ROWS, SHARE_OF_NUMBERS = 5, 0.6
 #: Lines among which a cell in quotes is looked for that goes on in the next one, and of how many it may be.
 MOST_BROKEN = 40
 #: Rows below the header, without any number, that say the columns' types and units.
 MOST_BELOW = 4
 #: A line that is neither a comment nor blank; what a spreadsheet makes of either has quotes or separators.
 TABLE_LINE = re.compile(rb'^(?![ \t,;"]*$)(?![ \t"]*#).+', re.MULTILINE)
-#: What may stand between cells; where none of them is in the header, blanks do.
-SEPARATORS = ",;\t|"
-#: The same in the order in which rows of numbers are tried: a comma may be a decimal one, a blank part of a date.
-IN_DOUBT = ";\t|, "
 #: What a spreadsheet writes where it has no value, in English and German: a blank cell, and no comment.
 NO_VALUE = re.compile(
     rb'(^|[,;\t|"]) *#(?:N/A|NV|(?:DIV/0|VALUE|WERT|REF|BEZUG|NUM|ZAHL|NULL)!|NAME\?)(?= *(?:[,;\t|"]|$))', re.MULTILINE
 )
-#: The column that LabVIEW announces, and leaves out of rows that have no comment.
-COMMENT = "comment"
 #: An artefact of dzdesign begins with its schema.
 ARTEFACT = re.compile(rb'\s*\{\s*"(?:[^"{}]*"\s*:\s*"[^"]*",?\s*")*?schema"\s*:\s*"(dzdesign\.[\w.-]+/\d+)"')
 #: First characters of text that is no table.
@@ -72,16 +68,6 @@ class Header:
     repeats: frozenset[str] = frozenset()
 
 
-@final
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Line:
-    """A line that may belong to the table: its number in the file, its text, and where it ends in it all."""
-
-    number: int
-    text: str
-    end: int
-
-
 def find_header(text: bytes, number: int, path: Path, *, at_first_line: bool) -> tuple[Header, int] | None:
     """Return the header and where in a text its rows begin; None if all is comments and blank lines.
 
@@ -105,10 +91,10 @@ def find_header(text: bytes, number: int, path: Path, *, at_first_line: bool) ->
     if not lines:
         return None
     _refuse_a_document(text, path)
-    found = None if at_first_line or len(lines[0].text) > LONGEST_LINE else _best(lines, path)
+    found = None if at_first_line or len(lines[0].text) > LONGEST_LINE else best_header(lines, path)
     at = found[0] if found else 0
     line = lines[at]
-    separator = found[1] if found else _usual_separator(line.text)
+    separator = found[1] if found else usual_separator(line.text)
     if found is None and _is_numbers(labels_of(line.text, separator, line.number, path)):
         commented = _commented_header(text, number, line)
         if commented is not None:
@@ -132,9 +118,9 @@ def find_header(text: bytes, number: int, path: Path, *, at_first_line: bool) ->
     return _fitted(header, rows), end + 1
 
 
-def _rows_of_words(rows: list[_Line], separator: str) -> list[_Line]:
+def _rows_of_words(rows: list[Line], separator: str) -> list[Line]:
     """Return the rows directly below a header that hold no number, if numbers follow: units, types of the columns."""
-    below: list[_Line] = []
+    below: list[Line] = []
     for row in rows[: MOST_BELOW + 1]:
         cells = cells_of(row.text, separator)
         if any(map(is_number, cells)):
@@ -147,25 +133,25 @@ def _with_units(header: Header, line: str) -> Header:
     """Return a header with what a row of units says."""
     units: dict[str, str] = {}
     for label, cell in zip(header.labels, cells_of(line, header.separator), strict=False):
-        if _bare(cell):
-            units.setdefault(label, _bare(cell))
+        if bare_unit(cell):
+            units.setdefault(label, bare_unit(cell))
     return replace(header, units=units, repeats=header.repeats | {line})
 
 
-def _lines(text: bytes, number: int) -> list[_Line]:
+def _lines(text: bytes, number: int) -> list[Line]:
     """Return the first lines that are neither a comment nor blank."""
-    lines: list[_Line] = []
+    lines: list[Line] = []
     before = 0
     for match in TABLE_LINE.finditer(text):
         if lines and (len(lines) == MOST_LINES or match.end() - match.start() > LONGEST_LINE):
             break
         number += text.count(b"\n", before, match.start())
         before = match.start()
-        lines.append(_Line(number=number, text=match[0].decode(), end=match.end()))
+        lines.append(Line(number=number, text=match[0].decode(), end=match.end()))
     return _with_broken_ones_joined(lines)
 
 
-def _with_broken_ones_joined(lines: list[_Line]) -> list[_Line]:
+def _with_broken_ones_joined(lines: list[Line]) -> list[Line]:
     """Return lines, of which those above the first row of numbers may be broken inside quotes: a cell of two lines."""
     for first, line in enumerate(lines[:MOST_BROKEN]):
         if line.text.count('"') % 2 == 0 or len(line.text) > LONGEST_LINE:
@@ -173,7 +159,7 @@ def _with_broken_ones_joined(lines: list[_Line]) -> list[_Line]:
         for last in range(first + 1, min(first + MOST_BROKEN, len(lines))):
             text = " ".join(each.text for each in lines[first : last + 1])
             if text.count('"') % 2 == 0:
-                joined = _Line(number=line.number, text=text, end=lines[last].end)
+                joined = Line(number=line.number, text=text, end=lines[last].end)
                 return [*lines[:first], joined, *lines[last + 1 :]]
     return lines
 
@@ -191,103 +177,11 @@ def _refuse_a_document(text: bytes, path: Path) -> None:
         raise InputError(f"'{path}' is {document}, expected a table of numbers; export the recording as CSV")
 
 
-def _best(lines: list[_Line], path: Path) -> tuple[int, str] | None:
-    """Return which line is the header, and what parts its cells; None if no rows of numbers tell."""
-    first = _usual_separator(lines[0].text)
-    if len(lines) > 1 and _could_be_labels(cells := cells_of(lines[0].text, first)):
-        second = cells_of(lines[1].text, first)
-        if len(cells) == len(second) and _is_row(second):
-            return 0, first
-    for separator in IN_DOUBT:
-        rows = _first_row(lines, separator)
-        if rows is None:
-            continue
-        width = len(cells_of(lines[rows].text, separator))
-        fitting = [
-            (_score(cells, lines, index, separator), index)
-            for index in range(rows)
-            if _fits(cells := cells_of(lines[index].text, separator), width)
-            and _could_be_labels(cells)
-            and not (index and is_row_of_units(cells))
-        ]
-        best = [index for score, index in fitting if score == max(fitting)[0]]
-        if len(best) > 1:
-            one, other = lines[best[0]], lines[best[-1]]
-            raise InputError(
-                f"'{path}': rows {one.number} ('{one.text[:QUOTED_CHARACTERS]}') and {other.number} "
-                f"('{other.text[:QUOTED_CHARACTERS]}') could each be the header; say how many rows stand above it by "
-                f"--skip-rows, for example --skip-rows {other.number - 1}"
-            )
-        return (best[0], separator) if best else None
-    return None
-
-
-def _first_row(lines: list[_Line], separator: str) -> int | None:
-    """Return the first of `FEWEST_ROWS` rows of numbers that have the same number of cells."""
-    run, width = 0, 0
-    for index, line in enumerate(lines):
-        cells = cells_of(line.text, separator)
-        if not _is_row(cells):
-            run = 0
-            continue
-        run, width = (run + 1 if len(cells) == width else 1), len(cells)
-        if run == FEWEST_ROWS:
-            return index - run + 1
-    return None
-
-
-def _is_row(cells: list[str]) -> bool:
-    filled = [cell for cell in cells if cell]
-    numbers = sum(map(is_number, filled))
-    return numbers >= 2 and is_number(filled[0]) and numbers >= SHARE_OF_NUMBERS * len(filled)
-
-
-def _could_be_labels(cells: list[str]) -> bool:
-    texts = sum(bool(cell) and not is_number(cell) for cell in cells)
-    return texts >= 2 and 2 * texts >= len(cells) and len(set(filter(None, cells))) > 1
-
-
-def _fits(cells: list[str], width: int) -> bool:
-    """Tell whether labels fit rows of some width: one cell more or less may be blank, or LabVIEW's comment."""
-    if len(cells) == width + 1:
-        return cells[-1].lower() in ("", COMMENT)
-    return len(cells) in (width, width - 1)
-
-
-def is_row_of_units(cells: list[str]) -> bool:
-    """Tell whether a row says the units of the columns, such as ``s;V;l/min;bar`` or ``(ms),(V),(V)``."""
-    filled = [_bare(cell) for cell in cells if cell]
-    known = sum(map(is_telling, filled)) + sum(measures(unit, "current") for unit in filled)
-    return known >= 2 and 2 * known >= len(filled) and not any(map(is_number, filled))
-
-
-def _bare(unit: str) -> str:
-    return unit.strip(" \t[](){}")
-
-
-def _score(cells: list[str], lines: list[_Line], index: int, separator: str) -> int:
-    """Return how many quantities and units the labels of a line say, and whether units stand below it."""
-    known = set()
-    for label in cells[:MOST_COLUMNS]:
-        quantity, unit = split_label(label)
-        known |= {quantity} if quantity else {unit} if unit != label and is_telling(unit) else set()
-    return len(known) + (len(TELLING) if is_row_of_units(cells_of(lines[index + 1].text, separator)) else 0)
-
-
-def _usual_separator(line: str) -> str:
-    """Return what is most often in a line; in a row of numbers with decimal commas that is not what parts its cells."""
-    for separator in IN_DOUBT[:3]:
-        if len(line) <= LONGEST_LINE and separator in line and _is_row(cells_of(line, separator)):
-            return separator
-    separator = max(SEPARATORS, key=line.count)
-    return separator if separator in line else BLANKS
-
-
 def _is_numbers(labels: list[str]) -> bool:
     return all(not label.strip() or is_number(clean_label(label)) for label in labels)
 
 
-def _commented_header(text: bytes, number: int, row: _Line) -> _Line | None:
+def _commented_header(text: bytes, number: int, row: Line) -> Line | None:
     """Return the last comment above a table without a header, if it can be one: numpy.savetxt writes it so."""
     above = text[: row.end].split(b"\n")[: row.number - number]
     for back, line in enumerate(reversed(above), start=1):
@@ -295,13 +189,13 @@ def _commented_header(text: bytes, number: int, row: _Line) -> _Line | None:
         if not comment:
             continue
         bare = comment.lstrip('" \t#')
-        separator = _usual_separator(row.text)
+        separator = usual_separator(row.text)
         names = cells_of(bare, separator)
         as_many = len(names) == len(cells_of(row.text, separator))
-        if not (comment.startswith("#") and as_many and _could_be_labels(names)):
+        if not (comment.startswith("#") and as_many and could_be_labels(names)):
             return None
         end = sum(len(each) + 1 for each in above[: len(above) - back + 1]) - 1
-        return _Line(number=row.number - back, text=bare, end=end)
+        return Line(number=row.number - back, text=bare, end=end)
     return None
 
 
@@ -322,12 +216,12 @@ def _header(number: int, line: str, separator: str, path: Path) -> Header:
     return Header(line=number, labels=labels, separator=separator, repeats=frozenset({line}))
 
 
-def _fitted(header: Header, rows: list[_Line]) -> Header:
+def _fitted(header: Header, rows: list[Line]) -> Header:
     """Return the header with a label more or less where its rows end in a separator and it does not, or the reverse."""
     cells = cells_of(rows[0].text, header.separator) if rows else []
     labels, few = header.labels, len(cells) == len(header.labels) - 1
-    if few and labels[-1].lower() in ("", COMMENT) and _is_row(cells):
+    if few and labels[-1].lower() in ("", COMMENT) and is_row_of_numbers(cells):
         labels = labels[:-1]
-    elif len(cells) == len(labels) + 1 and not cells[-1] and _is_row(cells):
+    elif len(cells) == len(labels) + 1 and not cells[-1] and is_row_of_numbers(cells):
         labels = (*labels, "")
     return replace(header, labels=labels)

@@ -15,14 +15,8 @@ from dzdesign.identify.reading.text.cells import BLANKS, split_line
 from dzdesign.identify.reading.text.decimal_marks import DecimalMarks
 from dzdesign.identify.reading.text.encoding import read_text
 from dzdesign.identify.reading.text.footer import Footer, is_no_sample
-from dzdesign.identify.reading.text.header import (
-    LONGEST_HEADER,
-    LONGEST_LINE,
-    NO_VALUE,
-    TABLE_LINE,
-    Header,
-    find_header,
-)
+from dzdesign.identify.reading.text.header import NO_VALUE, TABLE_LINE, Header, find_header
+from dzdesign.identify.reading.text.header_search import LONGEST_HEADER, LONGEST_LINE
 from dzdesign.identify.reading.text.text_table import TextTable
 
 #: The number of a line in its file (1 is the first), and the line.
