@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.knees.gated_line import GatedLine, PreparedBranch, lay_line
+from dzdesign.identify.knees.gated_line import GatedLine, PreparedBranch
+from dzdesign.identify.knees.line_fitting import lay_line
 from dzdesign.identify.knees.noise import one_error_slower, robust_sigma, shared_correlation
 from dzdesign.identify.ramps.branches import Branch
 

@@ -84,12 +84,14 @@ def _first_row(lines: list[Line], separator: str) -> int | None:
 
 
 def is_row_of_numbers(cells: list[str]) -> bool:
+    """Tell whether cells are a row of samples: mostly numbers, the first one too."""
     filled = [cell for cell in cells if cell]
     numbers = sum(map(is_number, filled))
     return numbers >= 2 and is_number(filled[0]) and numbers >= SHARE_OF_NUMBERS * len(filled)
 
 
 def could_be_labels(cells: list[str]) -> bool:
+    """Tell whether cells may be labels: mostly words, and not all the same."""
     texts = sum(bool(cell) and not is_number(cell) for cell in cells)
     return texts >= 2 and 2 * texts >= len(cells) and len(set(filter(None, cells))) > 1
 
@@ -109,6 +111,7 @@ def is_row_of_units(cells: list[str]) -> bool:
 
 
 def bare_unit(unit: str) -> str:
+    """Return a unit without brackets and blanks around it."""
     return unit.strip(" \t[](){}")
 
 
