@@ -10,7 +10,7 @@ from typing import final
 
 from dzdesign.core.errors import InputError
 from dzdesign.core.units import measures
-from dzdesign.identify.reading.column_labels import TELLING, is_telling, split_label
+from dzdesign.identify.reading.column_labels import QUANTITIES, names_a_quantity, split_label
 from dzdesign.identify.reading.table import QUOTED_CHARACTERS
 from dzdesign.identify.reading.text.cells import BLANKS, cells_of, is_number
 
@@ -106,7 +106,7 @@ def _fits(cells: list[str], width: int) -> bool:
 def is_row_of_units(cells: list[str]) -> bool:
     """Tell whether a row says the units of the columns, such as ``s;V;l/min;bar`` or ``(ms),(V),(V)``."""
     filled = [bare_unit(cell) for cell in cells if cell]
-    known = sum(map(is_telling, filled)) + sum(measures(unit, "current") for unit in filled)
+    known = sum(map(names_a_quantity, filled)) + sum(measures(unit, "current") for unit in filled)
     return known >= 2 and 2 * known >= len(filled) and not any(map(is_number, filled))
 
 
@@ -120,8 +120,8 @@ def _score(cells: list[str], lines: list[Line], index: int, separator: str) -> i
     known = set()
     for label in cells[:MOST_COLUMNS]:
         quantity, unit = split_label(label)
-        known |= {quantity} if quantity else {unit} if unit != label and is_telling(unit) else set()
-    return len(known) + (len(TELLING) if is_row_of_units(cells_of(lines[index + 1].text, separator)) else 0)
+        known |= {quantity} if quantity else {unit} if unit != label and names_a_quantity(unit) else set()
+    return len(known) + (len(QUANTITIES) if is_row_of_units(cells_of(lines[index + 1].text, separator)) else 0)
 
 
 def usual_separator(line: str) -> str:
