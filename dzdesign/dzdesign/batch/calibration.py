@@ -17,7 +17,7 @@ from dzdesign.report.lot.valve_folder import FIRMWARE, ValveManifest
 from dzdesign.stages.identify import IdentifyChoices
 
 #: A worker may run several threads; NumPy and the solvers of one process would only get in each other's way.
-ONE_AT_A_TIME = Lock()
+SOLVER_LOCK = Lock()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,7 +90,7 @@ def calibrate(task: Task) -> Outcome:
     """Identify, design, generate and, if asked for, verify one valve; a failure is an outcome, never an exception."""
     if task.refused:
         return task.outcome(FAILED, task.refused)
-    with ONE_AT_A_TIME, TemporaryDirectory() as temporary:
+    with SOLVER_LOCK, TemporaryDirectory() as temporary:
         folder, again = Path(temporary), False
         status: Status
         try:
