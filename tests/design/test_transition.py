@@ -17,12 +17,12 @@ from dzdesign.design.options import DesignOptions
 from dzdesign.verify.closed_loop.loop import RampSequence
 from tests.support.synthetic import SHARED, needs_compiler
 
-EDGE = options_of({"transition": "1 %"}, target_named("f28335").inputs())
+TRANSITION = options_of({"transition": "1 %"}, target_named("f28335").inputs())
 
 
 @pytest.fixture(scope="module")
 def with_transition(example_valve):
-    return design(example_valve, EDGE)
+    return design(example_valve, TRANSITION)
 
 
 def test_it_runs_from_the_certified_offset_to_the_opening_law_without_a_step(with_transition, example_valve):
@@ -84,7 +84,7 @@ def test_no_leak_and_one_per_cent_of_dead_zone_on_valve_a(tmp_path, capsys):
 def test_an_edge_needs_the_opening_branch(example_valve):
     side = dataclasses.replace(example_valve.positive, opening_curve=None)
     with pytest.raises(InputError, match="leave out --transition"):
-        design(dataclasses.replace(example_valve, sides={"positive": side}), EDGE)
+        design(dataclasses.replace(example_valve, sides={"positive": side}), TRANSITION)
 
 
 def test_below_the_reference_beta_is_held_or_extended(example_valve):

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from dzdesign.identify.first_look import SeenSide
+    from dzdesign.identify.first_look import SideOverview
     from dzdesign.identify.reading.guessed_columns import GuessedColumns
 
 
@@ -24,7 +24,7 @@ class Look:
     #: Whether the command is, so that full command can't be seen.
     in_per_cent: bool = False
     #: As `look_at_sides` gives them.
-    sides: "dict[str, SeenSide]"
+    sides: "dict[str, SideOverview]"
     refused: dict[str, str]
     #: What was seen and is not used, or comes from elsewhere than a column.
     notes: tuple[str, ...] = ()
