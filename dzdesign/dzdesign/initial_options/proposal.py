@@ -30,13 +30,6 @@ NAMED_FILES = 3
 def propose(ramps: Paths, *, columns: Table, dp: Table, skip_rows: int | None) -> Proposal:
     """Look at recordings, and return the file of options that this gives.
 
-    Parameters
-    ----------
-    ramps : path or iterable of paths
-        Recordings, or patterns; none: those of ./ramps, or of this folder.
-    columns, dp, skip_rows
-        As for `dzdesign.stages.recordings.read_recordings`.
-
     Raises
     ------
     InputError

@@ -37,13 +37,6 @@ class DesignArguments(DesignChoices):
 def design_options(choices: DesignChoices, target: str) -> "DesignOptions":
     """Return the engineer's choices for `design`.
 
-    Parameters
-    ----------
-    choices : DesignChoices
-        As written.
-    target : str
-        Microcontroller that is designed for.
-
     Raises
     ------
     InputError

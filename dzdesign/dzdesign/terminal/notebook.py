@@ -57,35 +57,17 @@ PAGES: Mapping[str, tuple[Callable[[Any], str], Callable[[Any, "Console"], None]
 
 
 def heading_of(result: object) -> str:
-    """Return the one line that stands for a result.
-
-    Parameters
-    ----------
-    result : object
-        Of a class in `PAGES`.
-    """
+    """Return the one line that stands for a result."""
     return one_line(PAGES[type(result).__name__][0](result))
 
 
 def text_of(result: object) -> str:
-    """Return a result as plain text.
-
-    Parameters
-    ----------
-    result : object
-        Of a class in `PAGES`.
-    """
+    """Return a result as plain text."""
     return f"{heading_of(result)}\n{_recorded(result).export_text()}".rstrip()
 
 
 def html_of(result: object) -> str:
-    """Return a result as HTML without script, style sheet or network; all text is escaped.
-
-    Parameters
-    ----------
-    result : object
-        Of a class in `PAGES`.
-    """
+    """Return a result as HTML without script, style sheet or network; all text is escaped."""
     return _recorded(result).export_html(inline_styles=True, code_format=FRAME)
 
 
