@@ -33,7 +33,7 @@ LAWS = {PAPER: "the paper's law", PRODUCT: "the product's C"}
 
 
 def figure_files(runs: Sequence[ValveRuns], suffix: str = "svg") -> dict[str, bytes]:
-    """Draw every figure (file name -> content) of the simulated, first and second valve; the same runs, the same bytes."""
+    """Draw every figure, file name to content, of the simulated, first and second valve; same runs, same bytes."""
     with plot_style():
         return {f"figure_{number:02}.{suffix}": saved(figure, suffix) for number, figure in _figures(runs)}
 

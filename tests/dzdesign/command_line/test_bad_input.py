@@ -393,7 +393,11 @@ COMPENSATORS = [
     (("signals", "command", "negative_full_code"), 9, "expected the other side of zero"),
     (("signals", "command", "valid_codes"), [0, 9], "full_code is 4095, outside the valid codes 0 to 9"),
     (("drive_functions", "dither_ticks"), 0, "'drive_functions.dither_ticks' is 0"),
-    ((*POSITIVE, "certificate", "dp_MPa"), [[1, 1]], "'sides.positive.certificate.dp_MPa' is [[1, 1]], expected a list of 2 items"),
+    (
+        (*POSITIVE, "certificate", "dp_MPa"),
+        [[1, 1]],
+        "'sides.positive.certificate.dp_MPa' is [[1, 1]], expected a list of 2 items",
+    ),
 ]
 
 
