@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from dzdesign.command_line.command_table import COMMANDS
-from dzdesign.command_line.parser import arguments_of_command, command_module, help_of, usage_of
+from dzdesign.command_line.parser import arguments_of_command, command_module, usage_of
 from dzdesign.commands.schema import SCHEMAS, schema_document
 
 #: What a caller of the rooms needs; of a module without names all that is its own.
@@ -43,7 +43,7 @@ def _command(name: str) -> str:
         names = [f"`{each}{value}`" for each in (argument.option.short, argument.flag) if each]
         required = " Required." if argument.required and not argument.is_positional else ""
         lines += [f"`{argument.option.metavar}`" if argument.is_positional else ", ".join(names)]
-        lines += [f": {_sentence(help_of(argument))}{required}", ""]
+        lines += [f": {_sentence(argument.described(argument.default_text))}{required}", ""]
     return "\n".join([*lines, "```text", *command_module(name).EXAMPLES, "```"])
 
 

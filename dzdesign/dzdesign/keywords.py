@@ -77,9 +77,8 @@ def _parameters(declared: Mapping[str, Argument], indent: str) -> str:
     lines = ["Parameters", "----------"]
     for argument in declared.values():
         optional = "" if argument.required else ", optional"
-        default = argument.option.default or (argument.default if isinstance(argument.default, str) else "")
-        lines += [f"{argument.name} : {_kind(argument)}{optional}", f"    {argument.option.help}"]
-        lines += [f"    Default: {default}."] if default else []
+        default = argument.option.default or str(argument.default or "")
+        lines += [f"{argument.name} : {_kind(argument)}{optional}", f"    {argument.described(default)}"]
     return "\n".join(f"{indent}{line}" for line in lines) + "\n\n"
 
 

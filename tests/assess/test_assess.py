@@ -618,7 +618,7 @@ def test_recordings_with_the_compensator_say_whose_and_the_pages_options_are_tak
     monkeypatch.chdir(tmp_path)
     assert main(["simulate", "--firmware", str(firmware_folder), "--dp", "1 MPa", "-o", "after"]) == 0
     manifest = json.loads((tmp_path / "after" / "manifest.json").read_text())
-    assert manifest["simulated"] is True and len(manifest["compensator"]["sha256"]) == 64
+    assert manifest["simulated"] is True and len(manifest["made_from"][0]["sha256"]) == 64
     page = (root / "docs" / "before-after.md").read_text(encoding="utf-8")
     options = re.search(r"    (meter-lag = .*?)\n\n", page, re.DOTALL)[1]
     Path("options.toml").write_text(textwrap.dedent("    " + options))

@@ -248,7 +248,7 @@ def test_the_cortex_m4_says_what_its_numbers_are_made_for(firmware):
 
 
 def test_the_help_of_design_states_no_default_that_a_target_changes():
-    helps = {argument.name: argument.option.help for argument in arguments_of(DesignChoices)}
+    helps = {argument.name: argument.help for argument in arguments_of(DesignChoices)}
     for name in ("command_signal", "pressure_a", "pressure_b"):
         assert "the whole range of the converter)" in helps[name] or "the converter's whole range)" in helps[name]
         assert not re.search(r"0\.\.3 V|x 0\.3\b", helps[name])

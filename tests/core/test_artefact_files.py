@@ -20,7 +20,6 @@ from dzdesign.core.artefact_files import (
     write_folder,
 )
 from dzdesign.core.errors import InputError, one_line
-from dzdesign.core.shape import Exactly, Number, check_shape
 from dzdesign.core.units import parse_quantity, si_factor
 
 NoneType = type(None)
@@ -260,60 +259,6 @@ def test_another_schema_is_refused(document):
 
 def test_a_document_written_is_the_document_read():
     assert parse_document(to_json(DOCUMENT).encode(), "valve.json", ("dzdesign.valve/1",)) == DOCUMENT
-
-
-SHAPE = {
-    "u_max_V": Number(0, 1e4),
-    "nodes": [{"dp_MPa": float, "name": str}],
-    "pair": Exactly(2, int),
-    "trend": (str, NoneType),
-    "codes": Number(1, 65535, whole=True),
-    "valve": dict,
-    "holds": bool,
-}
-GOOD = {
-    "u_max_V": 10, "nodes": [{"dp_MPa": 1, "name": "a"}], "pair": [1, 2], "trend": None, "codes": 4095, "valve": {},
-    "holds": True, "more": "is welcome",
-}  # fmt: skip
-
-
-def test_a_document_of_the_shape_is_accepted():
-    check_shape(GOOD, SHAPE, "x.json", "make it again")
-    check_shape({**GOOD, "trend": "flat", "nodes": []}, SHAPE, "x.json", "make it again")
-
-
-@pytest.mark.parametrize("key", list(SHAPE))
-def test_a_key_that_is_missing_is_named(key):
-    with pytest.raises(InputError, match=rf"'x.json' lacks the key '{key}'; make it again"):
-        check_shape({name: value for name, value in GOOD.items() if name != key}, SHAPE, "x.json", "make it again")
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"u_max_V": "10"}, "'u_max_V' is '10', expected a number from 0 to 10000"),
-        ({"u_max_V": True}, "'u_max_V' is True, expected a number"),
-        ({"u_max_V": -1}, "'u_max_V' is -1, expected a number from 0"),
-        ({"u_max_V": 10**4000}, r"'u_max_V' is 1000.*\.\.\., expected a number"),
-        ({"u_max_V": float("nan")}, "'u_max_V' is nan, expected a number"),
-        ({"nodes": [{"dp_MPa": 1, "name": "a"}, {"dp_MPa": "1", "name": "a"}]}, r"'nodes\[1\]\.dp_MPa' is '1'"),
-        ({"nodes": [{"dp_MPa": float("inf"), "name": "a"}]}, r"'nodes\[0\]\.dp_MPa' is inf, expected a number"),
-        ({"nodes": [{"name": "a"}]}, r"lacks the key 'nodes\[0\]\.dp_MPa'"),
-        ({"nodes": [1]}, r"'nodes\[0\]' is 1, expected an object with dp_MPa, name"),
-        ({"nodes": {}}, "'nodes' is {}, expected a list"),
-        ({"pair": [1]}, "'pair' has 1 items, expected 2"),
-        ({"pair": [1, 2.0]}, r"'pair\[1\]' is 2.0, expected a whole number"),
-        ({"pair": 1}, "'pair' is 1, expected a list"),
-        ({"trend": 1}, "'trend' is 1, expected text"),
-        ({"codes": 1.0}, "'codes' is 1.0, expected a whole number from 1 to 65535"),
-        ({"codes": 0}, "'codes' is 0, expected a whole number"),
-        ({"valve": []}, r"'valve' is \[\], expected an object"),
-        ({"holds": 1}, "'holds' is 1, expected true or false"),
-    ],
-)
-def test_a_value_that_does_not_fit_is_named(change, words):
-    with pytest.raises(InputError, match=words):
-        check_shape({**GOOD, **change}, SHAPE, "x.json", "make it again")
 
 
 @pytest.mark.parametrize(

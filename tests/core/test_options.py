@@ -7,33 +7,27 @@ from typing import Annotated
 import pytest
 
 from dzdesign.core.errors import InputError
-from dzdesign.core.options import (
-    AnyPath,
-    Option,
-    Paths,
-    Table,
-    Text,
-    arguments_of,
-    number,
-    paths_of,
-    percent_range,
-    quantity,
-    read_options,
-    texts_of,
-    whole_number,
-)
+from dzdesign.core.option_readers import number, percent_range, quantity, whole_number
+from dzdesign.core.options import AnyPath, Option, Paths, Table, Text, arguments_of, paths_of, read_options, texts_of
 
 
 @dataclass(frozen=True)
 class Pump:
-    oil: Annotated["Oil | AnyPath", Option("Oil.", "OIL")]  # noqa: F821
-    others: Annotated[Paths, Option("Others.", "OIL")] = ()
+    oil: Annotated["Oil | AnyPath", Option("OIL")]  # noqa: F821
+    """Oil."""
+    others: Annotated[Paths, Option("OIL")] = ()
+    """Others."""
     _: KW_ONLY
-    lag: Annotated[Text, Option("Lag.", "T", default="0.1 s", read=quantity("time"))] = None
-    ports: Annotated[Table, Option("Ports.", "MAP")] = None
-    record: Annotated[Mapping[str, object] | None, Option("Record.", "ENTRY", by_entry=True)] = None
-    fast: Annotated[bool, Option("Fast.")] = False
-    output: Annotated[AnyPath | None, Option("Output.", "FILE", command_default="pump.json")] = None
+    lag: Annotated[Text, Option("T", default="0.1 s", read=quantity("time"))] = None
+    """Lag."""
+    ports: Annotated[Table, Option("MAP")] = None
+    """Ports."""
+    record: Annotated[Mapping[str, object] | None, Option("ENTRY", by_entry=True)] = None
+    """Record."""
+    fast: Annotated[bool, Option()] = False
+    """Fast."""
+    output: Annotated[AnyPath | None, Option("FILE", command_default="pump.json")] = None
+    """Output."""
 
 
 def test_a_declaration_says_how_each_option_is_taken():

@@ -11,23 +11,14 @@ from dzdesign.design.compensator import Compensator
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Banner:
-    """What the first lines say of the compensator.
+    """What the first lines say of the compensator."""
 
-    Attributes
-    ----------
-    digest : str
-        SHA-256 of compensator.json.
-    recordings : sequence of str
-        Names from users; whatever could act in a comment is replaced.
-    simulated : bool
-        True if one of them is marked as simulated.
-    lot : LotInWords or None
-        Of a lot setting: its valves, of which the recordings are those of one.
-    """
-
+    #: SHA-256 of compensator.json.
     digest: str
+    #: Names from users; whatever could act in a comment is replaced.
     recordings: Sequence[str] = ()
     simulated: bool = False
+    #: Of a lot setting: the recordings are those of one of its valves.
     lot: LotInWords | None = None
 
     def lines(self, template: str) -> tuple[str, ...]:
@@ -46,15 +37,7 @@ class Banner:
 
 
 def banner_of(compensator: Compensator, digest: str) -> Banner:
-    """Return the banner of a compensator.
-
-    Parameters
-    ----------
-    compensator : Compensator
-        What the firmware is of.
-    digest : str
-        SHA-256 of compensator.json.
-    """
+    """Return the banner of a compensator whose file has this SHA-256."""
     valve = compensator.valve
     return Banner(
         digest=digest,
@@ -68,11 +51,6 @@ def board_lines(template: str) -> tuple[str, ...]:
     """Return the first lines of a file that its user fills in.
 
     Nothing in them, such as a hash, grows old where the file is kept through the next generation.
-
-    Parameters
-    ----------
-    template : str
-        File name of the template.
     """
     return (
         f"Written by dzdesign {__version__} from template {template}. Yours to edit: `dzdesign codegen` keeps what",

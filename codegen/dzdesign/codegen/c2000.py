@@ -19,21 +19,7 @@ TOOLS = {
 
 
 def exact(quantity: Fraction, what: str, largest: int) -> int:
-    """Return `quantity` as the integer that it must be.
-
-    Parameters
-    ----------
-    quantity : Fraction
-        A number of counts or periods, exact.
-    what : str
-        Its name in the message.
-    largest : int
-        What its register or function takes.
-
-    Raises
-    ------
-    DzdesignError
-        If it is not an integer from 1 to `largest`.
+    """Return a number of counts or periods as the integer from 1 to `largest` that its register takes.
 
     Examples
     --------
@@ -46,20 +32,7 @@ def exact(quantity: Fraction, what: str, largest: int) -> int:
 
 
 def within(quantity: Fraction, least: Fraction | int, most: Fraction | int, what: str) -> Fraction:
-    """Return `quantity` if it lies from `least` to `most`.
-
-    Parameters
-    ----------
-    quantity, least, most : Fraction
-        In the same unit.
-    what : str
-        Name and unit for the message.
-
-    Raises
-    ------
-    DzdesignError
-        If it lies outside.
-    """
+    """Return `quantity` if it lies from `least` to `most`, all in the unit that `what` names for the message."""
     if not least <= quantity <= most:
         raise DzdesignError(f"{what} must lie from {float(least):g} to {float(most):g}, got {float(quantity):g}")
     return quantity
@@ -77,19 +50,9 @@ def printed(quantity: Fraction) -> str:
 
 
 def pwm_timing(clock_hz: Fraction | int, watchdog_hz: int, prescale_max: int) -> dict[str, str]:
-    """Return the figures of PWM, interrupt and time-outs, printed.
+    """Return the figures of PWM, interrupt and time-outs, printed; a figure that no register holds is an error.
 
-    Parameters
-    ----------
-    clock_hz, watchdog_hz : Fraction or int
-        What the PWM counts, and the clock of the watchdog.
-    prescale_max : int
-        PWM periods that two starts of conversion may be apart.
-
-    Raises
-    ------
-    DzdesignError
-        If a figure is none that the registers hold.
+    The PWM counts `clock_hz`; two starts of conversion are at most `prescale_max` PWM periods apart.
     """
     # The compare value must reach period + 1 (100 % duty), so the period is limited to 65535 counts, not 65536.
     period = exact(Fraction(clock_hz) / PWM_HZ, "counts per PWM period", 0xFFFF)

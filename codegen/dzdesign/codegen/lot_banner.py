@@ -8,20 +8,9 @@ from dzdesign.design.compensator import Compensator
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LotInWords:
-    """The same for a banner, for a README and for the words on a certificate.
+    """The same in one line of a banner, in a paragraph of Markdown and in a sentence beside the certificate."""
 
-    Attributes
-    ----------
-    carrier : str
-        The valve that compensator.json holds.
-    banner : str
-        One line.
-    readme : str
-        A paragraph of Markdown.
-    certificate : str
-        A sentence beside the carrier's certificate.
-    """
-
+    #: The valve that compensator.json holds.
     carrier: str
     banner: str
     readme: str
@@ -29,13 +18,7 @@ class LotInWords:
 
 
 def lot_in_words(compensator: Compensator) -> LotInWords | None:
-    """Return the words on a lot setting; None of a valve's own.
-
-    Parameters
-    ----------
-    compensator : Compensator
-        What the firmware is of.
-    """
+    """Return the words on a lot setting; None of a valve's own."""
     count = len(compensator.lot)
     if not count:
         return None

@@ -8,15 +8,7 @@ from dzdesign.design.firmware_manifest import FirmwareConstant, FirmwareOrigin
 
 
 def origin_of(compensator: Compensator, compensator_sha256: str) -> FirmwareOrigin:
-    """Return the hashes of the files that a firmware was made from.
-
-    Parameters
-    ----------
-    compensator : Compensator
-        With the valve it was designed from.
-    compensator_sha256 : str
-        Of compensator.json as it stands in the firmware.
-    """
+    """Return the hashes of the files that a firmware was made from, compensator.json as it stands in it."""
     return FirmwareOrigin(
         compensator_json=compensator_sha256,
         valve_json=compensator.valve_json_sha256,
@@ -27,15 +19,7 @@ def origin_of(compensator: Compensator, compensator_sha256: str) -> FirmwareOrig
 def constants_of(
     compensator: Compensator, constants: Mapping[str, Sequence[Constant]]
 ) -> tuple[FirmwareConstant, ...]:
-    """Return where each constant came from, in the order of the files.
-
-    Parameters
-    ----------
-    compensator : Compensator
-        With the valve it was designed from.
-    constants : mapping
-        Of each file of the core, path to its constants: those that were printed into it.
-    """
+    """Return where each constant came from, in the order of the files of the core and of what stands in them."""
     valve_keys = _valve_keys(compensator)
     return tuple(constant.entry(path, valve_keys) for path in sorted(constants) for constant in constants[path])
 

@@ -120,18 +120,7 @@ class Target:
         )
 
     def check_signals(self, signals: Signals) -> None:
-        """Refuse a compensator that was designed for another converter or PWM.
-
-        Parameters
-        ----------
-        signals : Signals
-            Of the compensator.
-
-        Raises
-        ------
-        InputError
-            With the first scaling that differs.
-        """
+        """Refuse a compensator that was designed for another converter or PWM: the first scaling that differs."""
         for what, asked, has, fixed in (
             ("largest compare value", signals.compare_max, self.compare_max, not self.takes_any_signals),
             ("largest converter code", signals.code_max, self.adc_code_max, not self.takes_any_signals),
@@ -147,20 +136,7 @@ class Target:
     def check_designed_for(self, designed_for: TargetInputs) -> str:
         """Refuse a compensator whose codes are other voltages or times here than those that it was designed for.
 
-        Parameters
-        ----------
-        designed_for : TargetInputs
-            Target, converter and timer as the compensator states them.
-
-        Returns
-        -------
-        str
-            What a person should know of a harmless difference; empty if there is none.
-
-        Raises
-        ------
-        InputError
-            With the first number that differs.
+        Of a harmless difference it returns what a person should know; empty if there is none.
         """
         theirs, other = designed_for.converter, designed_for.name != self.name
         word = f"the compensator was designed for target {designed_for.name}; {self.name} "

@@ -52,16 +52,9 @@ class PinReading:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommandPoint:
-    """One command to try.
+    """One command to try."""
 
-    Attributes
-    ----------
-    u_i, share : str
-        The command in volts, as u_max counts it, and its share of full command, or ``zero``, ``full``.
-    pin : PinReading
-        What the converter reads.
-    """
-
+    #: In volts, as u_max counts it; then its share of full command, or ``zero``, ``full``.
     u_i: str
     share: str
     pin: PinReading
@@ -69,65 +62,33 @@ class CommandPoint:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PressureWiring:
-    """One pressure sensor.
-
-    Attributes
-    ----------
-    name : str
-        ``A`` or ``B``.
-    signal : PressureSignal
-        Its scaling.
-    zero, full : PinReading
-        Of no pressure and of the span.
-    shunt_ohm : str
-        Shunt that makes this of 4-20 mA; empty without a live zero of that kind.
-    """
+    """One pressure sensor, at no pressure and at its full span."""
 
     name: str
     signal: PressureSignal
     zero: PinReading
     full: PinReading
+    #: That makes this of 4-20 mA; empty without a live zero of that kind.
     shunt_ohm: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wiring:
-    """What a target's templates print of the signals' wiring.
+    """What a target's templates print of the signals' wiring."""
 
-    Attributes
-    ----------
-    commands : tuple of CommandPoint
-        From full negative command (or zero) to full positive command.
-    ends : tuple of CommandPoint
-        Those of `commands` that are zero or full.
-    command_shunt_ohm : str
-        The shunt that makes the command of 4-20 mA, or nothing.
-    no_voltage : str
-        What 0 V at the command's pin commands; empty where that code is not valid.
-    no_voltage_drives : bool
-        True if that is more than zero command.
-    pressures : tuple of PressureWiring
-        Sensors A and B.
-    """
-
+    #: From full negative command (or zero) to full positive command; then those of them that are zero or full.
     commands: tuple[CommandPoint, ...]
     ends: tuple[CommandPoint, ...]
+    #: The shunt that makes the command of 4-20 mA, or nothing.
     command_shunt_ohm: str
+    #: What 0 V at the command's pin commands; empty where that code is not valid. Then: whether that opens the valve.
     no_voltage: str
     no_voltage_drives: bool
     pressures: tuple[PressureWiring, ...]
 
 
 def wiring_of(compensator: Compensator, converter: Converter) -> Wiring:
-    """Return what is to be wired and tried.
-
-    Parameters
-    ----------
-    compensator : Compensator
-        What the firmware is of.
-    converter : Converter
-        The target's.
-    """
+    """Return what is to be wired to a target's converter, and tried."""
     signals, command = compensator.signals, compensator.signals.command
     points = _commands(compensator, converter)
     zero = PinReading(code=command.zero_code, converter=converter)

@@ -171,8 +171,9 @@ def _json_object(path: Path) -> dict[str, Any] | None:
 def _manifest_of(folder: Path) -> dict[str, Any] | None:
     """Return the manifest that dzdesign left in `folder`, or None."""
     document = _json_object(folder / MANIFEST_NAME)
-    ours = document is not None and str(document.get("schema", "")).startswith("dzdesign.")
-    if not ours or not isinstance(document.get("files"), dict):
+    if document is None or not str(document.get("schema", "")).startswith("dzdesign."):
+        return None
+    if not isinstance(document.get("files"), dict):
         return None
     # One that names what lies elsewhere is none of ours: nothing there is looked at, let alone replaced.
     return document if all(_is_name_inside(name) for name in document["files"]) else None

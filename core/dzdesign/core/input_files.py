@@ -114,7 +114,8 @@ def _piped(path: Path, what: str, most: int) -> bytes:
         return Path(path).read_bytes()
     import select
 
-    pieces, size = [], 0
+    pieces: list[bytes] = []
+    size = 0
     # Opened without waiting for a writer, so that the wait can have an end.
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
     try:

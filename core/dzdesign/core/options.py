@@ -3,23 +3,24 @@
 Command line, options file, keywords of `dzdesign.api`, help, shell completion and reference pages are made of it.
 
 >>> from typing import Annotated
+>>> from dzdesign.core.option_readers import quantity
 >>> @dataclass(frozen=True, kw_only=True)
 ... class Pump:
-...     lag: Annotated[str, Option("Lag of the pump.", "T", example="0.5 s", read=quantity("time"))] = "100 ms"
+...     lag: Annotated[str, Option("T", example="0.5 s", read=quantity("time"))] = "100 ms"
+...     '''Lag of the pump.'''
 >>> read_options(Pump(), ["lag"])
 {'lag': 0.1}
 """
 
-import contextlib
+import ast
+import inspect
+import itertools
 import os
-import re
+import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import MISSING, dataclass, fields
 from functools import cache
 from typing import Any, ForwardRef, get_args, get_origin
-
-from dzdesign.core.errors import InputError, quoted
-from dzdesign.core.units import parse_quantity
 
 #: Types of options: text; a file or folder as the standard library takes it, one or several; one or several texts.
 Text = str | None
@@ -31,8 +32,8 @@ Table = str | Mapping[str, str] | None
 
 #: Headings of the help, in their order; an option without one stands above them.
 RECORDINGS, METER, FIT, LAW = "recordings", "flow meter", "fit", "law"
-CONNECTIONS, AMPLIFIER, CHECKS = "connections of the firmware", "amplifier functions", "further checks"
-GROUPS = (RECORDINGS, METER, FIT, LAW, CONNECTIONS, AMPLIFIER, CHECKS)
+CONNECTIONS, DRIVE, CHECKS = "connections of the firmware", "drive functions", "further checks"
+GROUPS = (RECORDINGS, METER, FIT, LAW, CONNECTIONS, DRIVE, CHECKS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,8 +42,6 @@ class Option:
 
     Attributes
     ----------
-    help : str
-        One or two sentences, for the help of the command line and of Python.
     metavar : str
         How the help calls the value.
     group : str
@@ -65,7 +64,6 @@ class Option:
         A mapping that the command line takes an entry at a time, ``NAME = TEXT``, on top of the options file's table.
     """
 
-    help: str
     metavar: str = ""
     group: str = ""
     default: str = ""
@@ -88,6 +86,8 @@ class Argument:
         In Python and, with ``_`` or ``-``, in the options file.
     option : Option
         As declared.
+    help : str
+        One or two sentences: the docstring below the field.
     kinds : frozenset
         Types that a value may have, such as str, PathLike, Mapping, Iterable.
     result_class : str
@@ -102,6 +102,7 @@ class Argument:
 
     name: str
     option: Option
+    help: str
     kinds: frozenset[Any]
     result_class: str
     by_position: bool
@@ -136,8 +137,20 @@ class Argument:
     @property
     def default_text(self) -> str:
         """What stands for it on the command line if it is not given; empty if nothing does."""
-        text = self.option.command_default or self.option.default
-        return text or (self.default if isinstance(self.default, str) else "")
+        return self.option.command_default or self.option.default or str(self.default or "")
+
+    def described(self, default: str) -> str:
+        """Return the help with the words that it takes and its default.
+
+        Parameters
+        ----------
+        default : str
+            As it is to be stated; empty if there is none.
+        """
+        words = self.option.choices if isinstance(self.option.choices, tuple) else ()
+        notes = [", ".join(words)] if any(word not in self.help for word in words) else []
+        notes += [f"default: {default}"] if default else []
+        return f"{self.help.removesuffix('.')} ({'; '.join(notes)})." if notes else self.help
 
 
 def flag_of(name: str) -> str:
@@ -160,7 +173,7 @@ def arguments_of(declaration: type) -> tuple[Argument, ...]:
     declaration : type
         A dataclass whose fields are ``Annotated`` with an `Option`.
     """
-    found = []
+    found, helps = [], _helps_of(declaration)
     for field in fields(declaration):
         annotation, option = get_args(field.type)[:2]
         result_class = ""
@@ -171,6 +184,7 @@ def arguments_of(declaration: type) -> tuple[Argument, ...]:
             Argument(
                 name=field.name,
                 option=option,
+                help=helps.get(field.name, ""),
                 kinds=frozenset(get_origin(kind) or kind for kind in kinds or (annotation,)),
                 result_class=result_class,
                 by_position=not field.kw_only,
@@ -179,6 +193,30 @@ def arguments_of(declaration: type) -> tuple[Argument, ...]:
             )
         )
     return tuple(sorted(found, key=lambda argument: not argument.by_position))
+
+
+def _helps_of(declaration: type) -> dict[str, str]:
+    """Return the docstring that stands below each field of a class and of its bases; in the field's source alone."""
+    helps: dict[str, str] = {}
+    for each in reversed(declaration.__mro__):
+        helps |= _docstrings_in(each.__module__).get(each.__qualname__.rpartition(".")[2], {})
+    return helps
+
+
+@cache
+def _docstrings_in(module: str) -> dict[str, dict[str, str]]:
+    """Return the docstrings below the fields of a module's classes; none where there is no source."""
+    try:
+        tree = ast.parse(inspect.getsource(sys.modules[module]))
+    except (OSError, TypeError):
+        return {}
+    found: dict[str, dict[str, str]] = {}
+    for each in (node for node in ast.walk(tree) if isinstance(node, ast.ClassDef)):
+        for field, below in itertools.pairwise(each.body):
+            match field, below:
+                case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(text))):
+                    found.setdefault(each.name, {})[name] = " ".join(text.split())
+    return found
 
 
 def read_options(arguments: Any, names: Iterable[str]) -> dict[str, Any]:
@@ -203,77 +241,6 @@ def read_options(arguments: Any, names: Iterable[str]) -> dict[str, Any]:
         value = (option.default or None) if value is None else value
         values[name] = option.read(value, flag_of(name)) if option.read and value is not None else value
     return values
-
-
-def quantity(kind: str) -> Callable[[str, str], float]:
-    """Return what reads a number with its unit, in SI.
-
-    Parameters
-    ----------
-    kind : str
-        A key of `dzdesign.core.units.SI_UNIT`.
-    """
-    return lambda text, option: parse_quantity(text, kind, option)
-
-
-def number(expected: str, between: tuple[float, float] | None = None) -> Callable[[str | float, str], float]:
-    """Return what reads a number without a unit.
-
-    Parameters
-    ----------
-    expected : str
-        For the message, such as ``a number such as 0.99``.
-    between : tuple of float, optional
-        Every number lies between these.
-    """
-
-    def read(text: str | float, option: str) -> float:
-        with contextlib.suppress(ValueError):
-            value = float(text)
-            if between is None or between[0] < value < between[1]:
-                return value
-        raise InputError(f"{option} is {quoted(text)}, expected {expected}")
-
-    return read
-
-
-def whole_number(expected: str, least: int = 0, digits: int = 6) -> Callable[[str | int, str], int]:
-    """Return what reads a whole number.
-
-    Parameters
-    ----------
-    expected : str
-        For the message, such as ``a number of processes such as 4``.
-    least, digits : int
-        Smallest number, and how many digits the largest has.
-    """
-
-    def read(text: str | int, option: str) -> int:
-        if not re.fullmatch(rf"\d{{1,{digits}}}", str(text), re.ASCII) or int(text) < least:
-            raise InputError(f"{option} is {quoted(text)}, expected {expected}")
-        return int(text)
-
-    return read
-
-
-def percent_range(of: str) -> Callable[[str, str], tuple[float, float]]:
-    """Return what reads two percentages such as ``12-50``, as shares.
-
-    Parameters
-    ----------
-    of : str
-        For the message: of what, and an example.
-    """
-    # Digits and blanks without an end would be matched in the square of their number.
-    digits = r"\s{0,9}(\d{1,9}(?:\.\d{0,15})?)\s{0,9}%?\s{0,9}"
-
-    def read(text: str, option: str) -> tuple[float, float]:
-        ends = re.fullmatch(f"{digits}-{digits}", text, re.ASCII)
-        if ends is None:
-            raise InputError(f"{option} is {quoted(text)}, expected two per cents of {of}")
-        return float(ends[1]) / 100, float(ends[2]) / 100
-
-    return read
 
 
 def paths_of(paths: Paths) -> list[AnyPath]:

@@ -117,7 +117,7 @@ class Sides:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class Compensator(Artefact, ShownInNotebooks):
+class Compensator(ShownInNotebooks, Artefact):
     """The law u_O = g(dP) u_i + o(dP) on codes, every coefficient exact, as `dzdesign design` writes it."""
 
     FILE_NAME: ClassVar[str] = "compensator.json"

@@ -14,17 +14,7 @@ NAMED = 5
 
 
 def anomalies_of(found: Sequence[ValveFolder], folder: Path, valves: Sequence[Valve]) -> list[str]:
-    """Return sentences.
-
-    Parameters
-    ----------
-    found : sequence of ValveFolder
-        The lot as read back.
-    folder : Path
-        Of the lot.
-    valves : sequence of Valve
-        The lot as it was given, with the patterns of the recordings.
-    """
+    """Return sentences on a lot as read back from its folder, and as it was given, with patterns of recordings."""
     overlapping = _overlapping(valves)
     names = {each.name for each in found}
     return [*overlapping.values(), *_shared_recordings(found, overlapping), *_left_over(names, folder)]

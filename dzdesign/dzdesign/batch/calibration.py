@@ -3,17 +3,18 @@
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Lock
-from typing import Any
 
 from dzdesign.core.artefact_files import TOOL, sha256_of, write_folder
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile
 from dzdesign.core.errors import DzdesignError, one_line
+from dzdesign.design.request import DesignChoices
 from dzdesign.report.lot.summary import DOES_NOT_HOLD, FAILED, OK, Status
 from dzdesign.report.lot.valve_folder import FIRMWARE, ValveManifest
+from dzdesign.stages.identify import IdentifyChoices
 
 #: A worker may run several threads; NumPy and the solvers of one process would only get in each other's way.
 SOLVER_LOCK = Lock()
@@ -23,28 +24,15 @@ SOLVER_LOCK = Lock()
 class Task:
     """All that a worker needs to calibrate one valve; it may share no file with the client.
 
-    Attributes
-    ----------
-    name : str
-        Of the valve.
-    recordings : tuple of (str, bytes)
-        Name and content of each file.
-    identify, design : mapping
-        Options of the two commands, as they are written there; what is not given is missing.
-    target : str
-        Of the firmware.
-    verify : bool
-        Whether the firmware is verified.
-    plant : (str, bytes) or None
-        Name and content of the plant's file, for the verification.
-    refused : str
-        Why it can't be calibrated at all: its recordings can't be read.
+    Recordings and plant are name and content of a file; the options of `identify` and `design` are as they are written
+    on the command line, what is not given is missing. `refused` says why it can't be calibrated at all: its recordings
+    can't be read.
     """
 
     name: str
     recordings: tuple[tuple[str, bytes], ...]
-    identify: Mapping[str, Any]
-    design: Mapping[str, str]
+    identify: IdentifyChoices
+    design: DesignChoices
     target: str
     verify: bool = False
     plant: tuple[str, bytes] | None = None
@@ -57,8 +45,8 @@ class Task:
             "tool": TOOL,
             "name": self.name,
             "recordings": [(name, sha256_of(content)) for name, content in self.recordings],
-            "identify": dict(self.identify),
-            "design": dict(self.design),
+            "identify": asdict(self.identify),
+            "design": asdict(self.design),
             "target": self.target,
             "verify": self.verify,
             "plant": self.plant and (self.plant[0], sha256_of(self.plant[1])),
@@ -69,18 +57,9 @@ class Task:
     def outcome(
         self, status: Status, reason: str = "", files: Mapping[str, bytes] | None = None, *, again: bool = False
     ) -> "Outcome":
-        """Return what came of it.
+        """Return what came of it; `files` by their path in the valve's folder.
 
-        Parameters
-        ----------
-        status : {"ok", "failed", "does not hold"}
-            "does not hold": a requirement of its verification.
-        reason : str
-            Why it is not ok.
-        files : mapping of str to bytes, optional
-            Path in the valve's folder to content.
-        again : bool
-            Whether the next run tries it again, as that may end otherwise.
+        The next run tries it `again` where that may end otherwise.
         """
         manifest = ValveManifest(
             tool=THIS_TOOL,
@@ -136,9 +115,9 @@ def _run(task: Task, folder: Path) -> tuple[Status, str]:
     out = folder / "out"
     out.mkdir()
     recordings = _write_recordings(task, folder)
-    valve = identify(IdentifyArguments(recordings, **task.identify, output=out / "valve.json"))
+    valve = identify(IdentifyArguments(recordings, **vars(task.identify), output=out / "valve.json"))
     compensator = design(
-        DesignArguments(valve, target=task.target, **task.design, output=out / "compensator.json")
+        DesignArguments(valve, target=task.target, **vars(task.design), output=out / "compensator.json")
     )
     firmware = generate(compensator, task.target)  # proved by the design, a line above
     write_folder(out / FIRMWARE, firmware.files, firmware.manifest)

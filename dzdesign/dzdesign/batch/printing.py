@@ -15,16 +15,7 @@ UNITS = {"V": "V", "percent": "%"}
 
 
 def print_lot(summary: LotSummary, folder: Path, report: Path | None) -> None:
-    """Print what a lot came to.
-
-    Parameters
-    ----------
-    summary : LotSummary
-    folder : Path
-        Where it was written.
-    report : Path or None
-        The lot's report, if there is one.
-    """
+    """Print what a lot came to, where it was written, and its report if there is one."""
     from dzdesign.terminal.page import new_console, new_table, put_line, put_table
 
     console = new_console()

@@ -79,15 +79,7 @@ class Results:
         write_folder(self.of(outcome.name), files, replace(outcome.manifest, board=_board_files(files)))
 
     def read(self, name: str, unwritten: Mapping[str, str]) -> ValveFolder:
-        """Read a valve's folder; one that could not be written has failed, whatever an earlier run left there.
-
-        Parameters
-        ----------
-        name : str
-            Of the valve.
-        unwritten : mapping
-            Name to the reason why its folder could not be written.
-        """
+        """Read a valve's folder; one that could not be written has failed, whatever an earlier run left there."""
         if name not in unwritten:
             return read_valve_folder(self.of(name))
         return ValveFolder(

@@ -32,19 +32,10 @@ ENDED = "the process that calibrated it ended without a word (out of memory, or 
 
 
 def run_local(tasks: Iterable[Task], jobs: int, work: Work = calibrate) -> Iterator[Outcome]:
-    """Calibrate valves in processes of this machine and yield what came of each, in the order in which they end.
+    """Calibrate valves in processes of this machine (one: in this process) and yield what came of each, as they end.
 
-    A process that dies takes its pool along; what was under way then is tried again, each valve in a pool of its own,
-    so that the one that kills its process is named, and no other is lost.
-
-    Parameters
-    ----------
-    tasks : iterable of Task
-        Read as they are needed.
-    jobs : int
-        Processes; 1 runs in this one.
-    work : callable
-        What is done with each.
+    Tasks are read as they are needed. A process that dies takes its pool along; what was under way then is tried again,
+    each valve in a pool of its own, so that the one that kills its process is named, and no other is lost.
     """
     under_way: dict[str, Task] = {}
 
@@ -92,19 +83,11 @@ def _dead(task: Task) -> Outcome:
 
 
 def run_on_cluster(tasks: Iterable[Task], address: str, work: Work = calibrate) -> Iterator[Outcome]:
-    """Calibrate valves on the workers of a Dask scheduler and yield what came of each, in the order in which they end.
+    """Calibrate valves on the workers of a Dask scheduler (``tcp://10.0.0.5:8786``), and yield what came of each.
 
     The scheduler gives what a dead worker had, finished or not, to another. After several deaths it gives up all that
     lay on each of those workers: these valves are tried again one at a time, so that only the one that kills is blamed.
-
-    Parameters
-    ----------
-    tasks : iterable of Task
-        Read as they are needed.
-    address : str
-        Of the scheduler, such as ``tcp://10.0.0.5:8786``.
-    work : callable
-        What is done with each; the workers must be able to import it.
+    The workers must be able to import `work`.
 
     Raises
     ------

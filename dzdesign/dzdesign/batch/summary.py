@@ -60,21 +60,8 @@ def summary_of(
 ) -> LotSummary:
     """Return what batch.json says of a finished lot.
 
-    Parameters
-    ----------
-    rows : sequence of TableRow
-    files : mapping of str to bytes
-        Of the table, by name.
-    verified : bool
-        Whether each valve's firmware was verified too.
-    setting : LotSettingSummary, optional
-        Of the calibrated valves.
-    why_no_setting : str, optional
-        The reason where there is none.
-    made_from : mapping of str to bytes
-        Manifest of each valve's folder, by name of the valve.
-    anomalies : sequence of str
-        What is odd in the lot.
+    `files` of the table and `made_from`, the manifest of each valve's folder by the valve's name, are contents; of lot
+    setting and reason why there is none exactly one is given.
     """
     warnings: dict[str, list[str]] = {}
     for row in rows:
@@ -101,14 +88,7 @@ def summary_of(
 
 
 def setting_summary(setting: "LotSetting", designed: "Mapping[str, Compensator]") -> LotSettingSummary:
-    """Return what batch.json says of the lot setting.
-
-    Parameters
-    ----------
-    setting : LotSetting
-    designed : mapping of str to Compensator
-        The calibrated valves that it is of.
-    """
+    """Return what batch.json says of the lot setting of these calibrated valves."""
     from dzdesign.design.lot_pressures import lacking_in, without_narrow
 
     lot = setting.compensator.lot

@@ -22,18 +22,9 @@ RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Valve:
-    """One valve of the batch.
+    """One valve of the lot: files or patterns of its recordings, and what is different for it.
 
-    Attributes
-    ----------
-    name : str
-        By which it stands in the table, and its folder's name.
-    patterns : tuple of str
-        Names of its recordings, or patterns.
-    overrides : mapping of str to str
-        Options that are different for this valve, as on the command line.
-    record : mapping of str to str
-        Entries of its record, beside those of all valves.
+    `overrides` are options as on the command line, `record` the entries of its record beside those of all valves.
     """
 
     name: str
@@ -72,14 +63,9 @@ class Valve:
 def valves_of(source: Path, pattern: str | None, options: Collection[str]) -> list[Valve]:
     """Return the valves that a folder or a CSV file names, in the order of their names; see `by_name`.
 
-    Parameters
-    ----------
-    source : Path
-        A folder with one subfolder a valve, or a CSV file with the columns name, files, any option, and record.NAME.
-    pattern : str or None
-        Of the recordings in a subfolder; None takes all that are called as recordings are.
-    options : collection of str
-        Names of the options that a column of the CSV file may override.
+    A folder has one subfolder a valve, whose recordings the pattern matches (None: all that are called as recordings
+    are). A CSV file has the columns name, files, record.NAME and any of the options, which that valve then has of its
+    own.
 
     Raises
     ------

@@ -39,7 +39,7 @@ COMMANDS = {
     "batch": Command(
         PIPELINE,
         f"{ROOT}.batch",
-        "many valves: identify, design, codegen for each; one table, one report, the cost of one common setting",
+        "many valves: identify, design, codegen for each; one table, one report, the cost of one lot setting",
     ),
     "assess": Command(EVIDENCE, f"{ROOT}.assess", "compare ramp tests without and with the compensator, with limits"),
     "report": Command(

@@ -28,10 +28,14 @@ EXIT_STATUS = """exit status:
 class CommonArguments:
     """Options of every command, before it or after it."""
 
-    config: Annotated[str, Option("File with options of the same names; dzdesign init writes one.", "TOML")] = ""
-    json: Annotated[bool, Option("Print the result as JSON.")] = False
-    quiet: Annotated[bool, Option("Print results and errors only.", short="-q")] = False
-    verbose: Annotated[bool, Option("Log the work with times, files and the solver's output.", short="-v")] = False
+    config: Annotated[str, Option("TOML")] = ""
+    """File with options of the same names; dzdesign init writes one."""
+    json: Annotated[bool, Option()] = False
+    """Print the result as JSON."""
+    quiet: Annotated[bool, Option(short="-q")] = False
+    """Print results and errors only."""
+    verbose: Annotated[bool, Option(short="-v")] = False
+    """Log the work with times, files and the solver's output."""
 
 
 class HelpFormatter(argparse.RawDescriptionHelpFormatter):
@@ -165,7 +169,7 @@ def _add_options(command: Parser, arguments: tuple[Argument, ...]) -> None:
 
 def _add_option(place: argparse._ActionsContainer, argument: Argument) -> None:
     """Add an option, without a default: what was given is told from what was not, and what stands before stays."""
-    option, text = argument.option, help_of(argument).replace("%", "%%")
+    option, text = argument.option, argument.described(argument.default_text).replace("%", "%%")
     names = [name for name in (option.short, argument.flag) if name]
     nargs = None
     if argument.by_position and argument.is_repeatable:
@@ -181,18 +185,6 @@ def _add_option(place: argparse._ActionsContainer, argument: Argument) -> None:
             *names, action=action, nargs=nargs, required=argument.required, default=argparse.SUPPRESS,
             metavar=option.metavar, help=text,
         )  # fmt: skip
-
-
-def help_of(argument: Argument) -> str:
-    """Return the help of an option, with its default.
-
-    Parameters
-    ----------
-    argument : Argument
-        As a command declares it.
-    """
-    default = argument.default_text
-    return f"{argument.option.help.removesuffix('.')} (default: {default})." if default else argument.option.help
 
 
 def unknown_words(words: list[str], name: str, command: Parser) -> InputError:

@@ -21,12 +21,11 @@ EXAMPLES = (
 class Arguments(GenerateArguments):
     """Arguments of the stage, and what prints the targets instead."""
 
-    compensator: Annotated[
-        AnyPath | None,
-        Option("compensator.json; or a valve.json, designed first with the options below.", "COMPENSATOR.json"),
-    ] = None  # type: ignore[assignment]  # with --list-targets there is none
+    compensator: Annotated[AnyPath | None, Option("COMPENSATOR.json")] = None  # type: ignore[assignment]
+    """compensator.json; or a valve.json, designed first with the options below."""
     _: KW_ONLY
-    list_targets: Annotated[bool, Option("Print name and description of every target.")] = False
+    list_targets: Annotated[bool, Option()] = False
+    """Print name and description of every target."""
 
 
 def run(arguments: Arguments, json: bool) -> int:

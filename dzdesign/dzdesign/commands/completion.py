@@ -23,7 +23,8 @@ COMPLETE = "complete"
 class Arguments:
     """Arguments of `completion`."""
 
-    shell: Annotated[str, Option("bash, zsh, fish, powershell or tcsh.", "SHELL", choices="shtab:SUPPORTED_SHELLS")]
+    shell: Annotated[str, Option("SHELL", choices="shtab:SUPPORTED_SHELLS")]
+    """bash, zsh, fish, powershell or tcsh."""
 
 
 def run(arguments: Arguments, json: bool) -> int:

@@ -25,7 +25,8 @@ RECORD = {"valve": "simulated by dzdesign, no measurement"}
 class Arguments:
     """Arguments of `demo`."""
 
-    folder: Annotated[AnyPath, Option("Folder for the artefacts.", "DIR")]
+    folder: Annotated[AnyPath, Option("DIR")]
+    """Folder for the artefacts."""
 
 
 def run(arguments: Arguments, json: bool) -> int:

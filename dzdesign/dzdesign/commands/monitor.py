@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from dzdesign.core.artefact_files import check_file_may_be_written, to_json, write_file
 from dzdesign.core.errors import InputError, one_line
-from dzdesign.core.options import AnyPath, Option, Text, number, read_options
+from dzdesign.core.option_readers import number
+from dzdesign.core.options import AnyPath, Option, Text, read_options
 from dzdesign.terminal.progress import say
 
 if TYPE_CHECKING:
@@ -29,24 +30,25 @@ LOOK_S = 0.1
 
 
 EXAMPLES = ("dzdesign monitor COM5 --firmware firmware --seconds 100 -o ramp.csv",)
-# fmt: off
 
 
 @dataclass(frozen=True)
 class Arguments:
     """Arguments of `monitor`."""
 
-    port: Annotated[str, Option("Serial port, such as COM5 or /dev/ttyUSB0.", "PORT")]
+    port: Annotated[str, Option("PORT")]
+    """Serial port, such as COM5 or /dev/ttyUSB0."""
     _: KW_ONLY
-    output: Annotated[AnyPath, Option("File to write.", "FILE", short="-o")] = "ramp.csv"
-    firmware: Annotated[AnyPath, Option("Folder made by `dzdesign codegen`, with the scalings.", "DIR")] = "firmware"
-    baud: Annotated[Text, Option(
-        "Bits per second (default: what the firmware sends).",
-        "N", read=number("a positive number such as 115200", between=(0, 1e9)))] = None
-    seconds: Annotated[Text, Option(
-        "Time to record from the first frame on (default: until Ctrl-C).",
-        "S", read=number("a positive number such as 60", between=(0, 1e9)))] = None
-# fmt: on
+    output: Annotated[AnyPath, Option("FILE", short="-o")] = "ramp.csv"
+    """File to write."""
+    firmware: Annotated[AnyPath, Option("DIR")] = "firmware"
+    """Folder made by `dzdesign codegen`, with the scalings."""
+    baud: Annotated[Text, Option("N", read=number("a positive number such as 115200", between=(0, 1000000000.0)))] = (
+        None
+    )
+    """Bits per second (default: what the firmware sends)."""
+    seconds: Annotated[Text, Option("S", read=number("a positive number such as 60", between=(0, 1000000000.0)))] = None
+    """Time to record from the first frame on (default: until Ctrl-C)."""
 
 
 def run(arguments: Arguments, json: bool) -> int:

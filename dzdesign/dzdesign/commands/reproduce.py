@@ -16,7 +16,8 @@ EXAMPLES = ("dzdesign reproduce -o reproduction",)
 class Arguments:
     """Arguments of `reproduce`."""
 
-    output: Annotated[AnyPath, Option("Folder to write.", "DIR", short="-o")] = "reproduction"
+    output: Annotated[AnyPath, Option("DIR", short="-o")] = "reproduction"
+    """Folder to write."""
 
 
 def run(arguments: Arguments, json: bool) -> int:

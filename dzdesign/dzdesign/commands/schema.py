@@ -82,9 +82,8 @@ EXAMPLES = ("dzdesign schema", "dzdesign schema valve > valve.schema.json")
 class Arguments:
     """Arguments of `schema`."""
 
-    name: Annotated[
-        Text, Option("valve, compensator, firmware, ... (default: list them).", "NAME", choices=tuple(SCHEMAS))
-    ] = None
+    name: Annotated[Text, Option("NAME", choices=tuple(SCHEMAS))] = None
+    """valve, compensator, firmware, ... (default: list them)."""
 
 
 def run(arguments: Arguments, json: bool) -> int:

@@ -6,18 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.core.artefact_files import check_file_may_be_written, write_file, write_files
 from dzdesign.core.errors import InputError
-from dzdesign.core.options import (
-    FIT,
-    RECORDINGS,
-    AnyPath,
-    Option,
-    Paths,
-    Table,
-    Text,
-    percent_range,
-    quantity,
-    read_options,
-)
+from dzdesign.core.option_readers import percent_range, quantity
+from dzdesign.core.options import FIT, RECORDINGS, AnyPath, Option, Paths, Table, Text, read_options
 from dzdesign.core.units import parse_quantity
 from dzdesign.stages.recordings import RampArguments, check_plots, read_recordings, refuse_copies
 from dzdesign.terminal.progress import say, stage_progress
@@ -35,38 +25,32 @@ def _flow_or_share(text: str, option: str) -> tuple[float | None, float | None]:
     return parse_quantity(text, "flow", option), None
 
 
-# fmt: off
-
-
 @dataclass(frozen=True)
 class AssessArguments(RampArguments):
     """Arguments of `assess`."""
 
-    before: Annotated[Paths, Option("Recordings without the compensator, as for identify.", "BEFORE")]
-    after: Annotated[Paths, Option(
-        "Recordings with it; their command is the compensator's input.", "AFTER", named=True)]
+    before: Annotated[Paths, Option("BEFORE")]
+    """Recordings without the compensator, as for identify."""
+    after: Annotated[Paths, Option("AFTER", named=True)]
+    """Recordings with it; their command is the compensator's input."""
     _: KW_ONLY
-    output: Annotated[AnyPath | None, Option(
-        "File to write.", "FILE", command_default="assessment.json", short="-o")] = None
-    limits: Annotated[Table, Option(
-        'Largest values AFTER, such as "dead_zone_opening = 5 %, flow_at_zero = 0.1 L/min", also of dead_zone_closing, '
-        "knee_opening, knee_closing, hysteresis, linearity, symmetry, largest_flow_loss. In the options file a table "
-        "[limits].", "L", example="5 %")] = None
-    level: Annotated[Text, Option(
-        'Flow that ends the dead zone, such as "0.6 L/min", or "1 %" of the largest flow before (default: what counts '
-        "as flow, which is the meter's floor, its noise or 0.5 % of the largest flow).",
-        "Q", example="0.6 L/min", read=_flow_or_share)] = None
-    linearity_window: Annotated[str, Option(
-        "Range of the linearity, in percent of full command.",
-        "A-B", FIT, read=percent_range("full command such as '10-90'"))] = "10-90"
-    after_columns: Annotated[Table, Option(
-        "Columns of the recordings after, where u is the compensator's input (default: as --columns or [columns]).",
-        "MAP", RECORDINGS)] = None
-    after_u_max: Annotated[Text, Option(
-        "Full command of the recordings after (default: as --u-max).",
-        "U", RECORDINGS, example="10 V", read=quantity("voltage"))] = None
-    plots: Annotated[AnyPath | None, Option("Folder for plots in SVG: flow over command.", "DIR")] = None
-# fmt: on
+    output: Annotated[AnyPath | None, Option("FILE", command_default="assessment.json", short="-o")] = None
+    """File to write."""
+    limits: Annotated[Table, Option("L", example="5 %")] = None
+    """Largest values AFTER, such as "dead_zone_opening = 5 %, flow_at_zero = 0.1 L/min", also of dead_zone_closing,
+    knee_opening, knee_closing, hysteresis, linearity, symmetry, largest_flow_loss. In the options file a table
+    [limits]."""
+    level: Annotated[Text, Option("Q", example="0.6 L/min", read=_flow_or_share)] = None
+    """Flow that ends the dead zone, such as "0.6 L/min", or "1 %" of the largest flow before (default: what counts as
+    flow, which is the meter's floor, its noise or 0.5 % of the largest flow)."""
+    linearity_window: Annotated[str, Option("A-B", FIT, read=percent_range("full command such as '10-90'"))] = "10-90"
+    """Range of the linearity, in percent of full command."""
+    after_columns: Annotated[Table, Option("MAP", RECORDINGS)] = None
+    """Columns of the recordings after, where u is the compensator's input (default: as --columns or [columns])."""
+    after_u_max: Annotated[Text, Option("U", RECORDINGS, example="10 V", read=quantity("voltage"))] = None
+    """Full command of the recordings after (default: as --u-max)."""
+    plots: Annotated[AnyPath | None, Option("DIR")] = None
+    """Folder for plots in SVG: flow over command."""
 
 
 def assess(arguments: AssessArguments) -> "Assessment":

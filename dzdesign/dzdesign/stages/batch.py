@@ -14,7 +14,7 @@ def batch(arguments: BatchArguments) -> "LotSummary":
     Returns
     -------
     LotSummary
-        Content of batch.json: counts, reasons, quantiles, the common setting.
+        Content of batch.json: counts, reasons, quantiles, the lot setting.
 
     Raises
     ------

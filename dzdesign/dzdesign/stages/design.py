@@ -20,21 +20,18 @@ TARGETS = "dzdesign.codegen.project:TARGET_NAMES"
 #: Options that only a command of both signs has a use for.
 OF_BOTH_SIGNS = ("negative_dp", "zero_window")
 
-# fmt: off
-
 
 @dataclass(frozen=True)
 class DesignArguments(DesignChoices):
     """Arguments of `design`."""
 
-    valve: Annotated["ValveModel | AnyPath", Option("valve.json, made by `dzdesign identify`.", "VALVE.json")]
+    valve: Annotated["ValveModel | AnyPath", Option("VALVE.json")]
+    """valve.json, made by `dzdesign identify`."""
     _: KW_ONLY
-    output: Annotated[AnyPath | None, Option(
-        "File to write.", "FILE", command_default="compensator.json", short="-o")] = None
-    target: Annotated[str, Option(
-        "Microcontroller whose converter and timer the law is for; `codegen --list-targets` lists them.",
-        "NAME", choices=TARGETS)] = "f28335"
-# fmt: on
+    output: Annotated[AnyPath | None, Option("FILE", command_default="compensator.json", short="-o")] = None
+    """File to write."""
+    target: Annotated[str, Option("NAME", choices=TARGETS)] = "f28335"
+    """Microcontroller whose converter and timer the law is for; `codegen --list-targets` lists them."""
 
 
 def design_options(choices: DesignChoices, target: str) -> "DesignOptions":

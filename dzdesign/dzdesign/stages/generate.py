@@ -15,22 +15,18 @@ if TYPE_CHECKING:
     from dzdesign.codegen.project import Firmware
     from dzdesign.design.compensator import Compensator
 
-# fmt: off
-
 
 @dataclass(frozen=True)
 class GenerateArguments(DesignChoices):
     """Arguments of `codegen`, in Python `generate`."""
 
-    compensator: Annotated["Compensator | AnyPath", Option(
-        "compensator.json, or a valve.json, which is designed first with the options of `design`.",
-        "COMPENSATOR.json")]
+    compensator: Annotated["Compensator | AnyPath", Option("COMPENSATOR.json")]
+    """compensator.json, or a valve.json, which is designed first with the options of `design`."""
     _: KW_ONLY
-    output: Annotated[AnyPath | None, Option(
-        "Folder to write, with the C project.", "DIR", command_default="firmware", short="-o")] = None
-    target: Annotated[Text, Option(
-        "Microcontroller (default: that of the design; of a VALVE.json f28335).", "NAME", choices=TARGETS)] = None
-# fmt: on
+    output: Annotated[AnyPath | None, Option("DIR", command_default="firmware", short="-o")] = None
+    """Folder to write, with the C project."""
+    target: Annotated[Text, Option("NAME", choices=TARGETS)] = None
+    """Microcontroller (default: that of the design; of a VALVE.json f28335)."""
 
 
 def generate(arguments: GenerateArguments) -> "Firmware":

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.core.artefact_files import check_file_may_be_written, write_file, write_files
-from dzdesign.core.options import FIT, METER, RECORDINGS, AnyPath, Option, Paths, Text, number, quantity, read_options
+from dzdesign.core.option_readers import number, quantity
+from dzdesign.core.options import FIT, METER, RECORDINGS, AnyPath, Option, Paths, Text, read_options
 from dzdesign.stages.recordings import RampArguments, check_plots, read_recordings, refuse_copies
 from dzdesign.terminal.progress import stage_progress
 
@@ -15,46 +16,41 @@ if TYPE_CHECKING:
     from dzdesign.identify.options import IdentifyOptions
     from dzdesign.identify.valve.model import ValveModel
 
-# fmt: off
-
 
 @dataclass(frozen=True, kw_only=True)
 class IdentifyChoices(RampArguments):
     """Options of `identify`, of each valve of `batch` too."""
 
-    meter_zero: Annotated[str, Option(
-        "Bound of the flow meter's zero error.", "Q", METER, example="0.1 L/min", read=quantity("flow"))] = "0 L/min"
-    dp0: Annotated[Text, Option(
-        'Reference pressure drop (default: the test nearest to "1 MPa").',
-        "P", FIT, example="1 MPa", read=quantity("pressure"))] = None
-    x_max: Annotated[Text, Option(
-        'Stroke of the spool, such as "1.8 mm": gives k in V/mm.',
-        "X", FIT, example="1.8 mm", read=quantity("length"))] = None
-    confidence: Annotated[float | str, Option(
-        "Joint confidence level of all lower bounds.", "C", FIT, read=number("a number such as 0.99"))] = "0.99"
-    flat_below: Annotated[float | str, Option(
-        "Percent of full command: a threshold that changes by less over the tests counts as flat, and beta is 1.",
-        "C", FIT, read=lambda text, option: number("a number such as 0.1")(text, option) / 100)] = "0.1"
-    record: Annotated[Mapping[str, object] | None, Option(
-        'Entry of the test record, such as "serial = 4711": kept in valve.json and printed in the report, nothing is '
-        "computed from it. Repeatable. In the options file a table [record].",
-        "ENTRY", RECORDINGS, by_entry=True)] = None
+    meter_zero: Annotated[str, Option("Q", METER, example="0.1 L/min", read=quantity("flow"))] = "0 L/min"
+    """Bound of the flow meter's zero error."""
+    dp0: Annotated[Text, Option("P", FIT, example="1 MPa", read=quantity("pressure"))] = None
+    """Reference pressure drop (default: the test nearest to "1 MPa")."""
+    x_max: Annotated[Text, Option("X", FIT, example="1.8 mm", read=quantity("length"))] = None
+    """Stroke of the spool, such as "1.8 mm": gives k in V/mm."""
+    confidence: Annotated[float | str, Option("C", FIT, read=number("a number such as 0.99"))] = "0.99"
+    """Joint confidence level of all lower bounds."""
+    flat_below: Annotated[
+        float | str, Option("C", FIT, read=lambda text, option: number("a number such as 0.1")(text, option) / 100)
+    ] = "0.1"
+    """Percent of full command: a threshold that changes by less over the tests counts as flat, and beta is 1."""
+    record: Annotated[Mapping[str, object] | None, Option("ENTRY", RECORDINGS, by_entry=True)] = None
+    """Entry of the test record, such as "serial = 4711": kept in valve.json and printed in the report, nothing is
+    computed from it. Repeatable. In the options file a table [record]."""
 
 
 @dataclass(frozen=True)
 class IdentifyArguments(IdentifyChoices):
     """Arguments of `identify`."""
 
-    ramps: Annotated[Paths, Option(
-        "Recordings, or patterns such as ramps/*.csv: CSV, TDMS, MAT, HDF5, Parquet or Feather, with columns time_s, "
-        "u_V, dP_MPa, Q_Lmin.", "RAMP")]
+    ramps: Annotated[Paths, Option("RAMP")]
+    """Recordings, or patterns such as ramps/*.csv: CSV, TDMS, MAT, HDF5, Parquet or Feather, with columns time_s, u_V,
+    dP_MPa, Q_Lmin."""
     _: KW_ONLY
-    output: Annotated[AnyPath | None, Option(
-        "File to write.", "FILE", command_default="valve.json", short="-o")] = None
-    plots: Annotated[AnyPath | None, Option(
-        "Folder for plots in SVG and PNG: flow of each pressure drop with its knees, onsets and residuals; thresholds, "
-        "bounds and beta over dP.", "DIR")] = None
-# fmt: on
+    output: Annotated[AnyPath | None, Option("FILE", command_default="valve.json", short="-o")] = None
+    """File to write."""
+    plots: Annotated[AnyPath | None, Option("DIR")] = None
+    """Folder for plots in SVG and PNG: flow of each pressure drop with its knees, onsets and residuals; thresholds,
+    bounds and beta over dP."""
 
 
 def identify_options(choices: IdentifyChoices) -> "IdentifyOptions":

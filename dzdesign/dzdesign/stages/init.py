@@ -13,19 +13,16 @@ from dzdesign.stages.recordings import ColumnArguments
 if TYPE_CHECKING:
     from dzdesign.initial_options.look import Proposal
 
-# fmt: off
-
 
 @dataclass(frozen=True)
 class InitArguments(ColumnArguments):
     """Arguments of `init`."""
 
-    ramps: Annotated[Paths, Option("Recordings, as for identify (default: ramps/*, or *.csv).", "RAMP")] = ()
+    ramps: Annotated[Paths, Option("RAMP")] = ()
+    """Recordings, as for identify (default: ramps/*, or *.csv)."""
     _: KW_ONLY
-    output: Annotated[AnyPath | None, Option(
-        "File to write; one that exists is never overwritten.",
-        "FILE", command_default="dzdesign.toml", short="-o")] = None
-# fmt: on
+    output: Annotated[AnyPath | None, Option("FILE", command_default="dzdesign.toml", short="-o")] = None
+    """File to write; one that exists is never overwritten."""
 
 
 def init(arguments: InitArguments) -> "Proposal":

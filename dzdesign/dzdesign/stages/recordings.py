@@ -10,20 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, check_place_of_files
 from dzdesign.core.errors import InputError, nearest, neighbour
-from dzdesign.core.options import (
-    FIT,
-    METER,
-    RECORDINGS,
-    AnyPath,
-    Option,
-    Paths,
-    Table,
-    Text,
-    paths_of,
-    percent_range,
-    quantity,
-    whole_number,
-)
+from dzdesign.core.option_readers import percent_range, quantity, whole_number
+from dzdesign.core.options import FIT, METER, RECORDINGS, AnyPath, Option, Paths, Table, Text, paths_of
 from dzdesign.core.units import parse_quantity
 from dzdesign.terminal.progress import say, with_bar
 
@@ -34,41 +22,33 @@ if TYPE_CHECKING:
 #: Reads --skip-rows.
 read_skip_rows = whole_number("how many rows stand above the header, such as 12 (0: none)")
 
-# fmt: off
 
 @dataclass(frozen=True, kw_only=True)
 class ColumnArguments:
     """How the columns of recordings are found."""
 
-    columns: Annotated[Table, Option(
-        'Columns, such as "u=AO0:V, Q=Flow (L/min)": a quantity (time, u, dP, pA, pB, Q), its label in the file and, '
-        "after a colon, the unit that the label lacks. In the options file a table [columns].",
-        "MAP", RECORDINGS)] = None
-    dp: Annotated[Table, Option(
-        'Pressure drop of files without a column of it, such as "1 MPa". In the options file also a table [dp] from '
-        "file name or pattern to pressure.",
-        "P", RECORDINGS, example="1 MPa")] = None
-    skip_rows: Annotated[int | str | None, Option(
-        "Rows above the header of a text file, such as a logger's preamble (default: found).", "N", RECORDINGS,
-        read=read_skip_rows)] = None
+    columns: Annotated[Table, Option("MAP", RECORDINGS)] = None
+    """Columns, such as "u=AO0:V, Q=Flow (L/min)": a quantity (time, u, dP, pA, pB, Q), its label in the file and, after
+    a colon, the unit that the label lacks. In the options file a table [columns]."""
+    dp: Annotated[Table, Option("P", RECORDINGS, example="1 MPa")] = None
+    """Pressure drop of files without a column of it, such as "1 MPa". In the options file also a table [dp] from file
+    name or pattern to pressure."""
+    skip_rows: Annotated[int | str | None, Option("N", RECORDINGS, read=read_skip_rows)] = None
+    """Rows above the header of a text file, such as a logger's preamble (default: found)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RampArguments(ColumnArguments):
     """How ramp tests are read."""
 
-    u_max: Annotated[str, Option(
-        "Full command.", "U", RECORDINGS, example="10 V", read=quantity("voltage"))] = "10 V"
-    meter_floor: Annotated[Text, Option(
-        "Flow below which the meter reads zero (default: found).",
-        "Q", METER, example="0.6 L/min", read=quantity("flow"))] = None
-    meter_lag: Annotated[Text, Option(
-        "Lag of the flow meter (default: found from ramps of two rates).",
-        "T", METER, example="0.1 s", read=quantity("time"))] = None
-    knee_window: Annotated[str, Option(
-        "Flow range of the straight-line fit, in percent of maximum flow.",
-        "A-B", FIT, read=percent_range("the largest flow such as '12-50'"))] = "12-50"
-# fmt: on
+    u_max: Annotated[str, Option("U", RECORDINGS, example="10 V", read=quantity("voltage"))] = "10 V"
+    """Full command."""
+    meter_floor: Annotated[Text, Option("Q", METER, example="0.6 L/min", read=quantity("flow"))] = None
+    """Flow below which the meter reads zero (default: found)."""
+    meter_lag: Annotated[Text, Option("T", METER, example="0.1 s", read=quantity("time"))] = None
+    """Lag of the flow meter (default: found from ramps of two rates)."""
+    knee_window: Annotated[str, Option("A-B", FIT, read=percent_range("the largest flow such as '12-50'"))] = "12-50"
+    """Flow range of the straight-line fit, in percent of maximum flow."""
 
 
 def read_recordings(

@@ -11,20 +11,16 @@ from dzdesign.core.options import AnyPath, Option
 if TYPE_CHECKING:
     from dzdesign.report.valve_report import Report
 
-# fmt: off
-
 
 @dataclass(frozen=True)
 class ReportArguments:
     """Arguments of `report`."""
 
-    folder: Annotated[AnyPath, Option(
-        "Folder of demo, verify, codegen or batch, or with valve.json or compensator.json.", "DIR")]
+    folder: Annotated[AnyPath, Option("DIR")]
+    """Folder of demo, verify, codegen or batch, or with valve.json or compensator.json."""
     _: KW_ONLY
-    output: Annotated[AnyPath | None, Option(
-        "File to write (default of the command: report.html with the evidence, or in the folder).",
-        "FILE", short="-o")] = None
-# fmt: on
+    output: Annotated[AnyPath | None, Option("FILE", short="-o")] = None
+    """File to write (default of the command: report.html with the evidence, or in the folder)."""
 
 
 def report(arguments: ReportArguments) -> "Report":

@@ -3,37 +3,39 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.core.artefact_files import check_folder_may_be_written, write_folder
 from dzdesign.core.errors import InputError
-from dzdesign.core.options import AnyPath, Option, Texts, quantity, read_options, texts_of, whole_number
+from dzdesign.core.option_readers import quantity, whole_number
+from dzdesign.core.options import AnyPath, Option, Texts, read_options, texts_of
 from dzdesign.core.units import parse_quantity
 from dzdesign.terminal.progress import say, stage_progress
 
-PRESSURE_DROPS = ("0.5 MPa", "1 MPa", "2 MPa", "3 MPa", "4 MPa", "5 MPa")
+if TYPE_CHECKING:
+    from dzdesign.verify.closed_loop.simulation import SimulationManifest
 
-# fmt: off
+PRESSURE_DROPS = ("0.5 MPa", "1 MPa", "2 MPa", "3 MPa", "4 MPa", "5 MPa")
 
 
 @dataclass(frozen=True, kw_only=True)
 class SimulateArguments:
     """Arguments of `simulate`."""
 
-    output: Annotated[AnyPath | None, Option(
-        "Folder to write, with the recordings.", "DIR", command_default="ramps", short="-o")] = None
-    plant: Annotated[AnyPath | None, Option(
-        "File with the plant (default: that of the paper's valve).", "PLANT.toml")] = None
-    firmware: Annotated[AnyPath | None, Option(
-        "Folder made by `dzdesign codegen`, whose compensator then drives the valve.", "DIR")] = None
-    dp: Annotated[Texts, Option(
-        "Pressure drop of a ramp test; repeatable (default: 0.5, 1, 2, 3, 4 and 5 MPa).", "P", example="1 MPa")] = ()
-    ramp_time: Annotated[str, Option(
-        "Time from zero to full command.", "T", example="100 s", read=quantity("time"))] = "100 s"
-    seed: Annotated[int | str, Option(
-        "Random seed of the measurement noise.", "N",
-        read=whole_number("a whole number of zero or more, such as 1", digits=18))] = "1"
-# fmt: on
+    output: Annotated[AnyPath | None, Option("DIR", command_default="ramps", short="-o")] = None
+    """Folder to write, with the recordings."""
+    plant: Annotated[AnyPath | None, Option("PLANT.toml")] = None
+    """File with the plant (default: that of the paper's valve)."""
+    firmware: Annotated[AnyPath | None, Option("DIR")] = None
+    """Folder made by `dzdesign codegen`, whose compensator then drives the valve."""
+    dp: Annotated[Texts, Option("P", example="1 MPa")] = ()
+    """Pressure drop of a ramp test; repeatable (default: 0.5, 1, 2, 3, 4 and 5 MPa)."""
+    ramp_time: Annotated[str, Option("T", example="100 s", read=quantity("time"))] = "100 s"
+    """Time from zero to full command."""
+    seed: Annotated[
+        int | str, Option("N", read=whole_number("a whole number of zero or more, such as 1", digits=18))
+    ] = "1"
+    """Random seed of the measurement noise."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,7 +43,7 @@ class SimulatedRamps:
     """Ramp tests of a simulated valve: name of each file to its bytes, and the manifest of their folder."""
 
     files: Mapping[str, bytes]
-    manifest: Mapping[str, Any]
+    manifest: "SimulationManifest"
 
 
 def simulate(arguments: SimulateArguments) -> SimulatedRamps:

@@ -16,35 +16,31 @@ if TYPE_CHECKING:
     from dzdesign.verify.evidence import Check, MutationScore
     from dzdesign.verify.verification import Verification
 
-# fmt: off
-
 
 @dataclass(frozen=True)
 class VerifyArguments:
     """Arguments of `verify`."""
 
-    firmware: Annotated["Firmware | AnyPath", Option("Folder made by `dzdesign codegen`.", "DIR")]
+    firmware: Annotated["Firmware | AnyPath", Option("DIR")]
+    """Folder made by `dzdesign codegen`."""
     _: KW_ONLY
-    output: Annotated[AnyPath | None, Option(
-        "Folder to write, with the evidence.", "DIR", command_default="evidence", short="-o")] = None
-    plant: Annotated[AnyPath | None, Option(
-        "File with the plant of the closed loop, like examples/paper_valve/plant.toml (default: made of the identified "
-        "thresholds).", "PLANT.toml")] = None
-    tolerances: Annotated[AnyPath | None, Option(
-        "File with a series of plants to run too, like examples/paper_valve/tolerances.toml; needs a plant.",
-        "TOL.toml", CHECKS)] = None
-    include: Annotated[Paths, Option(
-        "Folder of headers that your board files include, such as your chip's. Repeatable.", "DIR", CHECKS)] = ()
-    c2000ware: Annotated[AnyPath | None, Option(
-        "Folder of your C2000Ware: also compile f28335 firmware against its headers.", "DIR", CHECKS)] = None
-    mutate: Annotated[bool, Option(
-        "Also make the C wrong in every place, and count what is caught.", group=CHECKS)] = False
-    machine_code: Annotated[bool, Option(
-        "Also check machine code: every input on a Cortex-M4 in QEMU, a sample on an AVR in simavr.",
-        group=CHECKS)] = False
-    proof: Annotated[bool, Option(
-        "Also prove by Frama-C that nothing overflows a 16-bit int.", group=CHECKS)] = False
-# fmt: on
+    output: Annotated[AnyPath | None, Option("DIR", command_default="evidence", short="-o")] = None
+    """Folder to write, with the evidence."""
+    plant: Annotated[AnyPath | None, Option("PLANT.toml")] = None
+    """File with the plant of the closed loop, like examples/paper_valve/plant.toml (default: made of the identified
+    thresholds)."""
+    tolerances: Annotated[AnyPath | None, Option("TOL.toml", CHECKS)] = None
+    """File with a series of plants to run too, like examples/paper_valve/tolerances.toml; needs a plant."""
+    include: Annotated[Paths, Option("DIR", CHECKS)] = ()
+    """Folder of headers that your board files include, such as your chip's. Repeatable."""
+    c2000ware: Annotated[AnyPath | None, Option("DIR", CHECKS)] = None
+    """Folder of your C2000Ware: also compile f28335 firmware against its headers."""
+    mutate: Annotated[bool, Option(group=CHECKS)] = False
+    """Also make the C wrong in every place, and count what is caught."""
+    machine_code: Annotated[bool, Option(group=CHECKS)] = False
+    """Also check machine code: every input on a Cortex-M4 in QEMU, a sample on an AVR in simavr."""
+    proof: Annotated[bool, Option(group=CHECKS)] = False
+    """Also prove by Frama-C that nothing overflows a 16-bit int."""
 
 
 def verify(arguments: VerifyArguments, plant_source: str = "") -> "Verification":

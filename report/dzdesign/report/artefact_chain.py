@@ -4,122 +4,25 @@ From the evidence back to the recordings each artefact states the hash of what i
 name whose hash is another is named in the report, and not used.
 """
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 from typing import Any
 
-from dzdesign.assess.assessment import Assessment
-from dzdesign.core.artefact_files import MANIFEST_NAME, TOOL, parse_document, sha256_of
-from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.core.artefact_types import Artefact, SourceFile, schema_of, to_json_bytes
-from dzdesign.core.documents import written_by
+from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
+from dzdesign.core.artefact_types import Artefact, to_json_bytes
 from dzdesign.core.errors import InputError
-from dzdesign.design.compensator import SCHEMA as COMPENSATOR_SCHEMA
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest
-from dzdesign.design.redesign_check import prove_derived
-from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.artefact_folder import VERIFICATION_NAME, is_of, listed_files
-from dzdesign.report.reproduction import Reproduction
-from dzdesign.verify.evidence import Evidence
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Kind:
-    """A kind of artefact: what it is called, its schema, and how a file of it is read."""
-
-    label: str
-    schema: str
-    read: Callable[[bytes, str], Any]
-
-    @property
-    def command(self) -> str | None:
-        """The command that makes it; None of what no chain lacks."""
-        return written_by(self.schema)
-
-
-def _typed(label: str, kind: type[Artefact]) -> Kind:
-    def read(content: bytes, name: str) -> Artefact:
-        return read_artefact(content, kind, name)
-
-    return Kind(label=label, schema=schema_of(kind), read=read)
-
-
-def _read_compensator(content: bytes, name: str) -> Compensator:
-    compensator = read_artefact(content, Compensator, name)
-    if parse_document(content, name, (COMPENSATOR_SCHEMA,))["tool"] == TOOL:  # another may have chosen other tables
-        prove_derived(compensator)
-    return compensator
-
-
-#: Role in a chain -> kind, from the evidence back to the recordings.
-KINDS = {
-    "evidence": _typed("evidence", Evidence),
-    "firmware": _typed("firmware", FirmwareManifest),
-    "compensator": Kind(label="compensator", schema=COMPENSATOR_SCHEMA, read=_read_compensator),
-    "valve": _typed("valve", ValveModel),
-    "assessment": _typed("assessment of recordings", Assessment),
-    "reproduction": _typed("the paper's numbers", Reproduction),
-}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
-    """Where an artefact was found: name below the folder of the report, hash, what made it and of what."""
-
-    name: str
-    sha256: str
-    made_by: str
-    made_from: tuple[SourceFile, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Chain:
-    """What a report is of; an artefact that was not found is None.
-
-    Attributes
-    ----------
-    evidence : Evidence or None
-    firmware : FirmwareManifest or None
-    compensator : Compensator or None
-    valve : ValveModel or None
-    assessment : Assessment or None
-    reproduction : Reproduction or None
-    places : mapping of str to Place
-        Where each was found, by these names.
-    curves : mapping of str to str
-        CSV files of the evidence whose hashes fit, by name.
-    faults : tuple of str
-        What does not fit: a file that was changed, or belongs to another chain. None of it is used.
-    missing : tuple of str
-        What is not there, and which command makes it.
-    """
-
-    evidence: Evidence | None = None
-    firmware: FirmwareManifest | None = None
-    compensator: Compensator | None = None
-    valve: ValveModel | None = None
-    assessment: Assessment | None = None
-    reproduction: Reproduction | None = None
-    places: Mapping[str, Place] = field(default_factory=dict)
-    curves: Mapping[str, str] = field(default_factory=dict)
-    faults: tuple[str, ...] = ()
-    missing: tuple[str, ...] = ()
+from dzdesign.report.chain import KINDS, Chain, Place
 
 
 def chain_of(files: Mapping[str, bytes], *, asked: tuple[str, ...] = ("",), sealed: bool = True) -> Chain:
     """Follow the chain from the evidence back to the valve, as far as the files go.
 
-    Parameters
-    ----------
-    files : mapping of str to bytes
-        By name, such as `read_artefact_folder` returns; of two of a kind the first one counts.
-    asked : tuple of str
-        How the names of the files begin that the report is asked for. What else lies there and belongs to another chain
-        is a stranger's: named, and no fault.
-    sealed : bool
-        False of evidence that `verify` has made this moment: no manifest states its hash yet, and what is wrong with
-        the files it has found itself, so that its own verdict stands.
+    Of two files of a kind the first one counts. `asked` is how the names of the files begin that the report is asked
+    for: what else lies there and belongs to another chain is a stranger's, named and no fault. Evidence that `verify`
+    has made this moment is not `sealed`: no manifest states its hash yet, and its own verdict stands whatever else lies
+    there.
 
     Raises
     ------
@@ -146,9 +49,14 @@ class _Search:
         if evidence := self._evidence():
             curves = self._curves(evidence)
             self._take("evidence", evidence)
-        self._firmware()
-        self._compensator()
-        self._valve()
+        self._link("firmware", "evidence", "the evidence is of")
+        if "firmware" in self.found:
+            self._firmware_files(self.found["firmware"], self.places["firmware"].name.removesuffix(MANIFEST_NAME))
+        self._link("compensator", "firmware", "the firmware was made from")
+        if "compensator" in self.found:
+            self._valve(self.found["compensator"])
+        else:
+            self._link("valve", "compensator", "the compensator was made from")
         for role in ("assessment", "reproduction"):
             if name := self._first(role):
                 self._take(role, name)
@@ -204,15 +112,16 @@ class _Search:
                 self.faults.append(f"{name} was changed since `dzdesign verify` wrote it: not drawn")
         return curves
 
-    def _firmware(self) -> None:
-        stated = self._origin("evidence")
-        if name := self._firmware_of_hash(stated) if stated else self._first("firmware"):
-            self._take("firmware", name)
-            if "firmware" in self.found:
-                self._firmware_files(self.found["firmware"], name.removesuffix(MANIFEST_NAME))
-            return
-        self._miss("firmware", stated)
-        self._name_other("firmware", stated, "the evidence is of")
+    def _link(self, role: str, parent: str, which: str) -> None:
+        """Take what an artefact was made from; of a chain that begins with it, the first of its kind."""
+        stated = self._origin(parent)
+        if stated is None and self.found:
+            self._miss(role, hint=f"which one is known from the {parent} alone")
+        elif name := self._of_hash(stated) if stated else self._first(role):
+            self._take(role, name)
+        else:
+            self._miss(role, stated)
+            self._name_other(role, stated, which)
 
     def _firmware_files(self, firmware: FirmwareManifest, place: str) -> None:
         """Name the files of the firmware that are not those generated; a board file is its user's to change."""
@@ -230,31 +139,10 @@ class _Search:
                     f"{stated}. What is reported here is of the firmware as generated"
                 )
 
-    def _compensator(self) -> None:
-        firmware: FirmwareManifest | None = self.found.get("firmware")
-        if "evidence" in self.found and firmware is None:
-            self._miss("compensator", hint="which one is known from the firmware alone")
-            return
-        stated = firmware.origin.compensator_json if firmware else None
-        if name := self._of_hash(stated) if stated else self._first("compensator"):
-            self._take("compensator", name)
-            return
-        self._miss("compensator", stated)
-        self._name_other("compensator", stated, "the firmware was made from")
-
-    def _valve(self) -> None:
-        stated = self._origin("compensator")
-        if stated is None:
-            name = None if {"firmware", "evidence"} & self.found.keys() else self._first("valve")
-            if name:
-                self._take("valve", name)
-            elif {"firmware", "evidence"} & self.found.keys():
-                self._miss("valve", hint="which one is known from the compensator alone")
-            else:
-                self._miss("valve")
-            return
-        held, place = self.found["compensator"].valve, self.places["compensator"]
-        named = place.made_from[0].source
+    def _valve(self, compensator: Compensator) -> None:
+        """Take the valve's file; where it is not here, the valve that the compensator holds."""
+        held, place = compensator.valve, self.places["compensator"]
+        stated, named = place.made_from[0].sha256, place.made_from[0].source
         name = self._of_hash(stated)
         if name is None:
             self._name_other("valve", stated, "the compensator was made from", named)
@@ -289,20 +177,20 @@ class _Search:
         """Return the hash of what an artefact was made from; None of one that was not found."""
         if role not in self.found:
             return None
+        if role == "firmware":
+            return str(self.found[role].origin.compensator_json)
         place = self.places[role]
         if not place.made_from:
             raise InputError(f"'{place.name}': 'made_from' is empty, expected what it was made from; make it again")
         return place.made_from[0].sha256
 
     def _of_hash(self, stated: str) -> str | None:
-        return next((name for name, digest in self.hashes.items() if digest == stated), None)
-
-    def _firmware_of_hash(self, stated: str) -> str | None:
-        """Return the manifest of a hash: of copies that in the folder asked for, then that beside which all fits."""
+        """Return the file of a hash: of copies of a manifest that in the folder asked for, then where all fits."""
 
         def preferred(name: str) -> tuple[bool, int]:
             place, files = name.removesuffix(MANIFEST_NAME), listed_files(self.files[name])
-            return not name.startswith(self.asked), sum(self.hashes.get(place + leaf) != files[leaf] for leaf in files)
+            wrong = sum(self.hashes.get(place + leaf) != digest for leaf, digest in files.items())
+            return bool(files) and not name.startswith(self.asked), wrong
 
         return min((name for name, digest in self.hashes.items() if digest == stated), key=preferred, default=None)
 
@@ -338,8 +226,8 @@ class _Search:
             self.found[role] = KINDS[role].read(self.files[name], name)
         except InputError as error:
             # What the evidence rests on must not go missing without a word: its verdict would stand.
-            told = self.faults if role == "compensator" and self.found else self.unreadable
-            told.append(f"{KINDS[role].label}: {error}")
+            lines = self.faults if role == "compensator" and self.found else self.unreadable
+            lines.append(f"{KINDS[role].label}: {error}")
             return
         self.places[role] = _place(name, self.hashes[name], self.found[role])
 

@@ -22,11 +22,6 @@ def read_artefact_folder(folder: Path) -> dict[str, bytes]:
 
     Of an evidence or firmware folder the folder around it is looked at too: what it was made from lies there.
 
-    Parameters
-    ----------
-    folder : Path
-        Of artefacts.
-
     Raises
     ------
     InputError
@@ -60,13 +55,7 @@ def read_artefact_folder(folder: Path) -> dict[str, bytes]:
 
 
 def asked_prefixes(folder: Path) -> tuple[str, ...]:
-    """Return how the names of a folder's own files begin among these; what else lies there was only looked around for.
-
-    Parameters
-    ----------
-    folder : Path
-        As `read_artefact_folder` takes it.
-    """
+    """Return how the names of a folder's own files begin; the other files only lie around it."""
     return (f"{folder.resolve().name}/",) if _is_one_stage(folder) else ("",)
 
 
@@ -127,13 +116,7 @@ def is_of(content: bytes, schema: str) -> bool:
 
 
 def listed_files(manifest: bytes | None) -> dict[str, str]:
-    """Return the files that a manifest lists, with their hashes; none of what is no manifest.
-
-    Parameters
-    ----------
-    manifest : bytes or None
-        Of an evidence or firmware folder.
-    """
+    """Return the files that a manifest of evidence or firmware lists, with their hashes; none of what is none."""
     if manifest is None:
         return {}
     try:

@@ -1,4 +1,4 @@
-"""Both sides of a compensator by their names."""
+"""The sides of a compensator by their names."""
 
 from dzdesign.design.compensator import Compensator, SideLaw
 

@@ -6,7 +6,7 @@ engine; only figures and formulas, made here, are markup.
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 from dzdesign.core.artefact_files import TOOL
@@ -28,22 +28,9 @@ LONGEST_WORD = 18
 class Section:
     """What a section holds, in the order in which it is shown.
 
-    Attributes
-    ----------
-    figures : tuple of ReportFigure
-    tables : tuple of Table
-    lines : tuple of str
-        Sentences of figures.
-    groups : tuple of (str, tuple of str)
-        Further sentences, each group under a heading of its own.
-    missing : str
-        What it lacks and which command makes that; empty if nothing.
-    optional : bool
-        Whether the page is whole without it.
-    note : str
-        What to do with it; what stands between backticks is a command.
-    of_valve : bool
-        Whether it is of one valve: of a common setting, of its carrier.
+    `groups` are further lines, each group under a heading of its own. `missing` says what the section lacks and which
+    command makes it; the page is whole without an `optional` one. In a `note` a command stands between backticks. Of a
+    lot setting a section may be of one valve, the carrier.
     """
 
     figures: tuple[ReportFigure, ...] = ()
@@ -56,44 +43,30 @@ class Section:
     of_valve: bool = False
 
 
-def render_page(
-    *,
-    title: str,
-    verdict: "Headline",
-    figures: "Sequence[Figure]",
-    headings: Sequence[tuple[str, str]],
-    sections: Mapping[str, Section],
-    missing: Sequence[str] = (),
-    law: "LawAccount | None" = None,
-    record: Sequence[tuple[str, str]] = (),
-    lot: "Sequence[Figure]" = (),
-    carrier: str = "",
-) -> str:
-    """Return the page.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Page:
+    """What a page holds.
 
-    Parameters
-    ----------
-    title : str
-        Its first heading.
-    verdict : Headline
-        What it leads with.
-    figures : sequence of Figure
-        The numbers that matter.
-    headings : sequence of (str, str)
-        Anchor and heading of every section, in their order; ``provenance`` and ``warnings`` among them.
-    sections : mapping of str to Section
-        By anchor.
-    missing : sequence of str
-        What is not there or not used, and which command makes it.
-    law : LawAccount, optional
-        The derivation, for the section ``law``.
-    record : sequence of (str, str)
-        Who and what, in the engineer's words.
-    lot : sequence of Figure
-        Of a common setting, before all others.
-    carrier : str
-        Of a common setting: the one valve that `record` and `figures` are of.
+    `headings` has anchor and heading of every section, in their order, ``provenance`` and ``warnings`` among them;
+    `missing` what is not there or not used, and which command makes it; `record` who and what, in the engineer's words.
+    Of a lot setting `lot` stands before all other figures, and `carrier` is the one valve that `record` and `figures`
+    are of.
     """
+
+    title: str
+    verdict: "Headline"
+    figures: "Sequence[Figure]"
+    headings: Sequence[tuple[str, str]]
+    sections: Mapping[str, Section]
+    missing: Sequence[str] = ()
+    law: "LawAccount | None" = None
+    record: Sequence[tuple[str, str]] = ()
+    lot: "Sequence[Figure]" = ()
+    carrier: str = ""
+
+
+def render(page: Page) -> str:
+    """Return a page as HTML."""
     import jinja2
 
     environment = jinja2.Environment(
@@ -105,20 +78,8 @@ def render_page(
         autoescape=True,
     )
     environment.filters.update(data_uri=data_uri, anchor=anchor, words=_words, cell=_cell)
-    html: str = environment.get_template("report.html.jinja").render(
-        title=title,
-        tool=TOOL,
-        verdict=verdict,
-        figures=figures,
-        sections=sections,
-        headings=headings,
-        law=law,
-        palette=PALETTE,
-        missing=missing,
-        record=record,
-        lot=lot,
-        carrier=carrier,
-    )
+    content = {each.name: getattr(page, each.name) for each in fields(page)}
+    html: str = environment.get_template("report.html.jinja").render(tool=TOOL, palette=PALETTE, **content)
     return html
 
 

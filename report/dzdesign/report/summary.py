@@ -7,7 +7,7 @@ from dzdesign.core.units import span_MPa
 from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED
 from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.model import ValveModel
-from dzdesign.report.artefact_chain import Chain
+from dzdesign.report.chain import Chain
 from dzdesign.report.compensator_sides import laws_of
 from dzdesign.report.sections.cells import counted, whole
 from dzdesign.verify.evidence import Check, Evidence, InputCheck, PressureResult
@@ -16,20 +16,10 @@ from dzdesign.verify.requirements import not_tried
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Headline:
-    """The verdict.
+    """The verdict: good if all holds, bad if something does not, open if something was not checked.
 
-    Attributes
-    ----------
-    kind : {"good", "bad", "open"}
-        All holds; something does not; something could not be checked, or nothing was.
-    sign, text : str
-        As on the page.
-    reasons : tuple of str
-        What does not hold or was not checked.
-    untried : tuple of str
-        What nobody asked for, and the command that tries it: no requirement, but a reader should see it.
-    cautions : tuple of str
-        What the verdict is not about, whatever it is, and what somebody accepted.
+    `reasons` name what does not hold or was not checked, `untried` what nobody asked for and the command that tries it,
+    `cautions` what the verdict is not about, and what somebody accepted.
     """
 
     kind: str

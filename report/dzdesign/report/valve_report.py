@@ -6,10 +6,11 @@ from pathlib import Path
 
 from dzdesign.core.artefact_types import schema_of
 from dzdesign.identify.valve.model import ValveModel
-from dzdesign.report.artefact_chain import Chain, chain_of
+from dzdesign.report.artefact_chain import chain_of
 from dzdesign.report.artefact_folder import asked_prefixes, is_of, read_artefact_folder
+from dzdesign.report.chain import Chain
 from dzdesign.report.figures.figure import figure_style
-from dzdesign.report.page import Section, render_page
+from dzdesign.report.page import Page, Section, render
 from dzdesign.report.sections.acceptance import acceptance_section
 from dzdesign.report.sections.compensator import integers_section, law_section
 from dzdesign.report.sections.evidence import checks_section, inputs_section, loop_section
@@ -66,12 +67,7 @@ class Report:
 
 
 def report_of_folder(folder: Path) -> Report:
-    """Make the report of an artefact folder.
-
-    Parameters
-    ----------
-    folder : Path
-        Of `dzdesign demo`, of evidence, of firmware, or with valve.json or compensator.json.
+    """Make the report of an artefact folder: of demo, evidence or firmware, or with valve.json or compensator.json.
 
     Raises
     ------
@@ -82,19 +78,10 @@ def report_of_folder(folder: Path) -> Report:
 
 
 def with_report(files: Mapping[str, str | bytes], firmware: Path, output: Path) -> dict[str, str | bytes]:
-    """Return the files of an evidence folder with the report of them: of what `verify` used, and of nothing else.
+    """Return the files of an evidence folder, not written yet, with the report of what `verify` used alone.
 
     Its verdict is the evidence's own. Files that lie about, an assessment or a stranger's valve.json, have no part in
-    it; `dzdesign report` looks at them.
-
-    Parameters
-    ----------
-    files : mapping
-        Of the evidence folder, not written yet: name to content.
-    firmware : Path
-        The firmware folder that it is of; the valve.json that it was made from is looked for around it.
-    output : Path
-        The evidence folder.
+    it; `dzdesign report` looks at them. The valve.json that the firmware was made from is looked for around it.
     """
     name, place = Path(output).resolve().name, Path(firmware).resolve().name
     if name == place:  # in two folders of one name
@@ -123,7 +110,7 @@ def make_report(chain: Chain) -> Report:
         lot, figures = (*lot, figures[-1]), figures[:-1]
     with figure_style():
         sections = _sections(chain)
-    html = render_page(
+    page = Page(
         title=_title(chain),
         verdict=verdict,
         record=tuple(chain.valve.record.items()) if chain.valve else (),
@@ -136,7 +123,7 @@ def make_report(chain: Chain) -> Report:
         law=account_of(compensator.law) if compensator else None,
     )
     return Report(
-        html=html,
+        html=render(page),
         kind=verdict.kind,
         holds=verdict.holds,
         verdict=verdict.text,

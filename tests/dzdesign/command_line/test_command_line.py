@@ -99,8 +99,8 @@ def test_every_declaration_has_a_sentence_and_a_known_group():
     declared = [argument for name in COMMANDS for argument in arguments_of_command(name)]
     assert len(declared) > 100
     for argument in declared:
-        assert argument.option.help[0].isupper() or argument.is_positional, argument
-        assert argument.option.help.endswith("."), argument
+        assert argument.help[0].isupper() or argument.is_positional, argument
+        assert argument.help.endswith("."), argument
         assert argument.option.group in ("", *GROUPS), argument
         assert argument.option.metavar or bool in argument.kinds, argument
 
@@ -113,7 +113,8 @@ def test_one_declaration_is_seen_everywhere(monkeypatch, tmp_path, capsys):
     @dataclass(frozen=True)
     class Arguments(design.DesignArguments):
         _: KW_ONLY
-        oil: Annotated[str, Option("Grade of the oil.", "GRADE", "law", choices=("HLP 32", "HLP 46"))] = "HLP 46"
+        oil: Annotated[str, Option("GRADE", "law", choices=("HLP 32", "HLP 46"))] = "HLP 46"
+        """Grade of the oil."""
 
     def stage(arguments: Arguments) -> str:
         """Tell the oil.
@@ -130,9 +131,9 @@ def test_one_declaration_is_seen_everywhere(monkeypatch, tmp_path, capsys):
     assert parse(["design", "v.json"]).arguments.oil == "HLP 46"
     assert parse(["design", "v.json", "--config", str(tmp_path / "dz.toml")]).arguments.oil == "HLP 32"
     assert parse(["design", "v.json", "--oil", "HLP 68"]).arguments.oil == "HLP 68"
-    assert re.search(r"--oil GRADE +Grade of the oil \(default: HLP 46\)\.", help_of("design"))
+    assert re.search(r"--oil GRADE +Grade of the oil \(HLP 32, HLP 46; default: HLP 46\)\.", help_of("design"))
     told = with_keywords(Arguments, stage)
-    assert told("v.json", oil="HLP 32") == "HLP 32" and "Grade of the oil." in told.__doc__
+    assert told("v.json", oil="HLP 32") == "HLP 32" and "Grade of the oil (" in told.__doc__
     assert "oil" in inspect.signature(told).parameters
     with pytest.raises(InputError, match="did you mean 'oil'"):
         told("v.json", oill="HLP 32")

@@ -24,17 +24,7 @@ class Requirement:
     how: str = "`verify`"
 
     def check(self, *, holds: bool | None, text: str, name: str = "") -> Check:
-        """Return what was found.
-
-        Parameters
-        ----------
-        holds : bool or None
-            None: it could not be checked.
-        text : str
-            What was found, with its figures.
-        name : str
-            In place of the title: what of it was tried, such as one processor's machine code.
-        """
+        """Return what was found; `name` says what of it was tried, such as one processor's machine code."""
         return Check(id=self.id, name=name or self.title, holds=holds, text=text)
 
 
@@ -90,13 +80,7 @@ REVIEW = "review it, and try it on the machine"
 
 
 def untried_requirements(evidence: Evidence) -> tuple[Requirement, ...]:
-    """Return what can be checked of a firmware and was not tried, and how to have it tried.
-
-    Parameters
-    ----------
-    evidence : Evidence
-        Of the firmware.
-    """
+    """Return what can be checked of a firmware and was not tried, and how to have it tried."""
     tried = {check.id for check in evidence.checks}
     untried = [
         Requirement(id="user-file", title=f"{name}, which is yours and was changed", how=REVIEW)
@@ -117,11 +101,5 @@ def untried_requirements(evidence: Evidence) -> tuple[Requirement, ...]:
 
 
 def not_tried(evidence: Evidence) -> tuple[str, ...]:
-    """Return the lines of what was not tried, each with the command that would.
-
-    Parameters
-    ----------
-    evidence : Evidence
-        Of the firmware.
-    """
+    """Return the lines of what was not tried, each with the command that would."""
     return tuple(f"{each.title}: {each.how}" for each in untried_requirements(evidence))

@@ -9,15 +9,7 @@ from dzdesign.design.compensator import Compensator
 
 
 def zero_command(compensator: Compensator, sign: int) -> tuple[int, int]:
-    """Return the least and the largest compare value at zero command.
-
-    Parameters
-    ----------
-    compensator : Compensator
-        The law in rationals.
-    sign : {1, -1}
-        Sign of the command.
-    """
+    """Return the least and the largest compare value at zero command of one sign."""
     zero = compensator.signals.command.zero_code
     nodes = [node * compensator.beta_step_codes for node in range(compensator.nodes(sign) - 1)]
     values = [compensator.compare(zero, code, sign) for code in nodes]
@@ -25,15 +17,7 @@ def zero_command(compensator: Compensator, sign: int) -> tuple[int, int]:
 
 
 def certificate_lines(compensator: Compensator, sign: int) -> list[str]:
-    """Return comment lines that say what the offset is certified for.
-
-    Parameters
-    ----------
-    compensator : Compensator
-        With its certificate.
-    sign : {1, -1}
-        Sign of the command.
-    """
+    """Return comment lines that say what the offset of one sign of command is certified for."""
     certificate = compensator.side(sign).certificate
     low, high = certificate.dp_MPa
     where = span_MPa(float(low), float(high)) + (", between the tests too" if low < high else "")

@@ -21,19 +21,14 @@ EXACT = "exact"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Constant:
-    """What a `#define` or a table is, and where it is from: its fields are those of `FirmwareConstant`.
-
-    Attributes
-    ----------
-    data : tuple of str
-        Keys of compensator.json that it was computed from, dotted; none for what codegen chooses itself.
-    """
+    """What a `#define` or a table is, and where it is from: its fields are those of `FirmwareConstant`."""
 
     symbol: str
     value: int | tuple[tuple[int, int], ...]
     equation: str
     engineering: str
     rounding: str = EXACT
+    #: Keys of compensator.json that it was computed from, dotted; none for what codegen chooses itself.
     data: tuple[str, ...] = ()
     generator: str
 
@@ -48,14 +43,9 @@ class Constant:
         return c_comment(self.text)
 
     def entry(self, file: str, valve_keys: Mapping[str, Sequence[str]]) -> FirmwareConstant:
-        """Return the manifest's entry of the constant in one file.
+        """Return the manifest's entry of the constant in a file of the firmware.
 
-        Parameters
-        ----------
-        file : str
-            Where the C is, relative to the firmware's folder.
-        valve_keys : mapping
-            Keys of valve.json by the key of compensator.json that was designed from them.
+        `valve_keys` has the keys of valve.json by the key of compensator.json that was designed from them.
         """
         from_valve = [key for datum in self.data for key in valve_keys.get(datum, ())]
         return FirmwareConstant(

@@ -40,17 +40,7 @@ TABLE_COLUMNS = 2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CoreFile:
-    """One file of the core.
-
-    Attributes
-    ----------
-    template : str
-        Name of its template.
-    values : mapping
-        What the template prints.
-    constants : tuple of Constant
-        Those that are printed into it, for the manifest.
-    """
+    """One file of the core: its template, what this prints, and the constants among it, for the manifest."""
 
     template: str
     values: Values
@@ -60,12 +50,7 @@ class CoreFile:
 def core_files(compensator: Compensator, arithmetic: str) -> dict[str, CoreFile]:
     """Return every file of the core, by its name.
 
-    Parameters
-    ----------
-    compensator : Compensator
-        The law in rationals.
-    arithmetic : {"wide", "narrow"}
-        Products of 32 by 32 to 64 bits, or arithmetic of 32 bits only.
+    The arithmetic is "wide", with products of 32 by 32 to 64 bits, or "narrow", of 32 bits only.
     """
     sources = {CORE_SOURCES[sign]: _law_source(compensator, sign, arithmetic) for sign in compensator.signals.signs}
     return {

@@ -75,17 +75,7 @@ _SYNC = _START[:2]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Link:
-    """The serial line of a target.
-
-    Attributes
-    ----------
-    tick_Hz : int
-        PWM periods in a second: the unit of a frame's time.
-    frame_ticks : int
-        PWM periods from one frame to the next.
-    baud : int
-        Nominal bits in a second.
-    """
+    """The serial line of a target: PWM periods a second and from frame to frame, and nominal bits a second."""
 
     tick_Hz: int
     frame_ticks: int
@@ -176,22 +166,9 @@ def frame_context() -> dict[str, str]:
 
 
 def beta_factor(unit: int, largest: int) -> tuple[int, int]:
-    """Return (m, s) with ``v * m >> s`` equal to ``v * 2^15 // unit`` for every v up to `largest`.
+    """Return (m, s) with ``v * m >> s`` equal to ``v * 2^15 // unit`` for every v up to `largest`, below 2^31.
 
-    Parameters
-    ----------
-    unit
-        What stands for beta = 1 on the scale of the core's table.
-    largest
-        Largest value on that scale; below 2^31.
-
-    Raises
-    ------
-    InputError
-        If no 32-bit factor is exact.
-
-    Notes
-    -----
+    `unit` stands for beta = 1 on the scale of the core's table. If no 32-bit factor is exact it is an `InputError`.
     With n/d = 2^15 / unit in lowest terms, m = ceil(2^s n / d) and e = m d - 2^s n the quotient errs by v e / (d 2^s),
     which must stay below 1/d, the least distance of v n / d to the integer above it.
     """

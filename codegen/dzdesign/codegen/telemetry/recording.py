@@ -38,25 +38,15 @@ class Channel:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scalings:
-    """What the codes in the frames of one firmware stand for.
-
-    Attributes
-    ----------
-    link : Link
-        Of the firmware's target.
-    sha256 : str
-        Of its compensator.json.
-    command, pressure_a, pressure_b : Channel
-        In V and MPa.
-    volts_out : Fraction
-        u_O of one count of the compare value.
-    """
+    """What the codes in the frames of one firmware stand for, in V and MPa."""
 
     link: Link
+    #: Of compensator.json.
     sha256: str
     command: Channel
     pressure_a: Channel
     pressure_b: Channel
+    #: u_O of one count of the compare value.
     volts_out: Fraction
 
     @property
@@ -66,13 +56,7 @@ class Scalings:
 
 
 def scalings_of(folder: Path) -> Scalings:
-    """Return the scalings of a firmware folder.
-
-    Raises
-    ------
-    InputError
-        If it is no firmware of dzdesign, or its target sends no telemetry.
-    """
+    """Return the scalings of a firmware folder; one that is no firmware or sends no telemetry is an `InputError`."""
     path = folder / MANIFEST_NAME
     manifest = read_artefact(read_bytes(path, "firmware manifest"), FirmwareManifest, str(path))
     target = target_named(manifest.target)
@@ -99,16 +83,11 @@ def _pressure(sensor: PressureSignal) -> Channel:
 
 
 class Recording:
-    """Frames as they came, in 32 bytes each, and what was missed between them.
-
-    Attributes
-    ----------
-    lost, restarts : int
-        Frames that are missing between others; how often the count of PWM periods went back, as after a reset.
-    """
+    """Frames as they came, in 32 bytes each, and what was missed between them."""
 
     def __init__(self, scalings: Scalings) -> None:
         self.scalings = scalings
+        #: Frames that are missing between others; how often the count of PWM periods went back, as after a reset.
         self.lost = self.restarts = 0
         self._rows = bytearray()
         self._periods = array("q")  # since the first frame, and going on over a restart
@@ -162,13 +141,7 @@ class Recording:
             )
 
     def to_csv(self, reader: FrameReader) -> str:
-        """Return the ramp file: what was recorded and what was missed as comments, then the table.
-
-        Parameters
-        ----------
-        reader
-            That found the frames: it knows what was skipped.
-        """
+        """Return the ramp file: comments on what was recorded and what `reader` missed, then the table."""
         comments = (
             f"recorded by dzdesign {TOOL['version']} monitor, firmware of compensator SHA-256 {self.scalings.sha256}",
             f"{len(self)} frames, {self.lost} lost, {reader.bad_crc} with a wrong CRC, {self.restarts} restarts",

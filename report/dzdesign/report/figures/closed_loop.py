@@ -27,17 +27,7 @@ NEAR_ZERO = 15.0
 
 
 def loop_figure(curves: Curves, side: str, both: bool) -> ReportFigure:
-    """Draw flow over command without and with the compensator, whole and near zero.
-
-    Parameters
-    ----------
-    curves : Curves
-        Of closed_loop_<side>.csv.
-    side : str
-        ``positive`` or ``negative``.
-    both : bool
-        Whether the valve has two sides.
-    """
+    """Draw flow over command without and with the compensator, whole and near zero, from closed_loop_<side>.csv."""
     ends = [name.removeprefix("q_with_") for name in curves.columns if name.startswith("q_with_")]
     figure = new_figure(3.9, top=0.3, right=0.5)
     wide, near = figure.subplots(1, 2, width_ratios=(1.35, 1), gridspec_kw={"wspace": 0.36})
@@ -108,17 +98,7 @@ def _span(values: Sequence[float]) -> str:
 
 
 def dead_zone_figure(pressures: Sequence[PressureResult], side: str, both: bool) -> ReportFigure:
-    """Draw the dead zone on both branches over the pressure drop, before and after.
-
-    Parameters
-    ----------
-    pressures : sequence of PressureResult
-        Of one side.
-    side : str
-        ``positive`` or ``negative``.
-    both : bool
-        Whether the valve has two sides.
-    """
+    """Draw the dead zone of one side on both branches over the pressure drop, before and after."""
     figure, axes = titled_axes(3.0, side, both, legend_rows=1)
     dp = [each.dp_MPa for each in pressures]
     lines = {

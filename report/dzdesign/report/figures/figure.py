@@ -71,20 +71,10 @@ STYLE = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReportFigure:
-    """A figure as the page shows it.
+    """A figure as the page shows it: markup in which every text is escaped, and the numbers that were drawn.
 
-    Attributes
-    ----------
-    name : str
-        Of its anchor and of the CSV file.
-    caption : str
-        What it shows and how to read it.
-    description : str
-        The same for who can't see it: what is found there.
-    svg : str
-        Markup, safe to stand in a page: every text in it is escaped.
-    csv : str
-        The numbers that were drawn.
+    The caption says what it shows and how to read it, the description what is found there, for who can't see it. The
+    name is that of its anchor and of the CSV file.
     """
 
     name: str
@@ -110,11 +100,6 @@ class Curves:
 def data_uri(text: str) -> str:
     """Return CSV text as a data: address.
 
-    Parameters
-    ----------
-    text : str
-        Of a file.
-
     Examples
     --------
     >>> data_uri("a,b")
@@ -124,15 +109,7 @@ def data_uri(text: str) -> str:
 
 
 def csv_text(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """Return rows as CSV; None is an empty cell.
-
-    Parameters
-    ----------
-    header : sequence of str
-        Names of the columns, units in them.
-    rows : iterable of sequence
-        Cells.
-    """
+    """Return rows as CSV; None is an empty cell."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(header)
@@ -148,16 +125,10 @@ def figure_style() -> AbstractContextManager[None]:
 
 
 def new_figure(height: float, *, legend_rows: int = 0, right: float = 0.2, top: float = 0.12) -> "Figure":
-    """Return an empty figure; its margins are stated, because laying it out by itself takes as long as drawing it.
+    """Return an empty figure, `WIDTH` wide, sizes in inches.
 
-    Parameters
-    ----------
-    height : float
-        Inches; all are `WIDTH` wide.
-    legend_rows : int
-        Of a legend below the axes.
-    right, top : float
-        Margins, inches: for labels at the lines' ends, and for titles.
+    Its margins are stated, because laying it out by itself takes as long as drawing it: room for the rows of a legend
+    below the axes, at the right for labels at the lines' ends, at the top for titles.
     """
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
@@ -193,14 +164,7 @@ def legend_below(figure: "Figure", columns: int) -> None:
 
 
 def label_ends(axes: "Axes", labels: Sequence[tuple[float, float, str, str]]) -> None:
-    """Write each line's name at its end, where none covers another.
-
-    Parameters
-    ----------
-    axes : Axes
-    labels : sequence of (x, y, text, hue)
-        In the axes' units.
-    """
+    """Write names at lines' ends (x, y, text, hue; in the axes' units), where none covers another."""
     room = 0.055 * max((label[1] for label in labels), default=1.0)
     below = -room
     for x, y, text, hue in sorted(labels, key=lambda label: label[1]):

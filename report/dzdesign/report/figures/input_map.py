@@ -24,15 +24,7 @@ def map_figure(
 ) -> ReportFigure:
     """Draw what the core gives over command and pressure drop, and where it falls back or is wrong.
 
-    Parameters
-    ----------
-    curves : Curves
-        Of input_map_<side>.csv.
-    zero : Curves or None
-        Of zero_command_<side>.csv: where the valve is over-compensated.
-    compensator : Compensator
-    inputs : InputCheck
-        Of the side.
+    From input_map_<side>.csv and, for where the valve is over-compensated, zero_command_<side>.csv.
     """
     side, grid = inputs.side, _grid_of(curves, compensator, inputs.sign)
     low, high = map(float, laws_of(compensator)[side].certificate.dp_MPa)

@@ -9,16 +9,7 @@ from dzdesign.verify.exhaustive.exact_law import ExactLaw
 
 
 def law_figure(compensator: Compensator, name: str, both: bool) -> ReportFigure:
-    """Draw the compensator's output over the command at the ends of the tested interval, and the threshold's bound.
-
-    Parameters
-    ----------
-    compensator : Compensator
-    name : str
-        ``positive`` or ``negative``.
-    both : bool
-        Whether the valve has two sides.
-    """
+    """Draw the compensator's output over the command at the ends of the tested interval, and the threshold's bound."""
     exact = ExactLaw(compensator, SIGNS[name])
     u_max, certificate = float(compensator.u_max_V), laws_of(compensator)[name].certificate
     low, high = map(float, certificate.dp_MPa)

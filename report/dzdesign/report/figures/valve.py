@@ -25,20 +25,11 @@ BRANCHES = (("rising", "opening", "^", "-", "blue"), ("falling", "closing", "v",
 
 
 def lines_figure(side: SideModel, name: str, both: bool) -> ReportFigure:
-    """Draw the straight parts that were fitted, and the knees that they give, one hue a pressure drop.
-
-    Parameters
-    ----------
-    side : SideModel
-    name : str
-        ``positive`` or ``negative``.
-    both : bool
-        Whether the valve has two sides.
-    """
+    """Draw the straight parts that were fitted, and the knees that they give, one hue a pressure drop."""
     figure, axes = titled_axes(3.5, name, both, right=0.65)
     rows, labels = [], []
     for index, test in enumerate(side.tests):
-        colour = LIGHT[CYCLE[index % len(CYCLE)]]
+        hue = LIGHT[CYCLE[index % len(CYCLE)]]
         far = (0.0, 0.0)
         for branch, word, marker, dash, _ in BRANCHES:
             knee, share = getattr(test, f"u_knee_{branch}_V"), getattr(test, f"straight_{branch}")
@@ -47,11 +38,11 @@ def lines_figure(side: SideModel, name: str, both: bool) -> ReportFigure:
             flows = np.array(share) * test.q_max_L_min
             ends = knee + flows / test.slope_L_min_V
             far = max(far, (float(ends[1]), float(flows[1])))
-            axes.plot([knee, ends[0]], [0, flows[0]], ":", color=colour, lw=1.2)
-            axes.plot(ends, flows, dash, color=colour, lw=1.8)
-            axes.plot(knee, 0, marker, color=colour, ms=5, clip_on=False, zorder=4)
+            axes.plot([knee, ends[0]], [0, flows[0]], ":", color=hue, lw=1.2)
+            axes.plot(ends, flows, dash, color=hue, lw=1.8)
+            axes.plot(knee, 0, marker, color=hue, ms=5, clip_on=False, zorder=4)
             rows.append([test.dp_MPa, word, knee, *ends.round(4).tolist(), *flows.round(4).tolist()])
-        labels.append((*far, _dp_text(test), colour))
+        labels.append((*far, _dp_text(test), hue))
     label_ends(axes, labels)
     for _, word, marker, dash, _ in BRANCHES:
         axes.plot([], [], dash, marker=marker, color=LIGHT["soft"], label=word)
@@ -80,29 +71,18 @@ def _span(values: Sequence[float] | np.ndarray, unit: str, digits: int) -> str:
 
 
 def thresholds_figure(side: SideModel, guard: str, name: str, both: bool) -> ReportFigure:
-    """Draw knees and onsets with their errors, the certified staircase and the largest offset over the pressure drop.
-
-    Parameters
-    ----------
-    side : SideModel
-    guard : str
-        Threshold that is guarded.
-    name : str
-        ``positive`` or ``negative``.
-    both : bool
-        Whether the valve has two sides.
-    """
+    """Draw knees and onsets with their errors, the certified staircase and the largest offset over dP."""
     curve = side.guards[guard]
     dp = np.array([test.dp_MPa or 0.0 for test in side.tests])
     figure, axes = titled_axes(3.8, name, both, legend_rows=2)
-    for branch, word, marker, _, colour in BRANCHES:
-        for what, face, size in (("knee", LIGHT[colour], 5.5), ("onset", "none", 8.5)):
+    for branch, word, marker, _, hue in BRANCHES:
+        for what, face, size in (("knee", LIGHT[hue], 5.5), ("onset", "none", 8.5)):
             at = [getattr(test, f"u_{what}_{branch}_V") for test in side.tests]
             seen = [i for i, value in enumerate(at) if value is not None]
             if seen:
                 error = [2 * (getattr(side.tests[i], f"u_{what}_{branch}_se_V") or 0.0) for i in seen]
                 axes.errorbar(dp[seen], [at[i] for i in seen], yerr=error, fmt=marker, ms=size, mfc=face,
-                              mec=LIGHT[colour], ecolor=LIGHT[colour], capsize=3, lw=1, label=f"{what} {word} ± 2 s.e.",
+                              mec=LIGHT[hue], ecolor=LIGHT[hue], capsize=3, lw=1, label=f"{what} {word} ± 2 s.e.",
                               zorder=4)  # fmt: skip
     axes.plot(dp, curve.u_lower_V, "_", ms=13, mew=2, color=LIGHT["ink"], label="lower bound, at the test", zorder=5)
     if len(dp) > 1:
@@ -146,21 +126,7 @@ def beta_figure(
 ) -> ReportFigure | None:
     """Draw beta between what the bounds allow and, where there is a compensator, its table of integers.
 
-    Parameters
-    ----------
-    side : SideModel
-    guard : str
-        Threshold that is guarded.
-    name : str
-        ``positive`` or ``negative``.
-    both : bool
-        Whether the valve has two sides.
-    compensator : Compensator or None
-
-    Returns
-    -------
-    ReportFigure or None
-        None of a valve tested at one pressure drop.
+    None of a valve tested at one pressure drop.
     """
     curve = side.guards[guard]
     if len(curve.beta) < 2:
@@ -179,7 +145,7 @@ def beta_figure(
     rows = [["valve", at, value, round(value * u_min0, 7)] for at, value in pairs]
     if compensator:
         where, nodes, of_the_C = _beta_table(compensator, name)
-        table = nodes * of_the_C / u_min0  # with an edge the C counts from the opening threshold
+        table = nodes * of_the_C / u_min0  # with a transition the C counts from the opening threshold
         near = (where >= dp[0] - 0.1 * np.ptp(dp)) & (where <= dp[-1] + 0.1 * np.ptp(dp))
         axes.plot(where[near], table[near], ".-", color=LIGHT["ink"], ms=4, lw=1, label="the C's offset / u_min0")
         rows += [

@@ -8,14 +8,7 @@ from dzdesign.report.figures.figure import LIGHT, Curves, ReportFigure, legend_b
 def zero_figure(curves: Curves, side: str, guard: str) -> ReportFigure:
     """Draw the drive at zero command under the threshold's lower bound, at every code of the tested interval.
 
-    Parameters
-    ----------
-    curves : Curves
-        Of zero_command_<side>.csv.
-    side : str
-        ``positive`` or ``negative``.
-    guard : str
-        Threshold that is guarded.
+    From zero_command_<side>.csv.
     """
     dp, drive, bound = (curves.columns[name] for name in ("dp_MPa", "drive_V", "bound_V"))
     above = drive > bound

@@ -55,24 +55,7 @@ def lot_style() -> Iterator[None]:
 
 
 def spread_figure(name: str, spreads: Sequence[Spread], caption: str, *, one_scale: bool) -> ReportFigure | None:
-    """Draw how quantities scatter, a panel each.
-
-    Parameters
-    ----------
-    name : str
-        Of the figure.
-    spreads : sequence of Spread
-        Top to bottom.
-    caption : str
-        What it shows.
-    one_scale : bool
-        Whether the panels have one axis of values.
-
-    Returns
-    -------
-    ReportFigure or None
-        None if there is no panel.
-    """
+    """Draw how quantities scatter, a panel each, top to bottom, on one axis of values or on one each; None of none."""
     if not spreads:
         return None
     figure = new_figure(0.95 + sum(STRIP_HIGH if _is_strip(each) else BARS_HIGH for each in spreads), legend_rows=1)
@@ -209,17 +192,7 @@ def _name_valves(axes: "Axes", spread: Spread) -> None:
 
 
 def order_figure(name: str, spread: Spread, caption: str) -> ReportFigure:
-    """Draw a quantity over the order of the valves' names.
-
-    Parameters
-    ----------
-    name : str
-        Of the figure.
-    spread : Spread
-        The quantity.
-    caption : str
-        What it shows.
-    """
+    """Draw a quantity over the order of the valves' names."""
     from matplotlib.ticker import MaxNLocator
 
     figure = new_figure(2.9, legend_rows=1)

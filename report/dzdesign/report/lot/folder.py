@@ -31,25 +31,10 @@ NAMED = 10
 class Lot:
     """What a report of a lot is of.
 
-    Attributes
-    ----------
-    tool : Tool
-        That wrote batch.json.
-    summary : LotSummary or None
-        None of a lot whose batch did not come to its end.
-    rows : tuple of TableRow
-    table : str
-        valves.csv; empty where it was not used.
-    expected : int
-        How many valves the lot has.
-    hashes : tuple of (str, str)
-        Name and SHA-256 of the files that were read.
-    faults, missing : tuple of str
-        What does not fit and was not used; what is not there.
-    compared : bool
-        Whether the valves' folders are there and were compared with the table.
-    warning_texts : mapping
-        Code of a warning to its text in the first valve that has it.
+    `summary` is None of a lot whose batch did not come to its end, `table` the text of valves.csv, empty where it was
+    not used, `expected` how many valves the lot has, `hashes` the name and SHA-256 of each file that was read. `faults`
+    do not fit and were not used. `compared` says whether the valves' folders are there and were compared with the
+    table, `warning_texts` has for each code of a warning its text in the first valve that has it.
     """
 
     tool: Tool

@@ -14,15 +14,9 @@ GAP = "…"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReasonGroup:
-    """Valves with one kind of reason.
+    """Valves with one kind of reason: what is wrong, and what to do; a gap stands for what differs between the valves.
 
-    Attributes
-    ----------
-    status : {"failed", "does not hold"}
-    what, advice : str
-        What is wrong and what to do; a gap stands for what differs between the valves.
-    valves : tuple of (str, str)
-        Name, and what is particular to it: what stands in the gaps.
+    `valves` has the name of each, and what is particular to it: what stands in the gaps.
     """
 
     status: str

@@ -12,7 +12,7 @@ from dzdesign.report.lot.setting_text import untested_lines
 from dzdesign.report.lot.spread import FAR, TWENTY, Spread, spreads_of
 from dzdesign.report.lot.summary import DOES_NOT_HOLD
 from dzdesign.report.lot.table import column_of
-from dzdesign.report.page import render_page
+from dzdesign.report.page import Page, render
 from dzdesign.report.sections.cells import whole
 from dzdesign.report.summary import Figure, Headline
 from dzdesign.report.valve_report import Report
@@ -22,12 +22,7 @@ IN_VERDICT, ANOMALIES_IN_VERDICT = 8, 3
 
 
 def report_of_lot(folder: Path) -> Report:
-    """Make the report of the folder of a batch.
-
-    Parameters
-    ----------
-    folder : Path
-        Finished or stopped.
+    """Make the report of the folder of a lot, finished or stopped.
 
     Raises
     ------
@@ -38,19 +33,13 @@ def report_of_lot(folder: Path) -> Report:
 
 
 def make_lot_report(lot: Lot) -> Report:
-    """Make the report of a lot.
-
-    Parameters
-    ----------
-    lot : Lot
-        Of `read_lot`.
-    """
+    """Make the report of a lot."""
     verdict = lot_headline(lot)
     spreads = spreads_of(lot.rows)
     missing = list(lot.missing)
     if lot.summary and lot.calibrated and not lot.summary.verified:
         missing.append("the evidence of each valve: `dzdesign batch --verify` makes it")
-    html = render_page(
+    page = Page(
         title=f"Lot of {whole(lot.expected)} valve{'' if lot.expected == 1 else 's'}",
         verdict=verdict,
         figures=key_figures_of_lot(lot, spreads),
@@ -60,7 +49,7 @@ def make_lot_report(lot: Lot) -> Report:
     )
     refuted = verdict.kind == "bad" or bool(lot.failed)
     return Report(
-        html=html,
+        html=render(page),
         kind=verdict.kind,
         holds=False if refuted else True if verdict.kind == "good" else None,
         verdict=verdict.text,
@@ -70,12 +59,7 @@ def make_lot_report(lot: Lot) -> Report:
 
 
 def lot_headline(lot: Lot) -> Headline:
-    """Return the verdict: good only if every valve is calibrated and verified, and every file fits.
-
-    Parameters
-    ----------
-    lot : Lot
-    """
+    """Return the verdict: good only if every valve is calibrated and verified, and every file fits."""
     anomalies = lot.summary.anomalies if lot.summary else ()
     lines = [f"odd: {text}" for text in anomalies[:ANOMALIES_IN_VERDICT]]
     simulated = [row.name for row in lot.calibrated if "simulated" in row.warnings]
@@ -125,14 +109,7 @@ def _not_calibrated(lot: Lot) -> tuple[str, ...]:
 
 
 def key_figures_of_lot(lot: Lot, spreads: Sequence[Spread]) -> tuple[Figure, ...]:
-    """Return the numbers that matter.
-
-    Parameters
-    ----------
-    lot : Lot
-    spreads : sequence of Spread
-        Of `spreads_of`.
-    """
+    """Return the numbers that matter."""
     by_column = {spread.column: spread for spread in spreads}
     figures = [_counts(lot), _look(lot, spreads)]
     for column, label, note in (

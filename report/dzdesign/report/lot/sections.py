@@ -49,14 +49,7 @@ NOT_PROVED = (
 
 
 def sections_of(lot: Lot, spreads: Sequence[Spread]) -> dict[str, Section]:
-    """Return every section by its anchor.
-
-    Parameters
-    ----------
-    lot : Lot
-    spreads : sequence of Spread
-        Of `spreads_of`.
-    """
+    """Return every section by its anchor."""
     with lot_style():
         made = {
             "failed": _failed_section(lot),
@@ -97,22 +90,22 @@ def _spread_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
         return Section(missing="No valve is calibrated, so there is nothing to compare.")
     figures = []
     for side in lot.sides:
-        own = [spread for spread in spreads if spread.side == side]
+        of_side = [spread for spread in spreads if spread.side == side]
         of, words = (f"-{side}", f" {side.capitalize()} commands.") if side else ("", "")
         figures += [
             spread_figure(
-                f"thresholds{of}", _of(own, "knee_opening_V", "knee_closing_V"),
+                f"thresholds{of}", _of(of_side, "knee_opening_V", "knee_closing_V"),
                 "Thresholds of the calibrated valves at dP0: the knee, where the straight part of the flow meets zero, "
                 f"on opening and on closing, on one scale; their distance is the hysteresis.{words}", one_scale=True,
             ),
             spread_figure(
-                f"law{of}", _of(own, "offset_V", "k_x_max_over_u_max", "beta_at_highest_dp"),
+                f"law{of}", _of(of_side, "offset_V", "k_x_max_over_u_max", "beta_at_highest_dp"),
                 "What the laws of the valves differ in: the offset at dP0, which lies under the threshold's bound; the "
                 f"travel k x_max/u_max from the threshold to full flow; β at the highest tested pressure drop.{words}",
                 one_scale=False,
             ),
         ]  # fmt: skip
-        first = _of(own, "knee_opening_V", "knee_closing_V")[:1]
+        first = _of(of_side, "knee_opening_V", "knee_closing_V")[:1]
         figures += [
             order_figure(
                 f"order{of}", spread,
@@ -175,11 +168,11 @@ def _left_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
         return Section(missing="No valve is calibrated.")
     figures = []
     for side in lot.sides:
-        own = [spread for spread in spreads if spread.side == side]
+        of_side = [spread for spread in spreads if spread.side == side]
         of, words = (f"-{side}", f", {side} commands") if side else ("", "")
         figures.append(
             spread_figure(
-                f"left{of}", _of(own, "dead_zone_opening_percent", "dead_zone_closing_percent"),
+                f"left{of}", _of(of_side, "dead_zone_opening_percent", "dead_zone_closing_percent"),
                 f"Dead zone that each valve's own compensator leaves, in per cent of command{words}: at the pressure "
                 "drop of its tests where it is largest.", one_scale=True,
             )

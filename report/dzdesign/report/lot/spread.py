@@ -23,19 +23,10 @@ TWENTY = 20
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Quantity:
-    """A column of the table that scatters.
+    """A column of the table that scatters, without its side: in words, with unit (empty of a ratio) and decimals.
 
-    Attributes
-    ----------
-    column : str
-        Its name, but for the side.
-    label, unit : str
-        In words; the unit is empty of a ratio.
-    digits : int
-        Decimals.
-    judged : bool
-        Whether a valve can be far from the rest in it. The cost of the lot setting follows from the offsets, and
-        its least is no merit.
+    A valve can be far from the rest in it if it is judged. The cost of the lot setting is not: it follows from the
+    offsets, and its least is no merit.
     """
 
     column: str
@@ -74,20 +65,9 @@ QUANTITIES = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spread:
-    """A quantity over the lot.
+    """A quantity of one side over the lot: the valves that have it, in the order of the table, with their values.
 
-    Attributes
-    ----------
-    quantity : Quantity
-    side : str
-        "positive", "negative", or empty in a lot of one side.
-    names : tuple of str
-        Of the valves that have it, in the order of the table.
-    values : tuple of float
-        One each.
-    at : Quantiles
-    deviation : float
-        Robust standard deviation, in the quantity's unit; 0 where it says nothing.
+    `deviation` is the robust standard deviation, in the quantity's unit; 0 where it says nothing.
     """
 
     quantity: Quantity
@@ -163,17 +143,7 @@ def _between(known: Sequence[float], place: float) -> float:
 
 
 def spread_of(rows: Sequence[TableRow], column: str, side: str) -> Spread | None:
-    """Return how a column scatters; None where no valve has it.
-
-    Parameters
-    ----------
-    rows : sequence of TableRow
-        Of the calibrated valves.
-    column : str
-        A key of `QUANTITIES`.
-    side : str
-        Side of the column.
-    """
+    """Return how a column of `QUANTITIES` scatters on a side; None where none of these valves has it."""
     known = {row.name: value for row in rows if (value := row.number(side, column)) is not None}
     if not known:
         return None
@@ -191,13 +161,7 @@ def spread_of(rows: Sequence[TableRow], column: str, side: str) -> Spread | None
 
 
 def spreads_of(rows: Sequence[TableRow]) -> tuple[Spread, ...]:
-    """Return how every quantity scatters that some calibrated valve has, side by side.
-
-    Parameters
-    ----------
-    rows : sequence of TableRow
-        Of the whole lot.
-    """
+    """Return how every quantity scatters that some calibrated valve has, side by side."""
     calibrated = [row for row in rows if row.calibrated]
     found = (spread_of(calibrated, column, side) for side in rows[0].sides for column in QUANTITIES) if rows else ()
     return tuple(spread for spread in found if spread is not None)

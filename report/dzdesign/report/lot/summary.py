@@ -17,11 +17,11 @@ LARGEST = 1e6
 
 Number = Annotated[float, Meta(ge=-LARGEST, le=LARGEST)]
 Pressure = Annotated[float, Meta(ge=0, le=LARGEST)]
+Distance = Annotated[float, Meta(ge=0, le=LARGEST)]
+Pressures = tuple[Pressure, Pressure]
 Count = Annotated[int, Meta(ge=0, le=10**9)]
 Sha256 = Annotated[str, Meta(pattern="^[0-9a-f]{64}$", max_length=64)]
-MEGAPASCALS = {"unit": "MPa"}
-
-
+Names = tuple[str, ...]
 #: What came of a valve; "does not hold": a requirement of its verification.
 Status = Literal["ok", "failed", "does not hold"]
 OK: Final = "ok"
@@ -60,23 +60,18 @@ class UntestedPressures:
 
     name: Annotated[str, Meta(description="Name of the valve.")]
     side: Annotated[Literal["positive", "negative"], Meta(description="Sign of command.")]
-    dp_MPa: Annotated[
-        tuple[Pressure, ...], Meta(description="Pressure drops that it lacks.", extra_json_schema=MEGAPASCALS)
-    ]
+    dp_MPa: Annotated[tuple[Pressure, ...], quantity("MPa", "Pressure drops that it lacks.")]
     narrows: Annotated[bool, Meta(description="Whether that makes the interval of the lot setting narrower.")]
     coarser_V: Annotated[
-        float,
+        Distance,
         quantity(
             "V",
             "How far its bound there lies under the straight line between its bounds at the tests beside: about what a "
             "test would gain; 0 outside its tests or without a trend.",
-            ge=0,
-            le=LARGEST,
         ),
     ]
     cost_percent: Annotated[
-        float,
-        quantity("%", "The same in percent of command if it holds the lot setting down, else 0.", ge=0, le=LARGEST),
+        Distance, quantity("%", "The same in percent of command if it holds the lot setting down, else 0.")
     ]
 
 
@@ -86,15 +81,13 @@ class SmallestMargin:
 
     valves: Annotated[int, Meta(description="For how many valves.", ge=2, le=10**9)]
     worst: Annotated[str, Meta(description="Name of the valve with the smallest margin.")]
-    dp_MPa: Annotated[float, quantity("MPa", "Pressure drop where it has it.", ge=0, le=LARGEST)]
+    dp_MPa: Annotated[Pressure, quantity("MPa", "Pressure drop where it has it.")]
     smallest_margin_V: Annotated[
-        float,
+        Number,
         quantity(
             "V",
             "That margin of the exact law under its bound, with half a count of rounding kept; what `verify` states is "
             "of the whole numbers of the C, rounded as they are.",
-            ge=-LARGEST,
-            le=LARGEST,
         ),
     ]
 
@@ -103,7 +96,7 @@ class SmallestMargin:
 class SettingOfOthers:
     """The lot setting of the others, if the valves that hold it down kept settings of their own."""
 
-    left_out: Annotated[tuple[str, ...], Meta(description="Valves that keep settings of their own.")]
+    left_out: Annotated[Names, Meta(description="Valves that keep settings of their own.")]
     quantiles: Annotated[
         Mapping[str, Quantiles],
         Meta(description="Dead zone that it leaves beyond each valve's own, in percent of command; empty of none."),
@@ -117,31 +110,24 @@ class LotSettingSummary:
 
     file: Annotated[str, Meta(description="Its compensator.", pattern=r"^\w[\w.-]{0,99}$", max_length=100)]
     sha256: Annotated[Sha256, Meta(description="SHA-256 of that file.")]
-    dp_MPa: Annotated[
-        tuple[Pressure, Pressure],
-        Meta(description="Interval in which it is certified for each valve.", extra_json_schema=MEGAPASCALS),
-    ]
+    dp_MPa: Annotated[Pressures, quantity("MPa", "Interval in which it is certified for each valve.")]
     untested: Annotated[
         tuple[UntestedPressures, ...],
         Meta(description="Valves that were not tested at a pressure drop at which half of the lot was."),
     ]
     dp_without_MPa: Annotated[
-        tuple[Pressure, Pressure] | None,
-        Meta(
-            description="What `dp_MPa` would be without those that make it narrower; null without any, or where no "
-            "interval would be left.",
-            extra_json_schema=MEGAPASCALS,
-        ),
+        Pressures | None,
+        quantity("MPa", "What `dp_MPa` would be without those that make it narrower; null without any or of none."),
     ]
     carrier: Annotated[str, Meta(description="Valve that the compensator holds: the nearest to the least.")]
-    binding: Annotated[tuple[str, ...], Meta(description="Valves that hold its offset down.")]
+    binding: Annotated[Names, Meta(description="Valves that hold its offset down.")]
     smallest_margin_V: Annotated[
         Mapping[str, tuple[Number, ...]],
-        Meta(
-            description="Of these valves: smallest margin of the offset under the valve's own ceiling, on each side: "
-            "what its own offset may not exceed, straight between the tests and nowhere above the bounds, with half a "
-            "count of rounding kept.",
-            extra_json_schema={"unit": "V"},
+        quantity(
+            "V",
+            "Of these valves: smallest margin of the offset under the valve's own ceiling, on each side: what its own "
+            "offset may not exceed, straight between the tests and nowhere above the bounds, with half a count of "
+            "rounding kept.",
         ),
     ]
     checked: Annotated[SmallestMargin, Meta(description="The smallest margin under the bounds of all valves.")]
@@ -163,17 +149,14 @@ class LotSummary(Artefact):
         "dzdesign.batch/1"
     )
     valves: Annotated[int, Meta(description="How many there are.", ge=1, le=10**9)]
-    calibrated: Annotated[
-        Count, Meta(description="How many of them have a firmware, verified if that was asked for.")
-    ] = field(init=False)
+    calibrated: Annotated[Count, Meta(description="How many have a firmware, verified if asked for.")] = field(
+        init=False
+    )
     failed: Annotated[tuple[FailedValve, ...], Meta(description="The others.")]
     verified: Annotated[bool, Meta(description="Whether each firmware was verified too.")]
-    warnings: Annotated[
-        Mapping[str, tuple[str, ...]], Meta(description="Code of each warning to the valves that have it.")
-    ]
+    warnings: Annotated[Mapping[str, Names], Meta(description="Code of each warning to the valves that have it.")]
     anomalies: Annotated[
-        tuple[str, ...],
-        Meta(description="What is odd though each valve is in order: a recording that two share, folders of others."),
+        Names, Meta(description="What is odd though each valve is in order, such as a recording that two share.")
     ]
     files: Annotated[Mapping[str, Sha256], Meta(description="SHA-256 of the table, by the name of its file.")]
     quantiles: Annotated[
@@ -201,4 +184,4 @@ class UnfinishedLot(Artefact):
     schema: Annotated[
         Literal["dzdesign.batch-unfinished/1"], Meta(description="Name and version of this schema.")
     ] = "dzdesign.batch-unfinished/1"
-    names: Annotated[tuple[str, ...], Meta(description="The valves, in the order of the table.")]
+    names: Annotated[Names, Meta(description="The valves, in the order of the table.")]

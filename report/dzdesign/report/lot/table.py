@@ -57,21 +57,10 @@ SIDE_COLUMNS = tuple(each.name for each in fields(SideFigures))
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TableRow:
-    """One valve of the lot.
+    """One valve of the lot: what its folder's manifest says, and its figures by side ("" where the lot has one).
 
-    Attributes
-    ----------
-    name, reason : str
-    status : Status
-        As in its folder's manifest.
-    sides : mapping of str to SideFigures
-        By "positive" and "negative"; by "" where the lot has one side.
-    warnings : tuple of str
-        Codes.
-    hashes : mapping of str to str
-        SHA-256 by column: ``inputs_sha256`` and those of `HASHED`; what is not there has none.
-    record : mapping of str to str
-        Who and what, as the engineer says it.
+    `hashes` has SHA-256 by column, ``inputs_sha256`` and those of `HASHED`; `record` who and what, as the engineer
+    says.
     """
 
     name: str
@@ -148,17 +137,10 @@ def _is_text(column: str) -> bool:
 def read_table(content: bytes, source: str) -> list[TableRow]:
     """Read valves.csv; a number is finite and of a size that a valve can have.
 
-    Parameters
-    ----------
-    content : bytes
-        Of the file.
-    source : str
-        Its name, for the message.
-
     Raises
     ------
     InputError
-        If it is no such table.
+        If it is no such table; naming it by `source`.
     """
     try:
         reader = csv.reader(io.StringIO(content.decode("utf-8"), newline=""), strict=True)

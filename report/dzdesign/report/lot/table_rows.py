@@ -22,16 +22,10 @@ def table_rows(
     lot_law: "Compensator | None" = None,
     records: Mapping[str, Mapping[str, str]] | None = None,
 ) -> list[TableRow]:
-    """Return the rows, in the order of the names.
+    """Return the rows of valves as read back, in the order of the names.
 
-    Parameters
-    ----------
-    valves : sequence of ValveFolder
-        As read back.
-    lot_law : Compensator, optional
-        The lot setting, for the cost of it at each valve.
-    records : mapping, optional
-        Name to the record that the valve was given, for those without a valve.json that has it.
+    `lot_law` is the lot setting, for the cost of it at each valve; `records` what each valve was given as its record,
+    for those without a valve.json that has it.
     """
     both = any(each.compensator and each.compensator.negative for each in valves)
     sides = tuple(SIGNS) if both else ("",)
@@ -109,15 +103,6 @@ def extra_dead_zone(designed: "Compensator", lot_law: "Compensator", sign: int) 
     """Return how much more dead zone the lot setting leaves than a valve's own, in percent of command.
 
     At the pressure drop of its tests where that is most, on opening; on closing where no opening was recorded.
-
-    Parameters
-    ----------
-    designed : Compensator
-        The valve and its own compensator.
-    lot_law : Compensator
-        The lot setting.
-    sign : {1, -1}
-        Of the command.
     """
     side = _side(designed, sign)
     branch = "opening" if side.tests[0].u_knee_rising_V is not None else "closing"

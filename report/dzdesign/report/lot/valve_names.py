@@ -12,11 +12,6 @@ SHORT = 18
 def by_name(name: str) -> tuple[tuple[tuple[str, int, str], ...], str]:
     """Return what to sort a valve by: its name, the numbers in it as numbers.
 
-    Parameters
-    ----------
-    name : str
-        Of a valve.
-
     Examples
     --------
     >>> sorted(["V10", "V2", "V1b", "V1"], key=by_name)
@@ -30,11 +25,6 @@ def by_name(name: str) -> tuple[tuple[tuple[str, int, str], ...], str]:
 
 def short(name: str) -> str:
     """Return a valve's name for a narrow place.
-
-    Parameters
-    ----------
-    name : str
-        Somebody's text.
 
     Examples
     --------

@@ -13,16 +13,9 @@ Item = TypeVar("Item")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cell:
-    """One cell.
+    """One cell, `more` on a second line, smaller.
 
-    Attributes
-    ----------
-    text : str
-        What stands in it.
-    kind : {"text", "number", "code", "symbol", "hash", "good", "bad", "open"}
-        How it is set; the last three are verdicts; a symbol is code on one line, a hash on two.
-    more : str
-        A second line, smaller.
+    Its kind is text, number, code, symbol (code on one line), hash (on two), or the verdict good, bad or open.
     """
 
     text: str
@@ -32,22 +25,7 @@ class Cell:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Table:
-    """A table.
-
-    Attributes
-    ----------
-    caption : str
-        What it shows.
-    columns : tuple of str
-        Headings, units in them.
-    rows : tuple of tuple of Cell
-    csv : str
-        The same to be downloaded; empty if it is not offered.
-    name : str
-        Of the CSV file.
-    notes : tuple of str
-        Below it, what marks in its cells point to.
-    """
+    """A table; `csv` holds all its rows, to be downloaded under its name, `notes` what marks in its cells point to."""
 
     caption: str
     columns: tuple[str, ...]
@@ -65,17 +43,7 @@ def table_of(
     name: str = "",
     notes: Sequence[str] = (),
 ) -> Table:
-    """Return a table with a row an item; a column is its heading and what makes a cell of an item.
-
-    Parameters
-    ----------
-    caption : str
-    items : iterable
-    *columns : (str, callable)
-    csv, name : str
-        All rows, to be downloaded under that name.
-    notes : sequence of str
-    """
+    """Return a table with a row an item; a column is its heading and what makes a cell of an item."""
     return Table(
         caption=caption,
         columns=tuple(heading for heading, _ in columns),
@@ -91,14 +59,7 @@ def _cell(cell: Cell | str) -> Cell:
 
 
 def number(value: float | None, digits: int, sign: str = "") -> Cell:
-    """Return a number with so many decimals; a dash for None.
-
-    Parameters
-    ----------
-    value : float or None
-    digits : int
-    sign : str
-        ``+`` to show it always.
+    """Return a number with so many decimals, ``+`` before it to show its sign always; a dash for None.
 
     Examples
     --------
@@ -121,10 +82,6 @@ def in_number_font(text: str) -> Cell:
 def whole(value: int) -> str:
     """Return a whole number with a thin gap at each thousand.
 
-    Parameters
-    ----------
-    value : int
-
     Examples
     --------
     >>> whole(33550336)
@@ -135,11 +92,6 @@ def whole(value: int) -> str:
 
 def counted(count: int, noun: str) -> str:
     """Return a count with its noun, in the plural where it is not one.
-
-    Parameters
-    ----------
-    count : int
-    noun : str
 
     Examples
     --------

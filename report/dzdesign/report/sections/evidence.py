@@ -5,7 +5,7 @@ from dataclasses import asdict
 
 from dzdesign.core.errors import InputError
 from dzdesign.core.verdicts import NOT_CHECKED
-from dzdesign.report.artefact_chain import Chain
+from dzdesign.report.chain import Chain
 from dzdesign.report.compensator_sides import laws_of
 from dzdesign.report.figures.closed_loop import dead_zone_figure, loop_figure
 from dzdesign.report.figures.figure import Curves, ReportFigure

@@ -20,20 +20,9 @@ STATEMENTS = (*APPROACH, *AT_REFERENCE, *OFF_REFERENCE, *TIES, *TARGET)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LawAccount:
-    """Where a law comes from.
+    """Where a law comes from: the law and before it what it rests on directly, with their steps; the rest, in order.
 
-    Attributes
-    ----------
-    note : Words
-        What the law does and does not achieve.
-    main : tuple of Entry
-        The law, and before it what it rests on directly; with their steps.
-    rest : tuple of Entry
-        What these rest on, in the account's order.
-    glossary : tuple of Term
-        The symbols.
-    page : HtmlWriter
-        Writes words and formulas.
+    `note` says what the law does and does not achieve; `page` writes words and formulas.
     """
 
     note: Words
@@ -48,12 +37,7 @@ class LawAccount:
         return all(entry.as_expected for entry in (*self.main, *self.rest))
 
     def outcome(self, entry: Entry) -> str:
-        """Return the kind of a verdict's cell.
-
-        Parameters
-        ----------
-        entry : Entry
-        """
+        """Return the kind of a verdict's cell."""
         if not entry.as_expected or entry.outcome is Outcome.DOES_NOT_FOLLOW:
             return "bad"
         return {Outcome.FOLLOWS: "good", Outcome.FOLLOWS_IF: "open"}.get(entry.outcome, "text")
@@ -61,13 +45,7 @@ class LawAccount:
 
 @cache
 def account_of(law_name: str) -> LawAccount:
-    """Derive a law from the paper's premises.
-
-    Parameters
-    ----------
-    law_name : str
-        Of compensator.json.
-    """
+    """Derive a law from the paper's premises."""
     number = law(law_name).stated_as
     numbers = closure(STATEMENTS, [number])
     statements = [statement for statement in STATEMENTS if statement.number in numbers]

@@ -9,7 +9,7 @@ from itertools import pairwise
 from dzdesign.core.verdicts import NOT_CHECKED
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.lot_valves import LotSide
-from dzdesign.report.artefact_chain import Chain
+from dzdesign.report.chain import Chain
 from dzdesign.report.compensator_sides import SIGNS, laws_of
 from dzdesign.report.figures.figure import csv_text
 from dzdesign.report.page import Section
@@ -20,7 +20,6 @@ from dzdesign.verify.exhaustive.exact_law import ExactLaw
 
 #: Valves in the table of the page; all of them stand in the CSV.
 ROWS = 40
-SECTION = ("lot", "The lot")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -3,7 +3,7 @@
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.signal_descriptions import signals_in_words
 from dzdesign.identify.valve.model import ValveModel
-from dzdesign.report.artefact_chain import KINDS, Chain
+from dzdesign.report.chain import KINDS, Chain
 from dzdesign.report.page import Section
 from dzdesign.report.sections.cells import Cell, Table, table_of, whole
 

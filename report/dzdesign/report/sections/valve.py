@@ -13,14 +13,7 @@ LAG = {"declared": "declared", "identified": "from ramps of two rates", "unknown
 
 
 def valve_sections(valve: ValveModel | None, compensator: Compensator | None) -> dict[str, Section]:
-    """Return the sections "data", "thresholds" and "beta".
-
-    Parameters
-    ----------
-    valve : ValveModel or None
-    compensator : Compensator or None
-        Whose guard the thresholds are of, and whose table is drawn over beta.
-    """
+    """Return the sections "data", "thresholds" and "beta", of the guard of the compensator where there is one."""
     if valve is None:
         gap = Section(missing="The valve is not here: `dzdesign identify` makes valve.json.")
         return {"data": gap, "thresholds": gap, "beta": gap}
@@ -70,15 +63,7 @@ def _trend(name: str, side: SideModel) -> str:
 
 
 def thresholds_table(side: SideModel, guard: str, title: str) -> Table:
-    """Return the thresholds of each ramp test, with the lower bounds of the guarded one.
-
-    Parameters
-    ----------
-    side : SideModel
-    guard : str
-        Threshold that is guarded.
-    title : str
-    """
+    """Return the thresholds of each ramp test, with the lower bounds of the guarded one."""
     return table_of(
         title,
         zip(side.tests, side.guards[guard].u_lower_V, strict=True),

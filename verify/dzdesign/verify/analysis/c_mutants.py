@@ -26,19 +26,7 @@ ENDS_OPERAND = re.compile(r"[\w\])]$")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mutant:
-    """One change.
-
-    Attributes
-    ----------
-    file : str
-        Name of the file.
-    line : int
-        Its line, from 1.
-    change : str
-        In words: ``REVERSE 40u: 40 -> 41``.
-    text : str
-        The whole file with the change.
-    """
+    """One change: its file, its line from 1, the change in words, and the whole file with it."""
 
     file: str
     line: int
@@ -47,15 +35,7 @@ class Mutant:
 
 
 def mutants_of(file: str, text: str) -> Iterator[Mutant]:
-    """Yield every mutant of a file.
-
-    Parameters
-    ----------
-    file : str
-        Its name.
-    text : str
-        C, or a header.
-    """
+    """Yield every mutant of a file."""
     before = ""
     for token in TOKEN.finditer(text):
         if token["skip"] is not None:

@@ -68,11 +68,6 @@ class Proof:
 def proof_check(folder: Path) -> Check:
     """Return the requirement that no input makes the core's C overflow, index beyond a table or shift too far.
 
-    Parameters
-    ----------
-    folder : Path
-        Firmware folder.
-
     Returns
     -------
     Check

@@ -34,13 +34,7 @@ RANDOM_TRIPLES = 2**24
 
 
 class MutationBench:
-    """The checks that a mutant has to pass, prepared once.
-
-    Parameters
-    ----------
-    folder : Path
-        Firmware folder.
-    """
+    """The checks that a mutant has to pass, prepared once."""
 
     def __init__(self, folder: Path) -> None:
         self._compensator = read_compensator(folder)
@@ -74,13 +68,7 @@ class MutationBench:
                 raise RequirementError(f"the firmware itself fails ({verdict}), so its mutants can't be judged")
 
     def judge(self, mutant: Mutant) -> MutantOutcome:
-        """Compile a mutant and try everything on it.
-
-        Parameters
-        ----------
-        mutant : Mutant
-            Of one of `sources`.
-        """
+        """Compile a mutant and try everything on it."""
         text = mutant.text.encode(errors="surrogateescape")
         drive = self._drive.edited(mutant.file, text)
         cores = {
@@ -145,17 +133,7 @@ def all_mutants(bench: MutationBench) -> list[Mutant]:
 def judge_all(
     bench: MutationBench, mutants: Sequence[Mutant], bar: Callable[[Sequence[Any]], Iterable[Any]] = iter
 ) -> list[MutantOutcome]:
-    """Judge mutants on all processors.
-
-    Parameters
-    ----------
-    bench : MutationBench
-        The checks; the original passes them.
-    mutants : sequence of Mutant
-        Which.
-    bar : callable
-        Shows progress over a sequence, and hands its items on.
-    """
+    """Judge mutants on all processors; `bar` shows progress over a sequence, and hands its items on."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         futures = [pool.submit(bench.judge, mutant) for mutant in mutants]
         try:
@@ -166,13 +144,7 @@ def judge_all(
 
 
 def mutation_score(outcomes: Sequence[MutantOutcome]) -> MutationScore:
-    """Return the counts, and by name what was not killed and why.
-
-    Parameters
-    ----------
-    outcomes : sequence of MutantOutcome
-        Of `judge_all`.
-    """
+    """Return the counts, and by name what was not killed and why."""
     count = Counter(each.verdict for each in outcomes)
     return MutationScore(
         mutants=len(outcomes),
@@ -189,13 +161,7 @@ def mutation_score(outcomes: Sequence[MutantOutcome]) -> MutationScore:
 
 
 def mutation_check(score: MutationScore) -> Check:
-    """Return the requirement that no mutant survives that is not equivalent.
-
-    Parameters
-    ----------
-    score : MutationScore
-        Of `mutation_score`.
-    """
+    """Return the requirement that no mutant survives that is not equivalent."""
     return MUTATION.check(
         holds=score.survived == 0 and score.killed > 0,
         text=f"{score.killed} of {score.mutants} mutants killed, {score.same_object + score.same_outputs} equivalent "

@@ -20,15 +20,7 @@ closed_loop_name, input_map_name, zero_command_name = (
 
 
 def curve_files(loops: Sequence[LoopComparison], maps: Sequence[InputMap]) -> dict[str, str]:
-    """Return the CSV files: name to content.
-
-    Parameters
-    ----------
-    loops : sequence of LoopComparison
-        Ramps without and with the compensator.
-    maps : sequence of InputMap
-        Compare values, one a side.
-    """
+    """Return the CSV files: name to content."""
     files = {}
     for side in dict.fromkeys(loop.result.side for loop in loops):
         files[closed_loop_name(side)] = _ramps([loop for loop in loops if loop.result.side == side])
@@ -66,11 +58,6 @@ def _csv(header: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
 
 def read_curves(text: str) -> Mapping[str, np.ndarray]:
     """Read one of these files back: column to numbers.
-
-    Parameters
-    ----------
-    text : str
-        The file's content.
 
     Raises
     ------

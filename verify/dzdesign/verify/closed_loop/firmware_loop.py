@@ -28,19 +28,7 @@ SIGNS: dict[Side, int] = {"positive": 1, "negative": -1}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FirmwareLoop:
-    """What the closed loop showed; nothing of it where there was no core to close it with.
-
-    Attributes
-    ----------
-    checks : tuple of Check
-    plants : tuple of IdentifiedPlant
-        Of each pressure drop.
-    loops : tuple of LoopComparison
-        Ramps without and with the compensator.
-    scenarios : tuple of ScenarioResult
-    monte_carlo : MonteCarlo or None
-        The series of plants, where tolerances were given.
-    """
+    """What the closed loop showed; nothing of it where there was no core to close it with."""
 
     checks: tuple[Check, ...] = ()
     plants: tuple[IdentifiedPlant, ...] = ()
@@ -57,14 +45,7 @@ class FirmwareLoop:
 def scenes_of(folder: Path, compensator: Compensator, plant: Plant | None) -> tuple[Scene, ...]:
     """Return the compensated loop of each side at every tested pressure drop.
 
-    Parameters
-    ----------
-    folder : Path
-        Of the firmware.
-    compensator : Compensator
-        What it was made from.
-    plant : Plant or None
-        None: plants are made from the identified thresholds.
+    Without a plant there is one for each pressure drop, made from the identified thresholds.
     """
     valve = compensator.valve
     scenes: list[Scene] = []
@@ -94,23 +75,7 @@ def close_the_loop(
     say: Callable[[str], None],
     watch: Watch,
 ) -> FirmwareLoop:
-    """Run the ramps, the scenarios and, where tolerances are given, the series of plants.
-
-    Parameters
-    ----------
-    scenes : tuple of Scene
-        Of `scenes_of`.
-    compensator : Compensator
-        What the firmware was made from.
-    plant : Plant or None
-        The one that was given.
-    sequence : RampSequence
-        The command over time.
-    tolerances : Tolerances or None
-        About the plant that was given.
-    say, watch : callable
-        As `dzdesign.verify.verification.verify` takes them.
-    """
+    """Run the ramps, the scenarios and, where tolerances are given, the series of plants."""
     given = plant is not None
     say("running the closed loop")
     with ThreadPoolExecutor(WORKERS) as pool:

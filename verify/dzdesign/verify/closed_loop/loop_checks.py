@@ -42,14 +42,7 @@ def plant_is_the_valve(ramps: Sequence[PressureResult], valve: ValveModel) -> Ch
 def no_flow_at_zero(ramps: Sequence[PressureResult], compensator: Compensator, *, plant_given: bool) -> Check:
     """Tell whether the valve is shut at zero command, after closing.
 
-    Parameters
-    ----------
-    ramps : sequence of PressureResult
-        One a side and pressure drop.
-    compensator : Compensator
-        With the threshold that it guards, and its valve with the one that was identified to be guarded.
-    plant_given : bool
-        Whether the plant is the user's; one made from the thresholds closes where they say.
+    A plant that is made from the thresholds, and not given, closes where they say.
     """
     worst = max(ramps, key=lambda ramp: ramp.q_zero_L_min)
     guards = {sign: compensator.side(sign).certificate.guard for sign in compensator.signals.signs}
@@ -79,14 +72,7 @@ def no_flow_at_zero(ramps: Sequence[PressureResult], compensator: Compensator, *
 def shut_after_scenarios(scenarios: Sequence[ScenarioResult], zero_flow: Check, *, plant_given: bool) -> Check:
     """Tell whether the valve is shut at zero command after everything that a core can know of, and what it can't.
 
-    Parameters
-    ----------
-    scenarios : sequence of ScenarioResult
-        At every pressure drop.
-    zero_flow : Check
-        Of `no_flow_at_zero`: where that could not be checked, this can't be.
-    plant_given : bool
-        Whether the plant is the user's, with which all scenarios are run.
+    Where the flow at zero command could not be checked, this can't be; a plant that is given sees all scenarios.
     """
     required = [each for each in scenarios if each.must_shut]
     worst = max(required, key=lambda each: each.q_zero_L_min)

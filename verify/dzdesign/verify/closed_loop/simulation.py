@@ -1,15 +1,15 @@
 """`simulate`: ramp tests as a bench would record them, from the plant; always marked as simulated."""
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from msgspec import Meta
 
-from dzdesign.core.artefact_files import TOOL, sha256_of
-from dzdesign.core.artefact_types import quantity
+from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
+from dzdesign.core.artefact_types import THIS_TOOL, Artefact, SourceFile, quantity
 from dzdesign.core.errors import InputError
 from dzdesign.identify.reading.ramp_files import SIMULATED_MARK, ramp_file_bytes
 from dzdesign.verify.closed_loop.loop import RECORD_S, ClosedLoop, RampSequence
@@ -34,6 +34,19 @@ class Bench:
     def __post_init__(self) -> None:
         if not 1 <= self.rate_Hz <= 1 / RECORD_S:
             raise InputError(f"the rate is {self.rate_Hz:g} Hz, expected 1 to {1 / RECORD_S:g} Hz")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SimulationManifest(Artefact):
+    """A folder of simulated ramp tests; made from the compensator of the firmware that drove the valve, if any."""
+
+    FILE_NAME: ClassVar[str] = MANIFEST_NAME
+    schema: Annotated[Literal["dzdesign.simulation/1"], Meta(description="Name and version of this schema.")] = (
+        "dzdesign.simulation/1"
+    )
+    simulated: Annotated[Literal[True], Meta(description="No measurement.")] = True
+    plant: Annotated[Plant, Meta(description="The valve.")]
+    bench: Annotated[Bench, Meta(description="What recorded it.")]
 
 
 def simulate_ramp(
@@ -73,7 +86,7 @@ def simulated_files(
     bench: Bench,
     say: Callable[[str], None],
     firmware: Path | None = None,
-) -> tuple[dict[str, bytes], dict[str, Any]]:
+) -> tuple[dict[str, bytes], SimulationManifest]:
     """Simulate one ramp test per pressure drop, up and down; with a firmware folder, of the compensated valve.
 
     Returns
@@ -83,7 +96,7 @@ def simulated_files(
     """
     if not 1 <= ramp_s <= 1000:
         raise InputError(f"the ramp time is {ramp_s:g} s, expected 1 to 1000 s")
-    loop, origin = (ClosedLoop(plant), {}) if firmware is None else _loop_of(plant, firmware)
+    loop, made_from = (ClosedLoop(plant), ()) if firmware is None else _loop_of(plant, firmware)
     name, mode = ("ramp", "direct") if firmware is None else ("compensated", "compensated")
     sequence = RampSequence(ramp=ramp_s)
     contents = {}
@@ -100,20 +113,12 @@ def simulated_files(
         )
         columns = simulate_ramp(loop, plant, dp_MPa, bench, sequence, mode)
         contents[f"{name}_dP{dp_MPa:g}.csv.gz"] = ramp_file_bytes(columns, comments, compress=True)
-    manifest = {
-        "schema": "dzdesign.simulation/1",
-        "tool": TOOL,
-        "simulated": True,
-        "plant": asdict(plant),
-        "bench": asdict(bench),
-        **origin,
-    }
-    return contents, manifest
+    return contents, SimulationManifest(tool=THIS_TOOL, made_from=made_from, plant=plant, bench=bench)
 
 
-def _loop_of(plant: Plant, firmware: Path) -> tuple[ClosedLoop, dict[str, Any]]:
-    """Return the loop of a plant with a firmware's core, and what the manifest says of it."""
+def _loop_of(plant: Plant, firmware: Path) -> tuple[ClosedLoop, tuple[SourceFile, ...]]:
+    """Return the loop of a plant with a firmware's core, and the compensator's file."""
     check_firmware_inside(firmware)
     compensator = read_compensator(firmware)
     digest = sha256_of((firmware / "compensator.json").read_bytes())
-    return ClosedLoop(plant, firmware, compensator), {"compensator": {"source": "compensator.json", "sha256": digest}}
+    return ClosedLoop(plant, firmware, compensator), (SourceFile(source="compensator.json", sha256=digest),)

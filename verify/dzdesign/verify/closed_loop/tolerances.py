@@ -104,20 +104,7 @@ def _spread(path: Path, name: str, value: Any) -> tuple[float, str]:
 def scatter(
     loop: ClosedLoop, nominal: Plant, tolerances: Tolerances, dp_MPa: float, side: Side = "positive"
 ) -> Scatter:
-    """Run every plant through a ramp at one pressure drop.
-
-    Parameters
-    ----------
-    loop : ClosedLoop
-        With the compensator of the side.
-    nominal : Plant
-        What the tolerances are about.
-    tolerances : Tolerances
-    dp_MPa : float
-        Pressure drop at no flow.
-    side : {"positive", "negative"}
-        For the result.
-    """
+    """Run every plant through a ramp at one pressure drop."""
     plants = tolerances.draw(nominal)
     command = SEQUENCE.no_faster_than(loop.slowest_ramp_s).command()
 
@@ -153,14 +140,6 @@ def _spread_of(values: np.ndarray, drawn: Sequence[Mapping[str, float]], worst: 
 
 
 def monte_carlo(tolerances: Tolerances, found: Sequence[Scatter]) -> MonteCarlo:
-    """Return what the evidence has of a series of plants.
-
-    Parameters
-    ----------
-    tolerances : Tolerances
-        Of the series.
-    found : sequence of Scatter
-        One a side and pressure drop.
-    """
+    """Return what the evidence has of a series of plants."""
     spreads = {name: f"{100 * spread:g} % {shape}" for name, (spread, shape) in tolerances.spreads.items()}
     return MonteCarlo(plants=tolerances.plants, seed=tolerances.seed, spreads=spreads, pressures=tuple(found))

@@ -1,11 +1,12 @@
 """Every input of the compiled core against the exactly rounded law, and the properties that make it safe."""
 
+from dataclasses import fields
 from pathlib import Path
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.design.compensator import Compensator
 from dzdesign.verify import requirements
-from dzdesign.verify.evidence import Check, InputCheck
+from dzdesign.verify.evidence import Check, InputCheck, InputCounts
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.lot_check import check_lot
 from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
@@ -22,15 +23,6 @@ def check_all_inputs(folder: Path, sign: int = 1, compensator: Compensator | Non
     every input is tried once, and with it every pair of sound pressure codes of which there are no more than commands;
     at zero command, where it matters most, all pairs that the law follows are tried, and all that are not sound.
 
-    Parameters
-    ----------
-    folder : Path
-        Firmware folder: ``core/`` and ``compensator.json``.
-    sign : {1, -1}
-        Sign of the commands that the side is for.
-    compensator : Compensator, optional
-        The folder's, where it has been read.
-
     Raises
     ------
     RequirementError
@@ -44,15 +36,6 @@ def check_all_inputs(folder: Path, sign: int = 1, compensator: Compensator | Non
 def input_check(prepared: PreparedInputs, core: CompiledCore, found: Findings) -> InputCheck:
     """Return what was found, with the bound at zero command.
 
-    Parameters
-    ----------
-    prepared : PreparedInputs
-        What was tried.
-    core : CompiledCore
-        What it was tried on.
-    found : Findings
-        What the machine reported.
-
     Raises
     ------
     RequirementError
@@ -64,38 +47,20 @@ def input_check(prepared: PreparedInputs, core: CompiledCore, found: Findings) -
         raise RequirementError("no pair of valid pressure codes makes a tested pressure drop, so no bound is known")
     return InputCheck(
         sign=1 if exact.sign > 0 else -1,
-        inputs=found.inputs,
-        wrong=found.wrong,
-        largest_error=found.largest_error,
-        out_of_range=found.out_of_range,
-        not_monotone_in_u=found.falls,
-        not_monotone_in_dp=found.against,
         over_compensated=margin.exceeded,
-        odd_pairs=found.odd,
-        bad_fallbacks=found.bad_fallbacks,
-        bad_status=found.bad_status,
-        bad_betas=found.bad_betas,
         smallest_margin_V=float(margin.margin_V),
         core_sha256=core.sha256,
         object_sha256=found.object_sha256,
         outputs_hash=found.outputs_hash,
-        calls=found.calls,
         pressure_pairs=differences.pairs,
         first_wrong=first_wrong(prepared, found),
         lot=check_lot(exact, differences, found.at_zero),
+        **{field.name: getattr(found, field.name) for field in fields(InputCounts)},
     )
 
 
 def first_wrong(prepared: PreparedInputs, found: Findings) -> str | None:
-    """Return the first wrong value in words, or None.
-
-    Parameters
-    ----------
-    prepared : PreparedInputs
-        What was tried: everything.
-    found : Findings
-        What the machine reported.
-    """
+    """Return the first wrong value in words, or None."""
     if not found.wrong:
         return None
     return (
@@ -106,15 +71,7 @@ def first_wrong(prepared: PreparedInputs, found: Findings) -> str | None:
 
 
 def input_checks(inputs: InputCheck, *, both_signs: bool) -> list[Check]:
-    """Return one requirement for each property that was compared; where there are two sides each says which.
-
-    Parameters
-    ----------
-    inputs : InputCheck
-        Of one side.
-    both_signs : bool
-        Whether the firmware has two sides.
-    """
+    """Return one requirement for each property that was compared; where there are two sides each says which."""
     margin_mV = 1e3 * inputs.smallest_margin_V
     found = (
         (

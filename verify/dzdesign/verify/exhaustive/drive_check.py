@@ -23,15 +23,7 @@ FIELDS = ("compare_a", "compare_b", "status", "law", "side", "ticks", "ramped")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveCheck:
-    """What running the drive beside its model found.
-
-    Attributes
-    ----------
-    ticks, wrong : int
-        PWM periods, and those after which an output or the state is not the model's.
-    first_wrong : str or None
-        The first of them, in words.
-    """
+    """What running the drive beside its model found."""
 
     ticks: int
     wrong: int
@@ -39,17 +31,7 @@ class DriveCheck:
 
 
 def drive_samples(compensator: Compensator, seed: int, count: int) -> list[Codes]:
-    """Return random codes, corners, steps from end to end, and noise about zero, one after the other.
-
-    Parameters
-    ----------
-    compensator : Compensator
-        Its signals and its window.
-    seed : int
-        Of the random numbers.
-    count : int
-        Samples: codes of command, pressure A and pressure B.
-    """
+    """Return codes of random samples, corners, steps from end to end, and noise about zero, one after the other."""
     rng = np.random.default_rng(seed)
     signals = compensator.signals
     zero, window = signals.command.zero_code, max(compensator.drive_functions.window_codes, 4)
@@ -80,15 +62,6 @@ def ramp_places(compensator: Compensator, seed: int, count: int) -> list[int]:
     """Return where the ramp is put before each sample, in codes over `STEP_UNIT`; `STAYS` where it goes on by itself.
 
     A slow ramp would need minutes of samples from end to end. Its state is one number, so it is put anywhere.
-
-    Parameters
-    ----------
-    compensator : Compensator
-        With its ramps; without any there is nothing to put.
-    seed : int
-        Of the random numbers.
-    count : int
-        Samples.
     """
     rng = np.random.default_rng([seed, 1])
     functions, signals = compensator.drive_functions, compensator.signals
@@ -105,13 +78,7 @@ def ramp_places(compensator: Compensator, seed: int, count: int) -> list[int]:
 
 
 def window_samples(compensator: Compensator) -> list[tuple[Codes, int]]:
-    """Return samples, each with the ramp's place: from either end to the window's edges, where the side changes.
-
-    Parameters
-    ----------
-    compensator : Compensator
-        Its signals, its window, and its ramps.
-    """
+    """Return samples, each with the ramp's place: from either end to the window's edges, where the side changes."""
     functions, command = compensator.drive_functions, compensator.signals.command
     sensors = (compensator.signals.pressure_a, compensator.signals.pressure_b)
     p_a, p_b = (sum(sensor.valid_codes) // 2 for sensor in sensors)
@@ -128,15 +95,7 @@ def window_samples(compensator: Compensator) -> list[tuple[Codes, int]]:
 
 
 class PreparedDrive:
-    """Samples, and what the model says after every tick.
-
-    Parameters
-    ----------
-    compensator : Compensator
-        What the firmware was made from.
-    seed, count : int
-        Of `drive_samples`.
-    """
+    """Samples, and what the model says after every tick."""
 
     def __init__(self, compensator: Compensator, seed: int = SEED, count: int = SAMPLES) -> None:
         signals = compensator.signals
@@ -161,13 +120,7 @@ class PreparedDrive:
 
 
 class CompiledDrive:
-    """The drive and the law's sides, compiled as they stand in the firmware.
-
-    Parameters
-    ----------
-    folder : Path
-        Firmware folder with ``core/dz_drive.c``.
-    """
+    """The drive and the law's sides, compiled as they stand in the firmware."""
 
     def __init__(self, folder: Path) -> None:
         self.sources = {path.name: path.read_bytes() for path in sorted((folder / "core").glob("*.[ch]"))}
@@ -189,11 +142,6 @@ class CompiledDrive:
 
     def check(self, prepared: PreparedDrive) -> DriveCheck:
         """Run the drive beside its model.
-
-        Parameters
-        ----------
-        prepared : PreparedDrive
-            Samples and the model's answers.
 
         Raises
         ------
@@ -217,15 +165,7 @@ class CompiledDrive:
 
 
 def drive_follows(folder: Path, compensator: Compensator) -> Check:
-    """Tell whether the drive around the law does what its model in rational numbers does.
-
-    Parameters
-    ----------
-    folder : Path
-        Firmware folder.
-    compensator : Compensator
-        What it was made from.
-    """
+    """Tell whether the drive around the law does what its model in rational numbers does."""
     prepared = PreparedDrive(compensator)
     try:
         found = CompiledDrive(folder).check(prepared)

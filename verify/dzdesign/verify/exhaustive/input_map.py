@@ -61,15 +61,6 @@ class InputMap:
 def map_inputs(folder: Path, compensator: Compensator, sign: int = 1) -> InputMap:
     """Call one side of the compiled core over the grid.
 
-    Parameters
-    ----------
-    folder : Path
-        Firmware folder.
-    compensator : Compensator
-        What it was made from.
-    sign : {1, -1}
-        Sign of the commands.
-
     Raises
     ------
     RequirementError

@@ -21,15 +21,6 @@ from dzdesign.verify.requirements import LOT
 def check_lot(exact: ExactLaw, found: Differences, at_zero: np.ndarray) -> LotCheck | None:
     """Compare the drive at zero command with the bounds of every valve of the lot; None of a valve's own setting.
 
-    Parameters
-    ----------
-    exact : ExactLaw
-        The side's law, of a compensator with its lot.
-    found : Differences
-        All differences.
-    at_zero : (D,) array
-        Compare values that the core gives at zero command.
-
     Raises
     ------
     InputError
@@ -65,15 +56,7 @@ def check_lot(exact: ExactLaw, found: Differences, at_zero: np.ndarray) -> LotCh
 
 
 def lot_checked(inputs: Sequence[InputCheck], compensator: Compensator) -> list[Check]:
-    """Tell whether the core of a lot setting over-compensates any valve of its lot; nothing of a valve's own.
-
-    Parameters
-    ----------
-    inputs : sequence of InputCheck
-        One a sign of command.
-    compensator : Compensator
-        With its lot.
-    """
+    """Tell whether the core of a lot setting over-compensates any valve of its lot; nothing of a valve's own."""
     count = len(compensator.lot)
     found = [each.lot for each in inputs if each.lot is not None]
     if not found:

@@ -91,13 +91,7 @@ class Straight:
 
 
 class PreparedInputs:
-    """What programs/every_input.c steps through for one side.
-
-    Parameters
-    ----------
-    exact : ExactLaw
-        The side's law.
-    """
+    """What programs/every_input.c steps through for one side."""
 
     def __init__(self, exact: ExactLaw) -> None:
         self.exact = exact

@@ -24,20 +24,7 @@ LARGEST = 2**62
 
 
 class Staircase:
-    """What is known of a threshold's lower bound between its ramp tests, by its monotony.
-
-    Parameters
-    ----------
-    bounds : LotSide
-        Pressure drops of the tests, the bound at each, and how the threshold runs with the pressure drop.
-
-    Attributes
-    ----------
-    dp_MPa, bounds_V : list of Fraction
-        Pressure drops of the tests, rising, and what is known of the bound at each.
-    falling : bool
-        Whether the threshold falls with the pressure drop.
-    """
+    """What is known of a threshold's lower bound, `bounds_V`, at each tested pressure drop, rising, by its monotony."""
 
     def __init__(self, bounds: LotSide) -> None:
         pairs = zip(bounds.dp_MPa, bounds.u_lower_V, strict=True)
@@ -99,17 +86,7 @@ class PressureDrops:
 
 
 def pressure_drops(exact: ExactLaw, found: Differences, tested_MPa: Iterable[Fraction]) -> PressureDrops:
-    """Return the pressure drops of all differences.
-
-    Parameters
-    ----------
-    exact : ExactLaw
-        Its sensors and what their codes stand for.
-    found : Differences
-        All differences.
-    tested_MPa : iterable of Fraction
-        Pressure drops that they are to be compared with: whole numbers over the scale, too.
-    """
+    """Return the pressure drops of all differences, over a scale by which the tested ones are whole numbers, too."""
     tested = set(tested_MPa)
     a_MPa, b_MPa, (a_least, a_most), (b_least, b_most) = (
         exact.a.per_code_MPa, exact.b.per_code_MPa, exact.a.error_MPa, exact.b.error_MPa,
@@ -147,20 +124,13 @@ def _extreme(values: np.ndarray, first: np.ndarray, last: np.ndarray, extreme: n
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ZeroCommandMargin:
-    """What the drive at zero command leaves to one staircase of bounds.
+    """What the drive at zero command leaves to one staircase of bounds: where it is least, and how often too little."""
 
-    Attributes
-    ----------
-    margin_V : Fraction
-        The least distance to the bound; negative if it is exceeded.
-    dp_MPa : float
-        Pressure drop where it is least: the middle of those that the difference of codes stands for.
-    exceeded : int
-        Differences of pressure codes at which the drive lies above the bound.
-    """
-
+    #: Negative if the bound is exceeded.
     margin_V: Fraction
+    #: The middle of the pressure drops that the difference of codes stands for.
     dp_MPa: float
+    #: Differences of pressure codes at which the drive lies above the bound.
     exceeded: int
 
 
@@ -169,16 +139,7 @@ def zero_command_margins(
 ) -> list[ZeroCommandMargin | None]:
     """Return what the drive at zero command leaves to each valve's bounds; None where no code reaches its tests.
 
-    Parameters
-    ----------
-    exact : ExactLaw
-        The side's law.
-    found : Differences
-        All differences.
-    at_zero : (D,) array
-        Compare values that the core gives at zero command.
-    bounds : sequence of LotSide
-        One entry a valve.
+    `at_zero` are the compare values that the core gives at zero command, one a difference of pressure codes.
     """
     stairs = [Staircase(each) for each in bounds]
     drops = pressure_drops(exact, found, {dp for each in stairs for dp in each.dp_MPa})

@@ -29,15 +29,7 @@ ELSEWHERE = re.compile(r"error: (\S+): No such file or directory")
 
 
 def compiles_strictly(folder: Path, manifest: FirmwareManifest) -> Check:
-    """Tell whether every compiler on this machine takes the core with every warning an error.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the firmware.
-    manifest : FirmwareManifest
-        Of `read_firmware_manifest`.
-    """
+    """Tell whether every compiler on this machine takes the core with every warning an error."""
     compilers = find_compilers()
     try:
         for compiler in compilers:
@@ -51,27 +43,12 @@ def compiles_strictly(folder: Path, manifest: FirmwareManifest) -> Check:
 
 
 def changed_board_files(folder: Path, manifest: FirmwareManifest) -> list[str]:
-    """Return the files of the target that the user fills in and that are no longer as generated.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the firmware.
-    manifest : FirmwareManifest
-        Of `read_firmware_manifest`.
-    """
+    """Return the files of the target that the user fills in and that are no longer as generated."""
     return sorted(name for name in changed_files(folder, manifest) if name in manifest.board)
 
 
 def check_include(include: Sequence[Path], manifest: FirmwareManifest) -> None:
     """Refuse folders of headers that are none, or of a target whose board files are not compiled here.
-
-    Parameters
-    ----------
-    include : sequence of Path
-        As given.
-    manifest : FirmwareManifest
-        Of `read_firmware_manifest`.
 
     Raises
     ------
@@ -97,17 +74,7 @@ class BoardCompiled:
 
 
 def board_compiles(folder: Path, manifest: FirmwareManifest, include: Sequence[Path] = ()) -> BoardCompiled:
-    """Compile the target's C together with the board files that were changed, and the user's own; nothing is linked.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the firmware.
-    manifest : FirmwareManifest
-        Of `read_firmware_manifest`.
-    include : sequence of Path
-        Where headers of the user's chip lie.
-    """
+    """Compile the target's C together with the board files that were changed, and the user's own; nothing is linked."""
     compiler, *options = COMPILERS.get(manifest.target, ("",))
     changed = changed_board_files(folder, manifest)
     if not changed or not compiler:

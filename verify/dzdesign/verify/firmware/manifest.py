@@ -22,17 +22,7 @@ Value = int | tuple[tuple[int, ...], ...] | str
 
 
 def manifest_follows(folder: Path, manifest: FirmwareManifest, compensator: Compensator) -> Check:
-    """Tell whether the manifest says what is in the folder; its words on a constant are not read.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the firmware.
-    manifest : FirmwareManifest
-        Of `read_firmware_manifest`.
-    compensator : Compensator
-        The folder's compensator.json.
-    """
+    """Tell whether the manifest says what is in the folder; its words on a constant are not read."""
     faults = [*_faults_of_origin(folder, manifest, compensator), *_faults_of_constants(folder, manifest)]
     if faults:
         more = f", and {len(faults) - 1} more" if len(faults) > 1 else ""
@@ -85,11 +75,6 @@ def _text(path: Path) -> str:
 
 def constants_in(text: str) -> Iterator[tuple[str, Value]]:
     """Yield name and value of the constants in C: of a table its rows, of what is no number its text.
-
-    Parameters
-    ----------
-    text : str
-        Of a file of the core.
 
     Examples
     --------

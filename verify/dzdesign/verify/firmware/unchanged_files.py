@@ -24,15 +24,7 @@ BUILD_FILES = {"makefile", "gnumakefile", "cmakelists.txt", "meson.build", ".pro
 
 
 def files_unchanged(folder: Path, manifest: FirmwareManifest) -> Check:
-    """Tell which generated files differ from the manifest: what is checked must be what was generated.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the firmware.
-    manifest : FirmwareManifest
-        Of `read_firmware_manifest`.
-    """
+    """Tell which generated files differ from the manifest: what is checked must be what was generated."""
     differing = changed_files(folder, manifest)
     filled_in = [name for name in differing if name in manifest.board]
     added, user = added_files(folder, manifest), user_files(folder, manifest)
@@ -72,15 +64,7 @@ def _fault(manifest: FirmwareManifest, changed: list[str], added: list[str], use
 
 
 def changed_files(folder: Path, manifest: FirmwareManifest) -> list[str]:
-    """Return the generated files that are missing or no longer as the manifest has them.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the firmware.
-    manifest : FirmwareManifest
-        Of `read_firmware_manifest`.
-    """
+    """Return the generated files that are missing or no longer as the manifest has them."""
     return [
         name
         for name, digest in manifest.files.items()
@@ -97,15 +81,7 @@ def added_files(folder: Path, manifest: FirmwareManifest) -> list[str]:
 
 
 def user_files(folder: Path, manifest: FirmwareManifest) -> list[str]:
-    """Return the files of the user's own: those in the folder kept for them, in which nothing is generated.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the firmware.
-    manifest : FirmwareManifest
-        Of `read_firmware_manifest`.
-    """
+    """Return the files of the user's own: those in the folder kept for them, in which nothing is generated."""
     found = [path for path in sorted((folder / USER_FOLDER).rglob("*")) if _is_source(path)]
     names = [path.relative_to(folder).as_posix() for path in found]
     return [name for name in names if name not in manifest.files]

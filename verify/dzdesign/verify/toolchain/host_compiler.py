@@ -72,11 +72,6 @@ def find_zig() -> str | None:
 def words_of(compiler: str) -> tuple[str, ...]:
     """Return how a command with a compiler begins.
 
-    Parameters
-    ----------
-    compiler : str
-        One of `find_compilers`.
-
     Examples
     --------
     >>> words_of("/opt/zig/zig")
@@ -135,13 +130,6 @@ def host_compiler() -> str:
 def run_compiler(command: Sequence[str], folder: Path | None = None) -> subprocess.CompletedProcess[str]:
     """Run a compiler, and log the command.
 
-    Parameters
-    ----------
-    command : sequence of str
-        As `words_of` begins it.
-    folder : Path, optional
-        To run in.
-
     Raises
     ------
     OSError, subprocess.TimeoutExpired
@@ -165,15 +153,6 @@ def first_error(messages: str) -> str:
 
 def build(command: Sequence[str], what: str, folder: Path | None = None) -> None:
     """Compile or link.
-
-    Parameters
-    ----------
-    command : sequence of str
-        As `words_of` begins it.
-    what : str
-        For messages.
-    folder : Path, optional
-        To run in.
 
     Raises
     ------
@@ -202,21 +181,7 @@ def check_strictly(source: Path, compiler: str, options: Sequence[str] = ()) -> 
 
 
 def load_library(sources: Mapping[str, str], what: str, options: Sequence[str] = ()) -> ctypes.CDLL:
-    """Compile C files together and load them.
-
-    Parameters
-    ----------
-    sources : mapping
-        File name to text; headers may be among them.
-    what : str
-        For messages.
-    options : sequence of str
-        Further options of the compiler.
-
-    Returns
-    -------
-    ctypes.CDLL
-    """
+    """Compile C files, with the headers among them, together and load them."""
     compiler = host_compiler()
     key = sha256_of(
         "\0".join([compiler, *options, *(f"{name}\0{text}" for name, text in sorted(sources.items()))]).encode(

@@ -120,25 +120,7 @@ def programs_folder() -> Path:
 def compile_object(
     machine: Machine, name: str, sources: Mapping[str, bytes], flags: tuple[str, ...], what: str
 ) -> Path:
-    """Compile one file of `sources` for a machine, once.
-
-    Parameters
-    ----------
-    machine : Machine
-        For which.
-    name : str
-        The file to compile.
-    sources : mapping
-        It and what it includes.
-    flags : tuple of str
-        For the compiler.
-    what : str
-        For messages.
-
-    Returns
-    -------
-    Path
-        The object, in a folder named by all that it is made from.
+    """Return the object of one file of `sources` for a machine, compiled once, in a folder named by all of it.
 
     Raises
     ------

@@ -1,0 +1,61 @@
+"""What evidence says of itself, and that every requirement is declared once."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from dzdesign.core.artefact_files import to_json
+from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.artefact_types import to_json_bytes
+from dzdesign.core.errors import InputError
+from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED
+from dzdesign.verify import requirements
+from dzdesign.verify.evidence import Evidence
+from dzdesign.verify.requirements import ALWAYS, OPTIONAL, Requirement, not_tried, untried_requirements
+from tests.support.evidence import EVIDENCE, read_evidence
+from tests.support.synthetic import needs_compiler
+
+DECLARED = [each for each in vars(requirements).values() if isinstance(each, Requirement)]
+
+
+def test_every_requirement_has_its_id_its_title_and_a_way_to_have_it_checked():
+    assert len(DECLARED) > 20 and set(DECLARED) >= {*ALWAYS, *OPTIONAL}
+    for values in ({each.id for each in DECLARED}, {each.title for each in DECLARED}):
+        assert len(values) == len(DECLARED)
+    assert all("`verify" in each.how for each in DECLARED)
+
+
+@needs_compiler
+def test_every_check_of_a_firmware_is_of_a_declared_requirement(reported_demo):
+    found = read_evidence(reported_demo / "evidence")
+    declared = {each.id: each.title for each in DECLARED}
+    assert all(check.name == declared[check.id] for check in found.checks)  # of one sign of command
+    assert {each.id for each in ALWAYS} - {check.id for check in found.checks} == {"regenerated"}  # the front door's
+
+
+def test_what_holds_follows_from_the_checks():
+    passed, failed, unknown = (
+        replace(EVIDENCE.checks[0], name=name, holds=holds) for name, holds in (("a", True), ("b", False), ("c", None))
+    )
+    assert EVIDENCE.holds and EVIDENCE.verdict == "Every requirement holds."
+    assert EVIDENCE.with_checks(unknown).verdict == f"{NOT_CHECKED}: c"
+    both = EVIDENCE.with_checks(unknown, failed, passed)
+    assert not both.holds and both.verdict == f"{DOES_NOT_HOLD}: b; {NOT_CHECKED}: c"
+
+
+def test_evidence_is_read_as_it_was_written_and_not_where_it_contradicts_itself():
+    failed = EVIDENCE.with_checks(replace(EVIDENCE.checks[0], holds=False))
+    assert read_artefact(to_json_bytes(failed), Evidence, "verification.json") == failed
+    document = json.loads(to_json_bytes(failed))
+    with pytest.raises(InputError, match="'holds' is True, but False follows"):
+        read_artefact(to_json({**document, "holds": True}).encode(), Evidence, "verification.json")
+
+
+def test_a_requirement_is_not_tried_until_a_check_of_it_is_there():
+    for requirement in (*ALWAYS, *OPTIONAL):
+        bare = replace(EVIDENCE, checks=(EVIDENCE.checks[0],))
+        assert (requirement in untried_requirements(bare)) == (requirement.id != EVIDENCE.checks[0].id)
+        tried = bare.with_checks(requirement.check(holds=None, text="not run"))
+        assert requirement not in untried_requirements(tried)
+        assert f"{requirement.title}: {requirement.how}" not in not_tried(tried)
