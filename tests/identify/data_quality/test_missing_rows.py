@@ -33,7 +33,7 @@ def test_lost_rows_are_no_floor_of_the_meter(floor):
     whole = [record(Valve(floor=floor), dp) for dp in PRESSURES]
     holed = [without(test, 5.2, 5.9, rising=True) for test in whole]
     before, after = identify(whole), identify(holed)
-    assert after.meter_floor_L_min == pytest.approx(before.meter_floor_L_min, abs=0.05)
+    assert after.meter.floor_L_min == pytest.approx(before.meter.floor_L_min, abs=0.05)
     assert bounds(after) == pytest.approx(bounds(before), abs=2e-3)
     assert [warning.source for warning in warned(after, "gap")] == [test.source for test in holed]
     assert not warned(before, "gap")

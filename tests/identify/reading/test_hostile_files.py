@@ -249,8 +249,7 @@ JSON = st.recursive(
 
 @pytest.fixture(scope="module")
 def documents(example_valve, example_compensator):
-
-    return {"valve": as_document(example_valve), "compensator": example_compensator}
+    return {"valve": as_document(example_valve), "compensator": as_document(example_compensator)}
 
 
 def places(value, way=()):
