@@ -9,7 +9,8 @@ import pytest
 from dzdesign.core.artefact_types import THIS_TOOL
 from dzdesign.report.lot.summary import FailedValve, LotSummary
 from dzdesign.terminal.notebook import html_of
-from dzdesign.terminal.tables import print_compensator, print_scenarios, print_valve
+from dzdesign.terminal.tables import print_compensator, print_valve
+from dzdesign.terminal.verification_tables import print_scenarios
 from tests.support.paths import ROOT
 
 GLOSSARY = (ROOT / "docs/concepts/glossary.md").read_text("utf-8")

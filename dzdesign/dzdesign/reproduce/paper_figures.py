@@ -33,20 +33,7 @@ LAWS = {PAPER: "the paper's law", PRODUCT: "the product's C"}
 
 
 def figure_files(runs: Sequence[ValveRuns], suffix: str = "svg") -> dict[str, bytes]:
-    """Draw every figure; the same runs give the same bytes.
-
-    Parameters
-    ----------
-    runs : sequence of ValveRuns
-        Simulated, first and second valve, with the product's runs.
-    suffix : {"svg", "png"}
-        Format.
-
-    Returns
-    -------
-    dict
-        File name, such as ``figure_07.svg``, to content.
-    """
+    """Draw every figure, file name to content, of the simulated, first and second valve; same runs, same bytes."""
     with plot_style():
         return {f"figure_{number:02}.{suffix}": saved(figure, suffix) for number, figure in _figures(runs)}
 

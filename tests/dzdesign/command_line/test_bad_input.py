@@ -361,29 +361,28 @@ VALVES = [
     (("made_from",), {}, "'made_from' is {}, expected a list"),
 ]
 POSITIVE = ("sides", "positive")
-POSITIVE = ("sides", "positive")
 COMPENSATORS = [
     (("signals",), None, "lacks the key 'signals'"),
     (("valve",), None, "lacks the key 'valve'"),
-    (("valve", "u_max_V"), None, "lacks the key 'u_max_V'"),
-    (("made_from",), [], "'made_from' is empty"),
+    (("valve", "u_max_V"), None, "lacks the key 'valve.u_max_V'"),
+    (("made_from",), [], "'made_from' has 0 files"),
     (("law",), "papr", "unknown law 'papr' (did you mean 'paper'?)"),
-    (("u_max_V",), [10, 0], "'u_max_V' is [10, 0], expected a positive denominator"),
-    (("u_max_V",), [10], "'u_max_V' has 1 items, expected 2"),
+    (("u_max_V",), [10, 0], "'u_max_V' is [10, 0], expected a list [numerator, denominator]"),
+    (("u_max_V",), [10], "'u_max_V' is [10], expected a list [numerator, denominator]"),
     (("u_max_V",), 10.0, "'u_max_V' is 10.0, expected a list"),
-    (("u_max_V",), [-10, 1], "is not that of its valve"),
-    ((*POSITIVE, "drive_range_over_u_max", 0), 10**70, "'sides.positive.k_x_max_over_u_max[0]' is 1000"),
+    (("u_max_V",), [-10, 1], "not that of its valve"),
+    ((*POSITIVE, "drive_range_over_u_max", 0), 10**70, "'sides.positive.drive_range_over_u_max' is [1000"),
     ((*POSITIVE, "drive_range_over_u_max", 0), -1, "k x_max/u_max must be positive"),
-    ((*POSITIVE, "drive_range_over_u_max", 1), -(2**16), "expected a positive denominator"),
+    ((*POSITIVE, "drive_range_over_u_max", 1), -(2**16), "expected a list [numerator, denominator]"),
     ((*POSITIVE, "u_min0_over_u_max"), [3, 2], "u_min0 is 1.500 of u_max, expected between 0 and 1"),
     ((*POSITIVE, "beta"), [1, 2], "beta has 2 nodes, expected 65"),
     ((*POSITIVE, "beta", 3), 0, "'sides.positive.beta[3]' is 0"),
     ((*POSITIVE, "beta", 3), 1.5, "'sides.positive.beta[3]' is 1.5, expected a whole number"),
-    ((*POSITIVE, "transition_beta"), [1, 2], "the edge's beta must have as many nodes"),
-    (("transition_codes",), 32, "an edge needs the opening threshold's beta"),
+    ((*POSITIVE, "transition_beta"), [1, 2], "the transition's beta must have as many nodes"),
+    (("transition_codes",), 32, "a transition needs the opening threshold's beta"),
     (("beta_denominator",), 3, "beta_denominator is 3, expected a power of two"),
     (("beta_step_codes",), 0, "'beta_step_codes' is 0"),
-    (("below_dp0",), "held", "below_dp0 is 'held', expected hold or extend"),
+    (("below_dp0",), "held", "'below_dp0' is 'held', expected 'extend' or 'hold'"),
     (("reverse_codes",), -1, "'reverse_codes' is -1"),
     (("reverse_codes",), "40", "'reverse_codes' is '40'"),
     (("signals", "compare_max"), 10**9, "'signals.compare_max' is 1000000000, expected a whole number from 1 to 65535"),
@@ -394,7 +393,11 @@ COMPENSATORS = [
     (("signals", "command", "negative_full_code"), 9, "expected the other side of zero"),
     (("signals", "command", "valid_codes"), [0, 9], "full_code is 4095, outside the valid codes 0 to 9"),
     (("drive_functions", "dither_ticks"), 0, "'drive_functions.dither_ticks' is 0"),
-    ((*POSITIVE, "certificate", "dp_MPa"), [[1, 1]], "'sides.positive.certificate.dp_MPa' has 1 items, expected 2"),
+    (
+        (*POSITIVE, "certificate", "dp_MPa"),
+        [[1, 1]],
+        "'sides.positive.certificate.dp_MPa' is [[1, 1]], expected a list of 2 items",
+    ),
 ]
 
 
