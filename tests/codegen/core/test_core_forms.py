@@ -36,7 +36,8 @@ def two_sided(example_valve):
         dataclasses.replace(test, u_guard_V=test.u_guard_V - 0.2, u_guard_lower_V=test.u_guard_lower_V - 0.2)
         for test in side.tests
     )
-    negative = dataclasses.replace(side, guards=lower, opening_curve=opening, tests=tests)
+    reference = dataclasses.replace(side.reference, u_min_V=lower[side.certificate.guard].u_min0_V)
+    negative = dataclasses.replace(side, guards=lower, reference=reference, opening_curve=opening, tests=tests)
     return dataclasses.replace(example_valve, sides={"positive": side, "negative": negative})
 
 
