@@ -127,13 +127,13 @@ class TestDropOuts:
         assert abs(self.mean_error_mV()) < 1.2
 
     def test_and_would_if_they_were_no_flow(self, monkeypatch):
-        monkeypatch.setattr("dzdesign.identify.knees.gated_line._share_of_drop_outs", lambda *_: 0.0)
+        monkeypatch.setattr("dzdesign.identify.knees.line_fitting._share_of_drop_outs", lambda *_: 0.0)
         assert self.mean_error_mV() > 2.0
 
     def test_bounds_hold_with_long_runs(self):
         assert self.failed() == 0
 
     def test_and_would_not_if_those_were_no_flow(self, monkeypatch):
-        nothing = "dzdesign.identify.knees.gated_line._runs_of_drop_outs"
+        nothing = "dzdesign.identify.knees.line_fitting._runs_of_drop_outs"
         monkeypatch.setattr(nothing, lambda censored, *_: np.zeros(censored.size, dtype=bool))
         assert self.failed() >= 3

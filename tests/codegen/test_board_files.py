@@ -331,7 +331,7 @@ def test_verify_holds_and_says_that_it_was_not_checked(cortex, tmp_path):
     assert result.holds and result.evidence.changed_board_files == ("cortex_m4/dz_board.c",)
     said = "cortex_m4/dz_board.c, which is yours and was changed: review it, and try it on the machine"
     assert said in not_tried(result.evidence)
-    assert "NOT CHECKED: cortex_m4/dz_board.c, which is yours" in str(result)
+    assert "NOT CHECKED  cortex_m4/dz_board.c, which is yours" in str(result)
     manifest = evidence_manifest(result.evidence)
     write_folder(tmp_path / "evidence", with_report(evidence_files(result), cortex, tmp_path / "evidence"), manifest)
     html = (tmp_path / "evidence" / REPORT_NAME).read_text(encoding="utf-8")

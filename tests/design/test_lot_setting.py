@@ -105,6 +105,6 @@ def test_what_has_no_common_setting_is_told_why(falling, rising):
     other = designed(rising.valve, DesignOptions(law="target"))
     with pytest.raises(InputError, match="another law"):
         lot_setting({"a": falling, "b": other})
-    edged = designed(falling.valve, DesignOptions(transition=Fraction(1, 50)))
+    with_transition = designed(falling.valve, DesignOptions(transition=Fraction(1, 50)))
     with pytest.raises(InputError, match="with --transition"):
-        lot_setting({"a": edged, "b": edged})
+        lot_setting({"a": with_transition, "b": with_transition})

@@ -4,8 +4,7 @@ import hashlib
 import json
 import math
 from collections.abc import Iterable, Mapping
-from io import BufferedReader
-from typing import Any
+from typing import Any, BinaryIO
 
 from dzdesign.core.errors import QUOTED, InputError
 
@@ -28,12 +27,14 @@ def sha256_of(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-def sha256_of_file(file: BufferedReader) -> str:
+def sha256_of_file(file: BinaryIO) -> str:
     """Return the SHA-256 of a whole file in hex, read piece by piece; the file is at its beginning again then."""
     file.seek(0)
-    digest = hashlib.file_digest(file, "sha256").hexdigest()
+    digest = hashlib.sha256()
+    while piece := file.read(1 << 20):
+        digest.update(piece)
     file.seek(0)
-    return digest
+    return digest.hexdigest()
 
 
 def to_json(document: Mapping[str, Any]) -> str:

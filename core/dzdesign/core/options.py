@@ -32,8 +32,8 @@ Table = str | Mapping[str, str] | None
 
 #: Headings of the help, in their order; an option without one stands above them.
 RECORDINGS, METER, FIT, LAW = "recordings", "flow meter", "fit", "law"
-CONNECTIONS, AMPLIFIER, CHECKS = "connections of the firmware", "amplifier functions", "further checks"
-GROUPS = (RECORDINGS, METER, FIT, LAW, CONNECTIONS, AMPLIFIER, CHECKS)
+CONNECTIONS, DRIVE, CHECKS = "connections of the firmware", "drive functions", "further checks"
+GROUPS = (RECORDINGS, METER, FIT, LAW, CONNECTIONS, DRIVE, CHECKS)
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,7 @@ from dzdesign.derivation.symbols import beta, k, kappa, u_i, u_max, u_min0, u_O,
 _LAW_SYMBOLS = {u_i, beta, k, x_max, u_max, u_min0}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)  # compared and hashed as the one object that it is
 class Law:
     """A compensation law ``u_O = gain * u_i + offset`` for positive commands.
 

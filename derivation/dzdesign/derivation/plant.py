@@ -9,33 +9,7 @@ from typing import NamedTuple
 
 import sympy
 
-from dzdesign.derivation.symbols import (
-    B_e,
-    C_d,
-    K_a,
-    K_et,
-    K_fi,
-    K_i,
-    L_c,
-    Q,
-    R_c,
-    W,
-    di_dt,
-    dP,
-    dv_dt,
-    dx_e_dt,
-    f_e,
-    f_eL,
-    i,
-    m_e,
-    r_p,
-    rho,
-    u_e,
-    u_i,
-    u_if,
-    v,
-    x_e,
-)
+from dzdesign.derivation.symbols import *
 
 # u_i is the amplifier's input here, as printed; behind a compensator it is the compensator's output u_O.
 PLANT_EQUATIONS = {

@@ -10,6 +10,7 @@ Eq. 11) and ``n_i`` (code of the command, which Eq. (29) calls u_i').
 """
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, TypeAlias
 
 import sympy
@@ -48,22 +49,14 @@ def _declare(name: Name, unit: str, meaning: str, **more: Any) -> Any:
     return name
 
 
-def _positive(name: str, unit: str, meaning: str, **more: Any) -> sympy.Symbol:
-    return _declare(sympy.Symbol(name, positive=True), unit, meaning, **more)
+def _symbol(name: str, unit: str, meaning: str, *, latex: str = "", varies: bool = False, **sign: bool) -> sympy.Symbol:
+    return _declare(sympy.Symbol(name, **sign), unit, meaning, latex=latex, varies=varies)
 
 
-def _nonnegative(name: str, unit: str, meaning: str, **more: Any) -> sympy.Symbol:
-    return _declare(sympy.Symbol(name, nonnegative=True), unit, meaning, **more)
-
-
-def _real(name: str, unit: str, meaning: str, **more: Any) -> sympy.Symbol:
-    return _declare(sympy.Symbol(name, real=True), unit, meaning, **more)
-
-
-def _varying(name: str, unit: str, meaning: str, **more: Any) -> sympy.Symbol:
-    return _real(name, unit, meaning, varies=True, **more)
-
-
+_positive = partial(_symbol, positive=True)
+_nonnegative = partial(_symbol, nonnegative=True)
+_real = partial(_symbol, real=True)
+_varying = partial(_real, varies=True)
 _FLOW = "m**3/s"
 
 # Codes in the compensator, Eqs. (29)-(32), and ratios

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from dzdesign.core.artefact_files import check_file_may_be_written, to_json, write_file
+from dzdesign.core.artefact_files import check_file_may_be_written, write_file
+from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.core.options import AnyPath, Option, Texts, texts_of
 from dzdesign.terminal.progress import stage_progress
@@ -54,16 +55,16 @@ def run(arguments: Arguments, json: bool) -> int:
 def _run_mutations(arguments: Arguments, json: bool) -> int:
     """Count the wrong equations that the account catches; 1 if one of them is not caught."""
     from dzdesign.derivation.account.account import verify_statements
-    from dzdesign.derivation.account.mutation import mutation_document, score_mutations
+    from dzdesign.derivation.account.mutation import score_mutations
     from dzdesign.terminal.tables import print_mutations
 
     with stage_progress() as stage:
         stage("making every equation wrong in every small way")
-        document = mutation_document(score_mutations(verify_statements()))
+        found = score_mutations(verify_statements())
     if arguments.output:
-        write_file(Path(arguments.output), to_json(document))
+        write_file(Path(arguments.output), to_json_bytes(found))
     elif json:
-        print(to_json(document), end="")
+        print(to_json_bytes(found).decode(), end="")
     else:
-        print_mutations(document)
-    return 0 if document["caught"] == document["mutants"] else 1
+        print_mutations(found)
+    return 0 if found.caught == found.mutants else 1

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from dzdesign.identify.first_look import SeenSide
+    from dzdesign.identify.first_look import SideOverview
     from dzdesign.identify.reading.guessed_columns import GuessedColumns
 
 
@@ -40,7 +40,7 @@ class Look:
     u_max: float = 10.0
     u_seen: float | None = None
     in_per_cent: bool = False
-    sides: "dict[str, SeenSide]"
+    sides: "dict[str, SideOverview]"
     refused: dict[str, str]
     notes: tuple[str, ...] = ()
     skip_rows: int | None = None

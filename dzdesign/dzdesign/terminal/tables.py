@@ -1,7 +1,7 @@
 """Results as tables on stdout, by rich; plain where stdout is no terminal."""
 
 import json
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dzdesign.core.units import chance, span_MPa
 from dzdesign.terminal.page import Table, new_console, new_table, put_line, put_table, volts
@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from dzdesign.codegen.project import Firmware
+    from dzdesign.derivation.account.mutation import AccountMutants
     from dzdesign.design.compensator import Compensator
     from dzdesign.identify.valve.model import ValveModel
     from dzdesign.identify.valve.side_model import SideModel
@@ -125,23 +126,23 @@ def print_firmware(firmware: "Firmware", console: "Console | None" = None, folde
     """Print the files of a firmware, and in which folder they are."""
     console = console or new_console()
     valves = len(json.loads(firmware.files["compensator.json"])["lot"])
-    common = f", common setting of {valves} valves" if valves else ""
+    common = f", lot setting of {valves} valves" if valves else ""
     place = f", in {folder}" if folder else ""
     put_line(console, f"Firmware for {firmware.manifest.target}, law {firmware.manifest.law}{common}{place}:")
     for name in firmware.files:
         put_line(console, f"  {name}")
 
 
-def print_mutations(document: dict[str, Any]) -> None:
+def print_mutations(found: "AccountMutants") -> None:
     """Print how many wrong equations were caught, those that were not, and the changes that mean the same."""
     table = new_table("Wrong equations", "statement", "wrong", "caught", "same meaning")
-    for row in document["statements"]:
-        table.add_row(row["number"], str(row["mutants"]), str(row["caught"]), str(len(row["equivalent"]) or ""))
+    for row in found.statements:
+        table.add_row(row.number, str(row.mutants), str(row.caught), str(len(row.equivalent) or ""))
     console = new_console()
     put_table(console, table)
-    for row in document["statements"]:
-        for survivor in row["survivors"]:
-            put_line(console, f"not caught, {row['number']}: {survivor}")
-        for text in row["equivalent"]:
-            put_line(console, f"same meaning, {row['number']}: {text}")
-    console.print(f"{document['caught']} of {document['mutants']} wrong equations are caught.")
+    for row in found.statements:
+        for survivor in row.survivors:
+            put_line(console, f"not caught, {row.number}: {survivor}")
+        for text in row.equivalent:
+            put_line(console, f"same meaning, {row.number}: {text}")
+    console.print(f"{found.caught} of {found.mutants} wrong equations are caught.")

@@ -1,4 +1,4 @@
-"""Both forms of the core, both sides of a valve, with an edge and sensors of unlike scaling: on every input."""
+"""Both forms of the core, both sides of a valve, with a transition and sensors of unlike scaling: on every input."""
 
 import dataclasses
 from fractions import Fraction
@@ -54,7 +54,7 @@ def test_the_narrow_form_equals_the_law_on_every_input(example_compensator, tmp_
 
 @needs_compiler
 @pytest.mark.parametrize("target", ["host", "avr"])
-def test_two_sides_with_an_edge_and_unlike_sensors_equal_the_law_on_every_input(two_sided, target, tmp_path):
+def test_two_sides_with_a_transition_and_unlike_sensors_equal_the_law_on_every_input(two_sided, target, tmp_path):
     converter = Converter()
     signals = Signals(
         command=command_signal(parse_signal("-10..10 V x 0.15 + 1.5 V", "--command-signal"), converter),

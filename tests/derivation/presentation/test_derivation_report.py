@@ -17,10 +17,11 @@ from dzdesign.command_line.cli import main
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.derivation import symbols
 from dzdesign.derivation.account import account
-from dzdesign.derivation.account.account import PAPER_NUMBERS, STATEMENTS, verify_statements
+from dzdesign.derivation.account.account import STATEMENTS, verify_statements
+from dzdesign.derivation.account.equations import PAPER_NUMBERS
 from dzdesign.derivation.account.identity import agree
 from dzdesign.derivation.account.statement import Outcome
-from dzdesign.derivation.presentation import formulas, prose, report, wording, writer
+from dzdesign.derivation.presentation import formulas, prose, report, writer
 from dzdesign.derivation.presentation.formulas import arrange, to_latex, to_mathml, to_text
 from dzdesign.derivation.presentation.writer import anchor
 from tests.support.paths import ROOT
@@ -533,7 +534,7 @@ def test_prose_survives_the_way_to_plain_text():
             assert str(prose.parse_prose(sentence, BY_NUMBER)) == sentence
 
 
-@pytest.mark.parametrize("module", [prose, report, writer, wording, formulas], ids=lambda one: one.__name__)
+@pytest.mark.parametrize("module", [prose, report, writer, formulas], ids=lambda one: one.__name__)
 def test_examples_in_the_docstrings_run(module):
     outcome = doctest.testmod(module)
     assert outcome.attempted > 0

@@ -8,8 +8,8 @@ from scipy.signal import lfilter
 
 from dzdesign.identify.identification import identify
 from dzdesign.identify.knees.noise import (
+    correlation_upper_limit,
     measure_roughness,
-    one_error_slower,
     shared_correlation,
     taken_by_parabola,
     variance_inflation,
@@ -50,7 +50,7 @@ def test_one_standard_error_slower_covers_five_of_six(correlation, least):
     for _ in range(100):
         roughness = [measure_roughness(u, slow_noise(rng, correlation, u.size)) for _ in range(2)]
         found.append(shared_correlation(roughness))
-        believed.append(one_error_slower(found[-1], roughness))
+        believed.append(correlation_upper_limit(found[-1], roughness))
     covered = np.mean(np.array(believed) >= correlation)
     assert least < covered < 0.97, f"seed {SEED}"  # 84 % if errors are as claimed; 100 scatter by 4 %
     assert np.mean(np.array(found) >= correlation) < least - 0.1

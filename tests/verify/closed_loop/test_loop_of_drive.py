@@ -1,4 +1,4 @@
-"""The closed loop with the amplifier's options: what its residual and its flow at zero command mean then."""
+"""The closed loop with drive functions: what its residual and its flow at zero command mean then."""
 
 from dataclasses import replace
 from fractions import Fraction

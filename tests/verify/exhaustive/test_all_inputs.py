@@ -30,7 +30,7 @@ from dzdesign.verify.exhaustive.test_vectors import (
 from dzdesign.verify.exhaustive.zero_command import pressure_drops
 from dzdesign.verify.firmware.folder import read_compensator
 from dzdesign.verify.toolchain import machines
-from dzdesign.verify.toolchain.compiled_core import CompiledCore, Findings
+from dzdesign.verify.toolchain.compiled_core import COUNTED, CompiledCore, Findings
 from dzdesign.verify.toolchain.host_compiler import host_compiler
 from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4
 from tests.support.golden_firmware import FULL, GOLDENS, INPUT
@@ -84,11 +84,14 @@ FAULTS = {
     "wrong": ("if (u_adc == 3000u && p_a_adc == p_b_adc + 77u) compare++;", {"wrong": 1}),
     "out of range": ("if (u_adc == 4095u && p_a_adc == p_b_adc) compare = 60001u;", {"out_of_range": 1, "wrong": 1}),
     # The row after it goes against the law too, where that rises with dP.
-    "falls": (
+    "not_monotone_in_u": (
         "if (u_adc == 2000u && p_a_adc == p_b_adc + 9u) compare = (uint16_t)(compare - 20u);",
-        {"falls": 1, "wrong": 1},
+        {"not_monotone_in_u": 1, "wrong": 1},
     ),
-    "against": ("if (u_adc <= 5u && p_a_adc == p_b_adc + 500u) compare = 33000u;", {"against": 6, "wrong": 6}),
+    "not_monotone_in_dp": (
+        "if (u_adc <= 5u && p_a_adc == p_b_adc + 500u) compare = 33000u;",
+        {"not_monotone_in_dp": 6, "wrong": 6},
+    ),
     "fallback": ("if (u_adc == 65535u) compare = 1u;", {"bad_fallbacks": 25}),
     "fallback of a pressure": ("if (p_b_adc == 65535u && u_adc == 17u) compare++;", {"bad_fallbacks": 5}),
 }
@@ -107,12 +110,12 @@ def test_a_pair_of_pressures_that_is_not_its_difference_is_odd_and_not_wrong(pla
     prepared = PreparedInputs(exact_law(plain))
     odd = wrapped(CompiledCore(plain), "if (p_a_adc == 2500u && p_b_adc == 2001u) compare++;")
     found = odd.check(prepared.everything())
-    assert found.wrong == 0 and found.odd >= 2, "at the commands that take it in turn, and at zero command"
+    assert found.wrong == 0 and found.odd_pairs >= 2, "at the commands that take it in turn, and at zero command"
     at_zero = wrapped(CompiledCore(plain), "if (u_adc == 0u && p_a_adc == 2500u && p_b_adc == 2001u) compare++;")
-    assert at_zero.check(prepared.everything()).odd >= 1
-    assert at_zero.check(prepared.everything(cube=False)).odd == 0
+    assert at_zero.check(prepared.everything()).odd_pairs >= 1
+    assert at_zero.check(prepared.everything(cube=False)).odd_pairs == 0
     low = wrapped(CompiledCore(plain), "if (p_a_adc == 100u && p_b_adc == 4000u) compare++;")
-    assert low.check(prepared.everything()).odd >= 1, "where the law does not follow, the commands still take it"
+    assert low.check(prepared.everything()).odd_pairs >= 1, "where the law does not follow, the commands still take it"
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -138,7 +141,7 @@ def test_both_sides_of_everything_see_a_fault_at_one_place(full):
         found = wrapped(core, f"if (u_adc == {code}u && p_a_adc == 2000u) compare++;", function).check(
             prepared.everything()
         )
-        assert found.wrong + found.odd >= 1
+        assert found.wrong + found.odd_pairs >= 1
         words = first_wrong(prepared, found)
         assert words is None or f"command code {code}," in words
         honest = core.check(prepared.everything())
@@ -298,9 +301,8 @@ def test_a_machine_that_is_not_here_is_not_passed(plain, monkeypatch):
 def input_check_of(folder):
     """An InputCheck without running anything."""
     prepared = PreparedInputs(exact_law(folder))
-    counts = [name for name, kind in Findings.__annotations__.items() if kind is int]
     at_zero = np.zeros(prepared.differences.values.size, dtype=int)
-    found = Findings(outputs_hash="", object_sha256="", at_zero=at_zero, **dict.fromkeys(counts, 0))
+    found = Findings(outputs_hash="", object_sha256="", at_zero=at_zero, **dict.fromkeys(COUNTED, 0))
     return input_check(prepared, CompiledCore(folder), found)
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from dzdesign.derivation.account.equations import APPROACH, AT_REFERENCE, OFF_REFERENCE, PAPER_NUMBERS
+from dzdesign.derivation.account.equations import APPROACH, AT_REFERENCE, OFF_REFERENCE
 from dzdesign.derivation.account.flow_over_pressure import FLOW_OVER_PRESSURE
 from dzdesign.derivation.account.identifiability import IDENTIFIABILITY
 from dzdesign.derivation.account.implementation import CODES, IMPLEMENTATION
@@ -35,8 +35,6 @@ SECTIONS = {
 STATEMENTS = tuple(
     replace(statement, section=section) for section, statements in SECTIONS.items() for statement in statements
 )
-
-__all__ = ["PAPER_NUMBERS", "SECTIONS", "STATEMENTS", "verify_statements"]
 
 
 def verify_statements(statements: Sequence[Statement] = STATEMENTS) -> tuple[Verdict, ...]:

@@ -8,7 +8,8 @@ from dzdesign.derivation.symbols import *
 #: The numbers of the paper's equations; the later ones stand in other modules.
 PAPER_NUMBERS = tuple(f"({number})" for number in range(1, 33))
 
-_ORIFICE = C_d * W * sympy.sqrt(2 * dP / rho)
+#: Flow per opening.
+ORIFICE = C_d * W * sympy.sqrt(2 * dP / rho)
 
 #: Section 1 up to Eq. (7), with the readings of its figures that the rest needs.
 APPROACH = (
@@ -17,9 +18,9 @@ APPROACH = (
         "dead-zone model",
         Q,
         sympy.Piecewise(
-            (-_ORIFICE * x, sympy.And(-u_max <= u_i, u_i <= -u_min)),
+            (-ORIFICE * x, sympy.And(-u_max <= u_i, u_i <= -u_min)),
             (0, sympy.And(-u_min < u_i, u_i < u_min)),
-            (_ORIFICE * x, sympy.And(u_min <= u_i, u_i <= u_max)),
+            (ORIFICE * x, sympy.And(u_min <= u_i, u_i <= u_max)),
         ),
         see=("T6d",),
         note="x is the opening of the edge, not the travel of the spool: x = 0 at the threshold. u_i is the valve's "
@@ -41,13 +42,13 @@ APPROACH = (
         "Q_max",
         "maximum flow (text below Eq. 2)",
         Q_max,
-        _ORIFICE * x_max,
+        ORIFICE * x_max,
         scope="full command at or above the threshold",
         grounds=(
             Ground(
-                number="(1)",
-                at=((Q, Q_max), (x, x_max), (u_max, u_min + headroom), (u_i, u_min + headroom)),
-                where="at full command, x = x_max",
+                "(1)",
+                ((Q, Q_max), (x, x_max), (u_max, u_min + headroom), (u_i, u_min + headroom)),
+                "at full command, x = x_max",
             ),
         ),
     ),
@@ -55,7 +56,7 @@ APPROACH = (
         "(3)",
         "flow gain by the orifice equation",
         K_e,
-        _ORIFICE * x_max / u_max,
+        ORIFICE * x_max / u_max,
         grounds=("(2)", "Q_max"),
         eliminate=(Q_max,),
         see=("T7b",),
@@ -100,7 +101,7 @@ AT_REFERENCE = (
         K_0,
         C_d * W * x_max * sympy.sqrt(2 * dP0 / rho) / u_max,
         gamma_0 * x_max / u_max,
-        grounds=(Ground(number="(3)", at=((K_e, K_0), (dP, dP0)), where="at dP = dP0"), "gamma_0"),
+        grounds=(Ground("(3)", ((K_e, K_0), (dP, dP0)), "at dP = dP0"), "gamma_0"),
         eliminate=(gamma_0,),
         note="x_max does not depend on dP (Assumption 3).",
     ),
@@ -109,7 +110,7 @@ AT_REFERENCE = (
         "wanted flow at the reference",
         Q_O,
         K_0 * u_i,
-        grounds=("Fig. 3, line", Ground(number="(2)", at=((K_e, K_0),), where="at dP = dP0")),
+        grounds=("Fig. 3, line", Ground("(2)", ((K_e, K_0),), "at dP = dP0")),
         eliminate=(Q_max,),
         see=("T1a",),
     ),
@@ -121,15 +122,15 @@ AT_REFERENCE = (
         scope="a command at or beyond the threshold",
         grounds=(
             Ground(
-                number="(1)",
-                at=(
+                "(1)",
+                (
                     (Q, Q_O),
                     (dP, dP0),
                     (u_i, u_min0 + u_i_prime),
                     (u_min, u_min0),
                     (u_max, u_min0 + u_i_prime + headroom),
                 ),
-                where="at dP = dP0, beyond the threshold",
+                "at dP = dP0, beyond the threshold",
             ),
         ),
     ),
@@ -195,7 +196,7 @@ OFF_REFERENCE = (
         K_1,
         C_d * W * x_max * sympy.sqrt(2 * dP1 / rho) / u_max,
         gamma_1 * x_max / u_max,
-        grounds=(Ground(number="(3)", at=((K_e, K_1), (dP, dP1)), where="at dP = dP1"), "gamma_1"),
+        grounds=(Ground("(3)", ((K_e, K_1), (dP, dP1)), "at dP = dP1"), "gamma_1"),
         eliminate=(gamma_1,),
         see=("T7a", "T7c"),
         note="The published largest flows grow far more slowly with dP: T7a.",
@@ -206,8 +207,8 @@ OFF_REFERENCE = (
         Q_O_prime,
         K_1 * u_i,
         grounds=(
-            Ground(number="Fig. 3, line", at=((Q_O, Q_O_prime),), where="at dP = dP1"),
-            Ground(number="(2)", at=((K_e, K_1),), where="at dP = dP1"),
+            Ground("Fig. 3, line", ((Q_O, Q_O_prime),), "at dP = dP1"),
+            Ground("(2)", ((K_e, K_1),), "at dP = dP1"),
         ),
         eliminate=(Q_max,),
         see=("T1c", "T1d"),
@@ -229,7 +230,7 @@ OFF_REFERENCE = (
         u_O,
         u_no + u_i,
         (beta * k * x_max / u_max - beta + 1) * u_i + beta * u_min0,
-        grounds=(Ground(number="u_O", at=((u_0, u_no),), where="with u_no for u_0"), "(17)"),
+        grounds=(Ground("u_O", ((u_0, u_no),), "with u_no for u_0"), "(17)"),
         eliminate=(u_no,),
         see=("T1b", "T1c", "T3a", "T4a"),
         note="Printed with u_0 on the left, which is the output u_O.",

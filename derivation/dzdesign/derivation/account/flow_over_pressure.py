@@ -17,8 +17,7 @@ FLOW_OVER_PRESSURE = (
         provided=(sympy.Ne(dP0, dP1),),
         grounds=("exponent",),
         values=tuple(
-            Value(label=valve.name, at=valve.at(), unit="1", remark=DROP_ASSUMED if valve is SECOND else "")
-            for valve in VALVES
+            Value(valve.name, valve.at(), "1", remark=DROP_ASSUMED if valve is SECOND else "") for valve in VALVES
         ),
         note="The orifice equation has 0.5. The published drop is 1 and 5 MPa; a supply that gives way, or a pressure "
         "drop taken with the valve's own passages, lowers the exponent.",
@@ -31,13 +30,13 @@ FLOW_OVER_PRESSURE = (
         grounds=("(15)", "gamma_1", "(8)", "gamma_0"),
         eliminate=(gamma_1, K_0, gamma_0),
         values=(
-            Value(label="K_1/K_0 by Eq. (15)", of=sympy.sqrt(dP1 / dP0), at=FIRST.at(), unit="1"),
+            Value("K_1/K_0 by Eq. (15)", of=sympy.sqrt(dP1 / dP0), at=FIRST.at(), unit="1"),
             *(
-                Value(label=f"K_1/K_0 by the largest flows, {valve.name}", of=Q_max1 / Q_max0, at=valve.at(), unit="1")
+                Value(f"K_1/K_0 by the largest flows, {valve.name}", of=Q_max1 / Q_max0, at=valve.at(), unit="1")
                 for valve in VALVES
             ),
             Value(
-                label="K_1/K_0 by Eq. (15) and the simulated openings",
+                "K_1/K_0 by Eq. (15) and the simulated openings",
                 # Section 2.2: 1.8 mm with 54 % dead at 1 MPa; 0.1 mm less with 1 % more dead at 5 MPa.
                 of=sympy.sqrt(dP1 / dP0) * sympy.Rational(17 * 45, 18 * 46),
                 at=FIRST.at(),
@@ -61,7 +60,7 @@ FLOW_OVER_PRESSURE = (
         expected=Outcome.DOES_NOT_FOLLOW,
         values=(
             Value(
-                label="target at full command over the largest flow, first valve",
+                "target at full command over the largest flow, first valve",
                 of=Q_max0 * sympy.sqrt(dP1 / dP0) / Q_max1,
                 at=FIRST.at(),
                 unit="1",

@@ -2,15 +2,14 @@
 
 import sympy
 
+from dzdesign.derivation.account.equations import ORIFICE
 from dzdesign.derivation.account.statement import Case, Ground, Kind
 from dzdesign.derivation.symbols import *
 
-_ORIFICE = C_d * W * sympy.sqrt(2 * dP / rho)
-
 _REGIMES = (
-    Case(at=((u_O, u_min - guard),), where="closed"),
-    Case(at=((u_O, u_min + y), (x_max, (y + rest) / k)), where="opening"),
-    Case(at=((u_O, u_min + k * x_max + headroom),), where="at the stop"),
+    Case(((u_O, u_min - guard),), "closed"),
+    Case(((u_O, u_min + y), (x_max, (y + rest) / k)), "opening"),
+    Case(((u_O, u_min + k * x_max + headroom),), "at the stop"),
 )
 #: Theorem 8: what can be identified from flow.
 IDENTIFIABILITY = (
@@ -20,8 +19,8 @@ IDENTIFIABILITY = (
         Q,
         sympy.Piecewise(
             (0, u_O < u_min),
-            (_ORIFICE * (u_O - u_min) / k, u_O < u_min + k * x_max),
-            (_ORIFICE * x_max, u_min + k * x_max <= u_O),
+            (ORIFICE * (u_O - u_min) / k, u_O < u_min + k * x_max),
+            (ORIFICE * x_max, u_min + k * x_max <= u_O),
         ),
         note="Eqs. (1) and (11) up to the stop, for positive commands.",
     ),
@@ -33,9 +32,9 @@ IDENTIFIABILITY = (
         grounds=(
             "valve",
             Ground(
-                number="valve",
-                at=((Q, Q_scaled), (C_d, scale * C_d), (k, scale * k), (x_max, x_max / scale)),
-                where="with C_d lambda, k lambda, x_max / lambda",
+                "valve",
+                ((Q, Q_scaled), (C_d, scale * C_d), (k, scale * k), (x_max, x_max / scale)),
+                "with C_d lambda, k lambda, x_max / lambda",
             ),
         ),
         eliminate=(Q,),
@@ -49,16 +48,16 @@ IDENTIFIABILITY = (
         dQ_dC_d,
         (x_max * dQ_dx_max - k * dQ_dk) / C_d,
         grounds=(
-            Ground(number="valve", derivative=(C_d, dQ_dC_d), where="differentiated by C_d"),
-            Ground(number="valve", derivative=(k, dQ_dk), where="differentiated by k"),
-            Ground(number="valve", derivative=(x_max, dQ_dx_max), where="differentiated by x_max"),
+            Ground("valve", derivative=(C_d, dQ_dC_d), where="differentiated by C_d"),
+            Ground("valve", derivative=(k, dQ_dk), where="differentiated by k"),
+            Ground("valve", derivative=(x_max, dQ_dx_max), where="differentiated by x_max"),
         ),
         eliminate=(dQ_dk, dQ_dx_max),
         cases=_REGIMES,
         note="So (C_d, k, -x_max) is a null direction of the sensitivity matrix: its product with every row is zero, "
         "however many commands and pressure drops are measured.",
     ),
-    Kind.DEFINITION("S", "flow per command beyond the threshold", s_flow, _ORIFICE / k),
+    Kind.DEFINITION("S", "flow per command beyond the threshold", s_flow, ORIFICE / k),
     Kind.DEFINITION("travel", "command that full opening takes", q_x, k * x_max),
     Kind.THEOREM(
         "T8c",
@@ -79,12 +78,12 @@ IDENTIFIABILITY = (
         scope="u_O at or beyond the threshold, and the spool has not met its stop",
         within=u_min <= u_O,
         grounds=(
-            Ground(number="(1)", at=((u_i, u_min + y), (u_max, u_min + y + headroom)), where="at u_O = u_min + y"),
-            Ground(number="opening", at=((u_O, u_min + y),), where="at u_O = u_min + y"),
+            Ground("(1)", ((u_i, u_min + y), (u_max, u_min + y + headroom)), "at u_O = u_min + y"),
+            Ground("opening", ((u_O, u_min + y),), "at u_O = u_min + y"),
             "S",
         ),
         eliminate=(x, s_flow),
-        cases=(Case(at=((u_O, u_min + y),), where="beyond the threshold, before the stop"),),
+        cases=(Case(((u_O, u_min + y),), "beyond the threshold, before the stop"),),
     ),
     Kind.THEOREM(
         "T8d",
@@ -93,8 +92,8 @@ IDENTIFIABILITY = (
         (Q_2 - Q_1) / (u_2 - u_1),
         provided=(sympy.Ne(u_1, u_2),),
         grounds=(
-            Ground(number="straight part", at=((Q, Q_2), (u_O, u_2)), where="at u_2"),
-            Ground(number="straight part", at=((Q, Q_1), (u_O, u_1)), where="at u_1"),
+            Ground("straight part", ((Q, Q_2), (u_O, u_2)), "at u_2"),
+            Ground("straight part", ((Q, Q_1), (u_O, u_1)), "at u_1"),
         ),
         eliminate=(u_min,),
         note="With T8e and T8f: these three are determined, and by T8b nothing else is.",
@@ -105,7 +104,7 @@ IDENTIFIABILITY = (
         u_min,
         u_1 - Q_1 / s_flow,
         u_1 - Q_1 * (u_2 - u_1) / (Q_2 - Q_1),
-        grounds=(Ground(number="straight part", at=((Q, Q_1), (u_O, u_1)), where="at u_1"), "T8d"),
+        grounds=(Ground("straight part", ((Q, Q_1), (u_O, u_1)), "at u_1"), "T8d"),
         eliminate=(s_flow,),
     ),
     Kind.THEOREM(
@@ -114,7 +113,7 @@ IDENTIFIABILITY = (
         q_x,
         Q_max / s_flow,
         scope="a command at or beyond the stop",
-        grounds=(Ground(number="T8c", at=((Q, Q_max), (u_O, u_min + q_x + headroom)), where="at the stop"),),
+        grounds=(Ground("T8c", ((Q, Q_max), (u_O, u_min + q_x + headroom)), "at the stop"),),
         note="Without such a sample k x_max is only known to be larger than the largest command beyond the threshold. "
         "Where x_max is known otherwise, k = (k x_max) / x_max.",
     ),

@@ -13,8 +13,8 @@ _SHARES = {kappa: k * x_max / u_max, scaling.mu: u_min0 / u_max}
 _PER_VOLT = n_adc / u_max  # counts per volt of command, what Eqs. (30) and (31) need where they have 1365
 _REST = k * x_max / u_max - 1
 _CONVERTER = ((n_adc, sympy.Integer(4095)), (V_adc, sympy.Integer(3)), (n_V, sympy.Integer(1365)))
-_UP_TO_REFERENCE = Case(at=((dP1, dP0 - below),), where="dP <= dP0")
-_ABOVE_REFERENCE = Case(at=((dP1, dP0 + above),), where="dP > dP0")
+_UP_TO_REFERENCE = Case(((dP1, dP0 - below),), "dP <= dP0")
+_ABOVE_REFERENCE = Case(((dP1, dP0 + above),), "dP > dP0")
 
 
 def _by_selector(up_to_reference: sympy.Expr, above_reference: sympy.Expr) -> sympy.Expr:
@@ -57,9 +57,9 @@ IMPLEMENTATION = (
         corrected_by="(29c)",
         values=(
             Value(
-                label="code of 10 V by (29)",
-                at=(*_CONVERTER, (u_i, sympy.Integer(10))),
-                unit="counts",
+                "code of 10 V by (29)",
+                (*_CONVERTER, (u_i, sympy.Integer(10))),
+                "counts",
                 remark="14 bits. A 12-bit converter stands at 4095 from 3 V on: 70 % of the command would be lost.",
             ),
         ),
@@ -96,14 +96,14 @@ IMPLEMENTATION = (
         corrected_by="(30c)",
         values=(
             Value(
-                label="u_min0 as it stands in (30), first valve",
+                "u_min0 as it stands in (30), first valve",
                 of=u_min0,
                 at=FIRST.at(),
                 unit="counts",
                 remark="volts added to counts: 0.13 % of the code range where 53.9 % is meant",
             ),
             Value(
-                label="command above which (30) is negative, first valve",
+                "command above which (30) is negative, first valve",
                 of=-1000 * u_min0 / (n_V * _REST),
                 at=(*FIRST.at(), *_CONVERTER),
                 unit="mV",
@@ -148,9 +148,7 @@ IMPLEMENTATION = (
         grounds=("scale of u_0", "(13)", "(29c)"),
         eliminate=(u_0, n_i),
         values=(
-            Value(
-                label="code of u_min0, first valve", of=_PER_VOLT * u_min0, at=(*FIRST.at(), *_CONVERTER), unit="counts"
-            ),
+            Value("code of u_min0, first valve", of=_PER_VOLT * u_min0, at=(*FIRST.at(), *_CONVERTER), unit="counts"),
         ),
     ),
     Kind.CORRECTED(
@@ -167,14 +165,7 @@ IMPLEMENTATION = (
         "output from the codes",
         u_O,
         _by_selector(K_c * (n_i + n_0), K_c * (n_i + n_no)),
-        grounds=(
-            Ground(number="u_O", at=((u_0, u_no),), where="with u_no for u_0"),
-            "(7)",
-            "(13)",
-            "(29c)",
-            "(30c)",
-            "(31c)",
-        ),
+        grounds=(Ground("u_O", ((u_0, u_no),), "with u_no for u_0"), "(7)", "(13)", "(29c)", "(30c)", "(31c)"),
         eliminate=(u_no, u_0, n_i, n_0, n_no),
         cases=(_UP_TO_REFERENCE, _ABOVE_REFERENCE),
         condition=Condition(
@@ -231,22 +222,22 @@ CODES = (
         eliminate=(u_O,),
         values=(
             Value(
-                label="without compensation at 2 V",
+                "without compensation at 2 V",
                 of=u_i / u_max,
                 at=(*FIRST.at(), (u_i, sympy.Integer(DUTY_COMMAND_V))),
                 unit="%",
                 published=DUTY_WITHOUT_PERCENT,
             ),
             Value(
-                label="second valve at 2 V",
-                at=(*SECOND.at(), (u_i, sympy.Integer(DUTY_COMMAND_V))),
-                unit="%",
+                "second valve at 2 V",
+                (*SECOND.at(), (u_i, sympy.Integer(DUTY_COMMAND_V))),
+                "%",
                 published=DUTY_WITH_PERCENT,
             ),
             Value(
-                label="first valve at 2 V",
-                at=(*FIRST.at(), (u_i, sympy.Integer(DUTY_COMMAND_V))),
-                unit="%",
+                "first valve at 2 V",
+                (*FIRST.at(), (u_i, sympy.Integer(DUTY_COMMAND_V))),
+                "%",
                 remark="Fig. 13 does not name its valve; its 55 % fits the second, not the first.",
             ),
         ),

@@ -2,11 +2,10 @@
 
 import sympy
 
+from dzdesign.derivation.account.equations import ORIFICE
 from dzdesign.derivation.account.published import DROP_ASSUMED, FIRST, SECOND
 from dzdesign.derivation.account.statement import Ground, Kind, Value
 from dzdesign.derivation.symbols import *
-
-_ORIFICE = C_d * W * sympy.sqrt(2 * dP / rho)
 
 #: Theorem 9: a meter that shows nothing below its floor.
 METER_FLOOR = (
@@ -15,8 +14,8 @@ METER_FLOOR = (
         "command at which the meter first shows flow",
         u_seen,
         u_min + Q_floor / s_flow,
-        u_min + Q_floor * k / _ORIFICE,
-        grounds=(Ground(number="straight part", at=((Q, Q_floor), (u_O, u_seen)), where="at the meter's floor"), "S"),
+        u_min + Q_floor * k / ORIFICE,
+        grounds=(Ground("straight part", ((Q, Q_floor), (u_O, u_seen)), "at the meter's floor"), "S"),
         eliminate=(s_flow,),
         note="Above the threshold, and the more so the lower the pressure drop.",
     ),
@@ -28,15 +27,15 @@ METER_FLOOR = (
         Q_floor * k / gamma_0 * (1 - sympy.sqrt(dP0) / sympy.sqrt(dP1)),
         grounds=(
             "fall",
-            Ground(number="T9a", at=((u_seen, u_seen0), (dP, dP0)), where="at dP0"),
-            Ground(number="T9a", at=((u_seen, u_seen1), (dP, dP1)), where="at dP1, the same u_min"),
+            Ground("T9a", ((u_seen, u_seen0), (dP, dP0)), "at dP0"),
+            Ground("T9a", ((u_seen, u_seen1), (dP, dP1)), "at dP1, the same u_min"),
             "gamma_0",
         ),
         eliminate=(u_seen0, u_seen1, gamma_0),
         positive_if=sympy.sqrt(dP1) > sympy.sqrt(dP0),
         values=tuple(
             Value(
-                label=f"in per cent of u_max, {valve.name}",
+                f"in per cent of u_max, {valve.name}",
                 of=Q_floor * (u_max - u_min0) / Q_max0 * (1 - sympy.sqrt(dP0 / dP1)) / u_max,
                 at=valve.at(),
                 unit="%",
@@ -54,21 +53,17 @@ METER_FLOOR = (
         Q_floor * (1 / s_flow0 - 1 / s_flow1),
         grounds=(
             "fall",
+            Ground("straight part", ((Q, Q_floor), (u_O, u_seen0), (s_flow, s_flow0)), "at dP0 and the meter's floor"),
             Ground(
-                number="straight part",
-                at=((Q, Q_floor), (u_O, u_seen0), (s_flow, s_flow0)),
-                where="at dP0 and the meter's floor",
-            ),
-            Ground(
-                number="straight part",
-                at=((Q, Q_floor), (u_O, u_seen1), (s_flow, s_flow1)),
-                where="at dP1 and the meter's floor, the same u_min",
+                "straight part",
+                ((Q, Q_floor), (u_O, u_seen1), (s_flow, s_flow1)),
+                "at dP1 and the meter's floor, the same u_min",
             ),
         ),
         eliminate=(u_seen0, u_seen1),
         values=tuple(
             Value(
-                label=f"in per cent of u_max, {valve.name}",
+                f"in per cent of u_max, {valve.name}",
                 of=Q_floor * ((u_max - u_min0) / Q_max0 - (u_max - u_min1) / Q_max1) / u_max,
                 at=valve.at(),
                 unit="%",
@@ -85,14 +80,12 @@ METER_FLOOR = (
         provided=(sympy.Ne(u_max, u_seen1),),
         grounds=(
             Ground(
-                number="straight part",
-                at=((Q, Q_max1), (u_O, u_max), (s_flow, s_flow1), (u_min, u_min1)),
-                where="at dP1, full command",
+                "straight part", ((Q, Q_max1), (u_O, u_max), (s_flow, s_flow1), (u_min, u_min1)), "at dP1, full command"
             ),
             Ground(
-                number="straight part",
-                at=((Q, Q_floor), (u_O, u_seen1), (s_flow, s_flow1), (u_min, u_min1)),
-                where="at dP1, where the meter starts",
+                "straight part",
+                ((Q, Q_floor), (u_O, u_seen1), (s_flow, s_flow1), (u_min, u_min1)),
+                "at dP1, where the meter starts",
             ),
         ),
         eliminate=(u_min1,),
@@ -104,23 +97,23 @@ METER_FLOOR = (
         Q_floor + (Q_max1 - Q_floor) * (u_seen0 - u_seen1) / (u_max - u_seen1),
         grounds=(
             Ground(
-                number="straight part",
-                at=((u_O, u_seen0), (s_flow, s_flow1), (u_min, u_min1)),
-                where="at dP1, where the offset is u_seen0",
+                "straight part",
+                ((u_O, u_seen0), (s_flow, s_flow1), (u_min, u_min1)),
+                "at dP1, where the offset is u_seen0",
             ),
             Ground(
-                number="straight part",
-                at=((Q, Q_floor), (u_O, u_seen1), (s_flow, s_flow1), (u_min, u_min1)),
-                where="at dP1, where the meter starts",
+                "straight part",
+                ((Q, Q_floor), (u_O, u_seen1), (s_flow, s_flow1), (u_min, u_min1)),
+                "at dP1, where the meter starts",
             ),
             "slope at dP1",
         ),
         eliminate=(u_min1, s_flow1),
         values=(
             Value(
-                label="first valve",
-                at=(*FIRST.at(), (u_seen0, sympy.Rational("5.39")), (u_seen1, sympy.Rational("5.17"))),
-                unit="L/min",
+                "first valve",
+                (*FIRST.at(), (u_seen0, sympy.Rational("5.39")), (u_seen1, sympy.Rational("5.17"))),
+                "L/min",
                 published=FIRST.zero_flow_without_beta,
                 remark="6 % above what was measured, where the model without the floor (T3b) is 30 % below",
             ),

@@ -9,13 +9,14 @@ import math
 import random
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any, ClassVar, Literal
 
 import sympy
+from msgspec import Meta
 from sympy.core.function import AppliedUndef
 from sympy.core.relational import Relational
 
-from dzdesign.core.artefact_files import TOOL
+from dzdesign.core.artefact_types import THIS_TOOL, Artefact
 from dzdesign.core.errors import RequirementError
 from dzdesign.derivation.account.identity import agree
 from dzdesign.derivation.account.proof import Verdict, judge
@@ -27,32 +28,30 @@ _SAMPLES, _SEED = 2000, 20261121
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MutationScore:
-    """Mutants of one statement.
+class StatementMutants:
+    """Mutants of one statement."""
 
-    Attributes
-    ----------
-    number : str
-        The statement.
-    mutants : int
-        Changes of its meaning that were tried.
-    equivalent : tuple of str
-        Changes that leave its meaning, so that nothing can show them.
-    survivors : tuple of str
-        Changes that no verdict shows.
-    """
-
-    number: str
-    mutants: int
-    equivalent: tuple[str, ...]
-    survivors: tuple[str, ...]
-
-    @property
-    def caught(self) -> int:
-        return self.mutants - len(self.survivors)
+    number: Annotated[str, Meta(description="The statement.")]
+    mutants: Annotated[int, Meta(description="Changes of its meaning that were tried.")]
+    caught: Annotated[int, Meta(description="Those of them that a verdict shows.")]
+    survivors: Annotated[tuple[str, ...], Meta(description="Those that none shows.")]
+    equivalent: Annotated[tuple[str, ...], Meta(description="Changes that leave its meaning, so that none can.")]
 
 
-def score_mutations(verdicts: Sequence[Verdict]) -> tuple[MutationScore, ...]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AccountMutants(Artefact):
+    """How many wrong equations the account catches."""
+
+    FILE_NAME: ClassVar[str] = "mutants.json"
+    schema: Annotated[Literal["dzdesign.mutation/1"], Meta(description="Name and version of this schema.")] = (
+        "dzdesign.mutation/1"
+    )
+    mutants: Annotated[int, Meta(description="Wrong equations.")]
+    caught: Annotated[int, Meta(description="Those that a verdict shows.")]
+    statements: Annotated[tuple[StatementMutants, ...], Meta(description="In the order of the account.")]
+
+
+def score_mutations(verdicts: Sequence[Verdict]) -> AccountMutants:
     """Mutate every statement and see which mutants are caught.
 
     Parameters
@@ -62,45 +61,23 @@ def score_mutations(verdicts: Sequence[Verdict]) -> tuple[MutationScore, ...]:
 
     Returns
     -------
-    tuple of MutationScore
-        One per statement, in order.
+    AccountMutants
     """
     statements = {verdict.number: verdict.statement for verdict in verdicts}
     found = {verdict.number: verdict for verdict in verdicts}
-    return tuple(_score(statement, statements, found) for statement in statements.values())
+    scores = tuple(_score(statement, statements, found) for statement in statements.values())
+    return AccountMutants(
+        tool=THIS_TOOL,
+        made_from=(),
+        mutants=sum(score.mutants for score in scores),
+        caught=sum(score.caught for score in scores),
+        statements=scores,
+    )
 
 
-def mutation_document(scores: Sequence[MutationScore]) -> dict[str, Any]:
-    """Return scores for people and machines.
-
-    Parameters
-    ----------
-    scores : sequence of MutationScore
-
-    Returns
-    -------
-    dict
-        Schema ``dzdesign.mutation/1``.
-    """
-    return {
-        "schema": "dzdesign.mutation/1",
-        "tool": TOOL,
-        "mutants": sum(score.mutants for score in scores),
-        "caught": sum(score.caught for score in scores),
-        "statements": [
-            {
-                "number": score.number,
-                "mutants": score.mutants,
-                "caught": score.caught,
-                "survivors": list(score.survivors),
-                "equivalent": list(score.equivalent),
-            }
-            for score in scores
-        ],
-    }
-
-
-def _score(statement: Statement, statements: Mapping[str, Statement], verdicts: Mapping[str, Verdict]) -> MutationScore:
+def _score(
+    statement: Statement, statements: Mapping[str, Statement], verdicts: Mapping[str, Verdict]
+) -> StatementMutants:
     users = [
         user
         for user in statements.values()
@@ -118,8 +95,12 @@ def _score(statement: Statement, statements: Mapping[str, Statement], verdicts: 
         judged = users if statement.kind.is_given else (mutant,)
         if not any(_shows(user, {**statements, mutant.number: mutant}, verdicts) for user in judged):
             survivors.append(text)
-    return MutationScore(
-        number=statement.number, mutants=mutants, equivalent=tuple(equivalent), survivors=tuple(survivors)
+    return StatementMutants(
+        number=statement.number,
+        mutants=mutants,
+        caught=mutants - len(survivors),
+        survivors=tuple(survivors),
+        equivalent=tuple(equivalent),
     )
 
 

@@ -254,7 +254,7 @@ def _sign_agrees(positive_if: Relational, case: Case, proof: CaseProof) -> bool:
 
 
 def _cases(statement: Statement) -> tuple[Case, ...]:
-    return statement.cases or (Case(at=(), where=""),)
+    return statement.cases or (Case((), ""),)
 
 
 def _proofs(statement: Statement, earlier: Mapping[str, Statement]) -> tuple[CaseProof, ...] | str:

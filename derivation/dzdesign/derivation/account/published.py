@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import sympy
 
 from dzdesign.derivation.account.statement import Replacements
-from dzdesign.derivation.symbols import Q_floor, Q_max0, Q_max1, beta, dP0, dP1, k, u_max, u_min0, u_min1, x_max
+from dzdesign.derivation.symbols import *
 
 U_MAX_V = 10
 DP0_MPA, DP1_MPA = 1, 5  # section 2.1: the reference, and off it

@@ -1,7 +1,7 @@
 """What a statement is: published or ours, with the grounds, cases and conditions that it is judged by."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from enum import StrEnum
 from typing import Any
 
@@ -50,7 +50,7 @@ class Kind(StrEnum):
         **more
             As `Statement` takes it.
         """
-        used = tuple(Ground(number=one) if isinstance(one, str) else one for one in grounds)
+        used = tuple(Ground(one) if isinstance(one, str) else one for one in grounds)
         return Statement(number=number, title=title, kind=self, symbol=symbol, members=members, grounds=used, **more)
 
 
@@ -63,7 +63,7 @@ class Outcome(StrEnum):
     DOES_NOT_FOLLOW = "does not follow"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Ground:
     """A statement used as a premise of another one, at certain values of its symbols.
 
@@ -86,6 +86,7 @@ class Ground:
     number: str
     at: Replacements = ()
     where: str = ""
+    _: KW_ONLY
     member: int = -1
     derivative: tuple[sympy.Symbol, Name] | None = None
 
@@ -93,7 +94,7 @@ class Ground:
         return f"{self.number} {self.where}" if self.where else self.number
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Case:
     """One of the cases by which a piecewise statement is proved; together they exhaust what can occur.
 
@@ -147,7 +148,7 @@ class Condition:
             )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Value:
     """A number that a statement gives with published figures put in, beside the number that the paper prints.
 
@@ -175,6 +176,7 @@ class Value:
     label: str
     at: Replacements
     unit: str
+    _: KW_ONLY
     of: sympy.Expr | None = None
     published: str = ""
     remark: str = ""
@@ -306,8 +308,3 @@ class Statement:
     def published(self) -> sympy.Eq:
         """The statement in its last form, the one that other statements use."""
         return sympy.Eq(self.symbol, self.members[-1], evaluate=False)
-
-    @property
-    def text(self) -> str:
-        """The statement as plain text."""
-        return " = ".join(sympy.sstr(side) for side in (self.symbol, *self.members))

@@ -18,23 +18,23 @@ def _flow(law_number: str, threshold: sympy.Symbol, pressure: sympy.Symbol) -> t
     """What gives the valve's flow under a law, beyond the threshold at one pressure drop."""
     return (
         Ground(
-            number="(1)",
-            at=(
+            "(1)",
+            (
                 (dP, pressure),
                 (u_i, threshold + u_i_prime),
                 (u_min, threshold),
                 (u_max, threshold + u_i_prime + headroom),
             ),
-            where=f"at dP = {pressure}, beyond the threshold",
+            f"at dP = {pressure}, beyond the threshold",
         ),
-        Ground(number="(11)"),
-        Ground(number="Fig. 3, command", at=((u_min0, threshold),), where=f"at dP = {pressure}"),
-        Ground(number=law_number),
+        Ground("(11)"),
+        Ground("Fig. 3, command", ((u_min0, threshold),), f"at dP = {pressure}"),
+        Ground(law_number),
     )
 
 
 _BEYOND = "0 <= u_i <= u_max, up to the spool's stop"
-_AT_DP1 = (Ground(number="(5)"), Ground(number="gamma_1"), Ground(number="(15)"), Ground(number="(16)"))
+_AT_DP1 = (Ground("(5)"), Ground("gamma_1"), Ground("(15)"), Ground("(16)"))
 _UNKNOWN_AT_DP1 = (x, u_i_prime, u_O, u_min1, gamma_1, K_1, Q_O_prime)
 
 #: Theorem 1: which flow the laws give.
@@ -45,7 +45,7 @@ TARGET = (
         Q,
         Q_O,
         scope=_BEYOND,
-        grounds=(*_flow("(14)", u_min0, dP0), *(Ground(number=number) for number in ("(9)", "(8)", "gamma_0"))),
+        grounds=(*_flow("(14)", u_min0, dP0), *(Ground(number) for number in ("(9)", "(8)", "gamma_0"))),
         eliminate=(x, u_i_prime, u_O, Q_O, K_0, gamma_0),
     ),
     Kind.THEOREM(
@@ -59,7 +59,7 @@ TARGET = (
         eliminate=_UNKNOWN_AT_DP1,
         values=tuple(
             Value(
-                label=f"flow over the target, {valve.name}",
+                f"flow over the target, {valve.name}",
                 of=beta + (1 - beta) * u_max / (k * x_max),
                 at=valve.at(),
                 unit="1",
@@ -100,9 +100,9 @@ TARGET = (
         "drive that the law `target` leaves unused at full command",
         drive_left,
         u_max - k * x_max - beta * u_min0,
-        grounds=("drive left", Ground(number="L3", at=((u_i, u_max),), where="at u_i = u_max")),
+        grounds=("drive left", Ground("L3", ((u_i, u_max),), "at u_i = u_max")),
         eliminate=(u_O,),
-        values=tuple(Value(label=f"at 5 MPa, {valve.name}", at=valve.at(), unit="V") for valve in (FIRST, SECOND)),
+        values=tuple(Value(f"at 5 MPa, {valve.name}", valve.at(), "V") for valve in (FIRST, SECOND)),
         note="(1 - beta) u_min0 where k x_max = u_max - u_min0: the target asks for x_max and not for more, though at "
         "a lower threshold the same command could open further. In flow it is what T1b gives above the target.",
     ),
@@ -112,10 +112,10 @@ TARGET = (
         u_no,
         u_0 - (1 - beta) * u_min0,
         grounds=(
-            Ground(number="u_O", at=((u_0, u_no),), where="with u_no for u_0"),
-            Ground(number="Fig. 3, command", at=((u_min0, u_min1),), where="at dP = dP1"),
+            Ground("u_O", ((u_0, u_no),), "with u_no for u_0"),
+            Ground("Fig. 3, command", ((u_min0, u_min1),), "at dP = dP1"),
             "(11)",
-            Ground(number="(10)", at=((Q_O, Q_O_prime), (dP0, dP1)), where="at dP = dP1"),
+            Ground("(10)", ((Q_O, Q_O_prime), (dP0, dP1)), "at dP = dP1"),
             "(16)",
             "(15)",
             "gamma_1",
@@ -134,7 +134,7 @@ FULL_COMMAND = (
         "output of the law (18) at full command",
         u_O,
         u_max + beta * (k * x_max + u_min0 - u_max),
-        grounds=(Ground(number="(18)", at=((u_i, u_max),), where="at u_i = u_max"),),
+        grounds=(Ground("(18)", ((u_i, u_max),), "at u_i = u_max"),),
     ),
     Kind.THEOREM(
         "T2b",

@@ -2,11 +2,10 @@
 
 import sympy
 
+from dzdesign.derivation.account.equations import ORIFICE
 from dzdesign.derivation.account.statement import Condition, Ground, Kind, Outcome, Statement
 from dzdesign.derivation.plant import PLANT_EQUATIONS, current_time_constant
 from dzdesign.derivation.symbols import *
-
-_FLOW_PER_TRAVEL = C_d * W * sympy.sqrt(2 * dP / rho)
 
 _TITLES = {
     "(19)": ("proportional amplifier", "Its gain is printed K_e, the name of the flow gain in Eq. (2); here K_a."),
@@ -24,8 +23,7 @@ _TITLES = {
 def _premise(number: str) -> Statement:
     title, note = _TITLES[number]
     equation = PLANT_EQUATIONS[number]
-    see = {"(24)": ("T6d",)}.get(number, ())
-    return Kind.PREMISE(number, title, equation.lhs, equation.rhs, see=see, note=note)
+    return Kind.PREMISE(number, title, equation.lhs, equation.rhs, see=("T6d",) if number == "(24)" else (), note=note)
 
 
 def _transformed(transform: sympy.Expr, order: int, *initial: sympy.Symbol) -> sympy.Expr:
@@ -77,7 +75,7 @@ def laplace(number: str, where: str = "under the Laplace transform") -> Ground:
     terms = sympy.Poly(equation.lhs - equation.rhs, *signals).monoms()
     if any(sum(powers) != 1 for powers in terms):
         raise ValueError(f"{number} is not linear in {signals}")
-    return Ground(number=number, at=LAPLACE, where=where)
+    return Ground(number, LAPLACE, where)
 
 
 #: Section 2.1.
@@ -122,9 +120,9 @@ SIMULATION_MODEL = (
         C_d * W * X_e * sympy.sqrt(2 * dP / rho),
         grounds=(
             Ground(
-                number="(24)",
-                at=((Q, Q_s), (x_e, X_e.func(s + a))),
-                where="transformed, with dP falling as exp(-2 a t), so that x_e exp(-a t) becomes X_e(s + a)",
+                "(24)",
+                ((Q, Q_s), (x_e, X_e.func(s + a))),
+                "transformed, with dP falling as exp(-2 a t), so that x_e exp(-a t) becomes X_e(s + a)",
             ),
         ),
         condition=Condition(
@@ -132,7 +130,7 @@ SIMULATION_MODEL = (
             # The transform of a unit step.
             witness=((X_e, 1 / s), (X_e.func(s + a), 1 / (s + a))),
             for_all=(s,),
-            discrepancy=_FLOW_PER_TRAVEL * (X_e.func(s + a) - X_e),
+            discrepancy=ORIFICE * (X_e.func(s + a) - X_e),
             words="(a constant pressure drop, Assumption 4)",
         ),
         expected=Outcome.FOLLOWS_IF,
@@ -151,10 +149,7 @@ TRANSFER_FUNCTION = (
         I_s,
         K_a * U_i / (_RESISTANCE + L_c * s),
         K_a / _RESISTANCE * U_i / (1 + current_time_constant() * s),
-        grounds=(
-            Ground(number="(25)", member=0, where="left side"),
-            Ground(number="(25)", member=1, where="right side"),
-        ),
+        grounds=(Ground("(25)", member=0, where="left side"), Ground("(25)", member=1, where="right side")),
         eliminate=(U_e,),
         expected=Outcome.FOLLOWS_IF,
         note="Time constant L_c / (R_c + r_p + K_a K_fi): the feedback makes the coil faster by the factor "
@@ -165,11 +160,11 @@ TRANSFER_FUNCTION = (
         "T6b",
         "transfer function of Eqs. (19)-(24) without load force",
         G,
-        _FLOW_PER_TRAVEL * K_i * K_a / ((L_c * s + _RESISTANCE) * (m_e * s**2 + B_e * s + K_et)),
+        ORIFICE * K_i * K_a / ((L_c * s + _RESISTANCE) * (m_e * s**2 + B_e * s + K_et)),
         grounds=(
             "transfer function",
             "(28)",
-            Ground(number="(27)", member=1, at=((F_eL, sympy.S.Zero),), where="right side, F_eL = 0"),
+            Ground("(27)", member=1, at=((F_eL, sympy.S.Zero),), where="right side, F_eL = 0"),
             "(26)",
             "T6a",
         ),
@@ -181,8 +176,8 @@ TRANSFER_FUNCTION = (
         "T6c",
         "static gain from command to flow",
         G_0,
-        _FLOW_PER_TRAVEL * K_i * K_a / (_RESISTANCE * K_et),
-        grounds=(Ground(number="T6b", at=((G, G_0), (s, sympy.S.Zero)), where="at s = 0"),),
+        ORIFICE * K_i * K_a / (_RESISTANCE * K_et),
+        grounds=(Ground("T6b", ((G, G_0), (s, sympy.S.Zero)), "at s = 0"),),
         expected=Outcome.FOLLOWS_IF,
         note="By the final value theorem, which the stability of T6b allows.",
     ),
@@ -191,14 +186,10 @@ TRANSFER_FUNCTION = (
         "T6d",
         "Eq. (24) is the dead-zone model (1) beyond the threshold",
         Q,
-        _FLOW_PER_TRAVEL * x_e,
+        ORIFICE * x_e,
         scope="a command from the threshold to full command",
         grounds=(
-            Ground(
-                number="(1)",
-                at=((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom)),
-                where="beyond the threshold",
-            ),
+            Ground("(1)", ((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom)), "beyond the threshold"),
             "overlap",
         ),
         eliminate=(x,),
@@ -206,7 +197,7 @@ TRANSFER_FUNCTION = (
         condition=Condition(
             any_of=((sympy.Eq(x_ov, 0),),),
             ruled_out_by=((x_ov, sympy.Rational(972, 10**6)),),
-            discrepancy=-_FLOW_PER_TRAVEL * x_ov,
+            discrepancy=-ORIFICE * x_ov,
         ),
         expected=Outcome.DOES_NOT_FOLLOW,
         corrected_by="T6e",
@@ -217,14 +208,10 @@ TRANSFER_FUNCTION = (
         "T6e",
         "flow across an edge with overlap, opened",
         Q,
-        _FLOW_PER_TRAVEL * (x_e - x_ov),
+        ORIFICE * (x_e - x_ov),
         scope="a command from the threshold to full command",
         grounds=(
-            Ground(
-                number="(1)",
-                at=((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom)),
-                where="beyond the threshold",
-            ),
+            Ground("(1)", ((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom)), "beyond the threshold"),
             "overlap",
         ),
         eliminate=(x,),

@@ -10,9 +10,9 @@ from dzdesign.derivation.symbols import *
 _PAPER_LAW = law("paper")
 _OFFSET = _PAPER_LAW.offset
 _THREE_CASES = (
-    Case(at=((u_min1, _OFFSET + guard),), where="beta u_min0 below the threshold"),
-    Case(at=((u_min1, _OFFSET),), where="beta u_min0 at the threshold"),
-    Case(at=((u_min1, _OFFSET - excess),), where="beta u_min0 above the threshold"),
+    Case(((u_min1, _OFFSET + guard),), "beta u_min0 below the threshold"),
+    Case(((u_min1, _OFFSET),), "beta u_min0 at the threshold"),
+    Case(((u_min1, _OFFSET - excess),), "beta u_min0 above the threshold"),
 )
 
 #: Theorem 3: zero command.
@@ -32,11 +32,11 @@ ZERO_COMMAND = (
         scope="beta u_min0 <= u_max",
         grounds=(
             Ground(
-                number="(1)",
-                at=((dP, dP1), (u_i, _OFFSET), (u_min, u_min1), (u_max, _OFFSET + headroom)),
-                where="at dP = dP1 and the law's output for u_i = 0, beta u_min0 (L1)",
+                "(1)",
+                ((dP, dP1), (u_i, _OFFSET), (u_min, u_min1), (u_max, _OFFSET + headroom)),
+                "at dP = dP1 and the law's output for u_i = 0, beta u_min0 (L1)",
             ),
-            Ground(number="opening", at=((u_O, _OFFSET), (u_min, u_min1)), where="at the same command"),
+            Ground("opening", ((u_O, _OFFSET), (u_min, u_min1)), "at the same command"),
             "gamma_1",
         ),
         eliminate=(x, gamma_1),
@@ -52,16 +52,12 @@ ZERO_COMMAND = (
         scope="u_min1 <= u_max, and the spool has not met its stop",
         within=u_min1 <= u_max,
         grounds=(
-            Ground(
-                number="(1)",
-                at=((Q, Q_max1), (dP, dP1), (u_min, u_min1), (u_i, u_max)),
-                where="at dP = dP1, full command",
-            ),
-            Ground(number="opening", at=((u_O, u_max), (u_min, u_min1)), where="at full command"),
+            Ground("(1)", ((Q, Q_max1), (dP, dP1), (u_min, u_min1), (u_i, u_max)), "at dP = dP1, full command"),
+            Ground("opening", ((u_O, u_max), (u_min, u_min1)), "at full command"),
             "gamma_1",
         ),
         eliminate=(x, gamma_1),
-        cases=(Case(at=((u_max, u_min1 + headroom),), where=""),),
+        cases=(Case(((u_max, u_min1 + headroom),), ""),),
         note="As long as the spool has not met its stop.",
     ),
     Kind.THEOREM(
@@ -73,27 +69,27 @@ ZERO_COMMAND = (
         provided=(sympy.Ne(u_max, u_min1),),
         scope="u_min1 < u_min0, a threshold lower than at the reference",
         within=u_min1 < u_min0,
-        grounds=(Ground(number="T3a", at=((beta, sympy.S.One),), where="at beta = 1"), "largest flow"),
+        grounds=(Ground("T3a", ((beta, sympy.S.One),), "at beta = 1"), "largest flow"),
         eliminate=(gamma_1,),
-        cases=(Case(at=((u_min1, u_min0 - excess),), where="threshold lower than at the reference"),),
+        cases=(Case(((u_min1, u_min0 - excess),), "threshold lower than at the reference"),),
         see=("T9d",),
         values=(
             Value(
-                label="simulation",
-                at=SIMULATION.at(),
-                unit="L/min",
+                "simulation",
+                SIMULATION.at(),
+                "L/min",
                 published=SIMULATION.zero_flow_without_beta,
                 remark="read off a figure; 0.01 L/min is 0.002 V of threshold",
             ),
             Value(
-                label="first valve",
-                at=FIRST.at(),
-                unit="L/min",
+                "first valve",
+                FIRST.at(),
+                "L/min",
                 published=FIRST.zero_flow_without_beta,
                 remark="If the paper's thresholds are the first flow that its meter shows (it starts at 0.6 L/min), "
                 "T9d gives 1.69.",
             ),
-            Value(label="second valve", at=SECOND.at(), unit="L/min"),
+            Value("second valve", SECOND.at(), "L/min"),
         ),
     ),
     Kind.THEOREM(
@@ -103,8 +99,8 @@ ZERO_COMMAND = (
         f(dP1) / f(dP0),
         grounds=(
             "(5)",
-            Ground(number="(4)", at=((u_min, u_min0), (dP, dP0)), where="at dP = dP0"),
-            Ground(number="(4)", at=((u_min, u_min1), (dP, dP1)), where="at dP = dP1"),
+            Ground("(4)", ((u_min, u_min0), (dP, dP0)), "at dP = dP0"),
+            Ground("(4)", ((u_min, u_min1), (dP, dP1)), "at dP = dP1"),
         ),
         eliminate=(u_min0, u_min1),
     ),
@@ -114,9 +110,9 @@ ZERO_COMMAND = (
         u_O,
         f(dP1),
         grounds=(
-            Ground(number="(18)", at=((u_i, sympy.S.Zero),), where="at u_i = 0"),
+            Ground("(18)", ((u_i, sympy.S.Zero),), "at u_i = 0"),
             "beta(dP)",
-            Ground(number="(4)", at=((u_min, u_min0), (dP, dP0)), where="at dP = dP0"),
+            Ground("(4)", ((u_min, u_min0), (dP, dP0)), "at dP = dP0"),
         ),
         eliminate=(beta, u_min0),
         note="Nothing is left for an error of the threshold: a design needs a guard.",
@@ -130,7 +126,7 @@ SHAPE = (
         "slope of the law (18)",
         slope,
         1 - beta * (1 - k * x_max / u_max),
-        grounds=(Ground(number="(18)", derivative=(u_i, slope), where="differentiated by u_i"),),
+        grounds=(Ground("(18)", derivative=(u_i, slope), where="differentiated by u_i"),),
         positive_if=beta * (1 - k * x_max / u_max) < 1,
         note="Holds for every beta <= 1. The law `target` always rises.",
     ),
@@ -143,8 +139,8 @@ SHAPE = (
         scope="dP1 just above dP0",
         grounds=(
             "jump",
-            Ground(number="L2", at=((u_O, u_above), (dP1, dP0 + above)), where="just above dP0"),
-            Ground(number="(14)", at=((u_O, u_below),), where="at dP0"),
+            Ground("L2", ((u_O, u_above), (dP1, dP0 + above)), "just above dP0"),
+            Ground("(14)", ((u_O, u_below),), "at dP0"),
         ),
         eliminate=(u_above, u_below),
         condition=Condition(
@@ -161,14 +157,10 @@ SHAPE = (
         "dead zone that is left below the reference",
         u_dz,
         (u_min - u_min0) * u_max / (k * x_max),
-        grounds=(
-            Ground(
-                number="(14)", at=((u_O, u_min), (u_i, u_dz)), where="where its output reaches the threshold, dP <= dP0"
-            ),
-        ),
+        grounds=(Ground("(14)", ((u_O, u_min), (u_i, u_dz)), "where its output reaches the threshold, dP <= dP0"),),
         values=(
             Value(
-                label="for a threshold 1 % of u_max above u_min0, first valve",
+                "for a threshold 1 % of u_max above u_min0, first valve",
                 of=(u_min - u_min0) / (k * x_max),
                 at=(*FIRST.at(), (u_min, sympy.Rational("5.49"))),
                 unit="%",
@@ -183,15 +175,11 @@ SHAPE = (
         -Q,
         scope="|u_i| from the threshold to full command",
         grounds=(
+            Ground("(1)", ((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom)), "at u_min + u_i'"),
             Ground(
-                number="(1)",
-                at=((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom)),
-                where="at u_min + u_i'",
-            ),
-            Ground(
-                number="(1)",
-                at=((Q, Q_neg), (u_i, -u_min - u_i_prime), (u_max, u_min + u_i_prime + headroom)),
-                where="at -(u_min + u_i')",
+                "(1)",
+                ((Q, Q_neg), (u_i, -u_min - u_i_prime), (u_max, u_min + u_i_prime + headroom)),
+                "at -(u_min + u_i')",
             ),
         ),
         eliminate=(Q,),
@@ -204,10 +192,10 @@ SHAPE = (
         sympy.S.Zero,
         scope="|u_i| below the threshold",
         within=(-u_min < u_i) & (u_i < u_min),
-        grounds=(Ground(number="(1)", at=((u_max, u_min + headroom),)),),
+        grounds=(Ground("(1)", ((u_max, u_min + headroom),)),),
         cases=(
-            Case(at=((u_i, y), (u_min, y + guard)), where="0 <= u_i < u_min"),
-            Case(at=((u_i, -y), (u_min, y + guard)), where="-u_min < u_i <= 0"),
+            Case(((u_i, y), (u_min, y + guard)), "0 <= u_i < u_min"),
+            Case(((u_i, -y), (u_min, y + guard)), "-u_min < u_i <= 0"),
         ),
     ),
 )

@@ -24,9 +24,9 @@ LAW = Law(
             "the selector gives the law `paper`, at beta = 1 up to dP0: Eq. (14)",
             u_O,
             sympy.Piecewise((_OUTPUT, dP1 > dP0), (_OUTPUT.subs(beta, 1), dP1 <= dP0)),
-            grounds=(Ground(number="u_O", at=((u_0, u_no),), where="with u_no for u_0"), "(7)", "(13)"),
+            grounds=(Ground("u_O", ((u_0, u_no),), "with u_no for u_0"), "(7)", "(13)"),
             eliminate=(u_no, u_0),
-            cases=(Case(at=((dP1, dP0 - below),), where="dP <= dP0"), Case(at=((dP1, dP0 + above),), where="dP > dP0")),
+            cases=(Case(((dP1, dP0 - below),), "dP <= dP0"), Case(((dP1, dP0 + above),), "dP > dP0")),
         ),
     ),
 )

@@ -108,17 +108,12 @@ def _product(product: sympy.Expr) -> sympy.Expr:
     constants = [factor for factor, _ in arranged if factor not in signals]
     if abs(coefficient) != 1:
         constants.insert(0, abs(coefficient))
-    is_fraction = [factor.as_base_exp()[1].could_extract_minus_sign() for factor in constants]
-    if signals and any(is_fraction) and not all(is_fraction) and not any(map(_varies_below, arranged)):
+    below = [base for _, (base, exponent) in arranged if exponent.could_extract_minus_sign()]
+    if signals and below and len(below) < len(constants) and not any(map(_varies, below)):
         constants = [sympy.Mul(*constants, evaluate=False)]
     sign = [sympy.S.NegativeOne] if coefficient < 0 else []
     written = [*sign, *constants, *signals] or [sympy.S.One]
     return written[0] if len(written) == 1 else sympy.Mul(*written, evaluate=False)
-
-
-def _varies_below(arranged: tuple[sympy.Expr, tuple[sympy.Expr, sympy.Expr]]) -> bool:
-    base, exponent = arranged[1]
-    return _varies(base) and not exponent.is_positive
 
 
 def _power(base: sympy.Expr, exponent: sympy.Expr) -> sympy.Expr:

@@ -9,6 +9,7 @@ from sympy.core.alphabets import greeks
 from sympy.core.function import AppliedUndef
 from sympy.core.relational import Relational
 from sympy.printing.latex import LatexPrinter
+from sympy.printing.printer import Printer
 from sympy.printing.str import StrPrinter
 
 from dzdesign.derivation import symbols
@@ -18,13 +19,22 @@ from dzdesign.derivation.symbols import QUANTITIES, Name
 _LOW_PARENTHESES = re.compile(r"\\left\(((?:(?!\\left|\\frac|\\sqrt|\\right).)*?) ?\\right\)")
 
 
+class _Chains(Printer):  # type: ignore[misc]
+    """Writes a <= u and u < b as a <= u < b."""
+
+    def _print_And(self, expr: sympy.And) -> str:
+        parts = [part if part.lhs == part.lts else part.reversed for part in expr.args]
+        lower, upper = sorted(parts, key=lambda part: any(part.lts == other.gts for other in parts))
+        return f"{self._print(lower)}{str(self._print(upper)).removeprefix(self._print(upper.lts))}"
+
+
 class _Ascii(StrPrinter):  # type: ignore[misc]
     def _print_Relational(self, relation: Relational) -> str:
         sign = {"==": "="}.get(relation.rel_op, relation.rel_op)
         return f"{self._print(relation.lhs)} {sign} {self._print(relation.rhs)}"
 
 
-class _Text(_Ascii):
+class _Text(_Chains, _Ascii):
     """ASCII that a person can read and a computer algebra system too, but for cases, one on a line."""
 
     def _print_Pow(self, expr: sympy.Pow, rational: bool = False) -> str:
@@ -32,9 +42,6 @@ class _Text(_Ascii):
 
     def _print_Root(self, root: Root) -> str:
         return f"sqrt({self._print(root.args[0])})"
-
-    def _print_And(self, expr: sympy.And) -> str:
-        return _chain([(self._print(side.lts), self._print(side)) for side in _ascending(expr)])
 
     def _print_Piecewise(self, expr: sympy.Piecewise) -> str:
         rows = [(self._print(value), when) for value, when in expr.args]
@@ -45,14 +52,11 @@ class _Text(_Ascii):
         return "otherwise" if when == sympy.true else f"if {self._print(when)}"
 
 
-class _Latex(LatexPrinter):  # type: ignore[misc]
+class _Latex(_Chains, LatexPrinter):  # type: ignore[misc]
     """LaTeX for math mode, with amsmath."""
 
     def _print_Root(self, root: Root) -> str:
         return rf"\sqrt{{{self._print(root.args[0])}}}"
-
-    def _print_And(self, expr: sympy.And) -> str:
-        return _chain([(self._print(side.lts), self._print(side)) for side in _ascending(expr)])
 
     def _print_Piecewise(self, expr: sympy.Piecewise) -> str:
         return str(super()._print_Piecewise(expr)).replace(r"\text{for}\:", r"\text{if }")
@@ -90,18 +94,6 @@ def _latex_word(word: str) -> str:
     if word in greeks:
         return "\\" + word
     return word if len(word) == 1 or word.isdigit() else rf"\text{{{word}}}"
-
-
-def _ascending(condition: sympy.And) -> list[Relational]:
-    """Return a <= u and u < b in that order, each with the smaller side on its left."""
-    ordered = [part if part.lhs == part.lts else part.reversed for part in condition.args]
-    return sorted(ordered, key=lambda part: any(part.lts == other.gts for other in ordered))
-
-
-def _chain(relations: list[tuple[str, str]]) -> str:
-    """Write a <= u and u < b as a <= u < b; each relation comes with its left side."""
-    first, *others = relations
-    return first[1] + "".join(relation.removeprefix(left) for left, relation in others)
 
 
 @cache

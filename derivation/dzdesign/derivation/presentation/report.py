@@ -110,31 +110,25 @@ def closure(statements: Sequence[Statement], wanted: Sequence[str]) -> tuple[str
     >>> closure(STATEMENTS, ["2"])
     ('Fig. 3, line', 'K_e', '(2)')
     """
-    numbers = {statement.number.lower(): statement.number for statement in statements}
+    names = {name: one.number for one in statements for name in (one.number.lower(), one.number.lower().strip("()"))}
     needed: set[str] = set()
     for text in wanted:
         # A comma may also be part of a name: Fig. 3, line.
-        parts = [text] if _key(text, numbers) in numbers else text.split(",")
-        needed.update(_number(part, numbers) for part in parts)
+        parts = [text] if text.strip().lower() in names else text.split(",")
+        needed.update(_number(part.strip(), names) for part in parts)
     for statement in reversed(statements):
         if statement.number in needed:
             needed.update(ground.number for ground in statement.grounds)
     return tuple(statement.number for statement in statements if statement.number in needed)
 
 
-def _key(text: str, numbers: dict[str, str]) -> str:
-    key = text.strip().lower()
-    return f"({key})" if f"({key})" in numbers else key
-
-
-def _number(text: str, numbers: dict[str, str]) -> str:
-    key = _key(text, numbers)
-    if key not in numbers:
-        near = nearest(key, numbers) or nearest(f"({key})", numbers)
-        for lower, number in numbers.items():
-            near = near.replace(f"'{lower}'", f"'{number}'")
-        raise InputError(f"no statement '{text.strip()}'{near}; give one such as 18, 6c or T3b")
-    return numbers[key]
+def _number(text: str, names: dict[str, str]) -> str:
+    if text.lower() not in names:
+        near = nearest(text.lower(), names)
+        for name, number in names.items():
+            near = near.replace(f"'{name}'", f"'{number}'")
+        raise InputError(f"no statement '{text}'{near}; give one such as 18, 6c or T3b")
+    return names[text.lower()]
 
 
 # --- what the report says of the whole ------------------------------------------------------------------------

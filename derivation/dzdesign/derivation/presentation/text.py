@@ -47,8 +47,8 @@ class TextWriter(Writer):
         return "\n".join(rows)
 
     def filters(self) -> dict[str, Callable[..., Any]]:
-        own: dict[str, Callable[..., Any]] = {"wrap": wrap, "head": head, "line": self.line, "labelled": labelled}
-        return {**super().filters(), **own, "equations": equations, "figures": self.figures}
+        own: dict[str, Callable[..., Any]] = {"wrap": wrap, "head": _head, "line": self.line, "labelled": _labelled}
+        return {**super().filters(), **own, "equations": _equations, "figures": self.figures}
 
     def line(self, line: Line, indent: str) -> str:
         """Return a sentence, and below it the formula that it leads to."""
@@ -91,17 +91,8 @@ def wrap(text: str, first: str = "", others: str | None = None) -> str:
     return "\n".join(lines).replace(_FIXED, " ")
 
 
-def equations(entries: Sequence[Entry]) -> str:
-    """Return the table of the paper's equations.
-
-    Parameters
-    ----------
-    entries : sequence of Entry
-
-    Returns
-    -------
-    str
-    """
+def _equations(entries: Sequence[Entry]) -> str:
+    """Return the table of the paper's equations."""
     rows = [("", "title", "verdict", "corrected", "see")]
     for entry in entries:
         corrected, see = (", ".join(one.number for one in found) for found in (entry.corrected_by, entry.see))
@@ -113,33 +104,15 @@ def equations(entries: Sequence[Entry]) -> str:
     return "\n".join(lines)
 
 
-def head(entry: Entry) -> str:
-    """Return a statement's number and title, with its verdict at the right end where there is room.
-
-    Parameters
-    ----------
-    entry : Entry
-
-    Returns
-    -------
-    str
-    """
+def _head(entry: Entry) -> str:
+    """Return a statement's number and title, with its verdict at the right end where there is room."""
     room = _WIDTH - len(entry.number) - len(entry.mark) - 6
     line = f"{entry.number}  {entry.title!s:<{room}}  [{entry.mark}]"
     return line if len(line) <= _WIDTH else wrap(line)
 
 
-def labelled(text: str, label: str, indent: str) -> str:
-    """Return a text behind a label.
-
-    Parameters
-    ----------
-    text, label, indent : str
-
-    Returns
-    -------
-    str
-    """
+def _labelled(text: str, label: str, indent: str) -> str:
+    """Return a text behind a label."""
     return wrap(text, f"{indent}{label}: ", " " * len(f"{indent}{label}: "))
 
 

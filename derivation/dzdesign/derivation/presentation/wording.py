@@ -212,28 +212,14 @@ def _figure(value: Value, statement: Statement, book: Mapping[str, Verdict]) -> 
         unit=value.unit,
         published=value.published,
         agrees=agrees,
-        ours=f"{significant(float(exact))}{unit}",
+        ours=f"{_significant(float(exact))}{unit}",
         paper=paper,
         remark=parse_prose(value.remark, book),
     )
 
 
-def significant(number: float) -> str:
-    """Write a number with four digits, or all digits before the point if there are more.
-
-    Parameters
-    ----------
-    number : float
-
-    Returns
-    -------
-    str
-
-    Examples
-    --------
-    >>> significant(0.939130), significant(13650.0)
-    ('0.9391', '13650')
-    """
+def _significant(number: float) -> str:
+    """Write a number with four digits, or all digits before the point if there are more."""
     return f"{number:.0f}" if abs(number) >= 1000 else f"{number:.4g}"
 
 

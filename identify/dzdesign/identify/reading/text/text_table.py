@@ -150,10 +150,14 @@ class TextTable(Table):
                 self.rows, separator=self.separator, has_header=False, schema=schema, columns=sorted(columns),
                 quote_char=None, n_rows=rows,
             )  # fmt: skip
-        except pl.exceptions.ComputeError as error:
+        except pl.exceptions.PolarsError as error:
             if pl.Float64 in types.values():
                 raise
             raise InputError(f"'{self.path}' can't be read as a table: {str(error).splitlines()[0]}") from error
+        if rows is None and frame.height != len(self.lines):
+            raise InputError(
+                f"'{self.path}' can't be read as a table: {len(self.lines)} rows of samples read as {frame.height}"
+            )
         return {label: frame[f"c{self.labels.index(label)}"] for label in types}
 
     def _no_number(self, label: str, row: int, cell: str) -> InputError:

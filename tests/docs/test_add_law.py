@@ -1,7 +1,8 @@
-"""A new law is one file: here one more goes into a copy of the room, and the whole chain runs with it."""
+"""The page on adding a law, followed to the letter in a copy of the room: one file, and the chain runs with it."""
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -11,18 +12,9 @@ import pytest
 from tests.support.paths import GOLDENS, ROOT
 from tests.support.synthetic import needs_compiler
 
-LAW = '''"""All of Eq. (14) times beta."""
-
-from dzdesign.derivation.law import Law
-from dzdesign.derivation.symbols import beta, k, u_i, u_max, u_min0, x_max
-
-LAW = Law(
-    name="scaled",
-    equation="(14) times beta",
-    output=beta * (k * x_max / u_max * u_i + u_min0),
-    note="Less gain where the dead zone is smaller.",
-)
-'''
+PAGE = ROOT / "docs" / "howto" / "add-law.md"
+#: The file that the page shows: its path, and its content.
+FILE = re.compile(r"^`([\w/]+\.py)`.*?\n\n```python\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +23,8 @@ def folder(tmp_path_factory):
     shutil.copytree(ROOT / "derivation", folder / "derivation", ignore=shutil.ignore_patterns("__pycache__"))
     laws = folder / "derivation/dzdesign/derivation/laws"
     assert {path.stem for path in laws.glob("*.py")} == {"__init__", "paper", "target"}
-    (laws / "scaled.py").write_text(LAW, encoding="utf-8")
+    [(place, content)] = FILE.findall(PAGE.read_text("utf-8"))
+    (folder / place).write_text(content, encoding="utf-8")
     shutil.copy(GOLDENS / "valve.json", folder)
     return folder
 
@@ -78,6 +71,7 @@ def test_the_firmware_says_which_law_it_is(firmware):
     assert "coefficient of beta * u_i in u_O: k x_max/u_max =" in source
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_every_input_follows_it_and_the_report_derives_it(run, firmware, folder):
     run("verify", "firmware", "-o", "evidence")
