@@ -87,6 +87,7 @@ def refusal(bench, capsys):
 # ramp tests
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("content", "words"),
     [
@@ -415,6 +416,7 @@ def test_a_valve_whose_value_does_not_fit(refusal, bench, path, change, wording)
     wording(f"bad valve.json: {place} {change}", refusal("design", "bad.json", "-o", "new.json"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("path", "change", "words"), COMPENSATORS)
 def test_a_compensator_whose_value_does_not_fit(refusal, bench, path, change, words):
     document = json.loads((bench / "compensator.json").read_text())
@@ -561,6 +563,7 @@ def test_a_folder_that_is_no_firmware(refusal, bench, name, content, words):
     assert words in refusal("verify", "firmware")
 
 
+@pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize(
     ("content", "words"),
@@ -582,6 +585,7 @@ def test_a_core_that_is_none_does_not_hold(bench, capsys, content, words):
     assert "DOES NOT HOLD  files as generated: changed or missing: core/dz_comp.c" in out and words in out
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_a_core_that_somebody_edited_does_not_hold(bench, capsys):
     core = bench / "firmware" / "core" / "dz_comp.c"
@@ -592,6 +596,7 @@ def test_a_core_that_somebody_edited_does_not_hold(bench, capsys):
     assert "HOLDS  equals the exactly rounded law" in out
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_a_plant_that_stays_shut_is_no_evidence(bench, capsys):
     """The spring holds it shut: no flow at zero command means nothing."""
@@ -611,6 +616,7 @@ def program(*argv, cwd):
     return subprocess.run([*command, *argv], cwd=cwd, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("argv", "line"),
     [
