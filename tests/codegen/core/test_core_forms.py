@@ -47,12 +47,14 @@ def firmware_folder(compensator, target: str, folder):
     return folder
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_the_narrow_form_equals_the_law_on_every_input(example_compensator, tmp_path):
     result = check_all_inputs(firmware_folder(example_compensator, "avr", tmp_path / "fw"))
     assert result.holds and result.inputs == 33550336
 
 
+@pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize("target", ["host", "avr"])
 def test_two_sides_with_a_transition_and_unlike_sensors_equal_the_law_on_every_input(two_sided, target, tmp_path):

@@ -64,6 +64,7 @@ def test_another_ramp_fills_the_gap():
     assert not warned(identify([holed, whole]), "gap")
 
 
+@pytest.mark.slow
 def test_the_error_of_a_zero_that_was_taken_off_is_in_the_bound():
     """Some hundred readings at rest tell it; left out, one bound in three lay above the threshold."""
     options, valve = IdentifyOptions(meter_lag=0.0), Valve(noise=0.1)
