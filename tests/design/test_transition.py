@@ -49,6 +49,7 @@ def test_the_transition_ends_at_or_above_the_opening_threshold_at_every_test(wit
         assert float(with_transition.drive(with_transition.transition_codes, code)) * 10 > test.u_knee_rising_V
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_no_leak_and_one_per_cent_of_dead_zone_on_the_example(with_transition, example_folder, tmp_path):
     """The issue's goal in the closed loop with hysteresis, PWM resolved: the plant is the one of the recordings."""
@@ -66,6 +67,7 @@ def test_no_leak_and_one_per_cent_of_dead_zone_on_the_example(with_transition, e
         assert loop.result.residual_opening <= 0.01
 
 
+@pytest.mark.slow
 @needs_compiler
 @pytest.mark.skipif(not SHARED.is_dir(), reason=f"the shared measurements are not at {SHARED}")
 def test_no_leak_and_one_per_cent_of_dead_zone_on_valve_a(tmp_path, capsys):
@@ -87,6 +89,7 @@ def test_an_edge_needs_the_opening_branch(example_valve):
         design(dataclasses.replace(example_valve, sides={"positive": side}), TRANSITION)
 
 
+@pytest.mark.slow
 def test_below_the_reference_beta_is_held_or_extended(example_valve):
     held, extended = design(example_valve), design(example_valve, DesignOptions(below_dp0="extend"))
     below, above = (round(held.signals.dp_code(Fraction(dp))) for dp in (Fraction(6, 10), Fraction(3)))

@@ -24,7 +24,7 @@ from tests.conftest import default_options
 from tests.support.evidence import EVIDENCE, evidence_with
 from tests.support.synthetic import needs_compiler
 
-pytestmark = needs_compiler
+pytestmark = [pytest.mark.slow, needs_compiler]
 
 
 @pytest.fixture

@@ -11,6 +11,8 @@ from dzdesign.core.errors import QUOTED, InputError
 #: Lists and objects in one another; dzdesign's own artefacts have eight. Beyond some hundred, what reads or prints the
 #: value would end in the interpreter's own limit, at a depth that depends on who called.
 DEEPEST = 32
+#: Bytes of a file that are hashed at a time.
+PIECE = 1 << 20
 #: Digits of a whole number; a part of a fraction has some sixty.
 MOST_DIGITS = 1000
 #: What writes the artefacts that are given to another command, by the schema's name without its version.
@@ -31,7 +33,7 @@ def sha256_of_file(file: BinaryIO) -> str:
     """Return the SHA-256 of a whole file in hex, read piece by piece; the file is at its beginning again then."""
     file.seek(0)
     digest = hashlib.sha256()
-    while piece := file.read(1 << 20):
+    while piece := file.read(PIECE):
         digest.update(piece)
     file.seek(0)
     return digest.hexdigest()

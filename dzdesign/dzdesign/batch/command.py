@@ -46,11 +46,6 @@ IDENTIFY = tuple(argument.name for argument in arguments_of(IdentifyChoices) if 
 def calibrate_lot(args: BatchArguments) -> tuple[LotSummary, Path | None]:
     """Calibrate the valves of a folder or a list; return batch.json, and where the report is if there is one.
 
-    Parameters
-    ----------
-    args : BatchArguments
-        Of the command.
-
     Raises
     ------
     InputError

@@ -36,6 +36,8 @@ from dzdesign.stages.identify import IdentifyChoices
 from tests.support.crashing_work import die_over_bad
 from tests.support.synthetic import needs_compiler
 
+pytestmark = pytest.mark.slow
+
 SEED, COUNT = 7, 12
 OPTIONS = ["--meter-lag", "0.1 s", "--target", "host"]
 NOTHING = dict(recordings=(), identify=IdentifyChoices(), design=DesignChoices(), target="host")

@@ -26,6 +26,8 @@ from dzdesign.stages.identify import IdentifyChoices
 from tests.support.crashing_work import die_over_bad
 from tests.support.paths import ROOT
 
+pytestmark = pytest.mark.slow
+
 COUNT, SEED = 7, 7
 OPTIONS = ["--meter-lag", "0.1 s", "--target", "host"]
 NOTHING = dict(recordings=(), identify=IdentifyChoices(), design=DesignChoices(), target="host")

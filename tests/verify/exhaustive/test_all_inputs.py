@@ -97,6 +97,7 @@ FAULTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS)
 def test_each_count_fires(plain, fault):
     statement, expected = FAULTS[fault]
@@ -106,6 +107,7 @@ def test_each_count_fires(plain, fault):
     assert found.faults
 
 
+@pytest.mark.slow
 def test_a_pair_of_pressures_that_is_not_its_difference_is_odd_and_not_wrong(plain):
     prepared = PreparedInputs(exact_law(plain))
     odd = wrapped(CompiledCore(plain), "if (p_a_adc == 2500u && p_b_adc == 2001u) compare++;")
@@ -133,6 +135,7 @@ def test_what_is_shown_is_checked_on_both_sides(full, sign):
             assert getattr(found, count) > 0 and found.faults == getattr(found, count)
 
 
+@pytest.mark.slow
 def test_both_sides_of_everything_see_a_fault_at_one_place(full):
     for sign, function in ((1, "dz_comp"), (-1, "dz_comp_negative")):
         prepared = PreparedInputs(exact_law(full, sign))
@@ -149,6 +152,7 @@ def test_both_sides_of_everything_see_a_fault_at_one_place(full):
         assert core.check(prepared.sample(), sample=True).faults == 0
 
 
+@pytest.mark.slow
 def test_the_hash_is_of_all_compare_values(plain):
     prepared = PreparedInputs(exact_law(plain)).everything()
     core = CompiledCore(plain)
@@ -189,6 +193,7 @@ def test_the_layouts_are_those_of_the_header(tmp_path):
     assert list(map(int, said)) == expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sign", [1, -1])
 def test_the_pairs_of_a_difference_are_those_that_make_it(full, sign):
     exact = exact_law(full, sign)
@@ -222,6 +227,7 @@ def test_the_pressure_drops_of_a_difference_are_the_extremes_over_its_pairs(full
         assert most[place] / scale == pytest.approx(drops.max() + ends[1], abs=1e-9)
 
 
+@pytest.mark.slow
 def test_the_steps_of_the_c_are_the_rows_of_the_reference(full):
     """The C's quotients and remainders against the law in fractions, command by command."""
     for sign in (1, -1):
@@ -256,6 +262,7 @@ def test_a_sample_has_the_corners(plain):
 # --- other processors ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @needs(CORTEX_M4)
 @pytest.mark.parametrize("sign", [1, -1])
 def test_the_machine_code_of_the_cortex_m4_gives_what_the_host_gives_at_every_input(sign, tmp_path):
@@ -265,6 +272,7 @@ def test_the_machine_code_of_the_cortex_m4_gives_what_the_host_gives_at_every_in
     assert done.holds and done.found.inputs == host.inputs and done.found.outputs_hash == host.outputs_hash
 
 
+@pytest.mark.slow
 @needs(AVR)
 def test_the_machine_code_of_the_avr_gives_what_the_host_gives_at_the_sample(tmp_path):
     folder = copy_of(GOLDENS, "avr", tmp_path / "fw")
@@ -272,6 +280,7 @@ def test_the_machine_code_of_the_avr_gives_what_the_host_gives_at_the_sample(tmp
     assert done.holds and done.found.inputs > 5000
 
 
+@pytest.mark.slow
 @needs(AVR)
 def test_an_int_of_16_bits_is_seen_on_the_avr_alone(tmp_path):
     """A product that needs a longer int, which no PC shows."""
@@ -306,6 +315,7 @@ def input_check_of(folder):
     return input_check(prepared, CompiledCore(folder), found)
 
 
+@pytest.mark.slow
 def test_the_command_line_reports_a_machine_that_is_not_here_and_does_not_hold(
     firmware_folder, tmp_path, capsys, monkeypatch
 ):

@@ -81,6 +81,7 @@ def slow_margin(compensator, each):
     return min(margins)
 
 
+@pytest.mark.slow
 def test_the_margin_of_each_valve_is_that_of_its_own_curve(batch, common):
     found = {each.name: each.margin_V for each in common.margins}
     assert set(found) == set(batch) and min(found.values()) >= 0
@@ -199,6 +200,7 @@ def test_verify_compares_the_core_with_every_valve(common, tmp_path):
     assert "d, 1.99 MPa" in check.text
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_the_command_fails_and_names_the_valve(common, tmp_path, capsys):
     folder, _ = firmware_of(with_bound(common.compensator, "c", 1, -1.0), tmp_path / "firmware")
@@ -285,6 +287,7 @@ def test_a_range_that_would_be_none_without_them_and_one_that_another_side_ends(
 # ---- what a reader is told ----
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_firmware_and_report_say_first_that_they_are_of_a_lot(common, batch, tmp_path):
     folder = tmp_path / "firmware"

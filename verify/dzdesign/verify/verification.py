@@ -1,6 +1,6 @@
 """`verify`: a firmware folder in, evidence out: strict compilation, every input, closed loop."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -188,7 +188,7 @@ def _try_core(folder: Path, compensator: Compensator) -> _Core:
     )
 
 
-def evidence_manifest(evidence: Evidence) -> dict[str, object]:
+def evidence_manifest(evidence: Evidence) -> Mapping[str, object]:
     """Return what the manifest of the evidence folder says beside the hashes of its files."""
     header = as_document(evidence)
     return {key: header[key] for key in ("schema", "tool", "made_from")}
