@@ -20,7 +20,7 @@ FIGURES = {
     "staircase": valve_figures.staircase,
     "over_compensation": law_figures.over_compensation,
     "residual": law_figures.residual,
-    "edge": law_figures.edge,
+    "transition": law_figures.transition,
     "pwm": law_figures.pwm,
     "every_input": law_figures.every_input,
 }

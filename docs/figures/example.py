@@ -43,9 +43,9 @@ class Example:
         return design(self.found.model)
 
     @cached_property
-    def with_edge(self) -> Compensator:
-        """The same with an edge over 1 % of command."""
-        return design(self.found.model, DesignOptions(edge=Fraction(1, 100)))
+    def with_transition(self) -> Compensator:
+        """The same with a transition over 1 % of command."""
+        return design(self.found.model, DesignOptions(transition=Fraction(1, 100)))
 
     @cached_property
     def loop(self) -> ClosedLoop:

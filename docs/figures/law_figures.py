@@ -1,4 +1,4 @@
-"""Figures of the law and of the firmware: over-compensation, residual dead zone, edge, PWM, every input."""
+"""Figures of the law and of the firmware: over-compensation, residual dead zone, transition, PWM, every input."""
 
 from fractions import Fraction
 from typing import TYPE_CHECKING
@@ -75,14 +75,14 @@ def residual(example: Example) -> "Figure":
     return figure
 
 
-def edge(example: Example) -> "Figure":
-    """Drive over the first per cents of command, without and with an edge."""
+def transition(example: Example) -> "Figure":
+    """Drive over the first per cents of command, without and with a transition."""
     figure, (axes,) = panels(3.5)
     test = example.side.tests[1]
     command = np.arange(0, 130)
     for compensator, colour, line, name in (
-        (example.compensator, BLUE, "--", "without an edge"),
-        (example.with_edge, GREEN, "-", 'with --transition "1 %"'),
+        (example.compensator, BLUE, "--", "without a transition"),
+        (example.with_transition, GREEN, "-", 'with --transition "1 %"'),
     ):
         code = int(compensator.signals.dp_code(Fraction(test.dp_MPa)))
         drive = 10 * np.array([float(compensator.drive(int(each), code)) for each in command])
@@ -92,7 +92,7 @@ def edge(example: Example) -> "Figure":
         axes.annotate(
             f"{name}, {height:.3f} V", (3.15, height), (0, -11), textcoords="offset points", ha="right", fontsize=8
         )
-    codes = example.with_edge.transition_codes
+    codes = example.with_transition.transition_codes
     end = 100 * codes / 4095
     axes.axvline(end, color=GREY, ls=":", lw=1.2)
     note(axes, f"transition's end: {codes} codes,\n{end:.2f} % of command", (1.55, 5.27), (end, 5.3))

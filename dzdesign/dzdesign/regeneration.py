@@ -18,25 +18,12 @@ if TYPE_CHECKING:
 
 
 def with_regenerated(verification: "Verification", folder: Path) -> "Verification":
-    """Return a verification with the check of `regenerated`.
-
-    Parameters
-    ----------
-    verification : Verification
-        Of the folder.
-    folder : Path
-        Of the firmware.
-    """
+    """Return a verification with the check of `regenerated`."""
     return verification.with_checks(regenerated(folder))
 
 
 def regenerated(folder: Path) -> "Check":
     """Tell whether every file is what `codegen` makes of compensator.json, but for those that are the user's.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the firmware.
 
     Returns
     -------

@@ -36,6 +36,7 @@ class TestBound:
         hidden = norm.pdf(z) ** 2 / ndtr(z)
         assert tobit_share(np.array(z)) == pytest.approx(seen + hidden, rel=1e-8)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("saturation_V", [10.0, 3.0], ids=["no saturation", "saturation"])
     def test_maximum_likelihood_reaches_it(self, saturation_V):
         bench = SMALL.with_changes(saturation_V=saturation_V, pressures_MPa=(1.0,), floor_L_min=1.5, noise_L_min=0.4)
@@ -123,17 +124,21 @@ class TestDropOuts:
     def failed(self):
         return int((self.outcome(self.in_long_runs, 40).bound_excess > 0).sum())
 
+    @pytest.mark.slow
     def test_single_ones_move_no_knee(self):
         assert abs(self.mean_error_mV()) < 1.2
 
+    @pytest.mark.slow
     def test_and_would_if_they_were_no_flow(self, monkeypatch):
-        monkeypatch.setattr("dzdesign.identify.knees.gated_line._share_of_drop_outs", lambda *_: 0.0)
+        monkeypatch.setattr("dzdesign.identify.knees.line_fitting._share_of_drop_outs", lambda *_: 0.0)
         assert self.mean_error_mV() > 2.0
 
+    @pytest.mark.slow
     def test_bounds_hold_with_long_runs(self):
         assert self.failed() == 0
 
+    @pytest.mark.slow
     def test_and_would_not_if_those_were_no_flow(self, monkeypatch):
-        nothing = "dzdesign.identify.knees.gated_line._runs_of_drop_outs"
+        nothing = "dzdesign.identify.knees.line_fitting._runs_of_drop_outs"
         monkeypatch.setattr(nothing, lambda censored, *_: np.zeros(censored.size, dtype=bool))
         assert self.failed() >= 3

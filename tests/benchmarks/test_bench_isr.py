@@ -101,6 +101,7 @@ def test_the_expected_values_are_those_of_the_compensator(example_compensator, i
             assert value == c.compare(u, p_a - p_b if possible else -c.signals.code_max)
 
 
+@pytest.mark.slow
 @needs(on_x86.X86)
 def test_rivals_do_the_same_job(example_compensator, inputs, expected, tmp_path):
     """Within a count, impossible codes included; only the unchecked table leaves those out."""
@@ -110,6 +111,7 @@ def test_rivals_do_the_same_job(example_compensator, inputs, expected, tmp_path)
         assert (wrong > 0) == rival.name.endswith("unchecked"), rival.name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "machine",
     [

@@ -87,6 +87,7 @@ def test_nothing_of_a_compensator_stands_in_them(compensator):
 # ---- generated again ----
 
 
+@pytest.mark.slow
 def test_what_was_filled_in_is_kept_and_said(compensator, cortex, tmp_path, capsys):
     fill_in(cortex)
     (cortex / "cortex_m4/main.c").unlink()  # wanted anew
@@ -213,6 +214,7 @@ def test_without_the_compiler_it_is_said_why(cortex, monkeypatch):
     assert found == BoardCompiled(not_compiled="no-such-gcc is not on the path; install it, then `verify`")
 
 
+@pytest.mark.slow
 @needs_arm
 def test_a_vendors_header_is_named_and_found_by_an_option(cortex, tmp_path, capsys):
     fill_in(cortex, old="#include", new='#include "stm32_chip.h"\n#include')
@@ -293,6 +295,7 @@ def test_a_manifest_can_not_hide_a_core_file_in_that_folder(cortex):
     assert unchanged(cortex).holds is False and "changed or missing: board/adc.c" in unchanged(cortex).text
 
 
+@pytest.mark.slow
 @needs_arm
 def test_make_takes_renamed_copies_of_board_files_and_finds_what_lies_in_board(cortex):
     place, own = cortex / "cortex_m4", cortex / "board"
@@ -314,6 +317,7 @@ def test_make_takes_renamed_copies_of_board_files_and_finds_what_lies_in_board(c
     assert unchanged(cortex).holds
 
 
+@pytest.mark.slow
 def test_an_earlier_target_that_is_replaced_is_said_so(compensator, cortex, tmp_path, capsys):
     path = tmp_path / "compensator.json"
     path.write_bytes(to_json_bytes(compensator))
@@ -325,13 +329,14 @@ def test_an_earlier_target_that_is_replaced_is_said_so(compensator, cortex, tmp_
     assert not (cortex / "cortex_m4").exists()
 
 
+@pytest.mark.slow
 def test_verify_holds_and_says_that_it_was_not_checked(cortex, tmp_path):
     fill_in(cortex)
     result = verify(cortex, sequence=RampSequence(rest=0.5, ramp=4.0, top=0.5))
     assert result.holds and result.evidence.changed_board_files == ("cortex_m4/dz_board.c",)
     said = "cortex_m4/dz_board.c, which is yours and was changed: review it, and try it on the machine"
     assert said in not_tried(result.evidence)
-    assert "NOT CHECKED: cortex_m4/dz_board.c, which is yours" in str(result)
+    assert "NOT CHECKED  cortex_m4/dz_board.c, which is yours" in str(result)
     manifest = evidence_manifest(result.evidence)
     write_folder(tmp_path / "evidence", with_report(evidence_files(result), cortex, tmp_path / "evidence"), manifest)
     html = (tmp_path / "evidence" / REPORT_NAME).read_text(encoding="utf-8")

@@ -47,8 +47,8 @@ def random_compensators(base, count: int, seed: int):
     """Vary every coefficient of a compensator at random, within what a valve can have."""
     rng = np.random.default_rng(seed)
     for _ in range(count):
-        edge = int(rng.choice([0, 1, 32]))
-        units = finest_units(base.signals, edge)
+        transition = int(rng.choice([0, 1, 32]))
+        units = finest_units(base.signals, transition)
         unit = units.beta
         falling = np.sort(rng.integers(unit // 2, unit + 1, base.nodes(1)))[::-1]
         side = SideLaw(
@@ -57,12 +57,12 @@ def random_compensators(base, count: int, seed: int):
             ),
             u_min0_over_u_max=Fraction(int(rng.integers(20, units.coefficient)), units.coefficient),
             beta=tuple(int(value) for value in falling),
-            transition_beta=tuple(int(value) + unit // 16 for value in falling) if edge else None,
+            transition_beta=tuple(int(value) + unit // 16 for value in falling) if transition else None,
             certificate=base.positive.certificate,
         )
         law_name = str(rng.choice(["paper", "target"]))
         yield dataclasses.replace(
-            base, law=law_name, sides=Sides(positive=side), transition_codes=edge, beta_denominator=unit
+            base, law=law_name, sides=Sides(positive=side), transition_codes=transition, beta_denominator=unit
         )
 
 
@@ -79,7 +79,7 @@ def test_integer_form_equals_the_exact_law_at_random_and_at_corners(example_comp
 
 @pytest.mark.parametrize("seed", range(20))
 def test_whatever_units_design_takes_the_firmware_can_count_in(example_compensator, seed):
-    """Converters, attenuators, PWMs and edges as they come: the coarsest units that design falls back to are enough."""
+    """Converters, attenuators, PWMs and transitions as they come: the coarsest units of design are enough."""
     rng = np.random.default_rng(seed)
     compare_max = int(rng.choice([60000, 40000, 10000, 4096, 1023]))
     span = int(rng.choice([4095, 3276, 3277, 2047, 2048, 4000, 1021]))

@@ -191,6 +191,7 @@ def test_cortex_m4_in_qemu_prints_the_hashes_of_the_host(copy):
     assert "dz_tick: 25 interrupts, compare values of dz_drive_tick()" in printed
 
 
+@pytest.mark.slow
 @needs_avr
 def test_avr_in_simavr_prints_the_hash_of_the_exact_law(copy):
     folder = copy("avr") / "avr"
@@ -201,6 +202,7 @@ def test_avr_in_simavr_prints_the_hash_of_the_exact_law(copy):
     ]
 
 
+@pytest.mark.slow
 @needs_avr
 def test_everything_switched_on_in_simavr_prints_the_hashes_of_the_host(tmp_path):
     """The avr's core has 32-bit arithmetic only, the host's 64-bit products; the walk drives both solenoids."""
@@ -230,6 +232,7 @@ def test_everything_switched_on_is_exact_on_all_inputs(sign, tmp_path):
     assert result.holds and result.wrong == 0 and result.over_compensated == 0
 
 
+@pytest.mark.slow
 @needs_avr
 def test_an_int_of_16_bits_shows_in_the_hash(copy):
     """Seed what a PC hides: a product that needs a longer int."""

@@ -142,6 +142,7 @@ def test_every_other_target_prints_names_by_the_same_banner():
 # plots and pages
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES, ids=range(len(NAMES)))
 def test_a_name_in_a_plot(name):
     from dzdesign.identify.plots.frame import finish, new_figure, plot_style, saved

@@ -76,6 +76,7 @@ def test_a_target_says_its_own_name_and_uses_every_template(name):
         assert PurePosixPath(path).parts[0] == target.folder and ".." not in path
 
 
+@pytest.mark.slow
 def test_the_wheel_generates_for_every_target(tmp_path):
     source = tmp_path / "source"
     left_out = shutil.ignore_patterns(".*", "*.egg-info", "build", "__pycache__", "tests", "benchmarks")
@@ -132,6 +133,7 @@ def test_codegen_without_a_source_says_so(capsys):
     assert "COMPENSATOR.json" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TARGET_NAMES)
 def test_design_and_codegen_fit_the_target(name, tmp_path, capsys):
     """From a valve codegen designs by itself, and that is what design and codegen do one after the other."""
@@ -156,6 +158,7 @@ def test_a_compensator_of_another_target_is_refused_with_the_way_out():
         assert "DZ_COMPARE_MAX 40000u" in generate(golden_compensator("f280049c"), name).files["core/dz_comp.h"]
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_the_core_is_exact_on_every_input_for_another_pwm(tmp_path):
     firmware = generate(golden_compensator("f280049c"), "f280049c")
@@ -221,6 +224,7 @@ def without_banner(text: str) -> list[str]:
     return [line for line in text.splitlines() if not re.search(meant, line)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("target", TARGET_NAMES)
 @pytest.mark.parametrize("name", HOSTILE)
 def test_a_hostile_name_changes_nothing_but_a_harmless_comment(target, name):

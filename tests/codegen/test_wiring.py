@@ -15,7 +15,7 @@ from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.options import arguments_of
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.request import DesignChoices
+from dzdesign.design.design_choices import DesignChoices
 from dzdesign.design.signal_text import command_signal, parse_signal
 from dzdesign.design.target_inputs import Converter
 from tests.support.golden_firmware import FULL, GOLDENS
@@ -73,6 +73,7 @@ SIGNALS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("polarity", ["normal", "inverted"])
 @pytest.mark.parametrize("name", SIGNALS)
 def test_the_codes_of_the_power_up_are_those_of_the_signal(firmware, name, polarity):
@@ -99,6 +100,7 @@ def shares(both: bool) -> list[Fraction]:
     return [Fraction(0), *positive] + ([-share for share in positive] if both else [])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("target", C2000)
 def test_zero_command_gives_what_the_law_gives(firmware, target):
     folder = firmware(target, "--command-signal", BOTH, both=True)
@@ -126,6 +128,7 @@ def test_the_cortex_m4_warns_of_a_broken_wire_too(firmware):
         assert text.count("0 V at the command's pin is code 0: full command. A broken wire opens the valve") == said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("target", C2000)
 @pytest.mark.parametrize(("signal", "polarity", "both", "said"), BROKEN)
 def test_the_wiring_says_what_a_broken_wire_of_the_command_does(firmware, target, signal, polarity, both, said):
@@ -203,6 +206,7 @@ def test_the_ramp_through_the_zero_window_changes_pins_where_the_drive_does(firm
     assert f"zero window, codes {zero - window} to {zero + window}" in step(readme(folder, "f28335"), 7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("target", C2000)
 def test_a_dither_shows_in_the_compare_value(firmware, target):
     folder = firmware(target, "--dither", "150 Hz 1 %")

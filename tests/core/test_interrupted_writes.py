@@ -20,7 +20,10 @@ from tests.support.paths import DEVICES
 
 HERE = DEVICES
 COMPILER = next((path for name in ("cc", "gcc", "clang") if (path := shutil.which(name))), None)
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="calls are intercepted by a Linux loader's means")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(sys.platform != "linux", reason="calls are intercepted by a Linux loader's means"),
+]
 #: What a kill may leave behind: hidden, and in nobody's way.
 LITTER = ".dzdesign-"
 

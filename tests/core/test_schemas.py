@@ -139,6 +139,7 @@ def test_a_compensator_with_every_option_fits():
     assert problems("compensator", document) == [] and problems("valve", document["valve"]) == []
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_evidence_fits_and_every_fault_in_it_is_seen(evidence):
     assert problems("evidence", evidence) == []

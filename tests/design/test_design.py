@@ -38,6 +38,7 @@ def designed(request):
     return (*compensator_of(threshold), threshold)
 
 
+@pytest.mark.slow
 def test_zero_command_stays_under_the_true_closing_threshold_at_every_pressure_code(designed):
     valve, compensator, threshold = designed
     low, high = valve.positive.valid_dp_MPa

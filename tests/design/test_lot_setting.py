@@ -50,6 +50,7 @@ def highest_over(common, each, label="positive", sign=1):
     return max(common.beta(code, sign) * u_min0 - top for code, top in enumerate(limit))
 
 
+@pytest.mark.slow
 def test_valves_of_opposite_trends_have_one_setting_under_both(falling, rising):
     common = lot_setting({"falling": falling, "rising": rising})
     assert set(common.binding) == {"falling", "rising"}
@@ -62,6 +63,7 @@ def test_of_valves_that_are_alike_it_is_their_own(falling):
     assert common.positive == falling.positive
 
 
+@pytest.mark.slow
 def test_both_signs():
     content = BOTH_SIDES.read_bytes()
     signals = Signals()
@@ -96,6 +98,7 @@ def test_the_doubles_find_the_exact_limit(falling, rising):
         np.testing.assert_allclose(found, [float(value) for value in exact], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_what_has_no_common_setting_is_told_why(falling, rising):
     low, high = (designed(valve(lambda dp: 5.4 - 0.05 * dp, pressures)) for pressures in ((0.5, 1.0), (2.0, 4.0)))
     with pytest.raises(InputError, match="no tested pressure drop in common"):
@@ -105,6 +108,6 @@ def test_what_has_no_common_setting_is_told_why(falling, rising):
     other = designed(rising.valve, DesignOptions(law="target"))
     with pytest.raises(InputError, match="another law"):
         lot_setting({"a": falling, "b": other})
-    edged = designed(falling.valve, DesignOptions(transition=Fraction(1, 50)))
+    with_transition = designed(falling.valve, DesignOptions(transition=Fraction(1, 50)))
     with pytest.raises(InputError, match="with --transition"):
-        lot_setting({"a": edged, "b": edged})
+        lot_setting({"a": with_transition, "b": with_transition})

@@ -72,6 +72,7 @@ def test_what_design_wrote_follows(document):
     prove_derived(read(document))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("path", "value", "said"),
     [
@@ -89,6 +90,7 @@ def test_an_edit_by_hand_is_refused_with_its_place(document, path, value, said):
     assert said in refusal(edited(document, path, lambda _: value))
 
 
+@pytest.mark.slow
 def test_every_number_of_the_file_counts(document):
     unseen = []
     for path in places({key: value for key, value in document.items() if key not in WORDS}):

@@ -1,4 +1,4 @@
-"""Signals as engineers write them, the codes they become, and the amplifier's options as integers."""
+"""Signals as engineers write them, the codes they become, and the drive functions as integers."""
 
 import random
 from fractions import Fraction
@@ -113,7 +113,7 @@ def test_sensors_too_unlike_are_refused():
         )
 
 
-def test_the_amplifiers_integers():
+def test_the_integers_of_the_drive_functions():
     options = DesignOptions(
         signals=Signals(command=command("-10..10 V x 0.15 + 1.5 V")),
         transition=Fraction(1, 100), ramp_up_s=(0.5, 0.8), dither_Hz=150.0, dither_peak=Fraction(1, 100),

@@ -1,4 +1,4 @@
-"""The edge and the other choices of design: what they promise, on the exact law and in the closed loop."""
+"""The transition and the other choices of design: what they promise, on the exact law and in the closed loop."""
 
 import dataclasses
 import json
@@ -17,46 +17,47 @@ from dzdesign.design.options import DesignOptions
 from dzdesign.verify.closed_loop.loop import RampSequence
 from tests.support.synthetic import SHARED, needs_compiler
 
-EDGE = options_of({"transition": "1 %"}, target_named("f28335").inputs())
+TRANSITION = options_of({"transition": "1 %"}, target_named("f28335").inputs())
 
 
 @pytest.fixture(scope="module")
-def edged(example_valve):
-    return design(example_valve, EDGE)
+def with_transition(example_valve):
+    return design(example_valve, TRANSITION)
 
 
-def test_the_edge_runs_from_the_certified_offset_to_the_opening_law_without_a_step(edged, example_valve):
+def test_it_runs_from_the_certified_offset_to_the_opening_law_without_a_step(with_transition, example_valve):
     plain = design(example_valve)
-    codes = edged.transition_codes
-    u_max = float(edged.u_max_V)
+    codes = with_transition.transition_codes
+    u_max = float(with_transition.u_max_V)
     for dp_code in range(0, 1100, 50):
-        drives = [edged.drive(command, dp_code) for command in range(codes + 3)]
-        # Zero command: the same certified curve as without an edge, to within the nodes' rounding.
+        drives = [with_transition.drive(command, dp_code) for command in range(codes + 3)]
+        # Zero command: the same certified curve as without a transition, to within the nodes' rounding.
         assert float(abs(drives[0] - plain.drive(0, dp_code))) * u_max < 1e-3
         rises = [right - left for left, right in pairwise(drives)]
         assert all(rise > 0 for rise in rises)
         assert len(set(rises[:codes])) == 1 and len(set(rises[codes:])) == 1  # two straight parts that meet
-        # Beyond the edge the law goes on as a law of the opening threshold's beta, Eq. (18).
-        side, beta, share = edged.positive, edged.law_beta(dp_code), Fraction(codes + 2, 4095)
+        # Beyond the transition the law goes on as a law of the opening threshold's beta, Eq. (18).
+        side, beta, share = with_transition.positive, with_transition.law_beta(dp_code), Fraction(codes + 2, 4095)
         law = (beta * side.drive_range_over_u_max - beta + 1) * share + beta * side.u_min0_over_u_max
         assert drives[codes + 2] == law
 
 
-def test_the_edge_ends_at_or_above_the_opening_threshold_at_every_test(edged, example_valve):
-    signals = edged.signals
+def test_the_transition_ends_at_or_above_the_opening_threshold_at_every_test(with_transition, example_valve):
+    signals = with_transition.signals
     for test in example_valve.positive.tests:
         code = round(signals.dp_code(Fraction(repr(test.dp_MPa))))
-        assert float(edged.drive(edged.transition_codes, code)) * 10 > test.u_knee_rising_V
+        assert float(with_transition.drive(with_transition.transition_codes, code)) * 10 > test.u_knee_rising_V
 
 
+@pytest.mark.slow
 @needs_compiler
-def test_no_leak_and_one_per_cent_of_dead_zone_on_the_example(edged, example_folder, tmp_path):
+def test_no_leak_and_one_per_cent_of_dead_zone_on_the_example(with_transition, example_folder, tmp_path):
     """The issue's goal in the closed loop with hysteresis, PWM resolved: the plant is the one of the recordings."""
     from dzdesign.codegen.project import generate
     from dzdesign.verify.closed_loop.plant import read_plant
     from dzdesign.verify.verification import verify
 
-    firmware = generate(edged, "f28335")
+    firmware = generate(with_transition, "f28335")
     write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
     plant = read_plant(example_folder / "plant.toml")
     result = verify(tmp_path / "fw", plant, sequence=RampSequence(rest=1.0, ramp=40.0, top=1.0))
@@ -66,6 +67,7 @@ def test_no_leak_and_one_per_cent_of_dead_zone_on_the_example(edged, example_fol
         assert loop.result.residual_opening <= 0.01
 
 
+@pytest.mark.slow
 @needs_compiler
 @pytest.mark.skipif(not SHARED.is_dir(), reason=f"the shared measurements are not at {SHARED}")
 def test_no_leak_and_one_per_cent_of_dead_zone_on_valve_a(tmp_path, capsys):
@@ -84,9 +86,10 @@ def test_no_leak_and_one_per_cent_of_dead_zone_on_valve_a(tmp_path, capsys):
 def test_an_edge_needs_the_opening_branch(example_valve):
     side = dataclasses.replace(example_valve.positive, opening_curve=None)
     with pytest.raises(InputError, match="leave out --transition"):
-        design(dataclasses.replace(example_valve, sides={"positive": side}), EDGE)
+        design(dataclasses.replace(example_valve, sides={"positive": side}), TRANSITION)
 
 
+@pytest.mark.slow
 def test_below_the_reference_beta_is_held_or_extended(example_valve):
     held, extended = design(example_valve), design(example_valve, DesignOptions(below_dp0="extend"))
     below, above = (round(held.signals.dp_code(Fraction(dp))) for dp in (Fraction(6, 10), Fraction(3)))

@@ -24,7 +24,11 @@ HOW_TO = [
     ),
 ]
 
-pytestmark = [needs_compiler, pytest.mark.skipif(shutil.which("bash") is None, reason="the pages' commands need bash")]
+pytestmark = [
+    pytest.mark.slow,
+    needs_compiler,
+    pytest.mark.skipif(shutil.which("bash") is None, reason="the pages' commands need bash"),
+]
 
 
 @pytest.fixture(scope="module")

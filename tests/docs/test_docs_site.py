@@ -26,7 +26,7 @@ FOLDERS = (*ROOMS, "tests", "examples", "docs")
 #: Tag -> attribute by which a page loads something; a link that a reader may follow is not among them.
 LOADS = {"link": "href", "script": "src", "img": "src", "source": "src", "iframe": "src", "object": "data"}
 
-pytestmark = needs_compiler
+pytestmark = [pytest.mark.slow, needs_compiler]
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,8 @@ import pytest
 from dzdesign.core.artefact_types import THIS_TOOL
 from dzdesign.report.lot.summary import FailedValve, LotSummary
 from dzdesign.terminal.notebook import html_of
-from dzdesign.terminal.tables import print_compensator, print_scenarios, print_valve
+from dzdesign.terminal.tables import print_compensator, print_valve
+from dzdesign.terminal.verification_tables import print_scenarios
 from tests.support.paths import ROOT
 
 GLOSSARY = (ROOT / "docs/concepts/glossary.md").read_text("utf-8")
@@ -79,7 +80,7 @@ def test_every_word_of_the_outputs_is_in_the_glossary():
     known = {word for term in terms for word in term.split(", ")}
     said = {
         "knee", "onset", "level", "s.e.", "bound", "beta", "dP0", "u_min0", "drive range", "k x_max/u_max", "trend",
-        "cost", "certificate", "guard", "edge", "over-compensation", "residual dead zone", "staircase", "offset",
+        "cost", "certificate", "guard", "transition", "over-compensation", "residual dead zone", "staircase", "offset",
         "drive", "code", "valid range", "compare value", "exactly rounded law", "monotone", "closed loop", "plant",
         "scenario", "mutant", "HOLDS", "DOES NOT HOLD", "NOT CHECKED", "SHA-256", "record", "calibrated",
         "lot setting", "saturates", "NOT VERIFIED", "THE FILES DO NOT BELONG TOGETHER", "SIMULATED",

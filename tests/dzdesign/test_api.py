@@ -143,6 +143,7 @@ def test_paths_may_come_from_anything_that_gives_them(ramps):
     assert len(api.identify((path for path in ramps), meter_lag="0.1 s").made_from) == len(ramps)
 
 
+@pytest.mark.slow
 def test_what_stands_around_the_stages_writes_the_bytes_of_the_commands(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     two = ["--dp", "1 MPa", "--dp", "2 MPa", "--ramp-time", "20 s"]
@@ -268,6 +269,7 @@ def stored_outputs(cell):
     return kept
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_the_notebook_gives_what_it_shows(tmp_path, request):
     """Its outputs are stored; `pytest tests/dzdesign/test_api.py -k notebook --update-docs` stores them anew."""
@@ -307,6 +309,7 @@ api.design("valve.json", transitoin="1 %")
 """
 
 
+@pytest.mark.slow
 def test_the_api_and_its_use_are_typed_strictly(tmp_path):
     (tmp_path / "right.py").write_text(RIGHT)
     (tmp_path / "wrong.py").write_text(WRONG)

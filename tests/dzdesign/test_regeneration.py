@@ -190,6 +190,7 @@ def test_a_version_of_any_length_and_any_characters_fits_a_message(firmware_fold
     assert len(text) < 300 and text.isprintable()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("origin", UNKNOWN_ORIGINS)
 def test_an_edit_does_not_hide_behind_an_unknown_origin(firmware_folder, tmp_path, monkeypatch, capsys, origin):
     monkeypatch.setattr(verification, "verify", partial(verification.verify, sequence=QUICK))
@@ -205,6 +206,7 @@ def test_an_edit_does_not_hide_behind_an_unknown_origin(firmware_folder, tmp_pat
     assert 'class="verdict good"' not in html
 
 
+@pytest.mark.slow
 def test_of_another_version_all_else_holds_and_the_function_says_so(firmware_folder, tmp_path, monkeypatch):
     monkeypatch.setattr(verification, "verify", partial(verification.verify, sequence=QUICK))
     always_60000(firmware_folder)
@@ -215,6 +217,7 @@ def test_of_another_version_all_else_holds_and_the_function_says_so(firmware_fol
     assert 'class="verdict open"' in html and "dzdesign 0.0.9" in html
 
 
+@pytest.mark.slow
 def test_the_command_and_the_function_say_so(firmware_folder, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(verification, "verify", partial(verification.verify, sequence=QUICK))
     edit(firmware_folder, "f28335/dz_isr.c", "{", "{ /* another */")

@@ -84,6 +84,7 @@ def third_parties():
     return set(packages_distributions()) | set(sys.stdlib_module_names) | EXTRAS
 
 
+@pytest.mark.slow
 def test_every_import_resolves(third_parties):
     files = sources()
     assert len(files) > 400

@@ -100,6 +100,7 @@ def circle(graph: Mapping[str, set[str]]) -> list[str]:
     return []
 
 
+@pytest.mark.slow
 def test_the_whole_tree_is_seen():
     graph = import_graph()
     assert len(graph) > 200
@@ -107,6 +108,7 @@ def test_the_whole_tree_is_seen():
     assert {room_of(name) for name in graph} == set(ROOMS)
 
 
+@pytest.mark.slow
 def test_a_room_imports_only_the_rooms_before_it():
     assert against_the_order(import_graph()) == []
 
@@ -133,10 +135,12 @@ def test_a_seeded_import_upwards_is_found(module, line):
     assert [found for found in against_the_floors(graph, "identify") if module in found]
 
 
+@pytest.mark.slow
 def test_there_is_no_import_circle():
     assert circle(import_graph()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("module", "line"),
     [
@@ -152,6 +156,7 @@ def test_a_seeded_import_against_the_order_is_found(module, line):
     assert any(module in found for found in against_the_order(graph))
 
 
+@pytest.mark.slow
 def test_a_seeded_circle_is_found():
     source = "if TYPE_CHECKING:\n    from dzdesign.identify.identification import identify"
     graph = import_graph()
@@ -200,6 +205,7 @@ def test_the_front_door_is_light():
     assert done.stdout.strip() == "[]"
 
 
+@pytest.mark.slow
 def test_no_assert_and_no_bare_except_in_shipped_code():
     found = []
     for source in modules().values():

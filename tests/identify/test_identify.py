@@ -275,6 +275,7 @@ def test_example_knees_match_the_plant_that_made_them(example_valve, example_fol
         assert test.u_knee_falling_V == pytest.approx(middle - plant.hysteresis_V / 2, abs=0.03)
 
 
+@pytest.mark.slow
 def test_random_valves_without_a_start_value_are_found_and_never_over_compensated():
     """A small version of the study: 40 valves, dead zone 1-70 %, either trend, with and without noise and floor."""
     rng = np.random.default_rng(77)
@@ -333,6 +334,7 @@ class TestHonesty:
         for test in valve.positive.tests:
             assert test.u_guard_lower_V < falling_threshold(test.dp_MPa) + scatter[test.dp_MPa] - 0.1
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("zero", [-0.3, 0.2])
     def test_a_zero_error_that_shows_at_rest_is_taken_out_and_said(self, zero):
         tests = [synthetic_ramp(dp, Truth(knee_rising=falling_threshold(dp))) for dp in PRESSURES]

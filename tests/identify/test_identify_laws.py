@@ -31,6 +31,7 @@ def thresholds(tests, options=None):
     return fit.knee, fit.knee_se
 
 
+@pytest.mark.slow
 @laws
 @given(seed=seeds, factor=st.floats(0.1, 2.4))
 def test_thresholds_scale_with_the_command(seed, factor):
@@ -42,6 +43,7 @@ def test_thresholds_scale_with_the_command(seed, factor):
     np.testing.assert_allclose(se_scaled, factor * se, rtol=1e-6)
 
 
+@pytest.mark.slow
 @laws
 @given(seed=seeds, factor=st.floats(0.1, 100))
 def test_the_size_of_the_valve_does_not_matter(seed, factor):
@@ -50,6 +52,7 @@ def test_the_size_of_the_valve_does_not_matter(seed, factor):
     np.testing.assert_allclose(thresholds(larger), thresholds(tests), rtol=1e-9)
 
 
+@pytest.mark.slow
 @laws
 @given(seed=seeds, longest=st.integers(2, 8))
 def test_lingering_in_the_dead_zone_does_not_move_a_quiet_meters_knees(seed, longest):
@@ -69,6 +72,7 @@ def test_lingering_in_the_dead_zone_does_not_move_a_quiet_meters_knees(seed, lon
     np.testing.assert_allclose(thresholds([longer])[0], thresholds([test])[0], rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 @laws
 @given(seed=seeds)
 def test_which_branch_comes_first_does_not_matter(seed):
@@ -84,6 +88,7 @@ def test_which_branch_comes_first_does_not_matter(seed):
     assert np.all(np.abs(swapped - knee) < se)
 
 
+@pytest.mark.slow
 def test_a_repeated_test_shrinks_the_error_by_the_root_of_two():
     ratios, moves = [], []
     for seed in range(8):

@@ -24,6 +24,7 @@ def artefacts(request, tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_knees_of_both_branches_at_every_pressure(artefacts):
     truth = json.loads((SHARED / "truth.json").read_text())
     valve = json.loads((artefacts / "valve.json").read_text())
@@ -39,6 +40,7 @@ def test_knees_of_both_branches_at_every_pressure(artefacts):
     assert valve["sides"]["positive"]["reference"]["dp_MPa"] == pytest.approx(1, abs=0.02)
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_firmware_from_them_is_verified(artefacts, capsys):
     assert main(["codegen", str(artefacts / "valve.json"), "-o", str(artefacts / "fw")]) == 0

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 
+import pytest
+
 from dzdesign.identify.identification import identify
 from tests.support.paths import ROOT
 from tests.support.synthetic import Truth, synthetic_ramp
@@ -26,6 +28,7 @@ def main():
     assert together == [alone[run % 3] for run in range(RUNS)]
 
 
+@pytest.mark.slow
 def test_threads_do_not_disturb_one_another():
     command = [sys.executable, "-m", "tests.identify.test_threads"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300, check=False)

@@ -70,6 +70,7 @@ def change_evidence(folder: Path, change) -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_verdict_and_the_numbers_that_matter_come_first(html, reported_demo):
     evidence = json.loads((reported_demo / "evidence" / "verification.json").read_bytes())
     loops = evidence["closed_loop"]["pressures"]
@@ -130,6 +131,7 @@ def test_figures_take_their_colours_from_the_page(html):
     assert html.count("--fig-ink: ") == 2  # light and dark
 
 
+@pytest.mark.slow
 def test_same_input_same_bytes_whichever_folder_is_named(reported_demo, html, copied):
     assert report_of_folder(copied).html == html
     chain = chain_of(read_artefact_folder(copied))
@@ -137,6 +139,7 @@ def test_same_input_same_bytes_whichever_folder_is_named(reported_demo, html, co
         assert chain_of(read_artefact_folder(folder)) == chain
 
 
+@pytest.mark.slow
 def test_report_makes_the_page_again_and_the_folder_still_fits(copied, capsys):
     page = copied / "evidence" / REPORT_NAME
     before = page.read_bytes()
@@ -157,6 +160,7 @@ def test_report_makes_the_page_again_and_the_folder_still_fits(copied, capsys):
 # --- a verdict that is not good ---------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_requirement_that_does_not_hold_is_loud(copied):
     def fail(evidence):
         evidence["holds"] = False
@@ -171,6 +175,7 @@ def test_a_requirement_that_does_not_hold_is_loud(copied):
     assert "Every requirement holds" not in html
 
 
+@pytest.mark.slow
 def test_what_was_not_checked_is_not_green(copied):
     def leave_open(evidence):
         evidence["holds"] = False
@@ -185,6 +190,7 @@ def test_what_was_not_checked_is_not_green(copied):
     assert '<td class="open">? NOT CHECKED</td>' in html
 
 
+@pytest.mark.slow
 def test_a_missed_limit_of_recordings_does_not_hold(copied):
     valve = read_artefact((copied / "valve.json").read_bytes(), ValveModel, "valve.json")
     after = Reading(value=4.5, se=None, at_most=None, not_observable=None, note=None, where=None)
@@ -222,17 +228,20 @@ def test_a_missed_limit_of_recordings_does_not_hold(copied):
     assert report.kind == "good" and "4.5 %, more than 4 %" not in report.html
 
 
+@pytest.mark.slow
 def test_evidence_without_its_manifest_is_said(copied):
     (copied / "evidence" / MANIFEST_NAME).unlink()
     assert any("nothing tells whether that is as written" in line for line in report_of_folder(copied).missing)
 
 
+@pytest.mark.slow
 def test_counts_that_no_requirement_speaks_of_stand_out(copied):
     change_evidence(copied, lambda evidence: evidence["inputs"][0].update(wrong=1234, over_compensated=99))
     report = report_of_folder(copied)
     assert report.kind == "bad" and "CONTRADICTS ITSELF" in report.verdict and "333" in report.verdict
 
 
+@pytest.mark.slow
 def test_a_valve_that_was_edited_within_the_compensator_is_found(copied):
     """The hash that it states is the genuine one's."""
 
@@ -254,6 +263,7 @@ def test_a_valve_that_was_edited_within_the_compensator_is_found(copied):
     assert report.kind == "bad"
 
 
+@pytest.mark.slow
 def test_a_compensator_that_was_edited_by_hand_is_found(copied):
     """With every hash of the chain made to fit."""
     content = change_json(copied / "compensator.json", lambda one: one["sides"]["positive"].update(
@@ -270,6 +280,7 @@ def test_a_compensator_that_was_edited_by_hand_is_found(copied):
     assert any("'sides.positive.drive_range_over_u_max' is 0.600000, but" in fault for fault in report.faults)
 
 
+@pytest.mark.slow
 def test_of_a_firmware_its_own_evidence_is_taken(copied):
     """Two firmware folders side by side, each with its evidence: the one that was named decides."""
     chain = chain_of(read_artefact_folder(copied / "firmware"))
@@ -290,6 +301,7 @@ def test_of_a_firmware_its_own_evidence_is_taken(copied):
     assert other.places["firmware"].sha256 == digest and not other.faults
 
 
+@pytest.mark.slow
 def test_what_was_not_tried_is_said(copied):
     """Without --plant the closed loop is of a plant made from the tests, and there are no load steps."""
     report = report_of_folder(copied)
@@ -311,12 +323,14 @@ def test_what_was_not_tried_is_said(copied):
     assert f"SHA-256 {'5' * 64}" in html and "m_e_kg" in html[html.index('id="loop"') :]
 
 
+@pytest.mark.slow
 def test_the_plant_of_the_tests_stands_in_the_closed_loop(copied):
     html = report_of_folder(copied).html
     loop = html[html.index('<section id="loop"') : html.index('<section id="acceptance"')]
     assert "from the least to the largest of 6 pressure drops" in loop and "preload_N" in loop
 
 
+@pytest.mark.slow
 def test_the_papers_numbers_are_shown_where_they_lie(copied):
     ours = Outcome(by="product", value=54.1, difference=0.2, allowed=(53.8, 54.0))
     row = PaperNumber(
@@ -344,6 +358,7 @@ def spoil(path: Path) -> None:
     path.write_bytes(path.read_bytes().replace(b"5", b"6", 1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "said"),
     [
@@ -360,6 +375,7 @@ def test_a_file_that_was_changed_is_said_and_no_verdict_stands(copied, name, sai
     assert headline(chain).kind == "bad" and "No verdict stands" in headline(chain).text
 
 
+@pytest.mark.slow
 def test_a_page_of_files_that_do_not_fit_says_so_first(copied):
     spoil(copied / "firmware" / "core" / "dz_drive.c")
     assert main(["report", str(copied), "-o", str(copied / "r.html")]) == 1
@@ -391,6 +407,7 @@ def test_a_manifest_reaches_no_file_outside_its_folder(copied, tmp_path):
 # --- parts of a chain ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_valve_alone_is_reported_and_what_is_missing_said(copied, tmp_path):
     folder = tmp_path / "valve only"
     folder.mkdir()
@@ -415,6 +432,7 @@ def test_evidence_alone_shows_its_figures_and_misses_the_rest(copied, tmp_path):
     assert "missing or not used" in report.html
 
 
+@pytest.mark.slow
 def test_evidence_of_an_earlier_version_without_curves(copied):
     for path in (copied / "evidence").glob("*.csv"):
         path.unlink()
@@ -429,6 +447,7 @@ def test_a_neighbour_that_can_not_be_read_does_not_hinder_the_rest(copied):
     assert [line for line in chain.missing if "assessment of recordings: 'assessment.json'" in line]
 
 
+@pytest.mark.slow
 def test_of_two_pieces_of_evidence_one_must_be_named(copied):
     chain = chain_of(read_artefact_folder(copied))
     shutil.copytree(copied / "evidence", copied / "evidence of May")
@@ -456,6 +475,7 @@ def is_of_the_number_of_texts(tag, given):
     return tag in ("li", "ul", "p", "tr", "td", "small", "wbr") or (tag, given) == ("span", {"class": "breaks"})
 
 
+@pytest.mark.slow
 def test_nobodys_text_becomes_markup(copied):
     name = " ".join(HOSTILE)
 
@@ -501,6 +521,7 @@ def test_the_headline_is_good_only_if_all_was_checked(copied):
     assert headline(chain_of(read_artefact_folder(copied))).kind == "open"
 
 
+@pytest.mark.slow
 def test_a_series_of_plants_is_shown(copied):
     spread = {"p01": 0.01, "p05": 0.011, "p50": 0.021, "p95": 0.033, "p99": 0.0345, "worst": 0.04, "worst_plant": {}}
     one = {
@@ -530,6 +551,7 @@ def reports(tmp_path_factory):
     return found
 
 
+@pytest.mark.slow
 def test_one_ramp_test_is_one(reports):
     text = Page(reports["one"]).text
     assert "1 ramp test; full command" in text and "1 ramp tests" not in text and "1 pressure drops" not in text

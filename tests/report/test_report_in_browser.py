@@ -19,7 +19,11 @@ VIEWS = [(width, scheme) for width in (1280, 400) for scheme in ("light", "dark"
 #: Of WCAG 2 AA; large or bold text may have less, but has as much here.
 CONTRAST = 4.5
 
-pytestmark = [needs_compiler, pytest.mark.skipif(CHROMIUM is None, reason="no Chromium (chromium) on the path")]
+pytestmark = [
+    pytest.mark.slow,
+    needs_compiler,
+    pytest.mark.skipif(CHROMIUM is None, reason="no Chromium (chromium) on the path"),
+]
 
 #: Of every text that is seen: its colour on the first opaque background behind it, as a ratio.
 CONTRASTS = """() => {

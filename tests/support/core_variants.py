@@ -37,7 +37,7 @@ UNLIKE = {
     "pressure_a": _sensor("4..20 mA on 149 ohm = 25 MPa"),
     "pressure_b": _sensor("0.5..4.5 V x 0.6 = 160 bar"),
 }
-AMPLIFIER = {
+DRIVE_FUNCTIONS = {
     "ramp_up_s": (0.5, 0.8),
     "ramp_down_s": (0.3, 0.0),
     "dither_Hz": 150.0,
@@ -48,13 +48,13 @@ AMPLIFIER = {
 VARIANTS = {
     "plain": {},
     "target law": {"law": "target"},
-    "edge": {"transition": Fraction(1, 100)},
-    "target law, edge": {"law": "target", "transition": Fraction(1, 100)},
+    "transition": {"transition": Fraction(1, 100)},
+    "target law, transition": {"law": "target", "transition": Fraction(1, 100)},
     "live zero": {"signals": UNLIKE | {"command": _command("4..20 mA on 149 ohm")}},
-    "inverted": {"signals": {"command": _command("0..10 V x 0.3", inverted=True)}, **AMPLIFIER},
+    "inverted": {"signals": {"command": _command("0..10 V x 0.3", inverted=True)}, **DRIVE_FUNCTIONS},
     "bipolar": {"signals": {"command": BOTH}},
     "bipolar, all options": {"signals": UNLIKE | {"command": BOTH, "swapped": True}, "transition": Fraction(1, 100)}
-    | AMPLIFIER,
+    | DRIVE_FUNCTIONS,
 }  # fmt: skip
 NAMES = tuple(product(VARIANTS, TARGETS))
 

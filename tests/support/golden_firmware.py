@@ -1,6 +1,6 @@
 """The goldens: what every target's files were from one small compensator.json, and how they are made anew.
 
-The second set, `FULL`, has everything switched on: a valve of two unlike sides, an edge, ramps, dither, a largest
+The second set, `FULL`, has everything switched on: a valve of two unlike sides, a transition, ramps, dither, a largest
 output, 4-20 mA sensors of unlike spans.
 """
 

@@ -11,7 +11,8 @@ import pytest
 from dzdesign.core.artefact_files import to_json, write_folder
 from dzdesign.core.errors import InputError
 from dzdesign.verify.closed_loop import motion
-from dzdesign.verify.closed_loop.loop import PERIODS_PER_RECORD, ClosedLoop, RampSequence, dead_zone
+from dzdesign.verify.closed_loop.dead_zone import dead_zone
+from dzdesign.verify.closed_loop.loop import PERIODS_PER_RECORD, ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.plant import Plant, plants_from_tests
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
@@ -75,6 +76,7 @@ FAULTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_seeded_fault_in_the_c_is_found(firmware_folder, fault):
     mutate(firmware_folder, *FAULTS[fault])
@@ -114,6 +116,7 @@ def test_a_certificate_that_says_too_much_is_found(example_compensator):
     assert "says dp_MPa = 0 to 20" in boastful.text
 
 
+@pytest.mark.slow
 def test_a_changed_file_fails_the_verification(firmware_folder):
     readme = firmware_folder / "f28335" / "README.md"
     readme.write_text(readme.read_text() + "\n")
@@ -210,6 +213,7 @@ class TestPlant:
         flow = plant.C_d_W_mm * 1e-3 * opening * np.sqrt(2 * run.dp_MPa[-1] * 1e6 / plant.rho_kg_m3) * 6e4
         assert run.q_L_min[-1] == pytest.approx(flow, rel=2e-3)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         "plant",
         [Plant(), Plant(hysteresis_V=0.0, droop_MPa_L_min2=0.0), Plant(preload_N=10.0, stroke_mm=0.8, m_e_kg=0.1)],
@@ -311,6 +315,7 @@ class TestPlant:
             assert dead_zone(run, 0.02, rising=False) * 10 == pytest.approx(test.u_guard_V, abs=0.03)
 
 
+@pytest.mark.slow
 def test_closed_loop_removes_the_dead_zone_and_without_beta_leaks(firmware_folder, example_folder):
     from dzdesign.verify.closed_loop.plant import read_plant
 
@@ -325,6 +330,7 @@ def test_closed_loop_removes_the_dead_zone_and_without_beta_leaks(firmware_folde
     assert at_highest.q_zero_without_beta_L_min > 0.3
 
 
+@pytest.mark.slow
 def test_a_law_without_its_guard_leaks_in_the_loop(example_compensator, example_folder, tmp_path):
     """The closed loop sees over-compensation on its own: an offset of the opening threshold, at every pressure."""
     from dzdesign.codegen.project import generate
@@ -338,6 +344,7 @@ def test_a_law_without_its_guard_leaks_in_the_loop(example_compensator, example_
     assert "no flow at zero command in the closed loop" in failed
 
 
+@pytest.mark.slow
 def test_what_could_not_be_checked_is_not_passed(tmp_path):
     """Rising ramps alone: where the valve closes is not known, so zero command after closing is not checked."""
     from dzdesign.codegen.project import generate
@@ -354,6 +361,7 @@ def test_what_could_not_be_checked_is_not_passed(tmp_path):
     assert not result.holds and result.evidence.holds is False
 
 
+@pytest.mark.slow
 def test_a_span_that_ends_at_the_tested_pressure_can_be_verified(example_valve, tmp_path):
     from dzdesign.codegen.project import generate, target_named
     from dzdesign.design.designing import design

@@ -2,11 +2,14 @@
 
 import json
 import shutil
+from collections import Counter
+from dataclasses import replace
 
 import pytest
 
 from dzdesign.codegen.project import generate
 from dzdesign.command_line.cli import main
+from dzdesign.core import artefact_reading
 from dzdesign.core.artefact_files import MANIFEST_NAME, TOOL, sha256_of, to_json, write_folder
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import to_json_bytes
@@ -14,13 +17,14 @@ from dzdesign.design.designing import design
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.valve_report import REPORT_NAME, report_of_folder, with_report
 from dzdesign.verify.firmware.compensator_checks import valve_follows
+from dzdesign.verify.firmware.folder import read_compensator
 from dzdesign.verify.requirements import VALVE, not_tried
 from dzdesign.verify.verification import SCHEMA
 from tests.conftest import default_options
 from tests.support.evidence import EVIDENCE, evidence_with
 from tests.support.synthetic import needs_compiler
 
-pytestmark = needs_compiler
+pytestmark = [pytest.mark.slow, needs_compiler]
 
 
 @pytest.fixture
@@ -121,12 +125,12 @@ def test_a_firmware_among_many_folders_is_found(copied):
 
 
 def spaced(copied):
-    """The firmware of a valve.json that somebody saved with another spacing; its compensator's document."""
+    """The firmware of a valve.json that somebody saved with another spacing; its compensator."""
     content = json.dumps(json.loads((copied / "valve.json").read_bytes())).encode()
     compensator = design(read_artefact(content, ValveModel, "valve.json"), default_options(), content)
     write_folder(copied / "firmware", *_made(compensator))
     (copied / "valve.json").write_bytes(content)
-    return json.loads(to_json_bytes(compensator))
+    return compensator
 
 
 def _made(compensator):
@@ -135,67 +139,66 @@ def _made(compensator):
 
 
 def test_the_hash_of_a_valve_as_identify_writes_it_needs_no_file(copied):
-    document = json.loads((copied / "compensator.json").read_bytes())
     (copied / "valve.json").unlink()
-    (check,) = valve_follows(copied / "firmware", document)
+    (check,) = valve_follows(copied / "firmware", read_compensator(copied / "firmware"))
     assert check.holds and check.id == VALVE.id
 
 
 def test_of_another_spacing_it_is_compared_with_the_file_and_not_tried_without(copied):
-    document = spaced(copied)
-    (check,) = valve_follows(copied / "firmware", document)
+    compensator = spaced(copied)
+    (check,) = valve_follows(copied / "firmware", compensator)
     assert check.holds and "compared with valve.json" in check.text
     (copied / "valve.json").rename(copied / "bench 7.json")  # the name says nothing
-    assert valve_follows(copied / "firmware", document)[0].holds
+    assert valve_follows(copied / "firmware", compensator)[0].holds
     (copied / "bench 7.json").unlink()
-    assert valve_follows(copied / "firmware", document) == []
+    assert valve_follows(copied / "firmware", compensator) == []
     (said,) = [line for line in not_tried(EVIDENCE) if line.startswith(VALVE.title)]
     assert "with the valve.json that compensator.json names by its SHA-256 beside the firmware" in said
 
 
 def test_a_valve_file_that_was_replaced_is_said_first(copied):
     """What was compared is told by its hash, and the file of the name comes before others."""
-    document = json.loads((copied / "compensator.json").read_bytes())
-    stated = document["made_from"][0]["sha256"]
+    compensator = read_compensator(copied / "firmware")
+    stated = compensator.valve_json_sha256
     other = json.loads((copied / "valve.json").read_bytes())
     other["record"] = {"serial": "another"}
     for name in ("again.json", "valve.json"):
         (copied / name).write_text(to_json(other))
     digest = sha256_of((copied / "valve.json").read_bytes())
-    (check,) = valve_follows(copied / "firmware", document)
+    (check,) = valve_follows(copied / "firmware", compensator)
     assert check.holds and "valve.json" not in check.name
     assert check.text.startswith(f"valve.json beside the firmware is ANOTHER valve, SHA-256 {digest}, and not used; ")
     assert check.text.endswith(f"the SHA-256 {stated} in made_from")
     shutil.rmtree(copied / "evidence")
     report = report_of_folder(copied / "firmware")
     assert any(line.startswith(f"valve.json has the SHA-256 {digest}, but the compen") for line in report.missing)
-    (copied / "a.json").write_text(to_json(document["valve"]))  # the one that it was made from, by another name
+    (copied / "a.json").write_bytes(to_json_bytes(compensator.valve))  # the one that it was made from, by another name
     report = report_of_folder(copied / "firmware")
     said = "valve.json is another valve by now; the compensator was made from a.json: used"
     assert said in report.missing and not report.faults
-    (check,) = valve_follows(copied / "firmware", document)
+    (check,) = valve_follows(copied / "firmware", compensator)
     assert check.holds and check.text.startswith("valve.json beside the firmware is ANOTHER valve")
 
 
 def test_a_strangers_valve_is_not_compared(copied):
-    document = spaced(copied)
+    compensator = spaced(copied)
     next(strangers(copied))
-    assert valve_follows(copied / "firmware", document) == []
+    assert valve_follows(copied / "firmware", compensator) == []
 
 
 def test_a_hash_that_is_not_that_of_the_valve_is_found(copied):
-    document = json.loads((copied / "compensator.json").read_bytes())
-    document["made_from"][0]["sha256"] = "0" * 64
-    (check,) = valve_follows(copied / "firmware", document)
+    compensator = read_compensator(copied / "firmware")
+    compensator = replace(compensator, made_from=(replace(compensator.made_from[0], sha256="0" * 64),))
+    (check,) = valve_follows(copied / "firmware", compensator)
     assert check.holds is False and "valve.json is that valve, but its SHA-256 is" in check.text
     (copied / "valve.json").unlink()
-    assert valve_follows(copied / "firmware", document) == []  # nobody can tell
+    assert valve_follows(copied / "firmware", compensator) == []  # nobody can tell
 
 
 def test_another_valve_under_the_hash_of_the_file_is_found(copied):
-    document = spaced(copied)
-    document["valve"]["u_max_V"] = 11.0
-    (check,) = valve_follows(copied / "firmware", document)
+    compensator = spaced(copied)
+    compensator = replace(compensator, valve=replace(compensator.valve, record={"serial": "another"}))
+    (check,) = valve_follows(copied / "firmware", compensator)
     assert check.holds is False and "but is another valve" in check.text
 
 
@@ -205,3 +208,19 @@ def test_another_valve_under_the_hash_of_the_file_is_found(copied):
 @pytest.mark.parametrize(("target", "said"), [("f28335", True), ("cortex-m4", False), ("host", False)])
 def test_the_headers_of_ti_are_named_where_they_make_sense(target, said):
     assert any("--c2000ware" in line for line in not_tried(evidence_with(target=target))) is said
+
+
+# ---- read once ----
+
+
+def test_verify_reads_valve_json_once(copied, tmp_path, monkeypatch):
+    """And compensator.json, which holds the valve, once for all checks and once for the report."""
+    read = Counter()
+    convert = artefact_reading.convert
+    monkeypatch.setattr(
+        artefact_reading,
+        "convert",
+        lambda document, kind, **how: read.update([kind.__name__]) or convert(document, kind, **how),
+    )
+    assert main(["verify", str(copied / "firmware"), "-o", str(tmp_path / "evidence")]) == 0
+    assert read["ValveModel"] == 1 and read["Compensator"] == 2 and read["Evidence"] == 1

@@ -46,13 +46,7 @@ def assess(before: Sequence[RampTest], after: Sequence[RampTest], options: Asses
 
 
 def assess_curves(comparison: Comparison) -> Assessment:
-    """Read every quantity of both sets, and check the limits.
-
-    Parameters
-    ----------
-    comparison : Comparison
-        Of `compare_curves`.
-    """
+    """Read every quantity of both sets, and check the limits."""
     options = comparison.options
     levels = [_level(pair, options) for pair in comparison.pairs]
     readings = [_read(pair, level, options) for pair, level in zip(comparison.pairs, levels, strict=True)]

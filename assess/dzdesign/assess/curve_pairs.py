@@ -39,21 +39,7 @@ class CurvePair:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Comparison:
-    """Both sets of recordings, read.
-
-    Attributes
-    ----------
-    options : AssessOptions
-        Choices of the engineer.
-    tests : mapping
-        The recordings of each set.
-    floor : float
-        Flow below which the meter shows nothing, m³/s.
-    lag : MeterLag
-        Of the meter.
-    pairs : tuple of CurvePair
-        Side by side, each in the order of rising pressure drop.
-    """
+    """Both sets of recordings, read: the meter's floor (m³/s), its lag, and the pairs, side by side."""
 
     options: AssessOptions
     tests: Mapping[Set, Sequence[RampTest]]
@@ -64,14 +50,6 @@ class Comparison:
 
 def compare_curves(before: Sequence[RampTest], after: Sequence[RampTest], options: AssessOptions) -> Comparison:
     """Read the curves of both sets, and pair those of one side and pressure drop.
-
-    Parameters
-    ----------
-    before, after : sequence of RampTest
-        Recordings in any order, as `identify` takes them: several ramps in one, both sides of a bipolar valve. The
-        command of `after` is what enters the compensator.
-    options : AssessOptions
-        Choices of the engineer.
 
     Raises
     ------

@@ -39,65 +39,39 @@ GAP = 10.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlowCurve:
-    """One branch: flow at the test's pressure drop over the command.
+    """One branch: flow (m³/s) at the test's pressure drop over the command (V)."""
 
-    Attributes
-    ----------
-    read : PreparedBranch
-        Its samples and their course, smoothed over 0.1 % of u_max (V, m³/s).
-    u, q, q_se : (C,) array
-        Means over cells of `CELL` u_max without outliers, in the order of rising command: V, m³/s, standard error (NaN
-        where a cell holds too few samples to tell it, as in a table).
-    sigma : float
-        Robust standard deviation of one sample about the course where the flow is small, m³/s.
-    colour : float
-        Long-run variance of the noise over its variance; 1 where no line tells it.
-    level : float
-        Flow that counts as flow, m³/s: the meter's floor, its noise or 0.5 % of the largest flow.
-    line : GatedLine or None
-        Through the straight part; None where there is none, which `no_line` explains.
-    """
-
+    #: Its samples and their course, smoothed over 0.1 % of u_max.
     read: PreparedBranch
+    #: Means over cells of `CELL` u_max without outliers, in the order of rising command; the standard error is NaN
+    #: where a cell holds too few samples to tell it, as in a table.
     u: np.ndarray
     q: np.ndarray
     q_se: np.ndarray
+    #: Robust standard deviation of one sample about the course where the flow is small.
     sigma: float
-    colour: float
+    #: Long-run variance of the noise over its variance; 1 where no line tells it.
+    variance_inflation: float
+    #: Flow that counts as flow: the meter's floor, its noise or 0.5 % of the largest flow.
     level: float
+    #: Through the straight part; where there is none, `no_line` says why.
     line: GatedLine | None
     no_line: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PressureCurves:
-    """All ramps of one set at one pressure drop, on one side of the valve.
-
-    Attributes
-    ----------
-    source : str
-        Names of the files.
-    ramps : tuple of str
-        Each ramp's file, and its number in it.
-    dp : float or None
-        Nominal pressure drop, Pa.
-    rising, falling : FlowCurve or None
-        The branches.
-    q_max : float
-        Largest flow as recorded, m³/s.
-    u_top : float
-        Largest command, V.
-    at_zero : (N,) array
-        Flow in the later half of the holds at zero command after closing, m³/s; empty where there is no such hold.
-    """
+    """All ramps of one set at one pressure drop (Pa), on one side of the valve."""
 
     source: str
     ramps: tuple[str, ...]
     dp: float | None
     rising: FlowCurve | None
     falling: FlowCurve | None
+    #: Largest flow as recorded, m³/s, and largest command, V.
     q_max: float
     u_top: float
+    #: Flow in the later half of the holds at zero command after closing, m³/s; empty where there is no such hold.
     at_zero: np.ndarray
 
     @property
@@ -111,9 +85,9 @@ class PressureCurves:
         return max(curve.read.y_max for curve in self.curves)
 
     @property
-    def colour(self) -> float:
+    def variance_inflation(self) -> float:
         """Long-run variance of the meter's noise over its variance."""
-        return max(curve.colour for curve in self.curves)
+        return max(curve.variance_inflation for curve in self.curves)
 
     @property
     def counts(self) -> float:
@@ -124,18 +98,9 @@ class PressureCurves:
 def read_curves(
     tests: Sequence[RampTest], options: IdentifyOptions, *, floor: float, lag: float
 ) -> list[PressureCurves]:
-    """Read the curves of one side from one set of recordings, in the order of rising pressure drop.
+    """Read the curves of one side, its commands positive, from one set of recordings: by rising pressure drop.
 
-    Parameters
-    ----------
-    tests : sequence of RampTest
-        Commands of that side positive.
-    options : IdentifyOptions
-        Choices of the engineer.
-    floor : float
-        Flow below which the meter shows nothing, m³/s.
-    lag : float
-        Of the flow meter, s: taken out.
+    The meter shows nothing below `floor` (m³/s); its `lag` (s) is taken out.
 
     Raises
     ------
@@ -215,16 +180,16 @@ def _curve(read: PreparedBranch, straight: tuple[GatedLine, float] | None, reaso
     def mean(values: np.ndarray) -> np.ndarray:
         return np.bincount(index, weights=values, minlength=filled.size) / n
 
-    # Noise with a memory averages out no better than 1/colour of its samples would, white.
-    colour = line.variance_inflation if line else 1.0
+    # Noise with a memory averages out no better than 1/inflation of its samples would, white.
+    inflation = line.variance_inflation if line else 1.0
     small = np.interp(u, *read.profile) < 0.05 * read.y_max
     return FlowCurve(
         read=read,
         u=mean(u),
         q=mean(y),
-        q_se=np.where(n < FEWEST_IN_CELL, np.nan, np.sqrt(mean(about**2) * np.minimum(colour, n) / n)),
+        q_se=np.where(n < FEWEST_IN_CELL, np.nan, np.sqrt(mean(about**2) * np.minimum(inflation, n) / n)),
         sigma=robust_sigma(about[small] if small.sum() >= 20 else about),
-        colour=colour,
+        variance_inflation=inflation,
         level=level,
         line=line,
         no_line="" if line else reason,

@@ -95,16 +95,9 @@ def _limit(key: str, text: str, u_max: float) -> float:
 def check_limits(
     limits: Mapping[str, float], place: str, before: Mapping[str, Reading] | None, after: Mapping[str, Reading]
 ) -> list[LimitResult]:
-    """Check the recordings with the compensator at one pressure drop against every limit.
+    """Check the recordings with the compensator at one pressure drop against every limit of `parse_limits`.
 
-    Parameters
-    ----------
-    limits : mapping
-        Of `parse_limits`.
-    place : str
-        Side and pressure drop, in words.
-    before, after : mapping
-        Readings of `QUANTITIES` in their units; None where there is no recording without the compensator.
+    `before` is None where there is no recording without the compensator.
     """
     results = []
     for key, limit in limits.items():

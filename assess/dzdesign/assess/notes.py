@@ -21,15 +21,7 @@ ALONE: tuple[tuple[Set, str], ...] = (
 
 
 def find_notes(comparison: Comparison, pressures: Sequence[PressureAssessment]) -> tuple[Warning_, ...]:
-    """Return the notes of an assessment.
-
-    Parameters
-    ----------
-    comparison : Comparison
-        The recordings.
-    pressures : sequence of PressureAssessment
-        What was read of each pair of the comparison.
-    """
+    """Return the notes of an assessment; `pressures` is what was read of each pair of the comparison."""
     options, pairs = comparison.options, comparison.pairs
     tests = [test for tests in comparison.tests.values() for test in tests]
     notes = [*about_recordings(tests), *_about_partners(pairs), *_about_the_meter(comparison)]

@@ -19,20 +19,7 @@ BLACK = "#000000"
 
 
 def plot_files(comparison: Comparison, assessment: Assessment) -> dict[str, bytes]:
-    """Draw an assessment; the same recordings give the same bytes.
-
-    Parameters
-    ----------
-    comparison : Comparison
-        The curves.
-    assessment : Assessment
-        What was read of them.
-
-    Returns
-    -------
-    dict
-        File name -> content: an SVG for each side and pressure drop.
-    """
+    """Draw an SVG for each side and pressure drop: file name -> content; the same recordings give the same bytes."""
     names = _names(assessment.pressures)
     with plot_style():
         return {

@@ -114,13 +114,7 @@ def hidden(reason: str, at_most: float | None = None) -> Reading:
 
 
 def in_units(readings: Mapping[str, Reading]) -> dict[str, Reading]:
-    """Return readings in SI, or as shares, in the units of their quantities.
-
-    Parameters
-    ----------
-    readings : mapping
-        Key of `QUANTITIES` -> reading.
-    """
+    """Return readings in SI, or as shares, in the units of their quantities."""
 
     def scaled(reading: Reading, factor: float) -> Reading:
         value, se, at_most = (
@@ -132,13 +126,7 @@ def in_units(readings: Mapping[str, Reading]) -> dict[str, Reading]:
 
 
 def symmetry(positive: Reading | None, negative: Reading | None) -> Reading:
-    """Return how much steeper one side is than the other, in per cent, from the gains of both.
-
-    Parameters
-    ----------
-    positive, negative : Reading or None
-        Gains at one pressure drop; None where the side was not recorded there.
-    """
+    """Return by how much one side is steeper than the other, in per cent, from the gains of both."""
     known: list[tuple[float, float]] = []
     for gain, side in ((positive, "positive"), (negative, "negative")):
         if gain is None:
@@ -152,13 +140,7 @@ def symmetry(positive: Reading | None, negative: Reading | None) -> Reading:
 
 
 def change(before: Reading | None, after: Reading | None) -> Change | None:
-    """Return AFTER less BEFORE and its standard error; None where one of them shows no value.
-
-    Parameters
-    ----------
-    before, after : Reading or None
-        Of one quantity.
-    """
+    """Return AFTER less BEFORE and its standard error; None where one of them shows no value."""
     if before is None or after is None or before.value is None or after.value is None:
         return None
     se = None if before.se is None or after.se is None else math.hypot(before.se, after.se)

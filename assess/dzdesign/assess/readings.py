@@ -29,17 +29,7 @@ def read_quantities(
 ) -> dict[str, Reading]:
     """Read every quantity of one set at one pressure drop, in its unit; symmetry, which needs both sides, is missing.
 
-    Parameters
-    ----------
-    curves : PressureCurves
-    u_max : float
-        Full command, V.
-    level : float
-        Flow that ends the dead zone, m³/s.
-    rated : float
-        Flow of which linearity is a share, m³/s.
-    window : tuple of float
-        Commands between which linearity is taken, over u_max.
+    The flow `level` ends the dead zone, linearity is a share of the flow `rated` (m³/s); `window` is over u_max (V).
     """
     rising, falling = curves.rising, curves.falling
     si = {
@@ -87,7 +77,7 @@ def _noise_of_course(curve: FlowCurve) -> float:
     """Return the standard error of the smoothed course where the flow is small, m³/s."""
     u, _ = curve.read.profile
     n = curve.read.branch.u.size / u.size * (BINS if u.size >= 200 else 1)
-    return OF_MEDIAN * curve.sigma * math.sqrt(min(curve.colour, n) / max(n, 1.0))
+    return OF_MEDIAN * curve.sigma * math.sqrt(min(curve.variance_inflation, n) / max(n, 1.0))
 
 
 def _passing(curve: FlowCurve, level: float, noise: float, u_max: float) -> Reading:
@@ -238,5 +228,5 @@ def _flow_at_zero(curves: PressureCurves) -> Reading:
     floor = curves.curves[0].read.floor
     if abs(value) < floor:
         return hidden(f"the meter shows nothing below {floor / L_MIN:.3g} L/min", at_most=floor)
-    spread = float(kept.std()) * math.sqrt(min(curves.colour, kept.size) / kept.size)
+    spread = float(kept.std()) * math.sqrt(min(curves.variance_inflation, kept.size) / kept.size)
     return observed(value, se=spread)

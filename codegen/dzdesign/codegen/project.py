@@ -59,22 +59,8 @@ class Firmware(ShownInNotebooks):
 def write_firmware(firmware: Firmware, folder: Path) -> Firmware:
     """Write a firmware folder; board files that their user changed in an earlier one stay as they are.
 
-    Parameters
-    ----------
-    firmware : Firmware
-        From `generate`.
-    folder : Path
-        Where it goes.
-
-    Returns
-    -------
-    Firmware
-        The same, with a note on what was kept, and on a target that was replaced.
-
-    Raises
-    ------
-    InputError
-        If the place can't be written, or holds files that would be lost.
+    The result is the same firmware, with a note on what was kept, and on a target that was replaced. A place that can't
+    be written, or holds files that would be lost, is an `InputError`.
     """
     earlier = _target_in(Path(folder))
     kept = write_folder(folder, firmware.files, firmware.manifest)
@@ -99,13 +85,7 @@ def _target_in(folder: Path) -> str:
 
 
 def target_named(name: str) -> Target:
-    """Return the target of that name.
-
-    Raises
-    ------
-    InputError
-        If there is none; the nearest name is proposed.
-    """
+    """Return the target of that name; of an unknown one the `InputError` proposes the nearest."""
     if name not in TARGET_NAMES:
         raise InputError(f"there is no target '{name}'{nearest(name, TARGET_NAMES)}; known: {', '.join(TARGET_NAMES)}")
     target: Target = import_module(f"{PACKAGE}.{folder_of(name)}.target").TARGET
@@ -166,17 +146,7 @@ def generate(
 
 
 def target_files(compensator: Compensator, target: Target, banner: Banner) -> dict[str, str]:
-    """Return the files around the core, path to text.
-
-    Parameters
-    ----------
-    compensator : Compensator
-        What the firmware is of.
-    target : Target
-        Where it goes.
-    banner : Banner
-        First lines of the files.
-    """
+    """Return the files around the core, path to text."""
     signals = compensator.signals
     levels, full_V = signals.code_max + 1, target.adc_full_V
     if target.takes_any_signals and compensator.target:  # a target without a converter of its own takes any

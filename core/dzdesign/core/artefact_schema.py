@@ -125,8 +125,8 @@ def _text_in_words(node: Node) -> str:
 def _list_in_words(node: Node) -> str:
     low, high = node.get("minItems", 0), node.get("maxItems")
     titles = [str(item["title"]) for item in node.get("prefixItems", ()) if "title" in item]
-    if titles:
-        return f"a list [{', '.join(titles)}]"
+    if titles:  # of a Fraction
+        return f"[{', '.join(titles)}]: whole numbers of at most 60 digits, the {titles[-1]} above zero"
     if high is not None:
         return f"a list of {high} items" if low == high else f"a list of {low} to {high} items"
     return "a list that is not empty" if low == 1 else f"a list of at least {low} items" if low else "a list"

@@ -4,14 +4,15 @@ import hashlib
 import json
 import math
 from collections.abc import Iterable, Mapping
-from io import BufferedReader
-from typing import Any
+from typing import Any, BinaryIO
 
 from dzdesign.core.errors import QUOTED, InputError
 
 #: Lists and objects in one another; dzdesign's own artefacts have eight. Beyond some hundred, what reads or prints the
 #: value would end in the interpreter's own limit, at a depth that depends on who called.
 DEEPEST = 32
+#: Bytes of a file that are hashed at a time.
+PIECE = 1 << 20
 #: Digits of a whole number; a part of a fraction has some sixty.
 MOST_DIGITS = 1000
 #: What writes the artefacts that are given to another command, by the schema's name without its version.
@@ -28,12 +29,14 @@ def sha256_of(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-def sha256_of_file(file: BufferedReader) -> str:
+def sha256_of_file(file: BinaryIO) -> str:
     """Return the SHA-256 of a whole file in hex, read piece by piece; the file is at its beginning again then."""
     file.seek(0)
-    digest = hashlib.file_digest(file, "sha256").hexdigest()
+    digest = hashlib.sha256()
+    while piece := file.read(PIECE):
+        digest.update(piece)
     file.seek(0)
-    return digest
+    return digest.hexdigest()
 
 
 def to_json(document: Mapping[str, Any]) -> str:

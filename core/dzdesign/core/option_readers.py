@@ -9,13 +9,7 @@ from dzdesign.core.units import parse_quantity
 
 
 def quantity(kind: str) -> Callable[[str, str], float]:
-    """Return what reads a number with its unit, in SI.
-
-    Parameters
-    ----------
-    kind : str
-        A key of `dzdesign.core.units.SI_UNIT`.
-    """
+    """Return what reads a number with its unit, in SI."""
     return lambda text, option: parse_quantity(text, kind, option)
 
 

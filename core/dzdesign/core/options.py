@@ -32,79 +32,48 @@ Table = str | Mapping[str, str] | None
 
 #: Headings of the help, in their order; an option without one stands above them.
 RECORDINGS, METER, FIT, LAW = "recordings", "flow meter", "fit", "law"
-CONNECTIONS, AMPLIFIER, CHECKS = "connections of the firmware", "amplifier functions", "further checks"
-GROUPS = (RECORDINGS, METER, FIT, LAW, CONNECTIONS, AMPLIFIER, CHECKS)
+CONNECTIONS, DRIVE, CHECKS = "connections of the firmware", "drive functions", "further checks"
+GROUPS = (RECORDINGS, METER, FIT, LAW, CONNECTIONS, DRIVE, CHECKS)
 
 
 @dataclass(frozen=True, slots=True)
 class Option:
-    """What is declared of an option, in the annotation of a field.
+    """What is declared of an option, in the annotation of a field; its help is the docstring below the field."""
 
-    Attributes
-    ----------
-    metavar : str
-        How the help calls the value.
-    group : str
-        Heading in the help, one of `GROUPS`.
-    default : str
-        Text that stands for an option that was not given, where the field's own default is None.
-    example : str
-        A right text with its unit, for the message about a value of another kind.
-    read : callable, optional
-        Turns text into the value that a stage works with; its second argument names the option for messages.
-    command_default : str
-        The same on the command line alone.
-    choices : tuple of str or str
-        Words that the option takes; where these are costly to import, their place as ``module:NAME``.
-    short : str
-        Spelling of one letter on the command line, such as ``-o``.
-    named : bool
-        The command line names it although Python takes it by position.
-    by_entry : bool
-        A mapping that the command line takes an entry at a time, ``NAME = TEXT``, on top of the options file's table.
-    """
-
+    #: How the help calls the value.
     metavar: str = ""
+    #: Heading in the help, one of `GROUPS`.
     group: str = ""
+    #: Text that stands for an option that was not given, where the field's own default is None.
     default: str = ""
+    #: A right text with its unit, for the message about a value of another kind.
     example: str = ""
-    read: Callable[[str, str], Any] | None = None
+    #: Turns text into the value that a stage works with; its second argument names the option for messages.
+    read: Callable[[Any, str], Any] | None = None
+    #: What stands for an option that was not given on the command line, where Python has another default.
     command_default: str = ""
+    #: Words that the option takes; where these are costly to import, their place as ``module:NAME``.
     choices: tuple[str, ...] | str = ()
+    #: Spelling of one letter on the command line, such as ``-o``.
     short: str = ""
+    #: The command line names it although Python takes it by position.
     named: bool = False
+    #: A mapping that the command line takes an entry at a time, ``NAME = TEXT``, on top of the options file's table.
     by_entry: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Argument:
-    """A field of a dataclass of arguments, and the option that it declares.
-
-    Attributes
-    ----------
-    name : str
-        In Python and, with ``_`` or ``-``, in the options file.
-    option : Option
-        As declared.
-    help : str
-        One or two sentences: the docstring below the field.
-    kinds : frozenset
-        Types that a value may have, such as str, PathLike, Mapping, Iterable.
-    result_class : str
-        Name of the class whose instances may be handed in place of a file; empty if there is none.
-    by_position : bool
-        Whether Python takes it by position.
-    required : bool
-        Whether it must be given.
-    default : object
-        Of the field.
-    """
+    """A field of a dataclass of arguments, and the option that it declares."""
 
     name: str
     option: Option
     help: str
+    #: Types that a value may have, such as str, PathLike, Mapping, Iterable.
     kinds: frozenset[Any]
+    #: Name of the class whose instances may be handed in place of a file; empty if there is none.
     result_class: str
+    #: Whether Python takes it by position.
     by_position: bool
     required: bool
     default: Any
@@ -140,13 +109,7 @@ class Argument:
         return self.option.command_default or self.option.default or str(self.default or "")
 
     def described(self, default: str) -> str:
-        """Return the help with the words that it takes and its default.
-
-        Parameters
-        ----------
-        default : str
-            As it is to be stated; empty if there is none.
-        """
+        """Return the help with the words that it takes and its default."""
         words = self.option.choices if isinstance(self.option.choices, tuple) else ()
         notes = [", ".join(words)] if any(word not in self.help for word in words) else []
         notes += [f"default: {default}"] if default else []
@@ -166,13 +129,7 @@ def flag_of(name: str) -> str:
 
 @cache
 def arguments_of(declaration: type) -> tuple[Argument, ...]:
-    """Return what a dataclass of arguments declares, those by position first.
-
-    Parameters
-    ----------
-    declaration : type
-        A dataclass whose fields are ``Annotated`` with an `Option`.
-    """
+    """Return what a dataclass of arguments declares, those by position first."""
     found, helps = [], _helps_of(declaration)
     for field in fields(declaration):
         annotation, option = get_args(field.type)[:2]
@@ -222,13 +179,6 @@ def _docstrings_in(module: str) -> dict[str, dict[str, str]]:
 def read_options(arguments: Any, names: Iterable[str]) -> dict[str, Any]:
     """Return options by name, each read; None where one is not given and has no default.
 
-    Parameters
-    ----------
-    arguments : dataclass
-        Of a class that `arguments_of` knows.
-    names : iterable of str
-        Fields of it.
-
     Raises
     ------
     InputError
@@ -244,22 +194,10 @@ def read_options(arguments: Any, names: Iterable[str]) -> dict[str, Any]:
 
 
 def paths_of(paths: Paths) -> list[AnyPath]:
-    """Return one path, or several, as a list.
-
-    Parameters
-    ----------
-    paths : path or iterable of paths
-        As a caller gave them.
-    """
+    """Return one path, or several, as a list."""
     return [paths] if isinstance(paths, str | os.PathLike) else list(paths)
 
 
 def texts_of(texts: Texts) -> list[str]:
-    """Return one text, or several, as a list.
-
-    Parameters
-    ----------
-    texts : str or iterable of str
-        As a caller gave them.
-    """
+    """Return one text, or several, as a list."""
     return [texts] if isinstance(texts, str) else list(texts)

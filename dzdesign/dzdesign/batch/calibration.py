@@ -3,20 +3,21 @@
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Lock
-from typing import Any
 
 from dzdesign.core.artefact_files import TOOL, sha256_of, write_folder
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile
 from dzdesign.core.errors import DzdesignError, one_line
+from dzdesign.design.design_choices import DesignChoices
 from dzdesign.report.lot.summary import DOES_NOT_HOLD, FAILED, OK, Status
 from dzdesign.report.lot.valve_folder import FIRMWARE, ValveManifest
+from dzdesign.stages.identify import IdentifyChoices
 
 #: A worker may run several threads; NumPy and the solvers of one process would only get in each other's way.
-ONE_AT_A_TIME = Lock()
+SOLVER_LOCK = Lock()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,8 +31,8 @@ class Task:
 
     name: str
     recordings: tuple[tuple[str, bytes], ...]
-    identify: Mapping[str, Any]
-    design: Mapping[str, str]
+    identify: IdentifyChoices
+    design: DesignChoices
     target: str
     verify: bool = False
     plant: tuple[str, bytes] | None = None
@@ -44,8 +45,8 @@ class Task:
             "tool": TOOL,
             "name": self.name,
             "recordings": [(name, sha256_of(content)) for name, content in self.recordings],
-            "identify": dict(self.identify),
-            "design": dict(self.design),
+            "identify": asdict(self.identify),
+            "design": asdict(self.design),
             "target": self.target,
             "verify": self.verify,
             "plant": self.plant and (self.plant[0], sha256_of(self.plant[1])),
@@ -89,7 +90,7 @@ def calibrate(task: Task) -> Outcome:
     """Identify, design, generate and, if asked for, verify one valve; a failure is an outcome, never an exception."""
     if task.refused:
         return task.outcome(FAILED, task.refused)
-    with ONE_AT_A_TIME, TemporaryDirectory() as temporary:
+    with SOLVER_LOCK, TemporaryDirectory() as temporary:
         folder, again = Path(temporary), False
         status: Status
         try:
@@ -114,9 +115,9 @@ def _run(task: Task, folder: Path) -> tuple[Status, str]:
     out = folder / "out"
     out.mkdir()
     recordings = _write_recordings(task, folder)
-    valve = identify(IdentifyArguments(recordings, **task.identify, output=out / "valve.json"))
+    valve = identify(IdentifyArguments(recordings, **vars(task.identify), output=out / "valve.json"))
     compensator = design(
-        DesignArguments(valve, target=task.target, **task.design, output=out / "compensator.json")
+        DesignArguments(valve, target=task.target, **vars(task.design), output=out / "compensator.json")
     )
     firmware = generate(compensator, task.target)  # proved by the design, a line above
     write_folder(out / FIRMWARE, firmware.files, firmware.manifest)

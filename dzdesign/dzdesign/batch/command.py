@@ -4,6 +4,7 @@ import contextlib
 import errno
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path
 
 from dzdesign.batch.anomalies import anomalies_of
@@ -24,7 +25,7 @@ from dzdesign.core.artefact_files import MANIFEST_NAME, read_bytes, write_file, 
 from dzdesign.core.errors import InputError
 from dzdesign.core.folder_swap import alone_in
 from dzdesign.core.options import arguments_of, read_options
-from dzdesign.design.request import DEFAULTS
+from dzdesign.design.design_choices import DEFAULTS, DesignChoices
 from dzdesign.report.lot.report import report_of_lot
 from dzdesign.report.lot.summary import LotSummary
 from dzdesign.report.lot.table import table_files
@@ -44,11 +45,6 @@ IDENTIFY = tuple(argument.name for argument in arguments_of(IdentifyChoices) if 
 
 def calibrate_lot(args: BatchArguments) -> tuple[LotSummary, Path | None]:
     """Calibrate the valves of a folder or a list; return batch.json, and where the report is if there is one.
-
-    Parameters
-    ----------
-    args : BatchArguments
-        Of the command.
 
     Raises
     ------
@@ -197,8 +193,7 @@ def _plant(args: BatchArguments) -> tuple[str, bytes] | None:
 
 def _task(valve: Valve, args: BatchArguments, plant: tuple[str, bytes] | None) -> Task:
     """Read a valve's recordings; where they can't be read the task says why."""
-    options = {**vars(args), **valve.overrides}
-    record = _record(valve, args)
+    options = {**vars(args), **valve.overrides, "record": _record(valve, args)}
     recordings, refused = [], ""
     try:
         recordings = [(path.name, read_bytes(path, "ramp file")) for path in valve.recordings()]
@@ -207,8 +202,8 @@ def _task(valve: Valve, args: BatchArguments, plant: tuple[str, bytes] | None) -
     return Task(
         name=valve.name,
         recordings=tuple(recordings),
-        identify={name: options[name] for name in IDENTIFY if options[name] is not None} | {"record": record},
-        design={name: options[name] for name in DEFAULTS if options[name] is not None},
+        identify=IdentifyChoices(**{each.name: options[each.name] for each in fields(IdentifyChoices)}),
+        design=DesignChoices(**{each.name: options[each.name] for each in fields(DesignChoices)}),
         target=options["target"],
         verify=args.verify,
         plant=plant,

@@ -24,12 +24,7 @@ from dzdesign.report.lot.valve_folder import (
 
 
 class Results:
-    """The folder that a batch is written into.
-
-    Parameters
-    ----------
-    folder : Path
-        New, empty, or of an earlier run, which is then taken up.
+    """The folder that a batch is written into: new, empty, or of an earlier run, which is then taken up.
 
     Raises
     ------
@@ -90,11 +85,12 @@ class Results:
 
     def is_done(self, name: str, digest: str) -> bool:
         """Tell whether a valve's folder was made from these inputs and holds every file as it was written."""
+        folder = self.of(name)
         try:
-            manifest = read_manifest(self.of(name))
+            manifest = read_manifest(folder)
             return manifest.inputs_sha256 == digest and all(
                 # A person's version of a board file is as good.
-                sha256_of((self.of(name) / file).read_bytes()) == sha256 or file in manifest.board
+                sha256_of((folder / file).read_bytes()) == sha256 or file in manifest.board
                 for file, sha256 in manifest.files.items()
             )
         except (InputError, OSError):

@@ -40,11 +40,6 @@ class Invocation:
 def parse(argv: list[str]) -> Invocation:
     """Parse a command line; what an options file says stands in for the defaults.
 
-    Parameters
-    ----------
-    argv : list of str
-        Without the program's name.
-
     Raises
     ------
     InputError
@@ -108,15 +103,6 @@ def _is_meant(value: Value, argument: Argument) -> bool:
 
 def merged_entries(flag: str, value: Value | None, entries: list[str]) -> dict[str, str]:
     """Return entries of the command line, ``name = text``, on top of those of the options file.
-
-    Parameters
-    ----------
-    flag : str
-        Option that they are of.
-    value : str, list of str or mapping, optional
-        Of the options file.
-    entries : list of str
-        Of the command line.
 
     Raises
     ------

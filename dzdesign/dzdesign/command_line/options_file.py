@@ -33,13 +33,6 @@ class _AsWritten(float):
 def options_from_file(path: str, declared: Iterable[Argument]) -> dict[str, Value]:
     """Read options; a key may be written ``meter-floor`` or ``meter_floor``, values as on the command line.
 
-    Parameters
-    ----------
-    path : str
-        TOML file.
-    declared : iterable of Argument
-        Options of all commands, so that one file serves every command.
-
     Raises
     ------
     InputError
@@ -90,15 +83,6 @@ def _is_text(item: object, free: bool) -> bool:
 
 def in_words_of_the_file(message: str, path: str, values: Mapping[str, Value]) -> str:
     """Return a message about an option as one about the line of the file where it stands; any other as it is.
-
-    Parameters
-    ----------
-    message : str
-        Of an error; about an option it begins with that.
-    path : str
-        The file.
-    values : mapping
-        Options that it says, by their names in words of Python.
 
     Examples
     --------

@@ -99,13 +99,7 @@ def arguments_of_command(name: str) -> tuple[Argument, ...]:
 
 
 def build_parser(only: str | None = None) -> tuple[Parser, dict[str, Parser]]:
-    """Return the parser and those of its commands.
-
-    Parameters
-    ----------
-    only : str, optional
-        The one command whose options are wanted: the others' modules are not imported. None: all of them.
-    """
+    """Return the parser and those of its commands; with `only` no other command's module is imported."""
     parser = FrontParser(prog="dzdesign", description=ABOUT, formatter_class=HelpFormatter, add_help=False)
     parser.add_argument("-h", "--help", action="help", help="Show this page and exit.")
     parser.add_argument("--version", action="version", version=f"dzdesign {__version__}", help="Print the version.")
@@ -131,15 +125,7 @@ def build_parser(only: str | None = None) -> tuple[Parser, dict[str, Parser]]:
 
 
 def usage_of(name: str, arguments: Iterable[Argument]) -> str:
-    """Return a command with the words that it must or may be given; options are listed below it, in groups.
-
-    Parameters
-    ----------
-    name : str
-        Of the command.
-    arguments : iterable of Argument
-        That it takes.
-    """
+    """Return a command with the words that it must or may be given; options are listed below it, in groups."""
     words = [f"dzdesign {name}"]
     for argument in arguments:
         word = argument.option.metavar + (" ..." if argument.is_repeatable else "")
@@ -188,17 +174,7 @@ def _add_option(place: argparse._ActionsContainer, argument: Argument) -> None:
 
 
 def unknown_words(words: list[str], name: str, command: Parser) -> InputError:
-    """Return the error for words that are no option of a command: the nearest that is one, or whose option it is.
-
-    Parameters
-    ----------
-    words : list of str
-        That argparse left over.
-    name : str
-        Of the command.
-    command : Parser
-        Of the command.
-    """
+    """Return the error for words that are no option of a command: the nearest that is one, or whose option it is."""
     wrong = next((word for word in words if word.startswith("-")), words[0]).partition("=")[0]
     if not wrong.startswith("-"):
         return InputError(f"'{wrong}' is one word too many; see `{command.prog} --help`")

@@ -6,7 +6,6 @@ import shutil
 import subprocess
 import sys
 from dataclasses import asdict, dataclass
-from typing import Any
 
 from dzdesign.core.artefact_files import to_json
 from dzdesign.core.errors import DzdesignError
@@ -66,28 +65,38 @@ class Arguments:
     """Arguments of `doctor`: none."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Installation:
+    """What is installed: paths and versions of programs and packages, None where there is none."""
+
+    dzdesign: str | None
+    python: str
+    system: str
+    #: Whether a library was compiled, loaded and called, and by which compiler or why not.
+    compiles: bool
+    compiler: str
+    programs: dict[str, dict[str, str] | None]
+    packages: dict[str, str | None]
+    to_get: list[Tool]
+    holds: bool
+
+
 def run(arguments: Arguments, json: bool) -> int:
     """Print what is there; 1 if no C compiler works, for then nothing can be verified."""
     programs = {tool.name: _found(tool) for tool in (*COMPILERS, *OPTIONAL)}
     packages = _packages()
-    works, text = _compiles()
+    works, compiler = _compiles()
     missing = [name for name, version in packages.items() if version is None and name != "ziglang"]
-    document = {
-        "dzdesign": _version("dzdesign"),
-        "python": platform.python_version(),
-        "system": platform.platform(),
-        "compiles": works,
-        "compiler": text,
-        "programs": programs,
-        "packages": packages,
-        "to_get": [asdict(tool) for tool in _lacking(programs)],
-        "holds": works and not missing,
-    }
+    found = Installation(
+        dzdesign=_version("dzdesign"), python=platform.python_version(), system=platform.platform(), compiles=works,
+        compiler=compiler, programs=programs, packages=packages, to_get=_lacking(programs),
+        holds=works and not missing,
+    )  # fmt: skip
     if json:
-        print(to_json(document), end="")
+        print(to_json(asdict(found)), end="")
     else:
-        _print(document, programs, missing)
-    return 0 if document["holds"] else 1
+        _print(found, missing)
+    return 0 if found.holds else 1
 
 
 def _found(tool: Tool) -> dict[str, str] | None:
@@ -149,27 +158,26 @@ def _lacking(programs: dict[str, dict[str, str] | None]) -> list[Tool]:
     ]
 
 
-def _print(document: dict[str, Any], programs: dict[str, dict[str, str] | None], missing: list[str]) -> None:
+def _print(found: Installation, missing: list[str]) -> None:
     from dzdesign.terminal.page import new_console, new_table, put_line, put_table
 
     console = new_console()
-    put_line(console, f"dzdesign {document['dzdesign']}, Python {document['python']}, {document['system']}")
+    put_line(console, f"dzdesign {found.dzdesign}, Python {found.python}, {found.system}")
     table = new_table("Programs", "program", "version", "for", words=(0, 1, 2))
     for tool in (*COMPILERS, *OPTIONAL):
-        found = programs[tool.name] or {"version": "not found"}
-        table.add_row(tool.name, found["version"] or "found", tool.purpose)
+        program = found.programs[tool.name] or {"version": "not found"}
+        table.add_row(tool.name, program["version"] or "found", tool.purpose)
     put_table(console, table)
-    versions = ", ".join(f"{name} {version or 'MISSING'}" for name, version in document["packages"].items())
+    versions = ", ".join(f"{name} {version or 'MISSING'}" for name, version in found.packages.items())
     put_line(console, f"Python packages: {versions.replace('ziglang MISSING', 'ziglang (optional) not there')}")
-    lacking = _lacking(programs)
-    if lacking:
+    if found.to_get:
         table = new_table("How to get the rest", "program", *SYSTEMS.values(), words=(0, 1, 2, 3))
-        for tool in lacking:
+        for tool in found.to_get:
             table.add_row(tool.name, tool.debian, tool.macos, tool.windows)
         put_table(console, table)
     if missing:
         put_line(console, f"Missing packages: {sys.executable} -m pip install {' '.join(missing)}")
-    if document["compiles"]:
-        put_line(console, f"A library was compiled, loaded and called with {document['compiler']}: verify can run.")
+    if found.compiles:
+        put_line(console, f"A library was compiled, loaded and called with {found.compiler}: verify can run.")
     else:
-        put_line(console, f"NO C COMPILER WORKS: {document['compiler']}")
+        put_line(console, f"NO C COMPILER WORKS: {found.compiler}")

@@ -16,15 +16,7 @@ MOST_NAMES = 3
 
 
 def run(arguments: Arguments, json: bool) -> int:
-    """Write the options file; 1 if it leaves something open without which `identify` can't run.
-
-    Parameters
-    ----------
-    arguments : InitArguments
-        Of the command.
-    json : bool
-        Whether the result is printed as JSON.
-    """
+    """Write the options file; 1 if it leaves something open without which `identify` can't run."""
     proposal = init(arguments)
     output = os.fspath(arguments.output or "")
     if json:

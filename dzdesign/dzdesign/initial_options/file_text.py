@@ -25,17 +25,7 @@ CHECK_DP = "check that it is the drop over the valve, and not the pressure of on
 
 
 def options_file(look: "Look", summary: list[str], opens: list[str]) -> str:
-    """Return the file: what identify is told, and as comments what it finds or takes by itself, with the reason.
-
-    Parameters
-    ----------
-    look : Look
-        What was seen.
-    summary : list of str
-        The same for a person.
-    opens : list of str
-        What is open.
-    """
+    """Return the file: what identify is told, and as comments what it finds or takes by itself, with the reason."""
     lines = [
         "# Options of dzdesign, made by `dzdesign init` from a look at the recordings; one file for all commands:",
         "#   dzdesign identify RAMP... --config dzdesign.toml",

@@ -5,43 +5,28 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from dzdesign.identify.first_look import SeenSide
+    from dzdesign.identify.first_look import SideOverview
     from dzdesign.identify.reading.guessed_columns import GuessedColumns
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Look:
-    """What was seen of all recordings; the maps are None or empty where the files need none.
-
-    Attributes
-    ----------
-    paths : list of Path
-        The recordings.
-    guesses : list of GuessedColumns
-        One per recording.
-    columns, dp : dict
-        Of the tables [columns] and [dp] to write.
-    u_max, u_seen : float
-        Full command to declare and the largest seen, V.
-    in_per_cent : bool
-        True if the command is, so that full command can't be seen.
-    sides, refused : dict
-        As `look_at_sides` gives them.
-    notes : tuple of str
-        What was seen and is not used, or comes from elsewhere than a column.
-    skip_rows : int or None
-        As declared.
-    """
+    """What was seen of all recordings; the maps are empty where the files need none."""
 
     paths: "list[Path]"
     guesses: "list[GuessedColumns]"
+    #: Of the tables [columns] and [dp] to write.
     columns: dict[str, str]
     dp: dict[str, str]
+    #: Full command to declare and the largest seen, V.
     u_max: float = 10.0
     u_seen: float | None = None
+    #: Whether the command is, so that full command can't be seen.
     in_per_cent: bool = False
-    sides: "dict[str, SeenSide]"
+    #: As `look_at_sides` gives them.
+    sides: "dict[str, SideOverview]"
     refused: dict[str, str]
+    #: What was seen and is not used, or comes from elsewhere than a column.
     notes: tuple[str, ...] = ()
     skip_rows: int | None = None
 

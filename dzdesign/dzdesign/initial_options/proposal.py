@@ -12,7 +12,7 @@ from dzdesign.stages.recordings import expand, read_recordings
 from dzdesign.terminal.progress import say, stage_progress, with_bar
 
 if TYPE_CHECKING:
-    from dzdesign.identify.first_look import SeenSide
+    from dzdesign.identify.first_look import SideOverview
     from dzdesign.identify.reading.guessed_columns import GuessedColumns
     from dzdesign.identify.reading.ramp_test import RampTest
     from dzdesign.identify.valve.model import Warning_
@@ -29,13 +29,6 @@ NAMED_FILES = 3
 
 def propose(ramps: Paths, *, columns: Table, dp: Table, skip_rows: int | None) -> Proposal:
     """Look at recordings, and return the file of options that this gives.
-
-    Parameters
-    ----------
-    ramps : path or iterable of paths
-        Recordings, or patterns; none: those of ./ramps, or of this folder.
-    columns, dp, skip_rows
-        As for `dzdesign.stages.recordings.read_recordings`.
 
     Raises
     ------
@@ -91,7 +84,7 @@ def _look(
         if len(dp) == len(lacking):
             tests = read_recordings(names, u_max=10.0, columns=columns or None, dp=dp, skip_rows=skip_rows)
     u_max, u_seen = proposed_u_max(tests)
-    sides: dict[str, SeenSide] = {}
+    sides: dict[str, SideOverview] = {}
     refused: dict[str, str] = {}
     in_per_cent = _is_in_per_cent(guesses, columns)
     if in_per_cent:
@@ -239,7 +232,7 @@ def _refusals(look: Look) -> list[str]:
     return [f"{name} commands would be refused: {reason}" for name, reason in look.refused.items()]
 
 
-def _side_line(name: str, side: "SeenSide") -> str:
+def _side_line(name: str, side: "SideOverview") -> str:
     pressures = ", ".join(f"{dp:.3g}" for dp in side.dp_MPa if dp is not None)
     where = f"{pressures} MPa" if pressures else "an unknown pressure drop"
     rate = "" if side.rate_V_s is None else f", at most {side.rate_V_s:.3g} V/s"

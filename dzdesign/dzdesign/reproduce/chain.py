@@ -19,7 +19,7 @@ from dzdesign.reproduce.recovered_valves import RecoveredValve
 from dzdesign.reproduce.valve_runs import ValveRuns, run_valve
 from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.plant import L_MIN, MPA
-from dzdesign.verify.closed_loop.simulation import Bench, simulate_ramp
+from dzdesign.verify.closed_loop.simulated_recordings import Bench, simulate_ramp
 
 #: Pressure drops of the ramp tests, MPa: the paper's two and some between ("multiple groups", section 1), closer at
 #: dP0, because between two tests only the lower of their bounds is certain.
@@ -36,15 +36,7 @@ class Chain:
 
 
 def run_chain(valve: RecoveredValve, say: Callable[[str], None] = lambda _: None) -> Chain:
-    """Run a recovered valve through the product.
-
-    Parameters
-    ----------
-    valve : RecoveredValve
-        The valve.
-    say : callable
-        Told each stage before it begins.
-    """
+    """Run a recovered valve through the product; `say` is told each stage before it begins."""
     name = valve.published.name
     bench = bench_of(valve)
     with tempfile.TemporaryDirectory(prefix="dzdesign-") as scratch:
@@ -93,11 +85,6 @@ def bench_of(valve: RecoveredValve) -> Bench:
     """Return the bench of Section 4.1: 100 Hz, and a meter that starts at 0.6 L/min; a simulation has exact readings.
 
     The paper gives no lag of the meter, and none is simulated.
-
-    Parameters
-    ----------
-    valve : RecoveredValve
-        Its level says whether a meter stood between.
     """
     bench = Bench(rate_Hz=float(RECORDS_HZ), meter_lag_s=0.0, meter_floor_L_min=valve.level_L_min)
     if valve.level_L_min:
@@ -106,13 +93,7 @@ def bench_of(valve: RecoveredValve) -> Bench:
 
 
 def identify_options(valve: RecoveredValve) -> IdentifyOptions:
-    """Return what an engineer who read Section 4.1 would declare.
-
-    Parameters
-    ----------
-    valve : RecoveredValve
-        The valve.
-    """
+    """Return what an engineer who read Section 4.1 would declare."""
     return IdentifyOptions(
         u_max=float(U_MAX_V), dp0=DP0_MPA * MPA, meter_floor=valve.level_L_min * L_MIN, meter_lag=0.0
     )

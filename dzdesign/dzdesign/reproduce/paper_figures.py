@@ -32,23 +32,10 @@ MARKS = "marks: the printed numbers, in the colours of their pressure drops"
 LAWS = {PAPER: "the paper's law", PRODUCT: "the product's C"}
 
 
-def figure_files(runs: Sequence[ValveRuns], suffix: str = "svg") -> dict[str, bytes]:
-    """Draw every figure; the same runs give the same bytes.
-
-    Parameters
-    ----------
-    runs : sequence of ValveRuns
-        Simulated, first and second valve, with the product's runs.
-    suffix : {"svg", "png"}
-        Format.
-
-    Returns
-    -------
-    dict
-        File name, such as ``figure_07.svg``, to content.
-    """
+def figure_files(runs: Sequence[ValveRuns]) -> dict[str, bytes]:
+    """Draw every figure of the simulated, first and second valve: file name -> SVG; the same runs, the same bytes."""
     with plot_style():
-        return {f"figure_{number:02}.{suffix}": saved(figure, suffix) for number, figure in _figures(runs)}
+        return {f"figure_{number:02}.svg": saved(figure, "svg") for number, figure in _figures(runs)}
 
 
 def _figures(runs: Sequence[ValveRuns]) -> Iterator[tuple[int, "Figure"]]:

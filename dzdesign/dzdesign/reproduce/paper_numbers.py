@@ -26,13 +26,7 @@ Range = tuple[float, float]
 
 
 def paper_numbers(runs: Sequence[ValveRuns]) -> list[PaperNumber]:
-    """Return the numbers of the simulated, the first and the second valve.
-
-    Parameters
-    ----------
-    runs : sequence of ValveRuns
-        In that order; without a firmware the product has no outcome.
-    """
+    """Return the numbers of the simulated, the first and the second valve; without a firmware the product has none."""
     simulated, first, second = runs
     return [
         *numbers_of_valve(simulated),
@@ -45,13 +39,7 @@ def paper_numbers(runs: Sequence[ValveRuns]) -> list[PaperNumber]:
 
 
 def numbers_of_valve(runs: ValveRuns) -> Iterator[PaperNumber]:
-    """Yield what the paper prints of every valve: dead zones and flows at both pressure drops, and at zero command.
-
-    Parameters
-    ----------
-    runs : ValveRuns
-        Of the valve.
-    """
+    """Yield what the paper prints of every valve: dead zones and flows at both pressure drops, and at zero command."""
     for dp_MPa in PRESSURES_MPA:
         yield from _without_compensator(runs, dp_MPa)
     for dp_MPa in PRESSURES_MPA:

@@ -79,29 +79,18 @@ class Printed(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecoveredValve:
-    """A valve of the paper as a plant.
-
-    Attributes
-    ----------
-    published : PublishedValve
-        What the paper prints of it.
-    plant : Plant
-        Its parameters; those in `rounding` are recovered, the others are the default plant's or of another valve.
-    rounding : mapping of str to float
-        Recovered parameter -> by how much it may be off for the rounding of the printed figures.
-    figures : tuple of FittedFigure
-        What went into the fit.
-    at_bound : tuple of str
-        Parameters that a bound of the fit holds.
-    level_L_min : float
-        Flow from which on the paper sees flow: its meter's floor, zero in its simulation.
-    """
+    """A valve of the paper as a plant."""
 
     published: PublishedValve
     plant: Plant
+    #: Recovered parameter -> by how much it may be off for the rounding of the printed figures; the plant's other
+    #: parameters are the default plant's or of another valve.
     rounding: Mapping[str, float]
+    #: What went into the fit.
     figures: tuple[FittedFigure, ...]
+    #: Parameters that a bound of the fit holds.
     at_bound: tuple[str, ...]
+    #: Flow from which on the paper sees flow: its meter's floor, zero in its simulation.
     level_L_min: float
 
     def parameters(self) -> dict[str, Parameter]:
@@ -218,19 +207,8 @@ def _printed_at_rest(valve: PublishedValve, values: Mapping[str, Any], level_L_m
 class AtRest:
     """The plant at rest at one pressure drop, Eqs. (19)-(24) with d/dt = 0, between its edge and its stop.
 
-    Parameters
-    ----------
-    values : mapping
-        Parameters by the names of `Plant`, as numbers or CasADi expressions.
-    dp_MPa : float
-        Across the edge.
-
-    Attributes
-    ----------
-    moves_V, opens_V : number or casadi.SX
-        Commands from which on the spool moves and the edge is open.
-    flow_per_volt : number or casadi.SX
-        L/min per V beyond.
+    `values` are parameters by the names of `Plant`, numbers or CasADi expressions; so are `moves_V` and `opens_V`, the
+    commands from which on the spool moves and the edge is open, and `flow_per_volt`, L/min per V beyond.
     """
 
     def __init__(self, values: Mapping[str, Any], dp_MPa: float) -> None:
@@ -261,12 +239,5 @@ class AtRest:
 
 
 def at_rest(plant: Plant, dp_MPa: float) -> AtRest:
-    """Return a plant at rest, as numbers; the supply's droop and the play must be none.
-
-    Parameters
-    ----------
-    plant : Plant
-    dp_MPa : float
-        Across the edge.
-    """
+    """Return a plant at rest, as numbers; the supply's droop and the play must be none."""
     return AtRest({field.name: getattr(plant, field.name) for field in fields(Plant)}, dp_MPa)

@@ -16,13 +16,7 @@ PAPER_DOI = "10.11916/j.issn.1005-9113.20063"
 
 
 def reproduce(folder: Path) -> Reproduction:
-    """Reproduce the paper's numbers and figures.
-
-    Parameters
-    ----------
-    folder : Path
-        To write.
-    """
+    """Reproduce the paper's numbers and figures, and write them to a folder."""
     schema = schema_of(Reproduction)
     check_folder_may_be_written(folder, schema)
     host_compiler()

@@ -10,7 +10,8 @@ from dzdesign.derivation.law import law
 from dzdesign.design.compensator import Compensator
 from dzdesign.report.reproduction import Driver
 from dzdesign.reproduce.recovered_valves import RecoveredValve
-from dzdesign.verify.closed_loop.loop import FLOW_SHARE, ClosedLoop, LoopRun, RampSequence, dead_zone
+from dzdesign.verify.closed_loop.dead_zone import FLOW_SHARE, dead_zone
+from dzdesign.verify.closed_loop.loop import ClosedLoop, LoopRun, RampSequence
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S
 
 PRESSURES_MPA = (float(DP0_MPA), float(DP1_MPA))
@@ -33,23 +34,14 @@ class Drive(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ValveRuns:
-    """Everything that was run of one valve.
-
-    Attributes
-    ----------
-    valve : RecoveredValve
-        The valve.
-    ramps : dict
-        (drive, pressure drop in MPa) -> the ramp up to full command and back; `command` is the compensator's input.
-    steps : dict
-        Drive -> the step to full command at dP0, one record a PWM period.
-    product_duty_percent : float or None
-        Duty cycle of the product at the command of Fig. 13 and dP0; None without a firmware.
-    """
+    """Everything that was run of one valve."""
 
     valve: RecoveredValve
+    #: By drive and pressure drop in MPa, up to full command and back; `command` is the compensator's input.
     ramps: dict[tuple[Drive, float], LoopRun]
+    #: To full command at dP0, one record a PWM period.
     steps: dict[Drive, LoopRun]
+    #: Of the product at the command of Fig. 13 and dP0; None without a firmware.
     product_duty_percent: float | None
 
     def dead_zone_percent(self, drive: Drive, dp_MPa: float, level_L_min: float | None = None) -> float:
@@ -92,16 +84,8 @@ class ValveRuns:
 def paper_drive(valve: PublishedValve, command: np.ndarray, dp_MPa: float, with_beta: bool = True) -> np.ndarray:
     """Return the output of the paper's compensator over u_max, its parameters taken from what the paper prints.
 
-    Parameters
-    ----------
-    valve : PublishedValve
-        Its dead zones are u_min0 and, over it, beta, Eq. (5); k x_max is the command left above u_min0.
-    command : (N,) array
-        Share of u_max.
-    dp_MPa : float
-        dP0 or dP1.
-    with_beta : bool
-        Whether the selector of Eq. (7) heeds the pressure drop.
+    The valve's dead zones are u_min0 and, over it, beta, Eq. (5); k x_max is the command left above u_min0. `with_beta`
+    says whether the selector of Eq. (7) heeds the pressure drop.
     """
     u_min0, u_min1 = (float(text) / 100 for text in (valve.dead_zone0_percent, valve.dead_zone1_percent))
     beta = u_min1 / u_min0 if with_beta and dp_MPa > DP0_MPA else 1.0  # Eqs. (5), (7)
@@ -116,17 +100,7 @@ def paper_duty_percent(valve: PublishedValve) -> float:
 
 
 def run_valve(valve: RecoveredValve, loop: ClosedLoop, compensator: Compensator | None = None) -> ValveRuns:
-    """Run a recovered valve through the paper's ramps and its step.
-
-    Parameters
-    ----------
-    valve : RecoveredValve
-        The valve.
-    loop : ClosedLoop
-        Of its plant.
-    compensator : Compensator, optional
-        Of the loop's firmware, if it has one: the product is run too.
-    """
+    """Run a recovered valve through the paper's ramps and its step; with a compensator the loop's firmware too."""
     command = RampSequence(ramp=float(RAMP_S)).command()
     ramps: dict[tuple[Drive, float], LoopRun] = {}
     for dp_MPa in PRESSURES_MPA:

@@ -54,13 +54,7 @@ class IdentifyArguments(IdentifyChoices):
 
 
 def identify_options(choices: IdentifyChoices) -> "IdentifyOptions":
-    """Return the engineer's choices for `identify`, SI.
-
-    Parameters
-    ----------
-    choices : IdentifyChoices
-        As written.
-    """
+    """Return the engineer's choices for `identify`, SI."""
     from dzdesign.identify.options import IdentifyOptions
 
     return IdentifyOptions(**read_options(choices, [field.name for field in fields(IdentifyOptions)]))
@@ -68,11 +62,6 @@ def identify_options(choices: IdentifyChoices) -> "IdentifyOptions":
 
 def record_of(given: Mapping[str, object] | None) -> dict[str, str]:
     """Return the record of a test, its numbers and dates as text.
-
-    Parameters
-    ----------
-    given : mapping, optional
-        Name to text, number or date.
 
     Raises
     ------

@@ -181,15 +181,7 @@ def refuse_copies(tests: list["RampTest"]) -> None:
 
 
 def check_plots(folder: AnyPath | None, output: AnyPath | None) -> None:
-    """Refuse a folder for plots that can't be one, or in whose place the output goes.
-
-    Parameters
-    ----------
-    folder : path, optional
-        Of the plots.
-    output : path, optional
-        Of the result.
-    """
+    """Refuse a folder for plots that can't be one, or in whose place the output goes."""
     if folder is None:
         return
     if not os.fspath(folder):

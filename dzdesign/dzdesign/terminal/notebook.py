@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from dzdesign.core.errors import one_line
-from dzdesign.terminal.page import FILE_WIDTH
+from dzdesign.terminal.page import FILE_WIDTH, put_line
 from dzdesign.terminal.tables import print_compensator, print_firmware, print_valve
 from dzdesign.terminal.verification_tables import print_verification
 
@@ -36,6 +36,13 @@ def _firmware_heading(firmware: "Firmware") -> str:
     return f"Firmware for {firmware.manifest.target}, law {firmware.manifest.law}, {len(firmware.files)} files"
 
 
+def _print_firmware(firmware: "Firmware", console: "Console") -> None:
+    """Print its files, and the note that the command line has on standard error."""
+    print_firmware(firmware, console)
+    if firmware.note:
+        put_line(console, firmware.note)
+
+
 def _verification_heading(verification: "Verification") -> str:
     return f"Verification: {verification.verdict}"
 
@@ -44,41 +51,23 @@ def _verification_heading(verification: "Verification") -> str:
 PAGES: Mapping[str, tuple[Callable[[Any], str], Callable[[Any, "Console"], None]]] = {
     "ValveModel": (_valve_heading, print_valve),
     "Compensator": (_compensator_heading, print_compensator),
-    "Firmware": (_firmware_heading, print_firmware),
+    "Firmware": (_firmware_heading, _print_firmware),
     "Verification": (_verification_heading, print_verification),
 }
 
 
 def heading_of(result: object) -> str:
-    """Return the one line that stands for a result.
-
-    Parameters
-    ----------
-    result : object
-        Of a class in `PAGES`.
-    """
+    """Return the one line that stands for a result."""
     return one_line(PAGES[type(result).__name__][0](result))
 
 
 def text_of(result: object) -> str:
-    """Return a result as plain text.
-
-    Parameters
-    ----------
-    result : object
-        Of a class in `PAGES`.
-    """
+    """Return a result as plain text."""
     return f"{heading_of(result)}\n{_recorded(result).export_text()}".rstrip()
 
 
 def html_of(result: object) -> str:
-    """Return a result as HTML without script, style sheet or network; all text is escaped.
-
-    Parameters
-    ----------
-    result : object
-        Of a class in `PAGES`.
-    """
+    """Return a result as HTML without script, style sheet or network; all text is escaped."""
     return _recorded(result).export_html(inline_styles=True, code_format=FRAME)
 
 

@@ -29,15 +29,7 @@ def new_console() -> "Console":
 
 
 def put_line(console: "Console", text: str) -> None:
-    """Print a sentence: on a terminal wrapped at blanks, in a file or a pipe as one line, for grep.
-
-    Parameters
-    ----------
-    console : Console
-        Of `new_console`.
-    text : str
-        One line.
-    """
+    """Print a sentence: on a terminal wrapped at blanks, in a file or a pipe as one line, for grep."""
     text = one_line(text)  # a name from a file steers no terminal
     if console.is_terminal:
         indent = " " * (len(text) - len(text.lstrip()) + 2)
@@ -48,26 +40,12 @@ def put_line(console: "Console", text: str) -> None:
 
 
 def put_table(console: "Console", table: "Table") -> None:
-    """Print a table: one that is wider than the page is not cut.
-
-    Parameters
-    ----------
-    console : Console
-        Of `new_console`.
-    table : Table
-        Of `new_table`.
-    """
+    """Print a table: one that is wider than the page is not cut."""
     console.print(table, crop=False)
 
 
 def volts(value: float | None) -> str:
-    """Return a voltage for a cell.
-
-    Parameters
-    ----------
-    value : float or None
-        In V.
-    """
+    """Return a voltage for a cell."""
     return "-" if value is None else f"{value:.3f}"
 
 

@@ -30,16 +30,7 @@ class _Verbosity:
 
 @contextlib.contextmanager
 def reporting(*, quiet: bool, verbose: bool) -> Iterator[None]:
-    """Report as much as was asked for, while a command runs.
-
-    Parameters
-    ----------
-    quiet : bool
-        Nothing but results and errors, and no bars.
-    verbose : bool
-        Also what the rooms log: files read and written, the solver's and the compilers' words; each with the time
-        since the beginning.
-    """
+    """Report as much as was asked for, while a command runs: quiet, nothing; verbose, also the log, with times."""
     before = (_Verbosity.quiet, _Verbosity.verbose, _Verbosity.begin)
     _Verbosity.quiet, _Verbosity.verbose, _Verbosity.begin = quiet, verbose, time.perf_counter()
     try:
@@ -72,13 +63,7 @@ def _logging() -> Iterator[None]:
 
 
 def say(text: str) -> None:
-    """Tell of progress, on stderr: stdout is for results.
-
-    Parameters
-    ----------
-    text : str
-        One line.
-    """
+    """Tell of progress, on stderr: stdout is for results."""
     if not _Verbosity.quiet:
         since = f"{time.perf_counter() - _Verbosity.begin:8.3f} s  " if _Verbosity.verbose else ""
         print(f"dzdesign: {since}{clear_line(text)}", file=sys.stderr, flush=True)
@@ -114,13 +99,7 @@ class StageProgress:
         self.begin(text)
 
     def begin(self, text: str) -> None:
-        """Begin a stage of which nothing is told but by its bar.
-
-        Parameters
-        ----------
-        text : str
-            Beside the bar.
-        """
+        """Begin a stage of which nothing is told but by its bar."""
         self.end()
         if is_watched():
             import threading
@@ -130,15 +109,7 @@ class StageProgress:
             self._timer.start()
 
     def each(self, items: Iterable[T], total: int | None) -> Iterator[T]:
-        """Return the items one by one: the bar of this stage knows its end then.
-
-        Parameters
-        ----------
-        items : iterable
-            Pieces of work, of about the same size.
-        total : int or None
-            How many; None: unknown.
-        """
+        """Return the items one by one: the bar of this stage knows its end then."""
         self._total = total
         for self._done, item in enumerate(items):
             if self._bar is not None:
@@ -168,17 +139,7 @@ class StageProgress:
 
 
 def with_bar(items: Iterable[T], what: str, total: int | None = None) -> Iterator[T]:
-    """Return the items one by one, with a bar on stderr once that has taken `PATIENCE`; none if it is no terminal.
-
-    Parameters
-    ----------
-    items : iterable
-        Pieces of work, of about the same size.
-    what : str
-        What is done with them.
-    total : int, optional
-        How many there are, of an iterable that does not know.
-    """
+    """Return the items one by one, with a bar on stderr once that has taken `PATIENCE`; none if it is no terminal."""
     with stage_progress() as stage:
         stage.begin(what)
         yield from stage.each(items, len(items) if isinstance(items, Sized) else total)

@@ -126,7 +126,7 @@ def print_firmware(firmware: "Firmware", console: "Console | None" = None, folde
     """Print the files of a firmware, and in which folder they are."""
     console = console or new_console()
     valves = len(json.loads(firmware.files["compensator.json"])["lot"])
-    common = f", common setting of {valves} valves" if valves else ""
+    common = f", lot setting of {valves} valves" if valves else ""
     place = f", in {folder}" if folder else ""
     put_line(console, f"Firmware for {firmware.manifest.target}, law {firmware.manifest.law}{common}{place}:")
     for name in firmware.files:

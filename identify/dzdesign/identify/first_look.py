@@ -23,7 +23,7 @@ from dzdesign.identify.valve.model import SIDES
 USUAL_U_MAX = (1.0, 2.5, 3.3, 5.0, 10.0, 12.0, 15.0, 20.0, 24.0, 48.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SeenSide:
+class SideOverview:
     """What the recordings of one side show.
 
     Attributes
@@ -64,7 +64,7 @@ def proposed_u_max(tests: Sequence[RampTest]) -> tuple[float, float]:
     return next((usual for usual in USUAL_U_MAX if seen <= 1.02 * usual), math.ceil(seen)), seen
 
 
-def look_at_sides(tests: Sequence[RampTest], u_max: float) -> tuple[dict[str, SeenSide], dict[str, str]]:
+def look_at_sides(tests: Sequence[RampTest], u_max: float) -> tuple[dict[str, SideOverview], dict[str, str]]:
     """Return what each side shows, and for a side that `identify` would refuse the reason.
 
     Parameters
@@ -74,23 +74,23 @@ def look_at_sides(tests: Sequence[RampTest], u_max: float) -> tuple[dict[str, Se
     u_max : float
         Full command, V.
     """
-    seen, refused = {}, {}
+    sides, refused = {}, {}
     options = IdentifyOptions(u_max=u_max)
     for name, sign in SIDES.items():
         of_side = tests_of_side(tests, sign, u_max)
         if not of_side:
             continue
         try:
-            seen[name] = _seen(describe_tests(of_side, options))
+            sides[name] = _overview(describe_tests(of_side, options))
         except InputError as error:
             refused[name] = str(error)
-    return seen, refused
+    return sides, refused
 
 
-def _seen(group: DescribedTests) -> SeenSide:
+def _overview(group: DescribedTests) -> SideOverview:
     rates = [shape.prepared.branch.rate for item in group.tests for shape in item.branches]
     rates = [rate for rate in rates if math.isfinite(rate)]
-    return SeenSide(
+    return SideOverview(
         dp_MPa=tuple(None if item.dp is None else item.dp / MPA for item in group.tests),
         ramps=sum(len(item.ramps) for item in group.tests),
         rate_V_s=max(rates, default=None),

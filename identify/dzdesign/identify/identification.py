@@ -19,7 +19,7 @@ from dzdesign.identify.side import identify_side
 from dzdesign.identify.valve.model import DECIMALS, SIDES, Meter, ValveModel, Warning_
 
 #: What ramps of several pressure drops show where a stuck sensor has made one test of them: no word on meter or valve.
-ALSO_OF_A_MIXTURE = ("noise", "bend")
+EXPLAINED_BY_MIXED_PRESSURES = ("noise", "bend")
 
 
 def identify(
@@ -76,7 +76,7 @@ def identify_sides(
             warnings.append(Warning_(code="side-refused", text=f"the {name} side is missing: {reason}", source=None))
             continue
         prefix = f"{name} side: " if len(sides) > 1 else ""
-        found = [item for item in sides[name].warnings if not mixed or item.code not in ALSO_OF_A_MIXTURE]
+        found = [item for item in sides[name].warnings if not mixed or item.code not in EXPLAINED_BY_MIXED_PRESSURES]
         warnings += [replace(item, text=prefix + item.text) for item in (*pressures, *clipped, *found)]
     lag = next(iter(sides.values())).described.lag
     files = dict.fromkeys(file for side in sides.values() for item in side.described.tests for file in item.files)

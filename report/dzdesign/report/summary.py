@@ -73,7 +73,7 @@ def _verdict(chain: Chain) -> Headline:
     if evidence is None:
         what = "a design" if chain.compensator else "an identified valve"
         return Headline(kind="open", sign="?", text=f"NOT VERIFIED: there is no evidence here, only {what}")
-    faults = sum(each.faults for each in evidence.inputs)
+    faults = sum(each.faults + each.over_compensated for each in evidence.inputs)
     if faults and all(check.holds is not False for check in evidence.checks):
         text = f"THE EVIDENCE CONTRADICTS ITSELF: {whole(faults)} faults counted, and every check holds"
         return Headline(kind="bad", sign="✗", text=text)

@@ -66,6 +66,7 @@ def test_the_core_of_every_target_has_the_constants_of_its_manifest(target):
     assert differences(made.files, made.manifest) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "arithmetic"), NAMES)
 def test_every_form_of_the_core_has_the_constants_of_its_manifest(name, arithmetic):
     made = firmware(name, arithmetic)

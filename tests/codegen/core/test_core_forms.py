@@ -1,4 +1,4 @@
-"""Both forms of the core, both sides of a valve, with an edge and sensors of unlike scaling: on every input."""
+"""Both forms of the core, both sides of a valve, with a transition and sensors of unlike scaling: on every input."""
 
 import dataclasses
 from fractions import Fraction
@@ -36,7 +36,8 @@ def two_sided(example_valve):
         dataclasses.replace(test, u_guard_V=test.u_guard_V - 0.2, u_guard_lower_V=test.u_guard_lower_V - 0.2)
         for test in side.tests
     )
-    negative = dataclasses.replace(side, guards=lower, opening_curve=opening, tests=tests)
+    reference = dataclasses.replace(side.reference, u_min_V=lower[side.certificate.guard].u_min0_V)
+    negative = dataclasses.replace(side, guards=lower, reference=reference, opening_curve=opening, tests=tests)
     return dataclasses.replace(example_valve, sides={"positive": side, "negative": negative})
 
 
@@ -46,15 +47,17 @@ def firmware_folder(compensator, target: str, folder):
     return folder
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_the_narrow_form_equals_the_law_on_every_input(example_compensator, tmp_path):
     result = check_all_inputs(firmware_folder(example_compensator, "avr", tmp_path / "fw"))
     assert result.holds and result.inputs == 33550336
 
 
+@pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize("target", ["host", "avr"])
-def test_two_sides_with_an_edge_and_unlike_sensors_equal_the_law_on_every_input(two_sided, target, tmp_path):
+def test_two_sides_with_a_transition_and_unlike_sensors_equal_the_law_on_every_input(two_sided, target, tmp_path):
     converter = Converter()
     signals = Signals(
         command=command_signal(parse_signal("-10..10 V x 0.15 + 1.5 V", "--command-signal"), converter),

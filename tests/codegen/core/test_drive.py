@@ -114,6 +114,7 @@ def first_difference(firmware, model: DriveModel, samples: list[tuple[int, int, 
     return ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SETS)
 def test_the_firmware_does_what_the_model_does(name):
     compensator = compensator_named(name)

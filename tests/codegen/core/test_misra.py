@@ -58,11 +58,13 @@ def written(folder, name: str, arithmetic: str):
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("target", TARGET_NAMES)
 def test_the_goldens_are_clean(target):
     assert findings(GOLDENS / target / "core") == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "arithmetic"), NAMES)
 def test_every_form_of_the_core_is_clean(name, arithmetic, tmp_path):
     assert findings(written(tmp_path, name, arithmetic)) == []
@@ -77,6 +79,7 @@ SEEDED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rule", SEEDED)
 def test_a_seeded_violation_is_found(rule, tmp_path):
     file, right, wrong = SEEDED[rule]

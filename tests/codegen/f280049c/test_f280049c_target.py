@@ -135,6 +135,7 @@ def check_zero_command(program: Path) -> None:
 CHECKS = [check_set_up, check_order, check_normal_running, check_trip_on_missing_samples, check_zero_command]
 
 
+@pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize("check", CHECKS)
 def test_firmware_on_the_model(firmware, check):
@@ -157,12 +158,14 @@ def check_second_trip_on_missing_samples(program: Path) -> None:
     assert set(ticks["tripped_b"][tripped:]) == {1}
 
 
+@pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize("check", [*CHECKS, check_both_outputs, check_second_trip_on_missing_samples])
 def test_firmware_of_two_solenoids_on_the_model(bipolar, check):
     check(build(bipolar))
 
 
+@pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize(
     ("file", "old", "new", "check"),
@@ -207,6 +210,7 @@ def test_watchdog_is_served_only_if_the_interrupt_ran(firmware):
     assert run(build(firmware), "watchdog") == ["0", "1"]
 
 
+@pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize(
     ("file", "old", "new", "check"),

@@ -259,6 +259,7 @@ def test_makefile_says_what_is_missing(firmware):
 CHECKS = [check_registers, check_normal_running, check_trip_on_missing_samples, check_zero_command, check_delays]
 
 
+@pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize("check", CHECKS)
 def test_firmware_on_the_device_model(firmware, check):
@@ -315,12 +316,14 @@ BIPOLAR_CHECKS = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize("check", [*CHECKS[1:], *BIPOLAR_CHECKS])
 def test_firmware_of_two_solenoids_on_the_device_model(bipolar, check):
     check(build(bipolar))
 
 
+@pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize(
     ("file", "old", "new", "check"),

@@ -81,6 +81,7 @@ def test_python_reads_what_the_firmware_packs(firmware):
     assert found == sent and reader.skipped == reader.bad_crc == 0
 
 
+@pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize("size", [1, 7, FRAME_OCTETS, 10_000])
 def test_frames_are_found_between_garbage_cuts_and_errors_in_pieces_of_any_size(firmware, size):
@@ -146,12 +147,14 @@ def check_blocked_line(program: Path) -> None:
     assert facts["ticks"] == "5000" and facts["services"] >= 5_000 and facts["lost"] == "0"
 
 
+@pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize("check", [check_stream, check_blocked_line])
 def test_telemetry_on_the_device_model(firmware, check):
     check(build(firmware))
 
 
+@pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize(
     ("old", "new", "check"),
@@ -200,6 +203,7 @@ def torn(frames: list[Frame]) -> list[Frame]:
     return [f for f in frames if f.compare_a != f.u_adc + 10 * f.p_a_adc + 100 * f.p_b_adc]
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_a_frame_is_of_one_moment_wherever_the_interrupt_comes(firmware):
     frames = preempted_frames(firmware)
@@ -207,6 +211,7 @@ def test_a_frame_is_of_one_moment_wherever_the_interrupt_comes(firmware):
     assert {frame.ticks for frame in frames} == {25, 27}, "the second reading is two periods younger"
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_a_state_read_once_is_torn(firmware):
     seed(firmware, "(dz_state.ticks == copy->ticks) ? 1u : 0u", "(dz_state.ticks == copy->ticks) ? 1u : 1u")

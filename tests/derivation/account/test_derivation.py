@@ -47,6 +47,7 @@ PAPER = {
 }
 
 
+@pytest.mark.slow
 def test_all_32_equations_have_their_verdict(verdicts):
     assert [int(number.strip("()")) for number in PAPER_NUMBERS] == sorted(PAPER) == list(range(1, 33))
     assert {number: verdicts[f"({number})"].outcome for number in PAPER} == PAPER
@@ -90,6 +91,7 @@ def test_units_find_the_mixed_sums_and_nothing_else(verdicts):
     assert set(wrong) == {"(30)", "(31)", "T5a", "T7d"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("statement", DERIVED, ids=number_of)
 def test_a_derivation_can_be_read_to_its_end(statement, verdicts):
     verdict = verdicts[statement.number]

@@ -27,16 +27,20 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
 from dzdesign.design.beta_table import DECIMALS
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.design_choices import DesignChoices
 from dzdesign.design.lot_setting import lot_setting
 from dzdesign.report.artefact_chain import chain_of
 from dzdesign.report.artefact_folder import read_artefact_folder
 from dzdesign.report.lot.valve_folder import read_manifest
+from dzdesign.stages.identify import IdentifyChoices
 from tests.support.crashing_work import die_over_bad
 from tests.support.synthetic import needs_compiler
 
+pytestmark = pytest.mark.slow
+
 SEED, COUNT = 7, 12
 OPTIONS = ["--meter-lag", "0.1 s", "--target", "host"]
-NOTHING = dict(recordings=(), identify={}, design={}, target="host")
+NOTHING = dict(recordings=(), identify=IdentifyChoices(), design=DesignChoices(), target="host")
 
 
 def tree(folder: Path) -> dict[str, str]:
@@ -346,7 +350,7 @@ def test_an_unexpected_fault_is_a_reason_and_is_tried_again(lot, tmp_path, monke
     def broken(*_args, **_options):
         raise ZeroDivisionError("a fault\nof ours")
 
-    monkeypatch.setattr("dzdesign.api.identify", broken)
+    monkeypatch.setattr("dzdesign.stages.identify.identify", broken)
     assert main(["batch", str(lot[0]), "-o", str(tmp_path / "out"), "--jobs", "1"]) == 1
     row = rows(tmp_path / "out")[0]
     assert row["reason"] == "unexpected ZeroDivisionError: a fault of ours" and row["inputs_sha256"] == ""

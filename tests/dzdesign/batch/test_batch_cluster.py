@@ -21,12 +21,16 @@ from dzdesign.batch.runners import _scheduler_lost, run_on_cluster
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.errors import InputError
+from dzdesign.design.design_choices import DesignChoices
+from dzdesign.stages.identify import IdentifyChoices
 from tests.support.crashing_work import die_over_bad
 from tests.support.paths import ROOT
 
+pytestmark = pytest.mark.slow
+
 COUNT, SEED = 7, 7
 OPTIONS = ["--meter-lag", "0.1 s", "--target", "host"]
-NOTHING = dict(recordings=(), identify={}, design={}, target="host")
+NOTHING = dict(recordings=(), identify=IdentifyChoices(), design=DesignChoices(), target="host")
 
 
 def start(*arguments: str, folder: Path, deaths: int = 3) -> subprocess.Popen:

@@ -19,6 +19,8 @@ from dzdesign.report.lot.valve_names import by_name
 from tests.support.html_pages import Page
 from tests.support.synthetic_lots import lot_rows, write_lot_folder
 
+pytestmark = pytest.mark.slow
+
 OPTIONS = ["--meter-lag", "0.1 s", "--target", "host"]
 COUNTED = ["V1", "V2", "V9", "V10", "V11"]
 #: What a spreadsheet, CSV or a page could take for something else.

@@ -60,6 +60,12 @@ def bench(good, tmp_path, monkeypatch, capsys):
     return folder
 
 
+def short(text):
+    """Return the beginning of a text, on one line: the name of a case."""
+    line = " ".join(text.split())
+    return line if len(line) <= 50 else f"{line[:50]}... ({len(text)} characters)"
+
+
 @pytest.fixture
 def refusal(bench, capsys):
     """Run a command that must refuse, and return its one line; nothing may have been written or lost."""
@@ -81,6 +87,7 @@ def refusal(bench, capsys):
 # ramp tests
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("content", "words"),
     [
@@ -169,89 +176,88 @@ def test_a_file_name_in_another_encoding(bench, capsys):
 
 
 @pytest.mark.parametrize(
-    ("argv", "words"),
+    "argv",
     [
-        ("", "required: COMMAND; see `dzdesign --help`"),
-        ("identfy a.csv", "did you mean 'identify'?"),
-        ("identify", "required: RAMP; see `dzdesign identify --help`"),
-        ("identify a.csv --meter-flor 1", "did you mean '--meter-floor'?"),
-        ("identify a.csv --dp0", "--dp0: expected one argument"),
-        ("identify a.csv --dp0 1", "--dp0 is '1' without a unit; write for example '1 MPa'"),
-        ("identify a.csv --dp0 1V", "--dp0 is '1V': 'V' is not a unit of pressure"),
-        ("identify a.csv --dp0 1mpa", "did you mean 'MPa'?"),
-        ("identify a.csv --dp0 one_MPa", "expected a number and a unit such as '1 MPa'"),
-        ("identify a.csv --dp0 0MPa", "dp0 is 0.0, expected a positive number"),
-        ("identify a.csv b.csv --dp0 2MPa", "dP0 = 2 MPa is not among the tested pressure drops (1, 4 MPa)"),
-        ("identify a.csv --u-max 5V", "the command reaches 10.00 V, above u_max = 5 V"),
-        ("identify a.csv --u-max 0V", "u_max is 0.0 V"),
-        ("identify a.csv --u-max 1e999V", "more than a number can hold"),
-        ("identify a.csv --x-max 1.8", "--x-max is '1.8' without a unit"),
-        ("identify a.csv --meter-lag=-1s", "meter_lag is negative"),
-        ("identify a.csv --meter-floor 1%", "'%' is not a unit of flow"),
-        ("identify a.csv --meter-floor 1000L/min", "0 samples at 0 levels of the command"),
-        ("identify a.csv --confidence 1", "the confidence is 1.0, expected 0.5 to below 1"),
-        ("identify a.csv --confidence 0.4", "the confidence is 0.4, expected 0.5 to below 1"),
-        ("identify a.csv --confidence nan", "the confidence is nan"),
-        ("identify a.csv --confidence high", "--confidence is 'high', expected a number such as 0.99"),
-        ("identify a.csv --knee-window 50-12", "expected two rising shares"),
-        ("identify a.csv --knee-window 12", "--knee-window is '12', expected two per cents"),
-        ("identify a.csv --knee-window a-b", "--knee-window is 'a-b', expected two per cents"),
-        ("identify a.csv --knee-window 12-500", "expected two rising shares"),
-        ("identify a.csv --knee-window 99-100", "samples lie between 99% and 100%"),
-        ("design valve.json --law papr", "unknown law 'papr' (did you mean 'paper'?)"),
-        ("design valve.json --pressure-span 2MPa", "ends below the tested pressure drop of 4 MPa"),
-        ("design valve.json --pressure-span 0MPa", "expected more than zero"),
-        ("design nowhere.json", "valve file 'nowhere.json' does not exist"),
-        ("codegen nowhere.json", "compensator file 'nowhere.json' does not exist"),
-        ("codegen compensator.json --target f28334", "no target 'f28334' (did you mean 'f28335'?)"),
-        ("codegen valve.json -o new --law aim", "unknown law 'aim'"),
-        ("derive --format htm", "unknown format 'htm' (did you mean 'html'?)"),
-        ("simulate --seed nan", "--seed is 'nan', expected a whole number"),
-        ("simulate --seed=-1", "--seed is '-1', expected a whole number"),
-        ("simulate --ramp-time 0s", "the ramp time is 0 s, expected 1 to 1000 s"),
-        ("simulate --dp 1MPa --dp 10bar", "--dp repeats a pressure drop"),
-        ("verify nowhere", "firmware manifest 'nowhere/manifest.json' does not exist"),
-        ("verify a.csv", "'a.csv' is a file, expected the firmware folder that `dzdesign codegen` writes"),
-        ("identify a.csv --config nowhere.toml", "config file 'nowhere.toml' does not exist"),
+        "",
+        "identfy a.csv",
+        "identify",
+        "identify a.csv --meter-flor 1",
+        "identify a.csv --dp0",
+        "identify a.csv --dp0 1",
+        "identify a.csv --dp0 1V",
+        "identify a.csv --dp0 1mpa",
+        "identify a.csv --dp0 one_MPa",
+        "identify a.csv --dp0 0MPa",
+        "identify a.csv b.csv --dp0 2MPa",
+        "identify a.csv --u-max 5V",
+        "identify a.csv --u-max 0V",
+        "identify a.csv --u-max 1e999V",
+        "identify a.csv --x-max 1.8",
+        "identify a.csv --meter-lag=-1s",
+        "identify a.csv --meter-floor 1%",
+        "identify a.csv --meter-floor 1000L/min",
+        "identify a.csv --confidence 1",
+        "identify a.csv --confidence 0.4",
+        "identify a.csv --confidence nan",
+        "identify a.csv --confidence high",
+        "identify a.csv --knee-window 50-12",
+        "identify a.csv --knee-window 12",
+        "identify a.csv --knee-window a-b",
+        "identify a.csv --knee-window 12-500",
+        "identify a.csv --knee-window 99-100",
+        "design valve.json --law papr",
+        "design valve.json --pressure-span 2MPa",
+        "design valve.json --pressure-span 0MPa",
+        "design nowhere.json",
+        "codegen nowhere.json",
+        "codegen compensator.json --target f28334",
+        "codegen valve.json -o new --law aim",
+        "derive --format htm",
+        "simulate --seed nan",
+        "simulate --seed=-1",
+        "simulate --ramp-time 0s",
+        "simulate --dp 1MPa --dp 10bar",
+        "verify nowhere",
+        "verify a.csv",
+        "identify a.csv --config nowhere.toml",
     ],
 )
-def test_a_bad_command_line(refusal, argv, words):
-    assert words in refusal(*argv.split()).replace("\\", "/")
+def test_a_bad_command_line(refusal, argv, wording):
+    wording(f"bad command line: {argv or 'none'}", refusal(*argv.split()).replace("\\", "/"))
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    "text",
     [
-        ("meter-flor = '1 L/min'", "there is no option 'meter-flor' (did you mean 'meter-floor'?)"),
-        ("meter_flor = '1 L/min'", "did you mean 'meter-floor'?"),
-        ("u-max: 10 V", "'options.toml' is not TOML"),
-        ("u-max = ", "'options.toml' is not TOML"),
-        ("a = " + "[" * 5000, "'options.toml' is not TOML"),
-        ("seed = " + "9" * 5000, "'options.toml' is not TOML"),
-        ("u-max = 10", "'options.toml': u-max is '10' without a unit; write for example u-max = \"10 V\""),
-        ("meter_lag = 0.1", "meter-lag is '0.1' without a unit; write for example meter-lag = \"0.1 s\""),
-        ("dp0 = 'one'", "dp0 is 'one', expected a number and a unit such as dp0 = \"1 MPa\""),
-        ("u-max = '10 bar'", "u-max is '10 bar': 'bar' is not a unit of voltage"),
-        ("u-max = '10 bar'", "expected for example V, mV; write for example u-max = \"10 V\""),
-        ("knee-window = '12'", "expected two per cents of the largest flow such as knee-window = \"12-50\""),
-        ("confidence = 'high'", "'options.toml': confidence is 'high', expected a number such as 0.99"),
-        ("u-max = ['10 V']", "option 'u-max' is ['10 V'], expected text"),
-        ("u-max = true", "option 'u-max' is True, expected text"),
-        ("u-max = {V = 10}", "option 'u-max' is"),
-        ("u-max = 1979-05-27", "option 'u-max' is"),
-        ("dp = []", "option 'dp' is [], expected text"),
-        ("dp = [['1 MPa']]", "option 'dp' is"),
-        ("u-max = '10 V'\nu_max = '9 V'", "option 'u_max' is given twice"),
-        ("confidence = nan", "the confidence is nan"),
-        ("valve = 'valve.json'", "there is no option 'valve'"),
-        ("run = 'other'", "there is no option 'run'"),
-        ("output = ''", "is a folder, expected the name of a file"),
-        ('output = "a\\u0000b"', "can't be written"),
+        "meter-flor = '1 L/min'",
+        "meter_flor = '1 L/min'",
+        "u-max: 10 V",
+        "u-max = ",
+        "a = " + "[" * 5000,
+        "seed = " + "9" * 5000,
+        "u-max = 10",
+        "meter_lag = 0.1",
+        "dp0 = 'one'",
+        "u-max = '10 bar'",
+        "knee-window = '12'",
+        "confidence = 'high'",
+        "u-max = ['10 V']",
+        "u-max = true",
+        "u-max = {V = 10}",
+        "u-max = 1979-05-27",
+        "dp = []",
+        "dp = [['1 MPa']]",
+        "u-max = '10 V'\nu_max = '9 V'",
+        "confidence = nan",
+        "valve = 'valve.json'",
+        "run = 'other'",
+        "output = ''",
+        'output = "a\\u0000b"',
     ],
 )
-def test_a_bad_file_of_options(refusal, bench, text, words):
+def test_a_bad_file_of_options(refusal, bench, text, wording):
     (bench / "options.toml").write_text(text)
-    assert words in refusal("identify", "a.csv", "b.csv", "--config", "options.toml")
+    wording(f"bad options file: {short(text)}", refusal("identify", "a.csv", "b.csv", "--config", "options.toml"))
 
 
 def test_what_the_command_line_says_is_not_blamed_on_the_file(refusal, bench):
@@ -318,72 +324,71 @@ def altered(document, path, change):
 
 SIDE = ("sides", "positive")
 VALVES = [
-    (("u_max_V",), None, "lacks the key 'u_max_V'"),
-    (("u_max_V",), "10", "'u_max_V' is '10', expected a number"),
-    (("u_max_V",), True, "'u_max_V' is True, expected a number"),
-    (("u_max_V",), 0, "'u_max_V' is 0, expected a number"),
-    (("sides",), [], "'sides' is []"),
-    ((*SIDE, "tests"), [], "'sides.positive.tests' is [], expected a list that is not empty"),
-    ((*SIDE, "tests", 0), None, "'sides.positive': a curve has 2 thresholds for 1 tests"),
-    ((*SIDE, "tests", 1, "dp_MPa"), "4", "'sides.positive.tests[1].dp_MPa' is '4', expected a number"),
-    ((*SIDE, "tests", 1, "u_guard_lower_V"), None, "lacks the key 'sides.positive.tests[1].u_guard_lower_V'"),
-    ((*SIDE, "tests", 1, "u_knee_rising_V"), "x", "'sides.positive.tests[1].u_knee_rising_V' is 'x'"),
-    ((*SIDE, "reference", "u_min_V"), "5", "'sides.positive.reference.u_min_V' is '5'"),
-    ((*SIDE, "reference", "u_min_V"), -5, "the reference's u_min_V is -5 V, not that of the closing curve"),
-    ((*SIDE, "k_x_max_over_u_max"), 10**40, "'sides.positive.k_x_max_over_u_max' is 1000"),
-    ((*SIDE, "trend"), "downhill", "'sides.positive.trend' is 'downhill', expected 'decreasing', 'flat'"),
-    ((*SIDE, "beta", "beta", 0), 1e308, "'sides.positive.beta.beta[0]' is 1e+308"),
-    ((*SIDE, "beta", "dp_MPa"), [4, 1], "'sides.positive.beta.dp_MPa[0]' is 4, but 1.0 follows"),
-    ((*SIDE, "guards", "closing", "certified_steps_V"), [], "0 steps bound 2 tests"),
-    ((*SIDE, "certificate", "confidence"), "high", "'sides.positive.certificate.confidence' is 'high'"),
-    ((*SIDE, "guards"), [], "'sides.positive.guards' is [], expected an object"),
-    ((*SIDE, "guards", "mean"), 5, "'sides.positive.guards.mean' is 5, expected an object with u_min0_V"),
-    ((*SIDE, "guards", "mean", "beta"), None, "lacks the key 'sides.positive.guards.mean.beta'"),
-    ((*SIDE, "guards", "mean", "u_lower_V", 1), "5", "'sides.positive.guards.mean.u_lower_V[1]' is '5'"),
-    ((*SIDE, "guards", "opening", "u_min0_V"), 0, "guards.opening': u_min0 is 0 V, expected a positive threshold"),
-    ((*SIDE, "guards", "opening", "beta_dp_MPa"), [4, 1], "guards.opening': the nodes of beta must be as many"),
-    ((*SIDE, "guards", "opening", "beta_dp_MPa"), [1, 3], "the nodes of beta must stand at the tests' pressure drops"),
-    ((*SIDE, "guards", "opening", "u_threshold_V"), [5], "guards.opening': 2 lower bounds stand beside 1 thresholds"),
-    ((*SIDE, "guards", "opening", "certified_steps_V"), [1], "the certified steps do not follow"),
-    ((*SIDE, "guards", "opening", "u_lower_V", 0), 9, "guards.opening': a lower bound lies above the threshold"),
-    ((*SIDE, "guards", "closing", "u_min0_V"), 4, "u_min_V is 4.69869 V, not that of the closing curve"),
-    ((*SIDE, "certificate", "guard"), "shut", "'sides.positive.certificate.guard' is 'shut', expected 'closing'"),
-    ((*SIDE, "tests", 1, "ramps"), None, "lacks the key 'sides.positive.tests[1].ramps'"),
-    ((*SIDE, "tests", 1, "ramps"), [], "'sides.positive.tests[1].ramps' is [], expected a list that is not empty"),
-    ((*SIDE, "tests", 1, "ramps"), "a.csv", "'sides.positive.tests[1].ramps' is 'a.csv'"),
-    ((*SIDE, "opening_curve"), [], "'sides.positive.opening_curve' is [], expected an object"),
-    ((*SIDE, "opening_curve", "u_V"), None, "lacks the key 'sides.positive.opening_curve.u_V'"),
-    ((*SIDE, "opening_curve", "u_V", 0), None, "the opening curve has 1 thresholds and 2 errors at 2 pressure drops"),
-    ((*SIDE, "opening_curve", "u_V"), [1, 1], "the opening curve lies below the offset of a guard's curve"),
-    ((*SIDE, "opening_curve", "u_V"), [8, 9], "the opening curve does not run one way"),
-    ((*SIDE, "opening_curve", "dp_MPa"), [1, 3], "the nodes of beta must stand at the tests' pressure drops"),
-    (("warnings",), ["none"], "'warnings[0]' is 'none', expected an object"),
-    (("made_from",), {}, "'made_from' is {}, expected a list"),
+    (("u_max_V",), None),
+    (("u_max_V",), "10"),
+    (("u_max_V",), True),
+    (("u_max_V",), 0),
+    (("sides",), []),
+    ((*SIDE, "tests"), []),
+    ((*SIDE, "tests", 0), None),
+    ((*SIDE, "tests", 1, "dp_MPa"), "4"),
+    ((*SIDE, "tests", 1, "u_guard_lower_V"), None),
+    ((*SIDE, "tests", 1, "u_knee_rising_V"), "x"),
+    ((*SIDE, "reference", "u_min_V"), "5"),
+    ((*SIDE, "reference", "u_min_V"), -5),
+    ((*SIDE, "k_x_max_over_u_max"), 10**40),
+    ((*SIDE, "trend"), "downhill"),
+    ((*SIDE, "beta", "beta", 0), 1e308),
+    ((*SIDE, "beta", "dp_MPa"), [4, 1]),
+    ((*SIDE, "guards", "closing", "certified_steps_V"), []),
+    ((*SIDE, "certificate", "confidence"), "high"),
+    ((*SIDE, "guards"), []),
+    ((*SIDE, "guards", "mean"), 5),
+    ((*SIDE, "guards", "mean", "beta"), None),
+    ((*SIDE, "guards", "mean", "u_lower_V", 1), "5"),
+    ((*SIDE, "guards", "opening", "u_min0_V"), 0),
+    ((*SIDE, "guards", "opening", "beta_dp_MPa"), [4, 1]),
+    ((*SIDE, "guards", "opening", "beta_dp_MPa"), [1, 3]),
+    ((*SIDE, "guards", "opening", "u_threshold_V"), [5]),
+    ((*SIDE, "guards", "opening", "certified_steps_V"), [1]),
+    ((*SIDE, "guards", "opening", "u_lower_V", 0), 9),
+    ((*SIDE, "guards", "closing", "u_min0_V"), 4),
+    ((*SIDE, "certificate", "guard"), "shut"),
+    ((*SIDE, "tests", 1, "ramps"), None),
+    ((*SIDE, "tests", 1, "ramps"), []),
+    ((*SIDE, "tests", 1, "ramps"), "a.csv"),
+    ((*SIDE, "opening_curve"), []),
+    ((*SIDE, "opening_curve", "u_V"), None),
+    ((*SIDE, "opening_curve", "u_V", 0), None),
+    ((*SIDE, "opening_curve", "u_V"), [1, 1]),
+    ((*SIDE, "opening_curve", "u_V"), [8, 9]),
+    ((*SIDE, "opening_curve", "dp_MPa"), [1, 3]),
+    (("warnings",), ["none"]),
+    (("made_from",), {}),
 ]
-POSITIVE = ("sides", "positive")
 POSITIVE = ("sides", "positive")
 COMPENSATORS = [
     (("signals",), None, "lacks the key 'signals'"),
     (("valve",), None, "lacks the key 'valve'"),
-    (("valve", "u_max_V"), None, "lacks the key 'u_max_V'"),
-    (("made_from",), [], "'made_from' is empty"),
+    (("valve", "u_max_V"), None, "lacks the key 'valve.u_max_V'"),
+    (("made_from",), [], "'made_from' has 0 files, expected valve.json alone"),
     (("law",), "papr", "unknown law 'papr' (did you mean 'paper'?)"),
-    (("u_max_V",), [10, 0], "'u_max_V' is [10, 0], expected a positive denominator"),
-    (("u_max_V",), [10], "'u_max_V' has 1 items, expected 2"),
-    (("u_max_V",), 10.0, "'u_max_V' is 10.0, expected a list"),
-    (("u_max_V",), [-10, 1], "is not that of its valve"),
-    ((*POSITIVE, "drive_range_over_u_max", 0), 10**70, "'sides.positive.k_x_max_over_u_max[0]' is 1000"),
+    (("u_max_V",), [10, 0], "'u_max_V' is [10, 0], expected [numerator, denominator]: whole numbers"),
+    (("u_max_V",), [10], "'u_max_V' is [10], expected [numerator, denominator]"),
+    (("u_max_V",), 10.0, "'u_max_V' is 10.0, expected [numerator, denominator]"),
+    (("u_max_V",), [-10, 1], "'u_max_V' is -10, not that of its valve"),
+    ((*POSITIVE, "drive_range_over_u_max", 0), 10**70, "'sides.positive.drive_range_over_u_max' is [1000"),
     ((*POSITIVE, "drive_range_over_u_max", 0), -1, "k x_max/u_max must be positive"),
-    ((*POSITIVE, "drive_range_over_u_max", 1), -(2**16), "expected a positive denominator"),
+    ((*POSITIVE, "drive_range_over_u_max", 1), -(2**16), "the denominator above zero"),
     ((*POSITIVE, "u_min0_over_u_max"), [3, 2], "u_min0 is 1.500 of u_max, expected between 0 and 1"),
     ((*POSITIVE, "beta"), [1, 2], "beta has 2 nodes, expected 65"),
     ((*POSITIVE, "beta", 3), 0, "'sides.positive.beta[3]' is 0"),
     ((*POSITIVE, "beta", 3), 1.5, "'sides.positive.beta[3]' is 1.5, expected a whole number"),
-    ((*POSITIVE, "transition_beta"), [1, 2], "the edge's beta must have as many nodes"),
-    (("transition_codes",), 32, "an edge needs the opening threshold's beta"),
+    ((*POSITIVE, "transition_beta"), [1, 2], "the transition's beta must have as many nodes"),
+    (("transition_codes",), 32, "a transition needs the opening threshold's beta"),
     (("beta_denominator",), 3, "beta_denominator is 3, expected a power of two"),
     (("beta_step_codes",), 0, "'beta_step_codes' is 0"),
-    (("below_dp0",), "held", "below_dp0 is 'held', expected hold or extend"),
+    (("below_dp0",), "held", "'below_dp0' is 'held', expected 'extend' or 'hold'"),
     (("reverse_codes",), -1, "'reverse_codes' is -1"),
     (("reverse_codes",), "40", "'reverse_codes' is '40'"),
     (("signals", "compare_max"), 10**9, "'signals.compare_max' is 1000000000, expected a whole number from 1 to 65535"),
@@ -394,18 +399,20 @@ COMPENSATORS = [
     (("signals", "command", "negative_full_code"), 9, "expected the other side of zero"),
     (("signals", "command", "valid_codes"), [0, 9], "full_code is 4095, outside the valid codes 0 to 9"),
     (("drive_functions", "dither_ticks"), 0, "'drive_functions.dither_ticks' is 0"),
-    ((*POSITIVE, "certificate", "dp_MPa"), [[1, 1]], "'sides.positive.certificate.dp_MPa' has 1 items, expected 2"),
+    ((*POSITIVE, "certificate", "dp_MPa"), [[1, 1]], "dp_MPa' is [[1, 1]], expected a list of 2 items"),
 ]
 
 
-@pytest.mark.parametrize(("path", "change", "words"), VALVES)
-def test_a_valve_whose_value_does_not_fit(refusal, bench, path, change, words):
+@pytest.mark.parametrize(("path", "change"), VALVES)
+def test_a_valve_whose_value_does_not_fit(refusal, bench, path, change, wording):
     document = json.loads((bench / "valve.json").read_text())
     (bench / "bad.json").write_text(json.dumps(altered(document, path, change)))
-    line = refusal("design", "bad.json", "-o", "new.json")
-    assert words in line and "bad.json" in line
+    place = ".".join(map(str, path))
+    change = "gone" if change is None else short(str(change))
+    wording(f"bad valve.json: {place} {change}", refusal("design", "bad.json", "-o", "new.json"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("path", "change", "words"), COMPENSATORS)
 def test_a_compensator_whose_value_does_not_fit(refusal, bench, path, change, words):
     document = json.loads((bench / "compensator.json").read_text())
@@ -444,28 +451,28 @@ def test_every_artefact_in_the_place_of_another(refusal):
 
 
 @pytest.mark.parametrize(
-    ("argv", "words"),
+    "argv",
     [
-        ("identify a.csv -o firmware", "is a folder, expected the name of a file"),
-        ("identify a.csv -o a.csv/valve.json", "its folder does not exist"),
-        ("identify a.csv -o nowhere/valve.json", "its folder does not exist"),
-        ("identify a.csv -o a.csv", "'a.csv' exists and is no dzdesign.valve/1"),
-        ("identify -o b.csv a.csv", "'b.csv' exists and is no dzdesign.valve/1"),
-        ("design valve.json -o valve.json", "'valve.json' exists and is no dzdesign.compensator/1"),
-        ("derive -o nowhere/equations.txt", "its folder does not exist"),
-        ("codegen compensator.json -o a.csv", "a.csv' is a file, expected a folder"),
-        ("codegen compensator.json -o a.csv/firmware", "a.csv' is a file, expected a folder"),
-        ("codegen compensator.json -o .", "is not empty and was not made by dzdesign"),
-        ("verify firmware -o .", "is not empty and was not made by dzdesign"),
-        ("verify firmware -o firmware", "which dzdesign.evidence/1 would replace"),
-        ("simulate -o a.csv/ramps", "a.csv' is a file, expected a folder"),
-        ("simulate -o .", "is not empty and was not made by dzdesign"),
-        ("demo a.csv", "a.csv"),
-        ("demo a.csv/demo", "a.csv"),
+        "identify a.csv -o firmware",
+        "identify a.csv -o a.csv/valve.json",
+        "identify a.csv -o nowhere/valve.json",
+        "identify a.csv -o a.csv",
+        "identify -o b.csv a.csv",
+        "design valve.json -o valve.json",
+        "derive -o nowhere/equations.txt",
+        "codegen compensator.json -o a.csv",
+        "codegen compensator.json -o a.csv/firmware",
+        "codegen compensator.json -o .",
+        "verify firmware -o .",
+        "verify firmware -o firmware",
+        "simulate -o a.csv/ramps",
+        "simulate -o .",
+        "demo a.csv",
+        "demo a.csv/demo",
     ],
 )
-def test_an_output_that_cannot_be_written(refusal, argv, words):
-    assert words in refusal(*argv.split())
+def test_an_output_that_cannot_be_written(refusal, argv, wording):
+    wording(f"bad output: {argv}", refusal(*argv.split()))
 
 
 def test_a_changed_firmware_is_not_overwritten_and_an_added_file_stays(refusal, bench, capsys):
@@ -506,26 +513,26 @@ def test_no_compiler_says_what_to_do(refusal, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    "text",
     [
-        ("K_q = 60.0", "there is no plant parameter 'K_q' (did you mean 'K_a'?)"),
-        ("K_a = -1", "plant parameter K_a is -1"),
-        ("K_a = nan", "plant parameter K_a is nan"),
-        ("K_a = 0", "plant parameter K_a is 0"),
-        ("K_a = 'big'", "plant parameter K_a is 'big'"),
-        ("preload_N = '27.6 N'", "that its name ends in, without quotes; write for example preload_N = 27.6"),
-        ("K_a = true", "plant parameter K_a is True"),
-        ("K_a = " + "9" * 400, "plant parameter K_a is 999"),
-        ("K_a = " + "9" * 5000, "'plant.toml' is not TOML"),
-        ("K_a = " + "[" * 5000, "'plant.toml' is not TOML"),
-        ("K_a: 4", "'plant.toml' is not TOML"),
-        ("stroke_mm = 0.1", "ends inside the overlap"),
-        ("m_e_kg = 1e-9", "the plant's spool moves at 4.5e+10 rad/s, expected at most 1e+06"),
+        "K_q = 60.0",
+        "K_a = -1",
+        "K_a = nan",
+        "K_a = 0",
+        "K_a = 'big'",
+        "preload_N = '27.6 N'",
+        "K_a = true",
+        "K_a = " + "9" * 400,
+        "K_a = " + "9" * 5000,
+        "K_a = " + "[" * 5000,
+        "K_a: 4",
+        "stroke_mm = 0.1",
+        "m_e_kg = 1e-9",
     ],
 )
-def test_a_bad_plant(refusal, bench, text, words):
+def test_a_bad_plant(refusal, bench, text, wording):
     (bench / "plant.toml").write_text(text)
-    assert words in refusal("verify", "firmware", "--plant", "plant.toml")
+    wording(f"bad plant: {short(text)}", refusal("verify", "firmware", "--plant", "plant.toml"))
 
 
 def test_a_plant_that_is_not_there(refusal):
@@ -552,6 +559,7 @@ def test_a_folder_that_is_no_firmware(refusal, bench, name, content, words):
     assert words in refusal("verify", "firmware")
 
 
+@pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize(
     ("content", "words"),
@@ -573,6 +581,7 @@ def test_a_core_that_is_none_does_not_hold(bench, capsys, content, words):
     assert "DOES NOT HOLD  files as generated: changed or missing: core/dz_comp.c" in out and words in out
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_a_core_that_somebody_edited_does_not_hold(bench, capsys):
     core = bench / "firmware" / "core" / "dz_comp.c"
@@ -583,6 +592,7 @@ def test_a_core_that_somebody_edited_does_not_hold(bench, capsys):
     assert "HOLDS  equals the exactly rounded law" in out
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_a_plant_that_stays_shut_is_no_evidence(bench, capsys):
     """The spring holds it shut: no flow at zero command means nothing."""
@@ -602,6 +612,7 @@ def program(*argv, cwd):
     return subprocess.run([*command, *argv], cwd=cwd, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("argv", "line"),
     [

@@ -10,6 +10,8 @@ from dzdesign.command_line.cli import main
 from tests.support.paths import ROOT
 from tests.support.synthetic import needs_compiler
 
+pytestmark = pytest.mark.slow
+
 RECORD = ("--record", "valve = simulated by dzdesign, no measurement")
 
 

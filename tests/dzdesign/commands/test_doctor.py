@@ -61,6 +61,7 @@ def test_a_compiler_that_does_not_work_is_found_out(bare, capsys):
     assert "does not compile" in report["compiler"]
 
 
+@pytest.mark.slow
 def test_a_missing_package_is_named(monkeypatch, capsys):
     known = doctor._version
     monkeypatch.setattr(doctor, "_version", lambda package: None if package == "polars" else known(package))

@@ -115,6 +115,7 @@ def table(path: Path) -> np.ndarray:
     return np.array([line.split(",") for line in lines[1:]], dtype=float)
 
 
+@pytest.mark.slow
 def test_good_frames_become_rows_in_units(bench):
     bench.listen()
     bench.send([bench.frame(index) for index in range(300)])
@@ -130,6 +131,7 @@ def test_good_frames_become_rows_in_units(bench):
     assert [path.name for path in bench.folder.iterdir()] == ["ramp.csv"]
 
 
+@pytest.mark.slow
 def test_what_solenoid_b_gets_is_written_as_its_own_and_negative(bench):
     bench.listen()
     bench.send([bench.frame(index, compare_a=0, compare_b=6 * index) for index in range(20)])
@@ -139,6 +141,7 @@ def test_what_solenoid_b_gets_is_written_as_its_own_and_negative(bench):
     assert np.all(rows[:, 6] == 0) and np.all(rows[:, 7] == 6 * index)
 
 
+@pytest.mark.slow
 def test_garbage_cut_frames_and_bad_crcs_are_passed_over_and_counted(bench):
     lines = [bench.frame(index) for index in range(50)]
     lines[10] = lines[10].replace("frame", "cut 11")
@@ -157,6 +160,7 @@ def test_garbage_cut_frames_and_bad_crcs_are_passed_over_and_counted(bench):
     assert "45 frames, 5 lost, 4 with a wrong CRC" in bench.output.read_text()
 
 
+@pytest.mark.slow
 def test_the_count_of_periods_wraps_and_a_reset_is_told(bench):
     ticks = [(2**32 - 3 * TICKS + TICKS * step) % 2**32 for step in range(6)]
     lines = [bench.frame(0, ticks=count) for count in (*ticks, TICKS, 2 * TICKS)]
@@ -167,6 +171,7 @@ def test_the_count_of_periods_wraps_and_a_reset_is_told(bench):
     assert np.allclose(table(bench.output)[:, 0], np.arange(8) / 100)
 
 
+@pytest.mark.slow
 def test_an_output_that_is_held_low_is_zero_and_faults_are_named(bench):
     bench.listen()
     bench.send([bench.frame(500), bench.frame(501, status=0), bench.frame(502, status=0x0103)])
@@ -175,6 +180,7 @@ def test_an_output_that_is_held_low_is_zero_and_faults_are_named(bench):
     assert result["faults"] == ["no usable sample in time", "trip input went low", "command outside its valid range"]
 
 
+@pytest.mark.slow
 def test_identify_reads_the_recording_with_the_flow_meters_column(bench):
     up = np.arange(0, 4096, 3)
     codes = np.concatenate([up, up[::-1]])
@@ -204,6 +210,7 @@ def test_identify_reads_the_recording_with_the_flow_meters_column(bench):
     assert found["u_knee_rising_V"] == pytest.approx(5.4, abs=0.01)
 
 
+@pytest.mark.slow
 def test_seconds_end_the_recording(bench):
     bench.listen("--seconds", "1.5")
     bench.send([bench.frame(index) for index in range(20)])
@@ -211,6 +218,7 @@ def test_seconds_end_the_recording(bench):
     assert status == 0 and result["frames"] == 20
 
 
+@pytest.mark.slow
 def test_a_line_that_breaks_leaves_what_came_and_status_1(bench):
     bench.listen()
     bench.send([bench.frame(index) for index in range(20)])
@@ -222,6 +230,7 @@ def test_a_line_that_breaks_leaves_what_came_and_status_1(bench):
     assert len(table(bench.output)) == 20
 
 
+@pytest.mark.slow
 def test_another_firmware_is_refused(bench):
     bench.listen()
     bench.send([bench.frame(0, origin=bench.origin ^ 1)])
@@ -229,6 +238,7 @@ def test_another_firmware_is_refused(bench):
     assert status == 2 and "not " + f"{bench.origin:04x}" in said and not bench.output.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("lines", "said"), [([], "nothing"), (["raw " + "00ff" * 40], "check --baud"), (["raw a55a0207"], "one version")]
 )
@@ -246,6 +256,7 @@ def refused(*words: str | Path) -> str:
     return done.stderr
 
 
+@pytest.mark.slow
 def test_a_bad_port_option_or_place_is_one_sentence(bench):
     port, output = os.ttyname(bench.slave), ["-o", bench.output]
     firmware = ["--firmware", bench.firmware]
@@ -259,6 +270,7 @@ def test_a_bad_port_option_or_place_is_one_sentence(bench):
     assert bench.output.read_text() == "time_s\n1\n"
 
 
+@pytest.mark.slow
 def test_a_port_in_use_is_refused(bench):
     bench.listen()
     other = bench.folder / "other.csv"

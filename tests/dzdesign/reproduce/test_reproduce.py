@@ -26,7 +26,7 @@ from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from tests.support.paths import ROOT
 from tests.support.synthetic import needs_compiler
 
-pytestmark = needs_compiler
+pytestmark = [pytest.mark.slow, needs_compiler]
 FIGURES = {f"figure_{number:02}.svg" for number in (2, 3, 6, 7, 8, 16, 17, 18, 19, 23)}
 PAPER = laws.law("paper")
 

@@ -33,7 +33,7 @@ def test_lost_rows_are_no_floor_of_the_meter(floor):
     whole = [record(Valve(floor=floor), dp) for dp in PRESSURES]
     holed = [without(test, 5.2, 5.9, rising=True) for test in whole]
     before, after = identify(whole), identify(holed)
-    assert after.meter_floor_L_min == pytest.approx(before.meter_floor_L_min, abs=0.05)
+    assert after.meter.floor_L_min == pytest.approx(before.meter.floor_L_min, abs=0.05)
     assert bounds(after) == pytest.approx(bounds(before), abs=2e-3)
     assert [warning.source for warning in warned(after, "gap")] == [test.source for test in holed]
     assert not warned(before, "gap")
@@ -64,6 +64,7 @@ def test_another_ramp_fills_the_gap():
     assert not warned(identify([holed, whole]), "gap")
 
 
+@pytest.mark.slow
 def test_the_error_of_a_zero_that_was_taken_off_is_in_the_bound():
     """Some hundred readings at rest tell it; left out, one bound in three lay above the threshold."""
     options, valve = IdentifyOptions(meter_lag=0.0), Valve(noise=0.1)

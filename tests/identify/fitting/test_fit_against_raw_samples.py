@@ -114,6 +114,7 @@ class TestOffset:
     def test_clarabel_finds_the_same(self, size, trend):
         assert max(self.disagreement(seed, size, trend) for seed in range(4)) < SAME
 
+    @pytest.mark.slow
     @settings(max_examples=300, deadline=None, derandomize=True)
     @given(
         seed=st.integers(0, 10**6), size=st.integers(2, 12), trend=st.sampled_from(TRENDS), reference=st.floats(0, 0.99)

@@ -10,7 +10,8 @@ from scipy.special import log_ndtr, logsumexp
 
 from dzdesign.identify.fitting import constrained_fits as fit
 from dzdesign.identify.fitting.constrained_fits import fit_knees, fit_offset
-from dzdesign.identify.knees.gated_line import lay_line, prepare_branch
+from dzdesign.identify.knees.gated_line import prepare_branch
+from dzdesign.identify.knees.line_fitting import lay_line
 from dzdesign.identify.knees.prepared_tests import describe_tests
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.branches import bin_branch

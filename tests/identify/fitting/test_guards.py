@@ -101,6 +101,7 @@ def test_the_laws_of_the_guards_in_every_trend(opens):
     np.testing.assert_allclose(side.opening_curve.u_V, opens(dp), rtol=0, atol=0.01)
 
 
+@pytest.mark.slow
 @settings(max_examples=8, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 10**6), run=st.floats(-0.1, 0.1), hysteresis=st.floats(0.05, 0.4))
 def test_the_laws_of_the_guards_whatever_the_valve(seed, run, hysteresis):
@@ -175,10 +176,12 @@ def gaps(request):
     return {name: tuple(map(np.array, both)) for name, both in found.items()}
 
 
+@pytest.mark.slow
 class TestCoverage:
     def failures(self, gap, shift=0.0):
         return int(np.count_nonzero((gap - shift).min(axis=1) < 0))
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("name", GUARDS)
     def test_the_bounds_hold_together(self, gaps, name):
         assert len(gaps[name][0]) == VALVES
@@ -216,6 +219,7 @@ class TestFile:
 
 
 class TestDesign:
+    @pytest.mark.slow
     @pytest.mark.parametrize("name", GUARDS)
     @pytest.mark.parametrize("trend", ["convex", "increasing"])
     def test_zero_command_stays_under_the_true_threshold_at_every_pressure_code(self, name, trend):
@@ -229,6 +233,7 @@ class TestDesign:
         below = OPENS[trend](dp) - BELOW_OPENING[name] - drive
         assert below[(dp >= low) & (dp <= high)].min() > 0
 
+    @pytest.mark.slow
     def test_the_offset_rises_from_guard_to_guard_and_flow_at_zero_command_is_said(self):
         valve = identify(ramps(OPENS["decreasing"]))
         made = [design(valve, DesignOptions(guard=name)) for name in GUARDS]
@@ -257,6 +262,7 @@ class TestDesign:
             DesignOptions(guard="meen")
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_verify_holds_the_core_against_the_bounds_of_its_own_guard(tmp_path, monkeypatch, capsys):
     """Of all inputs the bounds are read anew; flow at zero command is the price of the choice, and is said."""

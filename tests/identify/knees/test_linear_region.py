@@ -37,6 +37,7 @@ def test_a_straight_valve_is_straight_to_the_top_and_down_to_the_first_flow():
     assert [low < 0.12 for low, _ in found].count(True) >= 11
 
 
+@pytest.mark.slow
 def test_a_bend_too_slight_for_one_branch_stops_all():
     tests = ramps(bend=0.006)
     alone = [windows([test])[0][1] for test in tests]

@@ -8,8 +8,8 @@ from scipy.signal import lfilter
 
 from dzdesign.identify.identification import identify
 from dzdesign.identify.knees.noise import (
+    correlation_upper_limit,
     measure_roughness,
-    one_error_slower,
     shared_correlation,
     taken_by_parabola,
     variance_inflation,
@@ -39,6 +39,7 @@ def test_the_correlation_is_found_without_bias(correlation):
     assert abs(rate.mean() - (1 - correlation)) < max(4 * scatter, 0.01 * (1 - correlation)), f"seed {SEED}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("correlation", "least"), [(0.9, 0.75), (0.97, 0.75), (0.99, 0.55)])
 def test_one_standard_error_slower_covers_five_of_six(correlation, least):
     """Two branches of 700 samples hold a few independent stretches of slow noise: how slow it is, they hardly tell.
@@ -50,7 +51,7 @@ def test_one_standard_error_slower_covers_five_of_six(correlation, least):
     for _ in range(100):
         roughness = [measure_roughness(u, slow_noise(rng, correlation, u.size)) for _ in range(2)]
         found.append(shared_correlation(roughness))
-        believed.append(one_error_slower(found[-1], roughness))
+        believed.append(correlation_upper_limit(found[-1], roughness))
     covered = np.mean(np.array(believed) >= correlation)
     assert least < covered < 0.97, f"seed {SEED}"  # 84 % if errors are as claimed; 100 scatter by 4 %
     assert np.mean(np.array(found) >= correlation) < least - 0.1
@@ -105,6 +106,7 @@ def fitted(correlation, replicates, bend=0.0):
     return np.array(errors), np.array(standard_errors)
 
 
+@pytest.mark.slow
 def test_errors_are_near_the_limit_in_white_noise():
     """Cramér-Rao for a line from its zero at u to u + L: 2 sigma/(slope sqrt(n)); the floor hides a little more."""
     errors, standard_errors = fitted(0.0, 25)
@@ -115,6 +117,7 @@ def test_errors_are_near_the_limit_in_white_noise():
     assert np.sqrt(np.mean((errors / standard_errors) ** 2)) == pytest.approx(1, abs=0.25)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("correlation", [0.9, 0.99])
 def test_standard_errors_hold_in_slow_noise(correlation):
     errors, standard_errors = fitted(correlation, 15)

@@ -32,6 +32,7 @@ def test_a_meter_that_starts_above_the_straight_part_is_refused(floor, noise):
         identify([synthetic_ramp(1.0, truth)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.0, 0.1])
 @pytest.mark.parametrize("levels", [41, 81, 161])
 def test_a_table_that_jumps_certifies_nothing_above_the_truth(levels, noise):

@@ -24,6 +24,7 @@ def identified(seed: int, noise: float, floor: float):
     return identify_side(tests, IdentifyOptions(meter_lag=0.0, meter_floor=floor * L_MIN))
 
 
+@pytest.mark.slow
 def test_a_sharp_edge_under_a_floor_is_not_called_soft():
     """Without the censored samples the tail leaned to lower commands by one standard error, a test and a branch."""
     gaps, soft = [], 0

@@ -83,6 +83,7 @@ def bench(tmp_path, monkeypatch, capsys):
 
 
 class TestFlow:
+    @pytest.mark.slow
     @pytest.mark.parametrize("row", range(len(PRESSURES)))
     @pytest.mark.parametrize("title", ["whole range", "the edge"])
     def test_marks_stand_where_they_were_identified(self, found, figures, row, title):
@@ -220,6 +221,7 @@ class TestReadability:
             assert axes.get_legend() is None  # all in the figure's, below
         assert min(text.get_fontsize() for text in shown_text(figures[name])) >= 8
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("name", ["flow_1_MPa", "thresholds", "beta"])
     def test_nothing_leaves_the_page_and_the_legend_covers_no_panel(self, figures, name):
         figure = figures[name]
@@ -231,6 +233,7 @@ class TestReadability:
         assert not any(legend.overlaps(axes.get_tightbbox()) for axes in figure.axes)
         assert not any(figure._suptitle.get_window_extent().overlaps(axes.get_tightbbox()) for axes in figure.axes)
 
+    @pytest.mark.slow
     def test_a_file_with_an_odd_name_is_drawn(self):
         name = "ventil_中_$x$_" + 40 * "lang" + ".csv"
         found = identify_sides([ramp_of(1.0, source=name)])
@@ -240,6 +243,7 @@ class TestReadability:
 
 
 class TestFiles:
+    @pytest.mark.slow
     def test_files_are_small_and_say_neither_day_nor_version(self, found):
         files = plot_files(found)
         names = ("flow_0.5_MPa", "flow_1_MPa", "flow_4_MPa", "thresholds", "beta")
@@ -248,6 +252,7 @@ class TestFiles:
             assert not re.search(rb"Matplotlib|Software|dc:date", content), name
             assert len(content) < LARGEST_SVG
 
+    @pytest.mark.slow
     def test_plots_do_not_depend_on_a_users_settings(self, single):
         from matplotlib import rc_context
 
@@ -255,6 +260,7 @@ class TestFiles:
         with rc_context({"font.size": 20, "axes.facecolor": "black", "svg.hashsalt": None, "savefig.bbox": "tight"}):
             assert plot_files(single) == expected
 
+    @pytest.mark.slow
     def test_the_command_writes_and_overwrites_them(self, bench, capsys):
         argv = ["identify", "a.csv", "b.csv", "-o", "valve.json", "--plots", "deep/plots"]
         assert main(argv) == 0
@@ -269,6 +275,7 @@ class TestFiles:
         after = {path.name: path.read_bytes() for path in folder.iterdir()}
         assert after == {**before, "notes.txt": b"mine"}
 
+    @pytest.mark.slow
     def test_two_processes_write_the_same_bytes(self, bench):
         contents = []
         code = "import sys; from dzdesign.command_line.cli import main; sys.exit(main(sys.argv[1:]))"
@@ -281,6 +288,7 @@ class TestFiles:
         assert contents[0] == contents[1]
         assert contents[0]
 
+    @pytest.mark.slow
     def test_without_the_option_nothing_is_drawn(self, bench):
         code = (
             "import sys; from dzdesign.command_line.cli import main; main(['identify', 'a.csv', '--json']); "
@@ -315,6 +323,7 @@ class TestBadFolder:
         assert "--plots" in err
         assert {path.name for path in bench.iterdir()} == before
 
+    @pytest.mark.slow
     def test_a_folder_in_the_place_of_a_plot_is_left_alone(self, bench, capsys):
         (bench / "plots" / "thresholds.svg").mkdir(parents=True)
         assert main(["identify", "a.csv", "-o", "valve.json", "--plots", "plots"]) == 2

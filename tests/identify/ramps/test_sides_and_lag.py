@@ -102,6 +102,7 @@ class TestSides:
         read = read_artefact(to_json_bytes(valve), ValveModel, "valve.json")
         assert read == valve
 
+    @pytest.mark.slow
     def test_the_command_prints_both(self, recordings, tmp_path, monkeypatch, capsys):
         monkeypatch.chdir(tmp_path)
         for test in recordings:
@@ -133,6 +134,7 @@ def two_rates(lag, noise=0.08, seconds=(100.0, 20.0)):
 
 
 class TestLag:
+    @pytest.mark.slow
     @pytest.mark.parametrize("lag", [0.05, 0.1, 0.5])
     def test_two_rates_tell_the_lag_from_hysteresis(self, lag):
         valve = identify(two_rates(lag))

@@ -63,6 +63,7 @@ def assert_same_within_error(before, after, share=1.0):
 
 
 class TestLaws:
+    @pytest.mark.slow
     @laws
     @given(seed=seeds, order=st.permutations(range(4)))
     def test_the_order_of_files_does_not_matter(self, seed, order):
@@ -70,6 +71,7 @@ class TestLaws:
         tests = [dataclasses.replace(test, source=f"{number}.csv") for number, test in enumerate(tests)]
         assert to_json_bytes(identify([tests[index] for index in order])) == to_json_bytes(identify(tests))
 
+    @pytest.mark.slow
     @laws
     @given(seed=seeds, at=st.floats(0.1, 0.9))
     def test_a_ramp_split_over_two_files(self, seed, at):

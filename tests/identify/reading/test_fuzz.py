@@ -16,6 +16,7 @@ def test_every_target_is_run():
     assert tuple(TARGETS) == NAMES
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_nothing_is_found(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -62,6 +62,7 @@ def largest_memory(reset: bool = False) -> int:
     return next(int(line.split()[1]) << 10 for line in status.splitlines() if line.startswith("VmHWM:"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*TEXTS, *BINARIES])
 def test_a_hostile_recording(tmp_path, monkeypatch, name):
     monkeypatch.setattr(encoding, "FREE_BYTES", 1 << 22)  # a bomb is refused a little sooner
@@ -249,8 +250,7 @@ JSON = st.recursive(
 
 @pytest.fixture(scope="module")
 def documents(example_valve, example_compensator):
-
-    return {"valve": as_document(example_valve), "compensator": example_compensator}
+    return {"valve": as_document(example_valve), "compensator": as_document(example_compensator)}
 
 
 def places(value, way=()):
@@ -261,6 +261,7 @@ def places(value, way=()):
             yield from places(item, (*way, key))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["valve", "compensator"])
 def test_a_changed_artefact(documents, kind):
     from dzdesign.core.artefact_reading import read_artefact

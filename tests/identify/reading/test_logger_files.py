@@ -57,6 +57,7 @@ def assert_is_the_ramp(test, rows=slice(None)):
     np.testing.assert_allclose(test.q, L_MIN * Q[rows], atol=L_MIN * 1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FILES)
 def test_init_then_identify(here, name):
     make, options = FILES[name]

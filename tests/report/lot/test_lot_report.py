@@ -65,6 +65,7 @@ def head(html: str) -> str:
 # --- what the command leaves -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_batch_writes_the_report_and_it_leads_with_the_verdict(made):
     html = (made / "report.html").read_text(encoding="utf-8")
     document = json.loads((made / "batch.json").read_bytes())
@@ -83,6 +84,7 @@ def test_the_batch_writes_the_report_and_it_leads_with_the_verdict(made):
     assert all(digest in html for digest in (*hashes, sha256_of((made / "batch.json").read_bytes())))
 
 
+@pytest.mark.slow
 def test_report_makes_the_same_bytes_again(copied, capsys):
     before = (copied / "report.html").read_bytes()
     assert main(["report", str(copied)]) == 1
@@ -129,6 +131,7 @@ def test_a_table_too_large_for_a_page_is_one_sentence_and_leaves_no_page_of_an_e
     assert main(["report", str(out)]) == 1 and (out / "report.html").exists()
 
 
+@pytest.mark.slow
 def test_what_is_odd_is_in_the_verdict_and_all_of_it_below(copied, tmp_path):
     document = json.loads((copied / "batch.json").read_bytes())
     assert document["anomalies"] == [] and "odd:" not in head(report_of_lot(copied).html)
@@ -191,6 +194,7 @@ def test_what_the_setting_would_cost_without_those_that_hold_it_down(made):
     assert f"would cost {at['median']:.2f} % of command at the median valve" in html
 
 
+@pytest.mark.slow
 def test_one_valve_of_the_lot_has_its_own_report_and_one_without_calibration_its_reason(made, tmp_path, capsys):
     assert "dzdesign report valves/NAME" in (made / "report.html").read_text(encoding="utf-8")
     page = tmp_path / "one.html"
@@ -215,6 +219,7 @@ def test_the_tables_in_the_page_are_the_files(made):
 # --- files that do not fit -------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "said"),
     [
@@ -309,6 +314,7 @@ def test_a_batch_that_was_stopped_says_what_is_there(copied):
     assert "0 of 9 valves tried" in report.verdict and report.holds is None
 
 
+@pytest.mark.slow
 def test_good_is_only_a_lot_that_is_calibrated_and_verified(on_paper):
     report = report_of_lot(on_paper(lot_rows(8), verified=True))
     assert (report.kind, report.holds) == ("good", True)
@@ -354,6 +360,7 @@ def mirrored(content: bytes) -> bytes:
     return b"\n".join(b",".join(line) for line in turned) + b"\n"
 
 
+@pytest.mark.slow
 def test_bipolar_valves_through_the_command(tmp_path, capsys):
     for number in range(2):
         folder = tmp_path / "lot" / f"V{number}"
@@ -369,6 +376,7 @@ def test_bipolar_valves_through_the_command(tmp_path, capsys):
     assert "positive: all from " in head(html) and "negative: all from " in head(html)
 
 
+@pytest.mark.slow
 def test_a_thousand_valves_fit_a_page(on_paper):
     report = report_of_lot(on_paper(lot_rows(1000, failed=range(50, 1000, 97))))
     assert "990 of 1\u202f000 valves calibrated, 10 NOT" in head(report.html)
@@ -380,6 +388,7 @@ def test_a_thousand_valves_fit_a_page(on_paper):
 # --- what stands out -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_valve_far_from_the_rest_is_named_and_no_other(on_paper):
     rows = lot_rows(60, seed=5)
     rows[7] = with_figures(rows[7], offset_V=4.2)
@@ -467,6 +476,7 @@ def test_what_a_valve_that_narrows_the_interval_costs_is_said(dp_MPa, wider, sai
 # --- hostile text ----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_nobodys_text_becomes_markup(on_paper):
     """A table and a batch.json of somebody's making: their hashes fit."""
     rows = lot_rows(20, failed=(3, 4))
@@ -504,6 +514,7 @@ def test_names_reach_no_file_outside_of_the_valves(on_paper, tmp_path):
     assert any("../../secret" in fault for fault in read_lot(folder).faults)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("count", "strip"), [(2, True), (10, True), (11, False), (60, False)])
 def test_of_few_valves_each_is_a_dot_with_its_name_and_of_many_there_are_bars(count, strip, tmp_path):
     html = report_of_lot(write_lot_folder(tmp_path / "lot", lot_rows(count))).html

@@ -24,6 +24,7 @@ def written(folder: Path, name: str, arithmetic: str) -> Path:
     return folder
 
 
+@pytest.mark.slow
 @needs_frama_c
 @pytest.mark.parametrize(("name", "arithmetic"), [("plain", "wide"), ("bipolar, all options", "narrow")])
 def test_no_place_of_the_core_and_the_drive_is_left_in_doubt(name, arithmetic, tmp_path):
@@ -32,6 +33,7 @@ def test_no_place_of_the_core_and_the_drive_is_left_in_doubt(name, arithmetic, t
     assert ("dz_comp_negative" in found.functions) == name.startswith("bipolar")
 
 
+@pytest.mark.slow
 @needs_frama_c
 @pytest.mark.parametrize(
     ("file", "right", "wrong", "function"),
@@ -54,6 +56,7 @@ def test_a_fault_is_seen(file, right, wrong, function, tmp_path):
     assert function in {alarm.function for alarm in prove(folder, FEW).alarms}
 
 
+@pytest.mark.slow
 def test_without_frama_c_the_requirement_is_not_checked(firmware_folder, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(proof, "PROGRAM", "no-such-program")
     found = proof_check(firmware_folder)
@@ -62,6 +65,7 @@ def test_without_frama_c_the_requirement_is_not_checked(firmware_folder, tmp_pat
     assert "NOT CHECKED" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 @needs_frama_c
 def test_c_that_frama_c_refuses_is_not_checked(tmp_path):
     folder = written(tmp_path, "plain", "wide")

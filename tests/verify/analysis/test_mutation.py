@@ -85,6 +85,7 @@ def test_a_mutant_says_where_it_is():
     assert (one.file, one.line, one.change) == ("a.c", 2, "int b = 5;: 5 -> 6")
 
 
+@pytest.mark.slow
 def test_the_original_passes_and_a_wrong_one_is_no_bench(plain, tmp_path):
     plain.check_original()
     bench = bench_of(GOLDENS, "f28335", tmp_path / "fw")
@@ -107,6 +108,7 @@ JUDGED = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("file", "old", "new", "verdict"), JUDGED, ids=[f"{each[3]} {i}" for i, each in enumerate(JUDGED)]
 )
@@ -118,6 +120,7 @@ def test_a_verdict_is_given_where_it_is_due(plain, file, old, new, verdict):
     assert [row.verdict for row in score.not_killed] == ([] if verdict == KILLED else [verdict])
 
 
+@pytest.mark.slow
 def test_a_fault_that_no_converter_shows_survives(plain):
     """At codes that the check of codes that are not sound does not try: the random triples tell."""
     head = "uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)\n{"
@@ -130,6 +133,7 @@ def test_a_fault_that_no_converter_shows_survives(plain):
     assert not check.holds and check.text.endswith("1 survived")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["plain", "full"])
 def test_a_part_of_all_mutants_is_killed_or_equivalent(name, request):
     bench = request.getfixturevalue(name)
@@ -141,6 +145,7 @@ def test_a_part_of_all_mutants_is_killed_or_equivalent(name, request):
     assert sum(score.killers.values()) == score.killed
 
 
+@pytest.mark.slow
 def test_the_command_line_adds_the_row_and_the_list(firmware_folder, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(mutation, "all_mutants", lambda bench: [edited(bench, *JUDGED[k][:3]) for k in (0, 3)])
     assert main(["verify", str(firmware_folder), "--mutate", "-o", str(tmp_path / "evidence")]) == 0

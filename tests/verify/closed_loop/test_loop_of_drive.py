@@ -1,4 +1,4 @@
-"""The closed loop with the amplifier's options: what its residual and its flow at zero command mean then."""
+"""The closed loop with drive functions: what its residual and its flow at zero command mean then."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -12,7 +12,8 @@ from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.design.designing import design
 from dzdesign.identify.valve.model import ValveModel
-from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence, compare_at_pressure
+from dzdesign.verify.closed_loop.dead_zone import compare_at_pressure
+from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.plant import plants_from_tests
 from tests.support.golden_firmware import FULL, full_options
 from tests.support.synthetic import needs_compiler
@@ -39,6 +40,7 @@ def compared(folder, side: int = 1, change=lambda compensator: compensator, **op
     return loop, compare_at_pressure(loop, 3.0, 1.0, QUICK, name)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("side", [1, -1])
 def test_ramps_far_slower_than_the_command_change_none_of_the_results(tmp_path, side):
     """60 s ramps, a command of 20 s: it waits for them, and residual and zero flow stay what they were."""
@@ -52,6 +54,7 @@ def test_ramps_far_slower_than_the_command_change_none_of_the_results(tmp_path, 
         assert getattr(slow.result, name) == pytest.approx(getattr(plain.result, name), abs=4e-3)
 
 
+@pytest.mark.slow
 def test_without_waiting_the_ramps_lag_would_be_read_as_dead_zone(tmp_path):
     loop, slow = compared(tmp_path / "slow", ramp_up_s=(60.0, 60.0), ramp_down_s=(60.0, 60.0))
     loop.slowest_ramp_s = 0.0
@@ -61,6 +64,7 @@ def test_without_waiting_the_ramps_lag_would_be_read_as_dead_zone(tmp_path):
     assert hasty.result.q_zero_L_min > 1, "zero command, and the ramp is still on its way there"
 
 
+@pytest.mark.slow
 def test_a_dither_that_the_certificate_does_not_count_is_seen_at_the_waves_top(tmp_path):
     """Seeded: ten per cent of dither on an offset that was certified without. Flow passes at the wave's top only."""
 
@@ -76,6 +80,7 @@ def test_a_dither_that_the_certificate_does_not_count_is_seen_at_the_waves_top(t
     assert leaking.result.q_zero_L_min >= ends.max() * (1 - 1e-12)
 
 
+@pytest.mark.slow
 def test_a_record_holds_a_whole_wave_of_any_dither(tmp_path):
     """The mean and the largest of a record settle, whatever the wave's place at the record's end."""
     loop, _ = compared(tmp_path / "dither", dither_Hz=104.0)

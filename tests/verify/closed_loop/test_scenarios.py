@@ -75,6 +75,7 @@ def test_sensors_that_freeze_are_no_failure_that_a_core_can_see(results):
     assert not frozen.must_shut and frozen.q_zero_L_min > 0.3
 
 
+@pytest.mark.slow
 def test_a_core_that_holds_its_offset_when_a_sensor_fails_leaks(firmware, example_compensator, plant, tmp_path):
     """The fallback for codes that are not sound, taken out of the C: seen at the end of a ramp, at a high pressure."""
     core = tmp_path / "fw" / "core"
@@ -91,6 +92,7 @@ def test_a_core_that_holds_its_offset_when_a_sensor_fails_leaks(firmware, exampl
     assert found["sensor ahead breaks, or the one behind shows full"].q_zero_L_min > 0.3
 
 
+@pytest.mark.slow
 def test_a_plant_that_is_not_the_identified_valve_is_seen(firmware, plant):
     """With 45 N of preload it opens at 83 % of command and not at 54 %: the residual dead zone would be the plant's."""
     found = verify(firmware, replace(plant, preload_N=45.0), sequence=QUICK)
@@ -112,6 +114,7 @@ def test_ramps_of_the_firmware_are_waited_for(firmware, example_compensator, pla
     assert scene.held(0).size == round((3.0 + SETTLE_S) / STEP_S)
 
 
+@pytest.mark.slow
 def test_verification_fails_where_a_scenario_leaves_the_valve_open(example_compensator, plant, tmp_path):
     from dzdesign.codegen.project import generate
 
@@ -124,6 +127,7 @@ def test_verification_fails_where_a_scenario_leaves_the_valve_open(example_compe
     assert len(found.evidence.scenarios) > 40
 
 
+@pytest.mark.slow
 def test_a_plant_for_one_pressure_drop_gets_no_load_steps(firmware):
     found = verify(firmware, sequence=QUICK)
     names = [each.name for each in found.evidence.scenarios]

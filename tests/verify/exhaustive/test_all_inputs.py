@@ -30,7 +30,7 @@ from dzdesign.verify.exhaustive.test_vectors import (
 from dzdesign.verify.exhaustive.zero_command import pressure_drops
 from dzdesign.verify.firmware.folder import read_compensator
 from dzdesign.verify.toolchain import machines
-from dzdesign.verify.toolchain.compiled_core import CompiledCore, Findings
+from dzdesign.verify.toolchain.compiled_core import COUNTED, CompiledCore, Findings
 from dzdesign.verify.toolchain.host_compiler import host_compiler
 from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4
 from tests.support.golden_firmware import FULL, GOLDENS, INPUT
@@ -84,16 +84,20 @@ FAULTS = {
     "wrong": ("if (u_adc == 3000u && p_a_adc == p_b_adc + 77u) compare++;", {"wrong": 1}),
     "out of range": ("if (u_adc == 4095u && p_a_adc == p_b_adc) compare = 60001u;", {"out_of_range": 1, "wrong": 1}),
     # The row after it goes against the law too, where that rises with dP.
-    "falls": (
+    "not_monotone_in_u": (
         "if (u_adc == 2000u && p_a_adc == p_b_adc + 9u) compare = (uint16_t)(compare - 20u);",
-        {"falls": 1, "wrong": 1},
+        {"not_monotone_in_u": 1, "wrong": 1},
     ),
-    "against": ("if (u_adc <= 5u && p_a_adc == p_b_adc + 500u) compare = 33000u;", {"against": 6, "wrong": 6}),
+    "not_monotone_in_dp": (
+        "if (u_adc <= 5u && p_a_adc == p_b_adc + 500u) compare = 33000u;",
+        {"not_monotone_in_dp": 6, "wrong": 6},
+    ),
     "fallback": ("if (u_adc == 65535u) compare = 1u;", {"bad_fallbacks": 25}),
     "fallback of a pressure": ("if (p_b_adc == 65535u && u_adc == 17u) compare++;", {"bad_fallbacks": 5}),
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS)
 def test_each_count_fires(plain, fault):
     statement, expected = FAULTS[fault]
@@ -103,16 +107,17 @@ def test_each_count_fires(plain, fault):
     assert found.faults
 
 
+@pytest.mark.slow
 def test_a_pair_of_pressures_that_is_not_its_difference_is_odd_and_not_wrong(plain):
     prepared = PreparedInputs(exact_law(plain))
     odd = wrapped(CompiledCore(plain), "if (p_a_adc == 2500u && p_b_adc == 2001u) compare++;")
     found = odd.check(prepared.everything())
-    assert found.wrong == 0 and found.odd >= 2, "at the commands that take it in turn, and at zero command"
+    assert found.wrong == 0 and found.odd_pairs >= 2, "at the commands that take it in turn, and at zero command"
     at_zero = wrapped(CompiledCore(plain), "if (u_adc == 0u && p_a_adc == 2500u && p_b_adc == 2001u) compare++;")
-    assert at_zero.check(prepared.everything()).odd >= 1
-    assert at_zero.check(prepared.everything(cube=False)).odd == 0
+    assert at_zero.check(prepared.everything()).odd_pairs >= 1
+    assert at_zero.check(prepared.everything(cube=False)).odd_pairs == 0
     low = wrapped(CompiledCore(plain), "if (p_a_adc == 100u && p_b_adc == 4000u) compare++;")
-    assert low.check(prepared.everything()).odd >= 1, "where the law does not follow, the commands still take it"
+    assert low.check(prepared.everything()).odd_pairs >= 1, "where the law does not follow, the commands still take it"
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -130,6 +135,7 @@ def test_what_is_shown_is_checked_on_both_sides(full, sign):
             assert getattr(found, count) > 0 and found.faults == getattr(found, count)
 
 
+@pytest.mark.slow
 def test_both_sides_of_everything_see_a_fault_at_one_place(full):
     for sign, function in ((1, "dz_comp"), (-1, "dz_comp_negative")):
         prepared = PreparedInputs(exact_law(full, sign))
@@ -138,7 +144,7 @@ def test_both_sides_of_everything_see_a_fault_at_one_place(full):
         found = wrapped(core, f"if (u_adc == {code}u && p_a_adc == 2000u) compare++;", function).check(
             prepared.everything()
         )
-        assert found.wrong + found.odd >= 1
+        assert found.wrong + found.odd_pairs >= 1
         words = first_wrong(prepared, found)
         assert words is None or f"command code {code}," in words
         honest = core.check(prepared.everything())
@@ -146,6 +152,7 @@ def test_both_sides_of_everything_see_a_fault_at_one_place(full):
         assert core.check(prepared.sample(), sample=True).faults == 0
 
 
+@pytest.mark.slow
 def test_the_hash_is_of_all_compare_values(plain):
     prepared = PreparedInputs(exact_law(plain)).everything()
     core = CompiledCore(plain)
@@ -186,6 +193,7 @@ def test_the_layouts_are_those_of_the_header(tmp_path):
     assert list(map(int, said)) == expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sign", [1, -1])
 def test_the_pairs_of_a_difference_are_those_that_make_it(full, sign):
     exact = exact_law(full, sign)
@@ -219,6 +227,7 @@ def test_the_pressure_drops_of_a_difference_are_the_extremes_over_its_pairs(full
         assert most[place] / scale == pytest.approx(drops.max() + ends[1], abs=1e-9)
 
 
+@pytest.mark.slow
 def test_the_steps_of_the_c_are_the_rows_of_the_reference(full):
     """The C's quotients and remainders against the law in fractions, command by command."""
     for sign in (1, -1):
@@ -253,6 +262,7 @@ def test_a_sample_has_the_corners(plain):
 # --- other processors ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @needs(CORTEX_M4)
 @pytest.mark.parametrize("sign", [1, -1])
 def test_the_machine_code_of_the_cortex_m4_gives_what_the_host_gives_at_every_input(sign, tmp_path):
@@ -262,6 +272,7 @@ def test_the_machine_code_of_the_cortex_m4_gives_what_the_host_gives_at_every_in
     assert done.holds and done.found.inputs == host.inputs and done.found.outputs_hash == host.outputs_hash
 
 
+@pytest.mark.slow
 @needs(AVR)
 def test_the_machine_code_of_the_avr_gives_what_the_host_gives_at_the_sample(tmp_path):
     folder = copy_of(GOLDENS, "avr", tmp_path / "fw")
@@ -269,6 +280,7 @@ def test_the_machine_code_of_the_avr_gives_what_the_host_gives_at_the_sample(tmp
     assert done.holds and done.found.inputs > 5000
 
 
+@pytest.mark.slow
 @needs(AVR)
 def test_an_int_of_16_bits_is_seen_on_the_avr_alone(tmp_path):
     """A product that needs a longer int, which no PC shows."""
@@ -298,12 +310,12 @@ def test_a_machine_that_is_not_here_is_not_passed(plain, monkeypatch):
 def input_check_of(folder):
     """An InputCheck without running anything."""
     prepared = PreparedInputs(exact_law(folder))
-    counts = [name for name, kind in Findings.__annotations__.items() if kind is int]
     at_zero = np.zeros(prepared.differences.values.size, dtype=int)
-    found = Findings(outputs_hash="", object_sha256="", at_zero=at_zero, **dict.fromkeys(counts, 0))
+    found = Findings(outputs_hash="", object_sha256="", at_zero=at_zero, **dict.fromkeys(COUNTED, 0))
     return input_check(prepared, CompiledCore(folder), found)
 
 
+@pytest.mark.slow
 def test_the_command_line_reports_a_machine_that_is_not_here_and_does_not_hold(
     firmware_folder, tmp_path, capsys, monkeypatch
 ):

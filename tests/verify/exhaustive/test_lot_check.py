@@ -16,14 +16,14 @@ from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
-from dzdesign.design.lot import LotSide, lot_margins, prove_lot
+from dzdesign.design.lot import lot_margins, prove_lot
 from dzdesign.design.lot_pressures import Lacking, common_interval, lacking_in, without_narrow
 from dzdesign.design.lot_setting import lot_setting
+from dzdesign.design.lot_valves import LotSide
 from dzdesign.design.option_texts import options_of
 from dzdesign.design.redesign_check import prove_derived
 from dzdesign.identify.identification import identify
-from dzdesign.report.chain import Chain
-from dzdesign.report.sections.lot_setting import lot_costs, lot_figures, lot_section
+from dzdesign.report.sections.lot_setting import lot_costs
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.lot_check import check_lot, lot_checked
@@ -81,6 +81,7 @@ def slow_margin(compensator, each):
     return min(margins)
 
 
+@pytest.mark.slow
 def test_the_margin_of_each_valve_is_that_of_its_own_curve(batch, common):
     found = {each.name: each.margin_V for each in common.margins}
     assert set(found) == set(batch) and min(found.values()) >= 0
@@ -199,6 +200,7 @@ def test_verify_compares_the_core_with_every_valve(common, tmp_path):
     assert "d, 1.99 MPa" in check.text
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_the_command_fails_and_names_the_valve(common, tmp_path, capsys):
     folder, _ = firmware_of(with_bound(common.compensator, "c", 1, -1.0), tmp_path / "firmware")
@@ -285,6 +287,7 @@ def test_a_range_that_would_be_none_without_them_and_one_that_another_side_ends(
 # ---- what a reader is told ----
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_firmware_and_report_say_first_that_they_are_of_a_lot(common, batch, tmp_path):
     folder = tmp_path / "firmware"
@@ -332,13 +335,3 @@ def test_what_it_costs_a_valve_is_the_command_before_its_own_bound(common):
             shares.append(100 * first / full)
         found = costs[valve.name]
         assert [found.least_percent, found.most_percent] == pytest.approx([min(shares), max(shares)], abs=0.05)
-
-
-def test_an_old_common_file_without_its_lot_says_that_it_is_not_known(document):
-    old = {name: value for name, value in document.items() if name not in ("lot", "lot_sha256")}
-    compensator = read(old)
-    said = generate(compensator, "host").files["core/dz_comp.h"]
-    assert "LOT SETTING of 4 valves, the file does not say which." in said
-    first, worst, cost = lot_figures(Chain(compensator=compensator))
-    assert first.value == "of 4 valves" and worst.value == "NOT CHECKED" and cost.value == "not known"
-    assert "run `dzdesign batch` again" in lot_section(compensator).missing

@@ -35,12 +35,14 @@ def count_of_sources(firmware_folder) -> int:
     return count
 
 
+@pytest.mark.slow
 def test_the_whole_firmware_compiles_against_the_users_headers(firmware_folder, ware):
     check = check_against_c2000ware(firmware_folder, ware)
     assert check.holds, check.text
     assert check.text.startswith(f"compiled {count_of_sources(firmware_folder)} files against {ware}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("file", "old", "new"),
     [
@@ -59,6 +61,7 @@ def test_a_seeded_fault_against_the_headers_is_seen(firmware_folder, ware, file,
     assert not check.holds and file in check.text and "error" in check.text
 
 
+@pytest.mark.slow
 def test_a_file_that_the_project_links_and_c2000ware_lacks_is_named(firmware_folder, ware):
     (ware / "device_support" / "f2833x" / "common" / "source" / "DSP2833x_usDelay.asm").unlink()
     check = check_against_c2000ware(firmware_folder, ware)
@@ -81,6 +84,7 @@ def test_another_targets_firmware_is_bad_input(firmware_folder, ware):
         check_against_c2000ware(firmware_folder, ware)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("old", "status"), [(None, 0), ("ETPS", 1)])
 def test_the_command_reports_it_with_the_other_evidence(
     firmware_folder, ware, tmp_path, monkeypatch, capsys, old, status

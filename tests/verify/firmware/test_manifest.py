@@ -111,6 +111,7 @@ def test_c_of_another_compensator_is_named(firmware_folder):
     assert "core/dz_drive.h does not name this compensator.json in its first lines" in said
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_verify_says_so(firmware_folder):
     manifest = manifest_of(firmware_folder)

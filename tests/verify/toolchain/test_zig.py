@@ -77,6 +77,7 @@ def test_what_is_undefined_builds_no_trap(no_compiler, tmp_path):
     assert "f:" in ours and "ubsan" not in ours
 
 
+@pytest.mark.slow
 @needs_zig
 def test_verify_holds_without_a_compiler_on_the_path(firmware_folder, tmp_path):
     nothing = tmp_path / "nothing"

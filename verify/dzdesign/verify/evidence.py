@@ -60,10 +60,9 @@ class LotCheck:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class InputCheck:
-    """The check of every input of one side; every count that ends in a fault must be zero."""
+class InputCounts:
+    """What a machine counts that is given every input of one side, or a sample of them."""
 
-    sign: Annotated[Sign, about("Sign of the commands.")]
     inputs: Annotated[
         Count, about("Pairs of command code and difference of pressure codes, each compared with the exact law.")
     ]
@@ -72,15 +71,29 @@ class InputCheck:
     out_of_range: Annotated[Count, about("Compare values above the limit.")]
     not_monotone_in_u: Annotated[Count, about("Falls with rising command.")]
     not_monotone_in_dp: Annotated[Count, about("Steps over the pressure difference against the law's direction.")]
-    over_compensated: Annotated[
-        Count, about("Pressure codes of the certified interval whose drive at zero command lies above the bound.")
-    ]
     odd_pairs: Annotated[Count, about("Pairs of pressure codes that give another value than their difference does.")]
     bad_fallbacks: Annotated[
         Count, about("Codes outside their signal's valid range that do not fall back to the safe value.")
     ]
     bad_status: Annotated[Count, about("Status words that say something else.")]
     bad_betas: Annotated[Count, about("Pairs of pressure codes at which dz_beta() is not the law's.")]
+    calls: Annotated[Count, about("Calls of the core in all.")]
+
+    @property
+    def faults(self) -> int:
+        """All that must be none, together."""
+        counts = (self.wrong, self.out_of_range, self.not_monotone_in_u, self.not_monotone_in_dp, self.odd_pairs)
+        return sum(counts) + self.bad_fallbacks + self.bad_status + self.bad_betas
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InputCheck(InputCounts):
+    """The check of every input of one side; every count that ends in a fault must be zero."""
+
+    sign: Annotated[Sign, about("Sign of the commands.")]
+    over_compensated: Annotated[
+        Count, about("Pressure codes of the certified interval whose drive at zero command lies above the bound.")
+    ]
     smallest_margin_V: Annotated[
         float, quantity("V", "Smallest distance from the drive at zero command to the bound.", ge=-MOST_V, le=MOST_V)
     ]
@@ -93,12 +106,11 @@ class InputCheck:
             pattern="^[0-9a-f]{16}$", max_length=16,
         ),
     ]  # fmt: skip
-    calls: Annotated[Count, about("Calls of the core in all.")]
     pressure_pairs: Annotated[Count, about("Pairs of valid pressure codes, each of which was tried.")]
     first_wrong: Annotated[str | None, about("The first fault, in words.")]
     lot: Annotated[
         LotCheck | None,
-        about("Of a common setting: every valve of its lot against its own bounds; null of a valve's own."),
+        about("Of a lot setting: every valve of its lot against its own bounds; null of a valve's own."),
     ]
 
     @property
@@ -107,17 +119,9 @@ class InputCheck:
         return "positive" if self.sign > 0 else "negative"
 
     @property
-    def faults(self) -> int:
-        """All counts that must be zero, together; the valves of a lot are counted in their own requirement."""
-        return (
-            self.wrong + self.out_of_range + self.not_monotone_in_u + self.not_monotone_in_dp + self.over_compensated
-            + self.odd_pairs + self.bad_fallbacks + self.bad_status + self.bad_betas
-        )  # fmt: skip
-
-    @property
     def holds(self) -> bool:
         """True if nothing was found."""
-        return self.faults == 0 and not (self.lot and self.lot.over_compensated)
+        return self.faults + self.over_compensated == 0 and not (self.lot and self.lot.over_compensated)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,6 +1,6 @@
 """`verify`: a firmware folder in, evidence out: strict compilation, every input, closed loop."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,9 +10,10 @@ from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, as_document, sch
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.design.compensator import Compensator
+from dzdesign.verify.closed_loop.dead_zone import LoopComparison
 from dzdesign.verify.closed_loop.evidence_curves import curve_files
 from dzdesign.verify.closed_loop.firmware_loop import FirmwareLoop, Watch, close_the_loop, scenes_of
-from dzdesign.verify.closed_loop.loop import LoopComparison, RampSequence
+from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.closed_loop.tolerances import Tolerances
 from dzdesign.verify.evidence import Check, ClosedLoopResult, Evidence, InputCheck
@@ -188,7 +189,7 @@ def _try_core(folder: Path, compensator: Compensator) -> _Core:
     )
 
 
-def evidence_manifest(evidence: Evidence) -> dict[str, object]:
+def evidence_manifest(evidence: Evidence) -> Mapping[str, object]:
     """Return what the manifest of the evidence folder says beside the hashes of its files."""
     header = as_document(evidence)
     return {key: header[key] for key in ("schema", "tool", "made_from")}

@@ -91,12 +91,12 @@ def _noisy(test: TestResult, alone: bool) -> Warning_:
     )
 
 
-def _bent(test: TestResult, left: float, said: tuple[float, float]) -> Warning_:
+def _bent(test: TestResult, left: float, declared: tuple[float, float]) -> Warning_:
     of_rising = test.u_knee_rising_se_V == test.u_knee_se_V
-    straight = (test.straight_rising if of_rising else test.straight_falling) or said
-    (low, high), asked = ([100 * share for share in shares] for shares in (straight, said))
+    straight = (test.straight_rising if of_rising else test.straight_falling) or declared
+    (low, high), asked = ([100 * share for share in shares] for shares in (straight, declared))
     widened = f" (--knee-window {asked[0]:.3g}-{asked[1]:.3g}, widened as far as a line goes)"
-    widened = widened if straight != said else ""
+    widened = widened if straight != declared else ""
     return Warning_(
         code="bend",
         text=(

@@ -38,7 +38,7 @@ GROSSLY_APART = 0.3
 #: that keeps its flow the same by less than 2.5 up to a range of 1 to 6.
 FALLS, GROWS_TOO_LITTLE, GROWS_TOO_MUCH = 0.9, 2.5, 1.75
 #: Said of both kinds of contradiction.
-WHAT_FOLLOWS = "Thresholds may be assigned to wrong pressure drops, so the certificate may not hold"
+CONSEQUENCE = "Thresholds may be assigned to wrong pressure drops, so the certificate may not hold"
 
 
 def about_mixed_pressures(tests: Sequence[RampTest]) -> tuple[Warning_, ...]:
@@ -154,7 +154,7 @@ def about_stuck_recordings(tests: Sequence[RampTest]) -> Iterator[Warning_]:
                 text=(
                     f"the pressure drop is {dp / MPA:.6g} MPa to the last digit in every row, but "
                     f"{' and '.join(signs)}: the sensor is stuck or too coarse to show anything, or the number "
-                    f"was typed in. {WHAT_FOLLOWS}. Leave that column out and declare the pressure drop by [dp], or "
+                    f"was typed in. {CONSEQUENCE}. Leave that column out and declare the pressure drop by [dp], or "
                     "record again"
                 ),
                 source=test.source,
@@ -221,7 +221,7 @@ def about_mixtures(tests: Sequence[RampTest]) -> Iterator[Warning_]:
                 f"{min(flows) / L_MIN:.3g} L/min in '{least}', {max(flows) / L_MIN:.3g} L/min in '{most}'. Flow grows "
                 "as the root of the pressure drop (Eq. 1), so one of them was recorded at another pressure drop "
                 "(misread from its name, declared wrongly, a stuck sensor), or its unit of Q or its supply is "
-                f"another. {WHAT_FOLLOWS}. Correct [dp] or the columns, or leave that recording out"
+                f"another. {CONSEQUENCE}. Correct [dp] or the columns, or leave that recording out"
             ),
             source=None,
         )
@@ -280,7 +280,7 @@ def about_flow_gains(tests: Sequence[TestResult]) -> Iterator[Warning_]:
                 f"expected about {expected:.3g}, as the root of the pressure drop (Eq. 1), since it grows by "
                 f"{other.slope_L_min_V:.3g} at {other.dp_MPa:.4g} MPa ('{other.source}'): a pressure drop of one of "
                 "them is wrong (misread from a file's name, a wrong unit, a stuck sensor, ports swapped), or the unit "
-                f"of Q, or the supply is at its limit, or the valve compensates its pressure. {WHAT_FOLLOWS}. Correct "
+                f"of Q, or the supply is at its limit, or the valve compensates its pressure. {CONSEQUENCE}. Correct "
                 "it, or leave that recording out"
             ),
             source=test.source,

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import casadi as ca
 
 #: Held while a solver is built or used: one that is kept serves all threads, and CasADi does not expect two at once.
-ONE_AT_A_TIME = Lock()
+SOLVER_LOCK = Lock()
 #: Unknowns and constraints are in standard errors, so nothing is left to scale. Bounds are not relaxed, or knees would
 #: run the wrong way. Slack times multiplier is met as tightly as the rest: IPOPT's own 1e-4 leaves knees 1e-5 V off.
 Settings = dict[str, bool | int | float | str]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.fitting.casadi_problems import ONE_AT_A_TIME, branch_numbers, offset_solver, solver_with_numbers
+from dzdesign.identify.fitting.casadi_problems import SOLVER_LOCK, branch_numbers, offset_solver, solver_with_numbers
 from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.valve.staircase import Direction
 
@@ -84,7 +84,7 @@ def fit_knees(
     numbers = [branch_numbers(shape, scale, floor, u_max) for shape, scale in zip(branches, scales, strict=True)]
     chain = tuple(index for index, (_, column, _) in enumerate(placed) if column == ordered and trend != "flat")
     order = _order_knees(branches, scales, chain if len(chain) > 1 else (), increasing=trend == "increasing")
-    with ONE_AT_A_TIME:
+    with SOLVER_LOCK:
         solver, known = solver_with_numbers(numbers, order.chain, order.steps)
         solution = solver(x0=order.start, p=known, lbg=0.0, ubg=np.inf)
         outcome = solver.stats()
@@ -239,7 +239,7 @@ def fit_offset(
     weight = (largest / np.maximum(guard_se, largest / np.sqrt(LARGEST_WEIGHT))) ** 2
     known = np.concatenate([(guard - lowest) * 1e3, (ceiling - lowest) * 1e3, weight / weight.max()])
     low, high = {"decreasing": (-np.inf, 0.0), "increasing": (0.0, np.inf), "flat": (0.0, 0.0)}[trend]
-    with ONE_AT_A_TIME:
+    with SOLVER_LOCK:
         solver = offset_solver(guard.size)
         solution = solver(x0=0.1, p=known, lbx=0.0, lbg=low, ubg=high)
         outcome = solver.stats()

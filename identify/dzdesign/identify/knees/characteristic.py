@@ -6,7 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from dzdesign.identify.knees.branch_shape import BranchShape, Tail
-from dzdesign.identify.knees.gated_line import GATE, GatedLine, PreparedBranch, fit_line, inflation_by_blocks
+from dzdesign.identify.knees.gated_line import GATE, GatedLine, PreparedBranch, fit_line
+from dzdesign.identify.knees.line_fitting import inflation_by_blocks
 from dzdesign.identify.knees.linear_region import find_straight_parts
 from dzdesign.identify.knees.noise import measure_roughness, robust_sigma, variance_inflation
 from dzdesign.identify.knees.profile import crossing, flow_at_top, hole_within, smooth_profile

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.knees.gated_line import GatedLine, PreparedBranch, lay_line
-from dzdesign.identify.knees.noise import one_error_slower, robust_sigma, shared_correlation
+from dzdesign.identify.knees.gated_line import GatedLine, PreparedBranch
+from dzdesign.identify.knees.line_fitting import lay_line
+from dzdesign.identify.knees.noise import correlation_upper_limit, robust_sigma, shared_correlation
 from dzdesign.identify.ramps.branches import Branch
 
 #: Flow below this share of the largest is no useful flow, however fine the meter.
@@ -88,7 +89,7 @@ def find_straight_parts(reads: Sequence[PreparedBranch], *, u_max: float, window
     lines = _widest_straight(reads, narrow, lowest, correlation, blocks, LARGEST_SHIFT * u_max)
     # The wider windows know the noise better. Errors that are believed must bear that it is not known exactly.
     correlation, blocks = _shared_noise(lines)
-    correlation = one_error_slower(correlation, [line.roughness for line in lines])
+    correlation = correlation_upper_limit(correlation, [line.roughness for line in lines])
     return StraightParts(
         lines=tuple(line.with_shared_noise(correlation, blocks) for line in lines),
         levels=tuple(levels),

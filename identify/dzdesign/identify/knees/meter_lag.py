@@ -13,7 +13,8 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.constants import FULL_SWEEP
-from dzdesign.identify.knees.gated_line import lay_line, prepare_branch
+from dzdesign.identify.knees.gated_line import prepare_branch
+from dzdesign.identify.knees.line_fitting import lay_line
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.branches import at_nominal_pressure
 from dzdesign.identify.ramps.pooling import group_by_pressure

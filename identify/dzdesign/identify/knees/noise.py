@@ -100,7 +100,7 @@ def shared_correlation(roughness: Sequence[Roughness]) -> float:
     return 1 - float(np.exp((low + high) / 2))
 
 
-def one_error_slower(correlation: float, roughness: Sequence[Roughness]) -> float:
+def correlation_upper_limit(correlation: float, roughness: Sequence[Roughness]) -> float:
     """Return the correlation one standard error above the one found.
 
     Of n samples, n (1 - r) / (1 + r) stretches are independent, and so many squares tell 1 - r, to sqrt(2 / stretches)

@@ -26,7 +26,7 @@ EXAMPLE_UNITS = {"time": "s", "u": "V", "dP": "MPa", "pA": "MPa", "pB": "MPa", "
 MOST_MEANT = 200
 #: Units of a command that is a share of u_max.
 PER_CENT = ("%", "pct", "percent")
-TELLING = ("time", "voltage", "pressure", "flow")
+QUANTITIES = ("time", "voltage", "pressure", "flow")
 #: Characters of a label in which a quantity is looked for.
 LONGEST_NAME = 80
 
@@ -108,11 +108,11 @@ def find_columns(table: Table, chosen: Mapping[str, str]) -> dict[str, Column]:
     taken = {column.label for column in columns.values()}
     pressures = {"dP", "pA", "pB"} if "dP" in chosen or {"pA", "pB"} <= chosen.keys() else set()
     for label in table.labels:
-        quantity, unit = split_label(label)
+        quantity, in_label = split_label(label)
         if quantity is None or label in taken or quantity in chosen.keys() | pressures:
             continue
-        own = unit
-        unit = own if own and (fits(own, quantity) or label not in table.units) else table.units.get(label, "")
+        is_unit = in_label and (fits(in_label, quantity) or label not in table.units)
+        unit = in_label if is_unit else table.units.get(label, "")
         unit = "s" if quantity == "time" and not fits(unit, "time") and table.is_clock(label) else unit
         if quantity in columns and not fits(unit, quantity):
             continue  # an oil temperature T_degC beside the time t_s, a set point Q_set beside Q_Lmin
@@ -121,7 +121,7 @@ def find_columns(table: Table, chosen: Mapping[str, str]) -> dict[str, Column]:
                 f"'{table.path}'{table.header} has two columns of {quantity}: '{columns[quantity].label}' and "
                 f"'{label}'; keep one, give the other another name, or choose by --columns"
             )
-        _refuse_two_units(table, quantity, label, own)
+        _refuse_two_units(table, quantity, label, in_label)
         columns[quantity] = Column(label=label, unit=unit)
     if ("pA" in columns) != ("pB" in columns) and "dP" not in columns:
         have, lack = ("pA", "pB") if "pA" in columns else ("pB", "pA")
@@ -142,12 +142,12 @@ def _chosen_column(table: Table, quantity: str, text: str) -> Column:
         raise table.no_column(label, f"--columns names for {quantity}")
     if table.labels.count(label) > 1:
         raise InputError(f"'{table.path}'{table.header} has {table.labels.count(label)} columns '{label}'; rename one")
-    _, own = split_label(label)
+    _, in_label = split_label(label)
     bracketed = bool(re.search(r"[\[(]", label))
-    stated = (own if bracketed or is_signal_or_telling(own) else "") or table.units.get(label, "")
+    stated = (in_label if bracketed or names_a_quantity_or_current(in_label) else "") or table.units.get(label, "")
     if not unit:
-        _refuse_two_units(table, quantity, label, own)
-    unit = unit or (own if bracketed or fits(own, quantity) else "") or table.units.get(label, "")
+        _refuse_two_units(table, quantity, label, in_label)
+    unit = unit or (in_label if bracketed or fits(in_label, quantity) else "") or table.units.get(label, "")
     if quantity == "time" and not fits(unit, "time") and table.is_clock(label):
         unit = "s"
     if not unit:
@@ -158,13 +158,15 @@ def _chosen_column(table: Table, quantity: str, text: str) -> Column:
     return Column(label=label, unit=unit, stated=stated)
 
 
-def _refuse_two_units(table: Table, quantity: str, label: str, own: str) -> None:
+def _refuse_two_units(table: Table, quantity: str, label: str, in_label: str) -> None:
     """Refuse a label whose unit is another than the one that the file states beside it."""
     beside = table.units.get(label, "")
-    if beside and fits(own, quantity) and is_signal_or_telling(beside) and not same_unit(own, beside, quantity):
+    known = fits(in_label, quantity) and names_a_quantity_or_current(beside)
+    if beside and known and not same_unit(in_label, beside, quantity):
         raise InputError(
-            f"'{table.path}' column '{label}' says '{own}' in its label, and '{beside[:LONGEST_NAME]}' is stated as "
-            f'its unit beside it; correct one, or say which it is, for example --columns "{quantity}={label}:{own}"'
+            f"'{table.path}' column '{label}' says '{in_label}' in its label, and '{beside[:LONGEST_NAME]}' is stated "
+            "as its unit beside it; correct one, or say which it is, for example --columns "
+            f'"{quantity}={label}:{in_label}"'
         )
 
 
@@ -183,9 +185,9 @@ def same_unit(one: str, other: str, column: str) -> bool:
     return kind is not None and isclose(si_factor(one, kind), si_factor(other, kind), rel_tol=1e-9)
 
 
-def is_signal_or_telling(unit: str) -> bool:
+def names_a_quantity_or_current(unit: str) -> bool:
     """Tell whether a unit is one of a ramp test's quantities or of a current."""
-    return is_telling(unit) or measures(unit, "current")
+    return names_a_quantity(unit) or measures(unit, "current")
 
 
 def split_label(label: str) -> tuple[str | None, str]:
@@ -221,15 +223,15 @@ def _after_a_blank_or_slash(label: str) -> tuple[str | None, str]:
     """Split ``p / bar``, ``Druck in bar`` and ``flow l/min``; what follows must be a unit of a ramp test."""
     for name, unit in (label.rpartition(" ")[::2], label.partition("/")[::2], label.rpartition("_")[::2]):
         unit = unit.strip()
-        if name and is_telling(unit):
+        if name and names_a_quantity(unit):
             name = name.rstrip(" /,").removesuffix(" in")
             return _quantity_named(name), unit
     return None, label.rpartition("_")[2]
 
 
-def is_telling(unit: str) -> bool:
+def names_a_quantity(unit: str) -> bool:
     """Tell whether a unit says by itself which quantity of a ramp test it may be of."""
-    return unit.lower() in PER_CENT or any(measures(unit, quantity) for quantity in TELLING)
+    return unit.lower() in PER_CENT or any(measures(unit, quantity) for quantity in QUANTITIES)
 
 
 def _missing_column(quantity: str, table: Table, columns: Collection[str]) -> InputError:

@@ -19,7 +19,7 @@ from dzdesign.identify.reading.column_labels import (
     Column,
     find_columns,
     fits,
-    is_telling,
+    names_a_quantity,
     split_label,
 )
 from dzdesign.identify.reading.ramp_files import read_table
@@ -201,7 +201,7 @@ def _or_without_a_unit(table: Table) -> str:
     One that counts the rows is no time: a unit would make a wrong one of it.
     """
     first = table.labels[0]
-    if not first or table.units.get(first) or is_telling(split_label(first)[1]):
+    if not first or table.units.get(first) or names_a_quantity(split_label(first)[1]):
         return ""
     try:
         steps = np.diff(table.numbers(first))

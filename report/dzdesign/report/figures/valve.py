@@ -145,7 +145,7 @@ def beta_figure(
     rows = [["valve", at, value, round(value * u_min0, 7)] for at, value in pairs]
     if compensator:
         where, nodes, of_the_C = _beta_table(compensator, name)
-        table = nodes * of_the_C / u_min0  # with an edge the C counts from the opening threshold
+        table = nodes * of_the_C / u_min0  # with a transition the C counts from the opening threshold
         near = (where >= dp[0] - 0.1 * np.ptp(dp)) & (where <= dp[-1] + 0.1 * np.ptp(dp))
         axes.plot(where[near], table[near], ".-", color=LIGHT["ink"], ms=4, lw=1, label="the C's offset / u_min0")
         rows += [

@@ -51,7 +51,7 @@ NOT_PROVED = (
 def sections_of(lot: Lot, spreads: Sequence[Spread]) -> dict[str, Section]:
     """Return every section by its anchor."""
     with lot_style():
-        made = {
+        return {
             "failed": _failed_section(lot),
             "spread": _spread_section(lot, spreads),
             "far": _far_section(spreads),
@@ -62,7 +62,6 @@ def sections_of(lot: Lot, spreads: Sequence[Spread]) -> dict[str, Section]:
             "warnings": Section(lines=NOT_PROVED),
             "provenance": _provenance_section(lot),
         }
-    return {name: made[name] for name, _ in HEADINGS}
 
 
 def _of(spreads: Sequence[Spread], *columns: str) -> list[Spread]:

@@ -20,7 +20,6 @@ from dzdesign.verify.exhaustive.exact_law import ExactLaw
 
 #: Valves in the table of the page; all of them stand in the CSV.
 ROWS = 40
-SECTION = ("lot", "The lot")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

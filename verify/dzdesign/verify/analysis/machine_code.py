@@ -85,7 +85,7 @@ def _words(done: MachineCheck) -> str:
     elsewhere = found.bad_fallbacks + found.bad_status + found.bad_betas
     same = "as on the host" if found.outputs_hash == done.host_hash else f"on the host {done.host_hash}"
     return (
-        f"{which}: {found.wrong} wrong, {found.odd} odd pairs, {elsewhere} wrong at codes outside their signal's valid "
-        f"range{beyond}; hash of all compare values {found.outputs_hash}, {same}; {machine.runner[0]}, "
+        f"{which}: {found.wrong} wrong, {found.odd_pairs} odd pairs, {elsewhere} wrong at codes outside their signal's "
+        f"valid range{beyond}; hash of all compare values {found.outputs_hash}, {same}; {machine.runner[0]}, "
         f"{machine.compiler} {' '.join(machine.core_flags)}, object {found.object_sha256}"
     )

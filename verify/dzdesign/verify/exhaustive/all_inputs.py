@@ -1,11 +1,12 @@
 """Every input of the compiled core against the exactly rounded law, and the properties that make it safe."""
 
+from dataclasses import fields
 from pathlib import Path
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.design.compensator import Compensator
 from dzdesign.verify import requirements
-from dzdesign.verify.evidence import Check, InputCheck
+from dzdesign.verify.evidence import Check, InputCheck, InputCounts
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.lot_check import check_lot
 from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
@@ -46,25 +47,15 @@ def input_check(prepared: PreparedInputs, core: CompiledCore, found: Findings) -
         raise RequirementError("no pair of valid pressure codes makes a tested pressure drop, so no bound is known")
     return InputCheck(
         sign=1 if exact.sign > 0 else -1,
-        inputs=found.inputs,
-        wrong=found.wrong,
-        largest_error=found.largest_error,
-        out_of_range=found.out_of_range,
-        not_monotone_in_u=found.falls,
-        not_monotone_in_dp=found.against,
         over_compensated=margin.exceeded,
-        odd_pairs=found.odd,
-        bad_fallbacks=found.bad_fallbacks,
-        bad_status=found.bad_status,
-        bad_betas=found.bad_betas,
         smallest_margin_V=float(margin.margin_V),
         core_sha256=core.sha256,
         object_sha256=found.object_sha256,
         outputs_hash=found.outputs_hash,
-        calls=found.calls,
         pressure_pairs=differences.pairs,
         first_wrong=first_wrong(prepared, found),
         lot=check_lot(exact, differences, found.at_zero),
+        **{field.name: getattr(found, field.name) for field in fields(InputCounts)},
     )
 
 

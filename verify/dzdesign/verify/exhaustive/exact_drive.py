@@ -1,7 +1,7 @@
 """What the firmware's drive must do, in rational numbers from the compensator: no code of the generated C.
 
-Written from what an amplifier is asked for, not from the template: the command is a position in codes that the ramps
-hold back, the side changes where that position passes the window, the dither is a square wave about the law.
+Written from what the drive functions are asked for, not from the template: the command is a position in codes that the
+ramps hold back, the side changes where that position passes the window, the dither is a square wave about the law.
 """
 
 from dataclasses import dataclass, field

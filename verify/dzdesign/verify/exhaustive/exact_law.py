@@ -1,8 +1,8 @@
 """The exactly rounded law at every code pair, computed without the firmware's arithmetic.
 
 Starts from the rationals in compensator.json and the law of `dzdesign.derivation`; along a row of constant pressure the
-law is straight in the command code up to the edge's end and beyond it. No multiplication, shift or reciprocal is shared
-with the generated C.
+law is straight in the command code up to the transition's end and beyond. No multiplication, shift or reciprocal is
+shared with the generated C.
 """
 
 from fractions import Fraction
@@ -95,7 +95,7 @@ class ExactLaw:
         return BetaNumerators(law, zero, self._denominator * self._step)
 
     def corners(self, betas: Betas) -> list[tuple[int, Fraction]]:
-        """Return the law in counts at the ends of its straight parts: zero command, the edge's end, full command."""
+        """Return the law in counts at the ends of its straight parts: zero command, transition's end, full command."""
         line = evaluate_line(
             self._law,
             beta=betas.law,

@@ -1,12 +1,13 @@
 """The generated core as a black box: compiled by itself for a machine, and every input tried there."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
 
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.verify.evidence import InputCounts
 from dzdesign.verify.toolchain.machines import (
     HOST,
     Machine,
@@ -25,47 +26,23 @@ CHECK = ("every_input.c", "other_codes.c", "every_input.h", "march.h")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Findings:
-    """What a machine found: the counts of programs/every_input.h, the hash of all compare values, and which object.
+class Findings(InputCounts):
+    """What a machine found: the counts of programs/every_input.h, in their order, and of which object."""
 
-    Attributes
-    ----------
-    outputs_hash : str
-        Of all compare values in their order, 64 bits.
-    inputs, wrong, largest_error, out_of_range, falls, against, odd, bad_fallbacks, bad_status, bad_betas, calls : int
-        As `InputCheck` names them; calls of the core in all.
-    first_row, first_place, first_found, first_expected : int
-        Of the first wrong value.
-    at_zero : (D,) array
-        Compare values at zero command, a difference each; empty of a sample, and where a simulator ran it.
-    object_sha256 : str
-        Of the core's object file.
-    """
-
-    outputs_hash: str
-    inputs: int
-    wrong: int
-    largest_error: int
-    out_of_range: int
-    falls: int
-    against: int
-    odd: int
-    bad_fallbacks: int
-    bad_status: int
-    bad_betas: int
-    calls: int
+    #: Of the first wrong value.
     first_row: int
     first_place: int
     first_found: int
     first_expected: int
+    #: Of all compare values in their order, 64 bits.
+    outputs_hash: str
+    #: Compare values at zero command, (D,), a difference each; empty of a sample, and where a simulator ran it.
     at_zero: np.ndarray
     object_sha256: str
 
-    @property
-    def faults(self) -> int:
-        """All that must be none, together."""
-        counts = (self.wrong, self.out_of_range, self.falls, self.against, self.odd)
-        return sum(counts) + self.bad_fallbacks + self.bad_status + self.bad_betas
+
+#: What a program prints of an input check behind the two words of the hash, in this order.
+COUNTED = [field.name for field in fields(Findings)][:15]
 
 
 class CompiledCore:
@@ -122,13 +99,13 @@ def _read(path: Path) -> bytes:
 
 
 def _findings(printed: list[list[int]], object_sha256: str, what: str) -> Findings:
-    fields = 17
-    if not printed or len(printed[0]) != fields:
-        raise RequirementError(f"{what} reported {printed[0][:3] if printed else 'nothing'}, expected {fields} numbers")
+    if not printed or len(printed[0]) != 2 + len(COUNTED):
+        found = printed[0][:3] if printed else "nothing"
+        raise RequirementError(f"{what} reported {found}, expected {2 + len(COUNTED)} numbers")
     high, low, *counts = printed[0]
     return Findings(
         outputs_hash=f"{high:08x}{low:08x}",
-        **dict(zip(list(Findings.__dataclass_fields__)[1:16], counts, strict=True)),
         at_zero=np.array(printed[1] if len(printed) > 1 else [], dtype=np.int64),
         object_sha256=object_sha256,
+        **dict(zip(COUNTED, counts, strict=True)),
     )

@@ -181,7 +181,7 @@ def _ask_a_process(request: Request, patience: float) -> tuple[Answer, list[np.n
         reader = _idle.pop()
     except IndexError:
         reader = ReaderProcess()
-    if reader.owner != os.getpid():  # this process is a copy of the one that it serves
+    if reader.owner != os.getpid() or reader.process.poll() is not None:  # it serves another process, or has ended
         reader = ReaderProcess()
     try:
         answer = reader.ask(request, patience)

@@ -54,11 +54,7 @@ class DecimalMarks:
         self._doubtful: dict[str, tuple[str, str, str]] = {}  # label -> mark, cell, where it stands
 
     def check_points(
-        self,
-        label: str,
-        numbers: np.ndarray,
-        first_cells: "Callable[[int], pl.Series]",
-        place: "Callable[[int], str]",
+        self, label: str, numbers: np.ndarray, texts: "Callable[[], pl.Series]", place: "Callable[[int], str]"
     ) -> None:
         """Check a column that was read with decimal points.
 
@@ -68,8 +64,8 @@ class DecimalMarks:
             Of the column.
         numbers : (N,) array
             As read.
-        first_cells : callable
-            Gives its first cells, so many of them, as they stand in the file.
+        texts : callable
+            Gives its cells as they stand in the file, which takes longer.
         place : callable
             Row -> where it stands, for messages.
 
@@ -87,19 +83,17 @@ class DecimalMarks:
             if plain.size:
                 self._add_certain(label, ".", f"{some[broken[plain[0]]]:g}")
                 return
-        cells = first_cells(FEW_ROWS)
-        if not self._take(label, ".", cells, place) and broken.size:
-            row = int(broken[0])
-            self._add_doubtful(label, ".", cells[row] if row < len(cells) else f"{numbers[row]:.3f}", place(row))
+        cells = texts()
+        self._take(label, ".", cells, place)
         if broken.size and label in self._doubtful:
-            self._refuse_whole_numbers_beside(label, numbers, broken, first_cells, place)
+            self._refuse_whole_numbers_beside(label, numbers, broken, cells, place)
 
     def _refuse_whole_numbers_beside(
         self,
         label: str,
         numbers: np.ndarray,
         broken: np.ndarray,
-        first_cells: "Callable[[int], pl.Series]",
+        cells: "pl.Series",
         place: "Callable[[int], str]",
     ) -> None:
         """Refuse a column in which 998 and 1.001 stand: nothing measured goes from one to the other."""
@@ -107,7 +101,6 @@ class DecimalMarks:
         largest, marked = int(np.argmax(whole)), int(broken[np.argmin(np.abs(numbers[broken]))])
         if whole[largest] < LEAST_WHOLE or abs(numbers[marked]) > whole[largest] / FAR_LARGER:
             return
-        cells = first_cells(max(largest, marked) + 1)
         one, other = cells[largest], cells[marked]
         if "." not in one:
             raise InputError(
@@ -160,26 +153,22 @@ class DecimalMarks:
         self._add_certain(label, decimal, cell)
         return texts.str.replace_all(OTHER[decimal], "", literal=True).str.replace(decimal, ".", literal=True)
 
-    def _take(self, label: str, mark: str, texts: "pl.Series", place: "Callable[[int], str]") -> bool:
-        """Take cells with one mark, and tell whether one of them has it."""
+    def _take(self, label: str, mark: str, texts: "pl.Series", place: "Callable[[int], str]") -> None:
+        """Take the cells of a column that has one mark."""
         for some in (texts.head(FEW_ROWS), texts):
             marked = some.str.contains(WITH_MARK[mark]).fill_null(False)
             plain = (marked & ~some.str.contains(DOUBTFUL[mark]).fill_null(False)).arg_true()
             if len(plain):
                 self._add_certain(label, mark, some[int(plain[0])])
-                return True
+                return
         # Several points or commas in a number are no decimal ones: left to whoever reads it to refuse.
         if marked.any():
             row = int(marked.arg_true()[0])
-            self._add_doubtful(label, mark, texts[row], place(row))
-        return bool(marked.any())
+            self._doubtful[label] = mark, texts[row], place(row)
+            self._refuse_a_contradiction()
 
     def _add_certain(self, label: str, mark: str, cell: str) -> None:
         self._certain[label] = mark, cell
-        self._refuse_a_contradiction()
-
-    def _add_doubtful(self, label: str, mark: str, cell: str, place: str) -> None:
-        self._doubtful[label] = mark, cell, place
         self._refuse_a_contradiction()
 
     def _refuse_a_contradiction(self) -> None:

@@ -87,7 +87,7 @@ def _wrong_row(cells: Sequence[str], number: int, header: Header, path: Path, *,
     begin = f"'{path}' row {number} has"
     if len(cells) != width:
         comma = header.separator == "," and len(cells) == 2 * width
-        told = [
+        advice = [
             "decimal commas need ';' or a tab between the cells" if comma else "",
             "complete the row, or delete it, as a logger that was stopped may have left half of one"
             if len(cells) < width and is_number(word) and not first
@@ -95,7 +95,7 @@ def _wrong_row(cells: Sequence[str], number: int, header: Header, path: Path, *,
             "--skip-rows says how many rows stand above the header" if first else "",
         ]
         found = f"{len(cells)} cell{'s' if len(cells) > 1 else f', {word!r}'}"
-        return InputError(f"{begin} {found}, expected {width} as in {the_header}; {'; '.join(filter(None, told))}")
+        return InputError(f"{begin} {found}, expected {width} as in {the_header}; {'; '.join(filter(None, advice))}")
     kind = "a statistic" if _is_statistic(word) else "a word and no number"
     return InputError(
         f"{begin} {kind}, '{word}', and samples below it, expected nothing but samples below {the_header}; begin the "

@@ -10,7 +10,7 @@ from typing import final
 
 from dzdesign.core.errors import InputError
 from dzdesign.core.units import measures
-from dzdesign.identify.reading.column_labels import TELLING, is_telling, split_label
+from dzdesign.identify.reading.column_labels import QUANTITIES, names_a_quantity, split_label
 from dzdesign.identify.reading.table import QUOTED_CHARACTERS
 from dzdesign.identify.reading.text.cells import BLANKS, cells_of, is_number
 
@@ -84,12 +84,14 @@ def _first_row(lines: list[Line], separator: str) -> int | None:
 
 
 def is_row_of_numbers(cells: list[str]) -> bool:
+    """Tell whether cells are a row of samples: mostly numbers, the first one too."""
     filled = [cell for cell in cells if cell]
     numbers = sum(map(is_number, filled))
     return numbers >= 2 and is_number(filled[0]) and numbers >= SHARE_OF_NUMBERS * len(filled)
 
 
 def could_be_labels(cells: list[str]) -> bool:
+    """Tell whether cells may be labels: mostly words, and not all the same."""
     texts = sum(bool(cell) and not is_number(cell) for cell in cells)
     return texts >= 2 and 2 * texts >= len(cells) and len(set(filter(None, cells))) > 1
 
@@ -104,11 +106,12 @@ def _fits(cells: list[str], width: int) -> bool:
 def is_row_of_units(cells: list[str]) -> bool:
     """Tell whether a row says the units of the columns, such as ``s;V;l/min;bar`` or ``(ms),(V),(V)``."""
     filled = [bare_unit(cell) for cell in cells if cell]
-    known = sum(map(is_telling, filled)) + sum(measures(unit, "current") for unit in filled)
+    known = sum(map(names_a_quantity, filled)) + sum(measures(unit, "current") for unit in filled)
     return known >= 2 and 2 * known >= len(filled) and not any(map(is_number, filled))
 
 
 def bare_unit(unit: str) -> str:
+    """Return a unit without brackets and blanks around it."""
     return unit.strip(" \t[](){}")
 
 
@@ -117,8 +120,8 @@ def _score(cells: list[str], lines: list[Line], index: int, separator: str) -> i
     known = set()
     for label in cells[:MOST_COLUMNS]:
         quantity, unit = split_label(label)
-        known |= {quantity} if quantity else {unit} if unit != label and is_telling(unit) else set()
-    return len(known) + (len(TELLING) if is_row_of_units(cells_of(lines[index + 1].text, separator)) else 0)
+        known |= {quantity} if quantity else {unit} if unit != label and names_a_quantity(unit) else set()
+    return len(known) + (len(QUANTITIES) if is_row_of_units(cells_of(lines[index + 1].text, separator)) else 0)
 
 
 def usual_separator(line: str) -> str:

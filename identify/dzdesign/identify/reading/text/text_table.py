@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Collection
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, final
@@ -66,17 +67,14 @@ class TextTable(Table):
         return str(self._texts(label, row + 1)[row])
 
     def load(self, labels: Collection[str]) -> None:
-        """Read columns at once: as numbers where the first cell is one and all are, else as text."""
+        """Read at once those columns that begin with a number, if they hold nothing else."""
         import polars as pl
 
-        end = self.rows.find(b"\n")
-        cells = self.rows[: end if end >= 0 else None].decode().split(self.separator)
-        first = dict(zip(reversed(self.labels), reversed(cells), strict=False))  # of two equal labels the first counts
-        types = {label: pl.Float64 if NUMBER.fullmatch(first.get(label, "")) else pl.String for label in labels}
-        try:
-            self._loaded.update(self._read(types))
-        except pl.exceptions.PolarsError:  # a cell is no number
-            self._loaded.update(self._read(dict.fromkeys(labels, pl.String)))
+        cells = self.rows[: max(self.rows.find(b"\n"), 0) or None].decode().split(self.separator)
+        likely = [label for label in labels if len(self.lines) and NUMBER.fullmatch(cells[self.labels.index(label)])]
+        if likely:
+            with suppress(pl.exceptions.PolarsError):  # a cell is no number
+                self._loaded.update(self._read(dict.fromkeys(likely, pl.Float64)))
 
     def numbers(self, label: str) -> np.ndarray:
         """Return a column as float64, NaN where the cell is blank."""
@@ -84,12 +82,12 @@ class TextTable(Table):
 
         if label not in self._loaded:
             self.load([label])
-        loaded = self._loaded.pop(label)  # a second copy of a long recording would double the memory
-        if loaded.dtype == pl.Float64:
+        if label in self._loaded:
+            loaded = self._loaded.pop(label)  # a second copy of a long recording would double the memory
             read = np.asarray(loaded.fill_null(np.nan).to_numpy())
             self.marks.check_points(label, read, partial(self._texts, label), self.place)
             return read
-        texts = loaded.str.strip_chars(' \t"')
+        texts = self._texts(label)
         column = self.marks.with_points(label, texts, self.place)
         numbers = column.cast(pl.Float64, strict=False)
         filled = ~(column.is_null() | (column == ""))
@@ -150,10 +148,14 @@ class TextTable(Table):
                 self.rows, separator=self.separator, has_header=False, schema=schema, columns=sorted(columns),
                 quote_char=None, n_rows=rows,
             )  # fmt: skip
-        except pl.exceptions.ComputeError as error:
+        except pl.exceptions.PolarsError as error:
             if pl.Float64 in types.values():
                 raise
             raise InputError(f"'{self.path}' can't be read as a table: {str(error).splitlines()[0]}") from error
+        if rows is None and frame.height != len(self.lines):
+            raise InputError(
+                f"'{self.path}' can't be read as a table: {len(self.lines)} rows of samples read as {frame.height}"
+            )
         return {label: frame[f"c{self.labels.index(label)}"] for label in types}
 
     def _no_number(self, label: str, row: int, cell: str) -> InputError:

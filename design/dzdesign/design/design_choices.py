@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
-from dzdesign.core.options import AMPLIFIER, CONNECTIONS, LAW, Option, Text, arguments_of
+from dzdesign.core.options import CONNECTIONS, DRIVE, LAW, Option, Text, arguments_of
 from dzdesign.derivation.laws import LAW_NAMES
 
 if TYPE_CHECKING:
@@ -46,13 +46,13 @@ class DesignChoices:
     """Sensor behind the metering edge (default: the whole range of the converter)."""
     negative_dp: Annotated[Text, Option("D", CONNECTIONS, "same", choices=NEGATIVE_DP)] = None
     """Pressure drop of negative commands: same, or swapped, which is B less A."""
-    zero_window: Annotated[Text, Option("C", AMPLIFIER, "1 %", example="1 %")] = None
+    zero_window: Annotated[Text, Option("C", DRIVE, "1 %", example="1 %")] = None
     """Command of both signs: share by which it must pass zero before the other solenoid is driven."""
-    ramp_up: Annotated[Text, Option("T", AMPLIFIER, "0 s", example="0.5 s")] = None
+    ramp_up: Annotated[Text, Option("T", DRIVE, "0 s", example="0.5 s")] = None
     """Time from zero to full command, such as "0.5 s", or "0.5 s / 0.8 s" for positive and negative commands."""
-    ramp_down: Annotated[Text, Option("T", AMPLIFIER, "0 s", example="0.5 s")] = None
+    ramp_down: Annotated[Text, Option("T", DRIVE, "0 s", example="0.5 s")] = None
     """Time from full command to zero."""
-    dither: Annotated[Text, Option("D", AMPLIFIER, "off", example="150 Hz 1 %")] = None
+    dither: Annotated[Text, Option("D", DRIVE, "off", example="150 Hz 1 %")] = None
     """Square wave on the output, such as "150 Hz 1 %", plus and minus 1 % of full drive."""
 
 

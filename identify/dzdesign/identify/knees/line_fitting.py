@@ -1,0 +1,150 @@
+"""A straight line through the samples of a branch between two flows, which outliers and drop-outs do not move."""
+
+import numpy as np
+
+from dzdesign.core.errors import InputError
+from dzdesign.identify.knees.gated_line import GATE, GatedLine, PreparedBranch, fit_line
+from dzdesign.identify.knees.noise import measure_roughness, median
+from dzdesign.identify.knees.profile import crossing
+from dzdesign.identify.knees.table_lines import line_through_levels
+
+#: Most rounds in which outliers are left out and the line is laid anew: each finds those that the ones before hid.
+ROUNDS = 20
+#: Logarithm of the probability below which a run of readings below the floor is not the noise's: about one run in ten
+#: million, and a branch has a hundred.
+UNLIKELY = -16.0
+#: Fewest samples for a line through noise; with fewer it goes from level to level.
+FEWEST = 5
+#: Noise below this share of the largest flow is not believed: no meter is that fine.
+FINEST_NOISE = 1e-5
+#: Blocks into which the residuals in time order are cut, to see how coloured the noise is.
+BLOCKS = 16
+
+
+def lay_line(read: PreparedBranch, window: tuple[float, float]) -> GatedLine:
+    """Lay a line through the samples between two shares of the largest flow.
+
+    Parameters
+    ----------
+    read : PreparedBranch
+    window : tuple of float
+        Shares of the largest flow.
+
+    Raises
+    ------
+    InputError
+        Where there are too few samples for a line.
+    """
+    branch, y, floor = read.branch, read.y, read.floor
+    u_low, u_high = (crossing(*read.profile, share * read.y_max) for share in window)
+    inside = (branch.u >= u_low) & (branch.u <= u_high)
+    if inside.sum() < FEWEST and u_high > u_low:
+        chord = line_through_levels(read, window)
+        if chord is not None:
+            return chord
+    if inside.sum() < FEWEST or not u_high > u_low:
+        raise InputError(
+            f"'{read.source}': only {inside.sum()} samples lie between {window[0]:.0%} and {window[1]:.0%} of the "
+            "largest flow, expected at least 5; record a slower ramp or more levels"
+        )
+    u, y, censored = branch.u[inside], y[inside], branch.q[inside] < 0.5 * floor
+    seen = ~censored
+    _refuse_no_line(u[seen], window, floor, read.source)
+    slope, knee = fit_line(u[seen], y[seen])
+    finest = FINEST_NOISE * read.y_max
+    kept = np.ones(u.size, dtype=bool)
+    for _ in range(ROUNDS):
+        line, before = slope * (u - knee), kept
+        miss = np.abs(y - line)
+        sigma = max(1.4826 * median(miss[~censored]), finest)
+        # A zero reading is a censored sample only where flow below the floor is credible.
+        kept = np.where(censored, line < floor + GATE * sigma, miss < GATE * sigma)
+        if np.array_equal(kept, before):  # the same samples, so the same line
+            break
+        seen = kept & ~censored
+        _refuse_no_line(u[seen], window, floor, read.source)
+        slope, knee = fit_line(u[seen], y[seen])
+    u_seen = u[seen]
+    residual = y[seen] - slope * (u_seen - knee)
+    sigma = max(float(np.sqrt(np.sum(residual**2) / max(u_seen.size - 2, 1))), finest)
+    kept &= ~_runs_of_drop_outs(censored, (slope * (u - knee) - floor) / sigma, residual)
+    by_blocks = inflation_by_blocks(residual, sigma)
+    return GatedLine(
+        window=window,
+        slope=slope,
+        knee=knee,
+        lever=1 / u_seen.size + (u_seen.mean() - knee) ** 2 / np.sum((u_seen - u_seen.mean()) ** 2),
+        sigma=sigma,
+        block_inflation=by_blocks,
+        variance_inflation=by_blocks,
+        inside=inside,
+        kept=_among(inside, kept),
+        censored=_among(inside, censored),
+        roughness=measure_roughness(u_seen, residual),
+        outliers=int((~kept).sum()),
+        dropped=_share_of_drop_outs(censored, slope * (u - knee) >= floor + GATE * sigma),
+    )
+
+
+def _runs_of_drop_outs(censored: np.ndarray, above: np.ndarray, residual: np.ndarray) -> np.ndarray:
+    """Return which censored samples belong to a run that noise does not explain: a logger that was busy, a wire.
+
+    A meter with a floor reads nothing where the flow is a little above it, now and then, but not for long. Taken for
+    little flow, half a second of lost readings just above the knee lifts it, and the bounds with it.
+
+    Parameters
+    ----------
+    censored : (N,) bool array
+        Samples in the order of time that read below the floor.
+    above : (N,) array
+        How far the line is above the floor at each, in standard deviations.
+    residual : (M,) array
+        Of the other samples, which tell how slow the noise is: slow noise explains longer runs.
+    """
+    edges = np.flatnonzero(np.diff(censored.astype(np.int8), prepend=0, append=0))
+    starts, ends = edges[::2], edges[1::2]
+    lost = np.zeros(censored.size, dtype=bool)
+    if not starts.size or not np.any(above[censored] > 0):
+        return lost
+    from scipy.special import log_ndtr
+
+    slow = float(np.clip(residual[1:] @ residual[:-1] / max(residual @ residual, 1e-300), 0.0, 1.0))
+    news = (1 - slow) / (1 + slow)  # share of a sample that is new, of noise that forgets exponentially
+    length = ends - starts
+    last = np.cumsum(log_ndtr(-above[censored]))[np.cumsum(length) - 1]
+    chance = np.diff(last, prepend=0.0) * (news + (1 - news) / length)
+    lost[censored] = np.repeat(chance < UNLIKELY, length)
+    return lost
+
+
+def _share_of_drop_outs(censored: np.ndarray, plain: np.ndarray) -> float:
+    return float(censored[plain].mean()) if plain.any() else 0.0
+
+
+def _among(inside: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """Return which samples of all are chosen, from which of those inside the window are."""
+    among = np.zeros(inside.size, dtype=bool)
+    among[inside] = chosen
+    return among
+
+
+def inflation_by_blocks(residual: np.ndarray, sigma: float) -> float:
+    """Return the long-run variance factor from the means of `BLOCKS` blocks in time order."""
+    count = min(BLOCKS, residual.size // 2)
+    if count < 4:
+        return 1.0
+    base, longer = divmod(residual.size, count)
+    starts = np.arange(count) * base + np.minimum(np.arange(count), longer)
+    sizes = np.diff(starts, append=residual.size)
+    spread = float(np.sum(np.add.reduceat(residual, starts) ** 2 / sizes)) / (count - 2)
+    return max(1.0, spread / sigma**2)
+
+
+def _refuse_no_line(u: np.ndarray, window: tuple[float, float], floor: float, source: str) -> None:
+    """Refuse samples that hold no straight line: too few above the meter's floor, or all at one command."""
+    if u.size < FEWEST or np.ptp(u) == 0:
+        raise InputError(
+            f"'{source}': {u.size} samples at {np.unique(u).size} levels of the command lie between {window[0]:.0%} "
+            f"and {window[1]:.0%} of the largest flow and above half the meter's floor of {floor * 6e4:.3g} L/min, "
+            "expected at least 5 at 2 levels; record a slower ramp or more levels, or correct --meter-floor"
+        )
