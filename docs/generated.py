@@ -3,7 +3,8 @@
 import importlib
 import inspect
 from collections.abc import Callable, Iterator
-from typing import Any
+from dataclasses import fields, is_dataclass
+from typing import Any, get_type_hints
 
 from dzdesign.command_line.command_table import COMMANDS
 from dzdesign.command_line.parser import arguments_of_command, command_module, usage_of
@@ -18,10 +19,12 @@ API = (
     ("dzdesign.identify.reading.ramp_files", ("RampTest", "read_ramp_file")),
     ("dzdesign.identify.options", ("IdentifyOptions",)),
     ("dzdesign.identify.identification", ("identify",)),
-    ("dzdesign.identify.valve.model", ("ValveModel", "SideModel", "TestResult")),
+    ("dzdesign.identify.valve.model", ("ValveModel",)),
+    ("dzdesign.identify.valve.side_model", ("SideModel",)),
+    ("dzdesign.identify.valve.ramp_result", ("TestResult",)),
     ("dzdesign.design.options", ("DesignOptions",)),
     ("dzdesign.design.designing", ("design",)),
-    ("dzdesign.design.compensator", ("Compensator",)),
+    ("dzdesign.design.compensator", ("Compensator", "SideLaw")),
     ("dzdesign.codegen.project", ("generate",)),
     ("dzdesign.verify.closed_loop.plant", ("Plant", "read_plant")),
     ("dzdesign.verify.verification", ("verify", "Verification")),
@@ -141,8 +144,19 @@ def api() -> str:
             kind = "autofunction" if inspect.isfunction(getattr(found, name)) else "autoclass"
             members = "\n   :members:" if kind == "autoclass" else ""
             parts.append(f"\n.. {kind}:: {name}{members}\n")
+            parts += [f"   * ``{field}``: {text}" for field, text in _described_fields(getattr(found, name))]
         parts.append("\n```\n")
     return "\n".join(parts)
+
+
+def _described_fields(kind: object) -> Iterator[tuple[str, str]]:
+    """Yield name and description of each field of a class whose annotations describe them: the keys of a file."""
+    if inspect.isclass(kind) and is_dataclass(kind):
+        hints = get_type_hints(kind, include_extras=True)
+        for field in fields(kind):
+            for note in getattr(hints[field.name], "__metadata__", ()):
+                if text := getattr(note, "description", None):
+                    yield field.name, text
 
 
 #: What a page asks for by ``<!-- made: NAME -->``.
