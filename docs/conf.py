@@ -8,13 +8,14 @@ import os
 import re
 import shutil
 import sys
+from dataclasses import is_dataclass
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).parent))
 
 from figures.draw import draw_all
-from generated import MADE
+from generated import MADE, key_lines
 
 from dzdesign.commands.schema import SCHEMAS, schema_text
 from dzdesign.core.version import __version__
@@ -76,6 +77,12 @@ def _escape(app, what, name, obj, options, lines: list[str]) -> None:
         lines[index] = re.sub(r"^:(ivar|vartype) ([^:]+):", lambda found: found[0].replace(", ", ","), line)
 
 
+def _describe_keys(app, what, name, obj, options, lines: list[str]) -> None:
+    """Describe the keys of an artefact by its annotations, which its docstring does not repeat."""
+    if is_dataclass(obj) and not any(line.startswith(":ivar") for line in lines):
+        lines += ["", *key_lines(obj), ""]
+
+
 def _publish(app, error: Exception | None) -> None:
     """Put the schemas and the derivation's account beside the pages."""
     if error or app.builder.format != "html":
@@ -94,5 +101,6 @@ def setup(app) -> None:
     app.connect("env-before-read-docs", _say_reading)
     app.connect("env-updated", _say_writing)
     app.connect("source-read", _insert)
+    app.connect("autodoc-process-docstring", _describe_keys, priority=800)
     app.connect("autodoc-process-docstring", _escape, priority=900)
     app.connect("build-finished", _publish)

@@ -3,14 +3,14 @@
 import importlib
 import inspect
 from collections.abc import Callable, Iterator
-from dataclasses import fields, is_dataclass
+from dataclasses import fields
 from typing import Any, get_type_hints
 
 from dzdesign.command_line.command_table import COMMANDS
 from dzdesign.command_line.parser import arguments_of_command, command_module, usage_of
 from dzdesign.commands.schema import SCHEMAS, schema_document
 
-#: What a caller of the rooms needs; of a module without names all that is its own.
+#: What a caller of the rooms needs.
 API = (
     ("dzdesign.api", ("identify", "design", "generate", "verify", "init", "simulate", "assess", "report", "batch")),
     ("dzdesign.initial_options.look", ("Proposal",)),
@@ -25,9 +25,11 @@ API = (
     ("dzdesign.design.options", ("DesignOptions",)),
     ("dzdesign.design.designing", ("design",)),
     ("dzdesign.design.compensator", ("Compensator", "SideLaw")),
-    ("dzdesign.codegen.project", ("generate",)),
+    ("dzdesign.codegen.project", ("generate", "Firmware")),
     ("dzdesign.verify.closed_loop.plant", ("Plant", "read_plant")),
     ("dzdesign.verify.verification", ("verify", "Verification")),
+    ("dzdesign.verify.evidence", ("Evidence",)),
+    ("dzdesign.report.lot.summary", ("LotSummary",)),
     ("dzdesign.core.errors", ("DzdesignError", "InputError", "RequirementError")),
 )
 
@@ -125,38 +127,27 @@ def _kind(value: dict[str, Any], nullable: bool) -> str:
 
 
 def api() -> str:
-    """Return directives for the documented names of each module that there is."""
+    """Return directives for the documented names of each module."""
     parts = []
     for module, names in API:
-        try:
-            found = importlib.import_module(module)
-        except ModuleNotFoundError as error:
-            if error.name != module:
-                raise
-            continue
-        names = names or [
-            name
-            for name, value in vars(found).items()
-            if not name.startswith("_") and getattr(value, "__module__", None) == module and callable(value)
-        ]
+        found = importlib.import_module(module)
         parts.append(f"## {module}\n\n```{{eval-rst}}\n.. currentmodule:: {module}\n")
         for name in names:
             kind = "autofunction" if inspect.isfunction(getattr(found, name)) else "autoclass"
             members = "\n   :members:" if kind == "autoclass" else ""
             parts.append(f"\n.. {kind}:: {name}{members}\n")
-            parts += [f"   * ``{field}``: {text}" for field, text in _described_fields(getattr(found, name))]
         parts.append("\n```\n")
     return "\n".join(parts)
 
 
-def _described_fields(kind: object) -> Iterator[tuple[str, str]]:
-    """Yield name and description of each field of a class whose annotations describe them: the keys of a file."""
-    if inspect.isclass(kind) and is_dataclass(kind):
-        hints = get_type_hints(kind, include_extras=True)
-        for field in fields(kind):
-            for note in getattr(hints[field.name], "__metadata__", ()):
-                if text := getattr(note, "description", None):
-                    yield field.name, text
+def key_lines(artefact: type) -> list[str]:
+    """Return a field of reStructuredText for each key of an artefact, which its annotation describes."""
+    hints = get_type_hints(artefact, include_extras=True)
+    lines = []
+    for field in fields(artefact):
+        described = [each.description for each in getattr(hints[field.name], "__metadata__", ()) if each.description]
+        lines += [f":ivar {field.name}: {described[-1]}"] if described else []
+    return lines
 
 
 #: What a page asks for by ``<!-- made: NAME -->``.
