@@ -40,38 +40,22 @@ def thresholds(example: Example) -> "Figure":
     item, test = side.described.tests[AT_1_MPA], side.model.tests[AT_1_MPA]
     level = side.model.certificate.level_L_min
     names = ("opening (rising command)", "closing (falling command)")
-    branches = (
-        (test.u_knee_rising_V, test.u_level_rising_V, test.u_onset_rising_V),
-        (test.u_knee_falling_V, test.u_level_falling_V, test.u_onset_falling_V),
-    )
+    opening = test.u_knee_rising_V, test.u_level_rising_V, test.u_onset_rising_V
+    closing = test.u_knee_falling_V, test.u_level_falling_V, test.u_onset_falling_V
     for panel, shape, (knee, at_level, onset), name, colour in zip(
-        axes, item.shapes, branches, names, (BLUE, ORANGE), strict=True
+        axes, item.shapes, (opening, closing), names, (BLUE, ORANGE), strict=True
     ):
         read = shape.prepared.branch
         panel.plot(read.u, read.q / L_MIN, ".", ms=2, color=GREY, alpha=0.35, label="samples")
         u = np.array([knee, 6.3])
         panel.plot(u, (u - knee) * shape.slope / L_MIN, color=colour, lw=1.8, label="straight part, extended")
         panel.axhline(level, color=BLACK, ls=":", lw=1.2, label=f"what counts as flow, {level:.2f} L/min")
-        for value, height, marker, word in (
-            (knee, 0.0, "o", "knee"),
-            (at_level, level, "s", "level"),
-            (onset, 0.0, "D", "onset"),
-        ):
-            hollow = "none" if word == "onset" else colour
-            panel.plot(value, height, marker, ms=11 if word == "onset" else 6, mec=BLACK, mfc=hollow, zorder=5)
-        note(
-            panel,
-            f"knee {knee:.3f} V\n(dot)",
-            (knee + 0.45, -0.3),
-            (knee + 0.03, -0.02),
-            ha="left",
-        )
-        note(
-            panel,
-            f"onset {onset:.3f} V\n(diamond)",
-            (onset - 0.3, -0.62),
-            (onset - 0.02, -0.08),
-        )
+        for value, height, marker, size, face in (
+            (knee, 0.0, "o", 6, colour), (at_level, level, "s", 6, colour), (onset, 0.0, "D", 11, "none"),
+        ):  # fmt: skip
+            panel.plot(value, height, marker, ms=size, mec=BLACK, mfc=face, zorder=5)
+        note(panel, f"knee {knee:.3f} V\n(dot)", (knee + 0.45, -0.3), (knee + 0.03, -0.02), ha="left")
+        note(panel, f"onset {onset:.3f} V\n(diamond)", (onset - 0.3, -0.62), (onset - 0.02, -0.08))
         note(panel, f"level {at_level:.3f} V\n(square)", (at_level - 0.3, 1.9), (at_level, level + 0.1))
         panel.set(title=name, xlabel="command (V)", xlim=(4.55, 6.4), ylim=(-0.95, 3.4))
     axes[0].set_ylabel("flow at 1 MPa (L/min)")
