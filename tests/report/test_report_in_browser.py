@@ -4,6 +4,7 @@ import contextlib
 import json
 import os
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,7 @@ from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of, to_json
 from dzdesign.report.lot.report import report_of_lot
 from dzdesign.report.valve_report import REPORT_NAME, report_of_folder
 from tests.support.synthetic import needs_compiler
-from tests.support.synthetic_lots import lot_rows, write_lot_folder
+from tests.support.synthetic_lots import lot_rows, with_figures, write_lot_folder
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 VIEWS = [(width, scheme) for width in (1280, 400) for scheme in ("light", "dark")]
@@ -115,9 +116,9 @@ def pages(reported_demo, tmp_path_factory):
     for place in (failing, alone):
         (place / REPORT_NAME).write_text(report_of_folder(place).html, encoding="utf-8")
     rows = lot_rows(80, failed=(3, 4, 50))
-    rows[7] |= {"name": "unbroken" * 12, "offset_V": 4.2, "knee_opening_V": 4.4}
-    rows[8] |= {"name": "\u5f01 <b>7</b>", "offset_V": 4.25}
-    rows[3] |= {"name": "no-blank-in-it-" * 6, "reason": "unbroken" * 60}
+    rows[7] = replace(with_figures(rows[7], offset_V=4.2, knee_opening_V=4.4), name="unbroken" * 12)
+    rows[8] = replace(with_figures(rows[8], offset_V=4.25), name="\u5f01 <b>7</b>")
+    rows[3] = replace(rows[3], name="no-blank-in-it-" * 6, reason="unbroken" * 60)
     write_lot_folder(folder / "lot", rows)
     (folder / "lot" / REPORT_NAME).write_text(report_of_lot(folder / "lot").html, encoding="utf-8")
     return {
