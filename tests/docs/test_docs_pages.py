@@ -71,7 +71,7 @@ def test_every_command_of_every_page_and_of_the_readme_is_one_that_dzdesign_know
 
 
 def unknown_keywords(text):
-    """Return the keywords that calls of `dzdesign.api` in the indented Python of a page give and no function takes."""
+    """Return how many calls of `dzdesign.api` the indented Python of a page has, and the keywords that none takes."""
     calls = re.findall(r"^    .*\bapi\.\w+\(.*$", text, re.MULTILINE)
     trees = [ast.walk(ast.parse(line.strip())) for line in calls]
     found = [node for tree in trees for node in tree if isinstance(node, ast.Call)]
