@@ -24,7 +24,7 @@ API = (
     ("dzdesign.identify.valve.ramp_result", ("TestResult",)),
     ("dzdesign.design.options", ("DesignOptions",)),
     ("dzdesign.design.designing", ("design",)),
-    ("dzdesign.design.compensator", ("Compensator",)),
+    ("dzdesign.design.compensator", ("Compensator", "SideLaw")),
     ("dzdesign.codegen.project", ("generate", "Firmware")),
     ("dzdesign.verify.closed_loop.plant", ("Plant", "read_plant")),
     ("dzdesign.verify.verification", ("verify", "Verification")),

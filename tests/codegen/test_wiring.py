@@ -15,7 +15,7 @@ from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.options import arguments_of
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.request import DesignChoices
+from dzdesign.design.design_choices import DesignChoices
 from dzdesign.design.signal_text import command_signal, parse_signal
 from dzdesign.design.target_inputs import Converter
 from tests.support.golden_firmware import FULL, GOLDENS

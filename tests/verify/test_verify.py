@@ -11,7 +11,8 @@ import pytest
 from dzdesign.core.artefact_files import to_json, write_folder
 from dzdesign.core.errors import InputError
 from dzdesign.verify.closed_loop import motion
-from dzdesign.verify.closed_loop.loop import PERIODS_PER_RECORD, ClosedLoop, RampSequence, dead_zone
+from dzdesign.verify.closed_loop.dead_zone import dead_zone
+from dzdesign.verify.closed_loop.loop import PERIODS_PER_RECORD, ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.plant import Plant, plants_from_tests
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from dzdesign.verify.exhaustive.exact_law import ExactLaw

@@ -9,8 +9,8 @@ from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.options import flag_of
 from dzdesign.core.units import parse_quantity
 from dzdesign.design.compensator import BelowDp0
+from dzdesign.design.design_choices import DEFAULTS, NEGATIVE_DP, POLARITIES, DesignRequest
 from dzdesign.design.options import DesignOptions
-from dzdesign.design.request import DEFAULTS, NEGATIVE_DP, POLARITIES, DesignRequest
 from dzdesign.design.signal_text import command_signal, parse_signal, pressure_signal
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import TargetInputs

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from dzdesign.core.option_readers import whole_number
 from dzdesign.core.options import AnyPath, Option, Text
-from dzdesign.design.request import DesignChoices
+from dzdesign.design.design_choices import DesignChoices
 from dzdesign.stages.design import TARGETS
 from dzdesign.stages.identify import IdentifyChoices
 

@@ -25,7 +25,7 @@ from dzdesign.core.artefact_files import MANIFEST_NAME, read_bytes, write_file, 
 from dzdesign.core.errors import InputError
 from dzdesign.core.folder_swap import alone_in
 from dzdesign.core.options import arguments_of, read_options
-from dzdesign.design.request import DEFAULTS, DesignChoices
+from dzdesign.design.design_choices import DEFAULTS, DesignChoices
 from dzdesign.report.lot.report import report_of_lot
 from dzdesign.report.lot.summary import LotSummary
 from dzdesign.report.lot.table import table_files

@@ -19,7 +19,7 @@ from dzdesign.reproduce.recovered_valves import RecoveredValve
 from dzdesign.reproduce.valve_runs import ValveRuns, run_valve
 from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.plant import L_MIN, MPA
-from dzdesign.verify.closed_loop.simulation import Bench, simulate_ramp
+from dzdesign.verify.closed_loop.simulated_recordings import Bench, simulate_ramp
 
 #: Pressure drops of the ramp tests, MPa: the paper's two and some between ("multiple groups", section 1), closer at
 #: dP0, because between two tests only the lower of their bounds is certain.

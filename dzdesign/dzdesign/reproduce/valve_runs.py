@@ -10,7 +10,8 @@ from dzdesign.derivation.law import law
 from dzdesign.design.compensator import Compensator
 from dzdesign.report.reproduction import Driver
 from dzdesign.reproduce.recovered_valves import RecoveredValve
-from dzdesign.verify.closed_loop.loop import FLOW_SHARE, ClosedLoop, LoopRun, RampSequence, dead_zone
+from dzdesign.verify.closed_loop.dead_zone import FLOW_SHARE, dead_zone
+from dzdesign.verify.closed_loop.loop import ClosedLoop, LoopRun, RampSequence
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S
 
 PRESSURES_MPA = (float(DP0_MPA), float(DP1_MPA))

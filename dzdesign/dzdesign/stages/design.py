@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from dzdesign.core.artefact_files import check_file_may_be_written, read_bytes, write_file
 from dzdesign.core.errors import InputError
 from dzdesign.core.options import AnyPath, Option, flag_of
-from dzdesign.design.request import DEFAULTS, DesignChoices
+from dzdesign.design.design_choices import DEFAULTS, DesignChoices
 
 if TYPE_CHECKING:
     from dzdesign.design.compensator import Compensator

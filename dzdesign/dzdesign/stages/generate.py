@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from dzdesign.core.artefact_files import check_folder_may_be_written, parse_document, read_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.core.options import AnyPath, Option, Text, flag_of
-from dzdesign.design.request import DEFAULTS, DesignChoices
+from dzdesign.design.design_choices import DEFAULTS, DesignChoices
 from dzdesign.stages.design import TARGETS, design_options
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from dzdesign.core.units import parse_quantity
 from dzdesign.terminal.progress import say, stage_progress
 
 if TYPE_CHECKING:
-    from dzdesign.verify.closed_loop.simulation import SimulationManifest
+    from dzdesign.verify.closed_loop.simulated_recordings import SimulationManifest
 
 PRESSURE_DROPS = ("0.5 MPa", "1 MPa", "2 MPa", "3 MPa", "4 MPa", "5 MPa")
 
@@ -55,7 +55,7 @@ def simulate(arguments: SimulateArguments) -> SimulatedRamps:
         If a file or an option can't be read.
     """
     from dzdesign.verify.closed_loop.plant import Plant, read_plant
-    from dzdesign.verify.closed_loop.simulation import Bench, simulated_files
+    from dzdesign.verify.closed_loop.simulated_recordings import Bench, simulated_files
 
     if arguments.output is not None:
         check_folder_may_be_written(Path(arguments.output))

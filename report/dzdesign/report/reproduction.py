@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import Artefact, quantity
-from dzdesign.verify.closed_loop.simulation import Bench
+from dzdesign.verify.closed_loop.simulated_recordings import Bench
 
 #: Larger than any number here; bounds in a file keep arithmetic from overflowing.
 LARGEST = 1e12

@@ -27,8 +27,8 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
 from dzdesign.design.beta_table import DECIMALS
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.design_choices import DesignChoices
 from dzdesign.design.lot_setting import lot_setting
-from dzdesign.design.request import DesignChoices
 from dzdesign.report.artefact_chain import chain_of
 from dzdesign.report.artefact_folder import read_artefact_folder
 from dzdesign.report.lot.valve_folder import read_manifest

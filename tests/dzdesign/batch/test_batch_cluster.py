@@ -21,7 +21,7 @@ from dzdesign.batch.runners import _scheduler_lost, run_on_cluster
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.errors import InputError
-from dzdesign.design.request import DesignChoices
+from dzdesign.design.design_choices import DesignChoices
 from dzdesign.stages.identify import IdentifyChoices
 from tests.support.crashing_work import die_over_bad
 from tests.support.paths import ROOT

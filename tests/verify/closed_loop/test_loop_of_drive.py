@@ -12,7 +12,8 @@ from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.design.designing import design
 from dzdesign.identify.valve.model import ValveModel
-from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence, compare_at_pressure
+from dzdesign.verify.closed_loop.dead_zone import compare_at_pressure
+from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.plant import plants_from_tests
 from tests.support.golden_firmware import FULL, full_options
 from tests.support.synthetic import needs_compiler

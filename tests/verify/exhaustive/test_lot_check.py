@@ -1,4 +1,4 @@
-"""A common setting against every valve of its lot: in exact arithmetic by design, and the C's integers by verify."""
+"""A lot setting against every valve of its lot: in exact arithmetic by design, and the C's integers by verify."""
 
 import json
 from dataclasses import replace
@@ -54,7 +54,7 @@ def common(batch):
 
 
 def with_bound(compensator, name, place, change):
-    """Return a common setting in whose lot one bound of one valve is another."""
+    """Return a lot setting in whose lot one bound of one valve is another."""
     lot = []
     for valve in compensator.lot:
         if valve.name == name:
@@ -166,7 +166,7 @@ def test_the_valve_in_the_file_is_one_of_the_lot(common):
 
 
 def test_codegen_refuses_it_in_one_line(common, tmp_path, capsys):
-    path = tmp_path / "common_compensator.json"
+    path = tmp_path / "lot_compensator.json"
     path.write_bytes(to_json_bytes(with_bound(common.compensator, "c", 1, -1.0)))
     assert main(["codegen", str(path), "-o", str(tmp_path / "firmware")]) == 2
     said = capsys.readouterr().err

@@ -45,7 +45,7 @@ class Check:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LotCheck:
-    """What one sign of command of a common setting leaves to the bounds of every valve of its lot."""
+    """What one sign of command of a lot setting leaves to the bounds of every valve of its lot."""
 
     valves: Annotated[Count, about("How many were compared.")]
     over_compensated: Annotated[

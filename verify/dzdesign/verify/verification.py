@@ -10,9 +10,10 @@ from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, as_document, sch
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.design.compensator import Compensator
+from dzdesign.verify.closed_loop.dead_zone import LoopComparison
 from dzdesign.verify.closed_loop.evidence_curves import curve_files
 from dzdesign.verify.closed_loop.firmware_loop import FirmwareLoop, Watch, close_the_loop, scenes_of
-from dzdesign.verify.closed_loop.loop import LoopComparison, RampSequence
+from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.closed_loop.tolerances import Tolerances
 from dzdesign.verify.evidence import Check, ClosedLoopResult, Evidence, InputCheck

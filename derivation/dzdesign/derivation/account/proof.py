@@ -217,13 +217,13 @@ def judge(statement: Statement, earlier: Mapping[str, Statement], verdicts: Mapp
 
 
 def _limits(verdict: Verdict) -> tuple[str, ...]:
-    own = (verdict.number,) if verdict.statement.scope or verdict.statement.provided else ()
-    return own + verdict.limited_by
+    itself = (verdict.number,) if verdict.statement.scope or verdict.statement.provided else ()
+    return itself + verdict.limited_by
 
 
 def _conditional(verdict: Verdict) -> tuple[str, ...]:
-    own = (verdict.number,) if verdict.necessary is not None else ()
-    return own + verdict.inherited if verdict.outcome is Outcome.FOLLOWS_IF else ()
+    itself = (verdict.number,) if verdict.necessary is not None else ()
+    return itself + verdict.inherited if verdict.outcome is Outcome.FOLLOWS_IF else ()
 
 
 def _finding(statement: Statement, proofs: Sequence[CaseProof], differences: Sequence[sympy.Expr]) -> Finding:

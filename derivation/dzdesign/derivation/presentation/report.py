@@ -75,7 +75,7 @@ def render(verdicts: Sequence[Verdict], format: str, only: Sequence[str] | None 
     InputError
         If there is no such format.
     RequirementError
-        If all is to be shown, and an equation of the paper is missing.
+        If all are wanted, and an equation of the paper is missing.
     """
     check_format(format)
     numbers = [verdict.number for verdict in verdicts]
@@ -134,33 +134,33 @@ def _number(text: str, names: dict[str, str]) -> str:
 # --- what the report says of the whole ------------------------------------------------------------------------
 
 
-def compose(verdicts: Sequence[Verdict], shown: Sequence[str]) -> DerivationReport:
+def compose(verdicts: Sequence[Verdict], numbers: Sequence[str]) -> DerivationReport:
     """Say what the account found, of the statements to show.
 
     Parameters
     ----------
     verdicts : sequence of Verdict
         What `verify_statements` returns.
-    shown : sequence of str
-        Numbers of the statements to show.
+    numbers : sequence of str
+        Of the statements to show.
 
     Returns
     -------
     DerivationReport
     """
     book = {verdict.number: verdict for verdict in verdicts}
-    entries = tuple(describe(book[number], book) for number in shown)
-    partial = len(shown) < len(book)
+    entries = tuple(describe(book[number], book) for number in numbers)
+    partial = len(numbers) < len(book)
     return DerivationReport(
         tool=THIS_TOOL,
         made_from=(),
         title="Derivation of the dead-zone compensation law" + (", in part" if partial else ""),
         source="The paper: Wu et al. 2022, doi 10.11916/j.issn.1005-9113.20063.",
         holds=all(entry.as_expected for entry in entries),
-        summary=_summary([book[number] for number in shown]),
+        summary=_summary([book[number] for number in numbers]),
         wrong=tuple(_fault(entry) for entry in entries if _is_wrong(entry)),
         conditional=tuple(_judged(entry) for entry in entries if entry.outcome is Outcome.FOLLOWS_IF),
-        symbols=_symbols([book[number].statement for number in shown]),
+        symbols=_symbols([book[number].statement for number in numbers]),
         statements=entries,
     )
 
@@ -201,7 +201,7 @@ def _summary(verdicts: Sequence[Verdict]) -> tuple[Words, ...]:
         counts = "; ".join(
             f"{words}: {sum(verdict.outcome is outcome for verdict in paper)}" for outcome, words in _COUNTED.items()
         )
-        lines.append(Words(f"Of {which} of the paper shown here, {counts}."))
+        lines.append(Words(f"Of {which} of the paper in this report, {counts}."))
     return tuple(lines)
 
 

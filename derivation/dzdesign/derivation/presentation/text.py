@@ -47,8 +47,8 @@ class TextWriter(Writer):
         return "\n".join(rows)
 
     def filters(self) -> dict[str, Callable[..., Any]]:
-        own: dict[str, Callable[..., Any]] = {"wrap": wrap, "head": _head, "line": self.line, "labelled": _labelled}
-        return {**super().filters(), **own, "equations": _equations, "figures": self.figures}
+        lines: dict[str, Callable[..., Any]] = {"wrap": wrap, "head": _head, "line": self.line, "labelled": _labelled}
+        return {**super().filters(), **lines, "equations": _equations, "figures": self.figures}
 
     def line(self, line: Line, indent: str) -> str:
         """Return a sentence, and below it the formula that it leads to."""

@@ -14,7 +14,7 @@ class Writer(ABC):
 
     Parameters
     ----------
-    shown : collection of str
+    linked : collection of str
         Numbers of the statements in the document: those that can be pointed to.
     """
 
@@ -23,8 +23,8 @@ class Writer(ABC):
     #: What sets this template's syntax apart.
     SYNTAX: ClassVar[Mapping[str, Any]] = {}
 
-    def __init__(self, shown: Collection[str] = ()) -> None:
-        self.shown = shown
+    def __init__(self, linked: Collection[str] = ()) -> None:
+        self.linked = linked
 
     def words(self, *parts: Part) -> str:
         """Return words in this notation.
@@ -42,7 +42,7 @@ class Writer(ABC):
             case Code(text):
                 return self.code(text)
             case Reference(number, words):
-                return self.link(number, self.words(words)) if number in self.shown else self.words(words)
+                return self.link(number, self.words(words)) if number in self.linked else self.words(words)
         return self.text(part)
 
     @abstractmethod

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from dzdesign.verify.closed_loop.loop import LoopComparison
+from dzdesign.verify.closed_loop.dead_zone import LoopComparison
 from dzdesign.verify.exhaustive.input_map import InputMap
 
 #: Every so many records are kept, 0.2 s of the paper's ramp, 0.2 % of the command: finer than a printed line is wide.

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from dzdesign.design.compensator import Compensator
-from dzdesign.verify.closed_loop.loop import ClosedLoop, LoopComparison, RampSequence, compare_at_pressure
+from dzdesign.verify.closed_loop.dead_zone import LoopComparison, compare_at_pressure
+from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.loop_checks import (
     no_flow_at_zero,
     plant_is_the_valve,

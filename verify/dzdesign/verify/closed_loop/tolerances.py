@@ -12,7 +12,8 @@ import numpy as np
 
 from dzdesign.core.artefact_files import read_bytes
 from dzdesign.core.errors import InputError, nearest, quoted
-from dzdesign.verify.closed_loop.loop import FLOW_SHARE, NO_FLOW_L_MIN, ClosedLoop, RampSequence, dead_zone
+from dzdesign.verify.closed_loop.dead_zone import FLOW_SHARE, dead_zone
+from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN, ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.plant import LONGEST_KEY, Plant
 from dzdesign.verify.evidence import MonteCarlo, Scatter, Side, Spread
 
