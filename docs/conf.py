@@ -71,8 +71,11 @@ def _insert(app, page: str, source: list[str]) -> None:
 
 
 def _escape(app, what, name, obj, options, lines: list[str]) -> None:
-    """Keep reStructuredText from taking names for markup: one that ends in an underscore, several before a colon."""
+    """Keep reStructuredText from taking names for markup: an underscore at the end, a pattern's `*`, several names."""
     for index, line in enumerate(lines):
+        parts = line.split("`")  # what stands in backticks is taken as it is
+        parts[::2] = [re.sub(r"(?<=/)\*|\*(?=[/.])", r"\\*", part) for part in parts[::2]]
+        line = "`".join(parts)
         line = re.sub(r"\b([A-Za-z]\w*)_(?![\w`])", r"\1\\_", line)
         lines[index] = re.sub(r"^:(ivar|vartype) ([^:]+):", lambda found: found[0].replace(", ", ","), line)
 

@@ -1,10 +1,13 @@
 """The pages of the documentation, tried as a reader would: every command that they show, and what it prints."""
 
+import ast
+import inspect
 import re
 import shutil
 
 import pytest
 
+from dzdesign import api
 from dzdesign.command_line.parser import build_parser
 from tests.support.documented_commands import agrees, commands_of, try_page
 from tests.support.paths import ROOT
@@ -65,6 +68,29 @@ def test_every_command_of_every_page_and_of_the_readme_is_one_that_dzdesign_know
                 parser.parse_args(words[1:])
                 tried += 1
     assert tried > 30
+
+
+def unknown_keywords(text):
+    """Return how many calls of `dzdesign.api` the indented Python of a page has, and the keywords that none takes."""
+    calls = re.findall(r"^    .*\bapi\.\w+\(.*$", text, re.MULTILINE)
+    trees = [ast.walk(ast.parse(line.strip())) for line in calls]
+    found = [node for tree in trees for node in tree if isinstance(node, ast.Call)]
+    found = [node for node in found if isinstance(node.func, ast.Attribute) and ast.unparse(node.func.value) == "api"]
+    return len(found), [
+        f"{node.func.attr}({word.arg})"
+        for node in found
+        for word in node.keywords
+        if word.arg not in inspect.signature(getattr(api, node.func.attr)).parameters
+    ]
+
+
+def test_every_call_of_the_api_in_the_pages_is_one_that_it_takes():
+    counted = [
+        unknown_keywords(page.read_text("utf-8")) for page in (ROOT / "README.md", DOCS / "reference" / "api.md")
+    ]
+    assert [count for count, _ in counted] == [4, 5] and [words for _, words in counted] == [[], []]
+    wrong = '    firmware = api.generate(api.design(valve, edge="1 %"), output="firmware")\n'
+    assert unknown_keywords(wrong) == (2, ["design(edge)"])
 
 
 def without_shell(line):

@@ -180,6 +180,11 @@ def test_a_valve_file_that_was_replaced_is_said_first(copied):
     assert check.holds and check.text.startswith("valve.json beside the firmware is ANOTHER valve")
 
 
+def test_a_copy_of_the_valve_under_another_name_makes_no_other_valve(copied):
+    shutil.copy(copied / "valve.json", copied / "a.json")
+    assert not any("another valve" in line for line in report_of_folder(copied).missing)
+
+
 def test_a_strangers_valve_is_not_compared(copied):
     compensator = spaced(copied)
     next(strangers(copied))

@@ -150,7 +150,7 @@ class _Search:
             self.places["valve"] = _place(f"{place.name}, its key “valve”", sha256_of(to_json_bytes(held)), held)
             return
         self._take("valve", name)
-        if named != name and self._other("valve", named) == named:
+        if self.hashes.get(named) != stated and self._other("valve", named) == named:
             self.missing.append(f"{named} is another valve by now; the compensator was made from {name}: used")
         if self.found.get("valve", held) != held:
             self.faults.append(f"{place.name} holds another valve than {name}, whose SHA-256 it states: it was edited")
