@@ -15,18 +15,8 @@ def is_exhaustive(cases: tuple[Case, ...], within: Boolean) -> bool:
     """Return whether cases leave nothing out of what a statement is meant for.
 
     Each case replaces symbols by others plus a distance of known sign, as ``dP1 = dP0 + above``; so it says which
-    comparisons hold. The cases are exhaustive if propositional logic alone shows that one of them is true.
-
-    Parameters
-    ----------
-    cases : tuple of Case
-    within : sympy Boolean
-        Comparisons that hold wherever the statement is meant to; true if that is everywhere.
-
-    Returns
-    -------
-    bool
-        True where there are no cases; False also where a case can't be read as comparisons.
+    comparisons hold, as `within` says which ones hold wherever the statement is meant to. The cases are exhaustive if
+    propositional logic alone shows that one of them is true; a case that can't be read as comparisons shows nothing.
     """
     if not cases:
         return True

@@ -25,34 +25,22 @@ from dzdesign.derivation.symbols import Name
 
 @dataclass(frozen=True, kw_only=True)
 class CaseProof:
-    """The derivation of one case of a statement; most statements have a single one, without words.
-
-    Attributes
-    ----------
-    statement : Statement
-    where : str
-        The case in words.
-    derived : sympy.Expr
-        What the grounds give for the symbol.
-    discrepancies : tuple of sympy.Expr
-        Derived minus published, one per member; zero where they agree.
-    relations : tuple of Relation
-        The grounds at the values at which the case uses them.
-    solution : mapping
-        The statement's symbol and the eliminated ones, solved for.
-    reached : sympy.Expr
-        The form in which a derivation states the result: as published, or as derived where the two differ.
-    published : sympy.Expr
-        The last member's branch of this case, in the symbols of the statement.
-    """
+    """The derivation of one case of a statement; most statements have a single one, without words."""
 
     statement: Statement
+    #: The case in words.
     where: str
+    #: What the grounds give for the symbol.
     derived: sympy.Expr
+    #: Derived minus published, one per member; zero where they agree.
     discrepancies: tuple[sympy.Expr, ...]
+    #: The grounds at the values at which the case uses them.
     relations: tuple[Relation, ...]
+    #: The statement's symbol and the eliminated ones, solved for.
     solution: Mapping[Name, sympy.Expr]
+    #: The form in which a derivation states the result: as published, or as derived where the two differ.
     reached: sympy.Expr
+    #: The last member's branch of this case, in the symbols of the statement.
     published: sympy.Expr
 
     @cached_property
@@ -63,36 +51,23 @@ class CaseProof:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdict:
-    """What the engine found about one statement.
-
-    Attributes
-    ----------
-    statement : Statement
-    outcome : Outcome
-    words : str
-        The outcome with its condition, or the reason, in words.
-    as_expected : bool
-        Whether a correct account finds this.
-    proofs : tuple of CaseProof
-        One per case; empty for what is given and for what could not be solved.
-    necessary : bool or None
-        Whether the condition was proved necessary; None where there is none.
-    inherited : tuple of str
-        Grounds that follow only on a condition, which this statement therefore needs too.
-    limited_by : tuple of str
-        Grounds, and their grounds, that are proved on a part of their range only.
-    unit_error : str
-        What is wrong with its units; empty where they are right.
-    """
+    """What the engine found about one statement."""
 
     statement: Statement
     outcome: Outcome
+    #: The outcome with its condition, or the reason, in words.
     words: str
+    #: Whether a correct account finds this.
     as_expected: bool
+    #: One per case; empty for what is given and for what could not be solved.
     proofs: tuple[CaseProof, ...] = ()
+    #: Whether the condition was proved necessary; None where there is none.
     necessary: bool | None = None
+    #: Grounds that follow only on a condition, which this statement therefore needs too.
     inherited: tuple[str, ...] = ()
+    #: Grounds, and their grounds, that are proved on a part of their range only.
     limited_by: tuple[str, ...] = ()
+    #: What is wrong with its units; empty where they are right.
     unit_error: str = ""
 
     @property
@@ -112,17 +87,7 @@ class Verdict:
 
 
 def prove(statements: Sequence[Statement]) -> tuple[Verdict, ...]:
-    """Judge each statement from its grounds.
-
-    Parameters
-    ----------
-    statements : sequence of Statement
-        Premises and statements; each stands after its grounds.
-
-    Returns
-    -------
-    tuple of Verdict
-        One per statement, in order. A statement holds only if everything it rests on holds.
+    """Judge each statement from its grounds, in order; it holds only if everything it rests on holds.
 
     Raises
     ------
@@ -168,20 +133,7 @@ def _with_units(verdict: Verdict) -> Verdict:
 
 
 def judge(statement: Statement, earlier: Mapping[str, Statement], verdicts: Mapping[str, Verdict]) -> Verdict:
-    """Judge one statement by its logic alone.
-
-    Parameters
-    ----------
-    statement : Statement
-    earlier : mapping of str to Statement
-        Its grounds, by number.
-    verdicts : mapping of str to Verdict
-        What was found about them.
-
-    Returns
-    -------
-    Verdict
-    """
+    """Judge one statement by its logic alone, from the earlier ones and their verdicts, both by number."""
 
     def verdict(outcome: Outcome, words: str, flawed: bool = False, **found: Any) -> Verdict:
         expected = outcome is statement.expected and not flawed

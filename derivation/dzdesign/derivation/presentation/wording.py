@@ -19,18 +19,7 @@ _SIGNS = {"positive": "positive", "nonnegative": "zero or positive", "real": "of
 
 
 def describe(verdict: Verdict, book: Mapping[str, Verdict]) -> Entry:
-    """Say what was found about a statement.
-
-    Parameters
-    ----------
-    verdict : Verdict
-    book : mapping of str to Verdict
-        The whole account, by number.
-
-    Returns
-    -------
-    Entry
-    """
+    """Say what was found about a statement; `book` is the whole account, by number."""
     statement, condition = verdict.statement, verdict.statement.condition
     # Members that differ in the order of their terms only look alike.
     sides = (statement.symbol, *{to_text(member): member for member in statement.members}.values())
@@ -71,16 +60,7 @@ def describe(verdict: Verdict, book: Mapping[str, Verdict]) -> Entry:
 
 
 def refer(statement: Statement) -> Reference:
-    """Refer to a statement; what has no number of its own is named by what it is.
-
-    Parameters
-    ----------
-    statement : Statement
-
-    Returns
-    -------
-    Reference
-    """
+    """Refer to a statement; what has no number of its own is named by what it is."""
     number = statement.number
     if _NUMBERED.fullmatch(number):
         return Reference(number)
