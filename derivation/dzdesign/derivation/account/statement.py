@@ -205,6 +205,11 @@ class Statement:
             object.__setattr__(self, "expected", Outcome.GIVEN if self.kind.is_given else Outcome.FOLLOWS)
 
     @property
+    def cases_to_prove(self) -> tuple[Case, ...]:
+        """Its cases; of a statement without, the only one."""
+        return self.cases or (Case((), ""),)
+
+    @property
     def published(self) -> sympy.Eq:
         """The statement in its last form, the one that other statements use."""
         return sympy.Eq(self.symbol, self.members[-1], evaluate=False)
