@@ -99,10 +99,15 @@ def parse_document(content: bytes, source: str, schemas: tuple[str, ...]) -> dic
         found = document.get("schema")
         if found in schemas:
             return document
-    same_kind = next((schema for schema in schemas if str(found).partition("/")[0] == schema.partition("/")[0]), None)
+    same_kind = next((schema for schema in schemas if family_of(found) == family_of(schema)), None)
     command = written_by(same_kind) if same_kind else None
     remedy = f"make it again with `{command}` of this version" if command else "give another file"
     raise InputError(f"'{source}' has the schema {str(found)[:QUOTED]!r}, expected {expected}; {remedy}")
+
+
+def family_of(schema: object) -> str:
+    """Return a schema's name without its version: ``dzdesign.valve`` of ``dzdesign.valve/1``."""
+    return str(schema).partition("/")[0]
 
 
 def _writer(schema: str) -> str:
@@ -118,7 +123,7 @@ def written_by(schema: str) -> str | None:
     >>> written_by("dzdesign.valve/1")
     'dzdesign identify'
     """
-    return WRITTEN_BY.get(schema.partition("/")[0])
+    return WRITTEN_BY.get(family_of(schema))
 
 
 def _refuse_deep(document: Any) -> None:

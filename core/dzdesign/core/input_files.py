@@ -6,13 +6,14 @@ for it may have no end.
 
 import contextlib
 import io
+import json
 import logging
 import os
 import stat
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from dzdesign.core.errors import InputError, neighbour
 
@@ -54,6 +55,22 @@ def read_bytes(path: Path, what: str) -> bytes:
         )
     logger.debug("read %s '%s', %d bytes", what, path, len(content))
     return content
+
+
+def json_object(path: Path) -> dict[str, Any] | None:
+    """Return the JSON object that a file holds, or None if it holds anything else; a long measurement is not read."""
+    try:
+        if not path.is_file() or path.stat().st_size > MOST_DOCUMENT:
+            return None
+        document = json.loads(path.read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return None
+    return document if isinstance(document, dict) else None
+
+
+def reason_of(error: OSError | ValueError) -> str:
+    """Return why a file can't be read or written: the system's own words, where it has some."""
+    return getattr(error, "strerror", None) or str(error)
 
 
 @contextlib.contextmanager
