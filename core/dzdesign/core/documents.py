@@ -73,11 +73,8 @@ def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 def parse_document(content: bytes, source: str, schemas: tuple[str, ...]) -> dict[str, Any]:
     """Read a JSON artefact and check that its schema is one of `schemas`.
 
-    Raises
-    ------
-    InputError
-        If it is no JSON object in UTF-8, holds what can't be written again (NaN, half a character) or a key twice, or
-        has another schema.
+    Refused is what is no JSON object in UTF-8, holds a key twice or what can't be written again (NaN, half a
+    character), or has another schema.
     """
     expected = " or ".join(f"{schema}{_writer(schema)}" for schema in schemas)
     try:

@@ -30,20 +30,7 @@ logger = logging.getLogger(__name__)
 
 
 def read_bytes(path: Path, what: str) -> bytes:
-    """Read a whole file, or say in one sentence why it can't be read.
-
-    Parameters
-    ----------
-    path : Path
-        Of a document: options, plant, an artefact.
-    what : str
-        What it is to be, for the message.
-
-    Raises
-    ------
-    InputError
-        If it is not there, no file, or larger than `MOST_DOCUMENT`.
-    """
+    """Read a whole document (options, plant, artefact), or say in one sentence why that fails; `what` names it."""
     with _refusing(path, what):
         if _is_pipe(path, what):
             return _piped(path, what, MOST_DOCUMENT)
@@ -75,19 +62,9 @@ def reason_of(error: OSError | ValueError) -> str:
 
 @contextlib.contextmanager
 def open_bytes(path: Path, what: str) -> Iterator[BinaryIO]:
-    """Open a file that may be larger than memory; or say in one sentence why it can't be read.
+    """Open a recording that may be larger than memory, or say in one sentence why it can't be read; `what` names it.
 
-    Parameters
-    ----------
-    path : Path
-        Of a recording.
-    what : str
-        What it is to be, for the message.
-
-    Raises
-    ------
-    InputError
-        If it can't be read, or was changed until the context is left: what was computed of it is then of no one file.
+    One that is changed until the context is left is refused: what was computed of it is then of no one file.
     """
     with _refusing(path, what):
         piped = _is_pipe(path, what)
