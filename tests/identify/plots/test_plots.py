@@ -106,7 +106,7 @@ class TestFlow:
         slopes = []
         for column, (name, knee) in enumerate((("opening", test.u_knee_rising_V), ("closing", test.u_knee_falling_V))):
             solid = labelled(axes, f"line {name}")
-            ends = [item.shapes[column].y_max / L_MIN * share for share in item.shapes[column].window]
+            ends = [item.shapes[column].y_max / L_MIN * share for share in item.shapes[column].line.window]
             slope = found.sides["positive"].knees.slope[0, column] / L_MIN
             assert solid.get_linestyle() == "-"
             assert solid.get_ydata() == pytest.approx(ends, abs=0.1)
