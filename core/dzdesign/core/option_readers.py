@@ -37,6 +37,18 @@ def whole_number(expected: str, least: int = 0, digits: int = 6) -> Callable[[st
     return read
 
 
+def percent(example: str) -> Callable[[str, str], float]:
+    """Return what reads a percentage such as ``0.1 %`` as a share; the sign must stand there."""
+
+    def read(text: str, option: str) -> float:
+        found = re.fullmatch(r"(\d{1,9}(?:\.\d{0,15})?)\s?%", text, re.ASCII)
+        if found is None:
+            raise InputError(f'{option} is {quoted(text)}, expected a percentage such as "{example}"')
+        return float(found[1]) / 100
+
+    return read
+
+
 def percent_range(of: str) -> Callable[[str, str], tuple[float, float]]:
     """Return what reads two percentages such as ``12-50``, as shares; `of` says of what, with an example."""
     # Digits and blanks without an end would be matched in the square of their number.

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.core.artefact_files import check_file_may_be_written, write_file, write_files
-from dzdesign.core.option_readers import number, quantity
+from dzdesign.core.option_readers import number, percent, quantity
 from dzdesign.core.options import FIT, METER, RECORDINGS, AnyPath, Option, Paths, Text, read_options
 from dzdesign.stages.recordings import RampArguments, check_plots, read_recordings, refuse_copies
 from dzdesign.terminal.progress import stage_progress
@@ -33,6 +33,9 @@ class IdentifyChoices(RampArguments):
         float | str, Option("C", FIT, read=lambda text, option: number("a number such as 0.1")(text, option) / 100)
     ] = "0.1"
     """Percent of full command: a threshold that changes by less over the tests counts as flat, and beta is 1."""
+    repeatability: Annotated[Text, Option("S", FIT, example="0.1 %", read=percent("0.1 %"))] = None
+    """Standard deviation of the threshold from ramp to ramp, in percent of full command, such as "0.1 %" (default:
+    measured where ramps are repeated, otherwise 0.25 %)."""
     record: Annotated[Mapping[str, object] | None, Option("ENTRY", RECORDINGS, by_entry=True)] = None
     """Entry of the test record, such as "serial = 4711": kept in valve.json and printed in the report, nothing is
     computed from it. Repeatable. In the options file a table [record]."""

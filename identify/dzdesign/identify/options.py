@@ -42,6 +42,7 @@ class IdentifyOptions:
     confidence: float = 0.99
     knee_window: tuple[float, float] = (0.12, 0.5)
     flat_below: float = 1e-3
+    repeatability: float | None = None
 
     def __post_init__(self) -> None:
         if not self.u_max > 0:
@@ -50,6 +51,11 @@ class IdentifyOptions:
             raise InputError(f"the confidence is {self.confidence}, expected 0.5 to below 1, such as 0.99")
         if not 0 < self.knee_window[0] < self.knee_window[1] <= 1:
             raise InputError(f"the knee window is {self.knee_window}, expected two rising shares such as '12-50 %'")
+        if self.repeatability is not None and not 0 <= self.repeatability < 0.1:
+            raise InputError(
+                f"the repeatability is {100 * self.repeatability:.3g} % of full command, expected 0 to below 10 %: one "
+                "standard deviation of the threshold from ramp to ramp"
+            )
         if not 0 <= self.flat_below < 1:
             raise InputError(f"the change that counts as flat is {self.flat_below}, expected a share of u_max")
         for name in ("meter_floor", "meter_lag", "meter_zero"):

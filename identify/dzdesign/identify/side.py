@@ -8,7 +8,7 @@ import numpy as np
 from dzdesign.core.errors import InputError
 from dzdesign.identify.constants import L_MIN, MPA
 from dzdesign.identify.data_quality.side_warnings import find_warnings
-from dzdesign.identify.fitting.bounds import Trend, find_trend
+from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, Trend, find_trend
 from dzdesign.identify.fitting.constrained_fits import KneeFit, fit_knees
 from dzdesign.identify.fitting.guarding import (
     COLUMNS,
@@ -68,7 +68,11 @@ def _fit_with_trend(group: DescribedTests, options: IdentifyOptions) -> tuple[Tr
     dp = np.array([item.dp or math.nan for item in group.tests])
     column = _guarded_column(group.tests)
     budget = options.flat_below * options.u_max
-    trend = find_trend(dp, free.knee[:, column], free.knee_se[:, column], options.u_max, budget)
+    between, knee_se = group.between(column), free.knee_se[:, column]
+    degrees = float(between.degrees_of_freedom(knee_se, DEGREES_OF_FREEDOM).min())
+    trend = find_trend(
+        dp, free.knee[:, column], between.covariance_of_mean(knee_se), degrees, options.u_max, budget
+    )
     return trend, free, order_knees(group, free, trend.direction, column, options)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.constants import MPA
-from dzdesign.identify.fitting.bounds import excess_departure, lower_bounds
+from dzdesign.identify.fitting.bounds import FINEST_ERROR, excess_departure, lower_bounds
 from dzdesign.identify.fitting.constrained_fits import KneeFit, fit_knees, fit_offset
 from dzdesign.identify.knees.described_tests import DescribedTests
 from dzdesign.identify.options import IdentifyOptions
@@ -24,8 +24,6 @@ COLUMNS: dict[Guard, int] = {"opening": 0, "closing": 1}
 SOFT_SIGNIFICANCE = 3.5
 #: Standard errors of a lag that was found, against which the bounds guard.
 LAG_ERRORS = 3.0
-#: Errors below this share of u_max weigh alike: an exact table has none.
-FINEST_ERROR = 1e-5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,7 +79,8 @@ def order_knees(
     """
     if len(group.tests) < 2:
         return OrderedKnees(column=column, fit=free, departure=np.zeros(1))
-    knee, knee_se = free.knee[:, column], free.knee_se[:, column]
+    knee = free.knee[:, column]
+    knee_se = np.sqrt(np.diag(group.between(column).covariance_of_mean(free.knee_se[:, column])))
     budget = options.flat_below * options.u_max
     if direction == "flat":
         departure = excess_departure(np.abs(knee - knee.mean()), knee_se, budget)
@@ -114,8 +113,9 @@ def bound_threshold(group: DescribedTests, knees: OrderedKnees, options: Identif
     # One edge has passed the flow of all tests, so together they show a softness that none shows alone.
     together = np.sum(gap / error**2) > SOFT_SIGNIFICANCE * math.sqrt(np.sum(error**-2))
     soft = (gap > SOFT_SIGNIFICANCE * error) | (together & (gap > 0))
-    knee_bound = lower_bounds(knee, knee_se, options.confidence, knee_budget)
-    zero_bound = lower_bounds(zero, zero_se, options.confidence, zero_budget)
+    between = group.between(knees.column)
+    knee_bound = lower_bounds(knee, knee_se, between, options.confidence, knee_budget)
+    zero_bound = lower_bounds(zero, zero_se, between, options.confidence, zero_budget)
     return Threshold(
         np.where(soft, zero, knee),
         np.where(soft, zero_se, knee_se),

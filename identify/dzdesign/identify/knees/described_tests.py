@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from dzdesign.identify.knees.between_ramps import BetweenRamps
 from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.knees.meter_lag import MeterLag
 from dzdesign.identify.reading.ramp_test import RampTest
@@ -19,6 +20,8 @@ class DescribedTest:
     #: Largest flow, m³/s.
     q_max: float
     ramps: tuple[str, ...]
+    #: When each ramp was recorded, s on a clock common to all; NaN if that is not known.
+    when: tuple[float, ...]
     #: Source and SHA-256 of every file in it.
     files: tuple[tuple[str, str], ...]
 
@@ -52,3 +55,12 @@ class DescribedTests:
     zero_L_min: dict[str, float]
     #: Standard error of what was subtracted from each of `tests`, as of white noise, m³/s; 0 where nothing was.
     zero_se: tuple[float, ...]
+    #: What differs from ramp to ramp, of the rising and of the falling branch; None where there is none.
+    between_ramps: tuple[BetweenRamps | None, BetweenRamps | None]
+
+    def between(self, column: int) -> BetweenRamps:
+        """Return what differs from ramp to ramp on the rising (0) or falling (1) branch; ValueError without it."""
+        found = self.between_ramps[column]
+        if found is None:
+            raise ValueError(f"there is no {('rising', 'falling')[column]} branch")
+        return found

@@ -8,6 +8,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.constants import FULL_SWEEP, L_MIN
+from dzdesign.identify.knees.between_ramps import BetweenRamps, compare_ramps
 from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.knees.characteristic import describe_branches, find_meter_floor
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
@@ -45,20 +46,23 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
     zeros = [_reading_at_zero(test, options.u_max) for test in tests]
     zero_se = {test.source: se for test, (_, se) in zip(tests, zeros, strict=True)}
     tests = [replace(test, q=test.q - zero) for test, (zero, _) in zip(tests, zeros, strict=True)]
+    if len(tests) == 1 and tests[0].started is None:
+        tests = [replace(tests[0], started=0.0)]  # its own clock is common to all of its ramps
     ramps = split_recordings(tests, options, options.meter_lag or 0.0)
     lag = find_lag(ramps, options)
     pooled = pool_ramps(ramps if lag.origin != "identified" else split_recordings(tests, options, lag.seconds))
+    pooled = _in_order_of_pressure(pooled)
     _refuse_what_shows_no_dead_zone(pooled, options)
     floor = options.meter_floor if options.meter_floor is not None else found_floor(pooled, options)
-    reads = [read for item in pooled for read in _read(item, floor, options.u_max)]
-    for read in reads:
-        refuse_a_jump(read, options.u_max)
-    shapes = iter(describe_branches(reads, u_max=options.u_max, window=options.knee_window))
-    described = [_describe(item, shapes, options.u_max) for item in pooled]
-    described = _in_order_of_pressure(described)
+    described = _described(pooled, floor, options)
     _refuse_mixed_branches(described)
+    between = [_between_ramps(described, column, options) for column in (0, 1)]
+    if any(np.any(shift != 0) for found in between if found for shift in found.shifts):
+        moved = [_with_ramps_together(item, row, between) for row, item in enumerate(pooled)]
+        described = _described(moved, floor, options)
     return DescribedTests(
         tests=tuple(described),
+        between_ramps=(between[0], between[1]),
         floor=floor,
         lag=lag,
         zero_L_min={test.source: zero / L_MIN for test, (zero, _) in zip(tests, zeros, strict=True) if zero},
@@ -168,6 +172,33 @@ def found_floor(pooled: list[PooledTest], options: IdentifyOptions) -> float:
     return max((floor for floor in floors if floor is not None), default=0.0)
 
 
+def _described(pooled: list[PooledTest], floor: float, options: IdentifyOptions) -> list[DescribedTest]:
+    """Describe the branches of all tests."""
+    reads = [read for item in pooled for read in _read(item, floor, options.u_max)]
+    for read in reads:
+        refuse_a_jump(read, options.u_max)
+    shapes = iter(describe_branches(reads, u_max=options.u_max, window=options.knee_window))
+    return [_describe(item, shapes, options.u_max) for item in pooled]
+
+
+def _between_ramps(described: list[DescribedTest], column: int, options: IdentifyOptions) -> BetweenRamps | None:
+    """Compare the ramps of the rising (0) or falling (1) branch; None where it was not recorded."""
+    shapes = [shape for item in described if (shape := item.shapes[column])]
+    if not shapes:
+        return None
+    declared = None if options.repeatability is None else options.repeatability * options.u_max
+    return compare_ramps(shapes, [item.when for item in described], declared=declared, u_max=options.u_max)
+
+
+def _with_ramps_together(item: PooledTest, row: int, between: Sequence[BetweenRamps | None]) -> PooledTest:
+    """Return a test with each ramp's commands moved to the middle of the series and of the test's ramps."""
+    rising, falling = (
+        replace(branch, u=branch.u - np.repeat(found.shifts[row], branch.counts)) if branch and found else branch
+        for branch, found in zip(item.branches, between, strict=True)
+    )
+    return replace(item, branches=(rising, falling))
+
+
 def _read(item: PooledTest, floor: float, u_max: float) -> Iterator[PreparedBranch]:
     """Bring the flows of a test's branches to its nominal pressure drop."""
     dp = nominal_dp(item.test)
@@ -186,13 +217,14 @@ def _describe(item: PooledTest, shapes: Iterator[BranchShape], u_max: float) -> 
         shapes=(rising, falling),
         q_max=q_max,
         ramps=item.ramps,
+        when=item.when,
         files=item.files,
     )
 
 
-def _in_order_of_pressure(described: list[DescribedTest]) -> list[DescribedTest]:
+def _in_order_of_pressure(pooled: list[PooledTest]) -> list[PooledTest]:
     """Sort by pressure drop; what was read of all ramps together may fall together with the next test's by a hair."""
-    return sorted(described, key=lambda item: (item.dp or 0.0, item.test.source))
+    return sorted(pooled, key=lambda item: (nominal_dp(item.test) or 0.0, item.test.source))
 
 
 def _refuse_mixed_branches(described: list[DescribedTest]) -> None:

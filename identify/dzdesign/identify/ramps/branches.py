@@ -13,6 +13,7 @@ class Branch:
     """Samples of one direction, on one side of zero: command u in V, dp in Pa or None, flow q in m³/s, all (N,).
 
     `rate` is the pace of the command, V/s, always positive; of several ramps the fastest; NaN if it is not known.
+    `counts` are the samples of each ramp, one ramp after the other; none where the branch is of one ramp.
     """
 
     rising: bool
@@ -20,6 +21,13 @@ class Branch:
     q: np.ndarray
     dp: np.ndarray | None
     rate: float = math.nan
+    counts: tuple[int, ...] = ()
+
+    @property
+    def ramps(self) -> list[slice]:
+        """Which samples are each ramp's; a ramp without this branch has none."""
+        ends = np.cumsum(self.counts or (self.u.size,)).tolist()
+        return [slice(start, end) for start, end in zip([0, *ends], ends, strict=False)]
 
 
 def at_nominal_pressure(branch: Branch, dp: float | None) -> np.ndarray:

@@ -26,6 +26,8 @@ class PooledTest:
     branches: tuple[Branch | None, Branch | None]
     #: Each ramp's file, and its number in it.
     ramps: tuple[str, ...]
+    #: When each ramp was recorded, s on a clock common to all; NaN if that is not known.
+    when: tuple[float, ...]
     #: Source and SHA-256 of every file in it.
     files: tuple[tuple[str, str], ...]
 
@@ -64,6 +66,7 @@ def _pooled(group: list[Ramp]) -> PooledTest:
         test=test,
         branches=(_joined(group, rising=True), _joined(group, rising=False)),
         ramps=tuple(_name([ramp], every=True) for ramp in group),
+        when=tuple(ramp.when for ramp in group),
         files=tuple(dict.fromkeys((ramp.test.source, ramp.test.sha256) for ramp in group)),
     )
 
@@ -79,7 +82,8 @@ def _joined(group: list[Ramp], rising: bool) -> Branch | None:
     dp = None if parts[0].dp is None else np.concatenate([part.dp for part in parts])
     rates = np.array([part.rate for part in parts])
     rate = float(np.nanmax(rates)) if np.isfinite(rates).any() else math.nan
-    return Branch(rising=rising, u=u, q=q, dp=dp, rate=rate)
+    sizes = [sum(branch.u.size for branch in ramp.branches if branch.rising == rising) for ramp in group]
+    return Branch(rising=rising, u=u, q=q, dp=dp, rate=rate, counts=tuple(sizes))
 
 
 def _name(group: list[Ramp], every: bool = False) -> str:

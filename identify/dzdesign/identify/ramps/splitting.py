@@ -51,6 +51,11 @@ class Ramp:
     #: Its sweeps from zero up, command put right for the meter's lag.
     branches: tuple[Branch, ...]
 
+    @property
+    def when(self) -> float:
+        """When it was recorded, s on a clock common to all recordings; NaN if that is not known."""
+        return math.nan if self.test.started is None else self.test.started + float(self.test.time.mean())
+
 
 def split_ramps(test: RampTest, lag: float) -> list[Ramp]:
     """Split a recording into ramps, by the rule of this module.

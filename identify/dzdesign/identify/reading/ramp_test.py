@@ -41,6 +41,8 @@ class RampTest:
     clock_doubt: str = ""
     simulated: bool = False
     no_values: str = ""
+    #: Time of `time` = 0 on a clock common to all recordings, s; None if it is not known.
+    started: float | None = None
 
     def __post_init__(self) -> None:
         for array in (self.time, self.u, self.q, self.dp):
