@@ -153,7 +153,7 @@ def compare_ramps(
     drift = None
     if not no_drift:
         # Where a bend of the drift would show, it is in the scatter already.
-        shows = measured and _error_of_last(np.column_stack([design, clock**2])) <= TOLD_APART
+        shows = measured and _error_of_last(np.column_stack([design, (2 * clock) ** 2])) <= TOLD_APART
         drift = Drift(
             change=float(found[-1]),
             change_se=math.sqrt((sd**2 + noise * (not measured)) * covariance[-1, -1]),

@@ -59,7 +59,7 @@ def lay_line(read: PreparedBranch, window: tuple[float, float]) -> GatedLine:
         _refuse_no_line(u[seen], window, floor, read.source)
         slope, knee = fit_line(u[seen], y[seen])
     u_seen = u[seen]
-    residual = y[seen] - slope * (u_seen - knee)
+    residual = _within_ramps(y[seen] - slope * (u_seen - knee), branch.ramp_of_samples[inside][seen])
     sigma = max(float(np.sqrt(np.sum(residual**2) / max(u_seen.size - 2, 1))), finest)
     kept &= ~_runs_of_drop_outs(censored, (slope * (u - knee) - floor) / sigma, residual)
     by_blocks = inflation_by_blocks(residual, sigma)
@@ -78,6 +78,15 @@ def lay_line(read: PreparedBranch, window: tuple[float, float]) -> GatedLine:
         outliers=int((~kept).sum()),
         dropped=_share_of_drop_outs(censored, slope * (u - knee) >= floor + GATE * sigma),
     )
+
+
+def _within_ramps(residual: np.ndarray, ramp: np.ndarray) -> np.ndarray:
+    """Return residuals about the mean of their ramp: what ramps differ by is scatter of the valve, and no noise."""
+    if not ramp.size or ramp[0] == ramp[-1]:
+        return residual
+    count = np.maximum(np.bincount(ramp), 1)
+    within: np.ndarray = residual - (np.bincount(ramp, weights=residual) / count)[ramp]
+    return within
 
 
 def _runs_of_drop_outs(censored: np.ndarray, above: np.ndarray, residual: np.ndarray) -> np.ndarray:

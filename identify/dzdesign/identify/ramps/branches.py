@@ -24,6 +24,11 @@ class Branch:
     counts: tuple[int, ...] = ()
 
     @property
+    def ramp_of_samples(self) -> np.ndarray:
+        """Number of each sample's ramp, from 0 (N,)."""
+        return np.repeat(np.arange(max(len(self.counts), 1)), self.counts or (self.u.size,))
+
+    @property
     def ramps(self) -> list[slice]:
         """Which samples are each ramp's; a ramp without this branch has none."""
         ends = np.cumsum(self.counts or (self.u.size,)).tolist()
