@@ -15,7 +15,7 @@ from dzdesign.design.compensator import Compensator, SideLaw, Sides
 from dzdesign.design.costs import costs_of
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.quantise import Units, finest_units
-from dzdesign.design.signals import Signals
+from dzdesign.design.signals import SIDE_NAMES, Signals
 from dzdesign.identify.valve.guard_curve import GUARDS
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.side_model import SideModel
@@ -55,9 +55,7 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
         _refuse_two_signs(valve, options.guard)
     laws = {}
     for sign in signals.signs:
-        name = "positive" if sign > 0 else "negative"
-        side = valve.positive if sign > 0 else valve.sides[name]
-        laws[name] = _side_law(side, options, u_max, sign, units)
+        laws[sign] = _side_law(valve.sides[SIDE_NAMES[sign]], options, u_max, sign, units)
     digest = sha256_of(to_json_bytes(valve) if valve_bytes is None else valve_bytes)
     request = options.request
     compensator = Compensator(
@@ -69,7 +67,7 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
         below_dp0=options.below_dp0,
         signals=signals,
         u_max_V=u_max,
-        sides=Sides(positive=laws["positive"], negative=laws.get("negative")),
+        sides=Sides(positive=laws[1], negative=laws.get(-1)),
         beta_denominator=units.beta,
         beta_step_codes=STEP_CODES,
         reverse_codes=int(REVERSE_SHARE * (signals.pressure_a.full_code - signals.pressure_a.zero_code)),
