@@ -40,8 +40,8 @@ def hidden_failures(compensator: Compensator) -> tuple[str, ...]:
         if compensator.valve.sides[SIDE_NAMES[sign]].trend == "increasing":
             lines.append(
                 f"{_side_label(compensator, sign)}the threshold grows with the pressure drop, so a pressure signal "
-                "that reads too high raises the offset: a broken wire of sensor B is not recognised unless it has a live "
-                "zero; monitor the sensors outside"
+                "that reads too high raises the offset: a broken wire of sensor B is not recognised unless it has a "
+                "live zero; monitor the sensors outside"
             )
     return tuple(lines)
 

@@ -15,7 +15,7 @@ from dzdesign.design.compensator import Compensator, SideLaw, Sides
 from dzdesign.design.costs import costs_of
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.quantise import Units, finest_units
-from dzdesign.design.signals import SIDE_NAMES, Signals
+from dzdesign.design.signals import Signals
 from dzdesign.identify.valve.guard_curve import GUARDS
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.side_model import SideModel
@@ -55,7 +55,8 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
         _refuse_two_signs(valve, options.guard)
     laws = {}
     for sign in signals.signs:
-        laws[sign] = _side_law(valve.sides[SIDE_NAMES[sign]], options, u_max, sign, units)
+        side = valve.positive if sign > 0 else valve.sides["negative"]
+        laws[sign] = _side_law(side, options, u_max, sign, units)
     digest = sha256_of(to_json_bytes(valve) if valve_bytes is None else valve_bytes)
     request = options.request
     compensator = Compensator(
