@@ -24,56 +24,32 @@ USUAL_U_MAX = (1.0, 2.5, 3.3, 5.0, 10.0, 12.0, 15.0, 20.0, 24.0, 48.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SideOverview:
-    """What the recordings of one side show.
+    """What the recordings of one side show."""
 
-    Attributes
-    ----------
-    dp_MPa : tuple of float or None
-        Nominal pressure drops; None: not known.
-    ramps : int
-        Ramps of the command.
-    rate_V_s : float or None
-        Fastest pace of the command; None if it is not known.
-    q_max_L_min, floor_L_min : float
-        Largest flow, and the flow at which the meter starts.
-    lag_s, lag_is : float, str
-        Of the meter, as `MeterLag` says it.
-    zero_L_min : dict
-        Recording -> reading at zero command, where it is not zero.
-    """
-
+    #: Nominal pressure drops; None: not known.
     dp_MPa: tuple[float | None, ...]
+    #: Ramps of the command.
     ramps: int
+    #: Fastest pace of the command; None if it is not known.
     rate_V_s: float | None
+    #: Largest flow, and the flow at which the meter starts.
     q_max_L_min: float
     floor_L_min: float
+    #: Of the meter, as `MeterLag` says it.
     lag_s: float
     lag_is: str
+    #: Recording -> reading at zero command, where it is not zero.
     zero_L_min: dict[str, float]
 
 
 def proposed_u_max(tests: Sequence[RampTest]) -> tuple[float, float]:
-    """Return the full command to declare, and the largest command seen, both in V.
-
-    Parameters
-    ----------
-    tests : sequence of RampTest
-        All recordings.
-    """
+    """Return the full command to declare, and the largest command seen in all recordings, both in V."""
     seen = max(float(np.abs(despiked(test.u)).max()) for test in tests)
     return next((usual for usual in USUAL_U_MAX if seen <= 1.02 * usual), math.ceil(seen)), seen
 
 
 def look_at_sides(tests: Sequence[RampTest], u_max: float) -> tuple[dict[str, SideOverview], dict[str, str]]:
-    """Return what each side shows, and for a side that `identify` would refuse the reason.
-
-    Parameters
-    ----------
-    tests : sequence of RampTest
-        All recordings.
-    u_max : float
-        Full command, V.
-    """
+    """Return what each side shows in all recordings, and for a side that `identify` would refuse the reason."""
     sides, refused = {}, {}
     options = IdentifyOptions(u_max=u_max)
     for name, sign in SIDES.items():
