@@ -161,6 +161,11 @@ def side_words(name: str, both: bool) -> str:
     return f", {name} commands" if both else ""
 
 
+def span(values: "Sequence[float] | np.ndarray", unit: str, digits: int) -> str:
+    """Return from where to where values run, with their unit."""
+    return f"{min(values):.{digits}f} to {max(values):.{digits}f} {unit}"
+
+
 def legend_below(figure: "Figure", columns: int) -> None:
     """Put a legend of all axes below them, in a figure made with `legend_rows`."""
     figure.legend(loc="lower center", ncols=columns, columnspacing=1.2, borderpad=0.1, borderaxespad=0.1)
