@@ -4,10 +4,10 @@ import os
 from dataclasses import asdict
 from typing import Any
 
-from dzdesign.core.artefact_files import to_json
 from dzdesign.core.options import paths_of
 from dzdesign.initial_options.look import Proposal
 from dzdesign.stages.init import InitArguments, init
+from dzdesign.terminal.page import print_json
 
 Arguments = InitArguments
 EXAMPLES = ("dzdesign init ramps/*.csv", "dzdesign init ramps/*.tdms -o bench2.toml")
@@ -20,7 +20,7 @@ def run(arguments: Arguments, json: bool) -> int:
     proposal = init(arguments)
     output = os.fspath(arguments.output or "")
     if json:
-        print(to_json(_document(proposal, output)), end="")
+        print_json(_document(proposal, output))
         return 1 if proposal.opens else 0
     for line in (*proposal.seen, *(f"open: {line}" for line in proposal.opens)):
         print(line)
