@@ -8,9 +8,8 @@ import numpy as np
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.design.compensator import Compensator
-from dzdesign.verify.evidence import Check
 from dzdesign.verify.exhaustive.exact_drive import STEP_UNIT, DriveModel
-from dzdesign.verify.requirements import DRIVE
+from dzdesign.verify.requirements import DRIVE, Check
 from dzdesign.verify.toolchain.machines import HOST, compile_object, link_program, programs_folder, run_program, stored
 
 SEED, SAMPLES = 11, 3000
