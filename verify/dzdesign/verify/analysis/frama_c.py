@@ -20,10 +20,9 @@ from typing import NamedTuple
 import numpy as np
 
 from dzdesign.core.errors import RequirementError
-from dzdesign.verify.evidence import Check
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.firmware.folder import read_compensator
-from dzdesign.verify.requirements import UNDEFINED_BEHAVIOUR
+from dzdesign.verify.requirements import UNDEFINED_BEHAVIOUR, Check
 from dzdesign.verify.toolchain.compiled_core import SOURCES
 from dzdesign.verify.toolchain.machines import PROGRAMS
 

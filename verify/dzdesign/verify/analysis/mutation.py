@@ -18,12 +18,12 @@ from typing import Any
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.verify.analysis.c_mutants import Mutant, mutants_of
-from dzdesign.verify.evidence import Check, MutantOutcome, MutationScore
+from dzdesign.verify.evidence import MutantOutcome, MutationScore
 from dzdesign.verify.exhaustive.drive_check import CompiledDrive, PreparedDrive
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
 from dzdesign.verify.firmware.folder import read_compensator
-from dzdesign.verify.requirements import MUTATION
+from dzdesign.verify.requirements import MUTATION, Check
 from dzdesign.verify.toolchain.compiled_core import CompiledCore
 from dzdesign.verify.toolchain.machines import HOST, PROGRAMS
 

@@ -8,15 +8,14 @@ import numpy as np
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.design.compensator import Compensator
-from dzdesign.verify.evidence import Check
 from dzdesign.verify.exhaustive.exact_drive import STEP_UNIT, DriveModel
-from dzdesign.verify.requirements import DRIVE
+from dzdesign.verify.requirements import DRIVE, Check
 from dzdesign.verify.toolchain.machines import HOST, PROGRAMS, stored
 
-SEED, SAMPLES = 11, 3000
-#: A ramp that is not put anywhere; share of the samples before which it is.
 #: Codes of command, pressure A and pressure B.
 Codes = tuple[int, int, int]
+SEED, SAMPLES = 11, 3000
+#: A ramp that is not put anywhere; share of the samples before which it is.
 STAYS, PUT_SHARE = -(2**31), 0.04
 FIELDS = ("compare_a", "compare_b", "status", "law", "side", "ticks", "ramped")
 
