@@ -13,7 +13,7 @@ from dzdesign.commands.schema import SCHEMAS, schema_document
 #: What a caller of the rooms needs.
 API = (
     ("dzdesign.api", ("identify", "design", "generate", "verify", "init", "simulate", "assess", "report", "batch")),
-    ("dzdesign.initial_options.look", ("Proposal",)),
+    ("dzdesign.initial_options.proposal", ("Proposal",)),
     ("dzdesign.assess.assessment", ("Assessment",)),
     ("dzdesign.report.valve_report", ("Report",)),
     ("dzdesign.identify.reading.ramp_files", ("RampTest", "read_ramp_file")),

@@ -11,13 +11,7 @@ from dzdesign.identify.valve.side_model import SideModel
 
 
 def costs_of(compensator: Compensator) -> tuple[str, ...]:
-    """Return one line per test and per choice.
-
-    Raises
-    ------
-    InputError
-        If the largest output does not open the valve.
-    """
+    """Return one line per test and per choice; an output that never opens the valve is refused."""
     valve = compensator.valve
     lines = list(hidden_failures(compensator))
     for sign in compensator.signals.signs:
@@ -87,21 +81,10 @@ def _cost_of_test(compensator: Compensator, test: TestResult, sign: int) -> str:
 
 
 def remaining_dead_zone(compensator: Compensator, test: TestResult, sign: int = 1) -> dict[str, float]:
-    """Return the dead zone that the law leaves at a tested pressure drop, as a share of command.
+    """Return the dead zone that the law leaves at a tested pressure drop, on "opening" and "closing", as a share of command.
 
-    Parameters
-    ----------
-    compensator : Compensator
-        The law.
-    test : TestResult
-        Knees of a valve at its pressure drop; it need not be the valve that the law was designed for.
-    sign : {1, -1}
-        Of the command.
-
-    Returns
-    -------
-    dict
-        "opening" and "closing", those recorded: the share up to the knee; 0 where flow passes at zero command.
+    The test need not be of the valve that the law was designed for. A branch that was not recorded is left out; the share
+    is 0 where flow passes at zero command.
     """
     code = round(compensator.signals.dp_code(Fraction(repr(test.dp_MPa))))
     offset, at_end, full, transition = _corners(compensator, code, sign)

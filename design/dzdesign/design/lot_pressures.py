@@ -15,24 +15,16 @@ SLOPING = ("decreasing", "increasing")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lacking:
-    """A valve that was not tested at pressure drops at which half of the lot or more was.
+    """A valve that was not tested at pressure drops at which half of the lot or more was."""
 
-    Attributes
-    ----------
-    name : str
-        Of the valve.
-    sign : {1, -1}
-        Of the command.
-    dp_MPa : tuple of float
-        Which, as the others' tests have it in the middle.
-    coarser_V : float
-        By how much its bound there lies under the straight line between its bounds at the tests beside, at most: what
-        a test there would gain, about. 0 where its threshold has no trend, or lies outside its tests.
-    """
-
+    #: Of the valve.
     name: str
+    #: Of the command.
     sign: int
+    #: Which, as the others' tests have it in the middle.
     dp_MPa: tuple[float, ...]
+    #: By how much its bound there lies under the straight line between its bounds at the tests beside, at most: what a
+    #: test there would gain, about. 0 where its threshold has no trend, or lies outside its tests.
     coarser_V: float = 0.0
 
 
@@ -65,16 +57,7 @@ def without_narrow(
 ) -> tuple[frozenset[str], tuple[float, float] | None]:
     """Return which valves make the interval of the lot narrower by what they lack, and what it is without them.
 
-    Parameters
-    ----------
-    lot : sequence of LotValve
-    lacking : sequence of Lacking
-        Of `lacking_in`.
-
-    Returns
-    -------
-    frozenset of str, (float, float) or None
-        Names; None without any, or where no interval is left.
+    The interval is None without any such valve, or where none is left.
     """
     sides = {(valve.name, sign): side for valve in lot for sign, side in ((1, valve.positive), (-1, valve.negative))}
     names = set()

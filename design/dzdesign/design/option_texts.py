@@ -18,20 +18,7 @@ from dzdesign.identify.valve.guard_curve import Guard
 
 
 def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
-    """Return the engineer's choices.
-
-    Parameters
-    ----------
-    texts : mapping
-        Name of an option, of `DEFAULTS`, to how it was written; the default stands for one that is missing or empty.
-    target : TargetInputs
-        Converter and timer of the target that is designed for.
-
-    Raises
-    ------
-    InputError
-        If an option can't be read; it is named.
-    """
+    """Return the engineer's choices, from the text of each option; the default stands for one that is missing or empty."""
     text = {name: texts.get(name) or default for name, default in DEFAULTS.items()}
     for name, known in (("negative_dp", NEGATIVE_DP), ("polarity", POLARITIES)):
         if text[name] not in known:

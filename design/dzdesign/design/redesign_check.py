@@ -17,20 +17,7 @@ COARSEST = Fraction(1, 2**12)
 
 
 def refuse_unsaid(compensator: Compensator, source: str) -> None:
-    """Refuse a file that does not say what it was designed with: nothing in it could be derived again.
-
-    Parameters
-    ----------
-    compensator : Compensator
-        As it was read.
-    source : str
-        The file, for the message.
-
-    Raises
-    ------
-    InputError
-        If it does not.
-    """
+    """Refuse a file that does not say what it was designed with: nothing in it could be derived again."""
     if compensator.target is None:
         raise InputError(
             f"'{source}' does not say for which target and with which options it was designed ('target' and 'options' "
@@ -39,14 +26,9 @@ def refuse_unsaid(compensator: Compensator, source: str) -> None:
 
 
 def prove_derived(compensator: Compensator) -> None:
-    """Design the compensator again from the valve and the options in it, and compare every number.
+    """Design the compensator again from the valve and the options in it; refuse the first key that does not follow.
 
     A file that does not say what was asked for, as all from before that was kept, has its certificates proved alone.
-
-    Raises
-    ------
-    InputError
-        For the first key that does not follow.
     """
     prove_certificates(compensator)
     try:

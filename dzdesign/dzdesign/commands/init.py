@@ -1,12 +1,12 @@
 """`dzdesign init RAMP...`: look at recordings, write a commented dzdesign.toml with what was seen and what was not."""
 
 import os
-from dataclasses import asdict
 from typing import Any
 
 from dzdesign.core.artefact_files import to_json
+from dzdesign.core.artefact_types import as_document
 from dzdesign.core.options import paths_of
-from dzdesign.initial_options.look import Proposal
+from dzdesign.initial_options.proposal import Proposal
 from dzdesign.stages.init import InitArguments, init
 
 Arguments = InitArguments
@@ -37,16 +37,14 @@ def _word(name: str) -> str:
 
 
 def _document(proposal: Proposal, output: str) -> dict[str, Any]:
-    look = proposal.look
     return {
         "file": output,
-        "recordings": [path.as_posix() for path in look.paths],
-        "labels": [list(guess.labels) for guess in look.guesses],
-        "columns": look.columns,
-        "dp": look.dp,
-        "u_max_V": look.u_max,
-        "u_seen_V": look.u_seen,
-        "sides": {name: asdict(side) for name, side in look.sides.items()},
-        "refused": look.refused,
+        "recordings": [path.as_posix() for path in proposal.recordings],
+        "labels": [list(labels) for labels in proposal.labels],
+        "columns": proposal.columns,
+        "dp": proposal.dp,
+        "u_max_V": proposal.u_max_V,
+        "u_seen_V": proposal.u_seen_V,
+        "valve": proposal.valve and as_document(proposal.valve),
         "open": list(proposal.opens),
     }

@@ -1,1 +1,1 @@
-"""What `dzdesign init` proposes: recordings are looked at, and the options file is written with reasons."""
+"""What `dzdesign init` proposes: recordings enter, the text of an options file leaves, every line with its reason."""

@@ -1,30 +1,73 @@
-"""A look at recordings: which columns, pressures and sides they have, what is open, and the options file of it."""
+"""A look at recordings: which columns and pressures they have, what is open, and what `identify` finds in them."""
 
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING
 
-from dzdesign.core.errors import InputError
+from dzdesign.core.errors import InputError, one_line
 from dzdesign.core.options import Paths, Table, paths_of
-from dzdesign.initial_options.file_text import CHECK_DP, options_file
-from dzdesign.initial_options.look import Look, Proposal
-from dzdesign.stages.recordings import expand, read_recordings
+from dzdesign.stages.recordings import distinct_names, expand, read_recordings, refuse_copies
 from dzdesign.terminal.progress import say, stage_progress, with_bar
 
 if TYPE_CHECKING:
-    from dzdesign.identify.first_look import SideOverview
-    from dzdesign.identify.reading.guessed_columns import GuessedColumns
+    from dzdesign.identify.reading.proposed_columns import ProposedColumns
     from dzdesign.identify.reading.ramp_test import RampTest
-    from dzdesign.identify.valve.model import Warning_
+    from dzdesign.identify.valve.model import ValveModel
 
-#: Where recordings are looked for if none are named.
-PLACES = tuple(
-    f"{folder}*.{ending}"
-    for folder in ("ramps/", "")
-    for ending in ("csv", "csv.gz", "txt", "tdms", "mat", "h5", "hdf5", "parquet", "feather")
-)
+#: Endings of the files that are looked for if none are named.
+ENDINGS = ("csv", "csv.gz", "txt", "tdms", "mat", "h5", "hdf5", "parquet", "feather")
+#: Full commands that amplifiers have, V: the smallest that the recordings do not exceed by 2 % is proposed.
+USUAL_U_MAX = (1.0, 2.5, 3.3, 5.0, 10.0, 12.0, 15.0, 20.0, 24.0, 48.0)
 #: Files that a line names.
 NAMED_FILES = 3
+#: Said where a pressure was taken for the drop because of its unit alone.
+CHECK_DP = "check that it is the drop over the valve, and not the pressure of one port or of the supply"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Proposal:
+    """What a look at recordings proposes.
+
+    Attributes
+    ----------
+    text : str
+        Of the file of options.
+    seen : tuple of str
+        What was seen, for a person.
+    opens : tuple of str
+        What is open: without it `identify` can't run.
+    recordings, labels : tuple
+        The files, and the labels of each.
+    columns, dp : dict
+        The tables of the file; empty where the recordings need none.
+    u_max_V, u_seen_V : float
+        Full command to declare, and the largest one seen (None: not looked at).
+    valve : ValveModel or None
+        What `identify` finds; None while something is open.
+    """
+
+    text: str
+    seen: tuple[str, ...]
+    opens: tuple[str, ...]
+    recordings: tuple[Path, ...]
+    labels: tuple[tuple[str, ...], ...]
+    columns: dict[str, str]
+    dp: dict[str, str]
+    u_max_V: float
+    u_seen_V: float | None
+    valve: "ValveModel | None"
+
+
+@dataclass(frozen=True, slots=True)
+class _Remarks:
+    """What is open, and what is worth a note, as it is found."""
+
+    opens: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
 
 
 def propose(ramps: Paths, *, columns: Table, dp: Table, skip_rows: int | None) -> Proposal:
@@ -35,209 +78,190 @@ def propose(ramps: Paths, *, columns: Table, dp: Table, skip_rows: int | None) -
     InputError
         If a recording can't be read.
     """
-    patterns = paths_of(ramps)
+    from dzdesign.identify.reading.column_labels import PER_CENT, parse_columns
+    from dzdesign.identify.reading.proposed_columns import propose_columns
+
+    patterns, remarks = paths_of(ramps), _Remarks()
     paths = expand(patterns) if patterns else _found_recordings()
-    look, opens = _look(paths, columns, dp, skip_rows)
-    seen = _summary(look)
-    return Proposal(text=options_file(look, seen, opens), seen=tuple(seen), opens=tuple(opens), look=look)
+    given = parse_columns(columns) if columns else {}
+    looks = [propose_columns(path, given, skip_rows) for path in with_bar(paths, "looking at columns")]
+    chosen, unclear = _columns_of_all(looks, given, bool(dp), remarks)
+    guessed_dp = chosen.get("dP", "") if "dP" not in given else ""
+    table, readings = _pressure_table(distinct_names(paths), looks, dp, bool(guessed_dp or "dP" in unclear), remarks)
+    u_max, u_seen, valve = 10.0, None, None
+    in_per_cent = "u" not in unclear and any(
+        (look.known | look.proposed)["u"].unit.lower() in PER_CENT for look in looks
+    )
+    if not remarks.opens:
+        tests = read_recordings(paths, u_max=u_max, columns=chosen, dp=table or None, skip_rows=skip_rows)
+        if in_per_cent:
+            remarks.notes.append('full command: in per cent, so not recorded; u-max = "10 V" is a guess, correct it')
+        else:
+            u_max, u_seen = _full_command(tests)
+        valve = _identified(tests, u_max, guessed_dp, remarks)
+    seen, opens = tuple(_summary(looks, u_seen, valve, remarks.notes)), tuple(dict.fromkeys(remarks.opens))
+    text = _rendered(
+        seen=seen, opens=opens, u_max=u_max, u_seen=u_seen, in_per_cent=in_per_cent, skip_rows=skip_rows,
+        meter=valve and valve.meter, first=paths[0].name, look=looks[0], columns=chosen, unclear=unclear,
+        guessed_dp=guessed_dp, dp=table, readings=readings,
+    )  # fmt: skip
+    return Proposal(
+        text=text, seen=seen, opens=opens, recordings=tuple(paths), labels=tuple(look.labels for look in looks),
+        columns=chosen, dp=table, u_max_V=u_max, u_seen_V=u_seen, valve=valve,
+    )  # fmt: skip
 
 
 def _found_recordings() -> list[Path]:
     """Return the recordings in ./ramps, or in this folder."""
-    for folder in ("ramps/", ""):
-        found = sorted({path for place in PLACES if place.startswith(folder) for path in Path().glob(place)})
+    for folder in (Path("ramps"), Path()):
+        found = sorted({path for ending in ENDINGS for path in folder.glob(f"*.{ending}")})
         if found:
-            say(f"recordings found in {folder or 'this folder'}: {len(found)}")
+            say(f"recordings found in {folder if folder.name else 'this folder'}: {len(found)}")
             return found
     raise InputError("there are no recordings in ./ramps or in this folder; name them: dzdesign init RAMP...")
 
 
-def _look(
-    paths: list[Path],
-    declared_columns: Table,
-    declared_dp: Table,
-    skip_rows: int | None,
-) -> tuple[Look, list[str]]:
-    """Return what was seen, and what is open."""
-    from dzdesign.identify.first_look import look_at_sides, proposed_u_max
-    from dzdesign.identify.reading.column_labels import parse_columns
-    from dzdesign.identify.reading.guessed_columns import guess_columns
-
-    given = parse_columns(declared_columns) if declared_columns else {}
-    guesses = [guess_columns(path, skip_rows) for path in with_bar(paths, "looking at columns")]
-    columns, opens, notes = _columns(guesses, given, declared=bool(declared_dp))
-    undeclared, unused = _pressures(guesses, columns)
-    opens, notes = opens + undeclared, notes + unused
-    nothing = Look(paths=paths, guesses=guesses, columns=columns, dp={}, sides={}, refused={})
-    if opens:
-        return nothing, list(dict.fromkeys(opens))
-    names = [path.as_posix() for path in paths]
-    tests = read_recordings(names, u_max=10.0, columns=columns or None, dp=declared_dp, skip_rows=skip_rows)
-    dp: dict[str, str] = {}
-    if declared_dp:
-        every = {test.source: declared_dp for test in tests} if isinstance(declared_dp, str) else declared_dp
-        dp = dict(every)
-    lacking = [test.source for test in tests if test.dp is None]
-    if lacking:
-        dp, missing, by_names = _pressures_by_names(lacking, alone=len(tests) == 1)
-        opens, notes = opens + missing, notes + by_names
-        if len(dp) == len(lacking):
-            tests = read_recordings(names, u_max=10.0, columns=columns or None, dp=dp, skip_rows=skip_rows)
-    u_max, u_seen = proposed_u_max(tests)
-    sides: dict[str, SideOverview] = {}
-    refused: dict[str, str] = {}
-    in_per_cent = _is_in_per_cent(guesses, columns)
-    if in_per_cent:
-        u_max = 10.0
-        notes.append('full command: in per cent, so not recorded; u-max = "10 V" is a guess, correct it')
-    contradicted, doubts = _contradicted(tests, u_max, columns["dP"] if "dP" in columns and "dP" not in given else "")
-    opens, notes = opens + contradicted, notes + doubts
-    if not opens:
-        with stage_progress() as stage:
-            stage(f"looking at {len(tests)} recording{'s' if len(tests) > 1 else ''}")
-            sides, refused = look_at_sides(tests, u_max)
-    if not sides and not opens:
-        opens = [f"identify would refuse these recordings: {next(iter(refused.values()))}"]
-    return (
-        Look(
-            paths=paths, guesses=guesses, columns=columns, dp=dp, u_max=u_max, u_seen=None if in_per_cent else u_seen,
-            in_per_cent=in_per_cent, sides=sides, refused=refused, notes=tuple(notes), skip_rows=skip_rows,
-        ),
-        opens,
-    )  # fmt: skip
+def _columns_of_all(
+    looks: "Sequence[ProposedColumns]", given: Mapping[str, str], dp_is_declared: bool, remarks: _Remarks
+) -> tuple[dict[str, str], dict[str, str]]:
+    """Return the columns to declare, and of those that are unclear the reason."""
+    columns, unclear = dict(given), dict[str, str]()
+    for look in looks:
+        for quantity, column in look.proposed.items():
+            if quantity == "dP" and dp_is_declared:
+                remarks.notes.append(f"not used: '{column.label}', as --dp says the pressure drop")
+            elif (first := columns.setdefault(quantity, column.label)) != column.label:
+                remarks.opens.append(f"column of {quantity}: '{first}' in one file, '{column.label}' in another")
+        for quantity, why in look.unclear.items():
+            if quantity != "dP" or not dp_is_declared:
+                unclear.setdefault(quantity, why)
+        if look.bare_pressures and not dp_is_declared:
+            labels = look.bare_pressures
+            ports = ("pA", "pB") if len(labels) > 1 else ("dP",)
+            declared = ", ".join(f"{port}={label}:bar" for port, label in zip(ports, labels, strict=False))
+            look_like = "look like pressures" if len(labels) > 1 else "looks like a pressure"
+            remarks.notes.append(
+                f"not used: {' and '.join(map(repr, labels))} {look_like}, without a unit; declare by --columns "
+                f'"{declared}"'
+            )
+    remarks.opens.extend(f"column of {quantity}: {why}" for quantity, why in unclear.items())
+    if "dP" in columns and "dP" not in given:
+        remarks.notes.append(f"pressure drop: '{columns['dP']}', the only column in a unit of pressure; {CHECK_DP}")
+    return columns, unclear
 
 
-def _pressures_by_names(lacking: list[str], *, alone: bool) -> tuple[dict[str, str], list[str], list[str]]:
-    """Return the pressures that files' names state, what is open, and notes; a single file may lack it."""
+def _pressure_table(
+    names: Sequence[str], looks: "Sequence[ProposedColumns]", declared: Table, has_column: bool, remarks: _Remarks
+) -> tuple[dict[str, str], dict[str, tuple[str, ...]]]:
+    """Return the pressure drops to declare, as said or by files' names; and as what other files' names can be read."""
     from dzdesign.identify.reading.named_pressure import pressures_in_name
 
-    readings = {source: pressures_in_name(source) for source in lacking}
-    dp = {source: texts[0] for source, texts in readings.items() if len(texts) == 1}
-    opens = [
-        f"pressure drop of '{source}': its name may say {' or '.join(texts)}; declare the right one by --dp or [dp]"
-        if texts
-        else f"pressure drop of '{source}': no column, and none in its name; declare it by --dp or [dp]"
-        for source, texts in readings.items()
-        if len(texts) > 1 or (not texts and not alone)
-    ]
-    if len(dp) == len(lacking):
-        return dp, [], [f"pressure drop by the files' names: {', '.join(dict.fromkeys(dp.values()))}"]
-    nothing = 'no pressure drop, by a column or a file\'s name; declare it, if you know it, by --dp "1 MPa"'
-    return dp, opens, [] if opens else [nothing]
+    if declared:
+        return dict(declared) if isinstance(declared, Mapping) else dict.fromkeys(names, declared), {}
+    recorded = [has_column or "dP" in look.known or {"pA", "pB"} <= look.known.keys() for look in looks]
+    readings = {name: pressures_in_name(name) for name, has in zip(names, recorded, strict=True) if not has}
+    table = {name: texts[0] for name, texts in readings.items() if len(texts) == 1}
+    readings = {name: texts for name, texts in readings.items() if len(texts) != 1}
+    if readings and len(names) == 1 and not any(readings.values()):
+        remarks.notes.append(
+            'no pressure drop, by a column or a file\'s name; declare it, if you know it, by --dp "1 MPa"'
+        )
+        return {}, {}
+    for name, texts in readings.items():
+        why = (
+            f"its name may say {' or '.join(texts)}; declare the right one"
+            if texts
+            else "no column, and none in its name; declare it"
+        )
+        remarks.opens.append(f"pressure drop of '{name}': {why} by --dp or [dp]")
+    if table and not readings:
+        remarks.notes.append(f"pressure drop by the files' names: {', '.join(dict.fromkeys(table.values()))}")
+    return table, readings
 
 
-def _is_in_per_cent(guesses: "list[GuessedColumns]", columns: dict[str, str]) -> bool:
-    from dzdesign.identify.reading.column_labels import PER_CENT
-    from dzdesign.identify.reading.guessed_columns import is_per_cent
+def _full_command(tests: "Sequence[RampTest]") -> tuple[float, float]:
+    """Return the full command to declare, and the largest one seen, both in V."""
+    from dzdesign.identify.ramps.splitting import despiked
 
-    if "u" in columns:  # a label that was chosen ends in its unit: Sollwert [%]
-        return columns["u"].rstrip(" ])").endswith(PER_CENT)
-    return any(is_per_cent(guess.understood.get("u")) for guess in guesses)
-
-
-def _columns(
-    guesses: "list[GuessedColumns]", given: dict[str, str], *, declared: bool
-) -> tuple[dict[str, str], list[str], list[str]]:
-    """Return the columns to write, what is open of them, and notes; `declared`: --dp says the pressure."""
-    columns, opens, notes = dict(given), [], []
-    has_pressure = declared or "dP" in given or {"pA", "pB"} <= given.keys()
-    for guess in guesses:
-        for quantity, label in guess.chosen.items():
-            if quantity == "dP" and has_pressure:
-                notes += [f"not used: '{label}', as --dp says the pressure drop"] if declared else []
-                continue
-            if columns.setdefault(quantity, label) != label and quantity not in given:
-                opens.append(f"column of {quantity}: '{columns[quantity]}' in one file, '{label}' in another")
-    for quantity in ("time", "u", "Q", *(() if has_pressure else ("dP",))):
-        # Of a pressure whose label says which and lacks a unit, `_pressures` says more.
-        labelled = [guess for guess in guesses if quantity != "dP" or not any(guess.bare_pressures.values())]
-        reason = next((guess.unclear[quantity] for guess in labelled if quantity in guess.unclear), None)
-        if reason and quantity not in given:
-            opens.append(f"column of {quantity}: {reason}")
-    if "dP" in columns and "dP" not in given:
-        notes.append(f"pressure drop: '{columns['dP']}', the only column in a unit of pressure; {CHECK_DP}")
-    return columns, opens, list(dict.fromkeys(notes))
+    seen = max(float(abs(despiked(test.u)).max()) for test in tests)
+    return next((usual for usual in USUAL_U_MAX if seen <= 1.02 * usual), math.ceil(seen)), seen
 
 
-def _contradicted(tests: "list[RampTest]", u_max: float, guessed: str) -> tuple[list[str], list[str]]:
-    """Return what is open, and what is worth a note, where a file's name says another pressure than its column.
+def _identified(tests: "list[RampTest]", u_max: float, guessed_dp: str, remarks: _Remarks) -> "ValveModel | None":
+    """Return what `identify` finds, None if it can't; with a remark where a file's name says another pressure drop."""
+    from dzdesign.identify.identification import identify
+    from dzdesign.identify.options import IdentifyOptions
 
-    `guessed` is the label of a column that was taken for the drop because of its unit alone, or empty: then the column
-    says itself that it is the drop, and the name may be of another pressure.
-    """
-    from dzdesign.identify.data_quality.pressures import about_a_stuck_sensor, about_mixtures, about_stuck_recordings
-    from dzdesign.identify.ramps.sides import tests_of_side
-    from dzdesign.identify.reading.named_pressure import contradicts
-    from dzdesign.identify.valve.model import SIDES
-
-    measured = [
-        (test.source, median(test.dp.tolist())) for test in tests if test.dp is not None and not test.dp_is_declared
-    ]
-    wrong = [(source, stated, dp / 1e6) for source, dp in measured if (stated := contradicts(source, dp))]
-    if guessed:
-        return [
-            f"column of dP: '{source}' says {stated} in its name, and {dp_MPa:.3g} MPa in '{guessed}', the only column "
-            "in a unit of pressure; declare the one that is the drop, by --columns or --dp"
+    wrong = list(_contradicted(tests))
+    if guessed_dp and wrong:
+        remarks.opens.extend(
+            f"column of dP: '{source}' says {stated} in its name, and {dp_MPa:.3g} MPa in '{guessed_dp}', the only "
+            "column in a unit of pressure; declare the one that is the drop, by --columns or --dp"
             for source, stated, dp_MPa in wrong
-        ], []
-    found = [f"'{source}' holds {dp_MPa:.3g} MPa" for source, _, dp_MPa in wrong[:NAMED_FILES]]
-    more = f" and {len(wrong) - NAMED_FILES} more" if len(wrong) > NAMED_FILES else ""
-    notes = [
-        f"CHECK: a name says another pressure drop than the column: {', '.join(found)}{more}; the sensor is stuck, the "
-        "unit is wrong, or the name is of another pressure"
-    ]
-    sides = [tests_of_side(tests, sign, u_max) for sign in SIDES.values()]
-    stuck = [f"CHECK: {warning.text}" for side in sides for warning in about_a_stuck_sensor(side)]
-    if stuck:
-        return [], stuck
-    named = {source for source, _, _ in wrong}
-    doubts = [warning for side in sides if side for warning in (*about_stuck_recordings(side), *about_mixtures(side))]
-    checks = [f"CHECK: {_with_source(warning)}" for warning in doubts if warning.source not in named]
-    return [], (notes if wrong else []) + list(dict.fromkeys(checks))
+        )
+        return None
+    with stage_progress() as stage:
+        stage(f"looking at {len(tests)} recording{'s' if len(tests) > 1 else ''}")
+        try:
+            refuse_copies(tests)
+            valve = identify(tests, IdentifyOptions(u_max=u_max))
+        except InputError as error:
+            remarks.opens.append(f"identify would refuse these recordings: {error}")
+            return None
+    if wrong and not any(warning.code == "pressure-stuck" for warning in valve.warnings):
+        found = [f"'{source}' holds {dp_MPa:.3g} MPa" for source, _, dp_MPa in wrong[:NAMED_FILES]]
+        more = f" and {len(wrong) - NAMED_FILES} more" if len(wrong) > NAMED_FILES else ""
+        remarks.notes.append(
+            f"CHECK: a name says another pressure drop than the column: {', '.join(found)}{more}; the sensor is stuck, "
+            "the unit is wrong, or the name is of another pressure"
+        )
+    return valve
 
 
-def _with_source(warning: "Warning_") -> str:
-    return f"'{warning.source}': {warning.text}" if warning.source else warning.text
+def _contradicted(tests: "Sequence[RampTest]") -> Iterator[tuple[str, str, float]]:
+    """Yield recordings whose names say another pressure than was recorded, what they say, and that in MPa."""
+    from dzdesign.identify.reading.named_pressure import contradicts
+
+    for test in tests:
+        if test.dp is not None and not test.dp_is_declared:
+            dp = median(test.dp.tolist())
+            if stated := contradicts(test.source, dp):
+                yield test.source, stated, dp / 1e6
 
 
-def _pressures(guesses: "list[GuessedColumns]", columns: dict[str, str]) -> tuple[list[str], list[str]]:
-    """Return what is open of columns that look like a pressure and have no unit, and what is worth a note."""
-    opens: list[str] = []
-    notes: list[str] = []
-    if "dP" in columns or {"pA", "pB"} <= columns.keys():
-        return opens, notes
-    for guess in guesses:
-        labels = {label: quantity for label, quantity in guess.bare_pressures.items() if quantity not in columns}
-        if labels:
-            quantities = [label for label in labels.values() if label] or (["pA", "pB"] if len(labels) > 1 else ["dP"])
-            example = ", ".join(f"{name}={label}:bar" for name, label in zip(quantities, labels, strict=False))
-            seen = "looks like a pressure" if len(labels) == 1 else "look like pressures"
-            line = f'{" and ".join(map(repr, labels))} {seen}, without a unit; declare by --columns "{example}"'
-            # A label that says pA is read as that, and refused; any other is passed over.
-            opens += [f"pressure: {line}"] if any(labels.values()) else []
-            notes += [] if any(labels.values()) else [f"not used: {line}"]
-    return list(dict.fromkeys(opens)), list(dict.fromkeys(notes))
+def _summary(
+    looks: "Sequence[ProposedColumns]", u_seen: float | None, valve: "ValveModel | None", notes: Sequence[str]
+) -> Iterator[str]:
+    """Yield what was seen, for a person."""
+    yield f"recordings: {len(looks)}, columns {', '.join(looks[0].labels[:12])}"
+    if u_seen is not None:
+        yield f"largest command: {u_seen:.2f} V"
+    yield from dict.fromkeys(notes)
+    for name, side in valve.sides.items() if valve else ():
+        ramps = sum(len(test.ramps) for test in side.tests)
+        pressures = ", ".join(f"{test.dp_MPa:.3g}" for test in side.tests if test.dp_MPa is not None)
+        where = f"{pressures} MPa" if pressures else "an unknown pressure drop"
+        flow = max(test.q_max_L_min for test in side.tests)
+        yield f"{name} commands: {ramps} ramp{'s' if ramps > 1 else ''} at {where}, up to {flow:.3g} L/min"
+    for warning in valve.warnings if valve else ():
+        yield f"warning [{warning.code}] {f'{warning.source}: ' if warning.source else ''}{warning.text}"
 
 
-def _summary(look: Look) -> list[str]:
-    """Return what was seen, for a person."""
-    lines = [f"recordings: {len(look.paths)}, columns {', '.join(look.guesses[0].labels[:12])}"]
-    if look.u_seen is not None:
-        lines.append(f"largest command: {look.u_seen:.2f} V")
-    lines += look.notes
-    return lines + [_side_line(name, side) for name, side in look.sides.items()] + _refusals(look)
+def _rendered(**content: object) -> str:
+    import jinja2
 
-
-def _refusals(look: Look) -> list[str]:
-    return [f"{name} commands would be refused: {reason}" for name, reason in look.refused.items()]
-
-
-def _side_line(name: str, side: "SideOverview") -> str:
-    pressures = ", ".join(f"{dp:.3g}" for dp in side.dp_MPa if dp is not None)
-    where = f"{pressures} MPa" if pressures else "an unknown pressure drop"
-    rate = "" if side.rate_V_s is None else f", at most {side.rate_V_s:.3g} V/s"
-    floor = f"meter floor {side.floor_L_min:.2f} L/min" if side.floor_L_min else "no meter floor is seen"
-    return (
-        f"{name} commands: {side.ramps} ramp{'s' if side.ramps > 1 else ''} at {where}{rate}, "
-        f"up to {side.q_max_L_min:.3g} L/min; {floor}"
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("dzdesign.initial_options", "templates"),
+        undefined=jinja2.StrictUndefined,
+        keep_trailing_newline=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        finalize=lambda value: one_line(str(value)),  # labels come from the recordings
     )
+    environment.filters["quoted"] = _quoted
+    return str(environment.get_template("dzdesign.toml.jinja").render(check_dp=CHECK_DP, **content))
+
+
+def _quoted(text: str) -> str:
+    """Return a string of TOML: as in JSON, and without DEL."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

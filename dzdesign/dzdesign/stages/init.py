@@ -11,7 +11,7 @@ from dzdesign.core.options import AnyPath, Option, Paths, read_options
 from dzdesign.stages.recordings import ColumnArguments
 
 if TYPE_CHECKING:
-    from dzdesign.initial_options.look import Proposal
+    from dzdesign.initial_options.proposal import Proposal
 
 
 @dataclass(frozen=True)

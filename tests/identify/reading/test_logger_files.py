@@ -10,7 +10,7 @@ import pytest
 
 from dzdesign.command_line.cli import main
 from dzdesign.core.errors import InputError
-from dzdesign.identify.reading.guessed_columns import guess_columns
+from dzdesign.identify.reading.proposed_columns import propose_columns
 from dzdesign.identify.reading.ramp_files import read_ramp_file
 from dzdesign.identify.reading.text import table_reader
 from tests.dzdesign.command_line.test_bad_input import csv
@@ -73,7 +73,7 @@ def test_init_then_identify(here, name):
 def test_read_as_it_is_and_in_pieces(here, monkeypatch, name):
     make, options = FILES[name]
     Path("ramp.csv").write_bytes(make())
-    columns = guess_columns(Path("ramp.csv")).chosen
+    columns = {name: column.label for name, column in propose_columns(Path("ramp.csv"), {}).proposed.items()}
     if options:
         from dzdesign.identify.reading.column_labels import parse_columns
 

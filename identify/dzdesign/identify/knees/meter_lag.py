@@ -41,15 +41,7 @@ class MeterLag:
 
 
 def find_lag(ramps: Sequence[Ramp], options: IdentifyOptions) -> MeterLag:
-    """Find the meter's lag, unless it is declared.
-
-    Parameters
-    ----------
-    ramps : sequence of Ramp
-        All of them, split as if there were no lag.
-    options : IdentifyOptions
-        Choices of the engineer.
-    """
+    """Find the meter's lag, unless it is declared, from all ramps, split as if there were no lag."""
     if options.meter_lag is not None:
         return MeterLag(options.meter_lag, 0.0, "declared")
     total = weighted = 0.0

@@ -33,14 +33,7 @@ ZERO_SHARE = 2e-3
 
 
 def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> DescribedTests:
-    """Make ramp tests comparable and describe their branches.
-
-    Parameters
-    ----------
-    tests : sequence of RampTest
-        In any order.
-    options : IdentifyOptions
-        Choices of the engineer.
+    """Make ramp tests, in any order, comparable and describe their branches.
 
     Raises
     ------
@@ -121,14 +114,7 @@ def _error_of_median(values: np.ndarray) -> float:
 def split_recordings(tests: Sequence[RampTest], options: IdentifyOptions, lag: float) -> list[Ramp]:
     """Split every recording into ramps; refuse what has no ramp, too large a command, a wrong pressure, or no flow.
 
-    Parameters
-    ----------
-    tests : sequence of RampTest
-        In any order.
-    options : IdentifyOptions
-        Choices of the engineer.
-    lag : float
-        Of the flow meter, s.
+    The flow meter's lag is in s.
     """
     ramps = []
     highest = max(float(despiked(test.u).max()) for test in tests)
@@ -176,15 +162,7 @@ def _refuse_what_shows_no_dead_zone(pooled: list[PooledTest], options: IdentifyO
 
 
 def found_floor(pooled: list[PooledTest], options: IdentifyOptions) -> float:
-    """Return the largest meter floor that any branch shows (one meter, so one floor), m³/s; 0 if none can tell.
-
-    Parameters
-    ----------
-    pooled : list of PooledTest
-        All of them.
-    options : IdentifyOptions
-        Choices of the engineer.
-    """
+    """Return the largest meter floor that any branch shows (one meter, so one floor), m³/s; 0 if none can tell."""
     branches = (branch for item in pooled for branch in item.branches if branch is not None)
     floors = (find_meter_floor(branch.u, branch.q, options.u_max) for branch in branches)
     return max((floor for floor in floors if floor is not None), default=0.0)

@@ -44,14 +44,7 @@ def crossing(u: np.ndarray, y: np.ndarray, level: float) -> float:
 def hole_within(u: np.ndarray, low: float, high: float, u_max: float) -> tuple[float, float] | None:
     """Return the widest stretch without samples that shares a command with [low, high], or None; V.
 
-    Parameters
-    ----------
-    u : (P,) array
-        Commands of a profile, rising, V. Where all steps are wide, as of a staircase, none is a hole.
-    low, high : float
-        Commands between which it matters, V.
-    u_max : float
-        Full command, V.
+    The commands of a profile rise. Where all steps are wide, as of a staircase, none is a hole.
     """
     steps = np.diff(u)
     if not steps.size:

@@ -104,6 +104,20 @@ def find_columns(table: Table, chosen: Mapping[str, str]) -> dict[str, Column]:
     InputError
         If a quantity has no column, or two, or a chosen label is not in the table.
     """
+    columns = labelled_columns(table, chosen)
+    if ("pA" in columns) != ("pB" in columns) and "dP" not in columns:
+        have, lack = ("pA", "pB") if "pA" in columns else ("pB", "pA")
+        raise InputError(
+            f"'{table.path}'{table.header} has a column of {have} but none of {lack}; expected both, or dP"
+        )
+    for quantity in ("time", "u", "Q"):
+        if quantity not in columns:
+            raise _missing_column(quantity, table, columns)
+    return columns
+
+
+def labelled_columns(table: Table, chosen: Mapping[str, str]) -> dict[str, Column]:
+    """Return what `find_columns` does, without a word on quantities that have no column."""
     columns = {quantity: _chosen_column(table, quantity, label) for quantity, label in chosen.items()}
     taken = {column.label for column in columns.values()}
     pressures = {"dP", "pA", "pB"} if "dP" in chosen or {"pA", "pB"} <= chosen.keys() else set()
@@ -123,14 +137,6 @@ def find_columns(table: Table, chosen: Mapping[str, str]) -> dict[str, Column]:
             )
         _refuse_two_units(table, quantity, label, in_label)
         columns[quantity] = Column(label=label, unit=unit)
-    if ("pA" in columns) != ("pB" in columns) and "dP" not in columns:
-        have, lack = ("pA", "pB") if "pA" in columns else ("pB", "pA")
-        raise InputError(
-            f"'{table.path}'{table.header} has a column of {have} but none of {lack}; expected both, or dP"
-        )
-    for quantity in ("time", "u", "Q"):
-        if quantity not in columns:
-            raise _missing_column(quantity, table, columns)
     return columns
 
 

@@ -14,26 +14,29 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
+from dzdesign.identify.plots.frame import HUES
+
 if TYPE_CHECKING:
     import numpy as np
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Name of a variable of the page -> (light, dark). Hues of Okabe and Ito, darker or lighter where a label's contrast
-#: (4.5 to 1) asks for it; `sky` fills areas only.
-PALETTE = {
-    "ink": ("#1b2128", "#e3e7ec"),
-    "soft": ("#5a6570", "#a5b0bb"),
-    "grid": ("#d9dee4", "#333c46"),
-    "face": ("#fefefe", "#161b21"),
-    "blue": ("#0072b2", "#56b4e9"),
-    "vermilion": ("#c44e00", "#f0883e"),
-    "green": ("#008060", "#2fc496"),
-    "purple": ("#a0467a", "#dd8fc0"),
-    "orange": ("#8f6200", "#e6b422"),
-    "sky": ("#3b8fc4", "#9ad0f5"),
+#: Hues of the light theme, and the same of the dark one.
+LIGHT = HUES
+DARK = {
+    "ink": "#e3e7ec",
+    "soft": "#a5b0bb",
+    "grid": "#333c46",
+    "face": "#161b21",
+    "blue": "#56b4e9",
+    "vermilion": "#f0883e",
+    "green": "#2fc496",
+    "purple": "#dd8fc0",
+    "orange": "#e6b422",
+    "sky": "#9ad0f5",
 }
-LIGHT = {name: light for name, (light, _) in PALETTE.items()}
+#: Name of a variable of the page -> (light, dark).
+PALETTE = {name: (light, DARK[name]) for name, light in LIGHT.items()}
 #: For a series over the pressure drop: hues in turn.
 CYCLE = ("blue", "vermilion", "green", "purple", "orange", "ink")
 WIDTH = 7.4

@@ -1,0 +1,183 @@
+"""Which column of a recording may be which quantity, for a person who has yet to declare it.
+
+The reader's own recognition goes first; a quantity whose label it does not know is the only column in a unit of it.
+"""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from dzdesign.core.artefact_files import open_bytes
+from dzdesign.core.errors import InputError, nearest
+from dzdesign.core.units import measures
+from dzdesign.identify.reading.clock import is_milliseconds
+from dzdesign.identify.reading.column_labels import (
+    COLUMN_NAMES,
+    EXAMPLE_UNITS,
+    QUANTITY_OF_COLUMN,
+    Column,
+    fits,
+    labelled_columns,
+    names_a_quantity,
+    split_label,
+)
+from dzdesign.identify.reading.ramp_files import read_table
+from dzdesign.identify.reading.scaling import range_example, scaling_of
+from dzdesign.identify.reading.table import Table
+
+#: A label that may be a pressure's, and has no unit: p1, P_in, Druck A, but neither pos nor PWM.
+PRESSURE_LIKE = re.compile(
+    r"(?:[dΔδ]|delta|diff)?[\s_.-]?p[\s_.-]?(?:[abpst]|in|out|\d{1,2})?|[^\[(]{0,20}(?:press|druck)[^\[(]{0,20}",
+    re.IGNORECASE,
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProposedColumns:
+    """How the columns of a recording may be read.
+
+    Attributes
+    ----------
+    labels : tuple of str
+        All of the file's.
+    known : dict
+        Quantity -> column that its label, or the engineer, says to be it.
+    proposed : dict
+        Quantity -> column that is the only one it can be, by its unit.
+    unclear : dict
+        Quantity -> why it could not be told.
+    bare_pressures : tuple of str
+        Labels that look like a pressure and have no unit, where no pressure drop is known.
+    """
+
+    labels: tuple[str, ...]
+    known: dict[str, Column]
+    proposed: dict[str, Column]
+    unclear: dict[str, str]
+    bare_pressures: tuple[str, ...]
+
+
+def propose_columns(path: Path, chosen: Mapping[str, str], skip_rows: int | None = None) -> ProposedColumns:
+    """Tell which column of a recording is which quantity.
+
+    Parameters
+    ----------
+    path, skip_rows
+        As for `read_ramp_file`.
+    chosen : mapping
+        What the engineer has declared, as `parse_columns` gives it.
+
+    Raises
+    ------
+    InputError
+        If the file can't be read, or its labels contradict one another.
+    """
+    with open_bytes(path, "ramp file") as file:
+        table = read_table(file, path, skip_rows)
+        known = labelled_columns(table, chosen)
+        if "time" in known and known["time"].unit and not fits(known["time"].unit, "time"):
+            del known["time"]  # T_degC is no time
+        unclear = {name: why for name, column in known.items() if (why := _why_unreadable(path, name, column))}
+        taken = {column.label for column in known.values()}
+        proposed: dict[str, Column] = {}
+        for quantity in ("time", "u", "Q", "dP"):
+            if quantity in known or (quantity == "dP" and {"pA", "pB"} <= known.keys()):
+                continue
+            candidates = [label for label in _candidates(table, quantity) if label not in taken]
+            named = [label for label in candidates if nearest(re.split(r"[_\[( ]", label)[0], _spellings(quantity))]
+            port = next((known[name].label for name in ("pA", "pB") if name in known and quantity == "dP"), None)
+            if port is not None:
+                unclear["dP"] = f"'{port}' is the pressure of one port; which column is that of the other, or the drop?"
+            elif len(candidates) == 1 or (len(named) == 1 and quantity != "dP"):
+                label = candidates[0] if len(candidates) == 1 else named[0]
+                proposed[quantity] = Column(label=label, unit=_unit_of(table, label))
+                taken.add(label)
+            elif why := _why_none(table, quantity, candidates):
+                unclear[quantity] = why
+    has_pressure = "dP" in known or {"pA", "pB"} <= known.keys() or "dP" in proposed
+    bare = (label for label in table.labels if label not in taken and not table.units.get(label))
+    return ProposedColumns(
+        labels=table.labels, known=known, proposed=proposed, unclear=unclear,
+        bare_pressures=() if has_pressure else tuple(label for label in bare if PRESSURE_LIKE.fullmatch(label)),
+    )  # fmt: skip
+
+
+def _why_unreadable(path: Path, quantity: str, column: Column) -> str:
+    """Return why the reader would refuse a column, or nothing."""
+    if not column.unit:
+        return f"'{column.label}' has no unit; give it after a colon, such as {EXAMPLE_UNITS[quantity]}"
+    try:
+        scaling_of(path, quantity, column, u_max=1.0)
+    except InputError as error:
+        return str(error)
+    return ""
+
+
+def _candidates(table: Table, quantity: str) -> list[str]:
+    """Return the columns in a unit of a quantity; for the time also those of dates or times of day."""
+    candidates = [label for label in table.labels if fits(_unit_of(table, label), quantity)]
+    if quantity == "time":
+        clocks = [label for label in table.labels if _is_clock(table, label)]
+        # Milliseconds beside a clock are its fractions.
+        candidates = [label for label in candidates if not (clocks and is_milliseconds(label))] or clocks
+    return candidates
+
+
+def _is_clock(table: Table, label: str) -> bool:
+    try:
+        return table.is_clock(label)
+    except InputError:  # a date without a time of day
+        return False
+
+
+def _unit_of(table: Table, label: str) -> str:
+    return table.units.get(label) or split_label(label)[1]
+
+
+def _spellings(quantity: str) -> list[str]:
+    return [name for name, its in COLUMN_NAMES.items() if its == quantity and len(name) > 1]
+
+
+def _why_none(table: Table, quantity: str, candidates: list[str]) -> str:
+    """Return why no column is proposed, with what to do; nothing for a pressure drop that nothing hints at."""
+    both = " and ".join(map(repr, candidates))
+    if candidates and quantity != "dP":
+        return f"{both} could each be it, by their units"
+    if candidates:
+        ports = f' If one stands on either side: --columns "pA={candidates[0]}, pB={candidates[1]}"'
+        return f"{both}: a pressure, but is it the drop, pA or pB?{ports if len(candidates) == 2 else ''}"
+    currents = [label for label in table.labels if measures(_unit_of(table, label), "current")]
+    if quantity == "dP":
+        currents = [label for label in currents if PRESSURE_LIKE.fullmatch(re.split(r"[\[(/]", label)[0].strip())]
+        declared = currents and range_example("dP", currents[0], _unit_of(table, currents[0]))
+        return f"'{currents[0]}' is a current; say what it means, {declared}" if currents else ""
+    why = f"no column has a unit of {QUANTITY_OF_COLUMN[quantity]}"
+    if currents and quantity != "time":
+        declared = range_example(quantity, currents[0], _unit_of(table, currents[0]))
+        why += f"; if {' or '.join(map(repr, currents))} is it, say what the current means, {declared}"
+    words = " ".join(table.labels).lower()
+    if "varname" in words and "varvalue" in words:  # an archive of WinCC
+        why += "; the table has a row for each variable (VarName, VarValue): export a column for each"
+    return why + _or_first_column(table) if quantity == "time" else why
+
+
+def _or_first_column(table: Table) -> str:
+    """Return how the first column is declared as time, where it rises and has no unit, as LabVIEW's X_Value.
+
+    One that counts the rows is no time: a unit would make a wrong one of it.
+    """
+    first = table.labels[0]
+    if not first or table.units.get(first) or names_a_quantity(split_label(first)[1]):
+        return ""
+    try:
+        steps = np.diff(table.numbers(first))
+    except InputError:
+        return ""
+    if not (steps.size and np.all(steps >= 0) and steps.max() > 0):
+        return ""
+    if np.all(steps == 1):
+        return f"; '{first}' counts the rows: export the time beside it"
+    return f"; if '{first}' is it, say its unit, for example --columns \"time={first}:s\""
