@@ -12,13 +12,12 @@ from dzdesign.identify.knees.between_ramps import BetweenRamps, compare_ramps
 from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.knees.characteristic import describe_branches, find_meter_floor
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
-from dzdesign.identify.knees.gated_line import PreparedBranch, prepare_branch
+from dzdesign.identify.knees.gated_line import prepare_branch
 from dzdesign.identify.knees.meter_lag import find_lag
 from dzdesign.identify.knees.noise import robust_sigma
-from dzdesign.identify.knees.profile import flow_at_top, smooth_profile
+from dzdesign.identify.knees.profile import largest_flow
 from dzdesign.identify.knees.refusals import refuse_a_jump, refuse_a_shut_valve, refuse_a_wrong_pressure
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.ramps.branches import at_nominal_pressure
 from dzdesign.identify.ramps.pooling import PooledTest, pool_ramps
 from dzdesign.identify.ramps.splitting import Ramp, despiked, nominal_dp, split_ramps
 from dzdesign.identify.reading.ramp_test import RampTest
@@ -41,8 +40,6 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
     InputError
         For a test that holds no ramp or no flow, and for tests that can't stand beside one another.
     """
-    if not tests:
-        raise InputError("no ramp tests were given; expected at least one file")
     zeros = [_reading_at_zero(test, options.u_max) for test in tests]
     zero_se = {test.source: se for test, (_, se) in zip(tests, zeros, strict=True)}
     tests = [replace(test, q=test.q - zero) for test, (zero, _) in zip(tests, zeros, strict=True)]
@@ -174,7 +171,11 @@ def found_floor(pooled: list[PooledTest], options: IdentifyOptions) -> float:
 
 def _described(pooled: list[PooledTest], floor: float, options: IdentifyOptions) -> list[DescribedTest]:
     """Describe the branches of all tests."""
-    reads = [read for item in pooled for read in _read(item, floor, options.u_max)]
+    reads = [
+        prepare_branch(branch, item.test, u_max=options.u_max, floor=floor)
+        for item in pooled
+        for branch in filter(None, item.branches)
+    ]
     for read in reads:
         refuse_a_jump(read, options.u_max)
     shapes = iter(describe_branches(reads, u_max=options.u_max, window=options.knee_window))
@@ -199,23 +200,14 @@ def _with_ramps_together(item: PooledTest, row: int, between: Sequence[BetweenRa
     return replace(item, branches=(rising, falling))
 
 
-def _read(item: PooledTest, floor: float, u_max: float) -> Iterator[PreparedBranch]:
-    """Bring the flows of a test's branches to its nominal pressure drop."""
-    dp = nominal_dp(item.test)
-    for branch in filter(None, item.branches):
-        y = at_nominal_pressure(branch, dp)
-        yield prepare_branch(branch, y, u_max=u_max, floor=floor, source=item.test.source)
-
-
 def _describe(item: PooledTest, shapes: Iterator[BranchShape], u_max: float) -> DescribedTest:
     """Put a test together; `shapes` gives those of its branches next."""
     rising, falling = (next(shapes) if branch else None for branch in item.branches)
-    q_max = max(flow_at_top(*smooth_profile(branch.u, branch.q, u_max)) for branch in item.branches if branch)
     return DescribedTest(
         test=item.test,
         dp=nominal_dp(item.test),
         shapes=(rising, falling),
-        q_max=q_max,
+        q_max=largest_flow(item.branches, u_max),
         ramps=item.ramps,
         when=item.when,
         files=item.files,
