@@ -21,6 +21,7 @@ from dzdesign.identify.fitting.guarding import (
     opening_curve,
     order_knees,
 )
+from dzdesign.identify.knees.between_ramps import BetweenRamps
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
 from dzdesign.identify.knees.prepared_tests import describe_tests
 from dzdesign.identify.options import IdentifyOptions
@@ -28,6 +29,7 @@ from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.results import SideIdentification
 from dzdesign.identify.valve.guard_curve import GUARDS, Guard, GuardCurve, OpeningCurve
 from dzdesign.identify.valve.ramp_result import BRANCHES, TestResult
+from dzdesign.identify.valve.repeatability import Repeatability
 from dzdesign.identify.valve.side_model import BoundsBasis, Reference, SideModel
 
 #: dP0 names the tested pressure drop within this share of it.
@@ -119,11 +121,23 @@ def _side_model(
             confidence=options.confidence,
             guard=guard,
             level_L_min=max(shape.level for item in described for shape in item.branches) / L_MIN,
+            repeatability=_repeatability(group.between(guarded.column)),
         ),
         guards=guards,
         opening_curve=opening,
         active_constraints=knees.active
         + tuple(f"offset at test {row + 1}" for row, holds in enumerate(active) if holds),
+    )
+
+
+def _repeatability(found: BetweenRamps) -> Repeatability:
+    return Repeatability(
+        sd_V=found.sd,
+        origin=found.origin,
+        degrees_of_freedom=found.degrees if found.origin == "repeats" else None,
+        drift_V=found.drift.change if found.drift else None,
+        drift_se_V=found.drift.change_se if found.drift else None,
+        no_drift=found.no_drift,
     )
 
 

@@ -9,6 +9,7 @@ from dzdesign.identify.valve.model import Warning_
 MOST_SERIOUS_FIRST = (
     "branch-order", "one-branch",
     "simulated", "flow-contradicts-dp", "pressure-stuck", "time-unit", "missing-samples", "side-refused", "two-sides",
+    "no-repeats", "few-repeats", "repeatability", "order", "drift",
     "coarse-flow", "meter-clipped", "edge-not-swept", "gap", "not-monotone", "leak", "meter-zero", "onset-hidden",
     "lag-large", "lag-unknown", "clock",
     "no-pressure", "one-pressure", "declared-pressure",

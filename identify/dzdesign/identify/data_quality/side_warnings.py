@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from dzdesign.identify.constants import L_MIN
+from dzdesign.identify.data_quality.between_ramps import about_ramps
 from dzdesign.identify.data_quality.knee_errors import about_errors
 from dzdesign.identify.data_quality.pressures import about_flow_gains
 from dzdesign.identify.data_quality.sweeps import about_sweeps
@@ -52,6 +53,7 @@ def find_warnings(
         *_about_the_meter(group.zero_L_min),
         *_about_steps(side, group.tests, options),
         *_about_the_lag(group, options),
+        *about_ramps(side.certificate.repeatability, len(side.tests), options),
         *_about_order(side, departure),
         *about_flow_gains(side.tests),
         *_about_pressure(side, group.tests),

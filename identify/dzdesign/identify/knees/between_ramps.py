@@ -14,12 +14,12 @@ allows for the next closing at any state that the series has seen.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.knees.gated_line import fit_line
+from dzdesign.identify.valve.repeatability import NoDrift, Origin
 
 #: Standard deviation of the thresholds from ramp to ramp, over u_max, taken where nothing tells it: data sheets of
 #: valves without a position sensor state a repeatability of about 1 %, as a band of two standard deviations each way.
@@ -38,8 +38,6 @@ CONTRADICTED = 1e-3
 SMALLEST_SHARE = 1e-3
 #: Share of itself by which a drift that flattens out, as of oil that warms up, departs from a straight one at most.
 UNEVEN = 0.4
-
-NoDrift = Literal["", "one pressure drop", "order unknown", "order of pressure"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,7 +58,7 @@ class BetweenRamps:
     #: Standard deviation from ramp to ramp, V, and its degrees of freedom (infinite where it was not measured).
     sd: float
     degrees: float
-    origin: Literal["repeats", "declared", "assumed"]
+    origin: Origin
     #: Variance in `sd` that is the noise of one ramp, V²; 0 where it was not measured.
     noise: float
     #: Covariance of the tests' thresholds, and after them of the drift where it is in the model, over sd² (P, P).
@@ -220,9 +218,7 @@ def _error_of_last(design: np.ndarray) -> float:
     return 1 / math.sqrt(squares) if squares > NOTHING else math.inf
 
 
-def _origin(
-    squares: float, noise: float, degrees: int, declared: float | None
-) -> Literal["repeats", "declared", "assumed"]:
+def _origin(squares: float, noise: float, degrees: int, declared: float | None) -> Origin:
     """Return where the scatter is from: a declared one counts unless the repeats contradict it."""
     enough = degrees >= FEWEST_DEGREES
     if declared is None:

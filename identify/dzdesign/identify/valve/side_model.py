@@ -10,6 +10,7 @@ from dzdesign.core.artefact_types import RuleError, quantity
 from dzdesign.identify.valve.guard_curve import GUARDS, ROUNDING_V, Guard, GuardCurve, OpeningCurve
 from dzdesign.identify.valve.quantity_types import Flow, PressureDrop, Probability, Ratio, Voltage, VoltageError
 from dzdesign.identify.valve.ramp_result import TestResult
+from dzdesign.identify.valve.repeatability import Repeatability
 from dzdesign.identify.valve.staircase import Direction
 
 DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
@@ -54,6 +55,7 @@ class BoundsBasis:
             "largest flow."
         ),
     ]
+    repeatability: Annotated[Repeatability, Meta(description="What differs from ramp to ramp.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,0 +1,47 @@
+"""`Repeatability`: what was found, or taken, to differ from ramp to ramp; part of what the lower bounds rest on."""
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from dzdesign.core.artefact_types import RuleError, quantity
+from dzdesign.identify.valve.quantity_types import Voltage, VoltageError
+
+Origin = Literal["repeats", "declared", "assumed"]
+NoDrift = Literal["", "one pressure drop", "order unknown", "order of pressure"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Repeatability:
+    """Scatter of the guarded threshold from ramp to ramp, and its drift through the series of ramps."""
+
+    sd_V: Annotated[VoltageError, Meta(description="Standard deviation of the threshold from ramp to ramp.")]
+    origin: Annotated[
+        Origin,
+        Meta(
+            description="Where it is from: measured on repeats, declared by --repeatability, or the tool's own "
+            "assumption."
+        ),
+    ]
+    degrees_of_freedom: (
+        Annotated[float, quantity("1", "Of the measured one; null where it was not measured.", ge=1, le=1e9)] | None
+    )
+    drift_V: Annotated[
+        Voltage | None,
+        Meta(
+            description="Change of the threshold from the first ramp of the series to the last; null where it is not "
+            "in the model. The thresholds are those in the middle of the series, the bounds hold at either end."
+        ),
+    ]
+    drift_se_V: Annotated[VoltageError | None, Meta(description="Its standard error.")]
+    no_drift: Annotated[NoDrift, Meta(description="Why there is no drift in the model; empty where there is.")]
+
+    def __post_init__(self) -> None:
+        if (self.origin == "repeats") != (self.degrees_of_freedom is not None):
+            raise RuleError(
+                f"the scatter between ramps is '{self.origin}' and has {self.degrees_of_freedom} degrees of freedom; "
+                "expected them where it was measured on repeats, and null elsewhere"
+            )
+        if not (self.drift_V is None) == (self.drift_se_V is None) == bool(self.no_drift):
+            raise RuleError("the drift, its standard error and the reason that there is none contradict one another")
