@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.core.artefact_files import check_file_may_be_written, write_file, write_files
 from dzdesign.core.option_readers import number, percent, quantity
-from dzdesign.core.options import FIT, METER, RECORDINGS, AnyPath, Option, Paths, Text, read_options
-from dzdesign.stages.recordings import RampArguments, check_plots, read_recordings, refuse_copies
+from dzdesign.core.options import FIT, METER, RECORDINGS, AnyPath, Option, Paths, Text, Texts, read_options
+from dzdesign.stages.recordings import RampArguments, check_plots, in_order, read_recordings, refuse_copies
 from dzdesign.terminal.progress import stage_progress
 
 if TYPE_CHECKING:
@@ -51,6 +51,9 @@ class IdentifyArguments(IdentifyChoices):
     _: KW_ONLY
     output: Annotated[AnyPath | None, Option("FILE", command_default="valve.json", short="-o")] = None
     """File to write."""
+    order: Annotated[Texts | None, Option("FILE", RECORDINGS)] = None
+    """Recordings in the order in which they were taken, such as "p1.csv, p5.csv, p1_again.csv", to tell a drift of the
+    valve from the pressure drop (default: from date and time in the recordings)."""
     plots: Annotated[AnyPath | None, Option("DIR")] = None
     """Folder for plots in SVG and PNG: flow of each pressure drop with its knees, onsets and residuals; thresholds,
     bounds and beta over dP."""
@@ -94,6 +97,7 @@ def identify(arguments: IdentifyArguments) -> "ValveModel":
         arguments.ramps, u_max=options.u_max, columns=arguments.columns, dp=arguments.dp, skip_rows=arguments.skip_rows
     )
     refuse_copies(tests)
+    tests = in_order(tests, arguments.order)
     with stage_progress(f"fitting {len(tests)} recording{'s' if len(tests) > 1 else ''}"):
         found = identify_sides(tests, options, record)
     if arguments.output is not None:

@@ -90,6 +90,7 @@ def read_ramp_file(
         clock_doubt=doubt,
         simulated=recording.simulated,
         no_values=recording.no_values,
+        started=recording.started,
     )
 
 
@@ -105,6 +106,7 @@ class _Recording:
     simulated: bool
     may_count_ms: bool
     no_values: str
+    started: float | None
 
 
 def _refuse_too_few_rows(path: Path, recording: _Recording) -> None:
@@ -175,6 +177,7 @@ def _read_recording(table: Table, chosen: Mapping[str, str], u_max: float, dp: f
         simulated=_is_marked(table.comments),
         may_count_ms=not is_clock and may_count_ms(rows[0], longest_step=np.inf),
         no_values=describe_placeholders(placeholders),
+        started=table.started(found["time"].label) if is_clock else None,
     )
 
 

@@ -77,6 +77,10 @@ class Table(ABC):
         """Return a column of dates or times of day, as `is_clock` tells, as seconds since the first row of the file."""
         raise TypeError(f"column '{label}' holds numbers")
 
+    def started(self, label: str) -> float | None:
+        """Return the date and time of the first row of such a column, s on one calendar; None if they are not known."""
+        return None
+
     def found_labels(self) -> str:
         """Return the labels for a message, the first `QUOTED_COLUMNS` of them."""
         labels = ", ".join(label[:QUOTED_CHARACTERS] for label in self.labels[:QUOTED_COLUMNS])

@@ -85,6 +85,26 @@ def seconds_of_stamps(cells: "pl.Series", where: str) -> np.ndarray:
     return seconds - known[0] if known.size else seconds
 
 
+def start_of(cell: str) -> float | None:
+    """Return the date and time in a cell as seconds since the first day of the calendar, UTC if it states its zone.
+
+    None where it has no date, or one whose day and month can't be told apart.
+
+    Examples
+    --------
+    >>> start_of("2026-11-22 03:04:05") - start_of("22.11.2026 03:04:04,5"), start_of("03:04:05")
+    (0.5, None)
+    """
+    found = re.match(STAMP, cell)
+    days = set(_days(found[1]).values()) if found and found[1] else set()
+    if found is None or len(days) != 1:
+        return None
+    _, hour, minute, second, half, zone = found.groups()
+    hours = int(hour) % 12 + 12 * (half in ("P", "p")) if half else int(hour)
+    of_day = 3600.0 * hours + 60.0 * int(minute) + float(re.sub("[,:]", ".", second))
+    return DAY * days.pop() + of_day - (_zone(zone) if zone else 0.0)
+
+
 def _different(texts: "pl.Series") -> list[str]:
     """Return the different texts, the first of the file first; there are few."""
     return list(texts.unique(maintain_order=True).drop_nulls())
