@@ -14,6 +14,7 @@ for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "POLARS_MAX_THREADS"
 sys.path.insert(0, str(Path(__file__).parents[1]))  # for the scoreboard that all benchmarks share
 
 from accuracy import print_accuracy  # noqa: E402
+from between_ramps import print_between_ramps  # noqa: E402
 from bound_coverage import print_coverage, print_over_compensation, print_residual  # noqa: E402
 from measured import print_measured  # noqa: E402
 from random_valves import print_random_valves  # noqa: E402
@@ -26,6 +27,7 @@ PARTS = {
     "coverage": (print_coverage, 202),
     "over-compensation": (print_over_compensation, 203),
     "residual": (print_residual, 303),
+    "between-ramps": (print_between_ramps, 808),
     "random": (print_random_valves, 404),
     "measured": (print_measured, 0),
     "timing": (print_timing, 0),

@@ -60,9 +60,9 @@ def about_ramps(found: Repeatability, count: int, options: IdentifyOptions) -> I
         yield Warning_(
             code="order",
             text=(
-                "the pressure drops were recorded one after the other, so a drift of the valve (oil or coil warming "
-                "up) can't be told from their effect, and the bounds do not count it. Repeat the first ramp at the "
-                "end of the series, or record in random order"
+                "no pressure drop was recorded both early and late in the series, so a drift of the valve (oil or coil "
+                "warming up) can't be told from the effect of the pressure drop, and the bounds do not count it. "
+                "Repeat the first ramp at the end, or record repeats in random order"
             ),
             source=None,
         )

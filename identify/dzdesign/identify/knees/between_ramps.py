@@ -106,35 +106,36 @@ class BetweenRamps:
 
 
 @dataclass(frozen=True, slots=True)
-class _RampKnees:
-    """Knees of the single ramps that tell one, (R,): test, number in it, knee (V), variance of its noise (V²), and when
-    it was recorded (s, or NaN)."""
+class RampKnees:
+    """Knees of the single ramps that tell one, (R,), of one branch."""
+
+    #: Test of each, and which ramp of it, from 0.
 
     test: np.ndarray
     number: np.ndarray
+    #: V, and the variance that the noise gives it, V².
     knee: np.ndarray
     noise: np.ndarray
+    #: When it was recorded, s on a clock common to all; NaN where that is not known.
     when: np.ndarray
 
 
-def compare_ramps(
-    shapes: Sequence[BranchShape], when: Sequence[Sequence[float]], *, declared: float | None, u_max: float
-) -> BetweenRamps:
+def compare_ramps(known: RampKnees, counts: Sequence[int], *, declared: float | None, u_max: float) -> BetweenRamps:
     """Compare the ramps of one branch.
 
     Parameters
     ----------
-    shapes : sequence of BranchShape
-        That branch of the T tests.
-    when : sequence of sequence of float
-        For each ramp of each test when it was recorded, s, on one clock for all; NaN where that is not known.
+    known : RampKnees
+        What the ramps tell, each by itself.
+    counts : sequence of int
+        Ramps of each of the T tests.
     declared : float or None
         Standard deviation from ramp to ramp, V; None measures it where ramps were repeated. A declared one that the
         repeats contradict is not taken.
     u_max : float
         Full command, V.
     """
-    known, count = _knees_of_ramps(shapes, when), len(shapes)
+    count = len(counts)
     clock, no_drift = _series_clock(known, count)
     design = (known.test[:, None] == np.arange(count)).astype(float)
     told = design.any(axis=0)
@@ -160,7 +161,7 @@ def compare_ramps(
     # Only what exceeds the noise is scatter of the valve: to move ramps by their noise would blur the edge.
     kept = max(1 - noise * degrees / squares, 0.0) if degrees > 0 and squares > 0 else 0.0
     moved = kept * residual + (drift.change * clock if drift else 0.0)
-    shifts = tuple(np.zeros(len(times)) for times in when)
+    shifts = tuple(np.zeros(ramps) for ramps in counts)
     for row, number, shift in zip(known.test, known.number, moved, strict=True):
         shifts[row][number] = shift
     return BetweenRamps(
@@ -175,8 +176,11 @@ def compare_ramps(
     )
 
 
-def _knees_of_ramps(shapes: Sequence[BranchShape], when: Sequence[Sequence[float]]) -> _RampKnees:
-    """Return the zeros of lines through each ramp's samples of the straight part that the test's line rests on."""
+def knees_of_ramps(shapes: Sequence[BranchShape], when: Sequence[Sequence[float]]) -> RampKnees:
+    """Return the zeros of lines through each ramp's samples of the straight part that the test's line rests on.
+
+    `when` has for each ramp of each test when it was recorded, s, on one clock for all.
+    """
     tests: list[int] = []
     numbers: list[int] = []
     told: list[tuple[float, float, float]] = []
@@ -195,10 +199,10 @@ def _knees_of_ramps(shapes: Sequence[BranchShape], when: Sequence[Sequence[float
             tests.append(test)
             numbers.append(number)
             told.append((knee, noise, times[number]))
-    return _RampKnees(np.array(tests, dtype=int), np.array(numbers, dtype=int), *np.array(told).reshape(-1, 3).T)
+    return RampKnees(np.array(tests, dtype=int), np.array(numbers, dtype=int), *np.array(told).reshape(-1, 3).T)
 
 
-def _series_clock(known: _RampKnees, count: int) -> tuple[np.ndarray, NoDrift]:
+def _series_clock(known: RampKnees, count: int) -> tuple[np.ndarray, NoDrift]:
     """Return when each ramp was recorded, from -1/2 to 1/2, and why it tells no drift; empty where it does."""
     clock = np.zeros(known.test.size)
     if count < 2:

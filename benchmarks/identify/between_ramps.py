@@ -1,0 +1,142 @@
+"""8. Valves that scatter from ramp to ramp, or drift through the series: next closings below the offset, false trends.
+
+A family is one valve: its ramps are simulated as knees with the fit's measured error (of one ramp, 1.13 mV at 1 MPa to
+0.47 mV at 5 MPa), go through the product's own model of the ramps, trend, bounds and staircase, and then the valve
+closes once more at every test, in any state that the series has seen. What the product does in CasADi in between, to
+let the knees run one way, is an isotonic regression here.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import isotonic_regression
+from scoreboard import Row, print_rows, say
+
+from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, find_trend, lower_bounds
+from dzdesign.identify.knees.between_ramps import RampKnees, compare_ramps
+from dzdesign.identify.valve.staircase import staircase
+
+U_MAX, CONFIDENCE, FLAT_BELOW = 10.0, 0.99, 1e-3
+DP_MPa = np.linspace(1, 5, 6)
+#: Error of one ramp's knee, V.
+NOISE_SE = np.interp(DP_MPa, [1, 5], [1.13e-3, 0.47e-3])
+FALLING, FLAT = 4.6 - 0.075 * (DP_MPa - 1), np.full(DP_MPa.size, 4.6)
+SCATTERS_mV = (0.0, 5.0, 12.5, 25.0, 50.0)
+#: Of 1000 families; ten are expected at 99 %, and nineteen are three standard deviations more.
+LIMIT = 19
+#: Standard errors of one ramp by which the bound may lie lower than without scatter, where there is none.
+PRICE = 3.0
+
+Order = Callable[[np.random.Generator], np.ndarray]
+TESTS = np.arange(DP_MPa.size)
+ORDERS: dict[str, Order] = {
+    "closing repeat": lambda rng: np.append(TESTS, 0),
+    "three repeats in random order": lambda rng: rng.permutation(np.repeat(TESTS, 3)),
+    "three rounds": lambda rng: np.tile(TESTS, 3),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Family:
+    """What became of one valve: a next closing below the offset, a trend, and bound less threshold at the tests, V."""
+
+    opened: bool
+    trend: bool
+    margin: np.ndarray
+
+
+def print_between_ramps(*, quick: bool, seed: int) -> list[Row]:
+    """Print and return the rows of part 8."""
+    count = 200 if quick else 1000
+    limit = LIMIT * count / 1000 if not quick else 3 + 4 * count / 100
+    rows = []
+    for scatter in SCATTERS_mV:
+        for repeats in (1, 3):
+            rng = np.random.default_rng([seed, round(10 * scatter), repeats])
+            declared = 1e-3 * scatter if repeats == 1 else None
+            test = np.repeat(TESTS, repeats)
+            how = "one ramp, declared" if repeats == 1 else f"{repeats} repeats"
+            rows += _rows(f"sd {scatter:g} mV, {how}", test, None, 1e-3 * scatter, 0.0, declared, count, limit, rng)
+    for name, order in ORDERS.items():
+        for drift in (-0.02, 0.02):
+            rng = np.random.default_rng([seed, len(name), round(1e3 * (drift + 1))])
+            what = f"drift of {100 * drift:+g} %, sd 12.5 mV, {name}"
+            declared = 12.5e-3 if name == "closing repeat" else None
+            rows += _rows(what, None, order, 12.5e-3, 4.6 * drift, declared, count, limit, rng)
+    print_rows(f"8. Next closings below the offset and false trends, of {count} families (seed {seed})", rows)
+    return rows
+
+
+def _rows(
+    what: str,
+    test: np.ndarray | None,
+    order: Order | None,
+    scatter: float,
+    drift: float,
+    declared: float | None,
+    count: int,
+    limit: float,
+    rng: np.random.Generator,
+) -> list[Row]:
+    """Return the rows of one case: falling valves that open, and flat ones that open or show a trend."""
+    say(f"between ramps: {what}, {count} families")
+
+    def families(truth: np.ndarray) -> list[Family]:
+        return [
+            simulate(truth, test if order is None else order(rng), scatter, drift, declared, order is not None, rng)
+            for _ in range(count)
+        ]
+
+    falling, flat = families(FALLING), families(FLAT)
+    margin = -1e3 * float(np.mean([family.margin for family in falling]))
+    note = f"of {count}; bound {margin:.1f} mV under the threshold on average"
+    rows = [
+        Row(what=f"{what}: opened", value=float(sum(family.opened for family in falling)), limit=limit, note=note),
+        Row(what=f"{what}: flat valve opened", value=float(sum(family.opened for family in flat)), limit=limit),
+        Row(what=f"{what}: flat valve, trend", value=float(sum(family.trend for family in flat)), limit=limit),
+    ]
+    if scatter == 0.0:
+        from scipy.special import stdtrit
+
+        repeats = 1 if test is None else test.size // DP_MPa.size
+        before = stdtrit(DEGREES_OF_FREEDOM, 1 - (1 - CONFIDENCE) / DP_MPa.size) * NOISE_SE / np.sqrt(repeats)
+        lower = np.mean((-np.mean([family.margin for family in falling], axis=0) - before) / NOISE_SE)
+        rows.append(Row(what=f"{what}: bound lower than by noise alone", value=float(lower), limit=PRICE, unit="s.e."))
+    return rows
+
+
+def simulate(
+    truth: np.ndarray,
+    test: np.ndarray,
+    scatter: float,
+    drift: float,
+    declared: float | None,
+    clock: bool,
+    rng: np.random.Generator,
+) -> Family:
+    """Simulate one family; `truth` (T,) in the state of the first ramp, V, and `test` (R,) in the order of taking."""
+    state = np.linspace(0, 1, test.size)
+    knee = truth[test] + drift * state + scatter * rng.standard_normal(test.size)
+    knee += NOISE_SE[test] * rng.standard_normal(test.size)
+    counts = np.bincount(test)
+    known = RampKnees(
+        test=test,
+        number=np.array([np.sum(test[:at] == one) for at, one in enumerate(test)]),
+        knee=knee,
+        noise=NOISE_SE[test] ** 2,
+        when=60 * state if clock else np.full(test.size, np.nan),
+    )
+    between = compare_ramps(known, counts.tolist(), declared=declared, u_max=U_MAX)
+    middle = known.knee - (between.drift.change * (state - 0.5) if between.drift else 0.0)
+    mean, noise_se = np.bincount(test, weights=middle) / counts, NOISE_SE / np.sqrt(counts)
+    degrees = float(between.degrees_of_freedom(noise_se, DEGREES_OF_FREEDOM).min())
+    covariance = between.covariance_of_mean(noise_se)
+    trend = find_trend(1e6 * DP_MPa, mean, covariance, degrees, U_MAX, FLAT_BELOW * U_MAX).direction
+    if trend != "flat":
+        mean = isotonic_regression(mean, weights=noise_se**-2, increasing=trend == "increasing").x
+    bound = lower_bounds(mean, noise_se, between, CONFIDENCE, np.zeros(mean.size))
+    _, offset = staircase(bound, trend)
+    lowest = truth + min(drift, 0.0)
+    closing = lowest + scatter * rng.standard_normal(truth.size)
+    return Family(opened=bool(np.any(closing < offset)), trend=trend != "flat", margin=bound - lowest)
