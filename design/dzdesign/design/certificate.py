@@ -58,8 +58,7 @@ def prove_certificates(compensator: Compensator) -> None:
             raise InputError(f"the compensator drives the {name} side, but its valve has none; design it again")
         stated = law.certificate
         curve = guarded_curve(model, stated.guard, compensator.below_dp0)
-        reserve = Fraction(dither, signals.compare_max)
-        ceiling = offset_ceiling(curve, signals, compensator.u_max_V, sign=sign, reserve=reserve)
+        ceiling = offset_ceiling(curve, signals, compensator.u_max_V, sign=sign, dither_counts=dither)
         try:
             proved = certify(
                 model,
