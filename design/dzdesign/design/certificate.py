@@ -74,10 +74,10 @@ def prove_certificates(compensator: Compensator) -> None:
         except RequirementError as error:
             raise InputError(f"the {name} side's certificate does not hold: {error}; design it again") from error
         for field in fields(Certificate):
-            said, found = getattr(stated, field.name), getattr(proved, field.name)
-            if said != found:
+            claim, found = getattr(stated, field.name), getattr(proved, field.name)
+            if claim != found:
                 raise InputError(
-                    f"the {name} side's certificate says {field.name} = {_words(said)}, but {_words(found)} follows "
+                    f"the {name} side's certificate says {field.name} = {_words(claim)}, but {_words(found)} follows "
                     "from its valve; design it again"
                 )
 

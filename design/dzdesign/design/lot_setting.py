@@ -252,13 +252,13 @@ def _certified(side: _Side, name: str, law: SideLaw, first: Compensator) -> Cert
     """Prove the common law for one valve, on the whole interval that it was tested over."""
     dither = first.drive_functions.dither_counts
     curve = side.curves[name]
-    own = side.exact.get(name) or offset_ceiling(
+    ceiling = side.exact.get(name) or offset_ceiling(
         curve, first.signals, first.u_max_V, sign=side.sign, dither_counts=dither
     )
     return certify(
         side.models[name],
         curve,
-        own,
+        ceiling,
         guard=first.side(side.sign).certificate.guard,
         signals=first.signals,
         u_max_V=first.u_max_V,
