@@ -1,47 +1,31 @@
 """Plots of an assessment: flow over command at each pressure drop, without and with the compensator."""
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from dzdesign.assess.assessment import Assessment, PressureAssessment
 from dzdesign.assess.curve_pairs import Comparison, CurvePair
 from dzdesign.assess.options import AssessOptions
-from dzdesign.assess.quantities import L_MIN
-from dzdesign.identify.plots.frame import finish, new_figure, plot_style, saved
+from dzdesign.identify.constants import L_MIN
+from dzdesign.identify.plots.frame import HUES, finish, new_figure, plot_style, pressure_names, saved
+from dzdesign.identify.plots.valve_curves import BRANCHES
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Before and after: they differ in hue for the colour-blind (Okabe and Ito), in lightness in print, and in line.
-COLOURS = {"before": "#6E6E6E", "after": "#0072B2"}
-LINES, MARKERS, DIRECTIONS = ("-", "--"), ("^", "v"), ("opening", "closing")
-BLACK = "#000000"
+COLOURS = {"before": HUES["soft"], "after": HUES["blue"]}
 
 
 def plot_files(comparison: Comparison, assessment: Assessment) -> dict[str, bytes]:
     """Draw an SVG for each side and pressure drop: file name -> content; the same recordings give the same bytes."""
-    names = _names(assessment.pressures)
+    pressures = assessment.pressures
+    several = len({item.side for item in pressures}) > 1
+    stems = [f"{item.side}_before_after" if several else "before_after" for item in pressures]
+    names = pressure_names(stems, [item.dp_MPa for item in pressures])
     with plot_style():
         return {
             f"{name}.svg": saved(_figure(pair, item, comparison.options), "svg")
-            for name, pair, item in zip(names, comparison.pairs, assessment.pressures, strict=True)
+            for name, pair, item in zip(names, comparison.pairs, pressures, strict=True)
         }
-
-
-def _names(pressures: Sequence[PressureAssessment]) -> list[str]:
-    """Return a name for each plot, with as many digits of the pressure drop as tell them apart."""
-    several = len({item.side for item in pressures}) > 1
-    names: list[str] = []
-    for digits in range(3, 17):
-        names = [
-            (f"{item.side}_" if several else "")
-            + "before_after"
-            + ("" if item.dp_MPa is None else f"_{item.dp_MPa:.{digits}g}_MPa")
-            for item in pressures
-        ]
-        if len(set(names)) == len(names):
-            break
-    return names
 
 
 def _figure(pair: CurvePair, item: PressureAssessment, options: AssessOptions) -> "Figure":
@@ -51,16 +35,15 @@ def _figure(pair: CurvePair, item: PressureAssessment, options: AssessOptions) -
     axes = figure.subplots()
     for name, curves in pair.sets.items():
         u_max, readings = options.of_set(name).u_max, item.readings(name)
-        both = zip((curves.rising, curves.falling), LINES, DIRECTIONS, strict=True)
-        for curve, line, direction in both:
+        for (_, direction, _, line, _), curve in zip(BRANCHES, (curves.rising, curves.falling), strict=True):
             if curve is not None:
                 u, q = curve.read.profile
                 axes.plot(100 * u / u_max, q / L_MIN, line, lw=1.4, color=COLOURS[name], label=f"{name}, {direction}")
-        for direction, marker in zip(DIRECTIONS, MARKERS, strict=True):
+        for _, direction, marker, *_ in BRANCHES:
             at = readings[f"dead_zone_{direction}"].value
             if at is not None:
-                axes.plot(at, item.level_L_min, marker, ms=7, color=COLOURS[name], mec=BLACK, mew=0.8,
+                axes.plot(at, item.level_L_min, marker, ms=7, color=COLOURS[name], mec=HUES["ink"], mew=0.8,
                           label=f"{name}, dead zone {direction}", zorder=5)  # fmt: skip
-    axes.axhline(item.level_L_min, color=BLACK, lw=0.9, ls=":", label=f"level {item.level_L_min:.3g} L/min")
+    axes.axhline(item.level_L_min, color=HUES["ink"], lw=0.9, ls=":", label=f"level {item.level_L_min:.3g} L/min")
     axes.set(xlabel="command (% of full)", ylabel="flow at the nominal pressure drop (L/min)", xlim=(0, 100))
     return finish(figure, 3)

@@ -1,7 +1,10 @@
-"""What both C2000 targets compute alike: integers for registers, limits, and the times about a PWM period."""
+"""What both C2000 targets have alike: files, integers for registers, limits, and the times about a PWM period."""
 
+from collections.abc import Mapping
 from fractions import Fraction
 
+from dzdesign.codegen.target import Target
+from dzdesign.codegen.telemetry.frame import Link
 from dzdesign.core.errors import DzdesignError
 
 PWM_HZ = 2_500  # section 3 of the paper
@@ -16,6 +19,34 @@ TOOLS = {
     # Where TI's Windows installer puts C2000Ware; the user changes this one line of the projectspec.
     "c2000ware_default": "C:/ti/c2000/C2000Ware_26_01_00_00",
 }
+#: The C of every project, and what builds it; a target adds C of its own between them.
+SOURCES = ("main.c", "dz_hardware.c", "dz_hardware.h", "dz_isr.c", "dz_isr.h")
+PROJECT_FILES = ("dzdesign.projectspec", "Makefile", "README.md")
+
+
+def c2000_target(
+    name: str,
+    description: str,
+    context: Mapping[str, str],
+    *,
+    adc_span_V: Fraction | int,
+    sources: tuple[str, ...] = (),
+    link: Link | None = None,
+) -> Target:
+    """Return the target whose figures, printed, are `context`; `sources` is the C that only it has."""
+    return Target(
+        name=name,
+        description=description,
+        compare_max=int(context["compare_max"]),
+        adc_code_max=int(context["adc_code_max"]),
+        adc_full_V=Fraction(adc_span_V),
+        sample_Hz=SAMPLE_HZ,
+        tick_Hz=PWM_HZ,
+        templates={f"{name}/{file}": f"{file}.jinja" for file in (*SOURCES, *sources, *PROJECT_FILES)},
+        board=frozenset({f"{name}/dzdesign.projectspec"}),  # where the user's C2000Ware lies
+        context={**context, **TOOLS},
+        link=link,
+    )
 
 
 def exact(quantity: Fraction, what: str, largest: int) -> int:

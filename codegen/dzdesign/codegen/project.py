@@ -15,12 +15,7 @@ from dzdesign.codegen.core.files import CORE_HEADERS, CORE_SOURCES, Values, core
 from dzdesign.codegen.provenance import constants_of, origin_of
 from dzdesign.codegen.target import Target, folder_of
 from dzdesign.codegen.wiring import wiring_of
-from dzdesign.core.artefact_files import (
-    MANIFEST_NAME,
-    read_bytes,
-    sha256_of,
-    write_folder,
-)
+from dzdesign.core.artefact_files import MANIFEST_NAME, read_bytes, sha256_of, write_folder
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
 from dzdesign.core.errors import InputError, nearest
@@ -100,22 +95,11 @@ def targets() -> tuple[Target, ...]:
 def generate(
     compensator: Compensator, target_name: str | None = None, compensator_bytes: bytes | None = None
 ) -> Firmware:
-    """Generate the C project of a compensator for a target.
+    """Generate the C project of a compensator for a target, by default the one that it was designed for.
 
-    Parameters
-    ----------
-    compensator : Compensator
-        From `dzdesign.design.designing.design` or compensator.json.
-    target_name : str, optional
-        One of `TARGET_NAMES`; by default the one that the compensator was designed for.
-    compensator_bytes : bytes, optional
-        The file it was read from; without it the document as it would be written.
-
-    Raises
-    ------
-    InputError
-        If the target is unknown, its converter or PWM differs from those that the compensator was designed for, or the
-        compensator says of the target that it was designed for what is not so.
+    `compensator_bytes` is the file that the compensator was read from; without it the document as it would be written.
+    An unknown target is an `InputError`; so is one whose converter or PWM differs from those that the compensator was
+    designed for, and a compensator that says of its target what is not so.
     """
     designed_for = compensator.target
     target = target_named(target_name or (designed_for.name if designed_for else DEFAULT_TARGET))

@@ -16,9 +16,7 @@ def origin_of(compensator: Compensator, compensator_sha256: str) -> FirmwareOrig
     )
 
 
-def constants_of(
-    compensator: Compensator, constants: Mapping[str, Sequence[Constant]]
-) -> tuple[FirmwareConstant, ...]:
+def constants_of(compensator: Compensator, constants: Mapping[str, Sequence[Constant]]) -> tuple[FirmwareConstant, ...]:
     """Return where each constant came from, in the order of the files of the core and of what stands in them."""
     valve_keys = _valve_keys(compensator)
     return tuple(constant.entry(path, valve_keys) for path in sorted(constants) for constant in constants[path])

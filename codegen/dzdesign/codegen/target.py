@@ -12,7 +12,7 @@ from dzdesign.core.errors import DzdesignError, InputError
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import Converter, TargetInputs
 
-#: Products that the core may use: 32x32->64 bits, or none longer than 32 bits.
+#: Products that the core may use: "wide", 32x32->64 bits, or "narrow", none longer than 32 bits.
 ARITHMETICS = ("wide", "narrow")
 
 #: Names that the renderer itself passes to every template; a target's context may not use them.
@@ -26,56 +26,35 @@ RENDERER_NAMES = frozenset(
 class Target:
     """One microcontroller and its project files.
 
-    Parameters
-    ----------
-    name
-        Name on the command line, for example ``"cortex-m4"``; its folder is the same with underscores.
-    description
-        One line for ``--list-targets``.
-    compare_max
-        Compare value of 100 % duty; the core's ``DZ_COMPARE_MAX``. Fits an unsigned 16-bit register.
-    adc_code_max
-        Largest code of the converter, right-justified; the core's ``DZ_ADC_CODE_MAX``.
-    adc_full_V
-        Voltage at the pin that would be the code after the largest.
-    sample_Hz, tick_Hz
-        Samples and PWM periods in a second.
-    templates
-        Output path, relative to the firmware folder, to the template's file name in the target's ``templates/`` or in
-        those that the targets share.
-    context
-        Every value that a template prints, already a string.
-    board
-        Output paths of the files that are the user's to fill in; the rest is generated again as it is.
-    link
-        The serial line of its telemetry, or None if it sends none.
-    arithmetic
-        ``"wide"``: the core multiplies 32x32->64 bits; ``"narrow"``: nothing is longer than 32 bits.
-    takes_any_signals
-        True for a target without a converter and timer of its own, such as a library: it takes the scalings of any
-        compensator, and ``compare_max`` and ``adc_code_max`` are only what `design` uses if nobody says otherwise.
-    has_timer
-        True if it takes samples and ticks by a timer of its own, at `sample_Hz` and `tick_Hz` and no other rate.
-
-    Raises
-    ------
-    DzdesignError
-        If the plan is not printable as it stands.
+    A plan that is not printable as it stands is a `DzdesignError`.
     """
 
+    #: On the command line, for example ``"cortex-m4"``; the target's folder is the same with underscores.
     name: str
+    #: One line for ``--list-targets``.
     description: str
+    #: Compare value of 100 % duty, the core's ``DZ_COMPARE_MAX``: fits an unsigned 16-bit register.
     compare_max: int
+    #: Largest code of the converter, right-justified, the core's ``DZ_ADC_CODE_MAX``; the voltage one code above it.
     adc_code_max: int
     adc_full_V: Fraction = Fraction(3)
+    #: Samples and PWM periods in a second.
     sample_Hz: int = 1250
     tick_Hz: int = 2500
+    #: Output path in the firmware folder to the template, in the target's ``templates/`` or in those that all share.
     templates: Mapping[str, str]
+    #: Every value that a template prints, already a string.
     context: Mapping[str, str]
+    #: One of `ARITHMETICS`.
     arithmetic: str = "wide"
+    #: Of a target without a converter and timer of its own, such as a library: it takes the scalings of any
+    #: compensator, and `compare_max` and `adc_code_max` are only what `design` uses if nobody says otherwise.
     takes_any_signals: bool = False
+    #: Whether it takes samples and ticks by a timer of its own, at `sample_Hz` and `tick_Hz` and no other rate.
     has_timer: bool = True
+    #: Output paths of the files that are the user's to fill in; the rest is generated again as it is.
     board: frozenset[str] = frozenset()
+    #: The serial line of its telemetry, if it sends any.
     link: Link | None = None
 
     def __post_init__(self) -> None:
@@ -143,7 +122,14 @@ class Target:
         if self.takes_any_signals and other:
             word += f"takes its codes as they are: {theirs.levels} codes over {float(theirs.full_V):g} V, "
             return f"{word}{designed_for.compare_max} counts at full drive"
-        for what, asked, has in _inputs_compared(designed_for, self.inputs()):
+        ours = self.inputs()
+        for what, asked, has in (
+            ("a converter's range in V", theirs.full_V, ours.converter.full_V),
+            ("a converter's codes", theirs.levels, ours.converter.levels),
+            ("counts at full drive", designed_for.compare_max, ours.compare_max),
+            ("samples a second", designed_for.sample_Hz, ours.sample_Hz),
+            ("PWM periods a second", designed_for.tick_Hz, ours.tick_Hz),
+        ):
             if asked != has:
                 stated = (
                     f"was designed for target {designed_for.name} ({what}: {float(asked):g}), but {self.name} has"
@@ -153,17 +139,6 @@ class Target:
                 remedy = f"design it again with `dzdesign design --target {self.name}`"
                 raise InputError(f"the compensator {stated} {float(has):g}; {remedy}")
         return f"{word}has the same converter and timer" if other else ""
-
-
-def _inputs_compared(one: TargetInputs, other: TargetInputs) -> tuple[tuple[str, Fraction | int, Fraction | int], ...]:
-    """Return what each number is, and it of both."""
-    return (
-        ("a converter's range in V", one.converter.full_V, other.converter.full_V),
-        ("a converter's codes", one.converter.levels, other.converter.levels),
-        ("counts at full drive", one.compare_max, other.compare_max),
-        ("samples a second", one.sample_Hz, other.sample_Hz),
-        ("PWM periods a second", one.tick_Hz, other.tick_Hz),
-    )
 
 
 def folder_of(name: str) -> str:

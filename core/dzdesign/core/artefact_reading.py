@@ -31,27 +31,14 @@ logger = logging.getLogger(__name__)
 def read_artefact(
     content: bytes, kind: type[AnArtefact] | Sequence[type[AnArtefact]], source: str, remedy: str | None = None
 ) -> AnArtefact:
-    """Read an artefact; what is missing, does not fit or contradicts the rest is named.
+    """Read an artefact; what is missing, does not fit or contradicts the rest is named, with the file and the key.
 
     Every key of the type must be there: a default is for who makes one in Python. Keys that the type does not know are
     ignored, and logged. A value that would be written in another way than it was read, such as a derived one that does
     not follow from the others, is refused: no value is changed silently.
 
-    Parameters
-    ----------
-    content : bytes
-        The file.
-    kind : type or sequence of types
-        The artefact that is expected, or the several that may be; the schema in the file decides.
-    source : str
-        Name of the file, for the messages.
-    remedy : str, optional
-        What to do about a bad file, for the messages; by default to run the command again that writes it.
-
-    Raises
-    ------
-    InputError
-        Naming the file, the key, what was expected and what was found.
+    Of several kinds the schema in the file decides. A message ends with the remedy: unless one is given, to run the
+    command again that writes such a file.
     """
     kinds = {schema_of(each): each for each in ([kind] if isinstance(kind, type) else kind)}
     document = parse_document(content, source, tuple(kinds))

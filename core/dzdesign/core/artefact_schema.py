@@ -31,11 +31,6 @@ def json_schema(kind: type[Artefact]) -> Node:
 
     Further keys are welcome in every object (no ``additionalProperties: false``), as they are to the reader; a rule
     between fields is not in it.
-
-    Parameters
-    ----------
-    kind : type
-        The artefact.
     """
     components = msgspec.json.schema(kind, schema_hook=_schema_of_other_types)["$defs"]
     definitions: dict[str, Node] = {name: _tidy(node) for name, node in components.items()}
@@ -57,15 +52,7 @@ def json_schema(kind: type[Artefact]) -> Node:
 
 
 def node_at(schema: Node, path: list[str | int]) -> Node:
-    """Return the node of the value at a path of keys and indices, without references and without "or null".
-
-    Parameters
-    ----------
-    schema : dict
-        Of `json_schema`.
-    path : list of str or int
-        Keys and indices, from the root on.
-    """
+    """Return the node of the value at a path of keys and indices, without references and without "or null"."""
     node = _resolved(schema, schema)
     for step in path:
         if isinstance(step, int):

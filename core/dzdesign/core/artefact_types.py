@@ -93,15 +93,9 @@ def quantity(
 ) -> Meta:
     """Return the metadata of a physical quantity, for an annotation.
 
-    Parameters
-    ----------
-    unit : str
-        As a person writes it, such as ``L/min``; ``1`` of a ratio.
-    description : str, optional
-        One sentence; a type of several fields leaves it to them.
-    ge, gt, le, lt : float, optional
-        Bounds: at least, above, at most, below. Only of an ``int`` or a ``float``; those of the items of a list stand
-        in the annotation of the item.
+    The unit is as a person writes it, such as ``L/min``; ``1`` of a ratio. The description is one sentence; a type of
+    several fields leaves it to them. Bounds (at least, above, at most, below) are only of an ``int`` or a ``float``;
+    those of the items of a list stand in the annotation of the item.
 
     Examples
     --------
@@ -137,12 +131,7 @@ def as_document(artefact: object) -> dict[str, Any]:
 def to_json_bytes(artefact: Artefact) -> bytes:
     """Return an artefact as the bytes of its file; the same artefact gives the same bytes.
 
-    Raises
-    ------
-    ValueError
-        If a number is NaN or infinite.
-    TypeError
-        If a value is of a type that no artefact has, such as a NumPy number.
+    A number that is NaN or infinite is a ValueError; a type that no artefact has, such as a NumPy number, a TypeError.
     """
     return to_json(as_document(artefact)).encode()
 

@@ -73,11 +73,8 @@ def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 def parse_document(content: bytes, source: str, schemas: tuple[str, ...]) -> dict[str, Any]:
     """Read a JSON artefact and check that its schema is one of `schemas`.
 
-    Raises
-    ------
-    InputError
-        If it is no JSON object in UTF-8, holds what can't be written again (NaN, half a character) or a key twice, or
-        has another schema.
+    Refused is what is no JSON object in UTF-8, holds a key twice or what can't be written again (NaN, half a
+    character), or has another schema.
     """
     expected = " or ".join(f"{schema}{_writer(schema)}" for schema in schemas)
     try:
@@ -99,10 +96,15 @@ def parse_document(content: bytes, source: str, schemas: tuple[str, ...]) -> dic
         found = document.get("schema")
         if found in schemas:
             return document
-    same_kind = next((schema for schema in schemas if str(found).partition("/")[0] == schema.partition("/")[0]), None)
+    same_kind = next((schema for schema in schemas if family_of(found) == family_of(schema)), None)
     command = written_by(same_kind) if same_kind else None
     remedy = f"make it again with `{command}` of this version" if command else "give another file"
     raise InputError(f"'{source}' has the schema {str(found)[:QUOTED]!r}, expected {expected}; {remedy}")
+
+
+def family_of(schema: object) -> str:
+    """Return a schema's name without its version: ``dzdesign.valve`` of ``dzdesign.valve/1``."""
+    return str(schema).partition("/")[0]
 
 
 def _writer(schema: str) -> str:
@@ -118,7 +120,7 @@ def written_by(schema: str) -> str | None:
     >>> written_by("dzdesign.valve/1")
     'dzdesign identify'
     """
-    return WRITTEN_BY.get(schema.partition("/")[0])
+    return WRITTEN_BY.get(family_of(schema))
 
 
 def _refuse_deep(document: Any) -> None:

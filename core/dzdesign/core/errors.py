@@ -77,10 +77,7 @@ def clear_line(text: str) -> str:
 def neighbour(path: str | os.PathLike[str]) -> str:
     """Return `` (did you mean 'x'?)`` for what lies in the same folder under nearly that name, or an empty string.
 
-    Parameters
-    ----------
-    path : path-like
-        What does not exist; where its folder does not either, that folder's neighbours are looked at.
+    Where the folder of what is missing does not exist either, that folder's neighbours are looked at.
     """
     place, below = os.fspath(path), ""
     while place and not os.path.lexists(place):

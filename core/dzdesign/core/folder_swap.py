@@ -28,12 +28,8 @@ def beside(path: Path, kind: str = "new") -> Path:
 def alone_in(folder: Path) -> Iterator[None]:
     """Keep other processes of dzdesign from exchanging folders in `folder` meanwhile, where the system has such locks.
 
-    The lock goes with the process, however it ends; no file is made for it.
-
-    Raises
-    ------
-    OSError
-        If another one holds it for `LOCK_PATIENCE_S`.
+    The lock goes with the process, however it ends; no file is made for it. If another one holds it for
+    `LOCK_PATIENCE_S`, that is an OSError.
     """
     try:
         import fcntl

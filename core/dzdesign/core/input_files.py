@@ -6,13 +6,14 @@ for it may have no end.
 
 import contextlib
 import io
+import json
 import logging
 import os
 import stat
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from dzdesign.core.errors import InputError, neighbour
 
@@ -29,20 +30,7 @@ logger = logging.getLogger(__name__)
 
 
 def read_bytes(path: Path, what: str) -> bytes:
-    """Read a whole file, or say in one sentence why it can't be read.
-
-    Parameters
-    ----------
-    path : Path
-        Of a document: options, plant, an artefact.
-    what : str
-        What it is to be, for the message.
-
-    Raises
-    ------
-    InputError
-        If it is not there, no file, or larger than `MOST_DOCUMENT`.
-    """
+    """Read a whole document (options, plant, artefact), or say in one sentence why that fails; `what` names it."""
     with _refusing(path, what):
         if _is_pipe(path, what):
             return _piped(path, what, MOST_DOCUMENT)
@@ -56,21 +44,27 @@ def read_bytes(path: Path, what: str) -> bytes:
     return content
 
 
+def json_object(path: Path) -> dict[str, Any] | None:
+    """Return the JSON object that a file holds, or None if it holds anything else; a long measurement is not read."""
+    try:
+        if not path.is_file() or path.stat().st_size > MOST_DOCUMENT:
+            return None
+        document = json.loads(path.read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return None
+    return document if isinstance(document, dict) else None
+
+
+def reason_of(error: OSError | ValueError) -> str:
+    """Return why a file can't be read or written: the system's own words, where it has some."""
+    return getattr(error, "strerror", None) or str(error)
+
+
 @contextlib.contextmanager
 def open_bytes(path: Path, what: str) -> Iterator[BinaryIO]:
-    """Open a file that may be larger than memory; or say in one sentence why it can't be read.
+    """Open a recording that may be larger than memory, or say in one sentence why it can't be read; `what` names it.
 
-    Parameters
-    ----------
-    path : Path
-        Of a recording.
-    what : str
-        What it is to be, for the message.
-
-    Raises
-    ------
-    InputError
-        If it can't be read, or was changed until the context is left: what was computed of it is then of no one file.
+    One that is changed until the context is left is refused: what was computed of it is then of no one file.
     """
     with _refusing(path, what):
         piped = _is_pipe(path, what)

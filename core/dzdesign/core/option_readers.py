@@ -14,15 +14,7 @@ def quantity(kind: str) -> Callable[[str, str], float]:
 
 
 def number(expected: str, between: tuple[float, float] | None = None) -> Callable[[str | float, str], float]:
-    """Return what reads a number without a unit.
-
-    Parameters
-    ----------
-    expected : str
-        For the message, such as ``a number such as 0.99``.
-    between : tuple of float, optional
-        Every number lies between these.
-    """
+    """Return what reads a number without a unit, inside `between`; a message says what is `expected`."""
 
     def read(text: str | float, option: str) -> float:
         with contextlib.suppress(ValueError):
@@ -35,15 +27,7 @@ def number(expected: str, between: tuple[float, float] | None = None) -> Callabl
 
 
 def whole_number(expected: str, least: int = 0, digits: int = 6) -> Callable[[str | int, str], int]:
-    """Return what reads a whole number.
-
-    Parameters
-    ----------
-    expected : str
-        For the message, such as ``a number of processes such as 4``.
-    least, digits : int
-        Smallest number, and how many digits the largest has.
-    """
+    """Return what reads a whole number of at most so many digits; a message says what is `expected`."""
 
     def read(text: str | int, option: str) -> int:
         if not re.fullmatch(rf"\d{{1,{digits}}}", str(text), re.ASCII) or int(text) < least:
@@ -54,13 +38,7 @@ def whole_number(expected: str, least: int = 0, digits: int = 6) -> Callable[[st
 
 
 def percent_range(of: str) -> Callable[[str, str], tuple[float, float]]:
-    """Return what reads two percentages such as ``12-50``, as shares.
-
-    Parameters
-    ----------
-    of : str
-        For the message: of what, and an example.
-    """
+    """Return what reads two percentages such as ``12-50``, as shares; `of` says of what, with an example."""
     # Digits and blanks without an end would be matched in the square of their number.
     digits = r"\s{0,9}(\d{1,9}(?:\.\d{0,15})?)\s{0,9}%?\s{0,9}"
 

@@ -177,13 +177,7 @@ def _docstrings_in(module: str) -> dict[str, dict[str, str]]:
 
 
 def read_options(arguments: Any, names: Iterable[str]) -> dict[str, Any]:
-    """Return options by name, each read; None where one is not given and has no default.
-
-    Raises
-    ------
-    InputError
-        If one can't be read; it is named.
-    """
+    """Return options by name, each read; None where one is not given and has no default."""
     declaration: type = type(arguments)
     known, values = {argument.name: argument for argument in arguments_of(declaration)}, {}
     for name in names:

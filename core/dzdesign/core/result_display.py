@@ -19,13 +19,7 @@ _DISPLAY = _Display()
 def display_by(
     *, heading: Callable[[object], str], text: Callable[[object], str], html: Callable[[object], str]
 ) -> None:
-    """Set how results are displayed.
-
-    Parameters
-    ----------
-    heading, text, html : callable
-        Of a result: one line, some lines of plain text, and HTML in which every text from a file is escaped.
-    """
+    """Set how a result is displayed: one line, some lines of plain text, and HTML with every text escaped."""
     _DISPLAY.heading, _DISPLAY.text, _DISPLAY.html = heading, text, html
 
 

@@ -64,19 +64,9 @@ def _registry() -> "pint.UnitRegistry":
 
 
 def si_factor(unit: str, quantity: str) -> float:
-    """Return the factor that turns a value in `unit` into the SI unit of `quantity`.
+    """Return the factor that turns a value in `unit` into the SI unit of `quantity`, a key of `SI_UNIT`.
 
-    Parameters
-    ----------
-    unit : str
-        A unit as written by a person or a data logger: ``"bar"``, ``"L/min"``, ``"Lmin"``.
-    quantity : str
-        A key of `SI_UNIT`.
-
-    Raises
-    ------
-    InputError
-        If the unit is unknown or does not measure `quantity`.
+    A unit is as a person or a data logger writes it: ``"bar"``, ``"L/min"``, ``"Lmin"``.
 
     Examples
     --------
@@ -96,14 +86,7 @@ def si_factor(unit: str, quantity: str) -> float:
 
 @lru_cache(maxsize=1024)
 def measures(unit: str, quantity: str) -> bool:
-    """Tell whether a text is a unit of a quantity.
-
-    Parameters
-    ----------
-    unit : str
-        As for `si_factor`.
-    quantity : str
-        A key of `SI_UNIT`.
+    """Tell whether a text is a unit of a quantity, a key of `SI_UNIT`.
 
     Examples
     --------
@@ -142,21 +125,10 @@ def _near_unit(unit: str, quantity: str) -> str:
 
 
 def refuse_thousands(text: str, what: str, *, points: bool = False) -> None:
-    """Refuse a number whose comma may be a decimal one or stand between thousands.
+    """Refuse a number whose comma may be a decimal one or stand between thousands, as in ``2,000``.
 
-    Parameters
-    ----------
-    text : str
-        In which the number stands.
-    what : str
-        Begins the message, such as ``--dp is '2,000 kPa'``.
-    points : bool
-        Whether a point is in doubt too, as in a range that is copied from a data sheet: ``0..25.000 kPa``.
-
-    Raises
-    ------
-    InputError
-        If a comma stands before three digits, as in ``2,000``; ``0,125`` and ``2,0`` can only be decimals.
+    ``0,125`` and ``2,0`` can only be decimals. With `points`, a point is in doubt too, as in a range that is copied
+    from a data sheet: ``0..25.000 kPa``. `what` begins the message, such as ``--dp is '2,000 kPa'``.
     """
     found = THOUSANDS[","].search(text) or (THOUSANDS["."].search(text) if points else None)
     if found:
@@ -165,21 +137,7 @@ def refuse_thousands(text: str, what: str, *, points: bool = False) -> None:
 
 
 def parse_quantity(text: str, quantity: str, option: str) -> float:
-    """Read a number with its unit, such as ``"0.6 L/min"``, and return it in SI.
-
-    Parameters
-    ----------
-    text : str
-        Number, then unit.
-    quantity : str
-        A key of `SI_UNIT`.
-    option : str
-        The option or key the text came from, for the message.
-
-    Raises
-    ------
-    InputError
-        If the number or the unit can't be read, or the number may be 2000 or 2.0.
+    """Read a number with its unit, such as ``"0.6 L/min"``, and return it in SI; a message names the `option`.
 
     Examples
     --------
@@ -212,13 +170,6 @@ def parse_quantity(text: str, quantity: str, option: str) -> float:
 def span_MPa(low: float, high: float, digits: int = 2) -> str:
     """Say between which pressure drops something holds, or at which one.
 
-    Parameters
-    ----------
-    low, high : float
-        Ends, MPa.
-    digits : int
-        Decimals.
-
     Examples
     --------
     >>> span_MPa(1.0, 4.0), span_MPa(0.9993, 0.9993)
@@ -230,10 +181,6 @@ def span_MPa(low: float, high: float, digits: int = 2) -> str:
 
 def chance(p: float) -> str:
     """Say a p-value; one so small that only rounding is in its digits is said to be below.
-
-    Parameters
-    ----------
-    p : float
 
     Examples
     --------

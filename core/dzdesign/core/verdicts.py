@@ -4,12 +4,7 @@ HOLDS, DOES_NOT_HOLD, NOT_CHECKED = "HOLDS", "DOES NOT HOLD", "NOT CHECKED"
 
 
 def verdict_words(holds: bool | None) -> str:
-    """Return what a verdict is called.
-
-    Parameters
-    ----------
-    holds : bool or None
-        Whether a requirement holds; None: it was not checked.
+    """Return what a verdict is called; None was not checked.
 
     Examples
     --------

@@ -23,23 +23,6 @@ _LAW_SYMBOLS = {u_i, beta, k, x_max, u_max, u_min0}
 class Law:
     """A compensation law ``u_O = gain * u_i + offset`` for positive commands.
 
-    Parameters
-    ----------
-    name : str
-        What `law` and the command line call it: the name of its file in `laws/`.
-    equation : str
-        The equation that states it.
-    output : sympy.Expr
-        The compensator's output u_O [V] in `u_i`, `beta`, `k`, `x_max`, `u_max` and `u_min0`.
-    rises_if : sympy relational, optional
-        What more command gives more drive on; always, unless given.
-    note : str
-        What the law does and does not achieve.
-    statements : tuple of Statement
-        What it is in the account of the paper; our choice, unless given.
-    stated_as : str
-        Number of the statement that ends its derivation in a report; the last of `statements`, unless given.
-
     Raises
     ------
     ValueError
@@ -47,12 +30,19 @@ class Law:
         the firmware's zero band rest on, or names another symbol; if `rises_if` is not the sign of the gain.
     """
 
+    #: What `law` and the command line call it: the name of its file in `laws/`.
     name: str
+    #: The equation that states it.
     equation: str
+    #: The compensator's output u_O [V] in `u_i`, `beta`, `k`, `x_max`, `u_max` and `u_min0`.
     output: sympy.Expr
+    #: What more command gives more drive on; always, unless given.
     rises_if: Relational | BooleanTrue = sympy.true
+    #: What the law does and does not achieve.
     note: str
+    #: What it is in the account of the paper; our choice, unless given.
     statements: tuple[Statement, ...] = ()
+    #: Number of the statement that ends its derivation in a report; the last of `statements`, unless given.
     stated_as: str = ""
 
     def __post_init__(self) -> None:
@@ -93,19 +83,9 @@ class Law:
         return sympy.expand(self.gain).coeff(beta, power)
 
     def evaluate_gain(self, beta: Any, kappa: Any) -> Any:
-        """Return the gain for numbers of any kind.
+        """Return the gain for numbers of any kind: fractions stay exact, arrays and CasADi expressions what they are.
 
-        Parameters
-        ----------
-        beta : number or array
-            Correction coefficient at the present pressure drop, Eq. (5).
-        kappa : number or array
-            k x_max / u_max, dimensionless.
-
-        Returns
-        -------
-        number or array
-            Of the kind that came in: fractions stay exact, arrays and CasADi expressions stay what they are.
+        `beta` is Eq. (5) at the present pressure drop; `kappa` is k x_max / u_max, dimensionless.
 
         Examples
         --------
@@ -116,19 +96,9 @@ class Law:
         return _compiled_gain(self)(beta, kappa)
 
     def evaluate_offset(self, beta: Any, u_min0: Any) -> Any:
-        """Return the output at zero command for numbers of any kind.
+        """Return the output at zero command for numbers of any kind, in the unit of `u_min0`, V or any unit of command.
 
-        Parameters
-        ----------
-        beta : number or array
-            Correction coefficient at the present pressure drop, Eq. (5).
-        u_min0 : number or array
-            Dead-zone threshold at the reference pressure drop, in V or in any unit of command.
-
-        Returns
-        -------
-        number or array
-            In the unit of `u_min0` and of the kind that came in.
+        `beta` is Eq. (5) at the present pressure drop; `u_min0` is the dead-zone threshold at the reference one.
 
         Examples
         --------
@@ -150,21 +120,7 @@ def _compiled_offset(law: Law) -> Callable[..., Any]:
 
 
 def law(name: str) -> Law:
-    """Return the law of that name.
-
-    Parameters
-    ----------
-    name : str
-        One of `LAW_NAMES`.
-
-    Returns
-    -------
-    Law
-
-    Raises
-    ------
-    InputError
-        If there is no law of that name; the message gives the nearest one.
+    """Return the law of that name, one of `LAW_NAMES`.
 
     Examples
     --------

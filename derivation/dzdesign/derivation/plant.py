@@ -37,12 +37,9 @@ class StateDerivatives(NamedTuple):
 
 @cache
 def state_derivatives() -> StateDerivatives:
-    """Solve Eqs. (19)-(23) for the derivatives of the state.
+    """Solve Eqs. (19)-(23) for the derivatives of the state, in `STATE`, `INPUTS` and `PARAMETERS`.
 
-    Returns
-    -------
-    StateDerivatives
-        In `STATE`, `INPUTS` and `PARAMETERS`; `u_i` [V] is the amplifier's input, `f_eL` [N] the load force.
+    `u_i` [V] is the amplifier's input, `f_eL` [N] the load force.
 
     Examples
     --------
@@ -58,33 +55,19 @@ def state_derivatives() -> StateDerivatives:
 
 @cache
 def flow() -> sympy.Expr:
-    """Return the flow of Eq. (24) [m^3/s] in `x_e` and `FLOW_PARAMETERS`.
-
-    Returns
-    -------
-    sympy.Expr
-    """
+    """Return the flow of Eq. (24) [m^3/s] in `x_e` and `FLOW_PARAMETERS`."""
     return sympy.solve(PLANT_EQUATIONS["(24)"], Q)[0]
 
 
 @cache
 def steady_state_current() -> sympy.Expr:
-    """Return the coil current [A] at rest, in `u_i` and `PARAMETERS`.
-
-    Returns
-    -------
-    sympy.Expr
-    """
+    """Return the coil current [A] at rest, in `u_i` and `PARAMETERS`."""
     return sympy.solve(state_derivatives().di_dt, i)[0]
 
 
 @cache
 def current_time_constant() -> sympy.Expr:
     """Return the time constant [s] of the current loop, in `PARAMETERS`.
-
-    Returns
-    -------
-    sympy.Expr
 
     Examples
     --------

@@ -37,17 +37,9 @@ class Line(NamedTuple):
 
 @cache
 def law_in_counts(law: Law) -> Line:
-    """Put the scaling into a law's output: from the command's code to the compare value.
+    """Put the scaling into the output of a law, stated in volts: from the command's code to the compare value.
 
-    Parameters
-    ----------
-    law : Law
-        Any law, stated in volts.
-
-    Returns
-    -------
-    Line
-        SymPy expressions in `beta`, `kappa` (k x_max/u_max), `mu` (u_min0/u_max), `n_adc` and `n_full`.
+    The expressions are in `beta`, `kappa` (k x_max/u_max), `mu` (u_min0/u_max), `n_adc` and `n_full`.
 
     Examples
     --------
@@ -62,23 +54,10 @@ def law_in_counts(law: Law) -> Line:
 
 
 def evaluate_line(law: Law, *, beta: Any, kappa: Any, u_min0_over_u_max: Any, n_adc: Any, n_full: Any) -> Line:
-    """Return the law in counts for numbers of any kind.
+    """Return the law in counts for numbers of any kind; not rounded, not limited to 0...n_full.
 
-    Parameters
-    ----------
-    law : Law
-        Any law.
-    beta : number or array
-        Correction coefficient at the present pressure drop, Eq. (5).
-    kappa, u_min0_over_u_max : number or array
-        k x_max / u_max and u_min0 / u_max, dimensionless.
-    n_adc, n_full : number
-        Code of full command, and compare value of full drive.
-
-    Returns
-    -------
-    Line
-        Of the kind that came in; not rounded, not limited to 0...n_full.
+    `beta` is Eq. (5) at the present pressure drop; `kappa` and `u_min0_over_u_max` are dimensionless; `n_adc` is the
+    code of full command, `n_full` the compare value of full drive.
 
     Examples
     --------
@@ -97,18 +76,7 @@ def _lowered_line(line: Line) -> Callable[..., Any]:
 
 
 def drive(counts: Any, n_full: Any) -> Any:
-    """Return u_O/u_max of a compare value, for numbers of any kind.
-
-    Parameters
-    ----------
-    counts : number or array
-        Compare value, rounded or not.
-    n_full : number
-        Compare value of full drive.
-
-    Returns
-    -------
-    number or array
+    """Return u_O/u_max of a compare value, rounded or not, for numbers of any kind.
 
     Examples
     --------
@@ -125,21 +93,9 @@ def _lowered_drive() -> Callable[..., Any]:
 
 
 def pressure_drop(dp_code: Any, *, span: Any, code_max: Any) -> Any:
-    """Return the pressure drop that a difference of pressure codes stands for, for numbers of any kind.
+    """Return the pressure drop that a difference of pressure codes, A less B, stands for, for numbers of any kind.
 
-    Parameters
-    ----------
-    dp_code : number or array
-        Code of sensor A less that of sensor B.
-    span : number
-        Span of both sensors, in any unit of pressure.
-    code_max : number
-        Code of the full span.
-
-    Returns
-    -------
-    number or array
-        In the unit of `span`.
+    It is in the unit of `span`, which both sensors have; `code_max` is the code of the full span.
 
     Examples
     --------
@@ -155,20 +111,7 @@ def _lowered_pressure_drop() -> Callable[..., Any]:
 
 
 def pressure_drop_code(pressure_drop: Any, *, span: Any, code_max: Any) -> Any:
-    """Return the difference of pressure codes that a pressure drop makes, not rounded, for numbers of any kind.
-
-    Parameters
-    ----------
-    pressure_drop : number or array
-        In the unit of `span`.
-    span : number
-        Span of both sensors.
-    code_max : number
-        Code of the full span.
-
-    Returns
-    -------
-    number or array
+    """Return the difference of pressure codes that a pressure drop makes: the inverse of `pressure_drop`, not rounded.
 
     Examples
     --------

@@ -21,23 +21,15 @@ Name: TypeAlias = sympy.Symbol | sympy.core.function.AppliedUndef
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Quantity:
-    """What is known of a symbol.
+    """What is known of a symbol."""
 
-    Attributes
-    ----------
-    unit : str
-        As pint reads it; counts are ``code``.
-    meaning : str
-        In a few words, which may name other symbols.
-    latex : str
-        How it looks, where its name does not spell it.
-    varies : bool
-        Whether it varies with time, or is what a formula is a function of.
-    """
-
+    #: As pint reads it; counts are ``code``.
     unit: str
+    #: In a few words, which may name other symbols.
     meaning: str
+    #: How it looks, where its name does not spell it.
     latex: str = ""
+    #: Whether it varies with time, or is what a formula is a function of.
     varies: bool = False
 
 

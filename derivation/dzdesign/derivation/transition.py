@@ -29,21 +29,8 @@ def evaluate_transition(
 ) -> Any:
     """Return by how many counts the transition lowers the opening law, for numbers of any kind.
 
-    Parameters
-    ----------
-    beta_opening, beta_closing : number or array
-        Offsets of the two thresholds over the law's u_min0.
-    u_min0_over_u_max : number or array
-        The law's u_min0, dimensionless.
-    share_of_transition : number or array
-        u_i/u_t, from 0 to 1; beyond the transition there is nothing to lower.
-    n_full : number
-        Compare value of full drive.
-
-    Returns
-    -------
-    number or array
-        Of the kind that came in.
+    The betas are the offsets of the two thresholds over the law's u_min0; `share_of_transition` is u_i/u_t, from 0 to
+    1: beyond the transition there is nothing to lower. Full drive is `n_full` counts.
 
     Examples
     --------

@@ -21,42 +21,27 @@ SOLVER_MARGIN = 1e-7
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OffsetCeiling:
-    """Largest offset over u_max that the certificate allows, at every difference of pressure codes 0...code_max.
+    """Largest offset over u_max that the certificate allows, at every difference of pressure codes 0...code_max."""
 
-    Attributes
-    ----------
-    limit : tuple of Fraction
-        Limit at each code, exact: the least over the pressures that the code may stand for.
-    certified : range
-        Codes inside the tested interval of the pressure drop.
-    """
-
+    #: Limit at each code, exact: the least over the pressures that the code may stand for.
     limit: tuple[Fraction, ...]
+    #: Codes inside the tested interval of the pressure drop.
     certified: range
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OffsetCurve:
-    """An offset over the pressure drop and the bounds that hold it, exactly from the decimal numbers of valve.json.
+    """An offset over the pressure drop and the bounds that hold it, exactly from the decimal numbers of valve.json."""
 
-    Attributes
-    ----------
-    dp_MPa : tuple of Fraction
-        Tested pressure drops, rising.
-    offset_V : tuple of Fraction
-        Offset at each; straight between them.
-    steps_V : tuple of Fraction
-        Lower bounds of the guarded threshold between neighbouring tests (one fewer); empty from one test.
-    lowest_V : Fraction
-        The lowest bound of all tests.
-    hold_below_MPa : Fraction or None
-        Up to this dP0 the offset is at most the one there, as Eq. (7) holds beta = 1; None follows the tests.
-    """
-
+    #: Tested pressure drops, rising.
     dp_MPa: tuple[Fraction, ...]
+    #: Offset at each; straight between them.
     offset_V: tuple[Fraction, ...]
+    #: Lower bounds of the guarded threshold between neighbouring tests (one fewer); empty from one test.
     steps_V: tuple[Fraction, ...]
+    #: The lowest bound of all tests.
     lowest_V: Fraction
+    #: Up to this dP0 the offset is at most the one there, as Eq. (7) holds beta = 1; None follows the tests.
     hold_below_MPa: Fraction | None
 
     def at(self, dp_MPa: Fraction) -> Fraction:
@@ -94,15 +79,7 @@ class OffsetCurve:
 
 @lru_cache(maxsize=8)
 def pressures_MPa(signals: Signals, first: int, last: int) -> tuple[Fraction, ...]:
-    """Return the pressure drops of all differences of codes, MPa, exactly; kept, for a batch of valves has one scaling.
-
-    Parameters
-    ----------
-    signals : Signals
-        Scalings.
-    first, last : int
-        Differences of pressure codes.
-    """
+    """Return the pressure drops of differences of codes, MPa, exactly; kept, for a batch of valves has one scaling."""
     return tuple(signals.dp_MPa(code) for code in range(first, last + 1))
 
 
@@ -111,23 +88,8 @@ def offset_ceiling(
 ) -> OffsetCeiling:
     """Return the limit of the offset at every pressure code, the converter's error and the rounding counted.
 
-    Parameters
-    ----------
-    curve : OffsetCurve
-        Certified offset and bounds.
-    signals : Signals
-        Scalings.
-    u_max_V : Fraction
-        Full command.
-    sign : {1, -1}
-        Sign of the command.
-    reserve : Fraction
-        Of u_max, to keep free beside the rounding: the dither's peak.
-
-    Raises
-    ------
-    RequirementError
-        If the identified curve itself lies above the staircase somewhere: valve.json contradicts itself.
+    `reserve`, of u_max, is kept free beside the rounding: the dither's peak. A curve that lies above the staircase of
+    its bounds somewhere is refused: valve.json contradicts itself.
     """
     first, last = (signals.dp_code(end) for end in (curve.dp_MPa[0], curve.dp_MPa[-1]))
     code_max = signals.largest_difference(sign)

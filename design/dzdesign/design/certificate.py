@@ -10,7 +10,7 @@ from fractions import Fraction
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.beta_table import STEP_CODES, OffsetCeiling, OffsetCurve, offset_ceiling
 from dzdesign.design.compensator import Certificate, Compensator
-from dzdesign.design.signals import Signals
+from dzdesign.design.signals import SIDE_NAMES, Signals
 from dzdesign.identify.valve.guard_curve import Guard, GuardCurve
 from dzdesign.identify.valve.side_model import SideModel
 
@@ -32,29 +32,9 @@ def certify(
 ) -> Certificate:
     """Prove the certificate of one side, in exact arithmetic, at every pressure code.
 
-    Parameters
-    ----------
-    side : SideModel
-        What was identified.
-    curve, ceiling : OffsetCurve, OffsetCeiling
-        `guarded_curve`, and what `offset_ceiling` leaves of it for the converter's error, rounding and dither.
-    guard : str
-        The threshold that is protected.
-    signals : Signals
-        Scalings.
-    u_max_V : Fraction
-        Full command.
-    u_min0 : Fraction
-        Of the law, over u_max.
-    table : tuple of int
-        Nodes of beta over `denominator`.
-    denominator : int
-        Unit of the nodes.
-
-    Raises
-    ------
-    RequirementError
-        If the offset exceeds the ceiling anywhere.
+    The `curve` is the guarded one; the `ceiling` is what the converter's error, rounding and dither leave of it. The
+    table is of nodes of beta over `denominator`, `u_min0` is the law's over u_max. An offset above the ceiling is
+    refused.
     """
     losses = _losses_V(curve, ceiling, signals, table, u_min0 * u_max_V / denominator)
     return Certificate(
@@ -69,16 +49,10 @@ def certify(
 
 
 def prove_certificates(compensator: Compensator) -> None:
-    """Prove the certificates of a compensator again, from the valve in it.
-
-    Raises
-    ------
-    InputError
-        If one does not follow, with the first statement that differs.
-    """
+    """Prove the certificates of a compensator again, from the valve in it; refuse the first statement that differs."""
     signals, dither = compensator.signals, compensator.drive_functions.dither_counts
     for sign in signals.signs:
-        name = "positive" if sign > 0 else "negative"
+        name = SIDE_NAMES[sign]
         law, model = compensator.side(sign), compensator.valve.sides.get(name)
         if model is None:
             raise InputError(f"the compensator drives the {name} side, but its valve has none; design it again")
@@ -116,13 +90,7 @@ def _words(value: object) -> str:
 
 
 def guarded_curve(side: SideModel, guard: str, below_dp0: str) -> OffsetCurve:
-    """Return the certified offset of the threshold that is to be guarded.
-
-    Raises
-    ------
-    InputError
-        If the valve has no curve for that guard; why, and what to do.
-    """
+    """Return the certified offset of the threshold that is to be guarded, or say what to do if there is none."""
     if not side.beta.dp_MPa:
         raise InputError(
             "the valve was identified without a pressure drop, so no offset can be certified at any pressure; "

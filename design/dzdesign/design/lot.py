@@ -16,23 +16,15 @@ NAMED = 5
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LotMargin:
-    """How far the offset of a lot setting stays under the bound of one valve.
+    """How far the offset of a lot setting stays under the bound of one valve."""
 
-    Attributes
-    ----------
-    name : str
-        Of the valve.
-    sign : {1, -1}
-        Of the command, where that is least.
-    dp_MPa : Fraction
-        Pressure drop, where it is least.
-    margin_V : Fraction
-        The least distance; negative of a valve that is over-compensated.
-    """
-
+    #: Of the valve.
     name: str
+    #: Of the command, where that is least.
     sign: int
+    #: Pressure drop, where it is least.
     dp_MPa: Fraction
+    #: The least distance; negative of a valve that is over-compensated.
     margin_V: Fraction
 
 
@@ -40,11 +32,6 @@ def lot_margins(compensator: Compensator) -> tuple[LotMargin, ...]:
     """Return each valve's margin, exactly, at every code of its own tested interval, worst side, worst code.
 
     A code stands for all pressures that may have made it; rounding and dither count as drive.
-
-    Parameters
-    ----------
-    compensator : Compensator
-        A lot setting with its lot.
     """
     signals = compensator.signals
     dither = Fraction(compensator.drive_functions.dither_counts, signals.compare_max)
@@ -57,7 +44,7 @@ def lot_margins(compensator: Compensator) -> tuple[LotMargin, ...]:
         scale = compensator.beta_denominator * compensator.beta_step_codes
         unit_V = law.u_min0_over_u_max * compensator.u_max_V / scale
         for valve in compensator.lot:
-            side = valve.positive if sign > 0 else valve.negative
+            side = valve.side(sign)
             if side is None:
                 raise InputError(f"'{valve.name}' of the lot has no bounds of the negative side; run `batch` again")
             for left, right, bound in side.steps():
@@ -85,13 +72,7 @@ def _numerators(nodes: Sequence[int], step: int, last: int) -> np.ndarray:
 
 
 def prove_lot(compensator: Compensator) -> tuple[LotMargin, ...]:
-    """Prove that a lot setting over-compensates no valve of its lot, and return the margins.
-
-    Raises
-    ------
-    RequirementError
-        If it does, with the valves' names, the worst first.
-    """
+    """Prove that a lot setting over-compensates no valve of its lot, and return the margins."""
     margins = lot_margins(compensator)
     above = sorted((each for each in margins if each.margin_V < 0), key=lambda each: each.margin_V)
     if above:

@@ -25,7 +25,7 @@ from dzdesign.design.designing import over, prove_monotone, travel
 from dzdesign.design.lot import LotMargin, prove_lot
 from dzdesign.design.lot_valves import LotValve
 from dzdesign.design.quantise import finest_units
-from dzdesign.design.signals import Signals
+from dzdesign.design.signals import SIDE_NAMES, Signals
 from dzdesign.identify.valve.side_model import SideModel
 
 #: Of u_max: a ceiling that is nowhere this near to the least one can't be the least by a rounding error (1e-12).
@@ -38,29 +38,19 @@ SHARED = ("law", "below_dp0", "signals", "u_max_V", "beta_denominator", "transit
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LotSetting:
-    """One compensator for all valves.
+    """One compensator for all valves."""
 
-    Attributes
-    ----------
-    compensator : Compensator
-        The common law; the valve in it is the carrier's.
-    carrier : str
-        Name of the valve whose trend the law follows and whose certificate the file states.
-    dp_MPa : tuple of float
-        Pressure drops that every valve was tested over: inside, the setting is certified for each of them.
-    binding : tuple of str
-        Valves that hold the offset down somewhere; for these `proved` has an exact certificate.
-    proved : mapping of str to tuple of Certificate
-        Name to a certificate per sign of command.
-    margins : tuple of LotMargin
-        Of every valve of the batch: how far the offset stays under its bound.
-    """
-
+    #: The common law; the valve in it is the carrier's.
     compensator: Compensator
+    #: Name of the valve whose trend the law follows and whose certificate the file states.
     carrier: str
+    #: Pressure drops that every valve was tested over: inside, the setting is certified for each of them.
     dp_MPa: tuple[float, float]
+    #: Valves that hold the offset down somewhere; for these `proved` has an exact certificate.
     binding: tuple[str, ...]
+    #: Name to a certificate per sign of command.
     proved: Mapping[str, tuple[Certificate, ...]]
+    #: Of every valve of the batch: how far the offset stays under its bound.
     margins: tuple[LotMargin, ...]
 
     @property
@@ -84,18 +74,8 @@ class _Side:
 def lot_setting(batch: Mapping[str, Compensator]) -> LotSetting:
     """Return the largest setting, under one direction of the threshold, that is certified for every valve.
 
-    Parameters
-    ----------
-    batch : mapping of str to Compensator
-        Name of a valve to its own compensator; two at least.
-
-    Raises
-    ------
-    InputError
-        If there is no such setting: valves designed with other options, without a common pressure drop, or with an
-        transition, whose end is no bound.
-    RequirementError
-        If a proof fails.
+    The batch gives each valve's own compensator by its name. Refused are valves designed with other options, without a
+    common pressure drop, or with a transition, whose end is no bound.
     """
     first = _shared_design(batch)
     sides = [_side(batch, first, sign) for sign in first.signals.signs]
@@ -181,10 +161,9 @@ def _common_interval(sides: Iterable[Mapping[str, OffsetCurve]]) -> tuple[float,
 
 def _side(batch: Mapping[str, Compensator], first: Compensator, sign: int) -> _Side:
     """Find the least ceiling of one sign of command: in doubles over all valves, exactly over those near it."""
-    label = "positive" if sign > 0 else "negative"
     signals, u_max = first.signals, first.u_max_V
     reserve = Fraction(first.drive_functions.dither_counts, signals.compare_max)
-    models = {name: each.valve.sides[label] for name, each in batch.items()}
+    models = {name: each.valve.sides[SIDE_NAMES[sign]] for name, each in batch.items()}
     guard = first.side(sign).certificate.guard
     curves = {name: guarded_curve(model, guard, first.below_dp0) for name, model in models.items()}
     low, high = _common_interval([curves])

@@ -27,25 +27,17 @@ EXAMPLE = "'0..10 V x 0.3', '-10..10 V x 0.15 + 1.5 V' or '4..20 mA on 150 ohm =
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PinSignal:
-    """A signal's ends in its own unit, and the straight line from there to the voltage at the converter's pin.
+    """A signal's ends in its own unit, and the straight line from there to the voltage at the converter's pin."""
 
-    Attributes
-    ----------
-    text : str
-        As it was written, for messages.
-    low, high : Fraction
-        Ends of the span, in V or A.
-    volts_per_unit, offset_V : Fraction
-        Of the line.
-    span_MPa : Fraction or None
-        Pressure at `high`, where it was given.
-    """
-
+    #: As it was written, for messages.
     text: str
+    #: Ends of the span, in V or A.
     low: Fraction
     high: Fraction
+    #: Of the line.
     volts_per_unit: Fraction
     offset_V: Fraction
+    #: Pressure at `high`, where it was given.
     span_MPa: Fraction | None
 
     def volts(self, value: Fraction) -> Fraction:
@@ -73,19 +65,7 @@ class PinSignal:
 
 
 def parse_signal(text: str, option: str) -> PinSignal:
-    """Read a signal.
-
-    Parameters
-    ----------
-    text : str
-        ``LOW..HIGH UNIT [on SHUNT ohm] [x GAIN] [+ OFFSET V] [= PRESSURE]``; the unit is one of voltage or of current.
-    option : str
-        Where it was given, for messages.
-
-    Raises
-    ------
-    InputError
-        If it does not read so.
+    """Read a signal, ``LOW..HIGH UNIT [on SHUNT ohm] [x GAIN] [+ OFFSET V] [= PRESSURE]``, in V or A or the like.
 
     Examples
     --------
@@ -117,14 +97,7 @@ def parse_signal(text: str, option: str) -> PinSignal:
 def command_signal(signal: PinSignal, converter: Converter, *, inverted: bool = False) -> CommandSignal:
     """Return the codes of a command; one that runs from below zero to above it has both signs.
 
-    Parameters
-    ----------
-    signal : PinSignal
-        The command.
-    converter : Converter
-        The target's.
-    inverted : bool
-        True exchanges the signs of a command of both, and zero and full of a command of one.
+    `inverted` exchanges the signs of a command of both, and zero and full of a command of one.
     """
     signal.check_within(converter)
     both = signal.low < 0
@@ -146,14 +119,7 @@ def command_signal(signal: PinSignal, converter: Converter, *, inverted: bool = 
 def pressure_signal(signal: PinSignal, converter: Converter, span_MPa: Fraction) -> PressureSignal:
     """Return the codes of a pressure sensor, with the exact bounds of a code's error.
 
-    Parameters
-    ----------
-    signal : PinSignal
-        The sensor's signal.
-    converter : Converter
-        The target's.
-    span_MPa : Fraction
-        Pressure at the signal's upper end; that of `signal` goes before.
+    `span_MPa` is the pressure at the signal's upper end, unless the signal states its own.
     """
     signal.check_within(converter)
     if signal.low < 0:

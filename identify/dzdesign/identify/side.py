@@ -37,14 +37,7 @@ PAPER_DP0 = 1 * MPA
 
 
 def identify_side(tests: Sequence[RampTest], options: IdentifyOptions) -> SideIdentification:
-    """Identify the side of positive commands.
-
-    Parameters
-    ----------
-    tests : sequence of RampTest
-        In any order.
-    options : IdentifyOptions
-        Choices of the engineer.
+    """Identify the side of positive commands from ramp tests in any order.
 
     Raises
     ------
@@ -172,8 +165,8 @@ def _test_result(group: DescribedTests, knees: KneeFit, row: int, guarded: Thres
         source=item.test.source,
         dp_MPa=None if item.dp is None else item.dp / MPA,
         **_thresholds(item, knees, row),
-        straight_rising=rising.window if rising else None,
-        straight_falling=falling.window if falling else None,
+        straight_rising=rising.line.window if rising else None,
+        straight_falling=falling.line.window if falling else None,
         not_observable=_not_observable(group, row),
         u_guard_V=float(guarded.value[row]),
         u_guard_lower_V=float(guarded.bound[row]),

@@ -28,7 +28,7 @@ def ramps(bend=0.0, odd=None, noise=0.15):
 
 
 def windows(tests):
-    return [shape.window for item in describe_tests(tests, DECLARED).tests for shape in item.shapes]
+    return [shape.line.window for item in describe_tests(tests, DECLARED).tests for shape in item.shapes]
 
 
 def test_a_straight_valve_is_straight_to_the_top_and_down_to_the_first_flow():

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from dzdesign.command_line.cli import main
-from dzdesign.identify.identification import identify, identify_sides
-from dzdesign.identify.plots.frame import plot_style
-from dzdesign.identify.plots.valve_plots import MOST_POINTS, RESIDUAL_EDGE, _flow_names, draw_figures, plot_files
+from dzdesign.identify.identification import identify_sides
+from dzdesign.identify.plots.frame import plot_style, pressure_names
+from dzdesign.identify.plots.valve_plots import MOST_POINTS, RESIDUAL_EDGE, draw_figures, plot_files
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
 
 PRESSURES = (0.5, 1.0, 4.0)
@@ -106,7 +106,7 @@ class TestFlow:
         slopes = []
         for column, (name, knee) in enumerate((("opening", test.u_knee_rising_V), ("closing", test.u_knee_falling_V))):
             solid = labelled(axes, f"line {name}")
-            ends = [item.shapes[column].y_max / L_MIN * share for share in item.shapes[column].window]
+            ends = [item.shapes[column].y_max / L_MIN * share for share in item.shapes[column].line.window]
             slope = found.sides["positive"].knees.slope[0, column] / L_MIN
             assert solid.get_linestyle() == "-"
             assert solid.get_ydata() == pytest.approx(ends, abs=0.1)
@@ -144,11 +144,8 @@ class TestFlow:
             assert abs(np.mean(line.get_ydata())) < 0.1
 
     def test_names_have_the_digits_that_tell_pressures_apart(self):
-        pressures = (1.2341, 1.2349)
-        tests = [
-            dataclasses.replace(identify([ramp_of(1.0)]).positive.tests[0], dp_MPa=pressure) for pressure in pressures
-        ]
-        assert _flow_names(tuple(tests)) == ["flow_1.234_MPa", "flow_1.235_MPa"]
+        assert pressure_names(["flow", "flow"], (1.2341, 1.2349)) == ["flow_1.234_MPa", "flow_1.235_MPa"]
+        assert pressure_names(["flow"], [None]) == ["flow"]
 
 
 class TestOverPressure:
@@ -163,11 +160,13 @@ class TestOverPressure:
         band = labelled(axes, "from lower bound to threshold").get_segments()
         assert np.array(band).tolist() == [[[x, a], [x, b]] for x, a, b in zip(dp, bound, guard, strict=True)]
         bars = {container.get_label(): container for container in axes.containers}
-        for name, key in (("opening", "u_knee_rising_V"), ("closing", "u_knee_falling_V")):
-            points, _, (spread,) = bars[f"knee {name} ± s.e."]
-            assert points.get_ydata().tolist() == [getattr(test, key) for test in side.tests]
-            ends = np.array(spread.get_segments())[:, :, 1]
-            assert np.diff(ends).ravel() == pytest.approx([2 * test.u_knee_se_V for test in side.tests])
+        for name, branch in (("opening", "rising"), ("closing", "falling")):
+            for threshold in ("knee", "onset"):
+                points, _, (spread,) = bars[f"{threshold} {name} ± 2 s.e."]
+                key = f"u_{threshold}_{branch}"
+                assert points.get_ydata().tolist() == [getattr(test, f"{key}_V") for test in side.tests]
+                ends = np.array(spread.get_segments())[:, :, 1]
+                assert np.diff(ends).ravel() == pytest.approx([4 * getattr(test, f"{key}_se_V") for test in side.tests])
 
     def test_staircase_and_offset_are_certified(self, found, figures):
         side = found.model.positive
@@ -183,14 +182,13 @@ class TestOverPressure:
     def test_beta_lies_under_its_bounds(self, found, figures):
         side = found.model.positive
         axes = figures["beta"].axes[0]
-        nodes = labelled(axes, "β(dP), straight between its nodes").get_xydata()
+        nodes = labelled(axes, "β(dP) of the valve").get_xydata()
         assert nodes.tolist() == np.column_stack([side.beta.dp_MPa, side.beta.beta]).tolist()
         bound = labelled(axes, "lower bound / u_min0, at the test").get_ydata()
         assert bound * side.reference.u_min_V == pytest.approx([test.u_guard_lower_V for test in side.tests])
         assert np.all(nodes[:, 1] <= bound + 1e-9)
-        for label in ("certified staircase / u_min0", "allowed by all bounds together"):
-            steps = labelled(axes, label).get_data().values
-            assert steps * side.reference.u_min_V == pytest.approx(side.curve.certified_steps_V)
+        steps = labelled(axes, "certified staircase / u_min0").get_data().values
+        assert steps * side.reference.u_min_V == pytest.approx(side.curve.certified_steps_V)
         assert labelled(axes, "dP0, where β = 1").get_xydata().tolist() == [[side.reference.dp_MPa, 1]]
 
 

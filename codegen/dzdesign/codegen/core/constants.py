@@ -32,15 +32,10 @@ class Constant:
     data: tuple[str, ...] = ()
     generator: str
 
-    @property
-    def text(self) -> str:
-        """Say in a comment what the number is."""
-        text = f"{self.equation}: {self.engineering} ({self.rounding})."
-        return text[0].upper() + text[1:]
-
     def comment(self) -> list[str]:
-        """Return the comment in C, wrapped."""
-        return c_comment(self.text)
+        """Return the comment in C that says what the number is."""
+        text = f"{self.equation}: {self.engineering} ({self.rounding})."
+        return c_comment(text[0].upper() + text[1:])
 
     def entry(self, file: str, valve_keys: Mapping[str, Sequence[str]]) -> FirmwareConstant:
         """Return the manifest's entry of the constant in a file of the firmware.

@@ -11,6 +11,7 @@ the exactly rounded law. The division is a multiplication by a reciprocal that i
 can occur; where the target has 32-bit arithmetic only, it is an estimate and a proved number of corrections.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil, lcm
@@ -48,45 +49,26 @@ class IntegerForm:
     with B_law and B the tables interpolated without rounding;
     ``compare = min(total >> shift, largest) / divisor``, so that no compare value exceeds the limit; the division is
     ``(quotient * reciprocal) >> reciprocal_shift`` or the `estimate`.
-
-    Attributes
-    ----------
-    table : tuple of int
-        scale_beta times the numerators of the law's beta, then twice the smallest of them.
-    zero_table : tuple of int
-        The same of the certified beta at zero command; empty without a transition.
-    scale_beta : int
-        Factor of the tables.
-    slope, offset : int
-        32-bit signed.
-    transition : int
-        32 bits; 0 without a transition.
-    linear, linear_shift : int
-        Command term that beta does not touch.
-    half, shift, divisor : int
-        Rounding and denominator.
-    largest : int
-        Largest quotient that is divided: the one whose compare value is the limit.
-    exceeds : bool
-        Whether the law asks for more than the limit anywhere.
-    reciprocal, reciprocal_shift : int
-        Of the divisor.
-    estimate : Estimate
-        Of the division.
     """
 
+    #: `scale_beta` times the numerators of the law's beta, then twice the smallest of them.
     table: tuple[int, ...]
+    #: The same of the certified beta at zero command; empty without a transition.
     zero_table: tuple[int, ...]
     scale_beta: int
+    #: 32 bits with sign.
     slope: int
     offset: int
+    #: 32 bits; 0 without a transition.
     transition: int
     linear: int
     linear_shift: int
     half: int
     shift: int
     divisor: int
+    #: Largest quotient that is divided: the one whose compare value is the limit.
     largest: int
+    #: Whether the law asks for more than the limit anywhere.
     exceeds: bool
     reciprocal: int
     reciprocal_shift: int
@@ -96,17 +78,7 @@ class IntegerForm:
 def integer_form(compensator: Compensator, sign: int = 1) -> IntegerForm:
     """Lower the law of one side to integers and prove that nothing overflows and every division is exact.
 
-    Parameters
-    ----------
-    compensator : Compensator
-        The law in rationals.
-    sign : {1, -1}
-        Sign of the command.
-
-    Raises
-    ------
-    InputError
-        If the coefficients need more than 64-bit arithmetic.
+    Coefficients that need more than 64-bit arithmetic are an `InputError`.
     """
     c, side = compensator, compensator.side(sign)
     terms = _terms(compensator, sign)
@@ -226,24 +198,27 @@ def _largest_quotient(compensator: Compensator, sign: int, divisor: int) -> int:
     return int((max(values) * c.signals.compare_max + Fraction(1, 2)) * divisor)
 
 
-def _exact_reciprocal(divisor: int, largest: int) -> tuple[int, int]:
-    """Return (m, s) with ``n // divisor == n * m >> s`` for every n up to `largest`.
+def exact_factors(share: Fraction, largest: int, shifts: range, tried: int = 1) -> Iterator[tuple[int, int]]:
+    """Yield (m, s) with ``v * m >> s`` equal to v times `share`, rounded down, for every v up to `largest`.
 
-    With m at or above 2^s / d and e = m d - 2^s the quotient is exact as long as ``n e < 2^s`` (for n = q d + r the
-    error n e / (d 2^s) must stay below 1/d).
+    With n/d the share in lowest terms, m at or above 2^s n/d and e = m d - 2^s n, the quotient errs by v e / (d 2^s).
+    That must stay below 1/d, the least distance of v n/d to the integer above it. `tried` are the values of m at each
+    shift; none has more than 32 bits, and no product more than 64.
     """
+    numerator, denominator = share.as_integer_ratio()
+    for shift in shifts:
+        least = -(-(numerator << shift) // denominator)
+        for factor in range(least, least + tried):
+            excess = factor * denominator - (numerator << shift)
+            if factor < 1 << 32 and factor * largest < 1 << 64 and largest * excess < 1 << shift:
+                yield factor, shift
+
+
+def _exact_reciprocal(divisor: int, largest: int) -> tuple[int, int]:
+    """Return (m, s) with ``n // divisor == n * m >> s`` for every n up to `largest`."""
     if divisor == 1:
         return 1, 0
-    exact = []
-    for shift in range(32, 64):
-        least = -(-(1 << shift) // divisor)
-        exact += [
-            (reciprocal, shift)
-            for reciprocal in range(least, least + RECIPROCALS_TRIED)
-            if reciprocal * largest < 1 << 64
-            and reciprocal < 1 << 32
-            and largest * (reciprocal * divisor - (1 << shift)) < 1 << shift
-        ]
+    exact = list(exact_factors(Fraction(1, divisor), largest, range(32, 64), RECIPROCALS_TRIED))
     if not exact:
         raise InputError(f"no 32-bit reciprocal divides by {divisor} exactly up to {largest}")
     # A multiplier of few ones tempts compilers to shifts and additions, which take longer than one long product.

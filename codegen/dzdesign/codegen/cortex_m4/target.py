@@ -20,13 +20,7 @@ COMPARE_MAX = 60_000  # the PWM is the user's: full drive may be any 16-bit comp
 
 
 def systick_counts() -> int:
-    """Return the clock cycles between two interrupts.
-
-    Raises
-    ------
-    DzdesignError
-        If they are no integer that SysTick holds.
-    """
+    """Return the clock cycles between two interrupts: an integer that SysTick holds."""
     counts = Fraction(CLOCK_HZ, PWM_HZ)
     if counts.denominator != 1 or not 1 < counts <= SYSTICK_MAX:
         raise DzdesignError(f"cortex-m4: SysTick must count an integer from 2 to {SYSTICK_MAX}, got {counts}")

@@ -6,19 +6,7 @@ converter: data sheet SPRS945.
 
 from fractions import Fraction
 
-from dzdesign.codegen.c2000 import (
-    ADC_BITS,
-    CHANNELS,
-    ISR_DELAY_S,
-    PWM_HZ,
-    SAMPLE_HZ,
-    TOOLS,
-    exact,
-    printed,
-    pwm_timing,
-    within,
-)
-from dzdesign.codegen.target import Target
+from dzdesign.codegen.c2000 import ADC_BITS, CHANNELS, ISR_DELAY_S, c2000_target, exact, printed, pwm_timing, within
 
 SYSCLK_HZ = 100_000_000  # DEVICE_SYSCLK_FREQ of device.h: 20 MHz crystal, times 10, over 2
 SOCA_PRESCALE_MAX = 15  # EPWM_setADCTriggerEventPrescale()
@@ -60,36 +48,16 @@ def converter() -> dict[str, str]:
     }
 
 
-FOLDER = "f280049c"
-FILES = (
-    "main.c",
-    "dz_hardware.c",
-    "dz_hardware.h",
-    "dz_isr.c",
-    "dz_isr.h",
-    "dzdesign.projectspec",
-    "Makefile",
-    "README.md",
-)
-CONTEXT = {
-    **timing(),
-    **converter(),
-    **TOOLS,
-    # device.h and the linker files expect these of the compiler, as TI's own project files for this part set them.
+#: device.h and the linker files expect these of the compiler, as TI's own project files for this part set them.
+OPTIONS = {
     "compiler_options": "-v28 -ml -mt --float_support=fpu32 --tmu_support=tmu0 --abi=eabi -O2 --c99 -g "
     "--gen_func_subsections=on --diag_warning=225 --diag_suppress=10063",
     "linker_options": "--stack_size=0x3F8 --entry_point=code_start --rom_model",
 }
 
-TARGET = Target(
-    name=FOLDER,
-    description="TI TMS320F280049C at 100 MHz: DriverLib, ePWM1 at 2.5 kHz, ADC at 1.25 kHz, CCS project and makefile",
-    compare_max=int(CONTEXT["compare_max"]),
-    adc_code_max=int(CONTEXT["adc_code_max"]),
-    adc_full_V=ADC_SPAN_V,
-    sample_Hz=SAMPLE_HZ,
-    tick_Hz=PWM_HZ,
-    templates={f"{FOLDER}/{file}": f"{file}.jinja" for file in FILES},
-    board=frozenset({f"{FOLDER}/dzdesign.projectspec"}),  # where the user's C2000Ware lies
-    context=CONTEXT,
+TARGET = c2000_target(
+    "f280049c",
+    "TI TMS320F280049C at 100 MHz: DriverLib, ePWM1 at 2.5 kHz, ADC at 1.25 kHz, CCS project and makefile",
+    {**timing(), **converter(), **OPTIONS},
+    adc_span_V=ADC_SPAN_V,
 )

@@ -11,21 +11,13 @@ from dzdesign.codegen.c2000 import (
     ISR_DELAY_S,
     PWM_HZ,
     SAMPLE_HZ,
-    TOOLS,
+    c2000_target,
     exact,
     printed,
     pwm_timing,
     within,
 )
-from dzdesign.codegen.target import Target
-from dzdesign.codegen.telemetry.frame import (
-    CRC_OCTETS,
-    FRAME_BITS,
-    FRAME_OCTETS,
-    Link,
-    frame_context,
-    line_load,
-)
+from dzdesign.codegen.telemetry.frame import CRC_OCTETS, FRAME_BITS, FRAME_OCTETS, Link, frame_context
 
 CRYSTAL_HZ = 30_000_000
 PLL_DIV, PLL_DIVSEL = 10, 2  # SYSCLKOUT = crystal * DIV / DIVSEL, as C2000Ware's InitSysCtrl() sets it
@@ -116,7 +108,7 @@ def serial_line() -> dict[str, str]:
     error = baud / LINK.baud - 1
     within(abs(error), 0, BAUD_ERROR_MAX, "the error of the baud rate")
     frame_hz = exact(Fraction(LINK.tick_Hz, LINK.frame_ticks), "frames a second", LINK.tick_Hz)
-    load = within(line_load(baud, frame_hz), 0, LINE_LOAD_MAX, "the load of the line")
+    load = within(FRAME_BITS * frame_hz / baud, 0, LINE_LOAD_MAX, "the load of the line")
     # A turn of the main loop makes one frame at most; with the interrupt's share off it must fit in a PWM period,
     # of which the watchdog allows several.
     frame_s = within(FRAME_CYCLES / sysclkout_hz, 0, Fraction(1, 4 * PWM_HZ), "the making of a frame, in s,")
@@ -140,38 +132,11 @@ def serial_line() -> dict[str, str]:
     }
 
 
-FOLDER = "f28335"
-FILES = (
-    "main.c",
-    "dz_hardware.c",
-    "dz_hardware.h",
-    "dz_isr.c",
-    "dz_isr.h",
-    "dz_telemetry.c",
-    "dz_telemetry.h",
-    "dz_frame.c",
-    "dz_frame.h",
-    "dzdesign.projectspec",
-    "Makefile",
-    "README.md",
-)
-CONTEXT = {
-    **timing(),
-    **converter(),
-    **serial_line(),
-    **frame_context(),
-    **TOOLS,
-}
-
-TARGET = Target(
-    name=FOLDER,
-    description="TI TMS320F28335 at 150 MHz: ePWM1 at 2.5 kHz, ADC at 1.25 kHz, CCS project and makefile",
-    compare_max=int(CONTEXT["compare_max"]),
-    adc_code_max=int(CONTEXT["adc_code_max"]),
-    sample_Hz=SAMPLE_HZ,
-    tick_Hz=PWM_HZ,
-    templates={f"{FOLDER}/{file}": f"{file}.jinja" for file in FILES},
-    board=frozenset({f"{FOLDER}/dzdesign.projectspec"}),  # where the user's C2000Ware lies
-    context=CONTEXT,
+TARGET = c2000_target(
+    "f28335",
+    "TI TMS320F28335 at 150 MHz: ePWM1 at 2.5 kHz, ADC at 1.25 kHz, CCS project and makefile",
+    {**timing(), **converter(), **serial_line(), **frame_context()},
+    adc_span_V=ADC_SPAN_V,
+    sources=("dz_telemetry.c", "dz_telemetry.h", "dz_frame.c", "dz_frame.h"),
     link=LINK,
 )

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Annotated
 
+from dzdesign.codegen.core.integer_form import exact_factors
 from dzdesign.core.errors import InputError
 
 SYNC = 0xA55A
@@ -169,19 +170,7 @@ def beta_factor(unit: int, largest: int) -> tuple[int, int]:
     """Return (m, s) with ``v * m >> s`` equal to ``v * 2^15 // unit`` for every v up to `largest`, below 2^31.
 
     `unit` stands for beta = 1 on the scale of the core's table. If no 32-bit factor is exact it is an `InputError`.
-    With n/d = 2^15 / unit in lowest terms, m = ceil(2^s n / d) and e = m d - 2^s n the quotient errs by v e / (d 2^s),
-    which must stay below 1/d, the least distance of v n / d to the integer above it.
     """
-    share = Fraction(1 << BETA_BITS, unit)
-    for shift in range(64):
-        factor = -(-(share.numerator << shift) // share.denominator)
-        if factor >= 1 << 32:
-            break
-        if largest * (factor * share.denominator - (share.numerator << shift)) < 1 << shift:
-            return factor, shift
+    for factor in exact_factors(Fraction(1 << BETA_BITS, unit), largest, range(64)):
+        return factor
     raise InputError(f"no 32-bit factor brings beta from units of 1/{unit} to 2^-{BETA_BITS} exactly up to {largest}")
-
-
-def line_load(baud: Fraction, frame_Hz: Fraction | int) -> Fraction:
-    """Return the share of the time in which the line is busy with frames."""
-    return FRAME_BITS * frame_Hz / baud

@@ -4,7 +4,6 @@ import struct
 from array import array
 from collections.abc import Iterator
 from dataclasses import astuple, dataclass
-from fractions import Fraction
 from pathlib import Path
 
 from dzdesign.codegen.project import target_named
@@ -22,32 +21,19 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest
-from dzdesign.design.signals import PressureSignal
 
 COLUMNS = ("time_s", "u_V", "pA_MPa", "pB_MPa", "uO_V", "beta", "compare_a", "compare_b", "status")
 _ROW = struct.Struct("<9I")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Channel:
-    """One signal: its code of zero, and what one code more stands for."""
-
-    zero_code: int
-    per_code: Fraction
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Scalings:
-    """What the codes in the frames of one firmware stand for, in V and MPa."""
+    """What says how the frames of one firmware are read: its serial line, and the scalings of its compensator."""
 
     link: Link
+    compensator: Compensator
     #: Of compensator.json.
     sha256: str
-    command: Channel
-    pressure_a: Channel
-    pressure_b: Channel
-    #: u_O of one count of the compare value.
-    volts_out: Fraction
 
     @property
     def origin(self) -> int:
@@ -64,22 +50,7 @@ def scalings_of(folder: Path) -> Scalings:
         raise InputError(f"the target {target.name} of '{folder}' sends no telemetry; f28335 does")
     content = read_bytes(folder / "compensator.json", "compensator file")
     compensator = read_artefact(content, Compensator, str(folder / "compensator.json"))
-    signals = compensator.signals
-    return Scalings(
-        link=target.link,
-        sha256=sha256_of(content),
-        command=Channel(
-            zero_code=signals.command.zero_code,
-            per_code=signals.command.direction(1) * compensator.u_max_V / signals.command.span(1),
-        ),
-        pressure_a=_pressure(signals.pressure_a),
-        pressure_b=_pressure(signals.pressure_b),
-        volts_out=compensator.u_max_V / signals.compare_max,
-    )
-
-
-def _pressure(sensor: PressureSignal) -> Channel:
-    return Channel(zero_code=sensor.zero_code, per_code=sensor.per_code_MPa)
+    return Scalings(link=target.link, compensator=compensator, sha256=sha256_of(content))
 
 
 class Recording:
@@ -127,16 +98,17 @@ class Recording:
 
     def rows(self) -> Iterator[str]:
         """Yield the lines of the table."""
-        scale = self.scalings
-        channels = (scale.command, scale.pressure_a, scale.pressure_b)
-        (u_zero, volts), (a_zero, a_MPa), (b_zero, b_MPa) = ((one.zero_code, float(one.per_code)) for one in channels)
-        volts_out = float(scale.volts_out)
+        u_max_V, signals = self.scalings.compensator.u_max_V, self.scalings.compensator.signals
+        command, a, b = signals.command, signals.pressure_a, signals.pressure_b
+        volts, volts_out = float(command.direction(1) * u_max_V / command.span(1)), float(u_max_V / signals.compare_max)
+        a_MPa, b_MPa = float(a.per_code_MPa), float(b.per_code_MPa)
         for periods, row in zip(self._periods, _ROW.iter_unpack(self._rows), strict=True):
             _, _, u_adc, p_a_adc, p_b_adc, beta, compare_a, compare_b, status = row
             out = (compare_a - compare_b) * volts_out if status & STATUS_RELEASED else 0.0
-            volts_in, a_now, b_now = (u_adc - u_zero) * volts, (p_a_adc - a_zero) * a_MPa, (p_b_adc - b_zero) * b_MPa
+            volts_in = (u_adc - command.zero_code) * volts
+            a_now, b_now = (p_a_adc - a.zero_code) * a_MPa, (p_b_adc - b.zero_code) * b_MPa
             yield (
-                f"{periods / scale.link.tick_Hz:.4f},{volts_in:.5f},{a_now:.5f},{b_now:.5f},"
+                f"{periods / self.scalings.link.tick_Hz:.4f},{volts_in:.5f},{a_now:.5f},{b_now:.5f},"
                 f"{out:.5f},{beta / (1 << BETA_BITS):.5f},{compare_a},{compare_b},{status}\n"
             )
 

@@ -38,22 +38,7 @@ STATEMENTS = tuple(
 
 
 def verify_statements(statements: Sequence[Statement] = STATEMENTS) -> tuple[Verdict, ...]:
-    """Derive each statement from the premises that it names.
-
-    Parameters
-    ----------
-    statements : sequence of Statement, optional
-        Each after those it rests on.
-
-    Returns
-    -------
-    tuple of Verdict
-        One per statement, in order.
-
-    Raises
-    ------
-    RequirementError
-        If the premises of a statement are circular or missing.
+    """Derive each statement from the premises that it names; each stands after those it rests on.
 
     Examples
     --------

@@ -25,18 +25,7 @@ class Finding:
 
 
 def judge_condition(condition: Condition, differences: Sequence[sympy.Expr]) -> Finding:
-    """Judge a statement by the condition that it names.
-
-    Parameters
-    ----------
-    condition : Condition
-    differences : sequence of sympy.Expr
-        What was derived minus what is published, where they differ.
-
-    Returns
-    -------
-    Finding
-    """
+    """Judge a statement by its condition; `differences` are what was derived minus what is published."""
     words = _in_words(condition)
     if not differences:
         return Finding(Outcome.FOLLOWS, f"follows, also without {words}", flawed=True)

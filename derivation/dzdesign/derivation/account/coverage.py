@@ -1,12 +1,13 @@
 """Which part of its range a proof covers: a statement that is proved on a part of it only has to say on which."""
 
+from collections.abc import Mapping
 from functools import cache
 
 import sympy
 from sympy.core.relational import Relational
 from sympy.logic.boolalg import Boolean
 
-from dzdesign.derivation.account.statement import Case
+from dzdesign.derivation.account.statement import Case, Statement
 from dzdesign.derivation.symbols import DISTANCES
 
 
@@ -15,18 +16,8 @@ def is_exhaustive(cases: tuple[Case, ...], within: Boolean) -> bool:
     """Return whether cases leave nothing out of what a statement is meant for.
 
     Each case replaces symbols by others plus a distance of known sign, as ``dP1 = dP0 + above``; so it says which
-    comparisons hold. The cases are exhaustive if propositional logic alone shows that one of them is true.
-
-    Parameters
-    ----------
-    cases : tuple of Case
-    within : sympy Boolean
-        Comparisons that hold wherever the statement is meant to; true if that is everywhere.
-
-    Returns
-    -------
-    bool
-        True where there are no cases; False also where a case can't be read as comparisons.
+    comparisons hold, as `within` says which ones hold wherever the statement is meant to. The cases are exhaustive if
+    propositional logic alone shows that one of them is true; a case that can't be read as comparisons shows nothing.
     """
     if not cases:
         return True
@@ -38,6 +29,23 @@ def is_exhaustive(cases: tuple[Case, ...], within: Boolean) -> bool:
         lambda part: _is_above(part.gts - part.lts, isinstance(part, sympy.StrictGreaterThan | sympy.StrictLessThan)),
     )
     return not sympy.satisfiable(sympy.And(meant, *(sympy.Not(claim) for claim in claims)))
+
+
+def branch_conditions(member: sympy.Expr) -> list[sympy.Basic]:
+    """Return the conditions of a piecewise member's branches; none of any other."""
+    return [condition for _, condition in member.args] if isinstance(member, sympy.Piecewise) else []
+
+
+def meets_all_branches(statement: Statement, earlier: Mapping[str, Statement]) -> bool:
+    """Return whether each branch of each piecewise ground is met in one of the cases."""
+    for ground in statement.grounds:
+        member = earlier[ground.number].members[ground.member]
+        branches = [condition.xreplace(dict(ground.at)) for condition in branch_conditions(member)]
+        decided = [[one.xreplace(dict(case.at)) == sympy.true for one in branches] for case in statement.cases_to_prove]
+        # The first that is true is met; the last one's condition is often just "otherwise".
+        if branches and {case.index(True) if True in case else None for case in decided} != set(range(len(branches))):
+            return False
+    return True
 
 
 def _claim(case: Case) -> sympy.Basic | None:

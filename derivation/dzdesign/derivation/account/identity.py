@@ -16,14 +16,6 @@ def agree(left: sympy.Expr, right: sympy.Expr) -> bool:
     Exact for rational functions of symbols, of roots of single symbols, and of logarithms and applied functions,
     which count as symbols of their own; logarithms of products are expanded first.
 
-    Parameters
-    ----------
-    left, right : sympy.Expr
-
-    Returns
-    -------
-    bool
-
     Examples
     --------
     >>> from dzdesign.derivation.symbols import dP, rho

@@ -52,17 +52,7 @@ class AccountMutants(Artefact):
 
 
 def score_mutations(verdicts: Sequence[Verdict]) -> AccountMutants:
-    """Mutate every statement and see which mutants are caught.
-
-    Parameters
-    ----------
-    verdicts : sequence of Verdict
-        The account, as `verify_statements` returns it.
-
-    Returns
-    -------
-    AccountMutants
-    """
+    """Mutate every statement of a proved account and see which mutants are caught."""
     statements = {verdict.number: verdict.statement for verdict in verdicts}
     found = {verdict.number: verdict for verdict in verdicts}
     scores = tuple(_score(statement, statements, found) for statement in statements.values())

@@ -14,7 +14,7 @@ from sympy.core.relational import Relational
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.derivation.account.conditions import Finding, judge_condition
-from dzdesign.derivation.account.coverage import is_exhaustive
+from dzdesign.derivation.account.coverage import branch_conditions, is_exhaustive, meets_all_branches
 from dzdesign.derivation.account.identity import agree
 from dzdesign.derivation.account.solving import solve_relations
 from dzdesign.derivation.account.statement import Case, Ground, Kind, Outcome, Statement
@@ -25,34 +25,21 @@ from dzdesign.derivation.symbols import Name
 
 @dataclass(frozen=True, kw_only=True)
 class CaseProof:
-    """The derivation of one case of a statement; most statements have a single one, without words.
-
-    Attributes
-    ----------
-    statement : Statement
-    where : str
-        The case in words.
-    derived : sympy.Expr
-        What the grounds give for the symbol.
-    discrepancies : tuple of sympy.Expr
-        Derived minus published, one per member; zero where they agree.
-    relations : tuple of Relation
-        The grounds at the values at which the case uses them.
-    solution : mapping
-        The statement's symbol and the eliminated ones, solved for.
-    reached : sympy.Expr
-        The form in which a derivation states the result: as published, or as derived where the two differ.
-    published : sympy.Expr
-        The last member's branch of this case, in the symbols of the statement.
-    """
+    """The derivation of one case of a statement; most statements have a single one, without words."""
 
     statement: Statement
-    where: str
+    case: Case
+    #: What the grounds give for the symbol.
     derived: sympy.Expr
+    #: Derived minus published, one per member; zero where they agree.
     discrepancies: tuple[sympy.Expr, ...]
+    #: The grounds at the values at which the case uses them.
     relations: tuple[Relation, ...]
+    #: The statement's symbol and the eliminated ones, solved for.
     solution: Mapping[Name, sympy.Expr]
+    #: The form in which a derivation states the result: as published, or as derived where the two differ.
     reached: sympy.Expr
+    #: The last member's branch of this case, in the symbols of the statement.
     published: sympy.Expr
 
     @cached_property
@@ -63,36 +50,23 @@ class CaseProof:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdict:
-    """What the engine found about one statement.
-
-    Attributes
-    ----------
-    statement : Statement
-    outcome : Outcome
-    words : str
-        The outcome with its condition, or the reason, in words.
-    as_expected : bool
-        Whether a correct account finds this.
-    proofs : tuple of CaseProof
-        One per case; empty for what is given and for what could not be solved.
-    necessary : bool or None
-        Whether the condition was proved necessary; None where there is none.
-    inherited : tuple of str
-        Grounds that follow only on a condition, which this statement therefore needs too.
-    limited_by : tuple of str
-        Grounds, and their grounds, that are proved on a part of their range only.
-    unit_error : str
-        What is wrong with its units; empty where they are right.
-    """
+    """What the engine found about one statement."""
 
     statement: Statement
     outcome: Outcome
+    #: The outcome with its condition, or the reason, in words.
     words: str
+    #: Whether a correct account finds this.
     as_expected: bool
+    #: One per case; empty for what is given and for what could not be solved.
     proofs: tuple[CaseProof, ...] = ()
+    #: Whether the condition was proved necessary; None where there is none.
     necessary: bool | None = None
+    #: Grounds that follow only on a condition, which this statement therefore needs too.
     inherited: tuple[str, ...] = ()
+    #: Grounds, and their grounds, that are proved on a part of their range only.
     limited_by: tuple[str, ...] = ()
+    #: What is wrong with its units; empty where they are right.
     unit_error: str = ""
 
     @property
@@ -112,17 +86,7 @@ class Verdict:
 
 
 def prove(statements: Sequence[Statement]) -> tuple[Verdict, ...]:
-    """Judge each statement from its grounds.
-
-    Parameters
-    ----------
-    statements : sequence of Statement
-        Premises and statements; each stands after its grounds.
-
-    Returns
-    -------
-    tuple of Verdict
-        One per statement, in order. A statement holds only if everything it rests on holds.
+    """Judge each statement from its grounds, in order; it holds only if everything it rests on holds.
 
     Raises
     ------
@@ -168,20 +132,7 @@ def _with_units(verdict: Verdict) -> Verdict:
 
 
 def judge(statement: Statement, earlier: Mapping[str, Statement], verdicts: Mapping[str, Verdict]) -> Verdict:
-    """Judge one statement by its logic alone.
-
-    Parameters
-    ----------
-    statement : Statement
-    earlier : mapping of str to Statement
-        Its grounds, by number.
-    verdicts : mapping of str to Verdict
-        What was found about them.
-
-    Returns
-    -------
-    Verdict
-    """
+    """Judge one statement by its logic alone, from the earlier ones and their verdicts, both by number."""
 
     def verdict(outcome: Outcome, words: str, flawed: bool = False, **found: Any) -> Verdict:
         expected = outcome is statement.expected and not flawed
@@ -235,14 +186,14 @@ def _finding(statement: Statement, proofs: Sequence[CaseProof], differences: Seq
         return Finding(Outcome.FOLLOWS, "follows")
     positive_if = statement.positive_if
     claim = sympy.sstr(positive_if)
-    if all(_sign_agrees(positive_if, case, proof) for case, proof in zip(_cases(statement), proofs, strict=True)):
+    if all(_sign_agrees(positive_if, proof) for proof in proofs):
         return Finding(Outcome.FOLLOWS, f"follows; positive exactly if {claim}")
     return Finding(Outcome.DOES_NOT_FOLLOW, f"does not follow: positive not exactly if {claim}", flawed=True)
 
 
-def _sign_agrees(positive_if: Relational, case: Case, proof: CaseProof) -> bool:
+def _sign_agrees(positive_if: Relational, proof: CaseProof) -> bool:
     """Whether the derived value is positive in just the cases in which the claim is true."""
-    claim = positive_if.xreplace(dict(case.at))
+    claim = positive_if.xreplace(dict(proof.case.at))
     if claim == sympy.true:
         return proof.derived.is_positive is True
     if claim == sympy.false:
@@ -253,16 +204,12 @@ def _sign_agrees(positive_if: Relational, case: Case, proof: CaseProof) -> bool:
     return sympy.factor(sympy.cancel(sympy.factor(proof.derived) / (claim.gts - claim.lts))).is_positive is True
 
 
-def _cases(statement: Statement) -> tuple[Case, ...]:
-    return statement.cases or (Case((), ""),)
-
-
 def _proofs(statement: Statement, earlier: Mapping[str, Statement]) -> tuple[CaseProof, ...] | str:
     """Derive every case, or say why one can't be."""
     proofs = []
     chosen: set[sympy.Basic] = set()
     needed: set[sympy.Ne] = set()
-    for case in _cases(statement):
+    for case in statement.cases_to_prove:
         replacements = dict(case.at)
         relations = tuple(_relation(earlier[ground.number], ground, replacements) for ground in statement.grounds)
         provided = tuple(provision.xreplace(replacements) for provision in statement.provided)
@@ -282,7 +229,7 @@ def _proofs(statement: Statement, earlier: Mapping[str, Statement]) -> tuple[Cas
         proofs.append(
             CaseProof(
                 statement=statement,
-                where=case.where,
+                case=case,
                 derived=derived,
                 discrepancies=differences,
                 relations=relations,
@@ -291,7 +238,7 @@ def _proofs(statement: Statement, earlier: Mapping[str, Statement]) -> tuple[Cas
                 published=branches[-1],
             )
         )
-    idle = [sympy.sstr(one) for member in statement.members for one in _conditions(member) if one not in chosen]
+    idle = [sympy.sstr(one) for member in statement.members for one in branch_conditions(member) if one not in chosen]
     if idle:
         return f"no case stands for {', '.join(idle)}"
     unneeded = [sympy.sstr(provision) for provision in statement.provided if provision not in needed]
@@ -299,25 +246,10 @@ def _proofs(statement: Statement, earlier: Mapping[str, Statement]) -> tuple[Cas
         return f"the derivation does not need {', '.join(unneeded)}"
     if not is_exhaustive(statement.cases, statement.within):
         return "the cases leave something out"
-    limited = statement.within != sympy.true or not _meets_all_branches(statement, earlier)
+    limited = statement.within != sympy.true or not meets_all_branches(statement, earlier)
     if limited != bool(statement.scope):
         return "it does not say where it is proved" if limited else "it is proved everywhere, and says where"
     return tuple(proofs)
-
-
-def _conditions(member: sympy.Expr) -> list[sympy.Basic]:
-    return [condition for _, condition in member.args] if isinstance(member, sympy.Piecewise) else []
-
-
-def _meets_all_branches(statement: Statement, earlier: Mapping[str, Statement]) -> bool:
-    """Whether each branch of each piecewise ground is met in one of the cases."""
-    for ground in statement.grounds:
-        branches = [one.xreplace(dict(ground.at)) for one in _conditions(earlier[ground.number].members[ground.member])]
-        decided = [[branch.xreplace(dict(case.at)) == sympy.true for branch in branches] for case in _cases(statement)]
-        # The first that is true is met; the last one's condition is often just "otherwise".
-        if branches and {case.index(True) if True in case else None for case in decided} != set(range(len(branches))):
-            return False
-    return True
 
 
 def _branch(

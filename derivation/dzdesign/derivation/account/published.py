@@ -27,41 +27,29 @@ TEMPERATURE_CHANGE_PER_MILLE = "2"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PublishedValve:
-    """A valve of the paper, at the reference (1 MPa) and off it (5 MPa).
+    """A valve of the paper, at the reference (1 MPa) and off it (5 MPa)."""
 
-    Attributes
-    ----------
-    name, where : str
-        What the report calls it, and where its numbers are printed.
-    dead_zone0_percent, dead_zone1_percent : str
-        Thresholds at dP0 and dP1 as printed, in per cent of u_max.
-    flow0, flow1 : str
-        Largest flow without compensator at dP0 and dP1 as printed, L/min.
-    flow0_with, flow1_with : str
-        The same with compensator.
-    residual_percent : str
-        Dead zone with compensator, at both pressure drops, per cent.
-    zero_flow_without_beta : str
-        Flow at zero command and dP1 with the compensator that ignores beta, L/min; empty where none is printed. With
-        beta it is none.
-    stroke0_mm, stroke1_mm : str
-        Largest displacement of the spool at dP0 and dP1, mm; empty where none is printed.
-    displacement_dead_zone0_percent, displacement_dead_zone1_percent : str
-        Command from which on the spool moves, per cent of u_max; empty where none is printed.
-    """
-
+    #: What the report calls it, and where its numbers are printed.
     name: str
     where: str
+    #: Thresholds at dP0 and dP1 as printed, in per cent of u_max.
     dead_zone0_percent: str
     dead_zone1_percent: str
+    #: Largest flow without compensator at dP0 and dP1 as printed, L/min.
     flow0: str
     flow1: str
+    #: The same with compensator.
     flow0_with: str
     flow1_with: str
+    #: Dead zone with compensator, at both pressure drops, per cent.
     residual_percent: str
+    #: Flow at zero command and dP1 with the compensator that ignores beta, L/min; empty where none is printed. With
+    #: beta it is none.
     zero_flow_without_beta: str = ""
+    #: Largest displacement of the spool at dP0 and dP1, mm; empty where none is printed.
     stroke0_mm: str = ""
     stroke1_mm: str = ""
+    #: Command from which on the spool moves, per cent of u_max; empty where none is printed.
     displacement_dead_zone0_percent: str = ""
     displacement_dead_zone1_percent: str = ""
 

@@ -34,21 +34,9 @@ class Solution:
 def solve_relations(
     relations: tuple[Relation, ...], unknowns: tuple[Name, ...], provided: tuple[sympy.Ne, ...]
 ) -> Solution | str:
-    """Solve relations for unknowns.
+    """Solve the grounds of one case for unknowns, or return the reason why that can't be done.
 
-    Parameters
-    ----------
-    relations : tuple of Relation
-        The grounds of one case.
-    unknowns : tuple of symbols
-        What is wanted.
-    provided : tuple of sympy.Ne
-        What may be divided by although its symbols' signs do not tell that it is not zero.
-
-    Returns
-    -------
-    Solution or str
-        Or the reason why there is no such thing.
+    What is `provided` may be divided by although its symbols' signs do not tell that it is not zero.
     """
     # A piecewise expression none of whose cases holds is nan to SymPy.
     if any(relation.right.has(sympy.Piecewise, sympy.nan) for relation in relations):

@@ -40,15 +40,7 @@ class Kind(StrEnum):
     ) -> "Statement":
         """State something of this kind: ``symbol = member = ... = member``.
 
-        Parameters
-        ----------
-        number, title : str
-        symbol : sympy.Symbol or applied function
-        *members : sympy.Expr
-        grounds : sequence of str or Ground
-            A statement that is used as it stands is given by its number.
-        **more
-            As `Statement` takes it.
+        A ground that is used as it stands is given by its number; `more` is what `Statement` takes.
         """
         used = tuple(Ground(one) if isinstance(one, str) else one for one in grounds)
         return Statement(number=number, title=title, kind=self, symbol=symbol, members=members, grounds=used, **more)
@@ -65,29 +57,20 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """A statement used as a premise of another one, at certain values of its symbols.
+    """A statement used as a premise of another one, at certain values of its symbols."""
 
-    Parameters
-    ----------
-    number : str
-        Number of the statement used.
-    at : tuple of (sympy.Symbol, sympy.Expr)
-        What replaces its symbols, all at once: ``((dP, dP0),)`` takes it at the reference pressure drop. Values
-        whose signs SymPy knows also decide between the cases of a piecewise statement.
-    where : str
-        The same in words.
-    member : int
-        Which of its right-hand sides is used: the last, unless said otherwise.
-    derivative : tuple of (sympy.Symbol, sympy.Symbol), optional
-        ``(by, name)``: the statement is first differentiated by the symbol `by`, and the derivative of its
-        left-hand side is called `name`.
-    """
-
+    #: Number of the statement used.
     number: str
+    #: What replaces its symbols, all at once: ``((dP, dP0),)`` takes it at the reference pressure drop. Values whose
+    #: signs SymPy knows also decide between the cases of a piecewise statement.
     at: Replacements = ()
+    #: The same in words.
     where: str = ""
     _: KW_ONLY
+    #: Which of its right-hand sides is used: the last, unless said otherwise.
     member: int = -1
+    #: ``(by, name)``: the statement is first differentiated by the symbol `by`, and the derivative of its left-hand
+    #: side is called `name`.
     derivative: tuple[sympy.Symbol, Name] | None = None
 
     def __str__(self) -> str:
@@ -96,45 +79,29 @@ class Ground:
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One of the cases by which a piecewise statement is proved; together they exhaust what can occur.
+    """One of the cases by which a piecewise statement is proved; together they exhaust what can occur."""
 
-    Parameters
-    ----------
-    at : tuple of (sympy.Symbol, sympy.Expr)
-        Replacements that make the case, such as ``((dP1, dP0 + above),)`` with a positive `above`.
-    where : str
-        The same in words.
-    """
-
+    #: Replacements that make the case, such as ``((dP1, dP0 + above),)`` with a positive `above`.
     at: Replacements
+    #: The same in words.
     where: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Condition:
-    """What has to hold for a statement to follow; whether it is also necessary is for the proof to find.
+    """What has to hold for a statement to follow; whether it is also necessary is for the proof to find."""
 
-    Parameters
-    ----------
-    any_of : tuple of tuple of sympy.Eq
-        The statement follows if all equations of one of these hold.
-    for_all : tuple of sympy.Symbol
-        The statement is to hold for every value of these, so each power of them counts by itself.
-    witness : tuple of (sympy.Expr, sympy.Expr)
-        To hold for every function, the statement must hold for this one; necessity is proved on it.
-    ruled_out_by : tuple of (sympy.Symbol, sympy.Expr)
-        Published values at which none of the alternatives holds: the statement does not follow then.
-    discrepancy : sympy.Expr
-        Derived minus published, as a correct account finds it, of the first case and member in which they differ.
-    words : str
-        What the paper calls the condition, in brackets.
-    """
-
+    #: The statement follows if all equations of one of these hold.
     any_of: tuple[tuple[sympy.Eq, ...], ...]
+    #: The statement is to hold for every value of these, so each power of them counts by itself.
     for_all: tuple[sympy.Symbol, ...] = ()
+    #: To hold for every function, the statement must hold for this one; necessity is proved on it.
     witness: tuple[tuple[sympy.Expr, sympy.Expr], ...] = ()
+    #: Published values at which none of the alternatives holds: the statement does not follow then.
     ruled_out_by: Replacements = ()
+    #: Derived minus published, as a correct account finds it, of the first case and member in which they differ.
     discrepancy: sympy.Expr = sympy.S.Zero
+    #: What the paper calls the condition, in brackets.
     words: str = ""
 
     def __post_init__(self) -> None:
@@ -150,35 +117,20 @@ class Condition:
 
 @dataclass(frozen=True, slots=True)
 class Value:
-    """A number that a statement gives with published figures put in, beside the number that the paper prints.
+    """A number that a statement gives with published figures put in, beside the number that the paper prints."""
 
-    Parameters
-    ----------
-    label : str
-        Whose number it is.
-    at : tuple of (sympy.Symbol, sympy.Expr)
-        The published figures.
-    unit : str
-        Unit of the result, which `at` must be consistent with; for ``%`` the expression is multiplied by 100.
-    of : sympy.Expr, optional
-        The expression; the statement's last member if none is given.
-    published : str
-        The paper's number as printed, or empty where it has none.
-    remark : str
-        What could explain a difference, or what the number means.
-
-    Raises
-    ------
-    ValueError
-        If `published` is not a number.
-    """
-
+    #: Whose number it is.
     label: str
+    #: The published figures.
     at: Replacements
+    #: Unit of the result, which `at` must be consistent with; for ``%`` the expression is multiplied by 100.
     unit: str
     _: KW_ONLY
+    #: The expression; the statement's last member if none is given.
     of: sympy.Expr | None = None
+    #: The paper's number as printed, or empty where it has none.
     published: str = ""
+    #: What could explain a difference, or what the number means.
     remark: str = ""
 
     def __post_init__(self) -> None:
@@ -186,22 +138,7 @@ class Value:
             float(self.published)
 
     def exact(self, statement: "Statement") -> sympy.Expr:
-        """Return the number exactly, in `unit`.
-
-        Parameters
-        ----------
-        statement : Statement
-            Whose value it is.
-
-        Returns
-        -------
-        sympy.Expr
-
-        Raises
-        ------
-        ValueError
-            If the published figures do not determine it.
-        """
+        """Return the number exactly, in `unit`."""
         expression = statement.members[-1] if self.of is None else self.of
         number = sympy.simplify(expression.subs(dict(self.at)))
         if not number.is_number:
@@ -209,16 +146,7 @@ class Value:
         return 100 * number if self.unit == "%" else number
 
     def agrees(self, statement: "Statement") -> bool:
-        """Return whether the number, rounded to the digits that the paper prints, is the paper's.
-
-        Parameters
-        ----------
-        statement : Statement
-
-        Returns
-        -------
-        bool
-        """
+        """Return whether the number, rounded to the digits that the paper prints, is the paper's."""
         decimals = len(self.published.partition(".")[2])
         difference = abs(self.exact(statement) - sympy.Rational(self.published))
         return bool(difference <= sympy.Rational(1, 2 * 10**decimals))
@@ -226,73 +154,45 @@ class Value:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Statement:
-    """``symbol = member = ... = member``, with the grounds from which it is to follow.
+    """``symbol = member = ... = member``, with the grounds from which it is to follow."""
 
-    Parameters
-    ----------
-    number : str
-        The paper's number, or a name for what has none.
-    title : str
-        What it says, in words.
-    kind : Kind
-        Where it comes from.
-    symbol : sympy.Symbol or applied function
-        Left-hand side.
-    members : tuple of sympy.Expr
-        Right-hand sides, as published. A statement that rests on this one uses the last.
-    grounds : tuple of Ground
-        The premises; empty for what is taken as given.
-    eliminate : tuple of sympy.Symbol
-        Symbols of the grounds that are solved for along with `symbol`.
-    cases : tuple of Case
-        Where the members are piecewise: the cases to prove it by.
-    condition : Condition, optional
-        What is needed beside the grounds.
-    positive_if : sympy relational, optional
-        The claim that the left-hand side is positive exactly if this holds.
-    scope : str
-        Where it is proved, in words, if its cases and the branches of its grounds do not cover everything.
-    within : sympy Boolean
-        The comparisons that limit the cases, if the scope does: together with them the cases leave nothing out.
-    provided : tuple of sympy.Ne
-        What must differ for the derivation, which divides by the difference.
-    expected : Outcome, optional
-        What a correct account finds; `GIVEN` for what is taken as given, else `FOLLOWS`.
-    corrected_by : str
-        Number of the statement that says what this one should read.
-    see : tuple of str
-        Statements that qualify this one.
-    values : tuple of Value
-        Its numbers beside the paper's.
-    note : str
-        What a reader should know beyond the verdict.
-    section : str
-        Heading that it stands under.
-
-    Raises
-    ------
-    ValueError
-        If the statement defines its symbol by itself, or has grounds that do not fit its kind.
-    """
-
+    #: The paper's number, or a name for what has none.
     number: str
+    #: What it says, in words.
     title: str
+    #: Where it comes from.
     kind: Kind
+    #: Left-hand side.
     symbol: Name
+    #: Right-hand sides, as published. A statement that rests on this one uses the last.
     members: tuple[sympy.Expr, ...]
+    #: The premises; empty for what is taken as given.
     grounds: tuple[Ground, ...] = ()
+    #: Symbols of the grounds that are solved for along with `symbol`.
     eliminate: tuple[Name, ...] = ()
+    #: Where the members are piecewise: the cases to prove it by.
     cases: tuple[Case, ...] = ()
+    #: What is needed beside the grounds.
     condition: Condition | None = None
+    #: The claim that the left-hand side is positive exactly if this holds.
     positive_if: sympy.core.relational.Relational | None = None
+    #: Where it is proved, in words, if its cases and the branches of its grounds do not cover everything.
     scope: str = ""
+    #: The comparisons that limit the cases, if the scope does: together with them the cases leave nothing out.
     within: Boolean = sympy.true
+    #: What must differ for the derivation, which divides by the difference.
     provided: tuple[sympy.Ne, ...] = ()
+    #: What a correct account finds; `GIVEN` for what is taken as given, else `FOLLOWS`.
     expected: Outcome = None  # type: ignore[assignment]  # what is usual of its kind, by __post_init__
+    #: Number of the statement that says what this one should read.
     corrected_by: str = ""
+    #: Statements that qualify this one.
     see: tuple[str, ...] = ()
+    #: Its numbers beside the paper's.
     values: tuple[Value, ...] = ()
+    #: What a reader should know beyond the verdict.
     note: str = ""
+    #: Heading that it stands under.
     section: str = ""
 
     def __post_init__(self) -> None:
@@ -303,6 +203,11 @@ class Statement:
             raise ValueError(f"{self.number}: a statement of kind {self.kind} {wanted} grounds")
         if not self.expected:
             object.__setattr__(self, "expected", Outcome.GIVEN if self.kind.is_given else Outcome.FOLLOWS)
+
+    @property
+    def cases_to_prove(self) -> tuple[Case, ...]:
+        """Its cases; of a statement without, the only one."""
+        return self.cases or (Case((), ""),)
 
     @property
     def published(self) -> sympy.Eq:

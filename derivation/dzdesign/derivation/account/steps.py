@@ -27,46 +27,25 @@ class Relation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Step:
-    """One step: what was used, and what the symbol is after it.
+    """One step: what was used, and what the symbol is after it."""
 
-    Attributes
-    ----------
-    used : tuple of Ground
-        The grounds put in; empty where the last result was only rearranged.
-    name : symbol
-        What the ground was used for: the symbol that it gives.
-    gives : sympy.Expr
-        The value that it gives for `name`.
-    result : sympy.Expr
-        The statement's symbol after the step.
-    """
-
+    #: The grounds put in; empty where the last result was only rearranged.
     used: tuple[Ground, ...]
+    #: What the ground was used for: the symbol that it gives.
     name: Name
+    #: The value that it gives for `name`.
     gives: sympy.Expr
+    #: The statement's symbol after the step.
     result: sympy.Expr
 
 
 def derive_in_steps(
     relations: Sequence[Relation], statement: Statement, solution: Mapping[Name, sympy.Expr], reached: sympy.Expr
 ) -> tuple[Step, ...]:
-    """Derive a statement's symbol by substitution, one relation at a time.
+    """Derive a statement's symbol by substitution, one relation at a time, up to the form `reached`.
 
-    Parameters
-    ----------
-    relations : sequence of Relation
-        The grounds.
-    statement : Statement
-        Gives the symbol, and in `eliminate` what may not remain.
-    solution : mapping of symbol to sympy.Expr
-        What solving all relations at once gives; the steps must agree with it.
-    reached : sympy.Expr
-        The form in which the last step states the result.
-
-    Returns
-    -------
-    tuple of Step
-        Empty if no order of substitutions leads there: then there is nothing to read, though the solution stands.
+    The steps must agree with `solution`, what solving all relations at once gives. They are empty if no order of
+    substitutions leads there: then there is nothing to read, though the solution stands.
     """
     symbol = statement.symbol
     remaining = list(relations)

@@ -17,16 +17,7 @@ from dzdesign.derivation.symbols import QUANTITIES, Name
 
 
 def print_unit(name: Name) -> str:
-    """Return the unit of a symbol as a person writes it.
-
-    Parameters
-    ----------
-    name : symbol or applied function
-        One of `QUANTITIES`, or one of its functions of another argument.
-
-    Returns
-    -------
-    str
+    """Return the unit of a symbol, or of one of its functions of another argument, as a person writes it.
 
     Examples
     --------
@@ -38,17 +29,7 @@ def print_unit(name: Name) -> str:
 
 
 def find_unit_error(statement: Statement) -> str:
-    """Say what is wrong with the units of a statement.
-
-    Parameters
-    ----------
-    statement : Statement
-
-    Returns
-    -------
-    str
-        Empty if all its sides have one unit and no sum mixes units.
-    """
+    """Say what is wrong with the units of a statement; nothing if all sides have one and no sum mixes them."""
     left = _quantity_of(statement.symbol)
     if left is None:
         return f"the unit of {statement.symbol} is not known"

@@ -53,22 +53,9 @@ LAPLACE = (
 
 
 def laplace(number: str, where: str = "under the Laplace transform") -> Ground:
-    """Return a plant equation as a ground, transformed term by term.
+    """Return a plant equation, of Eqs. (19)-(24), as a ground, transformed term by term.
 
-    Parameters
-    ----------
-    number : str
-        One of Eqs. (19)-(24).
-    where : str, optional
-
-    Returns
-    -------
-    Ground
-
-    Raises
-    ------
-    ValueError
-        If the equation is not linear and homogeneous in the signals, so that its transform is another one.
+    One that is not linear and homogeneous in the signals is refused: its transform is another one.
     """
     equation = PLANT_EQUATIONS[number]
     signals = [signal for signal, _ in LAPLACE if equation.has(signal)]

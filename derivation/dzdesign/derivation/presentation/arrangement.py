@@ -27,14 +27,7 @@ class Root(sympy.Function):  # type: ignore[misc]
 def arrange(expression: sympy.Basic) -> sympy.Basic:
     """Put the terms and factors of an expression in the paper's order.
 
-    Parameters
-    ----------
-    expression : sympy.Basic
-
-    Returns
-    -------
-    sympy.Basic
-        The same function of its symbols, unevaluated, with `Root` for square roots.
+    The result is the same function of its symbols, unevaluated, with `Root` for square roots.
     """
     if isinstance(expression, sympy.Add):
         return _sum(expression)
@@ -79,16 +72,7 @@ def _term_key(term: sympy.Expr) -> tuple[Any, ...]:
 
 
 def with_positive_sign(product: sympy.Expr) -> sympy.Expr:
-    """Turn -(a - b) c into (b - a) c; which of them SymPy gives may change from run to run.
-
-    Parameters
-    ----------
-    product : sympy.Expr
-
-    Returns
-    -------
-    sympy.Expr
-    """
+    """Turn -(a - b) c into (b - a) c; which of them SymPy gives may change from run to run."""
     sums = [factor for factor in sympy.Mul.make_args(product) if isinstance(factor, sympy.Add)]
     if product.could_extract_minus_sign() and sums:
         return -product.xreplace({sums[0]: -sums[0]})

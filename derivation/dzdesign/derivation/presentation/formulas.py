@@ -100,14 +100,6 @@ def _latex_word(word: str) -> str:
 def to_text(formula: sympy.Basic) -> str:
     """Return an expression as ASCII text.
 
-    Parameters
-    ----------
-    formula : sympy.Basic
-
-    Returns
-    -------
-    str
-
     Examples
     --------
     >>> from dzdesign.derivation import symbols as s
@@ -120,14 +112,6 @@ def to_text(formula: sympy.Basic) -> str:
 @cache
 def to_latex(formula: sympy.Basic) -> str:
     r"""Return an expression as LaTeX for math mode.
-
-    Parameters
-    ----------
-    formula : sympy.Basic
-
-    Returns
-    -------
-    str
 
     Examples
     --------
@@ -145,31 +129,13 @@ def to_latex(formula: sympy.Basic) -> str:
 
 @cache
 def to_python(formula: sympy.Basic) -> str:
-    """Return an expression as SymPy reads it back.
-
-    Parameters
-    ----------
-    formula : sympy.Basic
-
-    Returns
-    -------
-    str
-    """
+    """Return an expression as SymPy reads it back."""
     return str(_Python().doprint(with_positive_sign(formula)))
 
 
 @cache
 def to_mathml(latex: str) -> str:
-    """Return LaTeX of math mode as the inside of an element ``math``, for a browser.
-
-    Parameters
-    ----------
-    latex : str
-
-    Returns
-    -------
-    str
-    """
+    """Return LaTeX of math mode as the inside of an element ``math``, for a browser."""
     from latex2mathml.converter import convert
 
     return convert(latex).partition(">")[2].removesuffix("</math>")

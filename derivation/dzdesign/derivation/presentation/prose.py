@@ -59,12 +59,7 @@ class Code(JsonText):
 
 
 class Words(JsonText):
-    """Text, formulas, references and code in a row.
-
-    Parameters
-    ----------
-    *parts : str, Formula, Reference, Code or Words
-    """
+    """Text, formulas, references and code in a row."""
 
     def __init__(self, *parts: "Part") -> None:
         flat = (one for part in parts for one in (part.parts if isinstance(part, Words) else (part,)))
@@ -108,17 +103,7 @@ def _pattern() -> re.Pattern[str]:
 
 
 def parse_prose(sentence: str, numbers: Collection[str] = ()) -> Words:
-    """Split a sentence into text, symbols and references; its signs become those of print.
-
-    Parameters
-    ----------
-    sentence : str
-    numbers : collection of str, optional
-        Statements that may be referred to.
-
-    Returns
-    -------
-    Words
+    """Split a sentence into text, symbols and references to statements of `numbers`; its signs become those of print.
 
     Examples
     --------

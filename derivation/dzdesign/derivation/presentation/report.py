@@ -36,46 +36,17 @@ _COUNTED = {
 
 
 def check_format(format: str) -> None:
-    """Refuse a format that there is not.
-
-    Parameters
-    ----------
-    format : str
-
-    Raises
-    ------
-    InputError
-        If it is none of `FORMATS`.
-    """
+    """Refuse a format that is none of `FORMATS`."""
     if format not in FORMATS:
         known = ", ".join(FORMATS)
         raise InputError(f"unknown format {format!r}{nearest(format, FORMATS)}: choose one of {known}")
 
 
 def render(verdicts: Sequence[Verdict], format: str, only: Sequence[str] | None = None) -> str:
-    """Render an account as one document.
+    """Render an account, or the statements `only`, as one document in one of `FORMATS`, with a newline at its end.
 
-    Parameters
-    ----------
-    verdicts : sequence of Verdict
-        What `verify_statements` returns.
-    format : str
-        One of `FORMATS`: ``text``, ``json`` (schema ``dzdesign.derivation/2``), ``latex`` (a document that
-        compiles by itself) or ``html`` (one page without scripts that needs no network).
-    only : sequence of str, optional
-        Numbers of the statements to show, such as `closure` returns; all of them unless given.
-
-    Returns
-    -------
-    str
-        The document, with a newline at its end.
-
-    Raises
-    ------
-    InputError
-        If there is no such format.
-    RequirementError
-        If all are wanted, and an equation of the paper is missing.
+    ``json`` has the schema ``dzdesign.derivation/2``, ``latex`` is a document that compiles by itself, ``html`` one
+    page without scripts that needs no network. The whole account may leave out no equation of the paper.
     """
     check_format(format)
     numbers = [verdict.number for verdict in verdicts]
@@ -88,21 +59,7 @@ def render(verdicts: Sequence[Verdict], format: str, only: Sequence[str] | None 
 def closure(statements: Sequence[Statement], wanted: Sequence[str]) -> tuple[str, ...]:
     """Return the numbers of some statements and of all that they rest on, in the order of the account.
 
-    Parameters
-    ----------
-    statements : sequence of Statement
-        Each after those it rests on.
-    wanted : sequence of str
-        As a person writes them: ``(18)``, ``18``, ``T3b``, ``t3b``; several in one, with commas between.
-
-    Returns
-    -------
-    tuple of str
-
-    Raises
-    ------
-    InputError
-        If there is no such statement.
+    They are `wanted` as a person writes them: ``(18)``, ``18``, ``T3b``, ``t3b``; several in one, with commas between.
 
     Examples
     --------
@@ -135,19 +92,7 @@ def _number(text: str, names: dict[str, str]) -> str:
 
 
 def compose(verdicts: Sequence[Verdict], numbers: Sequence[str]) -> DerivationReport:
-    """Say what the account found, of the statements to show.
-
-    Parameters
-    ----------
-    verdicts : sequence of Verdict
-        What `verify_statements` returns.
-    numbers : sequence of str
-        Of the statements to show.
-
-    Returns
-    -------
-    DerivationReport
-    """
+    """Say what the account found, of the statements to show."""
     book = {verdict.number: verdict for verdict in verdicts}
     entries = tuple(describe(book[number], book) for number in numbers)
     partial = len(numbers) < len(book)

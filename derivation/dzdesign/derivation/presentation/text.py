@@ -68,18 +68,7 @@ class TextWriter(Writer):
 
 
 def wrap(text: str, first: str = "", others: str | None = None) -> str:
-    """Break a text into lines.
-
-    Parameters
-    ----------
-    text : str
-    first, others : str, optional
-        What begins the first line, and the others: as the first unless given.
-
-    Returns
-    -------
-    str
-    """
+    """Break a text into lines; `first` begins the first one and, unless `others` is given, the others too."""
     lines = textwrap.wrap(
         text,
         _WIDTH,

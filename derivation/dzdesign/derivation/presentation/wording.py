@@ -19,18 +19,7 @@ _SIGNS = {"positive": "positive", "nonnegative": "zero or positive", "real": "of
 
 
 def describe(verdict: Verdict, book: Mapping[str, Verdict]) -> Entry:
-    """Say what was found about a statement.
-
-    Parameters
-    ----------
-    verdict : Verdict
-    book : mapping of str to Verdict
-        The whole account, by number.
-
-    Returns
-    -------
-    Entry
-    """
+    """Say what was found about a statement; `book` is the whole account, by number."""
     statement, condition = verdict.statement, verdict.statement.condition
     # Members that differ in the order of their terms only look alike.
     sides = (statement.symbol, *{to_text(member): member for member in statement.members}.values())
@@ -59,7 +48,7 @@ def describe(verdict: Verdict, book: Mapping[str, Verdict]) -> Entry:
         limited_by=verdict.limited_by,
         inherited=verdict.inherited,
         unit_error=verdict.unit_error,
-        derivations=tuple(_derivation(proof, index, book) for index, proof in enumerate(verdict.proofs)),
+        derivations=tuple(_derivation(proof, book) for proof in verdict.proofs),
         differences=tuple(_differences(verdict, book)),
         corrections=(_correction(statement, corrected.statement, book),) if corrected else (),
         corrected_by=(Reference(statement.corrected_by),) if statement.corrected_by else (),
@@ -71,16 +60,7 @@ def describe(verdict: Verdict, book: Mapping[str, Verdict]) -> Entry:
 
 
 def refer(statement: Statement) -> Reference:
-    """Refer to a statement; what has no number of its own is named by what it is.
-
-    Parameters
-    ----------
-    statement : Statement
-
-    Returns
-    -------
-    Reference
-    """
+    """Refer to a statement; what has no number of its own is named by what it is."""
     number = statement.number
     if _NUMBERED.fullmatch(number):
         return Reference(number)
@@ -170,7 +150,7 @@ def _differences(verdict: Verdict, book: Mapping[str, Verdict]) -> Iterator[Line
             if value == 0:
                 continue
             which = f", {form} form" if len(proof.discrepancies) > 1 else ""
-            where = Words(", ", parse_prose(proof.where, book)) if proof.where else ""
+            where = Words(", ", parse_prose(proof.case.where, book)) if proof.case.where else ""
             formula = Formula(sympy.factor(value) if stated is None else stated)
             yield Line(words=Words("Derived minus published", which, where, ":"), formula=formula)
             stated = None
@@ -226,11 +206,11 @@ def _significant(number: float) -> str:
 # --- a derivation -------------------------------------------------------------------------------------------
 
 
-def _derivation(proof: CaseProof, index: int, book: Mapping[str, Verdict]) -> Derivation:
+def _derivation(proof: CaseProof, book: Mapping[str, Verdict]) -> Derivation:
     symbol, cases = proof.statement.symbol, proof.statement.cases
-    where = parse_prose(proof.where, book)
+    where = parse_prose(proof.case.where, book)
     if cases:
-        made = Words.join(Formula(*pair) for pair in cases[index].at)
+        made = Words.join(Formula(*pair) for pair in proof.case.at)
         where = Words("Case: ", where, ", that is ", made) if where else Words("With ", made)
     steps = tuple(_visible(proof))
     lines = [Line(words=_step(one, before, proof, book), formula=Formula(symbol, one.result)) for before, one in steps]

@@ -10,13 +10,7 @@ from dzdesign.derivation.presentation.prose import Code, Formula, Part, Referenc
 
 
 class Writer(ABC):
-    """A notation.
-
-    Parameters
-    ----------
-    linked : collection of str
-        Numbers of the statements in the document: those that can be pointed to.
-    """
+    """A notation; `linked` are the numbers of the statements in the document: those that can be pointed to."""
 
     #: The template of a whole document.
     TEMPLATE: ClassVar[str]
@@ -27,12 +21,7 @@ class Writer(ABC):
         self.linked = linked
 
     def words(self, *parts: Part) -> str:
-        """Return words in this notation.
-
-        Parameters
-        ----------
-        *parts : Words, or what is in them
-        """
+        """Return words in this notation."""
         return "".join(map(self._part, Words(*parts).parts))
 
     def _part(self, part: str | Formula | Reference | Code) -> str:
@@ -75,18 +64,7 @@ class Writer(ABC):
 
 
 def write(kind: type[Writer], report: DerivationReport) -> str:
-    """Return a whole document.
-
-    Parameters
-    ----------
-    kind : type
-        The notation.
-    report : DerivationReport
-
-    Returns
-    -------
-    str
-    """
+    """Return a whole document in a notation."""
     import jinja2
 
     environment = jinja2.Environment(
@@ -103,14 +81,6 @@ def write(kind: type[Writer], report: DerivationReport) -> str:
 
 def anchor(number: str) -> str:
     """Return the name by which a statement can be linked to: ``eq-18``, ``T3b``.
-
-    Parameters
-    ----------
-    number : str
-
-    Returns
-    -------
-    str
 
     Examples
     --------

@@ -17,36 +17,20 @@ DEGREES_OF_FREEDOM = 14
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trend:
-    """How the threshold runs with the pressure drop.
-
-    Attributes
-    ----------
-    direction : {"decreasing", "flat", "increasing"}
-    change, change_se : float
-        Over the tested range, by a weighted straight line, and the standard error, V; NaN from one test.
-    p_value : float
-        Probability of so large a change, either way, if the threshold were flat (Student); NaN from one test.
-    """
+    """How the threshold runs with the pressure drop; from one test its numbers are NaN."""
 
     direction: Direction
+    #: Over the tested range, by a weighted straight line, and the standard error, V.
     change: float
     change_se: float
+    #: Probability of so large a change, either way, if the threshold were flat (Student).
     p_value: float
 
 
 def find_trend(dp: np.ndarray, threshold: np.ndarray, se: np.ndarray, u_max: float, budget: float) -> Trend:
-    """Test in which direction the threshold runs with the pressure drop.
+    """Test in which direction the threshold (V) runs with the pressure drop, which rises.
 
-    Parameters
-    ----------
-    dp : (T,) array
-        Nominal pressure drops, rising.
-    threshold, se : (T,) array
-        Thresholds and standard errors, V.
-    u_max : float
-        Full command, V.
-    budget : float
-        Change that systematic errors may make, V: a smaller one is flat, however significant.
+    The budget is the change that systematic errors may make, V: a smaller one is flat, however significant.
     """
     from scipy.special import stdtr
 
@@ -64,30 +48,18 @@ def find_trend(dp: np.ndarray, threshold: np.ndarray, se: np.ndarray, u_max: flo
 
 
 def excess_departure(departure: np.ndarray, se: np.ndarray, budget: float) -> np.ndarray:
-    """Return by how much each knee departs from one direction with the pressure drop, V; zero within its errors.
+    """Return the departures of the knees from the fit under the trend, V, zero where they lie within their errors.
 
-    Parameters
-    ----------
-    departure, se : (T,) array
-        Distance of each knee from the fit under the trend, and its standard error, V.
-    budget : float
-        Departure that systematic errors may make, V.
+    The budget is the departure that systematic errors may make, V.
     """
     real = departure > np.maximum(DEPARTURE_SIGNIFICANCE * se, budget)
     return np.where(real, departure, 0.0)
 
 
 def lower_bounds(threshold: np.ndarray, se: np.ndarray, confidence: float, budget: np.ndarray) -> np.ndarray:
-    """Return lower bounds that hold for all tests at once with the given confidence (Bonferroni, Student).
+    """Return lower bounds (V) that hold for all tests at once with the given confidence (Bonferroni, Student).
 
-    Parameters
-    ----------
-    threshold, se : (T,) array
-        Thresholds and standard errors, V.
-    confidence : float
-        Of all bounds together, for example 0.99.
-    budget : (T,) array
-        Systematic error to allow for beside the noise, V (the meter's zero).
+    The budget is the systematic error to allow for beside the noise, V (the meter's zero).
     """
     from scipy.special import stdtrit
 

@@ -54,16 +54,8 @@ def branch_numbers(
     Its sum of squares is quadratic in the line's changes of tilt and shift, so five sums are all that the solver ever
     sees: over the bins' means, and inside the bins sum (dy - line du)^2 about them, which only the tilt changes.
 
-    Parameters
-    ----------
-    shape : BranchShape
-        The branch; its line is where the fit starts from.
-    scale : tuple of float
-        Units of the unknowns: of the slope's relative change, and of the knee's in V.
-    floor : float
-        Meter floor, m³/s.
-    u_max : float
-        Full command, V.
+    The fit starts from the branch's line; `scale` has the units of its unknowns, of the slope's relative change and of
+    the knee's in V; `floor` is the meter's, m³/s.
 
     Returns
     -------
@@ -91,17 +83,11 @@ def branch_numbers(
 def solver_with_numbers(
     branches: Sequence[tuple[np.ndarray, np.ndarray]], chain: tuple[int, ...], steps: np.ndarray
 ) -> tuple["ca.Function", np.ndarray]:
-    """Return the solver of a joint fit and the parameters to call it with.
+    """Return the solver of a joint fit and the parameters to call it with, from the `branch_numbers` of all branches.
 
-    Parameters
-    ----------
-    branches : sequence
-        The `branch_numbers` of all B branches.
-    chain : tuple of int
-        Branches whose knees must run one way, in that order.
-    steps : (S, 3) array
-        Per step of the chain the distance of the next knee from the one before where the lines have their zeros, and by
-        how much each of the two unknowns adds to it: the solver's constraints bound that distance.
+    The knees of the branches in `chain` must run one way. Per step of the chain, `steps` (S, 3) has the distance of the
+    next knee from the one before where the lines have their zeros, and by how much each of the two unknowns adds to it:
+    the solver's constraints bound that distance.
     """
     most = max(censored.shape[1] for _, censored in branches)
     # Room for a power of two, filled up by bins with no samples, so that few layouts differ in it.

@@ -26,25 +26,15 @@ LARGEST_WEIGHT = 1e4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KneeFit:
-    """Result of the joint fit; one row a test, columns rising and falling (NaN where a branch is missing).
+    """Result of the joint fit; arrays (T, 2), columns rising and falling (NaN where a branch is missing)."""
 
-    Attributes
-    ----------
-    knee, knee_se : (T, 2) array
-        Knees in V and their standard errors (coloured noise counted).
-    slope : (T, 2) array
-        Slopes at the nominal pressure drop, m³/(s V).
-    active : tuple of str
-        The monotonicity constraints that hold with equality.
-    iterations : int
-        Of the solver.
-    """
-
+    #: Knees in V and their standard errors, coloured noise counted.
     knee: np.ndarray
     knee_se: np.ndarray
+    #: At the nominal pressure drop, m³/(s V).
     slope: np.ndarray
+    #: The monotonicity constraints that hold with equality.
     active: tuple[str, ...]
-    iterations: int
 
 
 def fit_knees(
@@ -58,20 +48,10 @@ def fit_knees(
     """Fit knees and slopes of all ramp tests jointly, the knees monotone in the pressure drop.
 
     Model, per test and branch: ``y = slope (u - knee)`` inside the knee window, y being the flow brought to the nominal
-    pressure drop. A reading below the meter's floor enters by its probability (a Tobit term), not as a zero.
-
-    Parameters
-    ----------
-    shapes : list of pairs
-        Rising and falling branch of each test, in the order of rising pressure drop.
-    floor : float
-        Meter floor, m³/s.
-    u_max : float
-        Full command, V.
-    trend : {"decreasing", "increasing", "flat"}
-        Direction in which the knees must run; "flat" leaves them free.
-    ordered : int
-        Column of the branch whose knees must run that way (1: falling); the other branch may run otherwise.
+    pressure drop. A reading below the meter's `floor` (m³/s) enters by its probability (a Tobit term), not as a zero.
+    The tests come in the order of rising pressure drop, each with its rising and its falling branch. The knees of the
+    branch `ordered` (0 rising, 1 falling) must run the way of the trend, of which "flat" leaves them free; those of the
+    other branch may run otherwise.
 
     Raises
     ------
@@ -112,7 +92,6 @@ def fit_knees(
             for (index, following), gap in zip(pairwise(order.chain), slack, strict=True)
             if gap < ACTIVE * u_max
         ),
-        iterations=int(outcome["iter_count"]),
     )
 
 
@@ -209,20 +188,9 @@ def fit_offset(
     The weights are the information of the joint fit about each threshold, so this is that fit's likelihood to second
     order, with the other parameters at their best. beta is monotone, 1 at the reference (Eqs. 5, 7), and
     ``beta u_min0 <= ceiling`` at every node; between nodes the chord lies under the ceiling because `ceiling[i]`
-    already is the lower of the bounds on both sides (see `bounds.staircase`).
-
-    Parameters
-    ----------
-    guard, guard_se : (T,) array
-        Guarded thresholds and standard errors, V, in the order of rising pressure drop.
-    ceiling : (T,) array
-        Largest offset that the certificate allows at each test, V.
-    reference : int
-        Index of the test at dP0.
-    u_max : float
-        Full command, V.
-    trend : {"decreasing", "increasing", "flat"}
-        "flat" makes beta 1 everywhere.
+    already is the lower of the bounds on both sides (see `staircase`). The thresholds, their standard errors and the
+    ceilings are (T,), in V, in the order of rising pressure drop; `reference` is the index of the test at dP0. A trend
+    that is "flat" makes beta 1 everywhere.
 
     Raises
     ------

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,21 +30,14 @@ FINEST_ERROR = 1e-5
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OrderedKnees:
-    """Knees of which those of one branch run the way of the trend.
+    """Knees of which those of one branch run the way of the trend."""
 
-    Attributes
-    ----------
-    column : int
-        That branch: 0 rising, 1 falling.
-    fit : KneeFit
-        The fit under the trend; the free one where there is none.
-    departure : (T,) array
-        How far each of its knees departs from that direction, V, beyond its own error: data that contradict the
-        certificate's one premise have to pay for it.
-    """
-
+    #: That branch: 0 rising, 1 falling.
     column: int
+    #: The fit under the trend; the free one where there is none.
     fit: KneeFit
+    #: How far each of its knees departs from that direction, V, beyond its own error: data that contradict the
+    #: certificate's one premise have to pay for it.
     departure: np.ndarray
 
     @property
@@ -75,22 +69,10 @@ def order_knees(
     *,
     alone: bool = False,
 ) -> OrderedKnees:
-    """Fit the knees again under the trend's direction, and see how far they depart from it.
+    """Fit the knees of one branch again under the trend's direction, and see how far they depart from it.
 
-    Parameters
-    ----------
-    group : DescribedTests
-        The ramp tests.
-    free : KneeFit
-        Fit without a direction.
-    direction : {"decreasing", "increasing", "flat"}
-        Of the side's threshold.
-    column : int
-        Branch whose knees must run that way: 0 rising, 1 falling.
-    options : IdentifyOptions
-        Choices of the engineer.
-    alone : bool
-        Leave the other branch out: the likelihood is a sum over branches, so it does not move this one.
+    From the fit without a direction. The other branch is left out if this one is fitted `alone`: the likelihood is a
+    sum over branches, so the other does not move this one.
 
     Raises
     ------
@@ -165,23 +147,8 @@ def fit_guard_curve(
 ) -> tuple[GuardCurve, np.ndarray]:
     """Fit the law's offset under the staircase of one threshold's bounds.
 
-    Parameters
-    ----------
-    threshold : Threshold
-        What is guarded, T tests.
-    dp : sequence of float or None
-        Pressure drops of the tests, Pa, rising; None where they are unknown.
-    reference : int
-        Index of the test at dP0.
-    direction : {"decreasing", "increasing", "flat"}
-        Of the trend.
-    u_max : float
-        Full command, V.
-
-    Returns
-    -------
-    tuple
-        The curve, and which of its bounds hold with equality, (T,) bool.
+    Returns the curve, and which of its bounds hold with equality, (T,) bool. The pressure drops (Pa) of the tests rise;
+    `reference` is the index of the test at dP0.
 
     Raises
     ------
@@ -207,16 +174,7 @@ def opening_curve(
 ) -> OpeningCurve | None:
     """Return where useful flow begins on opening, from the knees of the rising branch; None where dP is unknown.
 
-    Parameters
-    ----------
-    rising : OrderedKnees
-        Knees of the rising branch under the trend.
-    direction : {"decreasing", "increasing", "flat"}
-        Of the trend.
-    guards : mapping of str to GuardCurve
-        Curves below which it must not lie.
-    u_max : float
-        Full command, V.
+    It must not lie below the curves of the guards.
     """
     dp = next(iter(guards.values())).beta_dp_MPa
     if not dp:
@@ -242,8 +200,6 @@ def further_guards(
     """
     curves: dict[Guard, GuardCurve] = {}
     for name, threshold in thresholds.items():
-        try:
+        with suppress(InputError):
             curves[name], _ = fit_guard_curve(threshold, dp, reference, direction, u_max)
-        except InputError:
-            continue
     return curves

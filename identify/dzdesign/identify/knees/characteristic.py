@@ -30,19 +30,8 @@ def describe_branches(
 ) -> list[BranchShape]:
     """Describe all branches of a valve: where the straight part lies, its line, its noise, and the tail below it.
 
-    Parameters
-    ----------
-    reads : sequence of PreparedBranch
-        All branches of all ramp tests: one meter has read them, so they tell its noise together.
-    u_max : float
-        Full command, V.
-    window : tuple of float
-        Shares of the largest flow between which the characteristic is taken as straight.
-
-    Raises
-    ------
-    InputError
-        If a window holds too few samples for a line, or the flow does not rise in it.
+    One meter has read them all, so they tell its noise together; `window` and errors are those of
+    `find_straight_parts`.
     """
     parts = find_straight_parts(reads, u_max=u_max, window=window)
     return [
@@ -54,27 +43,25 @@ def describe_branches(
 def _describe(
     read: PreparedBranch, line: GatedLine, level: float, noise: float, correlation: float, u_max: float
 ) -> BranchShape:
-    branch = read.branch
+    branch, kept = read.branch, line.kept
     tail = _find_tail(read, level, line, noise, correlation, u_max)
     onset, onset_se = _find_onset(read, tail, level, noise)
     return BranchShape(
-        rising=branch.rising,
-        bins=bin_branch(branch.u[line.kept], read.y[line.kept], line.censored[line.kept], u_max),
+        prepared=read,
+        line=line,
+        bins=bin_branch(branch.u[kept], read.y[kept], line.censored[kept], u_max),
         y_max=read.y_max,
         slope=line.slope,
         knee=line.knee,
         sigma=line.sigma,
         variance_inflation=line.variance_inflation,
-        window=line.window,
+        outliers=line.outliers,
+        dropped=line.dropped,
         level=level,
         tail=tail,
         onset=onset,
         onset_se=onset_se,
         saturates=read.y_max < 0.93 * line.slope * (branch.u.max() - line.knee),
-        outliers=line.outliers,
-        dropped=line.dropped,
-        prepared=read,
-        line=line,
     )
 
 

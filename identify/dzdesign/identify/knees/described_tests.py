@@ -9,29 +9,17 @@ from dzdesign.identify.reading.ramp_test import RampTest
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DescribedTest:
-    """One ramp test.
-
-    Attributes
-    ----------
-    test : RampTest
-        Its samples.
-    dp : float or None
-        Nominal pressure drop, Pa; None if it is unknown.
-    shapes : tuple of BranchShape or None
-        Of its rising and its falling branch; None where there is none.
-    q_max : float
-        Largest flow, m³/s.
-    ramps : tuple of str
-        The ramps in it.
-    files : tuple of (str, str)
-        Source and SHA-256 of every file in it.
-    """
+    """One ramp test."""
 
     test: RampTest
+    #: Nominal pressure drop, Pa; None if it is unknown.
     dp: float | None
+    #: Of its rising and its falling branch; None where there is none.
     shapes: tuple[BranchShape | None, BranchShape | None]
+    #: Largest flow, m³/s.
     q_max: float
     ramps: tuple[str, ...]
+    #: Source and SHA-256 of every file in it.
     files: tuple[tuple[str, str], ...]
 
     @property
@@ -40,13 +28,7 @@ class DescribedTest:
         return [shape for shape in self.shapes if shape]
 
     def branch(self, column: int) -> BranchShape:
-        """Return the rising (0) or falling (1) branch.
-
-        Raises
-        ------
-        ValueError
-            If there is none.
-        """
+        """Return the rising (0) or falling (1) branch; a ValueError if there is none."""
         shape = self.shapes[column]
         if shape is None:
             raise ValueError(f"'{self.test.source}' has no {('rising', 'falling')[column]} branch")
@@ -60,24 +42,13 @@ class DescribedTest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DescribedTests:
-    """All ramp tests of a valve, in the order of rising pressure drop.
-
-    Attributes
-    ----------
-    tests : tuple of DescribedTest
-        All with the same branches.
-    floor : float
-        Meter floor, given or found, m³/s.
-    lag : MeterLag
-        Of the meter, declared or found.
-    zero_L_min : dict
-        Source -> flow read at zero command, where it is not zero; it has been subtracted.
-    zero_se : tuple of float
-        Standard error of what was subtracted from each of `tests`, as of white noise, m³/s; 0 where nothing was.
-    """
+    """All ramp tests of a valve, in the order of rising pressure drop, all with the same branches."""
 
     tests: tuple[DescribedTest, ...]
+    #: Of the meter, given or found, m³/s.
     floor: float
     lag: MeterLag
+    #: Source -> flow read at zero command, where it is not zero; it has been subtracted.
     zero_L_min: dict[str, float]
+    #: Standard error of what was subtracted from each of `tests`, as of white noise, m³/s; 0 where nothing was.
     zero_se: tuple[float, ...]

@@ -7,7 +7,9 @@ import numpy as np
 
 from dzdesign.identify.knees.noise import Roughness, variance_inflation
 from dzdesign.identify.knees.profile import flow_at_top, smooth_profile
-from dzdesign.identify.ramps.branches import Branch
+from dzdesign.identify.ramps.branches import Branch, at_nominal_pressure
+from dzdesign.identify.ramps.splitting import nominal_dp
+from dzdesign.identify.reading.ramp_test import RampTest
 
 #: A sample further than this many robust standard deviations from the line is an outlier.
 GATE = 6.0
@@ -26,75 +28,55 @@ def fit_line(u: np.ndarray, y: np.ndarray) -> tuple[float, float]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PreparedBranch:
-    """A branch, ready for lines to be laid through it.
-
-    Attributes
-    ----------
-    branch : Branch
-        Its samples.
-    y : (N,) array
-        Their flow at the nominal pressure drop, m³/s.
-    profile : tuple of (P,) array
-        Smoothed course of that flow: command (V), flow (m³/s).
-    y_max, floor : float
-        Flow at the largest command, and the meter's floor, m³/s.
-    source : str
-        For messages.
-    """
+    """A branch, ready for lines to be laid through it."""
 
     branch: Branch
+    #: Flow of its samples at the nominal pressure drop, (N,), m³/s.
     y: np.ndarray
+    #: Smoothed course of that flow: command (V), flow (m³/s), each (P,).
     profile: tuple[np.ndarray, np.ndarray]
+    #: Flow at the largest command, and the meter's floor, m³/s.
     y_max: float
     floor: float
+    #: For messages.
     source: str
 
 
-def prepare_branch(branch: Branch, y: np.ndarray, *, u_max: float, floor: float, source: str) -> PreparedBranch:
-    """Return a branch ready for lines to be laid through it; `floor` in m³/s, `source` for messages."""
+def prepare_branch(branch: Branch, test: RampTest, *, u_max: float, floor: float) -> PreparedBranch:
+    """Bring the flow of a test's branch to its nominal pressure drop, ready for lines; the meter's `floor` in m³/s."""
+    y = at_nominal_pressure(branch, nominal_dp(test))
     profile = smooth_profile(branch.u, y, u_max)
-    return PreparedBranch(branch=branch, y=y, profile=profile, y_max=flow_at_top(*profile), floor=floor, source=source)
+    y_max = flow_at_top(*profile)
+    return PreparedBranch(branch=branch, y=y, profile=profile, y_max=y_max, floor=floor, source=test.source)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GatedLine:
-    """Straight line through the samples between two flows, outliers left out.
+    """Straight line through the samples between two flows, outliers left out."""
 
-    Attributes
-    ----------
-    window : tuple of float
-        The two flows over the largest.
-    slope, knee : float
-        Of the line, m³/(s V), and its zero, V.
-    lever : float
-        Variance of the line's value at its zero, for independent samples of unit variance.
-    sigma : float
-        Standard deviation of one sample about the line, m³/s.
-    block_inflation, variance_inflation : float
-        Long-run variance over variance of one sample: as the residuals show it, and with what is known of the noise.
-    inside, kept, censored : (N,) bool array
-        Samples of the branch between the two flows, those of them that the line rests on, and those of them that read
-        below the meter's floor.
-    roughness : Roughness
-        Of the residuals.
-    outliers : int
-        Samples gated out.
-    dropped : float
-        Share of the samples that read below the floor where no flow below it is credible: drop-outs.
-    """
-
+    #: The two flows over the largest.
     window: tuple[float, float]
+    #: Of the line, m³/(s V), and its zero, V.
     slope: float
     knee: float
+    #: Variance of the line's value at its zero, for independent samples of unit variance.
     lever: float
+    #: Standard deviation of one sample about the line, m³/s.
     sigma: float
+    #: Long-run variance over variance of one sample: as the residuals show it, and with what is known of the noise. 1
+    #: for white noise, more for coloured noise or a bent line.
     block_inflation: float
     variance_inflation: float
+    #: Samples of the branch between the two flows, those of them that the line rests on, and those of them that read
+    #: below the meter's floor, each (N,) bool.
     inside: np.ndarray
     kept: np.ndarray
     censored: np.ndarray
+    #: Of the residuals.
     roughness: Roughness
+    #: Samples gated out.
     outliers: int
+    #: Share of the samples that read below the floor where no flow below it is credible: drop-outs.
     dropped: float
 
     @property
@@ -105,13 +87,8 @@ class GatedLine:
     def with_shared_noise(self, correlation: float, blocks: float) -> "GatedLine":
         """Return the same line with errors for the noise that all branches share.
 
-        Parameters
-        ----------
-        correlation : float
-            Between neighbouring samples.
-        blocks : float
-            Mean of all branches' `block_inflation`. That of one branch, from few blocks, counts where it stands out of
-            the mean: then it has more than noise in it.
+        Its correlation is that of neighbouring samples, `blocks` the mean of all branches' `block_inflation`. That of
+        one branch, from few blocks, counts where it stands out of the mean: then it has more than noise in it.
         """
         known = variance_inflation(correlation, self.roughness, self.sigma)
         of_this = self.block_inflation if self.block_inflation > STANDS_OUT * blocks else 1.0

@@ -24,12 +24,6 @@ BLOCKS = 16
 def lay_line(read: PreparedBranch, window: tuple[float, float]) -> GatedLine:
     """Lay a line through the samples between two shares of the largest flow.
 
-    Parameters
-    ----------
-    read : PreparedBranch
-    window : tuple of float
-        Shares of the largest flow.
-
     Raises
     ------
     InputError
@@ -92,14 +86,9 @@ def _runs_of_drop_outs(censored: np.ndarray, above: np.ndarray, residual: np.nda
     A meter with a floor reads nothing where the flow is a little above it, now and then, but not for long. Taken for
     little flow, half a second of lost readings just above the knee lifts it, and the bounds with it.
 
-    Parameters
-    ----------
-    censored : (N,) bool array
-        Samples in the order of time that read below the floor.
-    above : (N,) array
-        How far the line is above the floor at each, in standard deviations.
-    residual : (M,) array
-        Of the other samples, which tell how slow the noise is: slow noise explains longer runs.
+    `censored` (N,) says which samples in the order of time read below the floor, `above` (N,) how far the line is above
+    it at each, in standard deviations. The residuals (M,) of the other samples tell how slow the noise is: slow noise
+    explains longer runs.
     """
     edges = np.flatnonzero(np.diff(censored.astype(np.int8), prepend=0, append=0))
     starts, ends = edges[::2], edges[1::2]

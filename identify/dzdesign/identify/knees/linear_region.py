@@ -35,35 +35,21 @@ LARGEST_SHIFT = 3e-3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StraightParts:
-    """The straight parts of all branches of a valve.
+    """The straight parts of all branches of a valve."""
 
-    Attributes
-    ----------
-    lines : tuple of GatedLine
-        One per branch, as wide as the characteristic goes on straight.
-    levels, noises : tuple of float
-        Per branch the flow that counts as flow, and the noise of a reading while the valve is shut, m³/s.
-    correlation : float
-        Of the noise of neighbouring samples, by all branches together: at most, to one standard error.
-    """
-
+    #: One per branch, as wide as the characteristic goes on straight.
     lines: tuple[GatedLine, ...]
+    #: Per branch the flow that counts as flow, and the noise of a reading while the valve is shut, m³/s.
     levels: tuple[float, ...]
     noises: tuple[float, ...]
+    #: Of the noise of neighbouring samples, by all branches together: at most, to one standard error.
     correlation: float
 
 
 def find_straight_parts(reads: Sequence[PreparedBranch], *, u_max: float, window: tuple[float, float]) -> StraightParts:
-    """Find the straight part of each branch, and what all of them tell of the noise.
+    """Find the straight part of each branch of all ramp tests, and what all of them tell of the noise.
 
-    Parameters
-    ----------
-    reads : sequence of PreparedBranch
-        All branches of all ramp tests.
-    u_max : float
-        Full command, V.
-    window : tuple of float
-        Shares of the largest flow between which the characteristic is taken as straight.
+    `window` holds the shares of the largest flow between which the characteristic is taken as straight at first.
 
     Raises
     ------

@@ -6,6 +6,7 @@ one ramp rate that can't be told from hysteresis; a second rate moves the knees 
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal
 
@@ -16,9 +17,8 @@ from dzdesign.identify.constants import FULL_SWEEP
 from dzdesign.identify.knees.gated_line import prepare_branch
 from dzdesign.identify.knees.line_fitting import lay_line
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.ramps.branches import at_nominal_pressure
 from dzdesign.identify.ramps.pooling import group_by_pressure
-from dzdesign.identify.ramps.splitting import Ramp, nominal_dp
+from dzdesign.identify.ramps.splitting import Ramp
 
 #: Rates that differ by less than this factor are one.
 TWO_RATES = 1.5
@@ -41,15 +41,7 @@ class MeterLag:
 
 
 def find_lag(ramps: Sequence[Ramp], options: IdentifyOptions) -> MeterLag:
-    """Find the meter's lag, unless it is declared.
-
-    Parameters
-    ----------
-    ramps : sequence of Ramp
-        All of them, split as if there were no lag.
-    options : IdentifyOptions
-        Choices of the engineer.
-    """
+    """Find the meter's lag, unless it is declared, from all ramps, split as if there were no lag."""
     if options.meter_lag is not None:
         return MeterLag(options.meter_lag, 0.0, "declared")
     total = weighted = 0.0
@@ -81,15 +73,10 @@ def _knees(group: Sequence[Ramp], rising: bool, options: IdentifyOptions) -> tup
             whole = branch.u.max() >= FULL_SWEEP * highest and np.ptp(branch.u) >= FULL_SWEEP * highest
             if branch.rising is not rising or not math.isfinite(branch.rate) or not whole:
                 continue
-            y = at_nominal_pressure(branch, nominal_dp(ramp.test))
-            floor = options.meter_floor or 0.0
-            try:
-                read = prepare_branch(branch, y, u_max=options.u_max, floor=floor, source=ramp.test.source)
+            read = prepare_branch(branch, ramp.test, u_max=options.u_max, floor=options.meter_floor or 0.0)
+            with suppress(InputError):
                 line = lay_line(read, options.knee_window)
-            except InputError:
-                continue
-            if not line.slope > 0:
-                continue
-            found.append((branch.rate, line.knee, line.knee_se))
+                if line.slope > 0:
+                    found.append((branch.rate, line.knee, line.knee_se))
     columns = np.array(found).reshape(-1, 3)
     return columns[:, 0], columns[:, 1], columns[:, 2]

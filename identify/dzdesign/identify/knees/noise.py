@@ -47,13 +47,7 @@ class Roughness:
 
 
 def measure_roughness(u: np.ndarray, residual: np.ndarray) -> Roughness:
-    """Return the roughness of residuals about the parabola through them.
-
-    Parameters
-    ----------
-    u, residual : (N,) array
-        Commands, and residuals about any line, in the order of time.
-    """
+    """Return the roughness of residuals about any line, in the order of time, about the parabola through them."""
     if u.size > TERMS:
         x = (u - u.mean()) / max(np.ptp(u), 1e-300)
         powers = np.array([np.ones_like(x), x, x * x])
@@ -64,17 +58,9 @@ def measure_roughness(u: np.ndarray, residual: np.ndarray) -> Roughness:
 
 
 def shared_correlation(roughness: Sequence[Roughness]) -> float:
-    """Return the correlation of neighbouring samples by all residuals together: one meter, one kind of noise.
+    """Return the correlation of neighbouring samples by the residuals of all branches: one meter, one kind of noise.
 
-    Parameters
-    ----------
-    roughness : sequence of Roughness
-        One per branch.
-
-    Returns
-    -------
-    float
-        Zero for white noise; just below 1 where the noise is slower than the recordings can show.
+    It is zero for white noise, and just below 1 where the noise is slower than the recordings can show.
     """
     measured = [item for item in roughness if item.n > 2 * TERMS and item.steps > 0]
     if not measured:
@@ -101,18 +87,11 @@ def shared_correlation(roughness: Sequence[Roughness]) -> float:
 
 
 def correlation_upper_limit(correlation: float, roughness: Sequence[Roughness]) -> float:
-    """Return the correlation one standard error above the one found.
+    """Return the correlation one standard error above the one that `shared_correlation` found.
 
     Of n samples, n (1 - r) / (1 + r) stretches are independent, and so many squares tell 1 - r, to sqrt(2 / stretches)
     of itself. Slow noise in one or two short recordings leaves a dozen: noise may be half as quick as it looks there,
     and a line's error that does not know of it is believed where it must not be.
-
-    Parameters
-    ----------
-    correlation : float
-        Of neighbouring samples, as `shared_correlation` finds it.
-    roughness : sequence of Roughness
-        What it was found from.
     """
     longest = max((item.n for item in roughness), default=0)
     stretches = sum(item.n for item in roughness) * (1 - correlation) / (1 + correlation)
@@ -123,17 +102,7 @@ def correlation_upper_limit(correlation: float, roughness: Sequence[Roughness]) 
 
 
 def variance_inflation(correlation: float, roughness: Roughness, sigma: float) -> float:
-    """Return the variance of a line's parameters over what white noise of the residuals' size would give.
-
-    Parameters
-    ----------
-    correlation : float
-        Of neighbouring samples.
-    roughness : Roughness
-        Of the residuals.
-    sigma : float
-        Standard deviation of the residuals about the line.
-    """
+    """Return the variance of a line's parameters over what white noise of the residuals' size `sigma` would give."""
     n = roughness.n
     if n < 3 or sigma <= 0:
         return 1.0

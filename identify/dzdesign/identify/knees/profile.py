@@ -1,8 +1,10 @@
 """The course of the flow over the command, smoothed: where it crosses a level, and what it is at full command."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from dzdesign.identify.ramps.branches import bin_index
+from dzdesign.identify.ramps.branches import Branch, bin_index
 
 #: Share of the command's range, from the top, over which the largest flow is read.
 TOP = 0.05
@@ -44,14 +46,7 @@ def crossing(u: np.ndarray, y: np.ndarray, level: float) -> float:
 def hole_within(u: np.ndarray, low: float, high: float, u_max: float) -> tuple[float, float] | None:
     """Return the widest stretch without samples that shares a command with [low, high], or None; V.
 
-    Parameters
-    ----------
-    u : (P,) array
-        Commands of a profile, rising, V. Where all steps are wide, as of a staircase, none is a hole.
-    low, high : float
-        Commands between which it matters, V.
-    u_max : float
-        Full command, V.
+    The commands of a profile rise. Where all steps are wide, as of a staircase, none is a hole.
     """
     steps = np.diff(u)
     if not steps.size:
@@ -62,6 +57,11 @@ def hole_within(u: np.ndarray, low: float, high: float, u_max: float) -> tuple[f
         return None
     at = here[np.argmax(steps[here])]
     return float(u[at]), float(u[at + 1])
+
+
+def largest_flow(branches: Sequence[Branch | None], u_max: float) -> float:
+    """Return the largest flow that a test's branches have as recorded, m³/s."""
+    return max(flow_at_top(*smooth_profile(branch.u, branch.q, u_max)) for branch in branches if branch)
 
 
 def flow_at_top(u_profile: np.ndarray, y_profile: np.ndarray) -> float:

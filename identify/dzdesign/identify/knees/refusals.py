@@ -8,7 +8,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.identify.constants import L_MIN, LARGEST_DP, MPA, SMALLEST_DP
 from dzdesign.identify.knees.gated_line import PreparedBranch
 from dzdesign.identify.knees.noise import robust_sigma
-from dzdesign.identify.knees.profile import crossing, flow_at_top, smooth_profile
+from dzdesign.identify.knees.profile import crossing, largest_flow
 from dzdesign.identify.ramps.branches import Branch
 
 #: A flow that rises with the command has readings between these shares of the largest where its mean is between them.
@@ -20,15 +20,7 @@ FEWEST_IN_THE_MIDDLE, WIDEST_JUMP = 0.25, 0.05
 
 
 def refuse_a_wrong_pressure(source: str, dp: float | None) -> None:
-    """Refuse a pressure drop that is no valve's: a wrong unit, or ports that were swapped.
-
-    Parameters
-    ----------
-    source : str
-        For messages.
-    dp : float or None
-        Pa; None if it is unknown.
-    """
+    """Refuse a pressure drop (Pa; None if it is unknown) that is no valve's: a wrong unit, or swapped ports."""
     if dp is None:
         return
     if 0 < dp < SMALLEST_DP or dp > LARGEST_DP:
@@ -44,23 +36,11 @@ def refuse_a_wrong_pressure(source: str, dp: float | None) -> None:
 
 
 def refuse_a_shut_valve(source: str, branches: Sequence[Branch | None], u_max: float) -> None:
-    """Refuse a test whose flow at full command does not stand out of the meter's noise, or has the wrong sign.
-
-    Parameters
-    ----------
-    source : str
-        For messages.
-    branches : sequence of Branch or None
-        Of one test.
-    u_max : float
-        Full command, V.
-    """
-    for branch in branches:
-        if branch is None:
-            continue
+    """Refuse a test whose flow at full command does not stand out of the meter's noise, or has the wrong sign."""
+    for branch in filter(None, branches):
         bottom = branch.q[branch.u <= branch.u.min() + 0.05 * np.ptp(branch.u)]
         noise = robust_sigma(bottom)
-        rise = flow_at_top(*smooth_profile(branch.u, branch.q, u_max)) - float(np.median(bottom))
+        rise = largest_flow([branch], u_max) - float(np.median(bottom))
         least = max(6 * noise, 0.01 * L_MIN)
         if rise > least:
             continue
@@ -84,13 +64,6 @@ def refuse_a_jump(read: PreparedBranch, u_max: float) -> None:
     A meter whose floor lies above half of the largest flow makes such a jump wherever the flow happens to reach it, and
     so does a valve that only switches. The mean of readings on either side of a jump looks like a steep ramp; the
     readings themselves are on either side.
-
-    Parameters
-    ----------
-    read : PreparedBranch
-        One branch.
-    u_max : float
-        Full command, V.
     """
     low, high = (crossing(*read.profile, share * read.y_max) for share in MIDDLE)
     inside = (read.branch.u >= low) & (read.branch.u <= high)

@@ -3,7 +3,7 @@
 import io
 import textwrap
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -28,6 +28,19 @@ STYLE = {
     "svg.fonttype": "path",
     "svg.hashsalt": "dzdesign",  # ids in the file follow from its content: same input, same bytes
 }
+#: Hues of Okabe and Ito, darker or lighter where a label's contrast (4.5 to 1) asks for it; `sky` fills areas only.
+HUES = {
+    "ink": "#1b2128",
+    "soft": "#5a6570",
+    "grid": "#d9dee4",
+    "face": "#fefefe",
+    "blue": "#0072b2",
+    "vermilion": "#c44e00",
+    "green": "#008060",
+    "purple": "#a0467a",
+    "orange": "#8f6200",
+    "sky": "#3b8fc4",
+}
 #: Of a figure, inches; of a line of its title, characters.
 WIDTH, TITLE_WIDTH = 9, 105
 DPI = 150
@@ -46,14 +59,9 @@ def plot_style() -> Iterator[None]:
 
 
 def new_figure(height: float, *title: str) -> "Figure":
-    """Return an empty figure under its title; a file's name in it is no mathematics, whatever signs it has.
+    """Return an empty figure, `height` inches high, under the lines of its title; one too long is wrapped, then cut.
 
-    Parameters
-    ----------
-    height : float
-        Inches.
-    title : str
-        Its lines; one that is too long is wrapped, and cut after two.
+    A file's name in it is no mathematics, whatever signs it has.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -69,15 +77,7 @@ def new_figure(height: float, *title: str) -> "Figure":
 
 
 def finish(figure: "Figure", rows: int) -> "Figure":
-    """Put one legend of all panels under them, where it covers no data, and lay everything out, once.
-
-    Parameters
-    ----------
-    figure : Figure
-        With everything drawn.
-    rows : int
-        Of the legend.
-    """
+    """Put one legend of all panels under them, in so many rows, where it covers no data; lay everything out, once."""
     entries: dict[str, Artist] = {}
     for axes in figure.axes:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
@@ -97,15 +97,19 @@ def finish(figure: "Figure", rows: int) -> "Figure":
 
 
 def saved(figure: "Figure", suffix: str) -> bytes:
-    """Return the figure as a file's content.
-
-    Parameters
-    ----------
-    figure : Figure
-        Finished.
-    suffix : {"svg", "png"}
-        Format.
-    """
+    """Return the finished figure as the content of a file, "svg" or "png"."""
     out = io.BytesIO()
     figure.savefig(out, format=suffix, dpi=DPI, metadata=METADATA[suffix])
     return out.getvalue()
+
+
+def pressure_names(stems: Sequence[str], dp_MPa: Sequence[float | None]) -> list[str]:
+    """Return a file name for each pressure drop, with as few digits of it as tell all names apart."""
+    names: list[str] = []
+    for digits in range(3, 17):
+        names = [
+            stem if dp is None else f"{stem}_{dp:.{digits}g}_MPa" for stem, dp in zip(stems, dp_MPa, strict=True)
+        ]
+        if len(set(names)) == len(names):
+            break
+    return names

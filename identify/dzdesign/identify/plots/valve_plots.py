@@ -1,7 +1,6 @@
 """Plots of an identified valve: what each threshold rests on, what is certified, and the law's offset beside it.
 
-Only what was identified is drawn: nothing is fitted or smoothed here. A lower bound is drawn at its test alone and the
-staircase between tests, because a chord between two bounds is certified by nothing.
+Only what was identified is drawn: nothing is fitted or smoothed here.
 """
 
 from collections.abc import Iterator
@@ -12,7 +11,8 @@ import numpy as np
 from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.knees.described_tests import DescribedTest
-from dzdesign.identify.plots.frame import finish, new_figure, plot_style, saved
+from dzdesign.identify.plots.frame import HUES, finish, new_figure, plot_style, pressure_names, saved
+from dzdesign.identify.plots.valve_curves import BRANCHES, draw_beta, draw_thresholds, tested_pressures
 from dzdesign.identify.results import Identification, SideIdentification
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.ramp_result import TestResult
@@ -26,59 +26,34 @@ if TYPE_CHECKING:
 MOST_POINTS = 1500
 #: Residuals beyond this many sigma are drawn at this edge, so that a drop-out does not flatten the others.
 RESIDUAL_EDGE = 8.0
-#: Rising and falling: they differ in hue for the colour-blind (Okabe and Ito), in lightness in print, and in marker.
-COLOURS, MARKERS, NAMES = ("#0072B2", "#E69F00"), ("^", "v"), ("opening", "closing")
-BLACK, GREEN, PURPLE, GREY = "#000000", "#009E73", "#A0467A", "#6E6E6E"
+#: Of the rising and the falling branch.
+NAMES, MARKERS = (tuple(branch[index] for branch in BRANCHES) for index in (1, 2))
+COLOURS = tuple(HUES[hue] for *_, hue in BRANCHES)
 
 
 def plot_files(found: Identification) -> dict[str, bytes]:
-    """Draw an identified valve, each plot as SVG and as PNG; the same valve gives the same bytes.
+    """Draw an identified valve, each plot as SVG and as PNG: file name -> content; the same valve, the same bytes.
 
-    Parameters
-    ----------
-    found : Identification
-        Of `identify_sides`.
-
-    Returns
-    -------
-    dict
-        File name -> content: ``flow_<dP>_MPa`` for each pressure drop, ``thresholds`` and, where beta runs over several
-        pressure drops, ``beta``; of a valve with two sides each name starts with its side's.
+    There is ``flow_<dP>_MPa`` for each pressure drop, ``thresholds`` and, where beta runs over several pressure drops,
+    ``beta``; of a valve with two sides each name starts with its side's.
     """
-    files = {}
     with plot_style():
-        for name, figure in draw_figures(found):
-            for suffix in ("svg", "png"):
-                files[f"{name}.{suffix}"] = saved(figure, suffix)
-    return files
+        return {
+            f"{name}.{suffix}": saved(figure, suffix)
+            for name, figure in draw_figures(found)
+            for suffix in ("svg", "png")
+        }
 
 
 def draw_figures(found: Identification) -> Iterator[tuple[str, "Figure"]]:
-    """Return each plot's name and figure, one after the other.
-
-    Parameters
-    ----------
-    found : Identification
-        Of `identify_sides`.
-    """
+    """Return each plot's name and figure, one after the other."""
     for name, side in found.sides.items():
-        prefix = f"{name}_" if len(found.sides) > 1 else ""
-        for row, flow in enumerate(_flow_names(side.model.tests)):
-            yield prefix + flow, _flow_figure(found.model, side, row)
+        prefix, dp = f"{name}_" if len(found.sides) > 1 else "", [test.dp_MPa for test in side.model.tests]
+        for row, flow in enumerate(pressure_names([f"{prefix}flow"] * len(dp), dp)):
+            yield flow, _flow_figure(found.model, side, row)
         yield f"{prefix}thresholds", _thresholds_figure(side.model)
         if len(side.model.beta.beta) > 1:
             yield f"{prefix}beta", _beta_figure(side.model)
-
-
-def _flow_names(tests: tuple[TestResult, ...]) -> list[str]:
-    """Return a name for each pressure drop, with as many digits as tell them apart."""
-    if tests[0].dp_MPa is None:
-        return ["flow"]
-    for digits in range(3, 17):
-        names = [f"flow_{test.dp_MPa:.{digits}g}_MPa" for test in tests]
-        if len(set(names)) == len(names):
-            break
-    return names
 
 
 # Flow over command ---------------------------------------------------------------------------------------------------
@@ -105,14 +80,14 @@ def _flow_figure(valve: ValveModel, side: SideIdentification, row: int) -> "Figu
         for column, shape, knee, _, slope in branches:
             _draw_line(axes, shape, column, knee, slope / L_MIN)
         for column, _, knee, *_ in branches:
-            axes.plot(knee, 0, MARKERS[column], ms=size, color=COLOURS[column], mec=BLACK, mew=0.8,
+            axes.plot(knee, 0, MARKERS[column], ms=size, color=COLOURS[column], mec=HUES["ink"], mew=0.8,
                       label=f"knee {NAMES[column]}", zorder=5)  # fmt: skip
         for column, _, _, onset, _ in branches:  # hollow and larger: a knee at the same command shows inside it
             axes.plot(onset, 0, MARKERS[column], ms=1.8 * size, mfc="none", mec=COLOURS[column],
                       mew=1.6, label=f"onset {NAMES[column]}", zorder=6)  # fmt: skip
-        axes.axvline(test.u_guard_lower_V, color=BLACK, ls="-.", lw=1.2, label="certified bound")
+        axes.axvline(test.u_guard_lower_V, color=HUES["ink"], ls="-.", lw=1.2, label="certified bound")
         if valve.meter.floor_L_min > 0:
-            axes.axhline(valve.meter.floor_L_min, color=GREY, ls=":", lw=1.5, label="meter's floor")
+            axes.axhline(valve.meter.floor_L_min, color=HUES["soft"], ls=":", lw=1.5, label="meter's floor")
     for column, shape, knee, _, slope in branches:
         _draw_residuals(residual, shape, column, knee, slope)
     at = "" if test.dp_MPa is None else f" at {test.dp_MPa:.3f} MPa"
@@ -197,79 +172,51 @@ def _draw_residuals(axes: "Axes", shape: BranchShape, column: int, knee: float, 
     axes.plot(u[used], miss[used], MARKERS[column], ms=4 if used.size < 300 else 2, color=COLOURS[column],
               alpha=0.35, mew=0, rasterized=True, zorder=2)  # fmt: skip
     if gated.size:
-        axes.plot(u[gated], miss[gated], "x", ms=5, mew=1.3, color=BLACK, rasterized=True, zorder=3,
+        axes.plot(u[gated], miss[gated], "x", ms=5, mew=1.3, color=HUES["ink"], rasterized=True, zorder=3,
                   label=f"outlier (beyond {RESIDUAL_EDGE:g} σ: at the edge)")  # fmt: skip
-    axes.axhline(0, color=BLACK, lw=0.8)
+    axes.axhline(0, color=HUES["ink"], lw=0.8)
 
 
 # Over the pressure drop ----------------------------------------------------------------------------------------------
 
 
-def _pressures(side: SideModel) -> np.ndarray:
-    """Return the tested pressure drops, MPa; a single one that was not recorded stands at zero, without a number."""
-    return np.array([test.dp_MPa or 0.0 for test in side.tests])
-
-
-def _label_pressure(axes: "Axes", side: SideModel) -> None:
-    if side.tests[0].dp_MPa is None:
-        axes.set(xlabel="pressure drop dP (not recorded)", xticks=[])
-    else:
-        axes.set_xlabel("pressure drop dP (MPa)")
-
-
 def _thresholds_figure(side: SideModel) -> "Figure":
-    """Draw knees, guarded threshold with its bound, the certified staircase and the law's offset."""
-    dp = _pressures(side)
-    guard = np.array([test.u_guard_V for test in side.tests])
-    bound = np.array([test.u_guard_lower_V for test in side.tests])
+    """Draw the thresholds of all tests, the guarded one with its bound, and the law's offset."""
+    tests, curve = side.tests, side.curve
     change, error = (1e3 * (value or 0) for value in (side.trend_change_V, side.trend_change_se_V))
     trend = f"; {side.trend}: {change:.0f} ± {error:.0f} mV over the range" if side.trend else ""
     figure = new_figure(
         5.4,
-        f"Thresholds of {len(dp)} pressure drop{'s' if len(dp) > 1 else ''}: {side.tests[0].source}"
-        + (f" to {side.tests[-1].source}" if len(dp) > 1 else ""),
+        f"Thresholds of {len(tests)} pressure drop{'s' if len(tests) > 1 else ''}: {_sources(side)}",
         f"{side.certificate.guard} threshold guarded ({_percent(side)} for all tests together){trend}",
         f"u_min0 = {side.reference.u_min_V:.4f} V"
         + (f" at dP0 = {side.reference.dp_MPa:.3f} MPa" if side.beta.beta else ""),
     )
-    axes = figure.subplots()
-    for column, name in enumerate(NAMES):
-        knees = [knee for test in side.tests if (knee := _knees(test)[column]) is not None]
-        if knees:
-            errors = [test.u_knee_se_V for test in side.tests]
-            axes.errorbar(dp, knees, yerr=errors, fmt=MARKERS[column], ls="", ms=5, capsize=5, color=COLOURS[column],
-                          mec=BLACK, mew=0.6, label=f"knee {name} ± s.e.", zorder=4)  # fmt: skip
-    axes.vlines(dp, bound, guard, color=GREY, lw=7, alpha=0.35, label="from lower bound to threshold", zorder=1)
-    axes.plot(dp, guard, "s", ms=8.5, mfc="none", mec=BLACK, mew=1.2, label="guarded threshold", zorder=5)
-    axes.plot(dp, bound, "_", ms=12, mew=2, color=BLACK, label="lower bound, at the test", zorder=5)
-    if len(dp) > 1:
-        axes.stairs(side.curve.certified_steps_V, dp, baseline=None, color=GREEN, lw=2, label="certified staircase")
-    offset = side.reference.u_min_V * np.array(side.beta.beta or (1.0,))
-    axes.plot(dp, offset, "D--", ms=4, lw=1.4, color=PURPLE, label="largest certified offset", zorder=6)
-    axes.set_ylabel("command u (V)")
-    _label_pressure(axes, side)
-    return finish(figure, 2)
+    axes, dp = figure.subplots(), tested_pressures(side)
+    draw_thresholds(axes, side, curve)
+    axes.vlines(dp, curve.u_lower_V, curve.u_threshold_V, color=HUES["soft"], lw=7, alpha=0.35,
+                label="from lower bound to threshold", zorder=1)  # fmt: skip
+    axes.plot(dp, curve.u_threshold_V, "s", ms=11, mfc="none", mec=HUES["ink"], label="guarded threshold", zorder=5)
+    return finish(figure, 3)
 
 
 def _beta_figure(side: SideModel) -> "Figure":
-    """Draw beta with its nodes under what the bounds allow: the staircase and the bounds themselves, over u_min0."""
-    dp, u_min0 = _pressures(side), side.reference.u_min_V
-    beta = np.array(side.beta.beta)
-    steps = np.array(side.curve.certified_steps_V) / u_min0
-    bound = np.array([test.u_guard_lower_V for test in side.tests]) / u_min0
+    """Draw beta with its nodes under what the bounds allow, and dP0."""
+    dp, beta, u_min0 = tested_pressures(side), side.beta.beta, side.reference.u_min_V
     figure = new_figure(
         5.0,
-        f"β over {dp[0]:.3f} to {dp[-1]:.3f} MPa: {side.tests[0].source} to {side.tests[-1].source}",
+        f"β over {dp[0]:.3f} to {dp[-1]:.3f} MPa: {_sources(side)}",
         f"β = {beta[0]:.4f} to {beta[-1]:.4f}, 1 at dP0 = {side.reference.dp_MPa:.3f} MPa "
         f"(u_min0 = {u_min0:.4f} V); bounds: {_percent(side)} for all tests together",
     )
     axes = figure.subplots()
-    axes.plot(dp, bound, "_", ms=14, mew=2, color=BLACK, label="lower bound / u_min0, at the test", zorder=5)
-    axes.stairs(steps, dp, baseline=None, color=GREEN, lw=2, label="certified staircase / u_min0", zorder=3)
-    axes.plot(dp, beta, "D--", ms=5, lw=1.6, color=PURPLE, label="β(dP), straight between its nodes", zorder=4)
-    axes.plot(side.reference.dp_MPa or 0.0, 1, "o", ms=13, mfc="none", mec=BLACK, mew=1.2, label="dP0, where β = 1")
-    low = axes.get_ylim()[0]
-    axes.stairs(steps, dp, baseline=low, fill=True, color=GREEN, alpha=0.12, label="allowed by all bounds together")
-    axes.set(ylabel="β (no unit)", ylim=(low, None))
-    _label_pressure(axes, side)
+    draw_beta(axes, side.curve)
+    axes.plot(dp, np.array(side.curve.u_lower_V) / u_min0, "_", ms=14, mew=2, color=HUES["ink"],
+              label="lower bound / u_min0, at the test", zorder=5)  # fmt: skip
+    axes.plot(side.reference.dp_MPa or 0.0, 1, "o", ms=13, mfc="none", mec=HUES["ink"], label="dP0, where β = 1")
     return finish(figure, 2)
+
+
+def _sources(side: SideModel) -> str:
+    first, last = side.tests[0].source, side.tests[-1].source
+    return f"{first} to {last}" if len(side.tests) > 1 else first

@@ -33,28 +33,19 @@ def at_nominal_pressure(branch: Branch, dp: float | None) -> np.ndarray:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bins:
-    """Sufficient statistics of samples per bin of u; a straight line's least squares needs no more.
+    """Sufficient statistics of samples per bin of u, each (B,); a straight line's least squares needs no more."""
 
-    Attributes
-    ----------
-    n : (B,) array
-        Samples; bins without any are left out.
-    u, y : (B,) array
-        Means of command (V) and of flow at the nominal pressure drop (m³/s).
-    c_uu, c_uy, c_yy : (B,) array
-        Sums of squares and products about the means.
-    censored : (B,) array
-        Samples in the bin that read below the meter's floor; they are not in the other sums.
-    u_censored : (B,) array
-        Mean command of the censored samples; 0 where there are none.
-    """
-
+    #: Samples; bins without any are left out.
     n: np.ndarray
+    #: Means of command (V) and of flow at the nominal pressure drop (m³/s).
     u: np.ndarray
     y: np.ndarray
+    #: Sums of squares and products about the means.
     c_uu: np.ndarray
     c_uy: np.ndarray
     c_yy: np.ndarray
+    #: Samples in the bin that read below the meter's floor; they are not in the other sums. Their mean command, 0 where
+    #: there are none.
     censored: np.ndarray
     u_censored: np.ndarray
 
@@ -68,17 +59,7 @@ def bin_index(u: np.ndarray, u_max: float) -> tuple[np.ndarray, int]:
 
 
 def bin_branch(u: np.ndarray, y: np.ndarray, censored: np.ndarray, u_max: float) -> Bins:
-    """Gather samples in bins of `BIN_WIDTH` u_max.
-
-    Parameters
-    ----------
-    u, y : (N,) array
-        Command (V) and flow at the nominal pressure drop (m³/s).
-    censored : (N,) bool array
-        True where the meter read below its floor.
-    u_max : float
-        Full command, V.
-    """
+    """Gather samples, which are `censored` where the meter read below its floor, in bins of `BIN_WIDTH` u_max."""
     index, size = bin_index(u, u_max)
 
     def total(weight: np.ndarray, where: np.ndarray) -> np.ndarray:

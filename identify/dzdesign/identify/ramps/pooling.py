@@ -18,34 +18,20 @@ NAMED_FILES = 3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PooledTest:
-    """All ramps at one pressure drop.
+    """All ramps at one pressure drop."""
 
-    Attributes
-    ----------
-    test : RampTest
-        Their samples, one ramp after the other; `source` names the files, and the ramps of a file with several tests.
-    branches : tuple of Branch or None
-        Rising and falling, of all ramps; None where no ramp has any.
-    ramps : tuple of str
-        Each ramp's file, and its number in it.
-    files : tuple of (str, str)
-        Source and SHA-256 of every file in it.
-    """
-
+    #: Their samples, one ramp after the other; `source` names the files, and the ramps of a file with several tests.
     test: RampTest
+    #: Rising and falling, of all ramps; None where no ramp has any.
     branches: tuple[Branch | None, Branch | None]
+    #: Each ramp's file, and its number in it.
     ramps: tuple[str, ...]
+    #: Source and SHA-256 of every file in it.
     files: tuple[tuple[str, str], ...]
 
 
 def pool_ramps(ramps: Sequence[Ramp]) -> list[PooledTest]:
-    """Gather ramps by pressure drop, in the order of rising pressure drop.
-
-    Parameters
-    ----------
-    ramps : sequence of Ramp
-        Of all recordings; where a pressure drop is unknown they are one test.
-    """
+    """Gather the ramps of all recordings by pressure drop, in its rising order; where it is unknown, to one test."""
     return [_pooled(group) for group in group_by_pressure(ramps)]
 
 

@@ -15,16 +15,7 @@ AT_REST = 0.01
 
 
 def tests_of_side(tests: Sequence[RampTest], sign: int, u_max: float) -> list[RampTest]:
-    """Return the recordings that show one side, commands and flows of that side positive.
-
-    Parameters
-    ----------
-    tests : sequence of RampTest
-    sign : int
-        1 for positive commands, -1 for negative ones.
-    u_max : float
-        Full command, V.
-    """
+    """Return the recordings that show one side (1: positive commands, -1: negative ones), mirrored to positive."""
     found = []
     for test in tests:
         both = [_reaches(test, side, u_max) for side in (1, -1)]

@@ -39,36 +39,23 @@ SPIKE, SPIKE_STEPS = 0.02, 10
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ramp:
-    """One ramp of a recording.
+    """One ramp of a recording."""
 
-    Attributes
-    ----------
-    test : RampTest
-        Its samples, command as recorded.
-    number, of : int
-        Which ramp of how many in its recording, from 1.
-    dp : float or None
-        Pressure drop at (almost) no flow, Pa, which the supply's droop has not touched.
-    branches : tuple of Branch
-        Its sweeps from zero up, command put right for the meter's lag.
-    """
-
+    #: Its samples, command as recorded.
     test: RampTest
+    #: Which ramp of how many in its recording, from 1.
     number: int
     of: int
+    #: Pressure drop at (almost) no flow, Pa, which the supply's droop has not touched.
     dp: float | None
+    #: Its sweeps from zero up, command put right for the meter's lag.
     branches: tuple[Branch, ...]
 
 
 def split_ramps(test: RampTest, lag: float) -> list[Ramp]:
     """Split a recording into ramps, by the rule of this module.
 
-    Parameters
-    ----------
-    test : RampTest
-        One recording, of one ramp or several, with or without holds.
-    lag : float
-        Lag of the flow meter in s: the flow read at t belongs to the command at t - lag.
+    By the lag of the flow meter, s, the flow read at t belongs to the command at t - lag.
 
     Raises
     ------
@@ -124,14 +111,9 @@ def nominal_dp(test: RampTest) -> float | None:
 
 
 def lagged_command(time: np.ndarray, u: np.ndarray, lag: float) -> np.ndarray:
-    """Return the command to which each reading of a meter with a lag belongs.
+    """Return the command to which each reading of a meter with a lag (s) belongs.
 
-    Parameters
-    ----------
-    time, u : (N,) array
-        Clock (s, may stand still, as of a logger that stamps in whole seconds) and command (V).
-    lag : float
-        s.
+    The clock (s) may stand still, as of a logger that stamps in whole seconds.
     """
     if lag <= 0:
         return u

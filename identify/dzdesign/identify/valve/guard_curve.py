@@ -25,11 +25,6 @@ class GuardCurve:
 
     Its bounds hold together with the side's confidence. Those of two curves are not meant to hold together: a
     certificate protects one threshold.
-
-    Raises
-    ------
-    InputError
-        If the numbers do not fit together.
     """
 
     u_min0_V: Annotated[Voltage, Meta(description="The largest offset at dP0 that the certificate allows.")]
@@ -68,13 +63,7 @@ class GuardCurve:
         return tuple(share * self.u_min0_V for share in self.beta) or (self.u_min0_V,)
 
     def check_staircase(self, trend: Direction) -> None:
-        """Check that the steps follow from the tests' bounds under a trend.
-
-        Raises
-        ------
-        InputError
-            If they do not.
-        """
+        """Refuse steps that do not follow from the tests' bounds under a trend."""
         steps, _ = staircase(np.array(self.u_lower_V), trend)
         if any(abs(step - known) > ROUNDING_V for step, known in zip(steps, self.certified_steps_V, strict=True)):
             raise RuleError("the certified steps do not follow from the tests' lower bounds")
@@ -107,13 +96,7 @@ class OpeningCurve:
             )
 
     def check_order(self, trend: Direction, guards: Sequence[GuardCurve]) -> None:
-        """Check that it runs the way of the trend, and nowhere below the offset of a guard's curve.
-
-        Raises
-        ------
-        InputError
-            If it does not.
-        """
+        """Refuse a curve that does not run the way of the trend, or lies below the offset of a guard's curve."""
         steps = np.diff(self.u_V)
         wrong_way = {"decreasing": steps, "increasing": -steps, "flat": np.abs(steps)}[trend]
         if np.any(wrong_way > ROUNDING_V):

@@ -15,18 +15,15 @@ def staircase(bound: np.ndarray, trend: Direction) -> tuple[np.ndarray, np.ndarr
     that rises, at least the lower test's. Chords between the bounds would not be safe: a convex threshold lies below
     its chords.
 
-    Parameters
-    ----------
-    bound : (T,) array
-        Lower bounds at the tests, in the order of rising pressure drop.
-    trend : {"decreasing", "increasing", "flat"}
-        "flat" assumes no direction: the lowest bound holds everywhere.
+    The tests come in the order of rising pressure drop. A trend that is "flat" assumes no direction: the lowest bound
+    holds everywhere.
 
     Returns
     -------
-    tuple
-        steps : (T - 1,) array, bound on each closed interval between neighbouring tests; ceiling : (T,) array, the
-        largest offset at each test such that straight chords stay under the steps on both sides.
+    steps : (T - 1,) array
+        Bound on each closed interval between neighbouring tests.
+    ceiling : (T,) array
+        The largest offset at each test such that straight chords stay under the steps on both sides.
     """
     if trend == "decreasing":
         tightened = np.maximum.accumulate(bound[::-1])[::-1]

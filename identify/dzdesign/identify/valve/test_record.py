@@ -12,12 +12,7 @@ MOST_ENTRIES, LONGEST_NAME, LONGEST_TEXT = 40, 60, 200
 def checked_record(entries: Iterable[tuple[object, object]], where: str) -> dict[str, str]:
     """Return a record as it is kept: blanks at the ends taken off, of whichever width they are.
 
-    Parameters
-    ----------
-    entries : iterable of (name, text)
-        In the order in which they are shown.
-    where : str
-        What they stand in, for the messages.
+    Messages say what the entries stand in, `where`.
 
     Raises
     ------

@@ -1,11 +1,9 @@
 """Figures of the identified valve and of the law, from valve.json and compensator.json alone."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from dzdesign.design.compensator import Compensator
-from dzdesign.identify.valve.ramp_result import TestResult
+from dzdesign.identify.plots.valve_curves import BRANCHES, draw_beta, draw_thresholds
 from dzdesign.identify.valve.side_model import SideModel
 from dzdesign.report.compensator_sides import laws_of
 from dzdesign.report.figures.figure import (
@@ -16,12 +14,11 @@ from dzdesign.report.figures.figure import (
     label_ends,
     legend_below,
     side_words,
+    span,
     titled_axes,
     to_report_figure,
 )
 from dzdesign.report.sections.cells import counted
-
-BRANCHES = (("rising", "opening", "^", "-", "blue"), ("falling", "closing", "v", "--", "vermilion"))
 
 
 def lines_figure(side: SideModel, name: str, both: bool) -> ReportFigure:
@@ -42,7 +39,7 @@ def lines_figure(side: SideModel, name: str, both: bool) -> ReportFigure:
             axes.plot(ends, flows, dash, color=hue, lw=1.8)
             axes.plot(knee, 0, marker, color=hue, ms=5, clip_on=False, zorder=4)
             rows.append([test.dp_MPa, word, knee, *ends.round(4).tolist(), *flows.round(4).tolist()])
-        labels.append((*far, _dp_text(test), hue))
+        labels.append((*far, "dP not recorded" if test.dp_MPa is None else f"{test.dp_MPa:.2f} MPa", hue))
     label_ends(axes, labels)
     for _, word, marker, dash, _ in BRANCHES:
         axes.plot([], [], dash, marker=marker, color=LIGHT["soft"], label=word)
@@ -57,40 +54,17 @@ def lines_figure(side: SideModel, name: str, both: bool) -> ReportFigure:
         + ". Samples and residuals are drawn by dzdesign identify --plots: the recordings are not part of an "
         "artefact folder.",
         f"Straight lines of flow over command of {counted(len(side.tests), 'pressure drop')}; they meet zero "
-        f"flow at the knees, {_span([row[2] for row in rows], 'V', 3)}.",
+        f"flow at the knees, {span([row[2] for row in rows], 'V', 3)}.",
         csv_text(("dp_MPa", "branch", "knee_V", "from_V", "to_V", "from_L_min", "to_L_min"), rows),
     )
 
 
-def _dp_text(test: TestResult) -> str:
-    return "dP not recorded" if test.dp_MPa is None else f"{test.dp_MPa:.2f} MPa"
-
-
-def _span(values: Sequence[float] | np.ndarray, unit: str, digits: int) -> str:
-    return f"{min(values):.{digits}f} to {max(values):.{digits}f} {unit}"
-
-
 def thresholds_figure(side: SideModel, guard: str, name: str, both: bool) -> ReportFigure:
-    """Draw knees and onsets with their errors, the certified staircase and the largest offset over dP."""
+    """Draw the thresholds over the pressure drop, and what is certified of the guarded one."""
     curve = side.guards[guard]
-    dp = np.array([test.dp_MPa or 0.0 for test in side.tests])
+    several = len(side.tests) > 1
     figure, axes = titled_axes(3.8, name, both, legend_rows=2)
-    for branch, word, marker, _, hue in BRANCHES:
-        for what, face, size in (("knee", LIGHT[hue], 5.5), ("onset", "none", 8.5)):
-            at = [getattr(test, f"u_{what}_{branch}_V") for test in side.tests]
-            seen = [i for i, value in enumerate(at) if value is not None]
-            if seen:
-                error = [2 * (getattr(side.tests[i], f"u_{what}_{branch}_se_V") or 0.0) for i in seen]
-                axes.errorbar(dp[seen], [at[i] for i in seen], yerr=error, fmt=marker, ms=size, mfc=face,
-                              mec=LIGHT[hue], ecolor=LIGHT[hue], capsize=3, lw=1, label=f"{what} {word} ± 2 s.e.",
-                              zorder=4)  # fmt: skip
-    axes.plot(dp, curve.u_lower_V, "_", ms=13, mew=2, color=LIGHT["ink"], label="lower bound, at the test", zorder=5)
-    if len(dp) > 1:
-        axes.stairs(curve.certified_steps_V, dp, baseline=None, color=LIGHT["green"], lw=2,
-                    label="certified staircase")  # fmt: skip
-    offset = curve.u_min0_V * np.array(curve.beta or [1.0])
-    axes.plot(dp, offset, "D-.", ms=4, lw=1.3, color=LIGHT["purple"], label="largest certified offset", zorder=6)
-    axes.set(xlabel="pressure drop dP (MPa)", ylabel="command u (V)")
+    draw_thresholds(axes, side, curve)
     legend_below(figure, 4)
     return to_report_figure(
         figure,
@@ -99,12 +73,12 @@ def thresholds_figure(side: SideModel, guard: str, name: str, both: bool) -> Rep
         "drive at zero command stays below "
         + (
             "the staircase, which is what the bounds of all tests together certify between the tests too."
-            if len(dp) > 1
+            if several
             else "its lower bound. One pressure drop was tested, and nothing is certified at another."
         ),
-        f"Thresholds over the pressure drop: the {guard} threshold lies at {_span(curve.u_threshold_V, 'V', 3)}, "
-        f"its lower bound at {_span(curve.u_lower_V, 'V', 3)}, the largest certified offset at "
-        f"{_span(offset, 'V', 3)}.",
+        f"Thresholds over the pressure drop: the {guard} threshold lies at {span(curve.u_threshold_V, 'V', 3)}, "
+        f"its lower bound at {span(curve.u_lower_V, 'V', 3)}, the largest certified offset at "
+        f"{span(curve.u_offset_V, 'V', 3)}.",
         csv_text(
             ("dp_MPa", "knee_opening_V", "knee_closing_V", "onset_opening_V", "onset_closing_V", "threshold_V",
              "lower_bound_V", "offset_V", "certified_up_to_next_V"),
@@ -112,7 +86,7 @@ def thresholds_figure(side: SideModel, guard: str, name: str, both: bool) -> Rep
                 [
                     test.dp_MPa, test.u_knee_rising_V, test.u_knee_falling_V, test.u_onset_rising_V,
                     test.u_onset_falling_V, curve.u_threshold_V[i], curve.u_lower_V[i],
-                    round(float(offset[min(i, len(offset) - 1)]), 7),
+                    round(curve.u_offset_V[i], 7),
                     curve.certified_steps_V[i] if i < len(curve.certified_steps_V) else None,
                 ]
                 for i, test in enumerate(side.tests)
@@ -132,15 +106,8 @@ def beta_figure(
     if len(curve.beta) < 2:
         return None
     dp, u_min0 = np.array(curve.beta_dp_MPa), curve.u_min0_V
-    steps, lower, threshold = (
-        np.array(values) / u_min0 for values in (curve.certified_steps_V, curve.u_lower_V, curve.u_threshold_V)
-    )
     figure, axes = titled_axes(3.6, name, both, legend_rows=2)
-    axes.fill_between(dp, lower, threshold, color=LIGHT["sky"], alpha=0.25, lw=0,
-                      label="from bound to threshold, over u_min0")  # fmt: skip
-    axes.plot(dp, threshold, ":", color=LIGHT["blue"], lw=1.4, label="threshold / u_min0")
-    axes.stairs(steps, dp, baseline=None, color=LIGHT["green"], lw=2, label="certified staircase / u_min0")
-    axes.plot(dp, curve.beta, "D-.", color=LIGHT["purple"], ms=4.5, lw=1.4, label="β(dP) of the valve")
+    draw_beta(axes, curve)
     pairs = zip(dp.tolist(), curve.beta, strict=True)
     rows = [["valve", at, value, round(value * u_min0, 7)] for at, value in pairs]
     if compensator:
@@ -152,22 +119,20 @@ def beta_figure(
             ["C", round(float(x), 6), round(float(y), 7), round(float(y * of_the_C), 7)]
             for x, y in zip(where, nodes, strict=True)
         ]
-    axes.set(xlabel="pressure drop dP (MPa)", ylabel="β (no unit)")
     legend_below(figure, 3)
     low, high = min(curve.beta), max(curve.beta)
     return to_report_figure(
         figure,
         f"beta-{name}",
-        f"β over the pressure drop{side_words(name, both)}: the share of u_min0 that the law puts out at zero "
-        "command."
-        + _of_the_table(compensator),
+        f"β over the pressure drop{side_words(name, both)}: the share of u_min0 that the law puts out at zero command."
+        + _about_the_table(compensator),
         f"Beta lies between {low:.4f} and {high:.4f} over {dp[0]:.2f} to {dp[-1]:.2f} MPa, the certified staircase "
-        f"at {_span(steps, '', 4).strip()}.",
+        f"at {span(np.array(curve.certified_steps_V) / u_min0, '', 4).strip()}.",
         csv_text(("of", "dp_MPa", "beta", "offset_V"), rows),
     )
 
 
-def _of_the_table(compensator: Compensator | None) -> str:
+def _about_the_table(compensator: Compensator | None) -> str:
     if compensator is None:
         return ""
     holds = compensator.below_dp0 == "hold"
