@@ -40,14 +40,8 @@ def catalogue() -> dict[str, Entry]:
 def warn(code: str, source: str | None = None, case: str = "", **numbers: object) -> Warning_:
     """Return a warning of the catalogue.
 
-    Parameters
-    ----------
-    code, case : str
-        Its code, and which of its texts.
-    source : str, optional
-        Recording that it is about; None: all.
-    **numbers
-        What stands in the text.
+    A code that has several texts names one by `case`; `numbers` are what stands in it. No source: it is about all
+    recordings.
     """
     text = catalogue()[code].text
     text = text if isinstance(text, str) else text[case]

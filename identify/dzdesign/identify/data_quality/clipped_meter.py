@@ -29,12 +29,7 @@ def without_clipping(
 ) -> tuple[list[RampTest], IdentifyOptions, tuple[Warning_, ...]]:
     """Return the recordings with a zero wherever the meter was cut off, the floor that this means, and what to say.
 
-    Parameters
-    ----------
-    tests : sequence of RampTest
-        Of one side, its commands and flows positive.
-    options : IdentifyOptions
-        Choices of the engineer; a floor that is declared stays, unless the meter was cut off above it.
+    A floor that is declared stays, unless the meter was cut off above it.
     """
     lowest = [_clipped_at(test, options.u_max) for test in tests]
     if not any(lowest):

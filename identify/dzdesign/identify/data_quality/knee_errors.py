@@ -27,19 +27,7 @@ PARTS, FEWEST_PARTS = 8, 4
 def about_errors(
     side: SideModel, tests: tuple[DescribedTest, ...], u_max: float, window: tuple[float, float]
 ) -> Iterator[Warning_]:
-    """Yield a warning for each test whose knees are known badly, with the reason.
-
-    Parameters
-    ----------
-    side : SideModel
-        What was identified.
-    tests : tuple of DescribedTest
-        What it was identified from.
-    u_max : float
-        Full command, V.
-    window : tuple of float
-        Of --knee-window, as shares.
-    """
+    """Yield a warning for each test whose knees are known badly, with the reason."""
     if all(test.u_knee_se_V <= NOISY * u_max for test in side.tests):
         return
     left = _left_without_the_bend([shape for item in tests for shape in item.branches if _has_noise(shape)])

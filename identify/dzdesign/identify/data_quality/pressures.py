@@ -1,4 +1,7 @@
-"""What is weak in the pressure drop of recordings: a stuck sensor, a number typed in, flows that contradict it."""
+"""What is weak in the pressure drop of recordings: a stuck sensor, a number typed in, flows that contradict it.
+
+Recordings are those of one side, their commands and flows positive.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -41,25 +44,14 @@ FALLS, GROWS_TOO_LITTLE, GROWS_TOO_MUCH = 0.9, 2.5, 1.75
 
 
 def about_mixed_pressures(tests: Sequence[RampTest]) -> tuple[Warning_, ...]:
-    """Return what tells that recordings of several pressure drops pass for one: a stuck sensor, or else their flows.
-
-    Parameters
-    ----------
-    tests : sequence of RampTest
-        Of one side, its commands and flows positive.
-    """
+    """Return what tells that recordings of several pressure drops pass for one: a stuck sensor, or else their flows."""
     return tuple(about_a_stuck_sensor(tests)) or tuple(about_mixtures(tests))
 
 
 def about_single_pressures(tests: Sequence[RampTest], mixed: Sequence[Warning_]) -> tuple[Warning_, ...]:
     """Return what is weak in the pressure drop of single recordings; of a stuck one not that it was typed in.
 
-    Parameters
-    ----------
-    tests : sequence of RampTest
-        Of one side, its commands and flows positive.
-    mixed : sequence of Warning_
-        Of `about_mixed_pressures`: beside a stuck sensor there is nothing more to say.
+    Beside a stuck sensor, which `mixed` may tell of, there is nothing more to say.
     """
     if any(item.code == "pressure-stuck" for item in mixed):
         return ()
@@ -69,13 +61,7 @@ def about_single_pressures(tests: Sequence[RampTest], mixed: Sequence[Warning_])
 
 
 def about_a_stuck_sensor(tests: Sequence[RampTest]) -> Iterator[Warning_]:
-    """Yield a warning if the recordings of one side show one pressure drop, noise aside, and must have several.
-
-    Parameters
-    ----------
-    tests : sequence of RampTest
-        Of one side, its commands and flows positive.
-    """
+    """Yield a warning if the recordings of one side show one pressure drop, noise aside, and must have several."""
     recorded = [test.dp for test in tests if test.dp is not None and not test.dp_is_declared]
     if len(tests) < 2 or len(recorded) < len(tests):
         return
@@ -123,11 +109,6 @@ def about_stuck_recordings(tests: Sequence[RampTest]) -> Iterator[Warning_]:
     """Yield a warning for each recording whose pressure drop is one number to the last digit, and should not be.
 
     That is so where other recordings' readings scatter, or where the file's name says another pressure.
-
-    Parameters
-    ----------
-    tests : sequence of RampTest
-        Of one side, its commands and flows positive.
     """
     scatters = any(_scatters(test) for test in tests)
     for test in sorted(tests, key=lambda test: test.source):
@@ -142,13 +123,7 @@ def about_stuck_recordings(tests: Sequence[RampTest]) -> Iterator[Warning_]:
 
 
 def about_typed_pressures(tests: Sequence[RampTest]) -> Iterator[Warning_]:
-    """Yield a warning for each recording, if the pressure drop of every one is one number: nothing was measured.
-
-    Parameters
-    ----------
-    tests : sequence of RampTest
-        Of one side, its commands and flows positive.
-    """
+    """Yield a warning for each recording, if the pressure drop of every one is one number: nothing was measured."""
     recorded = [test for test in tests if test.dp is not None and not test.dp_is_declared]
     typed = [(dp, test.source) for test in recorded if (dp := _one_number(test)) is not None]
     for dp, source in sorted(typed) if len(typed) == len(recorded) else ():
@@ -172,13 +147,7 @@ def _scatters(test: RampTest) -> bool:
 
 
 def about_mixtures(tests: Sequence[RampTest]) -> Iterator[Warning_]:
-    """Yield a warning for each pressure drop at which recordings, taken as one test, differ grossly in their flow.
-
-    Parameters
-    ----------
-    tests : sequence of RampTest
-        Of one side, its commands and flows positive.
-    """
+    """Yield a warning for each pressure drop at which recordings, taken as one test, differ grossly in their flow."""
     highest = max(float(despiked(test.u).max()) for test in tests)
     whole = [test for test in tests if despiked(test.u).max() >= FULL_SWEEP * highest]
     for dp, group in _at_one_pressure(whole):
@@ -219,12 +188,7 @@ def about_flow_gains(tests: Sequence[TestResult]) -> Iterator[Warning_]:
     """Yield a warning for each test whose flow gain contradicts its pressure drop, by those of the other tests.
 
     The gain beyond the knee, and not the flow at one command, is compared: a supply at its limit and a knee that moves
-    leave it as it is.
-
-    Parameters
-    ----------
-    tests : sequence of TestResult
-        Of one side, in the order of rising pressure drop.
+    leave it as it is. The tests stand in the order of rising pressure drop.
     """
     left = [test for test in tests if test.dp_MPa is not None and test.slope_L_min_V > 0]
     # Without the worst one the others may agree; of two, either may be wrong, and both are named.

@@ -37,16 +37,8 @@ def find_warnings(
 ) -> tuple[Warning_, ...]:
     """Return the warnings about one side.
 
-    Parameters
-    ----------
-    side : SideModel
-        What was identified.
-    group : DescribedTests
-        What it was identified from.
-    departure : (T,) array
-        By how much each test's knees depart from one direction with the pressure drop, V; zero within their error.
-    options : IdentifyOptions
-        Choices of the engineer.
+    `departure` (T,) says by how much each test's knees depart from one direction with the pressure drop, V; zero
+    within their error.
     """
     return (
         *_about_the_meter(group.zero_L_min),

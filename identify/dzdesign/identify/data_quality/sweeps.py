@@ -23,17 +23,7 @@ MANY_OUTLIERS = 0.02
 
 
 def about_sweeps(side: SideModel, tests: tuple[DescribedTest, ...], u_max: float) -> Iterator[Warning_]:
-    """Yield the warnings about the sweeps of one side.
-
-    Parameters
-    ----------
-    side : SideModel
-        What was identified.
-    tests : tuple of DescribedTest
-        What it was identified from.
-    u_max : float
-        Full command, V.
-    """
+    """Yield the warnings about the sweeps of one side."""
     for test, item in zip(side.tests, tests, strict=True):
         yield from _about_branches(test)
         yield from _about_holes(test, item, side.certificate.guard)

@@ -75,10 +75,7 @@ def claimed_pressures(names: Sequence[str]) -> list[float]:
     In Pa where each states a unit, and else as they stand. Where names can be read in two ways, the readings that lie
     closest together.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Of the files; folders before them count for nothing.
+    Folders before a name count for nothing.
 
     Examples
     --------
@@ -115,13 +112,6 @@ def _closest(readings: Sequence[Sequence[float]]) -> list[float]:
 
 def contradicts(name: str, dp: float) -> str:
     """Return what a file's name states if the measured pressure, in Pa, is plainly another in any reading; or nothing.
-
-    Parameters
-    ----------
-    name : str
-        Of the file.
-    dp : float
-        As measured, Pa.
 
     Examples
     --------
