@@ -34,18 +34,6 @@ def pressures_in_name(name: str) -> tuple[str, ...]:
     return found.pop() if len(found) == 1 else ()
 
 
-def pressure_in_name(name: str) -> str | None:
-    """Return the one pressure that a file's name states, such as ``4 MPa``; None where it says none, or may say two.
-
-    Examples
-    --------
-    >>> pressure_in_name("ramp_4MPa_2.csv"), pressure_in_name("ramp_2.csv"), pressure_in_name("ramp_2_5MPa.csv")
-    ('4 MPa', None, None)
-    """
-    stated = pressures_in_name(name)
-    return stated[0] if len(stated) == 1 else None
-
-
 def _readings(before: str, mark: str, number: str, after: str) -> tuple[str, ...]:
     """Return the decimal number, and the other reading if there is one; `after`: that of digits with a mark between."""
     whole, _, fraction = number.replace(",", ".").partition(".")
