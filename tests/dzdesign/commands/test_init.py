@@ -202,6 +202,10 @@ def test_a_command_in_per_cent_under_another_name(here):
     write("ramp.csv", "t_s,Sollwert [%],dP_MPa,Q_Lmin", time, 10 * u, dp, q)
     text, _ = init_then_identify("ramp.csv")
     assert tomllib.loads(text)["columns"] == {"u": "Sollwert [%]"} and "recordings in per cent don't say it" in text
+    write("current.csv", "t_s,I [mA],dP_MPa,Q_Lmin", time, 4 + 1.6 * u, dp, q)
+    Path("dzdesign.toml").unlink()
+    text, _ = init_then_identify("current.csv", more=("--columns", "u=I [mA]:4..20 mA = 0..100 %"))
+    assert "recordings in per cent don't say it" in text
 
 
 @pytest.mark.parametrize(
