@@ -11,8 +11,9 @@ from dzdesign.report.chain import Chain
 from dzdesign.report.compensator_sides import laws_of
 from dzdesign.report.page import Figure, Headline, misfit
 from dzdesign.report.sections.cells import counted, whole
-from dzdesign.verify.evidence import Check, Evidence, InputCheck, PressureResult
-from dzdesign.verify.requirements import not_tried
+from dzdesign.verify.evidence import Evidence, InputCheck, PressureResult
+from dzdesign.verify.requirements import Check
+from dzdesign.verify.untried import not_tried
 
 
 def headline(chain: Chain) -> Headline:
@@ -27,7 +28,7 @@ def _cautions(chain: Chain) -> Iterator[str]:
     for cost in dict.fromkeys(compensator.costs if compensator else ()):
         if cost.startswith("accepted, "):
             yield f"ACCEPTED warning, {cost.removeprefix('accepted, ')}."
-    if valve and any(warning.code == "simulated" for warning in valve.warnings):
+    if valve and valve.simulated:
         yield "SIMULATED recordings: this is an example, not of a measured valve."
     if valve and compensator:
         for name in valve.sides.keys() - laws_of(compensator).keys():
@@ -45,7 +46,7 @@ def _verdict(chain: Chain) -> Headline:
     if faults and all(check.holds is not False for check in evidence.checks):
         text = f"THE EVIDENCE CONTRADICTS ITSELF: {whole(faults)} faults counted, and every check holds"
         return Headline(kind="bad", text=text)
-    return _judged([*evidence.checks, *_limits(chain)])
+    return _judged([*evidence.checks, *evidence.without_check, *_limits(chain)])
 
 
 def _judged(checks: Sequence[Check]) -> Headline:
