@@ -169,7 +169,8 @@ def test_a_name_in_the_derivation(capsys, tmp_path, monkeypatch):
 
 
 def test_names_in_tables_steer_no_terminal_and_are_no_markup(example_valve, capsys):
-    from dzdesign.terminal.tables import new_console, new_table, print_valve
+    from dzdesign.terminal.page import Table, new_console
+    from dzdesign.terminal.tables import print_valve
 
     side = example_valve.sides["positive"]
     tests = tuple(replace(test, source=name) for test, name in zip(side.tests, reversed(NAMES), strict=False))
@@ -178,7 +179,7 @@ def test_names_in_tables_steer_no_terminal_and_are_no_markup(example_valve, caps
         warning = replace(example_valve.warnings[0], text=name, source=name) if example_valve.warnings else None
         warnings = (warning,) if warning else ()
         print_valve(replace(example_valve, sides={"positive": replace(side, tests=tests)}, warnings=warnings))
-        table = new_table(name, name)
+        table = Table(name, name)
         table.add_row(name)
         new_console().print(table)
     out = capsys.readouterr().out
@@ -266,10 +267,15 @@ def test_a_firmware_that_leads_elsewhere_is_not_compiled(place, kind):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="links need a privilege on Windows")
-def test_a_link_inside_of_the_folder_is_welcome(place):
-    (place / "firmware" / "core" / "b.h").symlink_to("a.c")
-    read_firmware_manifest(place / "firmware")
-    check_inside(place / "firmware", ["core/b.h", "core/missing.c"], "a test")
+@pytest.mark.parametrize("target", ["core/a.c", "core", "nowhere"])
+def test_a_firmware_has_no_link_even_to_a_place_inside(place, wording, target):
+    """Seeded: no check follows a link to a folder, a build does."""
+    folder = place / "firmware"
+    (folder / "more").symlink_to(folder / target)
+    check_inside(folder, ["more", "core/missing.c"] if target == "core/a.c" else [], "a test")  # no place outside
+    with pytest.raises(InputError) as refused:
+        read_firmware_manifest(folder)
+    wording("hostile names: a link in a firmware", str(refused.value).replace(str(place), "FOLDER"))
 
 
 @pytest.mark.skipif(os.name == "nt", reason="links need a privilege on Windows")

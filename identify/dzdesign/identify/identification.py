@@ -83,6 +83,7 @@ def identify_sides(
     model = ValveModel(
         tool=THIS_TOOL,
         made_from=tuple(SourceFile(source=source, sha256=digest) for source, digest in files),
+        simulated=any(test.simulated for test in tests),
         u_max_V=options.u_max,
         meter=Meter(
             floor_L_min=max(side.described.floor for side in sides.values()) / L_MIN,

@@ -1,8 +1,23 @@
-"""Every requirement on a firmware, declared once: id, title and how to have it checked; and which were not."""
+"""Every requirement on a firmware, declared once: id, title and how to have it checked; and what is found of one."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Annotated
 
-from dzdesign.verify.evidence import Check, Evidence
+from msgspec import Meta
+
+from dzdesign.core.verdicts import DOES_NOT_HOLD, HOLDS, NOT_CHECKED
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Check:
+    """One requirement that was tried."""
+
+    id: Annotated[str, Meta(description="Short name of the requirement, the same in every version.")]
+    name: Annotated[str, Meta(description="What is required, with the sign of command or the processor it is of.")]
+    holds: Annotated[
+        bool | None, Meta(description=f"True: {HOLDS}; false: {DOES_NOT_HOLD}; null: {NOT_CHECKED}, it could not be.")
+    ]
+    text: Annotated[str, Meta(description="What was found, with its figures.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,31 +90,3 @@ ALWAYS = (
 )  # fmt: skip
 #: What is checked if it is asked for.
 OPTIONAL = (MACHINE_CODE, UNDEFINED_BEHAVIOUR, MUTATION)
-#: Of a file of the user's: nothing that was generated is there to compare it with.
-REVIEW = "review it, and try it on the machine"
-
-
-def untried_requirements(evidence: Evidence) -> tuple[Requirement, ...]:
-    """Return what can be checked of a firmware and was not tried, and how to have it tried."""
-    tried = {check.id for check in evidence.checks}
-    untried = [
-        Requirement(id="user-file", title=f"{name}, which is yours and was changed", how=REVIEW)
-        for name in evidence.changed_board_files
-    ]
-    untried += [
-        Requirement(id="user-file", title=f"{name}, which is yours", how=REVIEW) for name in evidence.user_files
-    ]
-    if evidence.board_not_compiled:
-        untried.append(replace(BOARD_FILES, how=evidence.board_not_compiled))
-    untried += [each for each in ALWAYS if each.id not in tried]
-    if evidence.closed_loop.plant is None:
-        untried += NEED_A_PLANT
-    if evidence.monte_carlo is None:
-        untried.append(SERIES)
-    optional = OPTIONAL + ((C2000WARE,) if evidence.target == "f28335" else ())
-    return tuple(untried + [each for each in optional if each.id not in tried])
-
-
-def not_tried(evidence: Evidence) -> tuple[str, ...]:
-    """Return the lines of what was not tried, each with the command that would."""
-    return tuple(f"{each.title}: {each.how}" for each in untried_requirements(evidence))

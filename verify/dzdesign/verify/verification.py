@@ -16,7 +16,7 @@ from dzdesign.verify.closed_loop.firmware_loop import FirmwareLoop, Watch, close
 from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.closed_loop.tolerances import Tolerances
-from dzdesign.verify.evidence import Check, ClosedLoopResult, Evidence, InputCheck
+from dzdesign.verify.evidence import ClosedLoopResult, Evidence, InputCheck
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs, input_checks
 from dzdesign.verify.exhaustive.drive_check import drive_follows
 from dzdesign.verify.exhaustive.input_map import InputMap, map_inputs
@@ -26,7 +26,7 @@ from dzdesign.verify.firmware.compilation import board_compiles, changed_board_f
 from dzdesign.verify.firmware.folder import read_compensator, read_firmware_manifest
 from dzdesign.verify.firmware.manifest import manifest_follows
 from dzdesign.verify.firmware.unchanged_files import files_unchanged, user_files
-from dzdesign.verify.requirements import EXACT_LAW
+from dzdesign.verify.requirements import EXACT_LAW, Check
 from dzdesign.verify.toolchain.host_compiler import host_compiler
 
 SCHEMA = schema_of(Evidence)
@@ -144,7 +144,7 @@ def verify(
             *loop.checks,
             certificate_follows(compensator),
             law_follows(compensator),
-            *valve_follows(folder, compensator),
+            valve_follows(folder, compensator),
             *board.checks,
         ),
         inputs=core.inputs,

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dzdesign.core.errors import RequirementError
-from dzdesign.verify.evidence import Check, InputCheck
+from dzdesign.verify.evidence import InputCheck
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import SAMPLED_STRIDE, PreparedInputs
 from dzdesign.verify.firmware.folder import read_compensator
-from dzdesign.verify.requirements import MACHINE_CODE
+from dzdesign.verify.requirements import MACHINE_CODE, Check
 from dzdesign.verify.toolchain.compiled_core import CompiledCore, Findings
 from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4, Machine
 

@@ -18,7 +18,8 @@ from dzdesign.verify.closed_loop.loop_checks import (
 from dzdesign.verify.closed_loop.plant import Plant, plants_from_tests
 from dzdesign.verify.closed_loop.scenarios import Scene, run_scenarios
 from dzdesign.verify.closed_loop.tolerances import Tolerances, monte_carlo, scatter
-from dzdesign.verify.evidence import Check, IdentifiedPlant, MonteCarlo, PressureResult, ScenarioResult, Side
+from dzdesign.verify.evidence import IdentifiedPlant, MonteCarlo, PressureResult, ScenarioResult, Side
+from dzdesign.verify.requirements import Check
 
 #: Shows how far a stage is: pieces and their number in, the pieces out.
 Watch = Callable[[Iterable[Any], int], Iterable[Any]]

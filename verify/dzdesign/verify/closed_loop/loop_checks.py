@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN
-from dzdesign.verify.evidence import Check, PressureResult, ScenarioResult
-from dzdesign.verify.requirements import PLANT_IS_THE_VALVE, PLANT_OPENS, ZERO_FLOW, ZERO_FLOW_AFTER_SCENARIOS
+from dzdesign.verify.evidence import PressureResult, ScenarioResult
+from dzdesign.verify.requirements import PLANT_IS_THE_VALVE, PLANT_OPENS, ZERO_FLOW, ZERO_FLOW_AFTER_SCENARIOS, Check
 
 #: Share of full command by which the opening of a plant may differ from the identified valve's: rounding, a quick ramp.
 SAME_THRESHOLD = 0.03

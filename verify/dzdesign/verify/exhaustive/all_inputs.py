@@ -6,12 +6,13 @@ from pathlib import Path
 from dzdesign.core.errors import RequirementError
 from dzdesign.design.compensator import Compensator
 from dzdesign.verify import requirements
-from dzdesign.verify.evidence import Check, InputCheck, InputCounts
+from dzdesign.verify.evidence import InputCheck, InputCounts
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.lot_check import check_lot
 from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
 from dzdesign.verify.exhaustive.zero_command import guarded_bounds, zero_command_margins
 from dzdesign.verify.firmware.folder import read_compensator
+from dzdesign.verify.requirements import Check
 from dzdesign.verify.toolchain.compiled_core import CompiledCore, Findings
 
 

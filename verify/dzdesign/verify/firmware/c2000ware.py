@@ -11,9 +11,8 @@ from xml.etree import ElementTree
 
 from dzdesign.core.artefact_files import read_bytes
 from dzdesign.core.errors import InputError, RequirementError
-from dzdesign.verify.evidence import Check
 from dzdesign.verify.firmware.folder import read_firmware_manifest
-from dzdesign.verify.requirements import C2000WARE
+from dzdesign.verify.requirements import C2000WARE, Check
 from dzdesign.verify.toolchain.host_compiler import check_strictly, host_compiler
 
 TARGET = "f28335"

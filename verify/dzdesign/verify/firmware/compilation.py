@@ -10,8 +10,8 @@ from pathlib import Path
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.verify import requirements
-from dzdesign.verify.evidence import Check
 from dzdesign.verify.firmware.unchanged_files import USER_FOLDER, changed_files, user_files
+from dzdesign.verify.requirements import Check
 from dzdesign.verify.toolchain.host_compiler import (
     STRICT,
     build_folder,
