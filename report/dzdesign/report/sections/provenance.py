@@ -1,5 +1,6 @@
 """Sections on what the report was made from, and on what it does not cover."""
 
+from dzdesign.core.artefact_types import Artefact
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.signal_descriptions import signals_in_words
 from dzdesign.identify.valve.model import ValveModel
@@ -48,22 +49,30 @@ def provenance_section(chain: Chain) -> Section:
 
 def _provenance_table(chain: Chain) -> Table:
     """Return which file made which, from the firmware's evidence back to the recordings."""
-    rows: list[tuple[Cell | str, ...]] = []
+    rows: list[tuple[str, Cell | str, Cell | str, str, str]] = []
     for role, kind in KINDS.items():
-        place = chain.places.get(role)
-        if place:
-            sources = ", ".join(each.source for each in place.made_from) or "–"
-            rows.append((kind.label, place.name, Cell(text=place.sha256, kind="hash"), place.made_by, sources))
+        artefact: Artefact | None = getattr(chain, role)
+        if artefact:
+            place, tool = chain.places[role], artefact.tool
+            sources = ", ".join(each.source for each in artefact.made_from) or "–"
+            rows.append((kind.label, place.name, _hash(place.sha256), f"{tool.name} {tool.version}", sources))
         elif kind.command:
             rows.append((kind.label, Cell(text="missing or not used", kind="open"), "", "", ""))
-    for source in chain.places["valve"].made_from if "valve" in chain.places else ():
-        rows.append(("recording", source.source, Cell(text=source.sha256, kind="hash"), "–", "–"))
-    headings = ("artefact", "file", "SHA-256", "made by", "made from")
+    for source in chain.valve.made_from if chain.valve else ():
+        rows.append(("recording", source.source, _hash(source.sha256), "–", "–"))
     return table_of(
         "Each artefact with the SHA-256 of its bytes, and what it was made from",
         rows,
-        *((heading, lambda row, place=place: row[place]) for place, heading in enumerate(headings)),
+        ("artefact", lambda row: row[0]),
+        ("file", lambda row: row[1]),
+        ("SHA-256", lambda row: row[2]),
+        ("made by", lambda row: row[3]),
+        ("made from", lambda row: row[4]),
     )
+
+
+def _hash(digest: str) -> Cell:
+    return Cell(text=digest, kind="hash")
 
 
 def _hashes_table(chain: Chain) -> Table | None:
