@@ -8,19 +8,6 @@ from dzdesign.report.chain import KINDS, Chain
 from dzdesign.report.page import Section
 from dzdesign.report.sections.cells import Cell, Table, table_of, whole
 
-#: Of every report, whatever it finds.
-NOT_PROVED = (
-    "Pressure drops beyond the tested interval: the nearest tested β is held there, and nothing is certified.",
-    "Commands above code 0: one code more is 1 to 2 mV more drive, and the law has no dead band.",
-    "What the certificate rests on: a threshold that runs one way with the pressure drop, also between the tests, and "
-    "a meter's lag that is as declared or found.",
-    "A leak or a soft edge below the flow that counts as flow; a meter's zero error that does not show at rest.",
-    "Errors of the pressure sensors beyond their converters', and failures that their signals hide.",
-    "Oil temperature and the spread between valves of a type: the compensator is certified for the valve of its tests.",
-    "The target's compiler and silicon: the C was compiled and tried on the host that made the evidence.",
-    "The closed loop is a simulation of the stated plant; it is no measurement.",
-)
-
 
 def warnings_section(valve: ValveModel | None, compensator: Compensator | None) -> Section:
     """Return the section on warnings, costs, signals, and what is not proved."""
@@ -37,7 +24,6 @@ def warnings_section(valve: ValveModel | None, compensator: Compensator | None) 
             ("Warnings of the recordings", tuple(warnings) or (("None.",) if valve else ())),
             ("What the design costs", compensator.costs if compensator else ()),
             ("What the codes stand for", tuple(signals)),
-            ("What this report does not prove", NOT_PROVED),
         )
     )
 
