@@ -11,7 +11,7 @@ from dzdesign.derivation.account.published import (
     SATURATED_FROM_V,
     U_MAX_V,
 )
-from dzdesign.reproduce.recovered_valves import at_rest
+from dzdesign.reproduce.recovered_valves import at_rest, printed_at
 from dzdesign.reproduce.valve_runs import DIRECT, PAPER, PRODUCT, Drive, ValveRuns
 
 #: What reading our own runs may cost: per cent of full command, share of a flow, L/min at zero command; and what
@@ -62,12 +62,11 @@ def displacement_beside(runs: ValveRuns) -> str:
 
 def displacement_before_flow(runs: ValveRuns, dp_MPa: float) -> str:
     """Say why the displacement's dead zone can't exceed the flow's."""
-    valve = runs.valve.published
-    flow = valve.dead_zone0_percent if dp_MPa == DP0_MPA else valve.dead_zone1_percent
-    moves = valve.displacement_dead_zone0_percent if dp_MPa == DP0_MPA else valve.displacement_dead_zone1_percent
+    printed = printed_at(runs.valve.published, dp_MPa)
     return (
-        f"the paper contradicts itself: by Eq. (24) no flow starts before the spool moves, but it reads {moves} % of "
-        f"displacement and {flow} % of flow; the fit follows the flow"
+        "the paper contradicts itself: by Eq. (24) no flow starts before the spool moves, but it reads "
+        f"{printed.displacement_dead_zone_percent} % of displacement and {printed.dead_zone_percent} % of flow; the "
+        "fit follows the flow"
     )
 
 
@@ -75,8 +74,9 @@ def residual(runs: ValveRuns, dp_MPa: float) -> str:
     """Say what the printed dead zone with compensator tells of the paper's offset, which it does not print."""
     recovered = runs.valve
     valve = recovered.published
-    onset = {by: runs.onset_percent(Drive(by), dp_MPa) for by in (PRODUCT,) if (Drive(by), dp_MPa) in runs.ramps}
-    ours = f"; the product's is {onset[PRODUCT]:.2f} % without a meter between" if onset else ""
+    ours = ""
+    if (Drive(PRODUCT), dp_MPa) in runs.ramps:
+        ours = f"; the product's is {runs.onset_percent(Drive(PRODUCT), dp_MPa):.2f} % without a meter between"
     if not recovered.level_L_min:
         return "the paper does not say how far below the threshold its offset stays, nor at what flow it reads" + ours
     printed = float(valve.residual_percent) / 100
