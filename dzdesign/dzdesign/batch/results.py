@@ -9,7 +9,7 @@ from pathlib import Path
 
 from dzdesign.batch.calibration import Outcome
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of, write_file, write_folder
-from dzdesign.core.artefact_types import THIS_TOOL, Artefact, to_json_bytes
+from dzdesign.core.artefact_types import THIS_TOOL, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.report.lot.folder import is_lot
 from dzdesign.report.lot.summary import FAILED, SUMMARY_NAME, LotSummary, UnfinishedLot
@@ -24,13 +24,7 @@ from dzdesign.report.lot.valve_folder import (
 
 
 class Results:
-    """The folder that a batch is written into: new, empty, or of an earlier run, which is then taken up.
-
-    Raises
-    ------
-    InputError
-        If it holds anything else, or can't be written.
-    """
+    """The folder that a batch is written into: new, empty, or of an earlier run, which is then taken up; no other."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -48,18 +42,15 @@ class Results:
 
     def begin(self, names: Collection[str]) -> None:
         """Mark the folder as a lot's, and take away what a killed run left half-written of these valves."""
-        self._write(UnfinishedLot(tool=THIS_TOOL, made_from=(), names=tuple(names)))
+        self.write_summary(UnfinishedLot(tool=THIS_TOOL, made_from=(), names=tuple(names)))
         left = re.compile(r"\.(.+)\.[a-z0-9_]{8}")
         for path in (self.folder / VALVES).iterdir():
             found = left.fullmatch(path.name)
             if found and found[1] in names and path.is_dir():
                 shutil.rmtree(path, ignore_errors=True)
 
-    def finish(self, summary: LotSummary) -> None:
-        """Write batch.json of a lot that has come to its end."""
-        self._write(summary)
-
-    def _write(self, summary: Artefact) -> None:
+    def write_summary(self, summary: LotSummary | UnfinishedLot) -> None:
+        """Write batch.json, of a lot that has come to its end or not."""
         write_file(self.folder / SUMMARY_NAME, to_json_bytes(summary))
 
     def of(self, name: str) -> Path:

@@ -88,11 +88,6 @@ def run_on_cluster(tasks: Iterable[Task], address: str, work: Work = calibrate) 
     The scheduler gives what a dead worker had, finished or not, to another. After several deaths it gives up all that
     lay on each of those workers: these valves are tried again one at a time, so that only the one that kills is blamed.
     The workers must be able to import `work`.
-
-    Raises
-    ------
-    InputError
-        If the scheduler can't be reached or goes away, or a worker runs another version of dzdesign.
     """
     with _scheduler_lost(address), _client(address) as client, _workers_missed(client, address):
         suspects = []

@@ -71,9 +71,7 @@ def run_chain(valve: RecoveredValve, say: Callable[[str], None] = lambda _: None
                 valve_json=sha256_of(valve_json),
                 compensator_json=sha256_of(compensator_json.encode()),
                 core={
-                    path: sha256_of(text.encode())
-                    for path, text in firmware.files.items()
-                    if path.startswith("core/")
+                    path: sha256_of(text.encode()) for path, text in firmware.files.items() if path.startswith("core/")
                 },
             ),
         ),

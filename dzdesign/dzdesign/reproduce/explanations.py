@@ -43,6 +43,11 @@ TOLERANCES = MappingProxyType(
     }
 )
 DROP = f"taken {DROP_ASSUMED}"
+#: Which valve Fig. 13 may be of.
+DUTY_OF_SECOND = (
+    "Fig. 13 does not name its valve; the product's offset lies below the threshold, the paper's at the first flow seen"
+)
+DUTY_OF_FIRST = "not required: Fig. 13 does not name its valve, and its 55 % fits the second"
 TEMPERATURE = (
     "not compared: the paper gives neither the temperatures nor the oil. In Eqs. (19)-(24) no threshold depends on it"
 )
@@ -162,14 +167,4 @@ def saturation(runs: ValveRuns) -> str:
         f"not required: a spool that meets its stop from {SATURATED_FROM_V[0]} V on at both pressure drops would by "
         f"Eq. (24) pass {stopped:.2f} times the flow at {DP1_MPA} MPa, the paper prints {printed:.2f} times; the fit "
         "follows the flows, by a flow force and without a stop"
-    )
-
-
-def duty(runs: ValveRuns, printed: bool) -> str:
-    """Say which valve Fig. 13 may be of."""
-    if not printed:
-        return "not required: Fig. 13 does not name its valve, and its 55 % fits the second"
-    return (
-        "Fig. 13 does not name its valve; the product's offset lies below the threshold, the paper's at the first flow "
-        "seen"
     )

@@ -203,12 +203,12 @@ def _duty_cycles(first: ValveRuns, second: ValveRuns) -> Iterator[PaperNumber]:
         second, dp_MPa, f"{at} without", "%", DUTY_WITHOUT_PERCENT,
         {DIRECT: 100 * DUTY_COMMAND_V / U_MAX_V}, _around(DUTY_WITHOUT_PERCENT, 0.0), tolerance=TOLERANCES["rounding"],
     )  # fmt: skip
-    for runs, printed in ((second, True), (first, False)):
+    for runs, why in ((second, explanations.DUTY_OF_SECOND), (first, explanations.DUTY_OF_FIRST)):
         values: dict[Driver, float | None] = {PAPER: paper_duty_percent(runs.valve.published)}
         if runs.product_duty_percent is not None:
             values[PRODUCT] = runs.product_duty_percent
+        allowed: dict[Driver, Range] | None = {PAPER: _around(DUTY_WITH_PERCENT, 0.0)} if runs is second else None
         yield _number(
-            runs, dp_MPa, f"{at} with", "%", DUTY_WITH_PERCENT, values,
-            {PAPER: _around(DUTY_WITH_PERCENT, 0.0)} if printed else None,
-            tolerance=TOLERANCES["rounding"] if printed else "", why=explanations.duty(runs, printed),
+            runs, dp_MPa, f"{at} with", "%", DUTY_WITH_PERCENT, values, allowed,
+            tolerance=TOLERANCES["rounding"] if allowed else "", why=why,
         )  # fmt: skip
