@@ -62,7 +62,9 @@ class Results:
         files = dict(outcome.files)
         if outcome.manifest.reason:
             files["reason.txt"] = f"{outcome.manifest.reason}\n".encode()
-        write_folder(self.of(outcome.name), files, replace(outcome.manifest, board=_board_files(files)))
+        firmware = files.get(f"{FIRMWARE}/{MANIFEST_NAME}")  # its board files are the user's to fill in
+        board = tuple(f"{FIRMWARE}/{name}" for name in json.loads(firmware)["board"]) if firmware else ()
+        write_folder(self.of(outcome.name), files, replace(outcome.manifest, board=board))
 
     def read(self, name: str, unwritten: Mapping[str, str]) -> ValveFolder:
         """Read a valve's folder; one that could not be written has failed, whatever an earlier run left there."""
@@ -86,9 +88,3 @@ class Results:
             )
         except (InputError, OSError):
             return False
-
-
-def _board_files(files: Mapping[str, bytes]) -> tuple[str, ...]:
-    """Return which files of a valve's folder are its user's to fill in: those of its firmware."""
-    manifest = files.get(f"{FIRMWARE}/{MANIFEST_NAME}")
-    return tuple(f"{FIRMWARE}/{name}" for name in json.loads(manifest)["board"]) if manifest else ()

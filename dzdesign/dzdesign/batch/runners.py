@@ -164,7 +164,8 @@ def _ended(client: "Client", source: Iterator[Task], work: Work) -> "Iterator[tu
         tasks[future] = task
         return future
 
-    completed = as_completed([submit(task) for task in islice(source, _ahead(client))], loop=client.loop)
+    ahead = AHEAD * max(sum(client.nthreads().values()), 8)  # workers that come later take from the same heap
+    completed = as_completed([submit(task) for task in islice(source, ahead)], loop=client.loop)
     for future in completed:
         task = tasks.pop(future)
         if future.status in ("cancelled", "lost"):
@@ -195,12 +196,6 @@ def _client(address: str) -> "Client":
             f"no Dask scheduler answers at '{address}' within {CONNECT_S} s ({type(error).__name__}); start one with "
             "`dask scheduler`, and give its address such as tcp://10.0.0.5:8786"
         ) from error
-
-
-def _ahead(client: "Client") -> int:
-    """Return how many tasks are handed over at first; workers that come later take from the same heap."""
-    threads: dict[str, int] = client.nthreads()
-    return AHEAD * max(sum(threads.values()), 8)
 
 
 def _outcome(future: "Future", task: Task) -> Outcome:

@@ -185,7 +185,7 @@ def _of_the_first_valve_alone(runs: ValveRuns) -> Iterator[PaperNumber]:
     reference, beside = PRESSURES_MPA
     yield _number(
         runs, beside, "largest flow, about", "L/min", ABOUT_LARGEST_L_MIN,
-        {DIRECT: runs.largest_L_min(Drive(DIRECT), beside)}, why=explanations.about_27(runs),
+        {DIRECT: runs.largest_L_min(Drive(DIRECT), beside)}, why=explanations.ABOUT_LARGEST,
     )  # fmt: skip
     yield _number(
         runs, reference, "largest flow with: reached at", "V", "-".join(SATURATED_FROM_V),
