@@ -106,16 +106,7 @@ class Plant:
 def read_plant(path: Path, say: Callable[[str], None] = lambda _: None) -> Plant:
     """Read a plant from TOML; a key that is none of `Plant`'s is refused, with the nearest that is.
 
-    Parameters
-    ----------
-    path : Path
-    say : callable
-        Told which parameters the file leaves as the default plant has them.
-
-    Raises
-    ------
-    InputError
-        If the file can't be read or a value does not fit.
+    `say` is told which parameters the file leaves as the default plant has them.
     """
     content = read_bytes(path, "plant file")
     try:
@@ -168,13 +159,10 @@ def plants_from_tests(side: SideModel, u_max_V: float) -> dict[float, Plant]:
 
 
 def derivatives(plant: Plant) -> tuple["casadi.SX", "casadi.SX", "casadi.SX"]:
-    """Return state, inputs and their derivatives of Eqs. (19)-(24), lowered from SymPy to CasADi.
+    """Return state, inputs and their derivatives of Eqs. (19)-(24), lowered from SymPy to CasADi, free of the stops.
 
-    Returns
-    -------
-    tuple
-        state (i in A, x_e in m, v in m/s); inputs (amplifier voltage in V, force offset of the play in N, supply
-        pressure drop in MPa); d state/dt, free of the stops.
+    The state is (i in A, x_e in m, v in m/s); the inputs are (amplifier voltage in V, force offset of the play in N,
+    supply pressure drop in MPa).
     """
     import casadi as ca
 

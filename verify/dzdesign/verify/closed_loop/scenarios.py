@@ -31,26 +31,18 @@ NO_FIGURES: Mapping[str, float] = MappingProxyType({})
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
-    """The loop of one side at one pressure drop.
+    """The loop of one side at one pressure drop."""
 
-    Attributes
-    ----------
-    loop : ClosedLoop
-        With the compensator, and the plant of this pressure drop.
-    plant : Plant
-    side : {"positive", "negative"}
-    dp_MPa, reference_MPa : float
-        Pressure drop at no flow, and the law's dP0.
-    tested_MPa : (float, float) or None
-        Lowest and highest tested pressure drop; None where the plant holds at `dp_MPa` only.
-    """
-
+    #: With the compensator, and the plant of this pressure drop.
     loop: ClosedLoop
     plant: Plant
     side: Side
+    #: At no flow.
     dp_MPa: float
+    #: The law's dP0.
     reference_MPa: float
-    tested_MPa: tuple[float, float] | None
+    #: Of the tests; None where the plant holds at `dp_MPa` only.
+    tested_MPa: Ends | None
 
     @property
     def settle_s(self) -> float:

@@ -27,17 +27,10 @@ MOST_PLANTS = 100_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tolerances:
-    """How the plants of a series scatter.
+    """How the plants of a series scatter."""
 
-    Attributes
-    ----------
-    spreads : dict of str to (float, str)
-        Parameter of `Plant` to its relative spread and the distribution: "uniform" (plus and minus that much) or
-        "normal" (its standard deviation).
-    plants, seed : int
-        How many plants, and of which random numbers.
-    """
-
+    #: Parameter of `Plant` to its relative spread and the distribution: "uniform" (plus and minus that much) or
+    #: "normal" (its standard deviation).
     spreads: dict[str, tuple[float, str]]
     plants: int = 200
     seed: int = 1
@@ -45,10 +38,7 @@ class Tolerances:
     def draw(self, nominal: Plant) -> list[Plant]:
         """Return the plants; the first n of a larger number are the same.
 
-        Raises
-        ------
-        InputError
-            If one of them is no plant: its parameters contradict each other.
+        One whose parameters contradict each other is an `InputError`.
         """
         drawn = []
         for index in range(self.plants):
