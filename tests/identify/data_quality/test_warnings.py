@@ -10,7 +10,7 @@ import pytest
 
 from dzdesign.codegen.project import generate, target_named
 from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_files import to_json
+from dzdesign.core.artefact_files import sha256_of, to_json
 from dzdesign.core.artefact_types import as_document, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.designing import design
@@ -25,6 +25,7 @@ from dzdesign.identify.valve.model import Warning_
 from dzdesign.report.artefact_chain import chain_of
 from dzdesign.report.summary import headline
 from dzdesign.report.valve_report import make_report
+from tests.conftest import default_options
 from tests.support.paths import ROOT
 from tests.support.synthetic import L_MIN, MPA, Truth, synthetic_ramp
 
@@ -91,6 +92,25 @@ class TestSimulated:
             assert [text.startswith("SIMULATED") for text in cautions] == [True] * simulated
             html = make_report(chain_of(shelf)).html
             assert ("SIMULATED recordings" in html[: html.index('<section id="data">')]) is simulated
+
+    @pytest.mark.parametrize("whole", [True, False])
+    def test_a_warning_taken_out_hides_no_simulation(self, tmp_path, capsys, wording, whole):
+        """Seeded: no warning is left, and the hash of the valve is made anew."""
+        compensator = design(identify([replace(valve_at(dp), simulated=True) for dp in PRESSURES]), default_options())
+        document = as_document(compensator)
+        assert document["valve"]["simulated"] is True
+        if not whole:
+            document["valve"]["warnings"] = []
+        document["valve_sha256"] = sha256_of(to_json(document["valve"]).encode())
+        path = tmp_path / "compensator.json"
+        path.write_text(to_json(document))
+        assert main(["codegen", str(path), "-o", str(tmp_path / "fw")]) == (0 if whole else 2)
+        if not whole:
+            wording("valve: simulated without its warning", capsys.readouterr().err)
+        document["valve"] |= {"simulated": False, "warnings": as_document(compensator.valve)["warnings"]}
+        path.write_text(to_json(document))
+        assert main(["codegen", str(path), "-o", str(tmp_path / "fw")]) == 2
+        wording("valve: a warning of simulation without one", capsys.readouterr().err)
 
 
 @pytest.fixture(scope="module")
