@@ -17,6 +17,8 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
+import platformdirs
+
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.errors import InputError, RequirementError
 
@@ -88,15 +90,7 @@ def environment() -> dict[str, str]:
 
     Without a home it would refuse to work; with ours for all it would build the C library at every start, for seconds.
     """
-    caches = (
-        {
-            "win32": os.environ.get("LOCALAPPDATA"),
-            "darwin": str(Path("~/Library/Caches").expanduser()),
-        }.get(sys.platform)
-        or os.environ.get("XDG_CACHE_HOME")
-        or str(Path("~/.cache").expanduser())
-    )
-    kept = Path(caches) / "dzdesign" / "zig"
+    kept = platformdirs.user_cache_path("dzdesign", appauthor=False) / "zig"
     try:
         kept.mkdir(parents=True, exist_ok=True)
         may_write = os.access(kept, os.W_OK)
