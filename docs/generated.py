@@ -15,7 +15,7 @@ API = (
     ("dzdesign.api", ("identify", "design", "generate", "verify", "init", "simulate", "assess", "report", "batch")),
     ("dzdesign.initial_options.proposal", ("Proposal",)),
     ("dzdesign.assess.assessment", ("Assessment",)),
-    ("dzdesign.report.valve_report", ("Report",)),
+    ("dzdesign.report.page", ("Report",)),
     ("dzdesign.identify.reading.ramp_files", ("RampTest", "read_ramp_file")),
     ("dzdesign.identify.options", ("IdentifyOptions",)),
     ("dzdesign.identify.identification", ("identify",)),

@@ -169,7 +169,8 @@ def test_a_name_in_the_derivation(capsys, tmp_path, monkeypatch):
 
 
 def test_names_in_tables_steer_no_terminal_and_are_no_markup(example_valve, capsys):
-    from dzdesign.terminal.tables import new_console, new_table, print_valve
+    from dzdesign.terminal.page import Table, new_console
+    from dzdesign.terminal.tables import print_valve
 
     side = example_valve.sides["positive"]
     tests = tuple(replace(test, source=name) for test, name in zip(side.tests, reversed(NAMES), strict=False))
@@ -178,7 +179,7 @@ def test_names_in_tables_steer_no_terminal_and_are_no_markup(example_valve, caps
         warning = replace(example_valve.warnings[0], text=name, source=name) if example_valve.warnings else None
         warnings = (warning,) if warning else ()
         print_valve(replace(example_valve, sides={"positive": replace(side, tests=tests)}, warnings=warnings))
-        table = new_table(name, name)
+        table = Table(name, name)
         table.add_row(name)
         new_console().print(table)
     out = capsys.readouterr().out

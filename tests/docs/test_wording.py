@@ -9,6 +9,7 @@ import pytest
 from dzdesign.core.artefact_types import THIS_TOOL
 from dzdesign.report.lot.summary import FailedValve, LotSummary
 from dzdesign.terminal.notebook import html_of
+from dzdesign.terminal.page import new_console
 from dzdesign.terminal.tables import print_compensator, print_valve
 from dzdesign.terminal.verification_tables import print_scenarios
 from tests.support.paths import ROOT
@@ -30,7 +31,7 @@ def scenario(name, **figures):
 def test_scenarios_are_a_table_of_short_rows_and_lines(monkeypatch, capsys, width):
     monkeypatch.setenv("COLUMNS", str(width))
     names = ("step to half command and back", "sensor ahead shows full, or the one behind breaks")
-    print_scenarios([scenario(names[0], **FIGURES), scenario(names[1])])
+    print_scenarios([scenario(names[0], **FIGURES), scenario(names[1])], new_console())
     table, _, lines = capsys.readouterr().out.partition(f"{names[0]}: ")
     rows = re.split("─{40,}", table)[1].splitlines()
     assert len([row for row in rows if row.strip()]) <= 3, "a row fills at most two lines"

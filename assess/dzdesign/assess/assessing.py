@@ -16,9 +16,10 @@ from dzdesign.assess.flow_curves import PressureCurves
 from dzdesign.assess.limits import check_limits
 from dzdesign.assess.notes import find_notes
 from dzdesign.assess.options import BOTH_SIDES, SETS, AssessOptions, Set
-from dzdesign.assess.quantities import L_MIN, LOSS, LOSS_OF_FLOW, MPA, QUANTITIES, Reading, change, symmetry
+from dzdesign.assess.quantities import LOSS, LOSS_OF_FLOW, QUANTITIES, Reading, change, symmetry
 from dzdesign.assess.readings import read_quantities
 from dzdesign.core.artefact_types import THIS_TOOL
+from dzdesign.identify.constants import L_MIN, MPA
 from dzdesign.identify.ramps.pooling import SAME_PRESSURE
 from dzdesign.identify.reading.ramp_test import RampTest
 

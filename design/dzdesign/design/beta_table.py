@@ -88,8 +88,8 @@ def offset_ceiling(
 ) -> OffsetCeiling:
     """Return the limit of the offset at every pressure code, the converter's error and the rounding counted.
 
-    `reserve`, of u_max, is kept free beside the rounding: the dither's peak. A curve that lies above the staircase of its
-    bounds somewhere is refused: valve.json contradicts itself.
+    `reserve`, of u_max, is kept free beside the rounding: the dither's peak. A curve that lies above the staircase of
+    its bounds somewhere is refused: valve.json contradicts itself.
     """
     first, last = (signals.dp_code(end) for end in (curve.dp_MPa[0], curve.dp_MPa[-1]))
     code_max = signals.largest_difference(sign)

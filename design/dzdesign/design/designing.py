@@ -55,9 +55,8 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
         _refuse_two_signs(valve, options.guard)
     laws = {}
     for sign in signals.signs:
-        name = "positive" if sign > 0 else "negative"
-        side = valve.positive if sign > 0 else valve.sides[name]
-        laws[name] = _side_law(side, options, u_max, sign, units)
+        side = valve.positive if sign > 0 else valve.sides["negative"]
+        laws[sign] = _side_law(side, options, u_max, sign, units)
     digest = sha256_of(to_json_bytes(valve) if valve_bytes is None else valve_bytes)
     request = options.request
     compensator = Compensator(
@@ -69,7 +68,7 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
         below_dp0=options.below_dp0,
         signals=signals,
         u_max_V=u_max,
-        sides=Sides(positive=laws["positive"], negative=laws.get("negative")),
+        sides=Sides(positive=laws[1], negative=laws.get(-1)),
         beta_denominator=units.beta,
         beta_step_codes=STEP_CODES,
         reverse_codes=int(REVERSE_SHARE * (signals.pressure_a.full_code - signals.pressure_a.zero_code)),

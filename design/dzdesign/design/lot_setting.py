@@ -25,7 +25,7 @@ from dzdesign.design.designing import over, prove_monotone, travel
 from dzdesign.design.lot import LotMargin, prove_lot
 from dzdesign.design.lot_valves import LotValve
 from dzdesign.design.quantise import finest_units
-from dzdesign.design.signals import Signals
+from dzdesign.design.signals import SIDE_NAMES, Signals
 from dzdesign.identify.valve.side_model import SideModel
 
 #: Of u_max: a ceiling that is nowhere this near to the least one can't be the least by a rounding error (1e-12).
@@ -161,10 +161,9 @@ def _common_interval(sides: Iterable[Mapping[str, OffsetCurve]]) -> tuple[float,
 
 def _side(batch: Mapping[str, Compensator], first: Compensator, sign: int) -> _Side:
     """Find the least ceiling of one sign of command: in doubles over all valves, exactly over those near it."""
-    label = "positive" if sign > 0 else "negative"
     signals, u_max = first.signals, first.u_max_V
     reserve = Fraction(first.drive_functions.dither_counts, signals.compare_max)
-    models = {name: each.valve.sides[label] for name, each in batch.items()}
+    models = {name: each.valve.sides[SIDE_NAMES[sign]] for name, each in batch.items()}
     guard = first.side(sign).certificate.guard
     curves = {name: guarded_curve(model, guard, first.below_dp0) for name, model in models.items()}
     low, high = _common_interval([curves])

@@ -11,6 +11,7 @@ from dzdesign.design.designing import design
 from dzdesign.design.lot import prove_lot
 from dzdesign.design.lot_valves import LotSide
 from dzdesign.design.option_texts import options_of
+from dzdesign.design.signals import SIDE_NAMES
 
 #: Coarsest unit of the law's coefficients, see `dzdesign.design.quantise`.
 COARSEST = Fraction(1, 2**12)
@@ -60,8 +61,7 @@ def _prove_lot_setting(compensator: Compensator, own: Compensator) -> None:
     """
     of_carrier = [each for each in compensator.lot if each.valve_sha256 == compensator.valve_json_sha256]
     for sign in compensator.signals.signs:
-        common, single = compensator.side(sign), own.side(sign)
-        name = "positive" if sign > 0 else "negative"
+        common, single, name = compensator.side(sign), own.side(sign), SIDE_NAMES[sign]
         drive_range, offset = common.drive_range_over_u_max, common.u_min0_over_u_max
         for place, value, low, high in (
             ("u_min0_over_u_max", offset, Fraction(0), single.u_min0_over_u_max),
@@ -73,7 +73,7 @@ def _prove_lot_setting(compensator: Compensator, own: Compensator) -> None:
                     f"a setting for this valve among others; {Compensator.REMEDY}"
                 )
         bounds = LotSide.of(compensator.valve.sides[name], common.certificate.guard)
-        if bounds not in [each.positive if sign > 0 else each.negative for each in of_carrier]:
+        if bounds not in [each.side(sign) for each in of_carrier]:
             raise InputError(
                 f"the lot has no valve with the hash and the {name} bounds of the valve in the file; make it again "
                 "with `dzdesign batch`"

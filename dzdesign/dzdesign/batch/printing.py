@@ -7,6 +7,7 @@ from dzdesign.core.errors import and_more
 from dzdesign.report.lot.setting_text import checked_line, span, untested_lines
 from dzdesign.report.lot.spread import TWENTY
 from dzdesign.report.lot.summary import LotSummary
+from dzdesign.terminal.page import Table, new_console, put_line, put_table
 
 #: Valves of one warning that are named, and of those that hold the lot setting down.
 NAMED, BINDING_NAMED = 3, 5
@@ -16,12 +17,10 @@ UNITS = {"V": "V", "percent": "%"}
 
 def print_lot(summary: LotSummary, folder: Path, report: Path | None) -> None:
     """Print what a lot came to, where it was written, and its report if there is one."""
-    from dzdesign.terminal.page import new_console, new_table, put_line, put_table
-
     console = new_console()
     count = summary.calibrated
     title = f"{count} calibrated valve{'' if count == 1 else 's'} of {summary.valves}"
-    table = new_table(title, "", "least", "5 %", "median", "95 %", "largest")
+    table = Table(title, "", "least", "5 %", "median", "95 %", "largest")
     for column, at in summary.quantiles.items():
         values = (at.least, at.q05, at.median, at.q95, at.largest)
         table.add_row(_in_words(column), *(f"{value:.3f}" for value in values))

@@ -12,39 +12,20 @@ from dzdesign.core.options import Argument
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Invocation:
-    """One call of the command line.
-
-    Attributes
-    ----------
-    command : str
-        Its name.
-    arguments : object
-        Of the command's class ``Arguments``.
-    json, quiet, verbose : bool
-        How the result is printed, and how much is logged.
-    options_file : str
-        Of --config; empty if none was given.
-    from_file : dict
-        Options whose value is that of the file.
-    """
+    """One call of the command line; `arguments` are of the command's class ``Arguments``."""
 
     command: str
     arguments: Any
-    json: bool = False
-    quiet: bool = False
-    verbose: bool = False
-    options_file: str = ""
+    json: bool
+    quiet: bool
+    verbose: bool
+    #: Of --config, empty if none was given; and the options whose value is that of the file.
+    options_file: str
     from_file: dict[str, Value]
 
 
 def parse(argv: list[str]) -> Invocation:
-    """Parse a command line; what an options file says stands in for the defaults.
-
-    Raises
-    ------
-    InputError
-        If the command line is wrong, or the file can't be read or names no option.
-    """
+    """Parse a command line; what an options file says stands in for the defaults."""
     word = _command_in(argv)
     if word and word not in COMMANDS:
         raise InputError(f"there is no command '{word}'{nearest(word, COMMANDS)}; see `dzdesign --help`")
@@ -96,29 +77,19 @@ def _meant_values(path: str, declared: tuple[Argument, ...]) -> dict[str, Value]
 
 def _is_meant(value: Value, argument: Argument) -> bool:
     """Tell whether a value of the file is for this command: `dp` is a list for simulate, a table for identify."""
-    if isinstance(value, dict):
-        return argument.is_table
-    return argument.is_repeatable or not isinstance(value, list)
+    return argument.is_table if isinstance(value, dict) else argument.is_repeatable or isinstance(value, str)
 
 
 def merged_entries(flag: str, value: Value | None, entries: list[str]) -> dict[str, str]:
-    """Return entries of the command line, ``name = text``, on top of those of the options file.
-
-    Raises
-    ------
-    InputError
-        If an entry is none, or a name is given twice.
-    """
+    """Return entries of the command line, ``name = text``, each name once, on top of those of the options file."""
     from dzdesign.identify.valve.test_record import checked_record
 
     table = checked_record(value.items(), "the record") if isinstance(value, dict) else {}
     texts = [value] if isinstance(value, str) else value if isinstance(value, list) else []
-    later = checked_record([_entry(flag, text) for text in (*texts, *entries)], flag)
-    return checked_record((table | later).items(), "the record")
-
-
-def _entry(flag: str, text: str) -> tuple[str, str]:
-    name, equals, value = text.partition("=")
-    if not equals:
-        raise InputError(f'{flag} is {quoted(text)}, expected a name and a text such as "serial = 4711"')
-    return name.strip(), value.strip()
+    pairs = []
+    for text in (*texts, *entries):
+        name, equals, entry = text.partition("=")
+        if not equals:
+            raise InputError(f'{flag} is {quoted(text)}, expected a name and a text such as "serial = 4711"')
+        pairs.append((name.strip(), entry.strip()))
+    return checked_record((table | checked_record(pairs, flag)).items(), "the record")

@@ -31,13 +31,7 @@ class _AsWritten(float):
 
 
 def options_from_file(path: str, declared: Iterable[Argument]) -> dict[str, Value]:
-    """Read options; a key may be written ``meter-floor`` or ``meter_floor``, values as on the command line.
-
-    Raises
-    ------
-    InputError
-        If the file is not TOML, a key is no option of any command, or a value does not fit.
-    """
+    """Read options; a key may be written ``meter-floor`` or ``meter_floor``, values as on the command line."""
     content = read_bytes(Path(path), "config file")
     try:
         document = tomllib.loads(content.decode("utf-8-sig"), parse_float=_AsWritten)

@@ -90,7 +90,7 @@ class FrontParser(Parser):
 @cache
 def command_module(name: str) -> ModuleType:
     """Return the module that has a command's ``Arguments``, ``EXAMPLES`` and ``run``."""
-    return import_module(COMMANDS[name].module)
+    return import_module(f"dzdesign.commands.{name}")
 
 
 def arguments_of_command(name: str) -> tuple[Argument, ...]:

@@ -2,6 +2,7 @@
 
 from dzdesign.core.errors import one_line
 from dzdesign.stages.assess import AssessArguments, assess
+from dzdesign.terminal.page import print_json
 
 Arguments = AssessArguments
 EXAMPLES = (
@@ -12,15 +13,13 @@ EXAMPLES = (
 
 def run(arguments: Arguments, json: bool) -> int:
     """Compare recordings; 1 if one with the compensator misses a limit, or a limit can't be checked."""
-    found = assess(arguments)
-    if json:
-        from dzdesign.core.artefact_types import to_json_bytes
-
-        print(to_json_bytes(found).decode(), end="")
-        return 0 if found.holds else 1
     from dzdesign.terminal.assessment_tables import print_assessment
 
-    print_assessment(found)
-    plots = f", plots in {arguments.plots}" if arguments.plots else ""
-    print(one_line(f"Written: {arguments.output}{plots}"))
+    found = assess(arguments)
+    if json:
+        print_json(found)
+    else:
+        print_assessment(found)
+        plots = f", plots in {arguments.plots}" if arguments.plots else ""
+        print(one_line(f"Written: {arguments.output}{plots}"))
     return 0 if found.holds else 1

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from dzdesign.batch.arguments import BatchArguments
-from dzdesign.core.artefact_files import to_json
 from dzdesign.core.errors import RequirementError
+from dzdesign.terminal.page import print_json
 
 Arguments = BatchArguments
 EXAMPLES = (
@@ -22,7 +22,7 @@ def run(arguments: Arguments, json: bool) -> int:
     output = Path(arguments.output)
     summary, report = calibrate_lot(arguments)
     if json:
-        print(to_json({**as_document(summary), "report": report and str(report)}), end="")
+        print_json({**as_document(summary), "report": report and str(report)})
     else:
         print_lot(summary, output, report)
     if summary.failed:

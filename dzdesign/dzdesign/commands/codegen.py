@@ -4,10 +4,10 @@ import os
 from dataclasses import KW_ONLY, dataclass
 from typing import Annotated
 
-from dzdesign.core.artefact_files import to_json
 from dzdesign.core.errors import InputError
 from dzdesign.core.options import AnyPath, Option
 from dzdesign.stages.generate import GenerateArguments, generate
+from dzdesign.terminal.page import print_json
 from dzdesign.terminal.progress import say
 
 EXAMPLES = (
@@ -30,6 +30,8 @@ class Arguments(GenerateArguments):
 
 def run(arguments: Arguments, json: bool) -> int:
     """Generate a firmware and print its files, or print the targets."""
+    from dzdesign.terminal.tables import print_firmware
+
     if arguments.list_targets:
         return _list_targets(json)
     if arguments.compensator is None:
@@ -38,13 +40,9 @@ def run(arguments: Arguments, json: bool) -> int:
     if firmware.note:
         say(firmware.note)
     if json:
-        from dzdesign.core.artefact_types import as_document
-
-        print(to_json(as_document(firmware.manifest)), end="")
-        return 0
-    from dzdesign.terminal.tables import print_firmware
-
-    print_firmware(firmware, folder=os.fspath(arguments.output or ""))
+        print_json(firmware.manifest)
+    else:
+        print_firmware(firmware, folder=os.fspath(arguments.output or ""))
     return 0
 
 
@@ -52,8 +50,7 @@ def _list_targets(json: bool) -> int:
     from dzdesign.codegen.project import targets
 
     if json:
-        listing = [{"name": target.name, "description": target.description} for target in targets()]
-        print(to_json({"targets": listing}), end="")
+        print_json({"targets": [{"name": target.name, "description": target.description} for target in targets()]})
         return 0
     width = max(len(target.name) for target in targets())
     for target in targets():

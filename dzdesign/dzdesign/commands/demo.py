@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from dzdesign.core.artefact_files import check_folder_may_be_written, to_json
+from dzdesign.core.artefact_files import check_folder_may_be_written
 from dzdesign.core.errors import InputError
 from dzdesign.core.options import AnyPath, Option
 from dzdesign.example import example_folder
@@ -13,6 +13,7 @@ from dzdesign.stages.design import DesignArguments, design
 from dzdesign.stages.generate import GenerateArguments, generate
 from dzdesign.stages.identify import IdentifyArguments, identify
 from dzdesign.stages.verify import VerifyArguments, verify
+from dzdesign.terminal.page import print_json
 from dzdesign.terminal.progress import say, stage_progress
 
 EXAMPLES = ("dzdesign demo demo",)
@@ -41,8 +42,7 @@ def run(arguments: Arguments, json: bool) -> int:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"the folder '{folder}' can't be made: {error.strerror}") from error
-    with stage_progress() as stage:
-        stage("re-deriving the paper's equations")
+    with stage_progress("re-deriving the paper's equations"):
         verdicts = verify_statements()
     expected = sum(verdict.as_expected for verdict in verdicts)
     say(f"derivation: {expected} of {len(verdicts)} statements have the verdict expected of them")
@@ -60,9 +60,7 @@ def run(arguments: Arguments, json: bool) -> int:
         plant_source="plant.toml of the example",
     )
     if json:
-        from dzdesign.core.artefact_types import as_document
-
-        print(to_json(as_document(verification.evidence)), end="")
+        print_json(verification.evidence)
     else:
         print_demo(valve, verification, os.fspath(folder))
     return 0 if verification.holds and expected == len(verdicts) else 1

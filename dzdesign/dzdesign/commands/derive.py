@@ -8,6 +8,7 @@ from dzdesign.core.artefact_files import check_file_may_be_written, write_file
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.core.options import AnyPath, Option, Texts, texts_of
+from dzdesign.terminal.page import print_json
 from dzdesign.terminal.progress import stage_progress
 
 EXAMPLES = ("dzdesign derive --equation 18", "dzdesign derive --format html -o derivation.html")
@@ -40,8 +41,7 @@ def run(arguments: Arguments, json: bool) -> int:
             raise InputError("--mutate counts over all equations; leave out --equation")
         return _run_mutations(arguments, json)
     chosen = closure(STATEMENTS, texts_of(arguments.equation)) if arguments.equation else None
-    with stage_progress() as stage:
-        stage("re-deriving the paper's equations")
+    with stage_progress("re-deriving the paper's equations"):
         verdicts = verify_statements()
     text = render(verdicts, "json" if json else arguments.format, chosen)
     if arguments.output:
@@ -58,13 +58,12 @@ def _run_mutations(arguments: Arguments, json: bool) -> int:
     from dzdesign.derivation.account.mutation import score_mutations
     from dzdesign.terminal.tables import print_mutations
 
-    with stage_progress() as stage:
-        stage("making every equation wrong in every small way")
+    with stage_progress("making every equation wrong in every small way"):
         found = score_mutations(verify_statements())
     if arguments.output:
         write_file(Path(arguments.output), to_json_bytes(found))
     elif json:
-        print(to_json_bytes(found).decode(), end="")
+        print_json(found)
     else:
         print_mutations(found)
     return 0 if found.caught == found.mutants else 1

@@ -5,10 +5,12 @@ import re
 import shutil
 import subprocess
 import sys
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from operator import attrgetter
 
-from dzdesign.core.artefact_files import to_json
 from dzdesign.core.errors import DzdesignError
+from dzdesign.terminal.page import new_console, print_json, put_line, put_rows
 
 TINY = "int dz_tiny(int a);\nint dz_tiny(int a) { return 3 * a; }\n"
 #: A program that says nothing of its version within this time is taken as it is, s.
@@ -54,9 +56,11 @@ OPTIONAL = (
     Tool(name="make", purpose="make demo, make test", debian="apt install make", macos="xcode-select --install",
          windows="winget install ezwinports.make"),
 )  # fmt: skip
-SYSTEMS = {"debian": "Debian, Ubuntu", "macos": "macOS", "windows": "Windows"}
-
-
+#: Columns of the table of where the tools come from.
+SOURCES: Mapping[str, Callable[[Tool], str]] = {
+    "program": attrgetter("name"), "Debian, Ubuntu": attrgetter("debian"), "macOS": attrgetter("macos"),
+    "Windows": attrgetter("windows"),
+}  # fmt: skip
 EXAMPLES = ("dzdesign doctor", "dzdesign doctor --json")
 
 
@@ -93,7 +97,7 @@ def run(arguments: Arguments, json: bool) -> int:
         holds=works and not missing,
     )  # fmt: skip
     if json:
-        print(to_json(asdict(found)), end="")
+        print_json(found)
     else:
         _print(found, missing)
     return 0 if found.holds else 1
@@ -159,22 +163,18 @@ def _lacking(programs: dict[str, dict[str, str] | None]) -> list[Tool]:
 
 
 def _print(found: Installation, missing: list[str]) -> None:
-    from dzdesign.terminal.page import new_console, new_table, put_line, put_table
-
     console = new_console()
     put_line(console, f"dzdesign {found.dzdesign}, Python {found.python}, {found.system}")
-    table = new_table("Programs", "program", "version", "for", words=(0, 1, 2))
-    for tool in (*COMPILERS, *OPTIONAL):
-        program = found.programs[tool.name] or {"version": "not found"}
-        table.add_row(tool.name, program["version"] or "found", tool.purpose)
-    put_table(console, table)
+    programs = {
+        "program": lambda tool: tool.name,
+        "version": lambda tool: (found.programs[tool.name] or {"version": "not found"})["version"] or "found",
+        "for": lambda tool: tool.purpose,
+    }
+    put_rows(console, "Programs", (*COMPILERS, *OPTIONAL), programs, words=(0, 1, 2))
     versions = ", ".join(f"{name} {version or 'MISSING'}" for name, version in found.packages.items())
     put_line(console, f"Python packages: {versions.replace('ziglang MISSING', 'ziglang (optional) not there')}")
     if found.to_get:
-        table = new_table("How to get the rest", "program", *SYSTEMS.values(), words=(0, 1, 2, 3))
-        for tool in found.to_get:
-            table.add_row(tool.name, tool.debian, tool.macos, tool.windows)
-        put_table(console, table)
+        put_rows(console, "How to get the rest", found.to_get, SOURCES, words=(0, 1, 2, 3))
     if missing:
         put_line(console, f"Missing packages: {sys.executable} -m pip install {' '.join(missing)}")
     if found.compiles:

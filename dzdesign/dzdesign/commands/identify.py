@@ -2,6 +2,7 @@
 
 from dzdesign.core.errors import one_line
 from dzdesign.stages.identify import IdentifyArguments, identify
+from dzdesign.terminal.page import print_json
 
 Arguments = IdentifyArguments
 EXAMPLES = (
@@ -13,15 +14,13 @@ EXAMPLES = (
 
 def run(arguments: Arguments, json: bool) -> int:
     """Identify a valve and print its thresholds."""
-    valve = identify(arguments)
-    if json:
-        from dzdesign.core.artefact_types import to_json_bytes
-
-        print(to_json_bytes(valve).decode(), end="")
-        return 0
     from dzdesign.terminal.tables import print_valve
 
-    print_valve(valve)
-    plots = f", plots in {arguments.plots}" if arguments.plots else ""
-    print(one_line(f"Written: {arguments.output}{plots}"))
+    valve = identify(arguments)
+    if json:
+        print_json(valve)
+    else:
+        print_valve(valve)
+        plots = f", plots in {arguments.plots}" if arguments.plots else ""
+        print(one_line(f"Written: {arguments.output}{plots}"))
     return 0

@@ -3,11 +3,10 @@
 import os
 from typing import Any
 
-from dzdesign.core.artefact_files import to_json
-from dzdesign.core.artefact_types import as_document
 from dzdesign.core.options import paths_of
 from dzdesign.initial_options.proposal import Proposal
 from dzdesign.stages.init import InitArguments, init
+from dzdesign.terminal.page import print_json
 
 Arguments = InitArguments
 EXAMPLES = ("dzdesign init ramps/*.csv", "dzdesign init ramps/*.tdms -o bench2.toml")
@@ -20,7 +19,7 @@ def run(arguments: Arguments, json: bool) -> int:
     proposal = init(arguments)
     output = os.fspath(arguments.output or "")
     if json:
-        print(to_json(_document(proposal, output)), end="")
+        print_json(_document(proposal, output))
         return 1 if proposal.opens else 0
     for line in (*proposal.seen, *(f"open: {line}" for line in proposal.opens)):
         print(line)
@@ -40,11 +39,11 @@ def _document(proposal: Proposal, output: str) -> dict[str, Any]:
     return {
         "file": output,
         "recordings": [path.as_posix() for path in proposal.recordings],
-        "labels": [list(labels) for labels in proposal.labels],
+        "labels": proposal.labels,
         "columns": proposal.columns,
         "dp": proposal.dp,
         "u_max_V": proposal.u_max_V,
         "u_seen_V": proposal.u_seen_V,
-        "valve": proposal.valve and as_document(proposal.valve),
-        "open": list(proposal.opens),
+        "valve": proposal.valve,
+        "open": proposal.opens,
     }

@@ -11,10 +11,11 @@ from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from dzdesign.core.artefact_files import check_file_may_be_written, to_json, write_file
+from dzdesign.core.artefact_files import check_file_may_be_written, write_file
 from dzdesign.core.errors import InputError, one_line
 from dzdesign.core.option_readers import number
 from dzdesign.core.options import AnyPath, Option, Text, read_options
+from dzdesign.terminal.page import print_json
 from dzdesign.terminal.progress import say
 
 if TYPE_CHECKING:
@@ -70,7 +71,7 @@ def run(arguments: Arguments, json: bool) -> int:
         raise _nothing(arguments.port, baud, reader)
     write_file(output, recording.to_csv(reader))
     if json:
-        print(to_json(_document(arguments, recording, reader)), end="")
+        print_json(_document(arguments, recording, reader))
     else:
         _print(arguments, recording, reader)
     if broken:

@@ -3,9 +3,9 @@
 from dataclasses import replace
 from pathlib import Path
 
-from dzdesign.core.artefact_files import to_json
 from dzdesign.core.errors import InputError
 from dzdesign.stages.report import ReportArguments, report
+from dzdesign.terminal.page import print_json
 from dzdesign.terminal.progress import say
 
 Arguments = ReportArguments
@@ -21,8 +21,8 @@ def run(arguments: Arguments, json: bool) -> int:
     for line in made.faults:
         say(f"does not fit: {line}")
     if json:
-        document = {"report": str(output), "holds": made.holds, "verdict": made.verdict}
-        print(to_json({**document, "faults": list(made.faults), "missing": list(made.missing)}), end="")
+        verdict = {"holds": made.holds, "verdict": made.verdict}
+        print_json({"report": str(output), **verdict, "faults": made.faults, "missing": made.missing})
     else:
         print(made.verdict)
         print(f"Written: {output}")

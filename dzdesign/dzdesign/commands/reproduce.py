@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.core.options import AnyPath, Option
+from dzdesign.terminal.page import print_json
 
 EXAMPLES = ("dzdesign reproduce -o reproduction",)
 
@@ -29,7 +29,7 @@ def run(arguments: Arguments, json: bool) -> int:
         raise InputError("-o is empty, expected the name of a folder, such as reproduction")
     made = reproduce(Path(arguments.output))
     if json:
-        print(to_json_bytes(made).decode(), end="")
+        print_json(made)
     else:
         print_reproduction(made)
         print(f"Figures, parameters and artefacts: {arguments.output}")

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 from dzdesign.core.documents import to_json
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.options import Option, Text
+from dzdesign.terminal.page import print_json
 
 #: Name -> (module and type, the artefact, the command that writes it), in the order of the pipeline.
 SCHEMAS = {
@@ -18,11 +19,9 @@ SCHEMAS = {
     "batch": ("dzdesign.report.lot.summary:LotSummary", "batch.json", "batch"),
     "reproduction": ("dzdesign.report.reproduction:Reproduction", "reproduction.json", "reproduce"),
     "derivation": (
-        "dzdesign.derivation.presentation.content:DerivationReport",
-        "derivation.json",
-        "derive --format json",
+        "dzdesign.derivation.presentation.content:DerivationReport", "derivation.json", "derive --format json"
     ),
-}
+}  # fmt: skip
 
 
 def schema_document(name: str) -> dict[str, Any]:
@@ -59,7 +58,7 @@ def run(arguments: Arguments, json: bool) -> int:
         print(schema_text(arguments.name), end="")
     elif json:
         listing = [{"name": name, "artefact": artefact} for name, (_, artefact, _) in SCHEMAS.items()]
-        print(to_json({"schemas": listing}), end="")
+        print_json({"schemas": listing})
     else:
         width = max(map(len, SCHEMAS))
         for name, (_, artefact, command) in SCHEMAS.items():

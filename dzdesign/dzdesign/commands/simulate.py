@@ -1,9 +1,8 @@
 """`dzdesign simulate`."""
 
-from dzdesign.core.artefact_files import to_json
-from dzdesign.core.artefact_types import as_document
 from dzdesign.core.errors import one_line
 from dzdesign.stages.simulate import SimulateArguments, simulate
+from dzdesign.terminal.page import print_json
 
 Arguments = SimulateArguments
 EXAMPLES = (
@@ -15,6 +14,8 @@ EXAMPLES = (
 def run(arguments: Arguments, json: bool) -> int:
     """Simulate ramp tests and print where they are."""
     made = simulate(arguments)
-    written = one_line(f"Written: {len(made.files)} simulated ramp tests in {arguments.output}")
-    print(to_json(as_document(made.manifest)) if json else written)
+    if json:
+        print_json(made.manifest)
+    else:
+        print(one_line(f"Written: {len(made.files)} simulated ramp tests in {arguments.output}"))
     return 0

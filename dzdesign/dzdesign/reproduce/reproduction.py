@@ -20,8 +20,7 @@ def reproduce(folder: Path) -> Reproduction:
     schema = schema_of(Reproduction)
     check_folder_may_be_written(folder, schema)
     host_compiler()
-    with stage_progress() as stage:
-        stage("recovering the valves' parameters from the printed figures")
+    with stage_progress("recovering the valves' parameters from the printed figures") as stage:
         chains = [run_chain(valve, say=stage) for valve in recover_valves()]
         reproduction = Reproduction(
             tool=THIS_TOOL,

@@ -74,8 +74,7 @@ def assess(arguments: AssessArguments) -> "Assessment":
     columns = arguments.after_columns or arguments.columns
     after = _read_set("after", arguments.after, columns, arguments, options.of_set("after").u_max)
     refuse_copies([*before, *after])
-    with stage_progress() as stage:
-        stage(f"comparing {len(before)} recordings before with {len(after)} after")
+    with stage_progress(f"comparing {len(before)} recordings before with {len(after)} after"):
         comparison = compare_curves(before, after, options)
     found = assess_curves(comparison)
     if arguments.output is not None:
@@ -83,8 +82,7 @@ def assess(arguments: AssessArguments) -> "Assessment":
     if arguments.plots is not None:
         from dzdesign.assess.plots import plot_files
 
-        with stage_progress() as stage:
-            stage("drawing")
+        with stage_progress("drawing"):
             write_files(Path(arguments.plots), plot_files(comparison, found), "--plots")
     return found
 

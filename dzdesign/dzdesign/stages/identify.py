@@ -61,21 +61,14 @@ def identify_options(choices: IdentifyChoices) -> "IdentifyOptions":
 
 
 def record_of(given: Mapping[str, object] | None) -> dict[str, str]:
-    """Return the record of a test, its numbers and dates as text.
-
-    Raises
-    ------
-    InputError
-        If an entry is none.
-    """
+    """Return the record of a test, its numbers and dates as text; refuse an entry that is neither."""
     from dzdesign.identify.valve.test_record import checked_record
 
-    texts = {name: str(value) if _is_plain(value) else value for name, value in (given or {}).items()}
-    return checked_record(texts.items(), "the record")
+    def as_text(value: object) -> object:
+        plain = isinstance(value, int | float | datetime.date | datetime.time) and not isinstance(value, bool)
+        return str(value) if plain else value
 
-
-def _is_plain(value: object) -> bool:
-    return isinstance(value, int | float | datetime.date | datetime.time) and not isinstance(value, bool)
+    return checked_record([(name, as_text(value)) for name, value in (given or {}).items()], "the record")
 
 
 def identify(arguments: IdentifyArguments) -> "ValveModel":
@@ -95,22 +88,16 @@ def identify(arguments: IdentifyArguments) -> "ValveModel":
         check_file_may_be_written(Path(arguments.output), SCHEMA)
     check_plots(arguments.plots, arguments.output)
     tests = read_recordings(
-        arguments.ramps,
-        u_max=options.u_max,
-        columns=arguments.columns,
-        dp=arguments.dp,
-        skip_rows=arguments.skip_rows,
+        arguments.ramps, u_max=options.u_max, columns=arguments.columns, dp=arguments.dp, skip_rows=arguments.skip_rows
     )
     refuse_copies(tests)
-    with stage_progress() as stage:
-        stage(f"fitting {len(tests)} recording{'s' if len(tests) > 1 else ''}")
+    with stage_progress(f"fitting {len(tests)} recording{'s' if len(tests) > 1 else ''}"):
         found = identify_sides(tests, options, record)
     if arguments.output is not None:
         write_file(Path(arguments.output), to_json_bytes(found.model), SCHEMA)
     if arguments.plots is not None:
         from dzdesign.identify.plots.valve_plots import plot_files
 
-        with stage_progress() as stage:
-            stage("drawing")
+        with stage_progress("drawing"):
             write_files(Path(arguments.plots), plot_files(found), "--plots")
     return found.model

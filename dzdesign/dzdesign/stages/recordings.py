@@ -60,27 +60,9 @@ def read_recordings(
     skip_rows: int | str | None = None,
     what: str = "reading recordings",
 ) -> "list[RampTest]":
-    """Read the recordings that patterns name.
+    """Read the recordings that patterns name, by the options of those names; `u_max`, V, is what 100 % means.
 
-    Parameters
-    ----------
-    patterns : path or iterable of paths
-        Names of files, or patterns such as ``ramps/*.csv``.
-    u_max : float
-        Command in V that 100 % means.
-    columns : str or mapping, optional
-        Of --columns, or of the table in the options file.
-    dp : str or mapping, optional
-        Pressure drop that --dp declares for all files, or that [dp] declares for each.
-    skip_rows : int or str, optional
-        Of --skip-rows.
-    what : str
-        For the progress bar.
-
-    Raises
-    ------
-    InputError
-        If a file can't be read, or has no pressure drop where [dp] names those of others.
+    Refuses a file that can't be read, or has no pressure drop where [dp] names those of others. `what` is for the bar.
     """
     from dzdesign.identify.reading.column_labels import parse_columns
     from dzdesign.identify.reading.ramp_files import read_ramp_file

@@ -115,14 +115,12 @@ def _further_checks(
     if arguments.machine_code:
         from dzdesign.verify.analysis.machine_code import machine_code_checks
 
-        with stage_progress() as stage:
-            stage("comparing the machine code of other processors with the exact law, in simulators")
+        with stage_progress("comparing the machine code of other processors with the exact law, in simulators"):
             checks += machine_code_checks(folder, verification.evidence.inputs)
     if arguments.proof:
         from dzdesign.verify.analysis.frama_c import proof_check
 
-        with stage_progress() as stage:
-            stage("reading the core's C for all inputs, with Frama-C: some minutes")
+        with stage_progress("reading the core's C for all inputs, with Frama-C: some minutes"):
             checks.append(proof_check(folder))
     if not arguments.mutate:
         return checks, None

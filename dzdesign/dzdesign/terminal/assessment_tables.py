@@ -3,7 +3,8 @@
 from typing import TYPE_CHECKING
 
 from dzdesign.core.verdicts import DOES_NOT_HOLD, verdict_words
-from dzdesign.terminal.page import Table, new_console, new_table, put_line, put_table
+from dzdesign.terminal.page import Table, new_console, put_line, put_table
+from dzdesign.terminal.tables import meter_line
 
 if TYPE_CHECKING:
     from dzdesign.assess.assessment import Assessment, PressureAssessment
@@ -16,26 +17,19 @@ DECIMALS = {"%": 2, "L/min": 3, "L/min/V": 4}
 def print_assessment(assessment: "Assessment") -> None:
     """Print each pressure drop, the reasons of what is not observable, formulas, notes and limits."""
     page = new_console()
-
-    def say(text: str) -> None:
-        put_line(page, text)
-
     for item in _shown_pressures(assessment):
         put_table(page, _table_of(item))
-    for text in (*_not_observable(assessment), *_remarks(assessment)):
-        say(text)
-    say(f"{assessment.terms[0].upper()}{assessment.terms[1:]}:")
-    for text in _formulas(assessment):
-        say(f"  {text}")
-    how = {"declared": "declared", "identified": "from ramps of two rates", "unknown": "none declared"}
-    say(
-        f"meter floor: {assessment.meter.floor_L_min:.2f} L/min; lag taken as {assessment.meter.lag_s:.3g} s "
-        f"({how[assessment.meter.lag_is]})"
-    )
-    for note in assessment.notes:
-        say(f"note [{note.code}] {f'{note.source}: ' if note.source else ''}{note.text}")
-    for text in _limits(assessment):
-        say(text)
+    lines = [
+        *_not_observable(assessment),
+        *_remarks(assessment),
+        f"{assessment.terms[0].upper()}{assessment.terms[1:]}:",
+        *(f"  {text}" for text in _formulas(assessment)),
+        meter_line(assessment.meter),
+        *(f"note [{each.code}] {f'{each.source}: ' if each.source else ''}{each.text}" for each in assessment.notes),
+        *_limits(assessment),
+    ]
+    for line in lines:
+        put_line(page, line)
 
 
 def _table_of(item: "PressureAssessment") -> Table:
@@ -43,34 +37,34 @@ def _table_of(item: "PressureAssessment") -> Table:
 
     where = "pressure drop unknown" if item.dp_MPa is None else f"{item.dp_MPa:.2f} MPa"
     flows = f"level {item.level_L_min:.3g} L/min, rated flow {item.rated_flow_L_min:.3g} L/min"
-    title = f"{where}, {item.side} commands; {flows}"
-    rows = new_table(title, "quantity", "unit", "before", "after", "change", "± s.e.")
+    rows = Table(
+        f"{where}, {item.side} commands; {flows}", "quantity", "unit", "before", "after", "change", "± s.e."
+    )
     for key, found in item.quantities.items():
-        quantity, change = QUANTITIES[key], found.change
-        both = (found.before, found.after)
+        quantity, change, both = QUANTITIES[key], found.change, (found.before, found.after)
         if key == "symmetry" and all(reading is None or reading.value is None for reading in both):
             continue  # of a valve with one side: printed below where a limit asks for it
         rows.add_row(
             quantity.name,
             quantity.unit,
             *(_shown(reading, quantity.unit) for reading in both),
-            "-" if change is None else _number(change.value, quantity.unit, "+"),
-            "-" if change is None or change.se is None else _number(change.se, quantity.unit),
+            _number(change.value if change else None, quantity.unit, "+"),
+            _number(change.se if change else None, quantity.unit),
         )
     return rows
 
 
-def _number(value: float, unit: str, sign: str = "") -> str:
+def _number(value: float | None, unit: str, sign: str = "") -> str:
+    if value is None:
+        return "-"
     text = f"{value:{sign}.{DECIMALS[unit]}f}"
     return text if float(text) else f"{0:{sign}.{DECIMALS[unit]}f}"  # no -0.00
 
 
 def _shown(reading: "Reading | None", unit: str) -> str:
     """Return a value, or the bound of what is not observable."""
-    if reading is None:
-        return "-"
-    if reading.value is not None:
-        return _number(reading.value, unit)
+    if reading is None or reading.value is not None:
+        return _number(reading.value if reading else None, unit)
     return "?" if reading.at_most is None else f"< {_number(reading.at_most, unit)}"
 
 
@@ -126,13 +120,9 @@ def _formulas(assessment: "Assessment") -> list[str]:
 
     low, high = assessment.options.linearity_window
     knee = "-".join(f"{share:.0%}" for share in assessment.options.knee_window).replace("%-", "-")
-    lines = [
-        f"{quantity.name} = {quantity.formula}"
-        for key, quantity in QUANTITIES.items()
-        if not (key == "symmetry" and _one_sided(assessment))
-    ]
+    shown = [each for key, each in QUANTITIES.items() if not (key == "symmetry" and _one_sided(assessment))]
     return [
-        *lines,
+        *(f"{each.name} = {each.formula}" for each in shown),
         "u_r(Q), u_f(Q): command at which the rising, the falling branch has the flow Q; every flow but the largest "
         "and that at zero is brought by sqrt(dP) to its set's pressure drop at no flow (of the two sets within 2 %); "
         f"straight part: {knee} of the largest flow, wider where it goes on straight; window "

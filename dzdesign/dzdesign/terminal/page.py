@@ -3,16 +3,17 @@
 import os
 import sys
 import textwrap
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, TypeVar
 
+from dzdesign.core.documents import to_json
 from dzdesign.core.errors import one_line
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions
     from rich.segment import Segment
 
+Row = TypeVar("Row")
 #: Columns of a page when stdout is a file or a pipe, and COLUMNS does not say.
 FILE_WIDTH = 140
 #: Blanks between the columns of a table, where there is room and where there is none; one more stands at its left.
@@ -26,6 +27,13 @@ def new_console() -> "Console":
     columns = os.environ.get("COLUMNS", "")
     width = int(columns) if columns.isdecimal() and int(columns) > 0 else FILE_WIDTH
     return Console(highlight=False, width=None if sys.stdout.isatty() else width)
+
+
+def print_json(result: object) -> None:
+    """Print an artefact, or an object of JSON values, as --json asks for it."""
+    from dzdesign.core.artefact_types import as_document
+
+    print(to_json(as_document(result)), end="")
 
 
 def put_line(console: "Console", text: str) -> None:
@@ -49,37 +57,26 @@ def volts(value: float | None) -> str:
     return "-" if value is None else f"{value:.3f}"
 
 
-def new_table(title: str, *columns: str, words: Sequence[int] = (0,)) -> "Table":
-    """Return an empty table.
-
-    Parameters
-    ----------
-    title : str
-        Above it.
-    *columns : str
-        Headers.
-    words : sequence of int
-        Columns of words, which may be wrapped at blanks; the others are numbers, which are not.
-    """
-    return Table(title=one_line(title), headers=tuple(map(one_line, columns)), words=tuple(words))
+def put_rows(
+    console: "Console", title: str, rows: Iterable[Row], columns: Mapping[str, Callable[[Row], str]],
+    words: Sequence[int] = (0,),
+) -> None:  # fmt: skip
+    """Print results as a table: each column is its header and what makes the cell of a result; `words` as for Table."""
+    table = Table(title, *columns, words=words)
+    for row in rows:
+        table.add_row(*(cell(row) for cell in columns.values()))
+    put_table(console, table)
 
 
-@dataclass(slots=True, kw_only=True)
 class Table:
     """A table that rich prints: headers and words are wrapped at blanks; one that is still too wide is not cut.
 
-    Attributes
-    ----------
-    title, headers, words
-        As for `new_table`.
-    rows : list of tuple of str
-        Cells, as many as headers.
+    `words` are the columns of words; the others hold numbers, which are not wrapped.
     """
 
-    title: str
-    headers: tuple[str, ...]
-    words: tuple[int, ...]
-    rows: list[tuple[str, ...]] = field(default_factory=list)
+    def __init__(self, title: str, *headers: str, words: Sequence[int] = (0,)) -> None:
+        self.title, self.headers, self.words = one_line(title), tuple(map(one_line, headers)), words
+        self.rows: list[tuple[str, ...]] = []
 
     def add_row(self, *cells: str) -> None:
         """Add a row."""

@@ -75,10 +75,15 @@ def is_watched() -> bool:
 
 
 @contextlib.contextmanager
-def stage_progress() -> Iterator["StageProgress"]:
-    """Give a `say` after which, once a stage has taken `PATIENCE`, a bar moves until the next stage, with the time."""
+def stage_progress(first: str = "") -> Iterator["StageProgress"]:
+    """Give a `say` after which, once a stage has taken `PATIENCE`, a bar moves until the next stage, with the time.
+
+    The `first` stage, if it is named, begins at once.
+    """
     stage = StageProgress()
     try:
+        if first:
+            stage(first)
         yield stage
     finally:
         stage.end()

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from dzdesign.core.verdicts import verdict_words
-from dzdesign.terminal.page import new_console, new_table, put_line, put_table
+from dzdesign.terminal.page import Table, new_console, put_line, put_table
 
 if TYPE_CHECKING:
     from dzdesign.report.reproduction import PaperNumber, Reproduction
@@ -16,7 +16,7 @@ def print_reproduction(reproduction: "Reproduction") -> None:
     reasons: dict[str, int] = {}
     numbers = reproduction.numbers
     for name in dict.fromkeys(number.valve for number in numbers):
-        table = new_table(
+        table = Table(
             f"The paper's numbers and ours: {name}", "", "MPa", "published", "in the fit", "valve", "paper's law",
             "product", "within", "", "why",
         )  # fmt: skip

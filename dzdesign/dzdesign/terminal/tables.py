@@ -4,17 +4,20 @@ import json
 from typing import TYPE_CHECKING
 
 from dzdesign.core.units import chance, span_MPa
-from dzdesign.terminal.page import Table, new_console, new_table, put_line, put_table, volts
+from dzdesign.terminal.page import new_console, put_line, put_rows, volts
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from fractions import Fraction
 
     from rich.console import Console
 
+    from dzdesign.assess.assessment import MeterTaken
     from dzdesign.codegen.project import Firmware
-    from dzdesign.derivation.account.mutation import AccountMutants
+    from dzdesign.derivation.account.mutation import AccountMutants, StatementMutants
     from dzdesign.design.compensator import Compensator
-    from dzdesign.identify.valve.model import ValveModel
+    from dzdesign.identify.valve.model import Meter, ValveModel
+    from dzdesign.identify.valve.ramp_result import TestResult
     from dzdesign.identify.valve.side_model import SideModel
 
 
@@ -29,41 +32,37 @@ def print_valve(valve: "ValveModel", console: "Console | None" = None) -> None:
         put_line(console, "record: " + "; ".join(f"{name} {text}" for name, text in valve.record.items()))
     for name, side in valve.sides.items():
         title = "Thresholds (V)" if len(valve.sides) == 1 else f"Thresholds (V), {name} side"
-        put_table(console, _thresholds(side, title))
+        _put_thresholds(console, side, title)
         for line in _side_lines(side):
             put_line(console, line)
     if "positive" not in valve.sides:
         console.print("positive commands: not tested")
-    how = {"declared": "declared", "identified": "from ramps of two rates", "unknown": "none declared"}
-    put_line(
-        console,
-        f"meter floor: {valve.meter.floor_L_min:.2f} L/min; lag taken as {valve.meter.lag_s:.3g} s "
-        f"({how.get(valve.meter.lag_is, valve.meter.lag_is)})",
-    )
+    put_line(console, meter_line(valve.meter))
     for warning in valve.warnings:
         source = f"{warning.source}: " if warning.source else ""
         put_line(console, f"warning [{warning.code}] {source}{warning.text}")
 
 
-def _thresholds(side: "SideModel", title: str) -> Table:
-    table = new_table(
-        title, "ramp test", "dP (MPa)", "knee opening", "knee closing", "s.e. of knee", "onset closing",
-         "bound", "beta", "Q max (L/min)",
-    )  # fmt: skip
-    betas = side.beta.beta or ("-",)
-    for test, beta in zip(side.tests, betas, strict=True):
-        table.add_row(
-            test.source,
-            "?" if test.dp_MPa is None else f"{test.dp_MPa:.3f}",
-            volts(test.u_knee_rising_V),
-            volts(test.u_knee_falling_V),
-            f"{test.u_knee_se_V:.4f}",
-            volts(test.u_onset_falling_V),
-            volts(test.u_guard_lower_V),
-            beta if isinstance(beta, str) else f"{beta:.4f}",
-            f"{test.q_max_L_min:.2f}",
-        )
-    return table
+def meter_line(meter: "Meter | MeterTaken") -> str:
+    """Return what is known of the flow meter of recordings."""
+    how = {"declared": "declared", "identified": "from ramps of two rates", "unknown": "none declared"}
+    return f"meter floor: {meter.floor_L_min:.2f} L/min; lag taken as {meter.lag_s:.3g} s ({how[meter.lag_is]})"
+
+
+def _put_thresholds(console: "Console", side: "SideModel", title: str) -> None:
+    betas = dict(zip((test.source for test in side.tests), side.beta.beta, strict=False))  # none without a known dP
+    columns: dict[str, Callable[[TestResult], str]] = {
+        "ramp test": lambda test: test.source,
+        "dP (MPa)": lambda test: "?" if test.dp_MPa is None else f"{test.dp_MPa:.3f}",
+        "knee opening": lambda test: volts(test.u_knee_rising_V),
+        "knee closing": lambda test: volts(test.u_knee_falling_V),
+        "s.e. of knee": lambda test: f"{test.u_knee_se_V:.4f}",
+        "onset closing": lambda test: volts(test.u_onset_falling_V),
+        "bound": lambda test: volts(test.u_guard_lower_V),
+        "beta": lambda test: f"{betas[test.source]:.4f}" if betas else "-",
+        "Q max (L/min)": lambda test: f"{test.q_max_L_min:.2f}",
+    }
+    put_rows(console, title, side.tests, columns)
 
 
 def _side_lines(side: "SideModel") -> tuple[str, ...]:
@@ -135,11 +134,14 @@ def print_firmware(firmware: "Firmware", console: "Console | None" = None, folde
 
 def print_mutations(found: "AccountMutants") -> None:
     """Print how many wrong equations were caught, those that were not, and the changes that mean the same."""
-    table = new_table("Wrong equations", "statement", "wrong", "caught", "same meaning")
-    for row in found.statements:
-        table.add_row(row.number, str(row.mutants), str(row.caught), str(len(row.equivalent) or ""))
     console = new_console()
-    put_table(console, table)
+    columns: dict[str, Callable[[StatementMutants], str]] = {
+        "statement": lambda row: row.number,
+        "wrong": lambda row: str(row.mutants),
+        "caught": lambda row: str(row.caught),
+        "same meaning": lambda row: str(len(row.equivalent) or ""),
+    }
+    put_rows(console, "Wrong equations", found.statements, columns)
     for row in found.statements:
         for survivor in row.survivors:
             put_line(console, f"not caught, {row.number}: {survivor}")

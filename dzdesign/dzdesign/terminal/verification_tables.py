@@ -3,15 +3,15 @@
 from typing import TYPE_CHECKING
 
 from dzdesign.core.verdicts import NOT_CHECKED, verdict_words
-from dzdesign.terminal.page import Table, new_console, new_table, put_line, put_table, volts
+from dzdesign.terminal.page import new_console, put_line, put_rows, volts
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from rich.console import Console
 
     from dzdesign.identify.valve.model import ValveModel
-    from dzdesign.verify.evidence import MonteCarlo, MutationScore, ScenarioResult, Spread
+    from dzdesign.verify.evidence import MonteCarlo, MutationScore, PressureResult, Scatter, ScenarioResult, Spread
     from dzdesign.verify.verification import Verification
 
 
@@ -29,60 +29,50 @@ def print_verification(verification: "Verification", console: "Console | None" =
     for name in not_tried(verification.evidence):
         put_line(console, f"{NOT_CHECKED}  {name}".replace("`", ""))
     if verification.loops:
-        put_table(console, _closed_loop(verification))
+        _put_closed_loop(console, verification)
     print_scenarios(verification.evidence.scenarios, console)
-    print_scatter(verification.evidence.monte_carlo, console)
+    if verification.evidence.monte_carlo:
+        print_scatter(verification.evidence.monte_carlo, console)
     put_line(console, verification.verdict)
 
 
-def _closed_loop(verification: "Verification") -> Table:
+def _put_closed_loop(console: "Console", verification: "Verification") -> None:
     plant = verification.evidence.closed_loop.plant_source
-    table = new_table(
-        f"Closed loop (plant: {plant}); dead zones in per cent of full command, onset of flow",
-        "dP (MPa)", "without: opening", "without: closing", "with: opening", "with: closing", "Q at zero, no beta",
-        "Q at zero, beta", "Q max without", "Q max with (L/min)",
-    )  # fmt: skip
     both = len({loop.result.side for loop in verification.loops}) > 1
-    for loop in verification.loops:
-        result = loop.result
-        table.add_row(
-            f"{result.side} {result.dp_MPa:.2f}" if both else f"{result.dp_MPa:.2f}",
-            _percent(result.dead_zone_opening),
-            _percent(result.dead_zone_closing),
-            _percent(result.residual_opening),
-            _percent(result.residual_closing),
-            f"{result.q_zero_without_beta_L_min:.2f}",
-            f"{result.q_zero_L_min:.2f}",
-            f"{result.q_max_direct_L_min:.1f}",
-            f"{result.q_max_L_min:.1f}",
-        )
-    return table
+    columns: dict[str, Callable[[PressureResult], str]] = {
+        "dP (MPa)": lambda loop: f"{loop.side} {loop.dp_MPa:.2f}" if both else f"{loop.dp_MPa:.2f}",
+        "without: opening": lambda loop: _percent(loop.dead_zone_opening),
+        "without: closing": lambda loop: _percent(loop.dead_zone_closing),
+        "with: opening": lambda loop: _percent(loop.residual_opening),
+        "with: closing": lambda loop: _percent(loop.residual_closing),
+        "Q at zero, no beta": lambda loop: f"{loop.q_zero_without_beta_L_min:.2f}",
+        "Q at zero, beta": lambda loop: f"{loop.q_zero_L_min:.2f}",
+        "Q max without": lambda loop: f"{loop.q_max_direct_L_min:.1f}",
+        "Q max with (L/min)": lambda loop: f"{loop.q_max_L_min:.1f}",
+    }
+    title = f"Closed loop (plant: {plant}); dead zones in per cent of full command, onset of flow"
+    put_rows(console, title, [loop.result for loop in verification.loops], columns)
 
 
-def print_scenarios(scenarios: "Sequence[ScenarioResult]", console: "Console | None" = None) -> None:
+def print_scenarios(scenarios: "Sequence[ScenarioResult]", console: "Console") -> None:
     """Print every scenario once: its worst over the pressure drops, and below the table what else was read there."""
-    if not scenarios:
-        return
-    table = new_table(
-        "Scenarios with the compensator, worst of all pressure drops", "scenario", "dP (MPa)",
-        "Q at zero, at the end (L/min)", "on the way, at most (L/min)",
-    )  # fmt: skip
-    lines = []
-    for name in dict.fromkeys(each.name for each in scenarios):
-        group = [each for each in scenarios if each.name == name]
-        worst = max(group, key=lambda each: (each.q_zero_L_min, each.q_peak_at_zero_L_min, each.dp_MPa))
-        table.add_row(
-            name + ("" if worst.must_shut else " (no core can know)"),
-            f"{worst.dp_MPa:.2f}",
-            f"{worst.q_zero_L_min:.2f}",
-            f"{worst.q_peak_at_zero_L_min:.2f}",
-        )
-        if worst.figures:
-            lines.append(f"{name}: {_figures(worst.figures)}")
-    console = console or new_console()
-    put_table(console, table)
-    for line in lines:  # words of many lines in a narrow column are no table
-        put_line(console, line)
+
+    def severity(each: "ScenarioResult") -> tuple[float, float, float]:
+        return each.q_zero_L_min, each.q_peak_at_zero_L_min, each.dp_MPa
+
+    names = dict.fromkeys(each.name for each in scenarios)
+    shown = [max((each for each in scenarios if each.name == name), key=severity) for name in names]
+    columns: dict[str, Callable[[ScenarioResult], str]] = {
+        "scenario": lambda each: each.name + ("" if each.must_shut else " (no core can know)"),
+        "dP (MPa)": lambda each: f"{each.dp_MPa:.2f}",
+        "Q at zero, at the end (L/min)": lambda each: f"{each.q_zero_L_min:.2f}",
+        "on the way, at most (L/min)": lambda each: f"{each.q_peak_at_zero_L_min:.2f}",
+    }
+    if shown:
+        put_rows(console, "Scenarios with the compensator, worst of all pressure drops", shown, columns)
+    for each in shown:  # words of many lines in a narrow column are no table
+        if each.figures:
+            put_line(console, f"{each.name}: {_figures(each.figures)}")
 
 
 #: How a figure's name begins -> of which valve it is.
@@ -107,31 +97,23 @@ def _figure(key: str, value: float) -> str:
     return f"{key} {value:.3g}"
 
 
-def print_scatter(series: "MonteCarlo | None", console: "Console | None" = None) -> None:
+def print_scatter(series: "MonteCarlo", console: "Console") -> None:
     """Print the quantiles of a series of plants per pressure drop."""
-    if series is None:
-        return
-    table = new_table(
-        f"Series of {series.plants} plants: median (1 to 99 %)", "side", "dP (MPa)", "dead zone opening (%)",
-        "closing (%)", "Q max (L/min)", "Q at zero (L/min)", "plants that leak",
-    )  # fmt: skip
 
     def spread(of: "Spread", by: float, digits: int) -> str:
         middle, low, high = (by * value for value in (of.p50, of.p01, of.p99))
         return f"{middle:.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
 
-    for each in series.pressures:
-        table.add_row(
-            each.side,
-            f"{each.dp_MPa:.2f}",
-            spread(each.residual_opening, 100, 1),
-            spread(each.residual_closing, 100, 1),
-            spread(each.q_max_L_min, 1, 1),
-            spread(each.q_zero_L_min, 1, 2),
-            f"{each.leaking} of {each.plants}",
-        )
-    console = console or new_console()
-    put_table(console, table)
+    columns: dict[str, Callable[[Scatter], str]] = {
+        "side": lambda each: each.side,
+        "dP (MPa)": lambda each: f"{each.dp_MPa:.2f}",
+        "dead zone opening (%)": lambda each: spread(each.residual_opening, 100, 1),
+        "closing (%)": lambda each: spread(each.residual_closing, 100, 1),
+        "Q max (L/min)": lambda each: spread(each.q_max_L_min, 1, 1),
+        "Q at zero (L/min)": lambda each: spread(each.q_zero_L_min, 1, 2),
+        "plants that leak": lambda each: f"{each.leaking} of {each.plants}",
+    }
+    put_rows(console, f"Series of {series.plants} plants: median (1 to 99 %)", series.pressures, columns)
     at = max(series.pressures, key=lambda each: each.q_zero_L_min.worst)
     worst = at.q_zero_L_min
     if worst.worst > 0:
@@ -145,26 +127,23 @@ def print_scatter(series: "MonteCarlo | None", console: "Console | None" = None)
 
 def print_demo(valve: "ValveModel", verification: "Verification", folder: str) -> None:
     """Print the demo's closing table: per pressure drop, what was found and what the compensator does."""
-    table = new_table(
-        "Simulated example valve, 0-10 V ramps in closed loop with the generated C",
-        "dP (MPa)", "threshold open/close (V)", "dead zone without", "with: opening", "with: closing",
-        "Q at zero without beta", "with beta (L/min)",
-    )  # fmt: skip
     tests = {round(test.dp_MPa or 0.0, 6): test for test in valve.positive.tests}
-    for loop in verification.loops:
-        result = loop.result
-        test = tests[round(result.dp_MPa, 6)]
-        table.add_row(
-            f"{result.dp_MPa:.2f}",
-            f"{volts(test.u_knee_rising_V)} / {volts(test.u_knee_falling_V)}",
-            _percent(result.dead_zone_opening),
-            _percent(result.residual_opening),
-            _percent(result.residual_closing),
-            f"{result.q_zero_without_beta_L_min:.2f}",
-            f"{result.q_zero_L_min:.2f}",
-        )
-    console = new_console()
-    put_table(console, table)
+
+    def thresholds(loop: "PressureResult") -> str:
+        test = tests[round(loop.dp_MPa, 6)]
+        return f"{volts(test.u_knee_rising_V)} / {volts(test.u_knee_falling_V)}"
+
+    columns: dict[str, Callable[[PressureResult], str]] = {
+        "dP (MPa)": lambda loop: f"{loop.dp_MPa:.2f}",
+        "threshold open/close (V)": thresholds,
+        "dead zone without": lambda loop: _percent(loop.dead_zone_opening),
+        "with: opening": lambda loop: _percent(loop.residual_opening),
+        "with: closing": lambda loop: _percent(loop.residual_closing),
+        "Q at zero without beta": lambda loop: f"{loop.q_zero_without_beta_L_min:.2f}",
+        "with beta (L/min)": lambda loop: f"{loop.q_zero_L_min:.2f}",
+    }
+    console, title = new_console(), "Simulated example valve, 0-10 V ramps in closed loop with the generated C"
+    put_rows(console, title, [loop.result for loop in verification.loops], columns)
     checked, wrong = (sum(getattr(each, name) for each in verification.evidence.inputs) for name in ("inputs", "wrong"))
     put_line(console, f"Inputs checked: {checked}, wrong: {wrong}")
     put_line(console, verification.verdict)

@@ -37,14 +37,7 @@ PAPER_DP0 = 1 * MPA
 
 
 def identify_side(tests: Sequence[RampTest], options: IdentifyOptions) -> SideIdentification:
-    """Identify the side of positive commands.
-
-    Parameters
-    ----------
-    tests : sequence of RampTest
-        In any order.
-    options : IdentifyOptions
-        Choices of the engineer.
+    """Identify the side of positive commands from ramp tests in any order.
 
     Raises
     ------

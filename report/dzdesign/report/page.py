@@ -18,10 +18,53 @@ if TYPE_CHECKING:
     import markupsafe
 
     from dzdesign.report.sections.law import LawAccount
-    from dzdesign.report.summary import Figure, Headline
 
 #: Characters of a word of the language; what is longer is a name or a hash.
 LONGEST_WORD = 18
+#: Kind of a verdict -> the sign before it.
+SIGNS = {"good": "✓", "bad": "✗", "open": "?"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Headline:
+    """The verdict: good if all holds, bad if something does not, open if something was not checked.
+
+    `reasons` name what does not hold or was not checked, `untried` what nobody asked for and the command that tries it,
+    `cautions` what the verdict is not about, and what somebody accepted; `some_failed`: valves of a lot are not
+    calibrated.
+    """
+
+    kind: str
+    text: str
+    reasons: tuple[str, ...] = ()
+    untried: tuple[str, ...] = ()
+    cautions: tuple[str, ...] = ()
+    some_failed: bool = False
+
+    @property
+    def sign(self) -> str:
+        """What stands before it, so that its colour is not its only carrier."""
+        return "!" if self.some_failed and self.kind == "open" else SIGNS[self.kind]
+
+    @property
+    def holds(self) -> bool | None:
+        """None where something was not checked, or is not there."""
+        return False if self.some_failed else {"good": True, "bad": False}.get(self.kind)
+
+
+def misfit(faults: tuple[str, ...]) -> Headline:
+    """Return the verdict on files of which some are not what the others were made from."""
+    return Headline(kind="bad", text="THE FILES DO NOT BELONG TOGETHER. No verdict stands.", reasons=faults)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Figure:
+    """One number that matters: its label, the number itself and what it is of."""
+
+    label: str
+    value: str
+    note: str
+    kind: str = "text"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,15 +97,50 @@ class Page:
     """
 
     title: str
-    verdict: "Headline"
-    figures: "Sequence[Figure]"
+    verdict: Headline
+    figures: Sequence[Figure]
     headings: Sequence[tuple[str, str]]
     sections: Mapping[str, Section]
     missing: Sequence[str] = ()
     law: "LawAccount | None" = None
     record: Sequence[tuple[str, str]] = ()
-    lot: "Sequence[Figure]" = ()
+    lot: Sequence[Figure] = ()
     carrier: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Report:
+    """A finished report.
+
+    Attributes
+    ----------
+    html : str
+        The page.
+    kind : {"good", "bad", "open"}
+        Of its verdict.
+    holds : bool or None
+        None where something was not checked, or is not there.
+    verdict : str
+        In words.
+    faults, missing : tuple of str
+        What does not fit, and what is not there.
+    """
+
+    html: str
+    kind: str
+    holds: bool | None
+    verdict: str
+    faults: tuple[str, ...]
+    missing: tuple[str, ...]
+
+
+def report_of(page: Page, faults: tuple[str, ...]) -> Report:
+    """Return the finished report of a page; `faults` name the files that do not fit."""
+    verdict = page.verdict
+    return Report(
+        html=render(page), kind=verdict.kind, holds=verdict.holds, verdict=verdict.text, faults=faults,
+        missing=tuple(page.missing),
+    )  # fmt: skip
 
 
 def render(page: Page) -> str:

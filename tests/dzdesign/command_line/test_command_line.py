@@ -29,7 +29,7 @@ from dzdesign.core.options import GROUPS, Option
 from dzdesign.core.units import si_factor
 from dzdesign.stages.recordings import distinct_names
 from dzdesign.terminal import progress
-from dzdesign.terminal.page import FILE_WIDTH, new_console, new_table, put_line, put_table
+from dzdesign.terminal.page import FILE_WIDTH, Table, new_console, put_line, put_table
 from tests.support.synthetic import L_MIN, MPA, Truth, synthetic_ramp
 
 
@@ -304,7 +304,7 @@ def test_colour_is_for_terminals_and_for_who_asks(monkeypatch):
                 patched.delenv(name, raising=False)
             for name, value in environment.items():
                 patched.setenv(name, value)
-            table = new_table("title", "a", "b")
+            table = Table("title", "a", "b")
             table.add_row("1", "2")
             new_console().print(table)
         return page.getvalue()
@@ -376,7 +376,7 @@ CELLS = st.lists(WORDS, min_size=1, max_size=4).map(" ".join)
 @given(st.integers(2, 9), st.integers(0, 4), st.integers(26, 160), st.data())
 def test_a_table_fits_the_page_with_every_word_whole(columns, rows, width, data):
     headers = data.draw(st.lists(CELLS, min_size=columns, max_size=columns))
-    table = new_table("a title", *headers)
+    table = Table("a title", *headers)
     for _ in range(rows):
         table.add_row(data.draw(CELLS), *data.draw(st.lists(WORDS, min_size=columns - 1, max_size=columns - 1)))
     page = Console(width=width, file=io.StringIO(), highlight=False)
@@ -391,7 +391,7 @@ def test_a_table_fits_the_page_with_every_word_whole(columns, rows, width, data)
 
 
 def test_a_table_too_wide_is_not_cut():
-    table = new_table("t", "ramp test", *(f"number{k}" for k in range(12)))
+    table = Table("t", "ramp test", *(f"number{k}" for k in range(12)))
     table.add_row("ramp_dP0.5.csv.gz", *(f"{k}.12345" for k in range(12)))
     page = Console(width=80, file=io.StringIO(), highlight=False)
     put_table(page, table)
@@ -401,7 +401,7 @@ def test_a_table_too_wide_is_not_cut():
 
 
 def test_markup_in_a_cell_is_text():
-    table = new_table("of [bold]x[/bold]", "[red]a", "b")
+    table = Table("of [bold]x[/bold]", "[red]a", "b")
     table.add_row("[/nothing]", "1")
     page = Console(width=80, file=io.StringIO())
     page.print(table)

@@ -44,7 +44,7 @@ def test_nothing_there_is_exit_status_1_with_what_to_do(bare, capsys):
     assert not any(report["programs"].values())
     assert {tool["name"] for tool in report["to_get"]} == set(report["programs"])
     for tool in report["to_get"]:
-        assert all(tool[system] for system in doctor.SYSTEMS)
+        assert all(tool[system] for system in ("debian", "macos", "windows"))
     assert main(["doctor"]) == 1
     page = capsys.readouterr().out
     assert "NO C COMPILER WORKS" in page and "pip install dzdesign[zig]" in page

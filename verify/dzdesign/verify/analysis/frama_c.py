@@ -24,7 +24,7 @@ from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.firmware.folder import read_compensator
 from dzdesign.verify.requirements import UNDEFINED_BEHAVIOUR, Check
 from dzdesign.verify.toolchain.compiled_core import SOURCES
-from dzdesign.verify.toolchain.machines import programs_folder
+from dzdesign.verify.toolchain.machines import PROGRAMS
 
 PROGRAM = "frama-c"
 #: A shift of a negative number to the right is each compiler's own; overflow of unsigned words is the core's tool.
@@ -119,7 +119,7 @@ def prove(folder: Path, rows: int | None = None) -> Proof:
             work.mkdir()
             for each in sources:
                 shutil.copyfile(folder / "core" / each, work / each)
-            shutil.copyfile(programs_folder() / "proof.c", work / "proof.c")
+            shutil.copyfile(PROGRAMS / "proof.c", work / "proof.c")
             tried = _sound(law.b.valid_codes)[:rows]
             (work / "pieces.h").write_text(_pieces(law, ending, tried))
             alarms |= _of_side(work, [each for each in sources if each.endswith(".c")], len(tried))

@@ -25,7 +25,7 @@ from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
 from dzdesign.verify.firmware.folder import read_compensator
 from dzdesign.verify.requirements import MUTATION, Check
 from dzdesign.verify.toolchain.compiled_core import CompiledCore
-from dzdesign.verify.toolchain.machines import HOST, compile_object, link_program, programs_folder, run_program
+from dzdesign.verify.toolchain.machines import HOST, PROGRAMS
 
 KILLED, REFUSED, SAME_OBJECT, SAME_OUTPUTS, SURVIVED = (
     "killed", "refused by the compiler", "same object code", "same outputs", "survived",
@@ -113,11 +113,11 @@ class MutationBench:
         """Compare every function of the core with the original's at random triples of 16 bits."""
         results = []
         flags = (*HOST.check_flags, *(["-DDZ_BOTH"] if len(self._signs) > 1 else []))
-        source = {"random_triples.c": (programs_folder() / "random_triples.c").read_bytes()}
-        main = compile_object(HOST, "random_triples.c", source, flags, "the random triples")
+        source = {"random_triples.c": (PROGRAMS / "random_triples.c").read_bytes()}
+        main = HOST.compile("random_triples.c", source, flags, "the random triples")
         for each in (objects, self._drive.objects()):
-            program = link_program(HOST, [*each, main], "the random triples")
-            results.append(run_program(HOST, program, [str(RANDOM_TRIPLES)], "the core"))
+            program = HOST.link([*each, main], "the random triples")
+            results.append(HOST.run(program, [str(RANDOM_TRIPLES)], "the core"))
         return results[0] == results[1]
 
 

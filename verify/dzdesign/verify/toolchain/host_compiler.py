@@ -110,13 +110,7 @@ def environment() -> dict[str, str]:
 
 
 def host_compiler() -> str:
-    """Return the C compiler to use.
-
-    Raises
-    ------
-    InputError
-        If there is none, with what to do.
-    """
+    """Return the C compiler to use; where there is none, an `InputError` says what to do."""
     compilers = find_compilers()
     if not compilers:
         raise InputError(
@@ -128,13 +122,7 @@ def host_compiler() -> str:
 
 
 def run_compiler(command: Sequence[str], folder: Path | None = None) -> subprocess.CompletedProcess[str]:
-    """Run a compiler, and log the command.
-
-    Raises
-    ------
-    OSError, subprocess.TimeoutExpired
-        If it can't be run, or does not end.
-    """
+    """Run a compiler, and log the command; whoever calls decides what one means that can't be run or does not end."""
     begin = time.perf_counter()
     done = subprocess.run(
         command, cwd=folder, capture_output=True, text=True, errors="replace", timeout=TIMEOUT_S, check=False,
@@ -152,13 +140,7 @@ def first_error(messages: str) -> str:
 
 
 def build(command: Sequence[str], what: str, folder: Path | None = None) -> None:
-    """Compile or link.
-
-    Raises
-    ------
-    RequirementError
-        With the compiler's first complaint.
-    """
+    """Compile or link; the compiler's first complaint is a `RequirementError`."""
     try:
         done = run_compiler(command, folder)
     except (OSError, subprocess.TimeoutExpired) as error:
@@ -168,14 +150,8 @@ def build(command: Sequence[str], what: str, folder: Path | None = None) -> None
 
 
 def check_strictly(source: Path, compiler: str, options: Sequence[str] = ()) -> None:
-    """Compile one file with every warning an error, and with further options.
-
-    Raises
-    ------
-    RequirementError
-        With the compiler's first complaint.
-    """
-    target = Path(_build_folder().name) / "strict.o"
+    """Compile one file with every warning an error, and with further options."""
+    target = build_folder() / "strict.o"
     command = [*words_of(compiler), *STRICT, "-O2", *options, "-c", str(source), "-o", str(target)]
     build(command, f"{source.name} ({Path(compiler).name})")
 
@@ -188,7 +164,7 @@ def load_library(sources: Mapping[str, str], what: str, options: Sequence[str] =
             errors="surrogateescape"
         )
     )
-    folder = Path(_build_folder().name) / key[:32]
+    folder = build_folder() / key[:32]
     library = folder / f"{key[:32]}{'.dll' if sys.platform == 'win32' else '.so'}"
     if not library.exists():
         folder.mkdir(exist_ok=True)
