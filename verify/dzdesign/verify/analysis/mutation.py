@@ -55,13 +55,7 @@ class MutationBench:
         return {name: text.decode(errors="surrogateescape") for name, text in self._drive.sources.items()}
 
     def check_original(self) -> None:
-        """Run every check on the firmware as it is.
-
-        Raises
-        ------
-        RequirementError
-            If it fails one: then no mutant's failing says anything.
-        """
+        """Run every check on the firmware as it is; if it fails one, no mutant's failing says anything."""
         _ = self._drive_samples
         for verdict in self._tried(self._cores, self._drive):
             if verdict:

@@ -41,11 +41,6 @@ def law_follows(compensator: Compensator) -> Check:
     """Tell whether designing again gives the same numbers, which a file without its options does not let anyone do.
 
     Another version of dzdesign may have chosen other tables, and none the worse.
-
-    Parameters
-    ----------
-    compensator : Compensator
-        As it was read.
     """
     if compensator.target is None:
         text = "compensator.json does not say for which target and with which options it was designed, so no number of "
