@@ -15,7 +15,7 @@ from dzdesign.verify.analysis.machine_code import check_on_machine
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from dzdesign.verify.toolchain.compiled_core import CompiledCore
 from dzdesign.verify.toolchain.host_compiler import load_library
-from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4, HOST, compile_object, link_program, run_program
+from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4, HOST
 
 ROUNDS, QUICK_ROUNDS, SIMULATED_ROUNDS = 25, 3, 5
 #: Inputs of the comparison with ctypes and Fraction, of which the whole is extrapolated.
@@ -106,9 +106,9 @@ def _simulated(firmware: Path) -> list[Row]:
 def _bare_batch(firmware: Path) -> Callable[[int], object]:
     core = CompiledCore(firmware).compiled()
     source = {"bare_batch.c": (Path(__file__).parent / "bare_batch.c").read_bytes()}
-    objects = [core, compile_object(HOST, "bare_batch.c", source, HOST.check_flags, "the bare batch")]
-    program = link_program(HOST, objects, "the bare batch")
-    return lambda last: run_program(HOST, program, [str(last)], "the bare batch")
+    objects = [core, HOST.compile("bare_batch.c", source, HOST.check_flags, "the bare batch")]
+    program = HOST.link(objects, "the bare batch")
+    return lambda last: HOST.run(program, [str(last)], "the bare batch")
 
 
 def _by_fractions(firmware: Path, compensator: Compensator, count: int, seed: int) -> None:

@@ -13,7 +13,7 @@ from dzdesign.core.errors import InputError, quoted
 
 if TYPE_CHECKING:
     from dzdesign.design.firmware_manifest import FirmwareManifest
-    from dzdesign.verify.evidence import Check
+    from dzdesign.verify.requirements import Check
     from dzdesign.verify.verification import Verification
 
 

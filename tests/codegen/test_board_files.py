@@ -14,13 +14,14 @@ from dzdesign.core.artefact_files import MANIFEST_NAME, to_json, write_folder
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.designing import design
+from dzdesign.regeneration import with_regenerated
 from dzdesign.report.valve_report import REPORT_NAME, report_of_folder, with_report
 from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.firmware import compilation
 from dzdesign.verify.firmware.compilation import BoardCompiled, board_compiles
 from dzdesign.verify.firmware.folder import read_firmware_manifest
 from dzdesign.verify.firmware.unchanged_files import files_unchanged
-from dzdesign.verify.requirements import not_tried
+from dzdesign.verify.untried import not_tried
 from dzdesign.verify.verification import evidence_files, evidence_manifest, verify
 from tests.conftest import default_options
 from tests.support.evidence import evidence_with
@@ -332,7 +333,7 @@ def test_an_earlier_target_that_is_replaced_is_said_so(compensator, cortex, tmp_
 @pytest.mark.slow
 def test_verify_holds_and_says_that_it_was_not_checked(cortex, tmp_path):
     fill_in(cortex)
-    result = verify(cortex, sequence=RampSequence(rest=0.5, ramp=4.0, top=0.5))
+    result = with_regenerated(verify(cortex, sequence=RampSequence(rest=0.5, ramp=4.0, top=0.5)), cortex)
     assert result.holds and result.evidence.changed_board_files == ("cortex_m4/dz_board.c",)
     said = "cortex_m4/dz_board.c, which is yours and was changed: review it, and try it on the machine"
     assert said in not_tried(result.evidence)

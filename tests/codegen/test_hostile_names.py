@@ -267,10 +267,15 @@ def test_a_firmware_that_leads_elsewhere_is_not_compiled(place, kind):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="links need a privilege on Windows")
-def test_a_link_inside_of_the_folder_is_welcome(place):
-    (place / "firmware" / "core" / "b.h").symlink_to("a.c")
-    read_firmware_manifest(place / "firmware")
-    check_inside(place / "firmware", ["core/b.h", "core/missing.c"], "a test")
+@pytest.mark.parametrize("target", ["core/a.c", "core", "nowhere"])
+def test_a_firmware_has_no_link_even_to_a_place_inside(place, wording, target):
+    """Seeded: no check follows a link to a folder, a build does."""
+    folder = place / "firmware"
+    (folder / "more").symlink_to(folder / target)
+    check_inside(folder, ["more", "core/missing.c"] if target == "core/a.c" else [], "a test")  # no place outside
+    with pytest.raises(InputError) as refused:
+        read_firmware_manifest(folder)
+    wording("hostile names: a link in a firmware", str(refused.value).replace(str(place), "FOLDER"))
 
 
 @pytest.mark.skipif(os.name == "nt", reason="links need a privilege on Windows")

@@ -14,7 +14,8 @@ from dzdesign.verify import verification
 from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.firmware.folder import read_firmware_manifest
 from dzdesign.verify.firmware.unchanged_files import files_unchanged
-from dzdesign.verify.requirements import REGENERATED, not_tried
+from dzdesign.verify.requirements import REGENERATED
+from dzdesign.verify.untried import not_tried
 from tests.support.evidence import read_evidence
 from tests.support.synthetic import needs_compiler
 

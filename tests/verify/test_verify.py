@@ -2,6 +2,8 @@
 
 import json
 import re
+import shutil
+import subprocess
 from dataclasses import replace
 from fractions import Fraction
 
@@ -10,6 +12,7 @@ import pytest
 
 from dzdesign.core.artefact_files import to_json, write_folder
 from dzdesign.core.errors import InputError
+from dzdesign.regeneration import with_regenerated
 from dzdesign.verify.closed_loop import motion
 from dzdesign.verify.closed_loop.dead_zone import dead_zone
 from dzdesign.verify.closed_loop.loop import PERIODS_PER_RECORD, ClosedLoop, RampSequence
@@ -163,6 +166,29 @@ def test_what_cmake_built_may_stay_where_nothing_of_ours_is(firmware_folder):
     for name in ("f28335/CMakeCache.txt", "f28335/extra.c", "CMakeCache.txt"):
         (firmware_folder / name).write_text("")
     assert "does not name f28335/extra.c;" in files_unchanged(firmware_folder, manifest).text
+
+
+def test_a_cache_of_cmake_hides_nothing_that_cmake_does_not_write(firmware_folder):
+    """Seeded: an empty CMakeCache.txt beside a header, under a name of ours or of its own."""
+    manifest = read_firmware_manifest(firmware_folder)
+    for name in ("build/CMakeCache.txt", "build/sub/own.h"):
+        (firmware_folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (firmware_folder / name).write_text("")
+    assert "build/sub/own.h" in files_unchanged(firmware_folder, manifest).text
+    (firmware_folder / "build/dz_comp.h").write_text("")
+    fault = files_unchanged(firmware_folder, manifest)
+    assert fault.holds is False and "build/dz_comp.h: not generated, but named as" in fault.text
+
+
+@pytest.mark.skipif(shutil.which("cmake") is None, reason="no CMake")
+def test_a_true_build_of_cmake_is_no_foreign_source(example_compensator, tmp_path):
+    from dzdesign.codegen.project import generate
+
+    firmware = generate(example_compensator, "host")
+    write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
+    subprocess.run(["cmake", "-S", "host", "-B", "host/build"], cwd=tmp_path / "fw", check=True, capture_output=True)
+    found = files_unchanged(tmp_path / "fw", read_firmware_manifest(tmp_path / "fw"))
+    assert found.holds and found.text.endswith("built by CMake, and not checked: build")
 
 
 def test_a_header_that_may_be_taken_for_ours_is_said(firmware_folder):
@@ -320,7 +346,7 @@ def test_closed_loop_removes_the_dead_zone_and_without_beta_leaks(firmware_folde
     from dzdesign.verify.closed_loop.plant import read_plant
 
     result = verify(firmware_folder, read_plant(example_folder / "plant.toml"), sequence=QUICK)
-    assert result.holds
+    assert with_regenerated(result, firmware_folder).holds
     for loop in result.loops:
         # The quick ramp lags by some tens of millivolts.
         assert loop.result.dead_zone_opening > 0.5
@@ -370,4 +396,4 @@ def test_a_span_that_ends_at_the_tested_pressure_can_be_verified(example_valve, 
     options = options_of({"pressure_span": "5.1 MPa"}, target_named("f28335").inputs())
     firmware = generate(design(example_valve, options), "f28335")
     write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
-    assert verify(tmp_path / "fw", sequence=QUICK).holds
+    assert with_regenerated(verify(tmp_path / "fw", sequence=QUICK), tmp_path / "fw").holds

@@ -1,6 +1,7 @@
 """What `verify` says and what its report says: one verdict, whatever else lies beside; and whose valve.json it is."""
 
 import json
+import re
 import shutil
 from collections import Counter
 from dataclasses import replace
@@ -18,10 +19,11 @@ from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.valve_report import REPORT_NAME, report_of_folder, with_report
 from dzdesign.verify.firmware.compensator_checks import valve_follows
 from dzdesign.verify.firmware.folder import read_compensator
-from dzdesign.verify.requirements import VALVE, not_tried
+from dzdesign.verify.requirements import VALVE
+from dzdesign.verify.untried import not_tried
 from dzdesign.verify.verification import SCHEMA
 from tests.conftest import default_options
-from tests.support.evidence import EVIDENCE, evidence_with
+from tests.support.evidence import evidence_with
 from tests.support.synthetic import needs_compiler
 
 pytestmark = [pytest.mark.slow, needs_compiler]
@@ -140,20 +142,18 @@ def _made(compensator):
 
 def test_the_hash_of_a_valve_as_identify_writes_it_needs_no_file(copied):
     (copied / "valve.json").unlink()
-    (check,) = valve_follows(copied / "firmware", read_compensator(copied / "firmware"))
+    check = valve_follows(copied / "firmware", read_compensator(copied / "firmware"))
     assert check.holds and check.id == VALVE.id
 
 
-def test_of_another_spacing_it_is_compared_with_the_file_and_not_tried_without(copied):
+def test_of_another_spacing_it_is_compared_with_the_file_and_not_checked_without(copied):
     compensator = spaced(copied)
-    (check,) = valve_follows(copied / "firmware", compensator)
+    check = valve_follows(copied / "firmware", compensator)
     assert check.holds and "compared with valve.json" in check.text
     (copied / "valve.json").rename(copied / "bench 7.json")  # the name says nothing
-    assert valve_follows(copied / "firmware", compensator)[0].holds
+    assert valve_follows(copied / "firmware", compensator).holds
     (copied / "bench 7.json").unlink()
-    assert valve_follows(copied / "firmware", compensator) == []
-    (said,) = [line for line in not_tried(EVIDENCE) if line.startswith(VALVE.title)]
-    assert "with the valve.json that compensator.json names by its SHA-256 beside the firmware" in said
+    assert valve_follows(copied / "firmware", compensator).holds is None
 
 
 def test_a_valve_file_that_was_replaced_is_said_first(copied):
@@ -165,7 +165,7 @@ def test_a_valve_file_that_was_replaced_is_said_first(copied):
     for name in ("again.json", "valve.json"):
         (copied / name).write_text(to_json(other))
     digest = sha256_of((copied / "valve.json").read_bytes())
-    (check,) = valve_follows(copied / "firmware", compensator)
+    check = valve_follows(copied / "firmware", compensator)
     assert check.holds and "valve.json" not in check.name
     assert check.text.startswith(f"valve.json beside the firmware is ANOTHER valve, SHA-256 {digest}, and not used; ")
     assert check.text.endswith(f"the SHA-256 {stated} in made_from")
@@ -176,7 +176,7 @@ def test_a_valve_file_that_was_replaced_is_said_first(copied):
     report = report_of_folder(copied / "firmware")
     said = "valve.json is another valve by now; the compensator was made from a.json: used"
     assert said in report.missing and not report.faults
-    (check,) = valve_follows(copied / "firmware", compensator)
+    check = valve_follows(copied / "firmware", compensator)
     assert check.holds and check.text.startswith("valve.json beside the firmware is ANOTHER valve")
 
 
@@ -188,22 +188,26 @@ def test_a_copy_of_the_valve_under_another_name_makes_no_other_valve(copied):
 def test_a_strangers_valve_is_not_compared(copied):
     compensator = spaced(copied)
     next(strangers(copied))
-    assert valve_follows(copied / "firmware", compensator) == []
+    assert valve_follows(copied / "firmware", compensator).holds is None
 
 
-def test_a_hash_that_is_not_that_of_the_valve_is_found(copied):
+def test_a_hash_that_is_not_that_of_the_valve_is_found(copied, wording):
     compensator = read_compensator(copied / "firmware")
     compensator = replace(compensator, made_from=(replace(compensator.made_from[0], sha256="0" * 64),))
-    (check,) = valve_follows(copied / "firmware", compensator)
+    check = valve_follows(copied / "firmware", compensator)
     assert check.holds is False and "valve.json is that valve, but its SHA-256 is" in check.text
     (copied / "valve.json").unlink()
-    assert valve_follows(copied / "firmware", compensator) == []  # nobody can tell
+    check = valve_follows(copied / "firmware", compensator)
+    assert check.holds is None  # nobody can tell, so it must not hold
+    digests = {"0" * 64: "STATED", compensator.valve_sha256: "FOUND"}
+    text = "".join(digests.get(word, word) for word in re.split(r"(\w+)", check.text))
+    wording("requirement valve: no file at hand", text)
 
 
 def test_another_valve_under_the_hash_of_the_file_is_found(copied):
     compensator = spaced(copied)
     compensator = replace(compensator, valve=replace(compensator.valve, record={"serial": "another"}))
-    (check,) = valve_follows(copied / "firmware", compensator)
+    check = valve_follows(copied / "firmware", compensator)
     assert check.holds is False and "but is another valve" in check.text
 
 

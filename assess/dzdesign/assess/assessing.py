@@ -16,9 +16,10 @@ from dzdesign.assess.flow_curves import PressureCurves
 from dzdesign.assess.limits import check_limits
 from dzdesign.assess.notes import find_notes
 from dzdesign.assess.options import BOTH_SIDES, SETS, AssessOptions, Set
-from dzdesign.assess.quantities import L_MIN, LOSS, LOSS_OF_FLOW, MPA, QUANTITIES, Reading, change, symmetry
+from dzdesign.assess.quantities import LOSS, LOSS_OF_FLOW, QUANTITIES, Reading, change, symmetry
 from dzdesign.assess.readings import read_quantities
 from dzdesign.core.artefact_types import THIS_TOOL
+from dzdesign.identify.constants import L_MIN, MPA
 from dzdesign.identify.ramps.pooling import SAME_PRESSURE
 from dzdesign.identify.reading.ramp_test import RampTest
 
@@ -29,13 +30,8 @@ Readings = dict[Set, dict[str, Reading]]
 def assess(before: Sequence[RampTest], after: Sequence[RampTest], options: AssessOptions | None = None) -> Assessment:
     """Compare ramps recorded without and with the compensator.
 
-    Parameters
-    ----------
-    before, after : sequence of RampTest
-        Recordings in any order, as `identify` takes them: several ramps in one, both sides of a bipolar valve. The
-        command of `after` is what enters the compensator.
-    options : AssessOptions, optional
-        Choices of the engineer.
+    The recordings come in any order, as `identify` takes them: several ramps in one, both sides of a bipolar valve. The
+    command of `after` is what enters the compensator.
 
     Raises
     ------

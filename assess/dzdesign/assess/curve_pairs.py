@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 from dzdesign.assess.flow_curves import PressureCurves, read_curves
 from dzdesign.assess.options import BOTH_SIDES, SETS, AssessOptions, Set, Side
-from dzdesign.assess.quantities import MPA
 from dzdesign.core.errors import InputError
+from dzdesign.identify.constants import MPA
 from dzdesign.identify.knees.meter_lag import MeterLag, find_lag
 from dzdesign.identify.knees.prepared_tests import found_floor, split_recordings
 from dzdesign.identify.ramps.pooling import SAME_PRESSURE, pool_ramps

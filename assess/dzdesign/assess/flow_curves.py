@@ -11,14 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.identify.constants import MPA
 from dzdesign.identify.knees.gated_line import GATE, GatedLine, PreparedBranch, prepare_branch
 from dzdesign.identify.knees.linear_region import USEFUL_FLOW, find_straight_parts
 from dzdesign.identify.knees.noise import robust_sigma
 from dzdesign.identify.knees.prepared_tests import split_recordings
-from dzdesign.identify.knees.profile import flow_at_top, smooth_profile
+from dzdesign.identify.knees.profile import largest_flow
 from dzdesign.identify.knees.refusals import refuse_a_jump
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.ramps.branches import Branch, at_nominal_pressure
 from dzdesign.identify.ramps.pooling import PooledTest, group_by_pressure, pool_ramps
 from dzdesign.identify.ramps.splitting import Ramp, nominal_dp
 from dzdesign.identify.reading.ramp_test import RampTest
@@ -111,31 +111,23 @@ def read_curves(
     pooled, groups = pool_ramps(ramps), group_by_pressure(ramps)
     for item in pooled:
         if item.branches == (None, None):
-            u = item.test.u
+            u, dp = item.test.u, nominal_dp(item.test)
+            at = "an unknown pressure drop" if dp is None else f"{dp / MPA:.3g} MPa"
             raise InputError(
-                f"'{item.test.source}' has no ramp from near zero up at {_said(nominal_dp(item.test))}: the command "
-                f"runs from {u.min():.2f} to {u.max():.2f} V, expected a sweep over half of it at least; record it so, "
-                "and give the compensator's input, not its output"
+                f"'{item.test.source}' has no ramp from near zero up at {at}: the command runs from {u.min():.2f} to "
+                f"{u.max():.2f} V, expected a sweep over half of it at least; record it so, and give the compensator's "
+                "input, not its output"
             )
     reads = [
-        None if branch is None else _read(branch, item, options.u_max, floor)
+        None if branch is None else prepare_branch(branch, item.test, u_max=options.u_max, floor=floor)
         for item in pooled
         for branch in item.branches
     ]
-    curves = iter(_curves(reads, options))
+    curves = _curves(reads, options)
     return [
-        _at_pressure(item, group, next(curves), next(curves), options)
-        for item, group in zip(pooled, groups, strict=True)
+        _at_pressure(item, group, rising, falling, options)
+        for item, group, rising, falling in zip(pooled, groups, curves[::2], curves[1::2], strict=True)
     ]
-
-
-def _said(dp: float | None) -> str:
-    return "an unknown pressure drop" if dp is None else f"{dp / 1e6:.3g} MPa"
-
-
-def _read(branch: Branch, item: PooledTest, u_max: float, floor: float) -> PreparedBranch:
-    y = at_nominal_pressure(branch, nominal_dp(item.test))
-    return prepare_branch(branch, y, u_max=u_max, floor=floor, source=item.test.source)
 
 
 def _curves(reads: Sequence[PreparedBranch | None], options: IdentifyOptions) -> list[FlowCurve | None]:
@@ -203,17 +195,15 @@ def _at_pressure(
     falling: FlowCurve | None,
     options: IdentifyOptions,
 ) -> PressureCurves:
-    branches = [branch for branch in item.branches if branch]
-    holds = [_hold_after_closing(ramp, options.u_max) for ramp in group]
     return PressureCurves(
         source=item.test.source,
         ramps=item.ramps,
         dp=nominal_dp(item.test),
         rising=rising,
         falling=falling,
-        q_max=max(flow_at_top(*smooth_profile(branch.u, branch.q, options.u_max)) for branch in branches),
-        u_top=max(float(branch.u.max()) for branch in branches),
-        at_zero=np.concatenate(holds),
+        q_max=largest_flow(item.branches, options.u_max),
+        u_top=max(float(branch.u.max()) for branch in item.branches if branch),
+        at_zero=np.concatenate([_hold_after_closing(ramp, options.u_max) for ramp in group]),
     )
 
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from dzdesign.assess.assessment import PressureAssessment
 from dzdesign.assess.curve_pairs import Comparison, CurvePair
 from dzdesign.assess.options import SETS, AssessOptions, Set
-from dzdesign.assess.quantities import L_MIN, MPA
+from dzdesign.identify.constants import L_MIN, MPA
 from dzdesign.identify.data_quality.recordings import about_recordings
 from dzdesign.identify.data_quality.side_warnings import LIKELY_LAG
 from dzdesign.identify.valve.model import Warning_

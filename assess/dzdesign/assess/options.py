@@ -16,28 +16,19 @@ SETS: tuple[Set, Set] = ("before", "after")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AssessOptions:
-    """Choices of the engineer, SI.
+    """Choices of the engineer, SI."""
 
-    Attributes
-    ----------
-    reading : IdentifyOptions
-        How recordings are read: full command, meter, knee window.
-    after_u_max : float or None
-        Full command of the recordings with the compensator, V; None: the same.
-    level, level_share : float or None
-        Flow that ends the dead zone, m³/s, or as a share of the largest flow BEFORE at that pressure drop; None takes
-        what counts as flow BEFORE: the meter's floor, its noise or 0.5 % of the largest flow.
-    window : tuple of float
-        Commands between which linearity is taken, over u_max.
-    limits : mapping
-        Of `parse_limits`.
-    """
-
+    #: How recordings are read: full command, meter, knee window.
     reading: IdentifyOptions = field(default_factory=IdentifyOptions)
+    #: Full command of the recordings with the compensator, V; None: the same.
     after_u_max: float | None = None
+    #: Flow that ends the dead zone, m³/s, or as a share of the largest flow BEFORE at that pressure drop; None takes
+    #: what counts as flow BEFORE: the meter's floor, its noise or 0.5 % of the largest flow.
     level: float | None = None
     level_share: float | None = None
+    #: Commands between which linearity is taken, over u_max.
     window: tuple[float, float] = (0.1, 0.9)
+    #: Of `parse_limits`.
     limits: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

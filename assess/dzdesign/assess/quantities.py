@@ -12,8 +12,8 @@ from typing import Annotated
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError
+from dzdesign.identify.constants import L_MIN
 
-L_MIN, MPA = 1e-3 / 60, 1e6
 #: Larger than any value that a recording may show, in any unit here; bounds in a file keep arithmetic from overflowing.
 LARGEST = 1e12
 
@@ -27,51 +27,35 @@ class Quantity:
     formula: Annotated[str, Meta(description="How it is computed.")]
 
 
-def _percent(name: str, formula: str) -> Quantity:
-    return Quantity(name=name, unit="%", formula=formula)
-
-
 QUANTITIES: dict[str, Quantity] = {
-    "dead_zone_opening": _percent(
-        "dead zone, opening", "u_r(Q_L) / u_max: command at which the rising branch passes the level Q_L"
-    ),
-    "dead_zone_closing": _percent(
-        "dead zone, closing", "u_f(Q_L) / u_max: command at which the falling branch passes the level Q_L"
-    ),
-    "knee_opening": _percent(
-        "knee, opening",
-        "zero of the line through the straight part of Q/sqrt(dP) on the rising branch, over u_max",
-    ),
-    "knee_closing": _percent("knee, closing", "the same on the falling branch"),
-    "hysteresis": _percent(
-        "hysteresis", "largest |u_r(Q) - u_f(Q)| / u_max at Q = 5, 10, ... 90 % of the largest flow"
-    ),
-    "linearity": _percent(
-        "linearity",
-        "largest |m(u) - (a + b u)| / Q_rated in the window of u; m is the mean of both branches, each averaged over "
-        "cells of 1 % of u_max (of single readings the noise would add to the largest), a + b u its least-squares line "
-        "there, Q_rated the largest flow BEFORE at this pressure drop",
-    ),
-    "gain": Quantity(
-        name="gain",
-        unit="L/min/V",
-        formula="slope of the lines through the straight part, mean of both branches",
-    ),
-    "flow_at_zero": Quantity(
-        name="flow at zero",
-        unit="L/min",
-        formula="mean of Q over the later half of the hold at zero command after closing",
-    ),
-    "largest_flow": Quantity(
-        name="largest flow",
-        unit="L/min",
-        formula="Q at the largest command, as recorded (its pressure drop may sag)",
-    ),
-    "symmetry": _percent("symmetry", "gain of the positive side over that of the negative side, less 1"),
-}
+    key: Quantity(name=name, unit=unit, formula=formula)
+    for key, name, unit, formula in (
+        ("dead_zone_opening", "dead zone, opening", "%",
+         "u_r(Q_L) / u_max: command at which the rising branch passes the level Q_L"),
+        ("dead_zone_closing", "dead zone, closing", "%",
+         "u_f(Q_L) / u_max: command at which the falling branch passes the level Q_L"),
+        ("knee_opening", "knee, opening", "%",
+         "zero of the line through the straight part of Q/sqrt(dP) on the rising branch, over u_max"),
+        ("knee_closing", "knee, closing", "%", "the same on the falling branch"),
+        ("hysteresis", "hysteresis", "%",
+         "largest |u_r(Q) - u_f(Q)| / u_max at Q = 5, 10, ... 90 % of the largest flow"),
+        ("linearity", "linearity", "%",
+         "largest |m(u) - (a + b u)| / Q_rated in the window of u; m is the mean of both branches, each averaged over "
+         "cells of 1 % of u_max (of single readings the noise would add to the largest), a + b u its least-squares "
+         "line there, Q_rated the largest flow BEFORE at this pressure drop"),
+        ("gain", "gain", "L/min/V", "slope of the lines through the straight part, mean of both branches"),
+        ("flow_at_zero", "flow at zero", "L/min",
+         "mean of Q over the later half of the hold at zero command after closing"),
+        ("largest_flow", "largest flow", "L/min",
+         "Q at the largest command, as recorded (its pressure drop may sag)"),
+        ("symmetry", "symmetry", "%", "gain of the positive side over that of the negative side, less 1"),
+    )
+}  # fmt: skip
 #: A quantity that compares both sets: it can be limited, and is read from no recording alone.
 LOSS = "largest_flow_loss"
-LOSS_OF_FLOW = _percent("loss of largest flow", "1 - largest flow AFTER / largest flow BEFORE")
+LOSS_OF_FLOW = Quantity(
+    name="loss of largest flow", unit="%", formula="1 - largest flow AFTER / largest flow BEFORE"
+)
 #: SI, or a share, to the unit of a quantity.
 IN_UNIT = {"%": 100.0, "L/min": 1 / L_MIN, "L/min/V": 1 / L_MIN}
 

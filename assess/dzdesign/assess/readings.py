@@ -5,7 +5,8 @@ import math
 import numpy as np
 
 from dzdesign.assess.flow_curves import CELL, ZERO, FlowCurve, PressureCurves
-from dzdesign.assess.quantities import L_MIN, Reading, hidden, in_units, observed
+from dzdesign.assess.quantities import Reading, hidden, in_units, observed
+from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.knees.gated_line import GATE, fit_line
 from dzdesign.identify.knees.noise import median
 from dzdesign.identify.knees.profile import crossing

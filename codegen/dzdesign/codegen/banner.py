@@ -42,7 +42,7 @@ def banner_of(compensator: Compensator, digest: str) -> Banner:
     return Banner(
         digest=digest,
         recordings=[file.source for file in valve.made_from],
-        simulated=any(warning.code == "simulated" for warning in valve.warnings),
+        simulated=valve.simulated,
         lot=lot_in_words(compensator),
     )
 

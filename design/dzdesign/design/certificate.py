@@ -10,7 +10,7 @@ from fractions import Fraction
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.beta_table import STEP_CODES, OffsetCeiling, OffsetCurve, offset_ceiling
 from dzdesign.design.compensator import Certificate, Compensator
-from dzdesign.design.signals import Signals
+from dzdesign.design.signals import SIDE_NAMES, Signals
 from dzdesign.identify.valve.guard_curve import Guard, GuardCurve
 from dzdesign.identify.valve.side_model import SideModel
 
@@ -32,8 +32,9 @@ def certify(
 ) -> Certificate:
     """Prove the certificate of one side, in exact arithmetic, at every pressure code.
 
-    The `curve` is the guarded one; the `ceiling` is what the converter's error, rounding and dither leave of it. The table
-    is of nodes of beta over `denominator`, `u_min0` is the law's over u_max. An offset above the ceiling is refused.
+    The `curve` is the guarded one; the `ceiling` is what the converter's error, rounding and dither leave of it. The
+    table is of nodes of beta over `denominator`, `u_min0` is the law's over u_max. An offset above the ceiling is
+    refused.
     """
     losses = _losses_V(curve, ceiling, signals, table, u_min0 * u_max_V / denominator)
     return Certificate(
@@ -51,14 +52,13 @@ def prove_certificates(compensator: Compensator) -> None:
     """Prove the certificates of a compensator again, from the valve in it; refuse the first statement that differs."""
     signals, dither = compensator.signals, compensator.drive_functions.dither_counts
     for sign in signals.signs:
-        name = "positive" if sign > 0 else "negative"
+        name = SIDE_NAMES[sign]
         law, model = compensator.side(sign), compensator.valve.sides.get(name)
         if model is None:
             raise InputError(f"the compensator drives the {name} side, but its valve has none; design it again")
         stated = law.certificate
         curve = guarded_curve(model, stated.guard, compensator.below_dp0)
-        reserve = Fraction(dither, signals.compare_max)
-        ceiling = offset_ceiling(curve, signals, compensator.u_max_V, sign=sign, reserve=reserve)
+        ceiling = offset_ceiling(curve, signals, compensator.u_max_V, sign=sign, dither_counts=dither)
         try:
             proved = certify(
                 model,
@@ -74,10 +74,10 @@ def prove_certificates(compensator: Compensator) -> None:
         except RequirementError as error:
             raise InputError(f"the {name} side's certificate does not hold: {error}; design it again") from error
         for field in fields(Certificate):
-            said, found = getattr(stated, field.name), getattr(proved, field.name)
-            if said != found:
+            claim, found = getattr(stated, field.name), getattr(proved, field.name)
+            if claim != found:
                 raise InputError(
-                    f"the {name} side's certificate says {field.name} = {_words(said)}, but {_words(found)} follows "
+                    f"the {name} side's certificate says {field.name} = {_words(claim)}, but {_words(found)} follows "
                     "from its valve; design it again"
                 )
 

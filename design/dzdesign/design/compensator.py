@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Annotated, ClassVar, Literal, get_args
+from typing import Annotated, ClassVar, Literal
 
 from msgspec import Meta
 
@@ -14,16 +14,13 @@ from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.derivation.law import law
 from dzdesign.derivation.scaling import drive, evaluate_line
 from dzdesign.derivation.transition import evaluate_transition
+from dzdesign.design.design_choices import BelowDp0
 from dzdesign.design.drive_functions import RAMPED_CODES, DriveFunctions
 from dzdesign.design.lot_valves import LotValve
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import TargetInputs
 from dzdesign.identify.valve.guard_curve import Guard
 from dzdesign.identify.valve.model import ValveModel
-
-#: What to do below the reference pressure drop: beta = 1 as in Eq. (7), or what the tests there say.
-BelowDp0 = Literal["hold", "extend"]
-BELOW_DP0: tuple[BelowDp0, ...] = get_args(BelowDp0)
 
 Node = Annotated[int, Meta(ge=1, le=2**31)]
 Codes = Annotated[int, Meta(ge=0, le=65535)]
@@ -133,9 +130,7 @@ class Compensator(ShownInNotebooks, Artefact):
         Meta(description="Options of `design`, as written, defaults included; null where nobody wrote them down."),
     ]
     law: Annotated[str, Meta(description="paper (Eq. 18), or target (meets Eq. 16).")]
-    below_dp0: Annotated[
-        BelowDp0, Meta(description="For dP <= dP0 hold beta = 1, or follow the tests there.")
-    ] = "hold"
+    below_dp0: Annotated[BelowDp0, Meta(description="For dP <= dP0 hold beta = 1, or follow the tests there.")] = "hold"
     u_max_V: Annotated[Fraction, quantity("V", "Full command.")]
     signals: Annotated[Signals, Meta(description="Scalings of command, pressures and compare value.")]
     beta_denominator: Annotated[int, Meta(description="Unit of the nodes of beta, a power of two.", ge=1, le=2**30)]
@@ -212,9 +207,8 @@ class Compensator(ShownInNotebooks, Artefact):
 
     def _check_side(self, sign: int) -> None:
         side = self.side(sign)
-        nodes = self.nodes(sign)
-        if len(side.beta) != nodes:
-            raise RuleError(f"beta has {len(side.beta)} nodes, expected {nodes} for every code")
+        if len(side.beta) != self.nodes(sign):
+            raise RuleError(f"beta has {len(side.beta)} nodes, expected {self.nodes(sign)} for every code")
         if not all(0 < numerator < 2 * self.beta_denominator for numerator in side.law_beta + side.beta):
             raise RuleError("every beta must lie between 0 and 2, exclusive")
         if bool(self.transition_codes) != (side.transition_beta is not None):
@@ -270,9 +264,8 @@ class Compensator(ShownInNotebooks, Artefact):
 
     def counts(self, command_code: int, dp_code: int, sign: int = 1) -> Fraction:
         """Return the compare value of the law at a code pair, exactly: not rounded, not limited."""
-        side, signals = self.side(sign), self.signals
+        side, signals, beta = self.side(sign), self.signals, self.law_beta(dp_code, sign)
         from_zero = signals.command.from_zero(command_code, sign)
-        beta = self.law_beta(dp_code, sign)
         line = evaluate_line(
             law(self.law),
             beta=beta,
@@ -294,8 +287,7 @@ class Compensator(ShownInNotebooks, Artefact):
 
     def drive(self, command_code: int, dp_code: int, sign: int = 1) -> Fraction:
         """Return u_O/u_max of the law at a code pair, exactly and before it is limited to 0...1."""
-        share: Fraction = drive(self.counts(command_code, dp_code, sign), self.signals.compare_max)
-        return share
+        return Fraction(drive(self.counts(command_code, dp_code, sign), self.signals.compare_max))
 
     def compare(self, command_code: int, dp_code: int, sign: int = 1) -> int:
         """Return the PWM compare value: the law rounded to the nearest count (a half goes up), limited to the range."""

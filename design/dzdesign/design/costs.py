@@ -6,6 +6,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.drive_functions import RAMP_UNIT
 from dzdesign.design.signal_descriptions import unseen_failures
+from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.ramp_result import TestResult
 from dzdesign.identify.valve.side_model import SideModel
 
@@ -15,9 +16,7 @@ def costs_of(compensator: Compensator) -> tuple[str, ...]:
     valve = compensator.valve
     lines = list(hidden_failures(compensator))
     for sign in compensator.signals.signs:
-        name = "positive" if sign > 0 else "negative"
-        label = "" if compensator.negative is None else f"{name} side, "
-        side = valve.sides[name]
+        side, label = valve.sides[SIDE_NAMES[sign]], _side_label(compensator, sign)
         lines += [label + _cost_of_test(compensator, test, sign) for test in side.tests]
         lines += [label + line for line in _cost_of_side(compensator, side, sign)]
     low, high = (float(end) for end in compensator.positive.certificate.dp_MPa)
@@ -38,15 +37,17 @@ def hidden_failures(compensator: Compensator) -> tuple[str, ...]:
     """Return one line for each failure of a signal that the firmware can't see; the first of `costs_of`."""
     lines = unseen_failures(compensator.signals)
     for sign in compensator.signals.signs:
-        name = "positive" if sign > 0 else "negative"
-        label = "" if compensator.negative is None else f"{name} side, "
-        if compensator.valve.sides[name].trend == "increasing":
+        if compensator.valve.sides[SIDE_NAMES[sign]].trend == "increasing":
             lines.append(
-                f"{label}the threshold grows with the pressure drop, so a pressure signal that reads too high raises "
-                "the offset: a broken wire of sensor B is not recognised unless it has a live zero; monitor the "
-                "sensors outside"
+                f"{_side_label(compensator, sign)}the threshold grows with the pressure drop, so a pressure signal "
+                "that reads too high raises the offset: a broken wire of sensor B is not recognised unless it has a "
+                "live zero; monitor the sensors outside"
             )
     return tuple(lines)
+
+
+def _side_label(compensator: Compensator, sign: int) -> str:
+    return "" if compensator.negative is None else f"{SIDE_NAMES[sign]} side, "
 
 
 def _cost_of_test(compensator: Compensator, test: TestResult, sign: int) -> str:
@@ -81,10 +82,10 @@ def _cost_of_test(compensator: Compensator, test: TestResult, sign: int) -> str:
 
 
 def remaining_dead_zone(compensator: Compensator, test: TestResult, sign: int = 1) -> dict[str, float]:
-    """Return the dead zone that the law leaves at a tested pressure drop, on "opening" and "closing", as a share of command.
+    """Return the dead zone that the law leaves at a tested pressure drop, as a share of command, by branch.
 
-    The test need not be of the valve that the law was designed for. A branch that was not recorded is left out; the share
-    is 0 where flow passes at zero command.
+    The test need not be of the valve that the law was designed for. A branch that was not recorded is left out; the
+    share is 0 where flow passes at zero command.
     """
     code = round(compensator.signals.dp_code(Fraction(repr(test.dp_MPa))))
     offset, at_end, full, transition = _corners(compensator, code, sign)
@@ -171,7 +172,7 @@ def _ramp_text(compensator: Compensator) -> str:
     parts = []
     for place, sign in enumerate(signals.signs):
         for way, steps in (("up", functions.ramp_up), ("down", functions.ramp_down)):
-            name = f"{'positive ' if sign > 0 else 'negative '}{way}" if compensator.negative is not None else way
+            name = way if compensator.negative is None else f"{SIDE_NAMES[sign]} {way}"
             seconds = signals.command.span(sign) * RAMP_UNIT / (steps[place] * signals.sample_Hz) if steps[place] else 0
             parts.append(f"{name} {seconds:.4g} s" if seconds else f"{name} at once")
     return ", ".join(parts)

@@ -5,7 +5,7 @@ Light on imports: the command line reads the options here.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal, get_args
 
 from dzdesign.core.options import CONNECTIONS, DRIVE, LAW, Option, Text, arguments_of
 from dzdesign.derivation.laws import LAW_NAMES
@@ -13,6 +13,9 @@ from dzdesign.derivation.laws import LAW_NAMES
 if TYPE_CHECKING:
     from dzdesign.design.target_inputs import TargetInputs
 
+#: What to do below the reference pressure drop: beta = 1 as in Eq. (7), or what the tests there say.
+BelowDp0 = Literal["hold", "extend"]
+BELOW_DP0: tuple[BelowDp0, ...] = get_args(BelowDp0)
 POLARITIES, NEGATIVE_DP = ("normal", "inverted"), ("same", "swapped")
 
 
@@ -26,7 +29,7 @@ class DesignChoices:
     """Threshold to protect: closing, mean or opening."""
     transition: Annotated[Text, Option("C", LAW, "0 %", example="1 %")] = None
     """First share of the command, over which the drive runs from the closing threshold to the opening one."""
-    below_dp0: Annotated[Text, Option("B", LAW, "hold", choices="dzdesign.design.compensator:BELOW_DP0")] = None
+    below_dp0: Annotated[Text, Option("B", LAW, "hold", choices=BELOW_DP0)] = None
     """Below dP0: hold beta = 1 as the paper does, or extend it to the tests there."""
     output_max: Annotated[Text, Option("C", LAW, "100 %", example="95 %")] = None
     """Largest drive, in percent of full drive."""

@@ -55,9 +55,8 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
         _refuse_two_signs(valve, options.guard)
     laws = {}
     for sign in signals.signs:
-        name = "positive" if sign > 0 else "negative"
-        side = valve.positive if sign > 0 else valve.sides[name]
-        laws[name] = _side_law(side, options, u_max, sign, units)
+        side = valve.positive if sign > 0 else valve.sides["negative"]
+        laws[sign] = _side_law(side, options, u_max, sign, units)
     digest = sha256_of(to_json_bytes(valve) if valve_bytes is None else valve_bytes)
     request = options.request
     compensator = Compensator(
@@ -69,7 +68,7 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
         below_dp0=options.below_dp0,
         signals=signals,
         u_max_V=u_max,
-        sides=Sides(positive=laws["positive"], negative=laws.get("negative")),
+        sides=Sides(positive=laws[1], negative=laws.get(-1)),
         beta_denominator=units.beta,
         beta_step_codes=STEP_CODES,
         reverse_codes=int(REVERSE_SHARE * (signals.pressure_a.full_code - signals.pressure_a.zero_code)),
@@ -97,8 +96,8 @@ def _side_law(side: SideModel, options: DesignOptions, u_max: Fraction, sign: in
     if u_min0 <= 0:
         raise InputError(f"u_min0 is {float(top):.4f} V, less than one count of the PWM: no dead zone")
     above_one = side.trend == "increasing" or options.below_dp0 == "extend"
-    dither = Fraction(options.drive_functions().dither_counts, signals.compare_max)
-    ceiling = offset_ceiling(certified, signals, u_max, sign=sign, reserve=dither)
+    dither = options.drive_functions().dither_counts
+    ceiling = offset_ceiling(certified, signals, u_max, sign=sign, dither_counts=dither)
     if min(ceiling.limit) <= 0:
         raise InputError("the dither's peak leaves no offset under the certified one; make it smaller")
 

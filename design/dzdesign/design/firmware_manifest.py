@@ -54,9 +54,9 @@ class FirmwareManifest(Artefact):
     """Which files a firmware has, and where every number in its core came from, as `dzdesign codegen` writes it."""
 
     FILE_NAME: ClassVar[str] = MANIFEST_NAME
-    schema: Annotated[
-        Literal["dzdesign.firmware/1"], Meta(description="Name and version of this schema.")
-    ] = "dzdesign.firmware/1"
+    schema: Annotated[Literal["dzdesign.firmware/1"], Meta(description="Name and version of this schema.")] = (
+        "dzdesign.firmware/1"
+    )
     target: Annotated[Text, Meta(description="Microcontroller, as `codegen --list-targets` names it.")]
     law: Annotated[Text, Meta(description="Name of the law, as compensator.json has it.")]
     core: Annotated[tuple[Text, ...], Meta(description="Files that are free of hardware.", min_length=1)]

@@ -34,8 +34,7 @@ def lot_margins(compensator: Compensator) -> tuple[LotMargin, ...]:
     A code stands for all pressures that may have made it; rounding and dither count as drive.
     """
     signals = compensator.signals
-    dither = Fraction(compensator.drive_functions.dither_counts, signals.compare_max)
-    kept = Fraction(1, 2 * signals.compare_max) + dither
+    kept = (Fraction(1, 2) + compensator.drive_functions.dither_counts) / signals.compare_max
     margins: dict[str, LotMargin] = {}
     for sign in signals.signs:
         law = compensator.side(sign)
@@ -44,7 +43,7 @@ def lot_margins(compensator: Compensator) -> tuple[LotMargin, ...]:
         scale = compensator.beta_denominator * compensator.beta_step_codes
         unit_V = law.u_min0_over_u_max * compensator.u_max_V / scale
         for valve in compensator.lot:
-            side = valve.positive if sign > 0 else valve.negative
+            side = valve.side(sign)
             if side is None:
                 raise InputError(f"'{valve.name}' of the lot has no bounds of the negative side; run `batch` again")
             for left, right, bound in side.steps():
@@ -72,7 +71,7 @@ def _numerators(nodes: Sequence[int], step: int, last: int) -> np.ndarray:
 
 
 def prove_lot(compensator: Compensator) -> tuple[LotMargin, ...]:
-    """Prove that a lot setting over-compensates no valve of its lot; return the margins, or name the valves, worst first."""
+    """Prove that a lot setting over-compensates no valve of its lot, and return the margins."""
     margins = lot_margins(compensator)
     above = sorted((each for each in margins if each.margin_V < 0), key=lambda each: each.margin_V)
     if above:

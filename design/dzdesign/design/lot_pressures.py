@@ -30,7 +30,7 @@ class Lacking:
 
 def common_interval(lot: Sequence[LotValve]) -> tuple[float, float] | None:
     """Return the pressure drops that every valve was tested over, MPa; None where there are none, or no valve."""
-    ends = [(side.dp_MPa[0], side.dp_MPa[-1]) for valve in lot for side in (valve.positive, valve.negative) if side]
+    ends = [(side.dp_MPa[0], side.dp_MPa[-1]) for valve in lot for sign in (1, -1) if (side := valve.side(sign))]
     if not ends:
         return None
     low, high = max(low for low, _ in ends), min(high for _, high in ends)
@@ -41,13 +41,13 @@ def lacking_in(lot: Sequence[LotValve]) -> tuple[Lacking, ...]:
     """Return the valves that lack one of the lot's pressure drops, in the order of the lot."""
     found = []
     for sign in (1, -1):
-        tested = {valve.name: side for valve in lot if (side := valve.positive if sign > 0 else valve.negative)}
+        tested = {valve.name: side for valve in lot if (side := valve.side(sign))}
         wanted = _pressures_of_lot([side.dp_MPa for side in tested.values()])
-        for name, own in tested.items():
-            missing = [(low, high) for low, high in wanted if not any(low <= dp <= high for dp in own.dp_MPa)]
+        for name, side in tested.items():
+            missing = [(low, high) for low, high in wanted if not any(low <= dp <= high for dp in side.dp_MPa)]
             if missing:
                 middles = tuple(round((low + high) / 2, 6) for low, high in missing)
-                coarser = max(_coarser_V(own, dp) for dp in middles)
+                coarser = max(_coarser_V(side, dp) for dp in middles)
                 found.append(Lacking(name=name, sign=sign, dp_MPa=middles, coarser_V=coarser))
     return tuple(found)
 
@@ -59,7 +59,7 @@ def without_narrow(
 
     The interval is None without any such valve, or where none is left.
     """
-    sides = {(valve.name, sign): side for valve in lot for sign, side in ((1, valve.positive), (-1, valve.negative))}
+    sides = {(valve.name, sign): valve.side(sign) for valve in lot for sign in (1, -1)}
     names = set()
     for each in lacking:
         side = sides[each.name, each.sign]
@@ -83,13 +83,11 @@ def _coarser_V(side: LotSide, dp_MPa: float) -> float:
 
 def _pressures_of_lot(tested: Sequence[Sequence[float]]) -> list[tuple[float, float]]:
     """Return from where to where the tests of each pressure drop lie at which half of the valves or more was tested."""
-    places = sorted((dp, valve) for valve, own in enumerate(tested) for dp in own)
+    places = sorted((dp, valve) for valve, pressures in enumerate(tested) for dp in pressures)
     groups: list[list[tuple[float, int]]] = []
     for dp, valve in places:
         if groups and dp <= groups[-1][-1][0] * (1 + SAME):
             groups[-1].append((dp, valve))
         else:
             groups.append([(dp, valve)])
-    return [
-        (group[0][0], group[-1][0]) for group in groups if 2 * len({valve for _, valve in group}) >= len(tested)
-    ]
+    return [(group[0][0], group[-1][0]) for group in groups if 2 * len({valve for _, valve in group}) >= len(tested)]

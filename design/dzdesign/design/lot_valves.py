@@ -76,6 +76,10 @@ class LotValve:
         LotSide | None, Meta(description="Bounds of negative commands; null: the setting drives none.")
     ] = None
 
+    def side(self, sign: int) -> LotSide | None:
+        """Return the bounds of one sign of command."""
+        return self.positive if sign > 0 else self.negative
+
     @classmethod
     def of(cls, name: str, valve_sha256: str, sides: Mapping[int, SideModel], guards: Mapping[int, str]) -> "LotValve":
         """Return a valve's part; `sides` and `guards` by the sign of command."""

@@ -8,8 +8,7 @@ from typing import cast
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.options import flag_of
 from dzdesign.core.units import parse_quantity
-from dzdesign.design.compensator import BelowDp0
-from dzdesign.design.design_choices import DEFAULTS, NEGATIVE_DP, POLARITIES, DesignRequest
+from dzdesign.design.design_choices import DEFAULTS, NEGATIVE_DP, POLARITIES, BelowDp0, DesignRequest
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.signal_text import command_signal, parse_signal, pressure_signal
 from dzdesign.design.signals import Signals
@@ -18,7 +17,7 @@ from dzdesign.identify.valve.guard_curve import Guard
 
 
 def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
-    """Return the engineer's choices, from the text of each option; the default stands for one that is missing or empty."""
+    """Return the engineer's choices, each from its text; the default stands for one that is missing or empty."""
     text = {name: texts.get(name) or default for name, default in DEFAULTS.items()}
     for name, known in (("negative_dp", NEGATIVE_DP), ("polarity", POLARITIES)):
         if text[name] not in known:

@@ -5,8 +5,7 @@ from fractions import Fraction
 from math import ceil, floor
 
 from dzdesign.core.errors import InputError, nearest
-from dzdesign.design.compensator import BELOW_DP0, BelowDp0
-from dzdesign.design.design_choices import DesignRequest
+from dzdesign.design.design_choices import BELOW_DP0, BelowDp0, DesignRequest
 from dzdesign.design.drive_functions import RAMP_UNIT, DriveFunctions
 from dzdesign.design.signals import Signals
 from dzdesign.identify.valve.guard_curve import GUARDS, Guard

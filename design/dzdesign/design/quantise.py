@@ -24,11 +24,11 @@ class Units:
 
 
 def finest_units(signals: Signals, transition_codes: int) -> Units:
-    """Return the finest units with which the law in counts fits the firmware's arithmetic; refuse if the coarsest do not.
+    """Return the finest units with which the law in counts fits the firmware's arithmetic; refuse where none do.
 
     In counts the law is ``B (p c + o) / (D S K C E) * M``, with C codes of command, E of the transition (0 without one)
-    and M counts of the PWM. What M has in common with the denominator cancels, and what remains of M goes with the table B
-    or with the factor in c, each of which has 31 bits.
+    and M counts of the PWM. What M has in common with the denominator cancels, and what remains of M goes with the
+    table B or with the factor in c, each of which has 31 bits.
     """
     units = _finest_that_fit(signals, transition_codes)
     if units is not None:

@@ -65,7 +65,7 @@ class PinSignal:
 
 
 def parse_signal(text: str, option: str) -> PinSignal:
-    """Read a signal: ``LOW..HIGH UNIT [on SHUNT ohm] [x GAIN] [+ OFFSET V] [= PRESSURE]``, in units of voltage or current.
+    """Read a signal, ``LOW..HIGH UNIT [on SHUNT ohm] [x GAIN] [+ OFFSET V] [= PRESSURE]``, in V or A or the like.
 
     Examples
     --------

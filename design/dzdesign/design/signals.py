@@ -1,9 +1,10 @@
 """The signals at the compensator's ends: what one code of command, pressure and compare value stands for."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from math import ceil, floor
-from typing import Annotated
+from typing import Annotated, Literal
 
 from msgspec import Meta
 
@@ -12,6 +13,8 @@ from dzdesign.core.errors import InputError
 from dzdesign.derivation.scaling import pressure_drop, pressure_drop_code
 from dzdesign.design.target_inputs import Count
 
+#: Side of the valve that each sign of command drives.
+SIDE_NAMES: Mapping[int, Literal["positive", "negative"]] = {1: "positive", -1: "negative"}
 CODE_LIMIT = 65535
 #: Sensors of unlike scaling are brought to sensor A's counts by an integer weight over this power of two.
 WEIGHT_SHIFT = 12
@@ -142,9 +145,7 @@ class Signals:
         for name in ("command", "pressure_a", "pressure_b"):
             low, high = getattr(self, name).valid_codes
             if not 0 <= low < high <= self.code_max:
-                raise RuleError(
-                    f"{name}: valid codes {low} to {high} are outside the converter's 0 to {self.code_max}"
-                )
+                raise RuleError(f"{name}: valid codes {low} to {high} are outside the converter's 0 to {self.code_max}")
         # Either way round: a failed sensor makes any difference of sound codes.
         a, b = self.pressure_a.valid_codes, self.pressure_b.valid_codes
         if max(self.difference(a[1], b[0]), -self.difference(a[0], b[1])) > LARGEST_DIFFERENCE:

@@ -133,7 +133,7 @@ def _run(task: Task, folder: Path) -> tuple[Status, str]:
     verification = verify(VerifyArguments(out / FIRMWARE, plant=plant, output=out / "evidence"))
     if verification.holds:
         return OK, ""
-    check = next(check for check in verification.evidence.checks if not check.holds)
+    check = next(check for check in verification.evidence.all_checks if not check.holds)
     return DOES_NOT_HOLD, f"{check.name}: {check.text}"
 
 

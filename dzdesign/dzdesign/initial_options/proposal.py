@@ -71,7 +71,7 @@ def propose(ramps: Paths, *, columns: Table, dp: Table, skip_rows: int | None) -
     table, readings = _pressure_table(distinct_names(paths), looks, dp, bool(guessed_dp or "dP" in unclear), remarks)
     u_max, u_seen, valve = 10.0, None, None
     in_per_cent = "u" not in unclear and any(
-        (look.known | look.proposed)["u"].unit.lower() in PER_CENT for look in looks
+        (look.known | look.proposed)["u"].unit.lower().endswith(PER_CENT) for look in looks
     )
     if not remarks.opens:
         tests = read_recordings(paths, u_max=u_max, columns=chosen, dp=table or None, skip_rows=skip_rows)

@@ -10,7 +10,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.core.options import AnyPath, Option
 
 if TYPE_CHECKING:
-    from dzdesign.report.valve_report import Report
+    from dzdesign.report.page import Report
 
 
 @dataclass(frozen=True)

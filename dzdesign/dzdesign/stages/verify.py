@@ -13,7 +13,8 @@ from dzdesign.terminal.progress import say, stage_progress, with_bar
 
 if TYPE_CHECKING:
     from dzdesign.codegen.project import Firmware
-    from dzdesign.verify.evidence import Check, MutationScore
+    from dzdesign.verify.evidence import MutationScore
+    from dzdesign.verify.requirements import Check
     from dzdesign.verify.verification import Verification
 
 

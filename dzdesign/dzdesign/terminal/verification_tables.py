@@ -21,7 +21,7 @@ def _percent(share: float) -> str:
 
 def print_verification(verification: "Verification", console: "Console | None" = None) -> None:
     """Print every check, what was not tried, and the closed loop per pressure drop."""
-    from dzdesign.verify.requirements import not_tried
+    from dzdesign.verify.untried import not_tried
 
     console = console or new_console()
     for check in verification.evidence.checks:

@@ -18,10 +18,53 @@ if TYPE_CHECKING:
     import markupsafe
 
     from dzdesign.report.sections.law import LawAccount
-    from dzdesign.report.summary import Figure, Headline
 
 #: Characters of a word of the language; what is longer is a name or a hash.
 LONGEST_WORD = 18
+#: Kind of a verdict -> the sign before it.
+SIGNS = {"good": "✓", "bad": "✗", "open": "?"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Headline:
+    """The verdict: good if all holds, bad if something does not, open if something was not checked.
+
+    `reasons` name what does not hold or was not checked, `untried` what nobody asked for and the command that tries it,
+    `cautions` what the verdict is not about, and what somebody accepted; `some_failed`: valves of a lot are not
+    calibrated.
+    """
+
+    kind: str
+    text: str
+    reasons: tuple[str, ...] = ()
+    untried: tuple[str, ...] = ()
+    cautions: tuple[str, ...] = ()
+    some_failed: bool = False
+
+    @property
+    def sign(self) -> str:
+        """What stands before it, so that its colour is not its only carrier."""
+        return "!" if self.some_failed and self.kind == "open" else SIGNS[self.kind]
+
+    @property
+    def holds(self) -> bool | None:
+        """None where something was not checked, or is not there."""
+        return False if self.some_failed else {"good": True, "bad": False}.get(self.kind)
+
+
+def misfit(faults: tuple[str, ...]) -> Headline:
+    """Return the verdict on files of which some are not what the others were made from."""
+    return Headline(kind="bad", text="THE FILES DO NOT BELONG TOGETHER. No verdict stands.", reasons=faults)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Figure:
+    """One number that matters: its label, the number itself and what it is of."""
+
+    label: str
+    value: str
+    note: str
+    kind: str = "text"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,8 +72,8 @@ class Section:
     """What a section holds, in the order in which it is shown.
 
     `groups` are further lines, each group under a heading of its own. `missing` says what the section lacks and which
-    command makes it; the page is whole without an `optional` one. In a `note` a command stands between backticks. Of a
-    lot setting a section may be of one valve, the carrier.
+    command makes it; the page is whole without an `optional` one. Of a lot setting a section may be of one valve, the
+    carrier.
     """
 
     figures: tuple[ReportFigure, ...] = ()
@@ -39,7 +82,6 @@ class Section:
     groups: tuple[tuple[str, tuple[str, ...]], ...] = ()
     missing: str = ""
     optional: bool = False
-    note: str = ""
     of_valve: bool = False
 
 
@@ -47,22 +89,57 @@ class Section:
 class Page:
     """What a page holds.
 
-    `headings` has anchor and heading of every section, in their order, ``provenance`` and ``warnings`` among them;
+    `template` has the heading of every section, and what no report proves; `sections` by anchor what this one found;
     `missing` what is not there or not used, and which command makes it; `record` who and what, in the engineer's words.
     Of a lot setting `lot` stands before all other figures, and `carrier` is the one valve that `record` and `figures`
     are of.
     """
 
     title: str
-    verdict: "Headline"
-    figures: "Sequence[Figure]"
-    headings: Sequence[tuple[str, str]]
+    verdict: Headline
+    figures: Sequence[Figure]
+    template: str
     sections: Mapping[str, Section]
     missing: Sequence[str] = ()
     law: "LawAccount | None" = None
     record: Sequence[tuple[str, str]] = ()
-    lot: "Sequence[Figure]" = ()
+    lot: Sequence[Figure] = ()
     carrier: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Report:
+    """A finished report.
+
+    Attributes
+    ----------
+    html : str
+        The page.
+    kind : {"good", "bad", "open"}
+        Of its verdict.
+    holds : bool or None
+        None where something was not checked, or is not there.
+    verdict : str
+        In words.
+    faults, missing : tuple of str
+        What does not fit, and what is not there.
+    """
+
+    html: str
+    kind: str
+    holds: bool | None
+    verdict: str
+    faults: tuple[str, ...]
+    missing: tuple[str, ...]
+
+
+def report_of(page: Page, faults: tuple[str, ...]) -> Report:
+    """Return the finished report of a page; `faults` name the files that do not fit."""
+    verdict = page.verdict
+    return Report(
+        html=render(page), kind=verdict.kind, holds=verdict.holds, verdict=verdict.text, faults=faults,
+        missing=tuple(page.missing),
+    )  # fmt: skip
 
 
 def render(page: Page) -> str:
@@ -79,7 +156,7 @@ def render(page: Page) -> str:
     )
     environment.filters.update(data_uri=data_uri, anchor=anchor, words=_words, cell=_cell)
     content = {each.name: getattr(page, each.name) for each in fields(page)}
-    html: str = environment.get_template("report.html.jinja").render(tool=TOOL, palette=PALETTE, **content)
+    html: str = environment.get_template(page.template).render(tool=TOOL, palette=PALETTE, **content)
     return html
 
 

@@ -1,7 +1,7 @@
 """What the report leads with: the verdict, and the few numbers that matter."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from dzdesign.core.units import span_MPa
 from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED
@@ -9,40 +9,12 @@ from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.chain import Chain
 from dzdesign.report.compensator_sides import laws_of
+from dzdesign.report.page import Figure, Headline, misfit
 from dzdesign.report.sections.cells import counted, whole
-from dzdesign.verify.evidence import Check, Evidence, InputCheck, PressureResult
-from dzdesign.verify.requirements import not_tried
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Headline:
-    """The verdict: good if all holds, bad if something does not, open if something was not checked.
-
-    `reasons` name what does not hold or was not checked, `untried` what nobody asked for and the command that tries it,
-    `cautions` what the verdict is not about, and what somebody accepted.
-    """
-
-    kind: str
-    sign: str
-    text: str
-    reasons: tuple[str, ...] = ()
-    untried: tuple[str, ...] = ()
-    cautions: tuple[str, ...] = ()
-
-    @property
-    def holds(self) -> bool | None:
-        """None where something was not checked, or is not there."""
-        return {"good": True, "bad": False}.get(self.kind)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Figure:
-    """One number that matters: its label, the number itself and what it is of."""
-
-    label: str
-    value: str
-    note: str
-    kind: str = "text"
+from dzdesign.verify.contradictions import contradictions
+from dzdesign.verify.evidence import Evidence, InputCheck, PressureResult
+from dzdesign.verify.requirements import Check
+from dzdesign.verify.untried import not_tried
 
 
 def headline(chain: Chain) -> Headline:
@@ -57,7 +29,7 @@ def _cautions(chain: Chain) -> Iterator[str]:
     for cost in dict.fromkeys(compensator.costs if compensator else ()):
         if cost.startswith("accepted, "):
             yield f"ACCEPTED warning, {cost.removeprefix('accepted, ')}."
-    if valve and any(warning.code == "simulated" for warning in valve.warnings):
+    if valve and valve.simulated:
         yield "SIMULATED recordings: this is an example, not of a measured valve."
     if valve and compensator:
         for name in valve.sides.keys() - laws_of(compensator).keys():
@@ -67,17 +39,15 @@ def _cautions(chain: Chain) -> Iterator[str]:
 def _verdict(chain: Chain) -> Headline:
     evidence = chain.evidence
     if chain.faults:
-        return Headline(
-            kind="bad", sign="✗", text="THE FILES DO NOT BELONG TOGETHER. No verdict stands.", reasons=chain.faults
-        )
+        return misfit(chain.faults)
     if evidence is None:
         what = "a design" if chain.compensator else "an identified valve"
-        return Headline(kind="open", sign="?", text=f"NOT VERIFIED: there is no evidence here, only {what}")
-    faults = sum(each.faults + each.over_compensated for each in evidence.inputs)
-    if faults and all(check.holds is not False for check in evidence.checks):
-        text = f"THE EVIDENCE CONTRADICTS ITSELF: {whole(faults)} faults counted, and every check holds"
-        return Headline(kind="bad", sign="✗", text=text)
-    return _judged([*evidence.checks, *_limits(chain)])
+        return Headline(kind="open", text=f"NOT VERIFIED: there is no evidence here, only {what}")
+    if others := contradictions(evidence, chain.compensator):
+        reasons = tuple(f"{check.name}: {check.text}" for check in others)
+        text = "THE EVIDENCE CONTRADICTS ITSELF: what it says to hold does not follow from its figures"
+        return Headline(kind="bad", text=text, reasons=reasons)
+    return _judged([*evidence.all_checks, *_limits(chain)])
 
 
 def _judged(checks: Sequence[Check]) -> Headline:
@@ -91,11 +61,11 @@ def _judged(checks: Sequence[Check]) -> Headline:
     )
     if missed:
         text = f"{DOES_NOT_HOLD}: {len(missed)} of {len(checks)} requirements not met"
-        return Headline(kind="bad", sign="✗", text=text, reasons=reasons)
+        return Headline(kind="bad", text=text, reasons=reasons)
     if unknown:
         text = f"{NOT_CHECKED} in full: {len(unknown)} of {len(checks)} requirements are open"
-        return Headline(kind="open", sign="?", text=text, reasons=reasons)
-    return Headline(kind="good", sign="✓", text=f"Every requirement holds, all {len(checks)} that were tried")
+        return Headline(kind="open", text=text, reasons=reasons)
+    return Headline(kind="good", text=f"Every requirement holds, all {len(checks)} that were tried")
 
 
 def _limits(chain: Chain) -> list[Check]:
@@ -113,15 +83,7 @@ def key_figures(chain: Chain) -> tuple[Figure, ...]:
     loops = evidence.closed_loop.pressures if evidence else ()
     figures: list[Figure] = []
     if loops:
-        figures += [
-            _dead_zone(
-                loops, "opening", [each.dead_zone_opening for each in loops], [each.residual_opening for each in loops]
-            ),
-            _dead_zone(
-                loops, "closing", [each.dead_zone_closing for each in loops], [each.residual_closing for each in loops]
-            ),
-            _at_zero(loops),
-        ]
+        figures += [_dead_zone(loops, "opening"), _dead_zone(loops, "closing"), _at_zero(loops)]
     elif chain.valve:
         figures.append(_threshold(chain.valve))
     if chain.compensator:
@@ -131,10 +93,10 @@ def key_figures(chain: Chain) -> tuple[Figure, ...]:
     return tuple(figures)
 
 
-def _dead_zone(
-    loops: Sequence[PressureResult], branch: str, without: Sequence[float], residual: Sequence[float]
-) -> Figure:
-    before, after, least = 100 * max(without), 100 * max(residual), 100 * min(residual)
+def _dead_zone(loops: Sequence[PressureResult], branch: str) -> Figure:
+    before = 100 * max(getattr(each, f"dead_zone_{branch}") for each in loops)
+    residual = [100 * getattr(each, f"residual_{branch}") for each in loops]
+    after, least = max(residual), min(residual)
     return Figure(
         label=f"Dead zone on {branch}",
         value=f"{before:.1f} % → {after:.1f} %",

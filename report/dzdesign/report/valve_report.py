@@ -1,7 +1,7 @@
 """report.html: one page, from the verdict to the hashes, of whatever artefacts there are."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from dzdesign.core.artefact_types import schema_of
@@ -10,7 +10,7 @@ from dzdesign.report.artefact_chain import chain_of
 from dzdesign.report.artefact_folder import asked_prefixes, is_of, read_artefact_folder
 from dzdesign.report.chain import Chain
 from dzdesign.report.figures.figure import figure_style
-from dzdesign.report.page import Page, Section, render
+from dzdesign.report.page import Page, Report, Section, report_of
 from dzdesign.report.sections.acceptance import acceptance_section
 from dzdesign.report.sections.compensator import integers_section, law_section
 from dzdesign.report.sections.evidence import checks_section, inputs_section, loop_section
@@ -21,49 +21,8 @@ from dzdesign.report.sections.valve import valve_sections
 from dzdesign.report.summary import headline, key_figures
 
 REPORT_NAME = "report.html"
-#: Anchor and heading of every section, in their order; the first is of a lot setting alone.
-SECTIONS = (
-    ("lot", "The lot"),
-    ("data", "Data and fit"),
-    ("thresholds", "Thresholds"),
-    ("beta", "β over the pressure drop"),
-    ("law", "The law and where it comes from"),
-    ("integers", "The integers and their error"),
-    ("inputs", "Every input"),
-    ("loop", "Closed loop"),
-    ("acceptance", "Acceptance"),
-    ("checks", "All requirements"),
-    ("warnings", "Warnings, and what is not covered"),
-    ("provenance", "Provenance"),
-)
 #: Of a lot setting, these are of the one valve that its file holds.
 OF_A_VALVE = ("data", "thresholds", "beta", "loop")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Report:
-    """A finished report.
-
-    Attributes
-    ----------
-    html : str
-        The page.
-    kind : {"good", "bad", "open"}
-        Of its verdict.
-    holds : bool or None
-        None where something was not checked, or is not there.
-    verdict : str
-        In words.
-    faults, missing : tuple of str
-        What does not fit, and what is not there.
-    """
-
-    html: str
-    kind: str
-    holds: bool | None
-    verdict: str
-    faults: tuple[str, ...]
-    missing: tuple[str, ...]
 
 
 def report_of_folder(folder: Path) -> Report:
@@ -104,7 +63,7 @@ def with_report(files: Mapping[str, str | bytes], firmware: Path, output: Path) 
 
 def make_report(chain: Chain) -> Report:
     """Make the report of a chain of artefacts."""
-    verdict, compensator = headline(chain), chain.compensator
+    compensator = chain.compensator
     lot, figures = lot_figures(chain), key_figures(chain)
     if lot and chain.evidence:  # the last of them, the inputs, is of the C and not of a valve
         lot, figures = (*lot, figures[-1]), figures[:-1]
@@ -112,24 +71,17 @@ def make_report(chain: Chain) -> Report:
         sections = _sections(chain)
     page = Page(
         title=_title(chain),
-        verdict=verdict,
+        verdict=headline(chain),
         record=tuple(chain.valve.record.items()) if chain.valve else (),
         figures=figures,
         lot=lot,
         carrier=carrier_of(compensator) if compensator and compensator.lot else "",
-        headings=[(name, heading) for name, heading in SECTIONS if name in sections],
+        template="valve.html.jinja",
         sections=sections,
         missing=chain.missing,
         law=account_of(compensator.law) if compensator else None,
     )
-    return Report(
-        html=render(page),
-        kind=verdict.kind,
-        holds=verdict.holds,
-        verdict=verdict.text,
-        faults=chain.faults,
-        missing=chain.missing,
-    )
+    return report_of(page, chain.faults)
 
 
 def _sections(chain: Chain) -> dict[str, Section]:

@@ -183,7 +183,7 @@ def worst_tobit_error(seed, floor=0.6, dropping=0.0):
         for branch in (shape.prepared.branch for shape in item.branches):
             q = np.where(rng.random(branch.q.size) < dropping, 0.0, branch.q)
             branch = replace(branch, q=q)
-            read = prepare_branch(branch, branch.q, u_max=U_MAX, floor=group.floor, source="")
+            read = prepare_branch(branch, item.test, u_max=U_MAX, floor=group.floor)
             line = lay_line(read, window)
             kept = line.kept
             bins = bin_branch(branch.u[kept], read.y[kept], line.censored[kept], U_MAX)

@@ -185,7 +185,7 @@ def test_the_layouts_are_those_of_the_header(tmp_path):
     (tmp_path / "sizes.c").write_text(
         f'#include <stddef.h>\n#include <stdio.h>\n#include "every_input.h"\nint main(void) {{ {prints} return 0; }}\n'
     )
-    command = [host_compiler(), f"-I{machines.programs_folder()}", "sizes.c", "-o", "sizes"]
+    command = [host_compiler(), f"-I{machines.PROGRAMS}", "sizes.c", "-o", "sizes"]
     subprocess.run(command, cwd=tmp_path, check=True)
     said = subprocess.run([str(tmp_path / "sizes")], capture_output=True, text=True, check=True).stdout.split()
     expected = [dtype.itemsize for dtype in structs.values()]

@@ -10,8 +10,9 @@ from typing import Annotated, ClassVar, Literal
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import Artefact, quantity
-from dzdesign.core.verdicts import DOES_NOT_HOLD, HOLDS, NOT_CHECKED
+from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED
 from dzdesign.verify.closed_loop.plant import Plant
+from dzdesign.verify.requirements import ALWAYS, Check
 
 
 def about(description: str) -> Meta:
@@ -29,18 +30,6 @@ Sha256 = Annotated[str, Meta(pattern="^[0-9a-f]{64}$", max_length=64)]
 Names = tuple[str, ...]
 #: Voltages are bounded so that no arithmetic on them overflows.
 MOST_V = 1e4
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Check:
-    """One requirement that was tried."""
-
-    id: Annotated[str, about("Short name of the requirement, the same in every version.")]
-    name: Annotated[str, about("What is required, with the sign of command or the processor it is of.")]
-    holds: Annotated[
-        bool | None, about(f"True: {HOLDS}; false: {DOES_NOT_HOLD}; null: {NOT_CHECKED}, it could not be.")
-    ]
-    text: Annotated[str, about("What was found, with its figures.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -262,7 +251,7 @@ class Evidence(Artefact):
         str, about("Why the changed board files were not compiled; empty if they were, or none was changed.")
     ]
     holds: Annotated[
-        bool, about("Whether every requirement that was tried holds; one that could not be checked does not.")
+        bool, about("Whether every requirement holds; one that could not be checked, or has no check here, does not.")
     ] = field(init=False)
     checks: Annotated[tuple[Check, ...], Meta(description="Every requirement that was tried.", min_length=1)]
     inputs: Annotated[
@@ -274,13 +263,22 @@ class Evidence(Artefact):
     mutants: Annotated[MutationScore | None, about("Wrong versions of the C, where --mutate was given.")]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "holds", all(check.holds for check in self.checks))
+        object.__setattr__(self, "holds", all(check.holds for check in self.all_checks))
+
+    @property
+    def all_checks(self) -> tuple[Check, ...]:
+        """The checks, and as not checked what every `verify` checks and is not here, unless a failure is the reason."""
+        if any(check.holds is False for check in self.checks):
+            return self.checks
+        tried = {check.id for check in self.checks}
+        text = "the evidence has no check of it; make it again with `dzdesign verify`"
+        return (*self.checks, *(each.check(holds=None, text=text) for each in ALWAYS if each.id not in tried))
 
     @property
     def verdict(self) -> str:
         """One sentence: what does not hold stands before what could not be checked."""
         missed = [check.name for check in self.checks if check.holds is False]
-        unknown = [check.name for check in self.checks if check.holds is None]
+        unknown = [check.name for check in self.all_checks if check.holds is None]
         parts = [f"{DOES_NOT_HOLD}: {', '.join(missed)}"] if missed else []
         parts += [f"{NOT_CHECKED}: {', '.join(unknown)}"] if unknown else []
         return "; ".join(parts) or "Every requirement holds."

@@ -1,26 +1,34 @@
-"""Every requirement on a firmware, declared once: id, title and how to have it checked; and which were not."""
+"""Every requirement on a firmware, declared once: id, title and how to have it checked; and what is found of one."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Annotated
 
-from dzdesign.verify.evidence import Check, Evidence
+from msgspec import Meta
+
+from dzdesign.core.verdicts import DOES_NOT_HOLD, HOLDS, NOT_CHECKED
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Check:
+    """One requirement that was tried."""
+
+    id: Annotated[str, Meta(description="Short name of the requirement, the same in every version.")]
+    name: Annotated[str, Meta(description="What is required, with the sign of command or the processor it is of.")]
+    holds: Annotated[
+        bool | None, Meta(description=f"True: {HOLDS}; false: {DOES_NOT_HOLD}; null: {NOT_CHECKED}, it could not be.")
+    ]
+    text: Annotated[str, Meta(description="What was found, with its figures.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Requirement:
-    """One requirement.
+    """One requirement."""
 
-    Attributes
-    ----------
-    id : str
-        Short name, the same in every version.
-    title : str
-        What is required.
-    how : str
-        What to do to have it checked; a command stands in backticks.
-    """
-
+    #: The same in every version.
     id: str
+    #: What is required.
     title: str
+    #: What to do to have it checked; a command stands in backticks.
     how: str = "`verify`"
 
     def check(self, *, holds: bool | None, text: str, name: str = "") -> Check:
@@ -68,6 +76,9 @@ NEED_A_PLANT = (
     Requirement(id="load-steps", title="load steps and frozen sensors in the closed loop", how="`verify --plant`"),
 )
 SERIES = Requirement(id="series", title="a series of plants, with tolerances", how="`verify --tolerances`")
+#: What follows from the figures that stand beside the checks: of every input, and of the closed loop.
+FROM_INPUTS = (EXACT_LAW, MONOTONE, ZERO_COMMAND, PRESSURE_DIFFERENCE, FALLBACK)
+FROM_LOOP = (PLANT_OPENS, PLANT_IS_THE_VALVE, ZERO_FLOW, ZERO_FLOW_AFTER_SCENARIOS)
 #: What every `verify` checks, in the order of the report.
 ALWAYS = (
     FILES, MANIFEST, COMPILES, EXACT_LAW, MONOTONE, ZERO_COMMAND, PRESSURE_DIFFERENCE, FALLBACK, DRIVE, PLANT_OPENS,
@@ -75,31 +86,3 @@ ALWAYS = (
 )  # fmt: skip
 #: What is checked if it is asked for.
 OPTIONAL = (MACHINE_CODE, UNDEFINED_BEHAVIOUR, MUTATION)
-#: Of a file of the user's: nothing that was generated is there to compare it with.
-REVIEW = "review it, and try it on the machine"
-
-
-def untried_requirements(evidence: Evidence) -> tuple[Requirement, ...]:
-    """Return what can be checked of a firmware and was not tried, and how to have it tried."""
-    tried = {check.id for check in evidence.checks}
-    untried = [
-        Requirement(id="user-file", title=f"{name}, which is yours and was changed", how=REVIEW)
-        for name in evidence.changed_board_files
-    ]
-    untried += [
-        Requirement(id="user-file", title=f"{name}, which is yours", how=REVIEW) for name in evidence.user_files
-    ]
-    if evidence.board_not_compiled:
-        untried.append(replace(BOARD_FILES, how=evidence.board_not_compiled))
-    untried += [each for each in ALWAYS if each.id not in tried]
-    if evidence.closed_loop.plant is None:
-        untried += NEED_A_PLANT
-    if evidence.monte_carlo is None:
-        untried.append(SERIES)
-    optional = OPTIONAL + ((C2000WARE,) if evidence.target == "f28335" else ())
-    return tuple(untried + [each for each in optional if each.id not in tried])
-
-
-def not_tried(evidence: Evidence) -> tuple[str, ...]:
-    """Return the lines of what was not tried, each with the command that would."""
-    return tuple(f"{each.title}: {each.how}" for each in untried_requirements(evidence))

@@ -7,7 +7,9 @@ import numpy as np
 
 from dzdesign.identify.knees.noise import Roughness, variance_inflation
 from dzdesign.identify.knees.profile import flow_at_top, smooth_profile
-from dzdesign.identify.ramps.branches import Branch
+from dzdesign.identify.ramps.branches import Branch, at_nominal_pressure
+from dzdesign.identify.ramps.splitting import nominal_dp
+from dzdesign.identify.reading.ramp_test import RampTest
 
 #: A sample further than this many robust standard deviations from the line is an outlier.
 GATE = 6.0
@@ -40,10 +42,12 @@ class PreparedBranch:
     source: str
 
 
-def prepare_branch(branch: Branch, y: np.ndarray, *, u_max: float, floor: float, source: str) -> PreparedBranch:
-    """Return a branch ready for lines to be laid through it; `floor` in m³/s, `source` for messages."""
+def prepare_branch(branch: Branch, test: RampTest, *, u_max: float, floor: float) -> PreparedBranch:
+    """Bring the flow of a test's branch to its nominal pressure drop, ready for lines; the meter's `floor` in m³/s."""
+    y = at_nominal_pressure(branch, nominal_dp(test))
     profile = smooth_profile(branch.u, y, u_max)
-    return PreparedBranch(branch=branch, y=y, profile=profile, y_max=flow_at_top(*profile), floor=floor, source=source)
+    y_max = flow_at_top(*profile)
+    return PreparedBranch(branch=branch, y=y, profile=profile, y_max=y_max, floor=floor, source=test.source)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

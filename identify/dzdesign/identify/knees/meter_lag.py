@@ -6,6 +6,7 @@ one ramp rate that can't be told from hysteresis; a second rate moves the knees 
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal
 
@@ -16,9 +17,8 @@ from dzdesign.identify.constants import FULL_SWEEP
 from dzdesign.identify.knees.gated_line import prepare_branch
 from dzdesign.identify.knees.line_fitting import lay_line
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.ramps.branches import at_nominal_pressure
 from dzdesign.identify.ramps.pooling import group_by_pressure
-from dzdesign.identify.ramps.splitting import Ramp, nominal_dp
+from dzdesign.identify.ramps.splitting import Ramp
 
 #: Rates that differ by less than this factor are one.
 TWO_RATES = 1.5
@@ -73,15 +73,10 @@ def _knees(group: Sequence[Ramp], rising: bool, options: IdentifyOptions) -> tup
             whole = branch.u.max() >= FULL_SWEEP * highest and np.ptp(branch.u) >= FULL_SWEEP * highest
             if branch.rising is not rising or not math.isfinite(branch.rate) or not whole:
                 continue
-            y = at_nominal_pressure(branch, nominal_dp(ramp.test))
-            floor = options.meter_floor or 0.0
-            try:
-                read = prepare_branch(branch, y, u_max=options.u_max, floor=floor, source=ramp.test.source)
+            read = prepare_branch(branch, ramp.test, u_max=options.u_max, floor=options.meter_floor or 0.0)
+            with suppress(InputError):
                 line = lay_line(read, options.knee_window)
-            except InputError:
-                continue
-            if not line.slope > 0:
-                continue
-            found.append((branch.rate, line.knee, line.knee_se))
+                if line.slope > 0:
+                    found.append((branch.rate, line.knee, line.knee_se))
     columns = np.array(found).reshape(-1, 3)
     return columns[:, 0], columns[:, 1], columns[:, 2]

@@ -11,13 +11,12 @@ from dzdesign.identify.constants import FULL_SWEEP, L_MIN
 from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.knees.characteristic import describe_branches, find_meter_floor
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
-from dzdesign.identify.knees.gated_line import PreparedBranch, prepare_branch
+from dzdesign.identify.knees.gated_line import prepare_branch
 from dzdesign.identify.knees.meter_lag import find_lag
 from dzdesign.identify.knees.noise import robust_sigma
-from dzdesign.identify.knees.profile import flow_at_top, smooth_profile
+from dzdesign.identify.knees.profile import largest_flow
 from dzdesign.identify.knees.refusals import refuse_a_jump, refuse_a_shut_valve, refuse_a_wrong_pressure
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.ramps.branches import at_nominal_pressure
 from dzdesign.identify.ramps.pooling import PooledTest, pool_ramps
 from dzdesign.identify.ramps.splitting import Ramp, despiked, nominal_dp, split_ramps
 from dzdesign.identify.reading.ramp_test import RampTest
@@ -40,8 +39,6 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
     InputError
         For a test that holds no ramp or no flow, and for tests that can't stand beside one another.
     """
-    if not tests:
-        raise InputError("no ramp tests were given; expected at least one file")
     zeros = [_reading_at_zero(test, options.u_max) for test in tests]
     zero_se = {test.source: se for test, (_, se) in zip(tests, zeros, strict=True)}
     tests = [replace(test, q=test.q - zero) for test, (zero, _) in zip(tests, zeros, strict=True)]
@@ -50,12 +47,19 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
     pooled = pool_ramps(ramps if lag.origin != "identified" else split_recordings(tests, options, lag.seconds))
     _refuse_what_shows_no_dead_zone(pooled, options)
     floor = options.meter_floor if options.meter_floor is not None else found_floor(pooled, options)
-    reads = [read for item in pooled for read in _read(item, floor, options.u_max)]
+    reads = [
+        prepare_branch(branch, item.test, u_max=options.u_max, floor=floor)
+        for item in pooled
+        for branch in filter(None, item.branches)
+    ]
     for read in reads:
         refuse_a_jump(read, options.u_max)
     shapes = iter(describe_branches(reads, u_max=options.u_max, window=options.knee_window))
-    described = [_describe(item, shapes, options.u_max) for item in pooled]
-    described = _in_order_of_pressure(described)
+    # By pressure drop again: what was read of all ramps together may fall together with the next test's by a hair.
+    described = sorted(
+        (_describe(item, shapes, options.u_max) for item in pooled),
+        key=lambda item: (item.dp or 0.0, item.test.source),
+    )
     _refuse_mixed_branches(described)
     return DescribedTests(
         tests=tuple(described),
@@ -168,31 +172,17 @@ def found_floor(pooled: list[PooledTest], options: IdentifyOptions) -> float:
     return max((floor for floor in floors if floor is not None), default=0.0)
 
 
-def _read(item: PooledTest, floor: float, u_max: float) -> Iterator[PreparedBranch]:
-    """Bring the flows of a test's branches to its nominal pressure drop."""
-    dp = nominal_dp(item.test)
-    for branch in filter(None, item.branches):
-        y = at_nominal_pressure(branch, dp)
-        yield prepare_branch(branch, y, u_max=u_max, floor=floor, source=item.test.source)
-
-
 def _describe(item: PooledTest, shapes: Iterator[BranchShape], u_max: float) -> DescribedTest:
     """Put a test together; `shapes` gives those of its branches next."""
     rising, falling = (next(shapes) if branch else None for branch in item.branches)
-    q_max = max(flow_at_top(*smooth_profile(branch.u, branch.q, u_max)) for branch in item.branches if branch)
     return DescribedTest(
         test=item.test,
         dp=nominal_dp(item.test),
         shapes=(rising, falling),
-        q_max=q_max,
+        q_max=largest_flow(item.branches, u_max),
         ramps=item.ramps,
         files=item.files,
     )
-
-
-def _in_order_of_pressure(described: list[DescribedTest]) -> list[DescribedTest]:
-    """Sort by pressure drop; what was read of all ramps together may fall together with the next test's by a hair."""
-    return sorted(described, key=lambda item: (item.dp or 0.0, item.test.source))
 
 
 def _refuse_mixed_branches(described: list[DescribedTest]) -> None:

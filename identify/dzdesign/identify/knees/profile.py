@@ -1,8 +1,10 @@
 """The course of the flow over the command, smoothed: where it crosses a level, and what it is at full command."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from dzdesign.identify.ramps.branches import bin_index
+from dzdesign.identify.ramps.branches import Branch, bin_index
 
 #: Share of the command's range, from the top, over which the largest flow is read.
 TOP = 0.05
@@ -55,6 +57,11 @@ def hole_within(u: np.ndarray, low: float, high: float, u_max: float) -> tuple[f
         return None
     at = here[np.argmax(steps[here])]
     return float(u[at]), float(u[at + 1])
+
+
+def largest_flow(branches: Sequence[Branch | None], u_max: float) -> float:
+    """Return the largest flow that a test's branches have as recorded, m³/s."""
+    return max(flow_at_top(*smooth_profile(branch.u, branch.q, u_max)) for branch in branches if branch)
 
 
 def flow_at_top(u_profile: np.ndarray, y_profile: np.ndarray) -> float:

@@ -8,7 +8,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.identify.constants import L_MIN, LARGEST_DP, MPA, SMALLEST_DP
 from dzdesign.identify.knees.gated_line import PreparedBranch
 from dzdesign.identify.knees.noise import robust_sigma
-from dzdesign.identify.knees.profile import crossing, flow_at_top, smooth_profile
+from dzdesign.identify.knees.profile import crossing, largest_flow
 from dzdesign.identify.ramps.branches import Branch
 
 #: A flow that rises with the command has readings between these shares of the largest where its mean is between them.
@@ -40,7 +40,7 @@ def refuse_a_shut_valve(source: str, branches: Sequence[Branch | None], u_max: f
     for branch in filter(None, branches):
         bottom = branch.q[branch.u <= branch.u.min() + 0.05 * np.ptp(branch.u)]
         noise = robust_sigma(bottom)
-        rise = flow_at_top(*smooth_profile(branch.u, branch.q, u_max)) - float(np.median(bottom))
+        rise = largest_flow([branch], u_max) - float(np.median(bottom))
         least = max(6 * noise, 0.01 * L_MIN)
         if rise > least:
             continue

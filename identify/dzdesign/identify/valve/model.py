@@ -60,6 +60,9 @@ class ValveModel(ShownInNotebooks, Artefact):
             max_length=MOST_ENTRIES,
         ),
     ]
+    simulated: Annotated[
+        bool, Meta(description="Whether a recording is simulated: no measurement, so no firmware for a machine.")
+    ]
     u_max_V: Annotated[float, quantity("V", "Full command.", ge=1e-3, le=1e4)]
     meter: Annotated[Meter, Meta(description="What was taken of the flow meter.")]
     knee_window: Annotated[
@@ -82,6 +85,9 @@ class ValveModel(ShownInNotebooks, Artefact):
     def __post_init__(self) -> None:
         if not self.sides or not set(self.sides) <= set(SIDES):
             raise RuleError(f"the sides are {', '.join(self.sides) or 'none'}, expected {' or '.join(SIDES)}")
+        if self.simulated != any(warning.code == "simulated" for warning in self.warnings):
+            stated, there = ("true", "lacks the") if self.simulated else ("false", "has a")
+            raise RuleError(f"'simulated' is {stated}, but 'warnings' {there} warning of that code")
         object.__setattr__(self, "record", checked_record(self.record.items(), "the record"))
         object.__setattr__(self, "untested_sides", tuple(name for name in SIDES if name not in self.sides))
 

@@ -14,6 +14,8 @@ from dzdesign.report.figures.figure import (
     label_ends,
     legend_below,
     new_figure,
+    side_words,
+    span,
     titled_axes,
     to_report_figure,
 )
@@ -39,11 +41,10 @@ def loop_figure(curves: Curves, side: str, both: bool) -> ReportFigure:
     return to_report_figure(
         figure,
         f"loop-{side}",
-        "Closed loop: a ramp up and down, the generated C driving the simulated valve"
-        + (f", {side} commands" if both else "")
-        + ". Of two branches the one at lower commands is closing; what lies between is the valve's hysteresis.",
+        f"Closed loop: a ramp up and down, the generated C driving the simulated valve{side_words(side, both)}. Of "
+        "two branches the one at lower commands is closing; what lies between is the valve's hysteresis.",
         f"Flow over command at {len(ends)} pressure drops. First flow on the ramp up: without the "
-        f"compensator at {_span(starts['without'])}, with it at {_span(starts['with'])} of full command.",
+        f"compensator at {span(starts['without'], '%', 1)}, with it at {span(starts['with'], '%', 1)} of full command.",
         curves.text,
     )
 
@@ -93,10 +94,6 @@ def _first_flow(curves: Curves, column: str) -> float:
     return float(flowing[0]) if flowing.size else 100.0
 
 
-def _span(values: Sequence[float]) -> str:
-    return f"{min(values):.1f} to {max(values):.1f} %"
-
-
 def dead_zone_figure(pressures: Sequence[PressureResult], side: str, both: bool) -> ReportFigure:
     """Draw the dead zone of one side on both branches over the pressure drop, before and after."""
     figure, axes = titled_axes(3.0, side, both, legend_rows=1)
@@ -116,7 +113,7 @@ def dead_zone_figure(pressures: Sequence[PressureResult], side: str, both: bool)
     return to_report_figure(
         figure,
         f"dead-zone-{side}",
-        "Dead zone in the closed loop, without and with the compensator" + (f", {side} commands." if both else "."),
+        f"Dead zone in the closed loop, without and with the compensator{side_words(side, both)}.",
         f"The dead zone on opening falls from at most {worst['dead_zone_opening']:.1f} % to at most "
         f"{worst['residual_opening']:.1f} % of command, on closing from {worst['dead_zone_closing']:.1f} % to "
         f"{worst['residual_closing']:.1f} %.",

@@ -8,8 +8,9 @@ never in colour alone.
 import csv
 import io
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager
+import warnings
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 from urllib.parse import quote
@@ -18,6 +19,7 @@ from dzdesign.identify.plots.frame import HUES
 
 if TYPE_CHECKING:
     import numpy as np
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -120,11 +122,14 @@ def csv_text(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     return out.getvalue()
 
 
-def figure_style() -> AbstractContextManager[None]:
-    """Return the style under which the report's figures are drawn."""
+@contextmanager
+def figure_style() -> Iterator[None]:
+    """Draw in the report's style; a name may have letters that the font for measuring lacks, the page's has them."""
     from matplotlib import rc_context
 
-    return rc_context(STYLE)
+    with rc_context(STYLE), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing from", UserWarning)
+        yield
 
 
 def new_figure(height: float, *, legend_rows: int = 0, right: float = 0.2, top: float = 0.12) -> "Figure":
@@ -161,9 +166,21 @@ def side_words(name: str, both: bool) -> str:
     return f", {name} commands" if both else ""
 
 
+def span(values: "Sequence[float] | np.ndarray", unit: str, digits: int) -> str:
+    """Return from where to where values run, with their unit."""
+    return f"{min(values):.{digits}f} to {max(values):.{digits}f} {unit}"
+
+
 def legend_below(figure: "Figure", columns: int) -> None:
-    """Put a legend of all axes below them, in a figure made with `legend_rows`."""
-    figure.legend(loc="lower center", ncols=columns, columnspacing=1.2, borderpad=0.1, borderaxespad=0.1)
+    """Put a legend of all axes below them, each label once, in a figure made with `legend_rows`."""
+    found: dict[str, Artist] = {}
+    for axes in figure.axes:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            found.setdefault(label, handle)
+    figure.legend(
+        found.values(), found.keys(), loc="lower center", ncols=columns, columnspacing=1.2, borderpad=0.1,
+        borderaxespad=0.1,
+    )  # fmt: skip
 
 
 def label_ends(axes: "Axes", labels: Sequence[tuple[float, float, str, str]]) -> None:

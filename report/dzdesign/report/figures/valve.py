@@ -1,12 +1,9 @@
 """Figures of the identified valve and of the law, from valve.json and compensator.json alone."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from dzdesign.design.compensator import Compensator
 from dzdesign.identify.plots.valve_curves import BRANCHES, draw_beta, draw_thresholds
-from dzdesign.identify.valve.ramp_result import TestResult
 from dzdesign.identify.valve.side_model import SideModel
 from dzdesign.report.compensator_sides import laws_of
 from dzdesign.report.figures.figure import (
@@ -17,6 +14,7 @@ from dzdesign.report.figures.figure import (
     label_ends,
     legend_below,
     side_words,
+    span,
     titled_axes,
     to_report_figure,
 )
@@ -41,7 +39,7 @@ def lines_figure(side: SideModel, name: str, both: bool) -> ReportFigure:
             axes.plot(ends, flows, dash, color=hue, lw=1.8)
             axes.plot(knee, 0, marker, color=hue, ms=5, clip_on=False, zorder=4)
             rows.append([test.dp_MPa, word, knee, *ends.round(4).tolist(), *flows.round(4).tolist()])
-        labels.append((*far, _dp_text(test), hue))
+        labels.append((*far, "dP not recorded" if test.dp_MPa is None else f"{test.dp_MPa:.2f} MPa", hue))
     label_ends(axes, labels)
     for _, word, marker, dash, _ in BRANCHES:
         axes.plot([], [], dash, marker=marker, color=LIGHT["soft"], label=word)
@@ -56,17 +54,9 @@ def lines_figure(side: SideModel, name: str, both: bool) -> ReportFigure:
         + ". Samples and residuals are drawn by dzdesign identify --plots: the recordings are not part of an "
         "artefact folder.",
         f"Straight lines of flow over command of {counted(len(side.tests), 'pressure drop')}; they meet zero "
-        f"flow at the knees, {_span([row[2] for row in rows], 'V', 3)}.",
+        f"flow at the knees, {span([row[2] for row in rows], 'V', 3)}.",
         csv_text(("dp_MPa", "branch", "knee_V", "from_V", "to_V", "from_L_min", "to_L_min"), rows),
     )
-
-
-def _dp_text(test: TestResult) -> str:
-    return "dP not recorded" if test.dp_MPa is None else f"{test.dp_MPa:.2f} MPa"
-
-
-def _span(values: Sequence[float] | np.ndarray, unit: str, digits: int) -> str:
-    return f"{min(values):.{digits}f} to {max(values):.{digits}f} {unit}"
 
 
 def thresholds_figure(side: SideModel, guard: str, name: str, both: bool) -> ReportFigure:
@@ -86,9 +76,9 @@ def thresholds_figure(side: SideModel, guard: str, name: str, both: bool) -> Rep
             if several
             else "its lower bound. One pressure drop was tested, and nothing is certified at another."
         ),
-        f"Thresholds over the pressure drop: the {guard} threshold lies at {_span(curve.u_threshold_V, 'V', 3)}, "
-        f"its lower bound at {_span(curve.u_lower_V, 'V', 3)}, the largest certified offset at "
-        f"{_span(curve.u_offset_V, 'V', 3)}.",
+        f"Thresholds over the pressure drop: the {guard} threshold lies at {span(curve.u_threshold_V, 'V', 3)}, "
+        f"its lower bound at {span(curve.u_lower_V, 'V', 3)}, the largest certified offset at "
+        f"{span(curve.u_offset_V, 'V', 3)}.",
         csv_text(
             ("dp_MPa", "knee_opening_V", "knee_closing_V", "onset_opening_V", "onset_closing_V", "threshold_V",
              "lower_bound_V", "offset_V", "certified_up_to_next_V"),
@@ -134,16 +124,15 @@ def beta_figure(
     return to_report_figure(
         figure,
         f"beta-{name}",
-        f"β over the pressure drop{side_words(name, both)}: the share of u_min0 that the law puts out at zero "
-        "command."
-        + _of_the_table(compensator),
+        f"β over the pressure drop{side_words(name, both)}: the share of u_min0 that the law puts out at zero command."
+        + _about_the_table(compensator),
         f"Beta lies between {low:.4f} and {high:.4f} over {dp[0]:.2f} to {dp[-1]:.2f} MPa, the certified staircase "
-        f"at {_span(np.array(curve.certified_steps_V) / u_min0, '', 4).strip()}.",
+        f"at {span(np.array(curve.certified_steps_V) / u_min0, '', 4).strip()}.",
         csv_text(("of", "dp_MPa", "beta", "offset_V"), rows),
     )
 
 
-def _of_the_table(compensator: Compensator | None) -> str:
+def _about_the_table(compensator: Compensator | None) -> str:
     if compensator is None:
         return ""
     holds = compensator.below_dp0 == "hold"

@@ -7,15 +7,13 @@ from pathlib import Path
 
 from dzdesign.core.errors import and_more
 from dzdesign.report.lot.folder import Lot, read_lot
-from dzdesign.report.lot.sections import HEADINGS, sections_of
+from dzdesign.report.lot.sections import sections_of
 from dzdesign.report.lot.setting_text import untested_lines
 from dzdesign.report.lot.spread import FAR, TWENTY, Spread, spreads_of
 from dzdesign.report.lot.summary import DOES_NOT_HOLD
 from dzdesign.report.lot.table import column_of
-from dzdesign.report.page import Page, render
+from dzdesign.report.page import Figure, Headline, Page, Report, misfit, report_of
 from dzdesign.report.sections.cells import whole
-from dzdesign.report.summary import Figure, Headline
-from dzdesign.report.valve_report import Report
 
 #: Valves that the verdict names, and anomalies.
 IN_VERDICT, ANOMALIES_IN_VERDICT = 8, 3
@@ -43,19 +41,11 @@ def make_lot_report(lot: Lot) -> Report:
         title=f"Lot of {whole(lot.expected)} valve{'' if lot.expected == 1 else 's'}",
         verdict=verdict,
         figures=key_figures_of_lot(lot, spreads),
-        headings=HEADINGS,
+        template="lot.html.jinja",
         sections=sections_of(lot, spreads),
         missing=missing,
     )
-    refuted = verdict.kind == "bad" or bool(lot.failed)
-    return Report(
-        html=render(page),
-        kind=verdict.kind,
-        holds=False if refuted else True if verdict.kind == "good" else None,
-        verdict=verdict.text,
-        faults=lot.faults,
-        missing=tuple(missing),
-    )
+    return report_of(page, lot.faults)
 
 
 def lot_headline(lot: Lot) -> Headline:
@@ -69,34 +59,30 @@ def lot_headline(lot: Lot) -> Headline:
         lines += untested_lines(lot.summary.lot_setting)
     more = len(anomalies) - ANOMALIES_IN_VERDICT
     lines += [f"odd: {more} more, under “What the recordings leave open”"] if more > 0 else []
-    return replace(_verdict(lot), cautions=tuple(lines))
+    return replace(_verdict(lot), cautions=tuple(lines), some_failed=bool(lot.failed))
 
 
 def _verdict(lot: Lot) -> Headline:
     if lot.faults:
-        return Headline(
-            kind="bad", sign="✗", text="THE FILES DO NOT BELONG TOGETHER. No verdict stands.", reasons=lot.faults
-        )
+        return misfit(lot.faults)
     done, count, expected = len(lot.calibrated), len(lot.rows), lot.expected
     reasons = _not_calibrated(lot)
     if lot.summary is None:
         text = f"NOT FINISHED: {whole(count)} of {whole(expected)} valves tried, {whole(done)} calibrated"
-        return Headline(kind="open", sign="?", text=text, reasons=reasons)
+        return Headline(kind="open", text=text, reasons=reasons)
     if not count:
-        return Headline(kind="open", sign="?", text="NOT KNOWN: the table is not here")
+        return Headline(kind="open", text="NOT KNOWN: the table is not here")
     words = f"{whole(done)} of {whole(count)} valves calibrated"
     if not done:
         text = f"NONE of {whole(count)} valves calibrated" if count > 1 else "The valve is NOT calibrated"
-        return Headline(kind="bad", sign="✗", text=text, reasons=reasons)
+        return Headline(kind="bad", text=text, reasons=reasons)
     if reasons:
         refuted = any(row.status == DOES_NOT_HOLD for row in lot.failed)
         text = f"{words}, {whole(count - done)} NOT"
-        return Headline(
-            kind="bad" if refuted else "open", sign="✗" if refuted else "!", text=text, reasons=reasons
-        )
+        return Headline(kind="bad" if refuted else "open", text=text, reasons=reasons)
     if not lot.summary.verified:
-        return Headline(kind="open", sign="?", text=f"{words}; their firmware is NOT VERIFIED")
-    return Headline(kind="good", sign="✓", text=f"{words}, and the firmware of each is verified")
+        return Headline(kind="open", text=f"{words}; their firmware is NOT VERIFIED")
+    return Headline(kind="good", text=f"{words}, and the firmware of each is verified")
 
 
 def _not_calibrated(lot: Lot) -> tuple[str, ...]:

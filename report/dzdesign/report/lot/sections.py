@@ -4,11 +4,12 @@ from collections import Counter
 from collections.abc import Sequence
 
 from dzdesign.core.errors import and_more
-from dzdesign.report.lot.figures import lot_style, order_figure, spread_figure
+from dzdesign.report.figures.figure import ReportFigure, figure_style
+from dzdesign.report.lot.figures import spread_figure
 from dzdesign.report.lot.folder import Lot
 from dzdesign.report.lot.reasons import reason_groups
 from dzdesign.report.lot.setting_text import checked_line, span, untested_lines
-from dzdesign.report.lot.spread import FAR, FEWEST, TWENTY, Spread
+from dzdesign.report.lot.spread import EXTRA, FAR, FEWEST, TWENTY, Spread
 from dzdesign.report.lot.summary import Quantiles, SettingOfOthers
 from dzdesign.report.lot.tables import (
     NAMED,
@@ -23,34 +24,37 @@ from dzdesign.report.lot.tables import (
 from dzdesign.report.page import Section
 from dzdesign.report.sections.cells import counted, whole
 
-#: Anchor and heading of every section, in their order.
-HEADINGS = (
-    ("failed", "Not calibrated"),
-    ("spread", "Spread of the lot"),
-    ("far", "Far from the rest"),
-    ("left", "Dead zone that remains"),
-    ("setting", "One setting for all"),
-    ("valves", "The valves"),
-    ("recordings", "What the recordings leave open"),
-    ("warnings", "Warnings: what is not covered"),
-    ("provenance", "Provenance"),
+#: Name of a figure, columns of the quantities in it, caption, and whether they are on one scale.
+FigureKind = tuple[str, tuple[str, ...], str, bool]
+SPREAD_FIGURES: tuple[FigureKind, ...] = (
+    (
+        "thresholds",
+        ("knee_opening_V", "knee_closing_V"),
+        "Thresholds of the calibrated valves at dP0: the knee, where the straight part of the flow meets zero, on "
+        "opening and on closing, on one scale; their distance is the hysteresis. Where names count up as the valves "
+        "were measured, a slope or a step is a drift of the bench or of the production.",
+        True,
+    ),
+    (
+        "law",
+        ("offset_V", "k_x_max_over_u_max", "beta_at_highest_dp"),
+        "What the laws of the valves differ in: the offset at dP0, which lies under the threshold's bound; the travel "
+        "k x_max/u_max from the threshold to full flow; β at the highest tested pressure drop.",
+        False,
+    ),
 )
-#: Of every report of a lot.
-NOT_PROVED = (
-    "A valve counts as calibrated if it was identified, its compensator designed and its C made. That the C does what "
-    "the law says is known of those that were verified.",
-    "The lot setting is certified for each valve of this lot with the confidence of that valve's own bounds, not "
-    "for all of them at once. Of a valve that is not in the lot it says nothing.",
-    "Spread is of the valves and of the bench: a meter or an oil temperature that drifts while a lot is measured looks "
-    "like valves that differ. Measure one valve again at the end of the lot to tell.",
-    "Far from the rest is a place to look, no verdict: such a valve is calibrated as certainly as any other.",
-    "Quantiles are those of the valves that were calibrated; the others have no numbers.",
+LEFT_FIGURE: FigureKind = (
+    "left",
+    ("dead_zone_opening_percent", "dead_zone_closing_percent"),
+    "Dead zone that each valve's own compensator leaves, in per cent of command: at the pressure drop of its tests "
+    "where it is largest.",
+    True,
 )
 
 
 def sections_of(lot: Lot, spreads: Sequence[Spread]) -> dict[str, Section]:
     """Return every section by its anchor."""
-    with lot_style():
+    with figure_style():
         return {
             "failed": _failed_section(lot),
             "spread": _spread_section(lot, spreads),
@@ -59,13 +63,21 @@ def sections_of(lot: Lot, spreads: Sequence[Spread]) -> dict[str, Section]:
             "setting": _setting_section(lot, spreads),
             "valves": _valves_section(lot, spreads),
             "recordings": _recordings_section(lot),
-            "warnings": Section(lines=NOT_PROVED),
+            "warnings": Section(),
             "provenance": _provenance_section(lot),
         }
 
 
-def _of(spreads: Sequence[Spread], *columns: str) -> list[Spread]:
-    return [spread for column in columns for spread in spreads if spread.quantity.column == column]
+def _figures(lot: Lot, spreads: Sequence[Spread], *kinds: FigureKind) -> tuple[ReportFigure, ...]:
+    """Return figures of each side, of those of their quantities that some valve has."""
+    found = []
+    for side in lot.sides:
+        of, words = (f"-{side}", f" {side.capitalize()} commands.") if side else ("", "")
+        of_side = {spread.quantity.column: spread for spread in spreads if spread.side == side}
+        for name, columns, caption, one_scale in kinds:
+            shown = [of_side[column] for column in columns if column in of_side]
+            found.append(spread_figure(name + of, shown, caption + words, one_scale=one_scale))
+    return tuple(figure for figure in found if figure)
 
 
 def _failed_section(lot: Lot) -> Section:
@@ -74,8 +86,6 @@ def _failed_section(lot: Lot) -> Section:
     groups = reason_groups(lot.failed)
     many, kinds = counted(len(lot.failed), "valve"), counted(len(groups), "kind")
     return Section(
-        note="The reason of a valve also stands in its `reason.txt`. Correct what it says, then run the same "
-        "`dzdesign batch` again: only what changed is done anew.",
         lines=(
             f"{many}, {kinds} of reason; what differs between the valves of a kind is … in the reason and stands "
             "behind the name.",
@@ -87,35 +97,9 @@ def _failed_section(lot: Lot) -> Section:
 def _spread_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
     if not spreads:
         return Section(missing="No valve is calibrated, so there is nothing to compare.")
-    figures = []
-    for side in lot.sides:
-        of_side = [spread for spread in spreads if spread.side == side]
-        of, words = (f"-{side}", f" {side.capitalize()} commands.") if side else ("", "")
-        figures += [
-            spread_figure(
-                f"thresholds{of}", _of(of_side, "knee_opening_V", "knee_closing_V"),
-                "Thresholds of the calibrated valves at dP0: the knee, where the straight part of the flow meets zero, "
-                f"on opening and on closing, on one scale; their distance is the hysteresis.{words}", one_scale=True,
-            ),
-            spread_figure(
-                f"law{of}", _of(of_side, "offset_V", "k_x_max_over_u_max", "beta_at_highest_dp"),
-                "What the laws of the valves differ in: the offset at dP0, which lies under the threshold's bound; the "
-                f"travel k x_max/u_max from the threshold to full flow; β at the highest tested pressure drop.{words}",
-                one_scale=False,
-            ),
-        ]  # fmt: skip
-        first = _of(of_side, "knee_opening_V", "knee_closing_V")[:1]
-        figures += [
-            order_figure(
-                f"order{of}", spread,
-                "The same knee in the order of the names. Where names count up as the valves were measured, a slope or "
-                f"a step here is a drift of the bench or of the production.{words}",
-            )
-            for spread in first
-        ]  # fmt: skip
     return Section(
         lines=tuple(_lot_lines(lot)),
-        figures=tuple(figure for figure in figures if figure),
+        figures=_figures(lot, spreads, *SPREAD_FIGURES),
         tables=(spread_table(spreads),),
     )
 
@@ -165,18 +149,7 @@ def _far_section(spreads: Sequence[Spread]) -> Section:
 def _left_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
     if not spreads:
         return Section(missing="No valve is calibrated.")
-    figures = []
-    for side in lot.sides:
-        of_side = [spread for spread in spreads if spread.side == side]
-        of, words = (f"-{side}", f", {side} commands") if side else ("", "")
-        figures.append(
-            spread_figure(
-                f"left{of}", _of(of_side, "dead_zone_opening_percent", "dead_zone_closing_percent"),
-                f"Dead zone that each valve's own compensator leaves, in per cent of command{words}: at the pressure "
-                "drop of its tests where it is largest.", one_scale=True,
-            )
-        )  # fmt: skip
-    return Section(figures=tuple(figure for figure in figures if figure))
+    return Section(figures=_figures(lot, spreads, LEFT_FIGURE))
 
 
 def _setting_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
@@ -185,7 +158,7 @@ def _setting_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
     setting = lot.summary.lot_setting
     if setting is None:
         return Section(missing=f"There is no lot setting: {lot.summary.why_no_lot_setting}.", optional=True)
-    costs = _of(spreads, "lot_extra_dead_zone_percent")
+    costs = [spread for spread in spreads if spread.quantity.column == EXTRA]
     checked = checked_line(setting)
     lines = (
         "The largest offset that over-compensates none of the valves, certified for each of them "
@@ -199,8 +172,8 @@ def _setting_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
     figure = spread_figure(
         "lot-setting", costs,
         "What one setting for all costs each valve: the dead zone that it leaves on opening less what the valve's own "
-        "setting leaves, at the worst pressure drop of its tests. The valves that hold the setting down stand at the "
-        "left.", one_scale=True,
+        "setting leaves, at the worst pressure drop of its tests. The valves that hold the setting down are the "
+        "lowest.", one_scale=True,
     )  # fmt: skip
     return Section(lines=lines, figures=(figure,) if figure else (), tables=(holding_table(lot, setting),))
 
@@ -238,9 +211,6 @@ def _without_lines(without: SettingOfOthers | None, count: int) -> list[str]:
 def _valves_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
     table = valves_table(lot, {name for spread in spreads for name, _ in spread.far()})
     return Section(
-        note="Each calibrated valve has a folder `valves/NAME` beside this page, with its valve.json, "
-        "compensator.json and firmware: `dzdesign report valves/NAME`, run in the folder of this page, makes its own "
-        "report.",
         tables=(table,) if table else (),
     )
 
@@ -253,8 +223,6 @@ def _recordings_section(lot: Lot) -> Section:
         return Section(lines=(*odd, *none))
     return Section(
         lines=odd,
-        note="None of these stops a calibration. The text of each valve, with its numbers, stands in its report and in "
-        "its valve.json; what to do about a code stands in the documentation under “Warning codes”.",
         tables=(table,),
     )
 

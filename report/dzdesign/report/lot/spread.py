@@ -21,9 +21,9 @@ FEWEST = 8
 TWENTY = 20
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Quantity:
-    """A column of the table that scatters, without its side: in words, with unit (empty of a ratio) and decimals.
+    """A column of the table that scatters, without its side: in words, as a heading, unit (empty of a ratio), decimals.
 
     A valve can be far from the rest in it if it is judged. The cost of the lot setting is not: it follows from the
     offsets, and its least is no merit.
@@ -31,6 +31,7 @@ class Quantity:
 
     column: str
     label: str
+    short_label: str
     unit: str
     digits: int
     judged: bool = True
@@ -38,27 +39,36 @@ class Quantity:
     @property
     def heading(self) -> str:
         """Label and unit, as on an axis."""
-        return f"{self.label} ({self.unit})" if self.unit else self.label
+        return self.label + self._in_unit
+
+    @property
+    def short_heading(self) -> str:
+        """The same for the head of a narrow column."""
+        return self.short_label + self._in_unit
+
+    @property
+    def _in_unit(self) -> str:
+        return f" ({self.unit})" if self.unit else ""
+
+    def text(self, value: float) -> str:
+        """Return a value with its decimals."""
+        return f"{value:.{self.digits}f}"
 
 
+#: What a lot setting costs a valve.
+EXTRA = "lot_extra_dead_zone_percent"
 #: Columns of the table whose quantiles tell of the batch, by name.
 QUANTITIES = {
     each.column: each
     for each in (
-        Quantity(column="knee_opening_V", label="knee on opening", unit="V", digits=3),
-        Quantity(column="knee_closing_V", label="knee on closing", unit="V", digits=3),
-        Quantity(column="offset_V", label="offset at dP0", unit="V", digits=3),
-        Quantity(column="beta_at_highest_dp", label="β at the highest dP", unit="", digits=4),
-        Quantity(column="k_x_max_over_u_max", label="k x_max/u_max", unit="", digits=4),
-        Quantity(column="dead_zone_opening_percent", label="dead zone left on opening", unit="%", digits=2),
-        Quantity(column="dead_zone_closing_percent", label="dead zone left on closing", unit="%", digits=2),
-        Quantity(
-            column="lot_extra_dead_zone_percent",
-            label="extra dead zone of the lot setting",
-            unit="%",
-            digits=2,
-            judged=False,
-        ),
+        Quantity("knee_opening_V", "knee on opening", "knee opening", "V", 3),
+        Quantity("knee_closing_V", "knee on closing", "knee closing", "V", 3),
+        Quantity("offset_V", "offset at dP0", "offset", "V", 3),
+        Quantity("beta_at_highest_dp", "β at the highest dP", "β at highest dP", "", 4),
+        Quantity("k_x_max_over_u_max", "k x_max/u_max", "k x_max/u_max", "", 4),
+        Quantity("dead_zone_opening_percent", "dead zone left on opening", "left on opening", "%", 2),
+        Quantity("dead_zone_closing_percent", "dead zone left on closing", "left on closing", "%", 2),
+        Quantity(EXTRA, "extra dead zone of the lot setting", "extra of the lot setting", "%", 2, judged=False),
     )
 }
 

@@ -7,7 +7,7 @@ from dzdesign.core.errors import and_more
 from dzdesign.report.figures.figure import csv_text
 from dzdesign.report.lot.folder import Lot
 from dzdesign.report.lot.reasons import ReasonGroup
-from dzdesign.report.lot.spread import Spread
+from dzdesign.report.lot.spread import EXTRA, QUANTITIES, Quantity, Spread
 from dzdesign.report.lot.summary import LotSettingSummary, Quantiles
 from dzdesign.report.lot.table import TABLE, TableRow, safe_cell
 from dzdesign.report.lot.valve_names import short
@@ -19,19 +19,6 @@ NAMED, ROWS = 40, 100
 SMALL_LOT, FIRST = 50, 10
 #: Characters of a table that the page holds: some 4000 valves.
 EMBEDDED = 2_000_000
-#: What the lot setting costs a valve.
-EXTRA = "lot_extra_dead_zone_percent"
-#: Columns of the whole table that the page shows, with heading and decimals.
-NUMBERS = (
-    ("knee_opening_V", "knee opening (V)", 3),
-    ("knee_closing_V", "knee closing (V)", 3),
-    ("offset_V", "offset (V)", 3),
-    ("beta_at_highest_dp", "β at highest dP", 4),
-    ("k_x_max_over_u_max", "k x_max/u_max", 4),
-    ("dead_zone_opening_percent", "left on opening (%)", 2),
-    ("dead_zone_closing_percent", "left on closing (%)", 2),
-    (EXTRA, "extra of the lot setting (%)", 2),
-)
 
 
 def failed_table(groups: Sequence[ReasonGroup], failed: Sequence[TableRow]) -> Table:
@@ -44,7 +31,7 @@ def failed_table(groups: Sequence[ReasonGroup], failed: Sequence[TableRow]) -> T
     return table_of(
         "Why valves are not calibrated, by kind of reason",
         groups,
-        ("status", lambda group: Cell(text=f"✗ {group.status}", kind="bad")),
+        ("status", lambda group: _failed(group.status)),
         ("valves", lambda group: in_number_font(whole(len(group.valves)))),
         ("what is wrong", lambda group: group.what),
         ("what is expected, or to be done", lambda group: group.advice or "–"),
@@ -184,19 +171,19 @@ def valves_table(lot: Lot, far: Collection[str]) -> Table | None:
         rows, caption = rows[:ROWS], f"{caption}, the first {ROWS} of {len(rows)}"
     embedded = len(lot.table) <= EMBEDDED
 
-    def figure_of(side: str, column: str, digits: int) -> Callable[[TableRow], Cell]:
-        return lambda row: number(row.number(side, column), digits)
+    def figure_of(side: str, quantity: Quantity) -> Callable[[TableRow], Cell]:
+        return lambda row: number(row.number(side, quantity.column), quantity.digits)
 
     return table_of(
         caption,
         rows,
         ("valve", lambda row: row.name),
         *((("serial", lambda row: _serial(row) or "–"),) if any(map(_serial, lot.rows)) else ()),
-        ("status", lambda row: Cell(text="✓ ok", kind="good") if row.calibrated else _not_calibrated(row)),
+        ("status", lambda row: Cell(text="✓ ok", kind="good") if row.calibrated else _failed(row.status)),
         *(
-            (f"{side} {heading}" if side else heading, figure_of(side, column, digits))
+            (f"{side} {quantity.short_heading}".lstrip(), figure_of(side, quantity))
             for side in lot.sides
-            for column, heading, digits in NUMBERS
+            for quantity in QUANTITIES.values()
         ),
         ("warnings", lambda row: " ".join(row.warnings) or "–"),
         csv=lot.table if embedded else "",
@@ -205,8 +192,8 @@ def valves_table(lot: Lot, far: Collection[str]) -> Table | None:
     )
 
 
-def _not_calibrated(row: TableRow) -> Cell:
-    return Cell(text=f"✗ {row.status}", kind="bad")
+def _failed(status: str) -> Cell:
+    return Cell(text=f"✗ {status}", kind="bad")
 
 
 def _serial(row: TableRow) -> str:

@@ -23,7 +23,7 @@ from dzdesign.verify.evidence import (
     ScenarioResult,
     Spread,
 )
-from dzdesign.verify.requirements import untried_requirements
+from dzdesign.verify.untried import untried_requirements
 
 
 def _curves(chain: Chain, name: str) -> Curves | None:

@@ -12,9 +12,8 @@ from dzdesign.design.lot_valves import LotSide
 from dzdesign.report.chain import Chain
 from dzdesign.report.compensator_sides import SIGNS, laws_of
 from dzdesign.report.figures.figure import csv_text
-from dzdesign.report.page import Section
+from dzdesign.report.page import Figure, Section
 from dzdesign.report.sections.cells import in_number_font, number, table_of
-from dzdesign.report.summary import Figure
 from dzdesign.verify.evidence import Evidence
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 

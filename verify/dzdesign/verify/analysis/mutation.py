@@ -18,14 +18,14 @@ from typing import Any
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.verify.analysis.c_mutants import Mutant, mutants_of
-from dzdesign.verify.evidence import Check, MutantOutcome, MutationScore
+from dzdesign.verify.evidence import MutantOutcome, MutationScore
 from dzdesign.verify.exhaustive.drive_check import CompiledDrive, PreparedDrive
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
 from dzdesign.verify.firmware.folder import read_compensator
-from dzdesign.verify.requirements import MUTATION
+from dzdesign.verify.requirements import MUTATION, Check
 from dzdesign.verify.toolchain.compiled_core import CompiledCore
-from dzdesign.verify.toolchain.machines import HOST, compile_object, link_program, programs_folder, run_program
+from dzdesign.verify.toolchain.machines import HOST, PROGRAMS
 
 KILLED, REFUSED, SAME_OBJECT, SAME_OUTPUTS, SURVIVED = (
     "killed", "refused by the compiler", "same object code", "same outputs", "survived",
@@ -55,13 +55,7 @@ class MutationBench:
         return {name: text.decode(errors="surrogateescape") for name, text in self._drive.sources.items()}
 
     def check_original(self) -> None:
-        """Run every check on the firmware as it is.
-
-        Raises
-        ------
-        RequirementError
-            If it fails one: then no mutant's failing says anything.
-        """
+        """Run every check on the firmware as it is; if it fails one, no mutant's failing says anything."""
         _ = self._drive_samples
         for verdict in self._tried(self._cores, self._drive):
             if verdict:
@@ -113,11 +107,11 @@ class MutationBench:
         """Compare every function of the core with the original's at random triples of 16 bits."""
         results = []
         flags = (*HOST.check_flags, *(["-DDZ_BOTH"] if len(self._signs) > 1 else []))
-        source = {"random_triples.c": (programs_folder() / "random_triples.c").read_bytes()}
-        main = compile_object(HOST, "random_triples.c", source, flags, "the random triples")
+        source = {"random_triples.c": (PROGRAMS / "random_triples.c").read_bytes()}
+        main = HOST.compile("random_triples.c", source, flags, "the random triples")
         for each in (objects, self._drive.objects()):
-            program = link_program(HOST, [*each, main], "the random triples")
-            results.append(run_program(HOST, program, [str(RANDOM_TRIPLES)], "the core"))
+            program = HOST.link([*each, main], "the random triples")
+            results.append(HOST.run(program, [str(RANDOM_TRIPLES)], "the core"))
         return results[0] == results[1]
 
 

@@ -57,13 +57,7 @@ def _csv(header: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
 
 
 def read_curves(text: str) -> Mapping[str, np.ndarray]:
-    """Read one of these files back: column to numbers.
-
-    Raises
-    ------
-    ValueError
-        If it is no table of numbers.
-    """
+    """Read one of these files back, column to numbers; what is no table of numbers is a `ValueError`."""
     lines = text.splitlines()
     header = lines[0].split(",") if lines else []
     table = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]])

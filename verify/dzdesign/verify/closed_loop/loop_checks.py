@@ -5,11 +5,24 @@ from collections.abc import Sequence
 from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN
-from dzdesign.verify.evidence import Check, PressureResult, ScenarioResult
-from dzdesign.verify.requirements import PLANT_IS_THE_VALVE, PLANT_OPENS, ZERO_FLOW, ZERO_FLOW_AFTER_SCENARIOS
+from dzdesign.verify.evidence import PressureResult, ScenarioResult
+from dzdesign.verify.requirements import PLANT_IS_THE_VALVE, PLANT_OPENS, ZERO_FLOW, ZERO_FLOW_AFTER_SCENARIOS, Check
 
 #: Share of full command by which the opening of a plant may differ from the identified valve's: rounding, a quick ramp.
 SAME_THRESHOLD = 0.03
+
+
+def loop_checks(
+    ramps: Sequence[PressureResult], scenarios: Sequence[ScenarioResult], compensator: Compensator, *, plant_given: bool
+) -> tuple[Check, ...]:
+    """Return all of them, in the order of the report."""
+    zero_flow = no_flow_at_zero(ramps, compensator, plant_given=plant_given)
+    return (
+        plant_opens(ramps),
+        plant_is_the_valve(ramps, compensator.valve),
+        zero_flow,
+        shut_after_scenarios(scenarios, zero_flow, plant_given=plant_given),
+    )
 
 
 def plant_opens(ramps: Sequence[PressureResult]) -> Check:

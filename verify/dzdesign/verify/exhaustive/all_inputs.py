@@ -6,12 +6,13 @@ from pathlib import Path
 from dzdesign.core.errors import RequirementError
 from dzdesign.design.compensator import Compensator
 from dzdesign.verify import requirements
-from dzdesign.verify.evidence import Check, InputCheck, InputCounts
+from dzdesign.verify.evidence import InputCheck, InputCounts
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.lot_check import check_lot
 from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
 from dzdesign.verify.exhaustive.zero_command import guarded_bounds, zero_command_margins
 from dzdesign.verify.firmware.folder import read_compensator
+from dzdesign.verify.requirements import Check
 from dzdesign.verify.toolchain.compiled_core import CompiledCore, Findings
 
 
@@ -23,10 +24,7 @@ def check_all_inputs(folder: Path, sign: int = 1, compensator: Compensator | Non
     every input is tried once, and with it every pair of sound pressure codes of which there are no more than commands;
     at zero command, where it matters most, all pairs that the law follows are tried, and all that are not sound.
 
-    Raises
-    ------
-    RequirementError
-        If the core does not compile, crashes, or hangs.
+    A core that does not compile, crashes or hangs is a `RequirementError`.
     """
     prepared = PreparedInputs(ExactLaw(compensator or read_compensator(folder), sign))
     core = CompiledCore(folder, sign)
@@ -34,13 +32,7 @@ def check_all_inputs(folder: Path, sign: int = 1, compensator: Compensator | Non
 
 
 def input_check(prepared: PreparedInputs, core: CompiledCore, found: Findings) -> InputCheck:
-    """Return what was found, with the bound at zero command.
-
-    Raises
-    ------
-    RequirementError
-        If no pair of pressure codes makes a pressure drop that was tested.
-    """
+    """Return what was found, with the bound at zero command."""
     exact, differences = prepared.exact, prepared.differences
     (margin,) = zero_command_margins(exact, differences, found.at_zero, [guarded_bounds(exact.compensator, exact.sign)])
     if margin is None:

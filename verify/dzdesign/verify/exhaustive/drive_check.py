@@ -1,5 +1,6 @@
 """The compiled drive against its model, tick by tick: outputs and state, over corners and random samples."""
 
+import copy
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -8,15 +9,14 @@ import numpy as np
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.design.compensator import Compensator
-from dzdesign.verify.evidence import Check
 from dzdesign.verify.exhaustive.exact_drive import STEP_UNIT, DriveModel
-from dzdesign.verify.requirements import DRIVE
-from dzdesign.verify.toolchain.machines import HOST, compile_object, link_program, programs_folder, run_program, stored
+from dzdesign.verify.requirements import DRIVE, Check
+from dzdesign.verify.toolchain.machines import HOST, PROGRAMS, stored
 
-SEED, SAMPLES = 11, 3000
-#: A ramp that is not put anywhere; share of the samples before which it is.
 #: Codes of command, pressure A and pressure B.
 Codes = tuple[int, int, int]
+SEED, SAMPLES = 11, 3000
+#: A ramp that is not put anywhere; share of the samples before which it is.
 STAYS, PUT_SHARE = -(2**31), 0.04
 FIELDS = ("compare_a", "compare_b", "status", "law", "side", "ticks", "ramped")
 
@@ -127,7 +127,7 @@ class CompiledDrive:
 
     def edited(self, name: str, text: bytes) -> "CompiledDrive":
         """Return the drive with another text in one of its files."""
-        other = object.__new__(CompiledDrive)
+        other = copy.copy(self)
         other.sources = {**self.sources, name: text}
         return other
 
@@ -135,24 +135,18 @@ class CompiledDrive:
         """Return the objects, each compiled by itself."""
         headers = {name: text for name, text in self.sources.items() if name.endswith(".h")}
         return [
-            compile_object(HOST, name, {**headers, name: text}, HOST.core_flags, f"the firmware's {name}")
+            HOST.compile(name, {**headers, name: text}, HOST.core_flags, f"the firmware's {name}")
             for name, text in self.sources.items()
             if name.endswith(".c")
         ]
 
     def check(self, prepared: PreparedDrive) -> DriveCheck:
-        """Run the drive beside its model.
-
-        Raises
-        ------
-        RequirementError
-            If the drive does not compile, crashes, or hangs.
-        """
+        """Run the drive beside its model; a drive that does not compile, crashes or hangs is a `RequirementError`."""
         main = {name: text for name, text in self.sources.items() if name.endswith(".h")}
-        main["drive.c"] = (programs_folder() / "drive.c").read_bytes()
-        objects = [*self.objects(), compile_object(HOST, "drive.c", main, HOST.check_flags, "the check of the drive")]
+        main["drive.c"] = (PROGRAMS / "drive.c").read_bytes()
+        objects = [*self.objects(), HOST.compile("drive.c", main, HOST.check_flags, "the check of the drive")]
         file = stored(prepared.content)
-        printed = run_program(HOST, link_program(HOST, objects, "the drive"), [str(file)], "the drive")
+        printed = HOST.run(HOST.link(objects, "the drive"), [str(file)], "the drive")
         if not printed or len(printed[0]) != 4:
             raise RequirementError(f"the drive's check reported {printed[:1]}, expected four numbers")
         ticks, wrong, tick, field = printed[0]

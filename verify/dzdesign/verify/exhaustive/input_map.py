@@ -25,29 +25,19 @@ BEYOND = 0.15
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InputMap:
-    """Compare values of one side on a grid of command codes and differences of pressure codes.
-
-    Attributes
-    ----------
-    side : str
-        ``positive`` or ``negative``.
-    command_codes : (U,) tuple of int
-    dp_codes : (D,) tuple of int
-        Differences of pressure codes, rising.
-    compare, exact, status : (D, U) array
-        What the core gives, the exactly rounded law, and the status word; of a command that is not sound the law
-        says nothing, and `exact` is what the core gives.
-    zero_command : tuple of (int, float, float, float)
-        At every difference of the tested interval: its code, pressure drop in MPa, drive at zero command in V (with
-        a dither its peak), and the lower bound of the threshold in V.
-    """
+    """Compare values of one side on a grid of U command codes and D differences of pressure codes."""
 
     side: Side
     command_codes: tuple[int, ...]
+    #: Differences of pressure codes, rising.
     dp_codes: tuple[int, ...]
+    #: (D, U): what the core gives, the exactly rounded law, and the status word. Of a command that is not sound the
+    #: law says nothing, and `exact` is what the core gives.
     compare: np.ndarray
     exact: np.ndarray
     status: np.ndarray
+    #: At every difference of the tested interval: its code, pressure drop in MPa, drive at zero command in V (with a
+    #: dither its peak), and the lower bound of the threshold in V.
     zero_command: tuple[tuple[int, float, float, float], ...]
 
     def rows(self) -> Iterator[tuple[int, int, int, int, int]]:
@@ -59,13 +49,7 @@ class InputMap:
 
 
 def map_inputs(folder: Path, compensator: Compensator, sign: int = 1) -> InputMap:
-    """Call one side of the compiled core over the grid.
-
-    Raises
-    ------
-    RequirementError
-        If the core does not compile.
-    """
+    """Call one side of the compiled core over the grid."""
     exact = ExactLaw(compensator, sign)
     name, ending = SOURCES[sign]
     texts = {

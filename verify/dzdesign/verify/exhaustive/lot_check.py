@@ -11,21 +11,15 @@ import numpy as np
 from dzdesign.core.errors import InputError, and_more
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.lot import NAMED
-from dzdesign.verify.evidence import Check, InputCheck, LotCheck
+from dzdesign.verify.evidence import InputCheck, LotCheck
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import Differences
 from dzdesign.verify.exhaustive.zero_command import zero_command_margins
-from dzdesign.verify.requirements import LOT
+from dzdesign.verify.requirements import LOT, Check
 
 
 def check_lot(exact: ExactLaw, found: Differences, at_zero: np.ndarray) -> LotCheck | None:
-    """Compare the drive at zero command with the bounds of every valve of the lot; None of a valve's own setting.
-
-    Raises
-    ------
-    InputError
-        If a valve of the lot has no bounds of this side.
-    """
+    """Compare the drive at zero command with the bounds of every valve of the lot; None of a valve's own setting."""
     lot = exact.compensator.lot
     if not lot:
         return None

@@ -14,8 +14,7 @@ from dzdesign.design.certificate import prove_certificates
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.redesign_check import prove_derived
 from dzdesign.identify.valve.model import SCHEMA, ValveModel
-from dzdesign.verify.evidence import Check
-from dzdesign.verify.requirements import CERTIFICATE, LAW, VALVE
+from dzdesign.verify.requirements import CERTIFICATE, LAW, VALVE, Check
 
 #: The schema stands in the first bytes of an artefact; a valve.json is far smaller than the limit.
 HEAD, LARGEST_FILE = 512, 32 * 2**20
@@ -42,11 +41,6 @@ def law_follows(compensator: Compensator) -> Check:
     """Tell whether designing again gives the same numbers, which a file without its options does not let anyone do.
 
     Another version of dzdesign may have chosen other tables, and none the worse.
-
-    Parameters
-    ----------
-    compensator : Compensator
-        As it was read.
     """
     if compensator.target is None:
         text = "compensator.json does not say for which target and with which options it was designed, so no number of "
@@ -63,8 +57,8 @@ def law_follows(compensator: Compensator) -> Check:
     return LAW.check(holds=True, text=text)
 
 
-def valve_follows(folder: Path, compensator: Compensator) -> list[Check]:
-    """Tell whether the valve in a compensator is that of the file it names; nothing where that file is not at hand.
+def valve_follows(folder: Path, compensator: Compensator) -> Check:
+    """Tell whether the valve in a compensator is that of the file it names; not checked where that is not at hand.
 
     The name alone says nothing: a valve.json of another hash and another content is a stranger's.
 
@@ -86,17 +80,19 @@ def valve_follows(folder: Path, compensator: Compensator) -> list[Check]:
     )
     if stated == compensator.valve_sha256:  # as `identify` writes it: no file is needed
         text = f"the valve that compensator.json holds has, as `identify` writes it, the SHA-256 {stated} in made_from"
-        return [VALVE.check(holds=True, text=other + text)]
+        return VALVE.check(holds=True, text=other + text)
     for each in around:
         if each.sha256 == stated:
             same = each.valve == valve
             text = f"compared with {each.name}, which has the SHA-256 {stated} in made_from"
             text += "" if same else ", but is another valve; make the compensator again with `dzdesign design`"
-            return [VALVE.check(holds=same, text=other + text)]
+            return VALVE.check(holds=same, text=other + text)
         if each.valve == valve:
             text = f"{each.name} is that valve, but its SHA-256 is {each.sha256} and compensator.json names {stated}; "
-            return [VALVE.check(holds=False, text=f"{text}make the compensator again with `dzdesign design`")]
-    return []
+            return VALVE.check(holds=False, text=f"{text}make the compensator again with `dzdesign design`")
+    text = f"compensator.json names a valve.json of SHA-256 {stated}, the valve in it has {compensator.valve_sha256} "
+    text += "as `identify` writes it; put the valve.json that it names beside the firmware"
+    return VALVE.check(holds=None, text=other + text)
 
 
 class _ValveFile:

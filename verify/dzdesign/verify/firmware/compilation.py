@@ -10,8 +10,8 @@ from pathlib import Path
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.verify import requirements
-from dzdesign.verify.evidence import Check
 from dzdesign.verify.firmware.unchanged_files import USER_FOLDER, changed_files, user_files
+from dzdesign.verify.requirements import Check
 from dzdesign.verify.toolchain.host_compiler import (
     STRICT,
     build_folder,
@@ -48,13 +48,7 @@ def changed_board_files(folder: Path, manifest: FirmwareManifest) -> list[str]:
 
 
 def check_include(include: Sequence[Path], manifest: FirmwareManifest) -> None:
-    """Refuse folders of headers that are none, or of a target whose board files are not compiled here.
-
-    Raises
-    ------
-    InputError
-        Naming the first that is none.
-    """
+    """Refuse folders of headers that are none, or of a target whose board files are not compiled here."""
     for place in include:
         if not place.is_dir():
             raise InputError(f"'{place}' is no folder, expected one with headers after --include; check the name")

@@ -1,5 +1,6 @@
 """A firmware folder as it is given: its manifest, and that nothing in it leads elsewhere."""
 
+import os
 from functools import lru_cache
 from pathlib import Path
 
@@ -13,13 +14,7 @@ from dzdesign.design.firmware_manifest import FirmwareManifest
 def read_firmware_manifest(folder: Path) -> FirmwareManifest:
     """Return the manifest of a firmware folder.
 
-    What is read, compiled and run afterwards are the files that it names, and C: each must be a file in this folder,
-    also where it is a link.
-
-    Raises
-    ------
-    InputError
-        If the folder is no firmware, or leads elsewhere.
+    What is read, compiled and run afterwards are the files that it names, and C: each must be a file in this folder.
     """
     path = folder / MANIFEST_NAME
     if folder.is_file() or (folder.is_dir() and not path.exists()):
@@ -32,13 +27,7 @@ def read_firmware_manifest(folder: Path) -> FirmwareManifest:
 
 
 def read_compensator(folder: Path) -> Compensator:
-    """Return the compensator of a firmware folder.
-
-    Raises
-    ------
-    InputError
-        If it is missing or none.
-    """
+    """Return the compensator of a firmware folder."""
     path = folder / "compensator.json"
     return _compensator(read_bytes(path, "compensator of the firmware"), str(path))
 
@@ -50,6 +39,10 @@ def _compensator(content: bytes, source: str) -> Compensator:
 
 
 def check_firmware_inside(folder: Path) -> None:
-    """Refuse a firmware folder whose C is not in it."""
+    """Refuse a firmware folder whose C is not in it, or with a link: a build follows it, and no check looks behind."""
     found = [path.relative_to(folder).as_posix() for path in sorted(folder.rglob("*.[ch]"))]
     check_inside(folder, ["compensator.json", *found], f"'{folder}'")
+    home = os.path.realpath(folder)
+    for path in sorted(folder.rglob("*")):
+        if os.path.realpath(path) != os.path.join(home, path.relative_to(folder)):  # also a junction of Windows
+            raise InputError(f"'{path}' is a link, which no firmware has; put what it leads to in its place")

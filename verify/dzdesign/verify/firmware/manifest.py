@@ -8,8 +8,7 @@ from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.artefact_types import SourceFile
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest
-from dzdesign.verify.evidence import Check
-from dzdesign.verify.requirements import MANIFEST
+from dzdesign.verify.requirements import MANIFEST, Check
 
 COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 #: A number as the core writes it: 64u, UINT32_C(64), (-INT32_C(64)).

@@ -6,7 +6,7 @@ from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.errors import and_more
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.verify import requirements
-from dzdesign.verify.evidence import Check
+from dzdesign.verify.requirements import Check
 
 #: User's files that a sentence names.
 MOST_NAMED = 5
@@ -20,6 +20,9 @@ SOURCES = {
 USER_FOLDER = "board"
 #: Endings of precompiled headers, files or folders: a compiler takes one in place of the header beside it.
 PRECOMPILED = (".gch", ".pch", ".pcm")
+#: What CMake writes where it builds: makefiles or projects, scripts, exports, and C that names the compiler.
+CMAKE_FILES = {"makefile", "cmakeccompilerid.c", "cmakecxxcompilerid.cpp"}
+CMAKE_ENDINGS = {".cmake", ".vcxproj", ".def"}
 BUILD_FILES = {"makefile", "gnumakefile", "cmakelists.txt", "meson.build", ".project", ".cproject", ".ccsproject"}
 
 
@@ -73,9 +76,13 @@ def changed_files(folder: Path, manifest: FirmwareManifest) -> list[str]:
 
 
 def added_files(folder: Path, manifest: FirmwareManifest) -> list[str]:
-    """Return the source and project files that were not generated, but for what CMake has built."""
+    """Return the source and project files that were not generated, but for what CMake writes where it builds."""
     built = _cmake_trees(folder, manifest)
-    found = [path for path in sorted(folder.rglob("*")) if _is_source(path) and not built.intersection(path.parents)]
+    found = [
+        path
+        for path in sorted(folder.rglob("*"))
+        if _is_source(path) and not (_is_written_by_cmake(path) and built.intersection(path.parents))
+    ]
     names = [path.relative_to(folder).as_posix() for path in found]
     return [name for name in names if name not in manifest.files]
 
@@ -109,6 +116,11 @@ def _cmake_trees(folder: Path, manifest: FirmwareManifest) -> set[Path]:
     """Return the folders in which CMake has built, with makefiles and C of its own, and in which nothing is ours."""
     ours = {parent for name in manifest.files for parent in (folder / name).parents}
     return {path.parent for path in folder.rglob("CMakeCache.txt")} - ours - {folder}
+
+
+def _is_written_by_cmake(path: Path) -> bool:
+    """Tell whether CMake writes such a file; a header is none, so whoever has one there put it there."""
+    return path.name.lower() in CMAKE_FILES or path.suffix.lower() in CMAKE_ENDINGS
 
 
 def _is_source(path: Path) -> bool:

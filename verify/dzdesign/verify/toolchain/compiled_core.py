@@ -1,5 +1,6 @@
 """The generated core as a black box: compiled by itself for a machine, and every input tried there."""
 
+import copy
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -8,15 +9,7 @@ import numpy as np
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.verify.evidence import InputCounts
-from dzdesign.verify.toolchain.machines import (
-    HOST,
-    Machine,
-    compile_object,
-    link_program,
-    programs_folder,
-    run_program,
-    stored,
-)
+from dzdesign.verify.toolchain.machines import HOST, PROGRAMS, Machine, stored
 
 #: Source of each sign of command, and what its functions' names end with.
 SOURCES = {1: ("dz_comp.c", ""), -1: ("dz_comp_negative.c", "_negative")}
@@ -55,39 +48,32 @@ class CompiledCore:
 
     def edited(self, name: str, text: bytes) -> "CompiledCore":
         """Return the core with another text in one of its files."""
-        other = object.__new__(CompiledCore)
-        other.__dict__.update(self.__dict__)
+        other = copy.copy(self)
         other.sources = {**self.sources, name: text}
         return other
 
     def compiled(self, machine: Machine = HOST) -> Path:
         """Return the core's object for a machine: compiled alone, so that nothing of it is inlined into the check."""
-        return compile_object(machine, self._name, self.sources, machine.core_flags, f"the core {self._name}")
+        return machine.compile(self._name, self.sources, machine.core_flags, f"the core {self._name}")
 
     def check(self, prepared: bytes, machine: Machine = HOST, *, sample: bool = False) -> Findings:
-        """Try what was prepared on a machine.
-
-        Raises
-        ------
-        RequirementError
-            If the core does not compile, crashes, or hangs.
-        """
+        """Try what was prepared on a machine; a core that does not compile, crashes or hangs: `RequirementError`."""
         core = self.compiled(machine)
         called = (f"-DDZ_{name.upper()}=dz_{name}{self._ending}" for name in ("status", "beta"))
         flags = (*machine.check_flags, f"-DDZ_CORE=dz_comp{self._ending}", *called)
-        check = {name: _read(programs_folder() / name) for name in (*CHECK, machine.main)}
+        check = {name: _read(PROGRAMS / name) for name in (*CHECK, machine.main)}
         units = [name for name in check if name.endswith(".c")]
-        objects = [core, *(compile_object(machine, name, check, flags, "the check") for name in units)]
+        objects = [core, *(machine.compile(name, check, flags, "the check") for name in units)]
         arguments = []
         if machine.section:
             text = f'{machine.section}\n.balign 8\n.global dz_prepared\ndz_prepared:\n.incbin "prepared.bin"\n'
             tables = {"prepared.S": text.encode(), "prepared.bin": prepared}
-            objects.append(compile_object(machine, "prepared.S", tables, machine.check_flags, "the prepared inputs"))
+            objects.append(machine.compile("prepared.S", tables, machine.check_flags, "the prepared inputs"))
         else:
             file = stored(prepared)
             arguments = [str(file), *(["sample"] if sample else [])]
-        program = link_program(machine, objects, f"the core {self._name} ({machine.name})")
-        printed = run_program(machine, program, arguments, f"the core {self._name}")
+        program = machine.link(objects, f"the core {self._name} ({machine.name})")
+        printed = machine.run(program, arguments, f"the core {self._name}")
         return _findings(printed, sha256_of(core.read_bytes()), f"the core {self._name} on the {machine.name}")
 
 

@@ -1,0 +1,35 @@
+"""What can be checked of a firmware and was not tried, and how to have it tried."""
+
+from dataclasses import replace
+
+from dzdesign.verify.evidence import Evidence
+from dzdesign.verify.requirements import ALWAYS, BOARD_FILES, C2000WARE, NEED_A_PLANT, OPTIONAL, SERIES, Requirement
+
+#: Of a file of the user's: nothing that was generated is there to compare it with.
+REVIEW = "review it, and try it on the machine"
+
+
+def untried_requirements(evidence: Evidence) -> tuple[Requirement, ...]:
+    """Return what can be checked of a firmware and was not tried, and how to have it tried."""
+    tried = {check.id for check in evidence.checks}
+    untried = [
+        Requirement(id="user-file", title=f"{name}, which is yours and was changed", how=REVIEW)
+        for name in evidence.changed_board_files
+    ]
+    untried += [
+        Requirement(id="user-file", title=f"{name}, which is yours", how=REVIEW) for name in evidence.user_files
+    ]
+    if evidence.board_not_compiled:
+        untried.append(replace(BOARD_FILES, how=evidence.board_not_compiled))
+    untried += [each for each in ALWAYS if each.id not in tried]
+    if evidence.closed_loop.plant is None:
+        untried += NEED_A_PLANT
+    if evidence.monte_carlo is None:
+        untried.append(SERIES)
+    optional = OPTIONAL + ((C2000WARE,) if evidence.target == "f28335" else ())
+    return tuple(untried + [each for each in optional if each.id not in tried])
+
+
+def not_tried(evidence: Evidence) -> tuple[str, ...]:
+    """Return the lines of what was not tried, each with the command that would."""
+    return tuple(f"{each.title}: {each.how}" for each in untried_requirements(evidence))
