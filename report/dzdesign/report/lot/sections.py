@@ -22,7 +22,7 @@ from dzdesign.report.lot.tables import (
     warnings_table,
 )
 from dzdesign.report.page import Section
-from dzdesign.report.sections.cells import counted, whole
+from dzdesign.report.sections.cells import counted, from_to, whole
 
 #: Name of a figure, columns of the quantities in it, caption, and whether they are on one scale.
 FigureKind = tuple[str, tuple[str, ...], str, bool]
@@ -68,7 +68,7 @@ def sections_of(lot: Lot, spreads: Sequence[Spread]) -> dict[str, Section]:
         }
 
 
-def _figures(lot: Lot, spreads: Sequence[Spread], *kinds: FigureKind) -> tuple[ReportFigure, ...]:
+def _figures(lot: Lot, spreads: Sequence[Spread], *kinds: FigureKind) -> list[ReportFigure | None]:
     """Return figures of each side, of those of their quantities that some valve has."""
     found = []
     for side in lot.sides:
@@ -77,7 +77,7 @@ def _figures(lot: Lot, spreads: Sequence[Spread], *kinds: FigureKind) -> tuple[R
         for name, columns, caption, one_scale in kinds:
             shown = [of_side[column] for column in columns if column in of_side]
             found.append(spread_figure(name + of, shown, caption + words, one_scale=one_scale))
-    return tuple(figure for figure in found if figure)
+    return found
 
 
 def _failed_section(lot: Lot) -> Section:
@@ -115,20 +115,13 @@ def _lot_lines(lot: Lot) -> list[str]:
             continue
         trends = Counter(each.trend or "not known" for each in tested)
         counts = ", ".join(f"{word} in {whole(count)}" for word, count in trends.most_common())
+        dp0 = from_to([each.dp0_MPa for each in tested], ".3g")
+        highest = from_to([each.highest_dp_MPa for each in tested], ".3g")
         lines.append(
-            f"{of}dP0 is {_from_to([each.dp0_MPa for each in tested])} MPa, the highest tested pressure drop "
-            f"{_from_to([each.highest_dp_MPa for each in tested])} MPa. Threshold over the pressure drop: {counts} "
-            "valves."
+            f"{of}dP0 is {dp0} MPa, the highest tested pressure drop {highest} MPa. Threshold over the pressure drop: "
+            f"{counts} valves."
         )
     return lines
-
-
-def _from_to(values: Sequence[float | None]) -> str:
-    known = [value for value in values if value is not None]
-    if not known:
-        return "not known"
-    low, high = f"{min(known):.3g}", f"{max(known):.3g}"
-    return low if low == high else f"{low} to {high}"
 
 
 def _far_section(spreads: Sequence[Spread]) -> Section:
@@ -143,7 +136,7 @@ def _far_section(spreads: Sequence[Spread]) -> Section:
         "by chance. No verdict: these valves are calibrated; look for a mix-up, a part, or the recording."
     )
     table = far_table(judged)
-    return Section(lines=(rule, *([] if table else ["No valve lies there."])), tables=(table,) if table else ())
+    return Section(lines=(rule,) if table else (rule, "No valve lies there."), tables=(table,))
 
 
 def _left_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
@@ -175,7 +168,7 @@ def _setting_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
         "setting leaves, at the worst pressure drop of its tests. The valves that hold the setting down are the "
         "lowest.", one_scale=True,
     )  # fmt: skip
-    return Section(lines=lines, figures=(figure,) if figure else (), tables=(holding_table(lot, setting),))
+    return Section(lines=lines, figures=(figure,), tables=(holding_table(lot, setting),))
 
 
 def _cost_line(spread: Spread) -> str:
@@ -209,22 +202,14 @@ def _without_lines(without: SettingOfOthers | None, count: int) -> list[str]:
 
 
 def _valves_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
-    table = valves_table(lot, {name for spread in spreads for name, _ in spread.far()})
-    return Section(
-        tables=(table,) if table else (),
-    )
+    return Section(tables=(valves_table(lot, {name for spread in spreads for name, _ in spread.far()}),))
 
 
 def _recordings_section(lot: Lot) -> Section:
     table = warnings_table(lot)
     odd = tuple(f"Odd: {text}." for text in (lot.summary.anomalies if lot.summary else ()))
-    if table is None:
-        none = ("No recording of a calibrated valve has a warning.",) if lot.calibrated else ()
-        return Section(lines=(*odd, *none))
-    return Section(
-        lines=odd,
-        tables=(table,),
-    )
+    none = ("No recording of a calibrated valve has a warning.",) if lot.calibrated and not table else ()
+    return Section(lines=(*odd, *none), tables=(table,))
 
 
 def _provenance_section(lot: Lot) -> Section:

@@ -135,13 +135,7 @@ def _is_text(column: str) -> bool:
 
 
 def read_table(content: bytes, source: str) -> list[TableRow]:
-    """Read valves.csv; a number is finite and of a size that a valve can have.
-
-    Raises
-    ------
-    InputError
-        If it is no such table; naming it by `source`.
-    """
+    """Read valves.csv; a number is finite and of a size that a valve can have."""
     try:
         reader = csv.reader(io.StringIO(content.decode("utf-8"), newline=""), strict=True)
         heading, *lines = [*reader] or [[]]

@@ -25,7 +25,7 @@ def acceptance_section(assessment: Assessment | None, reproduction: Reproduction
         "No acceptance table is here: `dzdesign assess` compares recordings with limits, `dzdesign reproduce` the "
         "paper's numbers."
     )
-    return Section(tables=tuple(tables), missing="" if tables else missing, optional=True)
+    return Section(tables=tables, missing="" if tables else missing, optional=True)
 
 
 def _paper_table(valve: str, rows: Sequence[PaperNumber]) -> Table:
