@@ -8,9 +8,9 @@ from dzdesign.report.figures.figure import ReportFigure, figure_style
 from dzdesign.report.lot.figures import spread_figure
 from dzdesign.report.lot.folder import Lot
 from dzdesign.report.lot.reasons import reason_groups
-from dzdesign.report.lot.setting_text import checked_line, span, untested_lines
-from dzdesign.report.lot.spread import EXTRA, FAR, FEWEST, TWENTY, Spread
-from dzdesign.report.lot.summary import Quantiles, SettingOfOthers
+from dzdesign.report.lot.setting_text import checked_line, cost_lines, cost_text, span, untested_lines
+from dzdesign.report.lot.spread import EXTRA, FAR, FEWEST, Spread
+from dzdesign.report.lot.summary import SettingOfOthers
 from dzdesign.report.lot.tables import (
     NAMED,
     failed_table,
@@ -152,13 +152,12 @@ def _setting_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
     if setting is None:
         return Section(missing=f"There is no lot setting: {lot.summary.why_no_lot_setting}.", optional=True)
     costs = [spread for spread in spreads if spread.quantity.column == EXTRA]
-    checked = checked_line(setting)
     lines = (
         "The largest offset that over-compensates none of the valves, certified for each of them "
         f"{span(*setting.dp_MPa)}, is in {setting.file}; its trend is that of {setting.carrier}.",
-        f"{checked[0].upper()}{checked[1:]}. The C made of the file is compared with all bounds by dzdesign verify.",
+        f"{_sentence(checked_line(setting))} The C made of the file is compared with all bounds by dzdesign verify.",
         *(f"{line}." for line in untested_lines(setting)),
-        *(_cost_line(spread) for spread in costs),
+        *map(_sentence, cost_lines(lot.summary)),
         f"It is held down by {and_more(setting.binding, NAMED)}.",
         *_without_lines(setting.without_binding, len(lot.calibrated)),
     )
@@ -171,18 +170,8 @@ def _setting_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
     return Section(lines=lines, figures=(figure,), tables=(holding_table(lot, setting),))
 
 
-def _cost_line(spread: Spread) -> str:
-    side = f"{spread.side.capitalize()} side: it" if spread.side else "It"
-    return (
-        f"{side} leaves more dead zone than each valve's own setting: {_three(spread.at, len(spread.values))} "
-        f"({spread.ends[1]})."
-    )
-
-
-def _three(at: Quantiles, count: int) -> str:
-    """Say a cost at the median valve, at one in twenty if there are so many, and at worst."""
-    twentieth = f"{at.q95:.2f} % at one in twenty, " if count >= TWENTY else ""
-    return f"{at.median:.2f} % of command at the median valve, {twentieth}{at.largest:.2f} % at worst"
+def _sentence(line: str) -> str:
+    return f"{line[0].upper()}{line[1:]}."
 
 
 def _without_lines(without: SettingOfOthers | None, count: int) -> list[str]:
@@ -196,7 +185,7 @@ def _without_lines(without: SettingOfOthers | None, count: int) -> list[str]:
         side = f" on the {column.partition('_')[0]} side" if column.startswith(("positive", "negative")) else ""
         lines.append(
             f"With settings of their own for {and_more(without.left_out, 5)}, the lot setting of the others would "
-            f"cost{side} {_three(at, count - len(without.left_out))}."
+            f"cost{side} {cost_text(at, count - len(without.left_out))}."
         )
     return lines
 
