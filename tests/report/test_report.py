@@ -592,8 +592,8 @@ def test_figures_of_two_sides_say_which_they_are_of(reports):
     [
         ({"positive": 1}, "at 1.00 MPa, the one pressure drop tested"),
         ({"positive": 6}, "the worst of 6 pressure drops"),
-        ({"positive": 2, "negative": 2}, "the worst of 2 pressure drops on each of 2 sides"),
-        ({"positive": 1, "negative": 1}, "the worse of both sides, each at one pressure drop"),
+        ({"positive": 2, "negative": 2}, "the worst of 2 pressure drops positive and 2 pressure drops negative"),
+        ({"positive": 1, "negative": 1}, "the worst of 1 pressure drop positive and 1 pressure drop negative"),
         ({"positive": 3, "negative": 1}, "the worst of 3 pressure drops positive and 1 pressure drop negative"),
     ],
 )

@@ -113,12 +113,12 @@ def _plant_line(loop: ClosedLoopResult) -> str:
 def plant_table(loop: ClosedLoopResult) -> Table | None:
     """Return the parameters of the closed loop's plant; from where to where, of one for each pressure drop."""
     plants = [asdict(loop.plant)] if loop.plant else [asdict(each.parameters) for each in loop.plants]
-    cells = []
-    for name in plants[0] if plants else ():
-        values = from_to([plant[name] for plant in plants], ".6g")
-        cells.append((Cell(text=name, kind="symbol"), in_number_font(values)))
-    if not cells:
+    if not plants:
         return None
+    cells = [
+        (Cell(text=name, kind="symbol"), in_number_font(from_to([plant[name] for plant in plants], ".6g")))
+        for name in plants[0]
+    ]
     half = -(-len(cells) // 2)  # in two columns, or they would take a page of paper
     right = [*cells[half:], (Cell(text=""), Cell(text=""))]
     of = "" if len(plants) == 1 else f", from the least to the largest of {len(plants)} pressure drops"
