@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
 from typing import Any, ForwardRef, ParamSpec, TypeVar, get_args
 
-from dzdesign.core.errors import InputError, nearest, quoted
+from dzdesign.core.errors import DzdesignError, InputError, nearest, quoted
 from dzdesign.core.options import Argument, arguments_of
 from dzdesign.terminal.progress import reporting
 
@@ -46,14 +46,24 @@ def with_keywords(declaration: Callable[P, A], stage: Callable[[A], R]) -> Calla
         bound = signature.bind(*args, **kwargs)
         for key, value in bound.arguments.items():
             bound.arguments[key] = _checked(declared[key], value)
-        with reporting(quiet=True, verbose=False):
-            return stage(declaration(*bound.args, **bound.kwargs))
+        try:
+            with reporting(quiet=True, verbose=False):
+                return stage(declaration(*bound.args, **bound.kwargs))
+        except DzdesignError as error:
+            raise type(error)(_in_keywords(str(error), declared)) from error
 
     plain = [each.replace(annotation=_plain(each.annotation)) for each in signature.parameters.values()]
     result = inspect.signature(stage).return_annotation
     call.__signature__ = inspect.Signature(plain, return_annotation=result)  # type: ignore[attr-defined]
     call.__doc__ = SECTION.sub(lambda found: _parameters(declared, found[1]) + found[0], stage.__doc__ or "", count=1)
     return call
+
+
+def _in_keywords(message: str, declared: Mapping[str, Argument]) -> str:
+    """Return a message with options as keywords: stages name them as the command line does, by which most call them."""
+    keywords = {argument.flag: argument.name for argument in declared.values()}
+    keywords |= {argument.option.short: argument.name for argument in declared.values() if argument.option.short}
+    return re.sub(r"(?<![\w-])--?[a-z][\w-]*", lambda found: keywords.get(found[0], found[0]), message)
 
 
 def _plain(annotation: Any) -> Any:

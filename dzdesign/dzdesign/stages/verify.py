@@ -47,13 +47,6 @@ class VerifyArguments:
 def verify(arguments: VerifyArguments, plant_source: str = "") -> "Verification":
     """Verify a firmware: every input against the exact law, then the closed loop; needs a C compiler.
 
-    Parameters
-    ----------
-    arguments : VerifyArguments
-        Of the stage.
-    plant_source : str
-        How the evidence calls the plant; by default the name of its file.
-
     Raises
     ------
     InputError
@@ -69,16 +62,18 @@ def verify(arguments: VerifyArguments, plant_source: str = "") -> "Verification"
 
     if arguments.output is not None:
         check_folder_may_be_written(Path(arguments.output), SCHEMA)
-    plant_path = None if arguments.plant is None else Path(arguments.plant)
-    plant = read_plant(plant_path, say) if plant_path else None
-    digest = sha256_of(read_bytes(plant_path, "plant file")) if plant_path else None
+    plant, digest = None, None
+    if arguments.plant is not None:
+        plant = read_plant(Path(arguments.plant), say)
+        digest = sha256_of(read_bytes(Path(arguments.plant), "plant file"))
+        plant_source = plant_source or Path(arguments.plant).name  # how the evidence calls the plant
     tolerances = read_tolerances(Path(arguments.tolerances)) if arguments.tolerances is not None else None
     with _firmware_folder(arguments.firmware) as folder:
         ware = arguments.c2000ware
         added = [check_against_c2000ware(folder, Path(ware), say)] if ware is not None else []
         with stage_progress() as stage:
             verification = verify_folder(
-                folder, plant, plant_source or (plant_path.name if plant_path else ""), digest, tolerances=tolerances,
+                folder, plant, plant_source, digest, tolerances=tolerances,
                 include=[Path(place) for place in paths_of(arguments.include)], say=stage, watch=stage.each,
             )  # fmt: skip
         verification = with_regenerated(verification, folder)

@@ -75,26 +75,19 @@ def print_scenarios(scenarios: "Sequence[ScenarioResult]", console: "Console") -
             put_line(console, f"{each.name}: {_figures(each.figures)}")
 
 
-#: How a figure's name begins -> of which valve it is.
-VALVES = {"compensated_": "with the compensator ", "direct_": "without it "}
+#: How a figure's name begins -> of which valve it is; and how it ends -> its unit.
+VALVES = {"compensated_": "with the compensator ", "direct_": "without it ", "": ""}
+UNITS = {"_L_min": " L/min", "_MPa": " MPa", "_ms": " ms", "_mL": " mL", "_percent": " %", "": ""}
 
 
 def _figures(figures: "Mapping[str, float]") -> str:
-    """Return figures as words, those of one valve together."""
-    groups = {
-        words: [_figure(key.removeprefix(start), value) for key, value in figures.items() if key.startswith(start)]
-        for start, words in VALVES.items()
-    }
-    groups[""] = [_figure(key, value) for key, value in figures.items() if not key.startswith(tuple(VALVES))]
-    return "; ".join(words + ", ".join(each) for words, each in groups.items() if each)
-
-
-def _figure(key: str, value: float) -> str:
-    """Return a figure whose name ends in its unit as words: rise_ms is a rise in ms."""
-    for ending, unit in (("_L_min", "L/min"), ("_MPa", "MPa"), ("_ms", "ms"), ("_mL", "mL"), ("_percent", "%")):
-        if key.endswith(ending):
-            return f"{key.removesuffix(ending).replace('_', ' ')} {value:.3g} {unit}"
-    return f"{key} {value:.3g}"
+    """Return figures as words, those of one valve together: rise_ms is a rise in ms."""
+    groups: dict[str, list[str]] = {start: [] for start in VALVES}
+    for key, value in figures.items():
+        start, end = next(filter(key.startswith, VALVES)), next(filter(key.endswith, UNITS))
+        name = key.removeprefix(start).removesuffix(end).replace("_", " ")
+        groups[start].append(f"{name} {value:.3g}{UNITS[end]}")
+    return "; ".join(VALVES[start] + ", ".join(each) for start, each in groups.items() if each)
 
 
 def print_scatter(series: "MonteCarlo", console: "Console") -> None:
