@@ -14,12 +14,6 @@ from dzdesign.core.errors import InputError, quoted
 if TYPE_CHECKING:
     from dzdesign.design.firmware_manifest import FirmwareManifest
     from dzdesign.verify.requirements import Check
-    from dzdesign.verify.verification import Verification
-
-
-def with_regenerated(verification: "Verification", folder: Path) -> "Verification":
-    """Return a verification with the check of `regenerated`."""
-    return verification.with_checks(regenerated(folder))
 
 
 def regenerated(folder: Path) -> "Check":

@@ -52,7 +52,7 @@ def verify(arguments: VerifyArguments, plant_source: str = "") -> "Verification"
     InputError
         If a file can't be read, or there is no C compiler. A requirement that does not hold is no error: see ``holds``.
     """
-    from dzdesign.regeneration import with_regenerated
+    from dzdesign.regeneration import regenerated
     from dzdesign.report.valve_report import with_report
     from dzdesign.verify.closed_loop.plant import read_plant
     from dzdesign.verify.closed_loop.tolerances import read_tolerances
@@ -76,9 +76,8 @@ def verify(arguments: VerifyArguments, plant_source: str = "") -> "Verification"
                 folder, plant, plant_source, digest, tolerances=tolerances,
                 include=[Path(place) for place in paths_of(arguments.include)], say=stage, watch=stage.each,
             )  # fmt: skip
-        verification = with_regenerated(verification, folder)
         more, mutants = _further_checks(arguments, folder, verification)
-        verification = verification.with_checks(*added, *more)
+        verification = verification.with_checks(regenerated(folder), *added, *more)
         if mutants:
             verification = replace(verification, evidence=replace(verification.evidence, mutants=mutants))
         if arguments.output is not None:

@@ -34,6 +34,8 @@ def print_verification(verification: "Verification", console: "Console | None" =
     if verification.evidence.monte_carlo:
         print_scatter(verification.evidence.monte_carlo, console)
     put_line(console, verification.verdict)
+    if verification.evidence.mutants:
+        print_firmware_mutants(verification.evidence.mutants, console)
 
 
 def _put_closed_loop(console: "Console", verification: "Verification") -> None:
@@ -143,9 +145,8 @@ def print_demo(valve: "ValveModel", verification: "Verification", folder: str) -
     put_line(console, f"Artefacts: {folder}")
 
 
-def print_firmware_mutants(score: "MutationScore") -> None:
+def print_firmware_mutants(score: "MutationScore", console: "Console") -> None:
     """Print what of the wrong C was not killed, and why."""
-    console = new_console()
     put_line(console, f"Mutants that were not killed; equivalent: {score.equivalent_means}")
     for each in score.not_killed:
         put_line(console, f"{each.verdict}, {each.file} line {each.line}: {each.change}")
