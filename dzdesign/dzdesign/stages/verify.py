@@ -118,17 +118,11 @@ def _further_checks(
             checks.append(proof_check(folder))
     if not arguments.mutate:
         return checks, None
-    from dzdesign.verify.analysis.mutation import (
-        MutationBench,
-        all_mutants,
-        judge_all,
-        mutation_check,
-        mutation_score,
-    )
+    from dzdesign.verify.analysis import mutation
 
-    bench = MutationBench(folder)
-    mutants = all_mutants(bench)
+    bench = mutation.MutationBench(folder)
+    mutants = mutation.all_mutants(bench)
     say(f"checking the core with {len(mutants)} faults, one at a time")
     bench.check_original()
-    found = mutation_score(judge_all(bench, mutants, lambda work: with_bar(work, "mutants")))
-    return [*checks, mutation_check(found)], found
+    found = mutation.mutation_score(mutation.judge_all(bench, mutants, lambda work: with_bar(work, "mutants")))
+    return [*checks, mutation.mutation_check(found)], found
