@@ -19,11 +19,8 @@ if TYPE_CHECKING:
 def regenerated(folder: Path) -> "Check":
     """Tell whether every file is what `codegen` makes of compensator.json, but for those that are the user's.
 
-    Returns
-    -------
-    Check
-        Not checked where another version of dzdesign generated the firmware, or one with other targets: then nothing
-        tells an edited file from a generated one, so the firmware does not hold.
+    It is not checked where another version of dzdesign generated the firmware, or one with other targets: then nothing
+    tells an edited file from a generated one, so the firmware does not hold.
     """
     from dzdesign.codegen.project import generate
     from dzdesign.verify.firmware.folder import read_compensator, read_firmware_manifest

@@ -29,8 +29,6 @@ FIRST_FRAME_S = 3.0
 #: The longest that a look at the line takes: Ctrl-C is noticed after it.
 LOOK_S = 0.1
 POSITIVE = (0.0, 1e9)
-
-
 EXAMPLES = ("dzdesign monitor COM5 --firmware firmware --seconds 100 -o ramp.csv",)
 
 

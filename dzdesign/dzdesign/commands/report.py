@@ -16,8 +16,10 @@ def run(arguments: Arguments, json: bool) -> int:
     """Make report.html; 1 if a requirement does not hold or was not checked, or the files do not belong together."""
     output = arguments.output or _beside_evidence(Path(arguments.folder))
     made = report(replace(arguments, output=output))
-    for line in (*(f"missing: {each}" for each in made.missing), *(f"does not fit: {each}" for each in made.faults)):
-        say(line)
+    for line in made.missing:
+        say(f"missing: {line}")
+    for line in made.faults:
+        say(f"does not fit: {line}")
     if json:
         verdict = {"holds": made.holds, "verdict": made.verdict}
         print_json({"report": str(output), **verdict, "faults": made.faults, "missing": made.missing})
