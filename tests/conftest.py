@@ -85,7 +85,7 @@ def reported_demo(example_valve, tmp_path_factory):
     from dzdesign.codegen.project import generate
     from dzdesign.core.artefact_types import to_json_bytes
     from dzdesign.design.designing import design
-    from dzdesign.regeneration import with_regenerated
+    from dzdesign.regeneration import regenerated
     from dzdesign.report.valve_report import with_report
     from dzdesign.verify.closed_loop.loop import RampSequence
     from dzdesign.verify.verification import evidence_files, evidence_manifest, verify
@@ -99,7 +99,7 @@ def reported_demo(example_valve, tmp_path_factory):
     firmware = generate(compensator, "f28335", compensator_json.encode())
     write_folder(folder / "firmware", firmware.files, firmware.manifest)
     evidence = verify(folder / "firmware", sequence=RampSequence(rest=0.5, ramp=10.0, top=0.5))
-    evidence = with_regenerated(evidence, folder / "firmware")
+    evidence = evidence.with_checks(regenerated(folder / "firmware"))
     files = with_report(evidence_files(evidence), folder / "firmware", folder / "evidence")
     write_folder(folder / "evidence", files, evidence_manifest(evidence.evidence))
     return folder

@@ -14,7 +14,7 @@ from dzdesign.core.artefact_files import MANIFEST_NAME, to_json, write_folder
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.designing import design
-from dzdesign.regeneration import with_regenerated
+from dzdesign.regeneration import regenerated
 from dzdesign.report.valve_report import REPORT_NAME, report_of_folder, with_report
 from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.firmware import compilation
@@ -333,7 +333,7 @@ def test_an_earlier_target_that_is_replaced_is_said_so(compensator, cortex, tmp_
 @pytest.mark.slow
 def test_verify_holds_and_says_that_it_was_not_checked(cortex, tmp_path):
     fill_in(cortex)
-    result = with_regenerated(verify(cortex, sequence=RampSequence(rest=0.5, ramp=4.0, top=0.5)), cortex)
+    result = verify(cortex, sequence=RampSequence(rest=0.5, ramp=4.0, top=0.5)).with_checks(regenerated(cortex))
     assert result.holds and result.evidence.changed_board_files == ("cortex_m4/dz_board.c",)
     said = "cortex_m4/dz_board.c, which is yours and was changed: review it, and try it on the machine"
     assert said in not_tried(result.evidence)

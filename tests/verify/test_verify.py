@@ -12,7 +12,7 @@ import pytest
 
 from dzdesign.core.artefact_files import to_json, write_folder
 from dzdesign.core.errors import InputError
-from dzdesign.regeneration import with_regenerated
+from dzdesign.regeneration import regenerated
 from dzdesign.verify.closed_loop import motion
 from dzdesign.verify.closed_loop.dead_zone import dead_zone
 from dzdesign.verify.closed_loop.loop import PERIODS_PER_RECORD, ClosedLoop, RampSequence
@@ -346,7 +346,7 @@ def test_closed_loop_removes_the_dead_zone_and_without_beta_leaks(firmware_folde
     from dzdesign.verify.closed_loop.plant import read_plant
 
     result = verify(firmware_folder, read_plant(example_folder / "plant.toml"), sequence=QUICK)
-    assert with_regenerated(result, firmware_folder).holds
+    assert result.with_checks(regenerated(firmware_folder)).holds
     for loop in result.loops:
         # The quick ramp lags by some tens of millivolts.
         assert loop.result.dead_zone_opening > 0.5
@@ -396,4 +396,4 @@ def test_a_span_that_ends_at_the_tested_pressure_can_be_verified(example_valve, 
     options = options_of({"pressure_span": "5.1 MPa"}, target_named("f28335").inputs())
     firmware = generate(design(example_valve, options), "f28335")
     write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
-    assert with_regenerated(verify(tmp_path / "fw", sequence=QUICK), tmp_path / "fw").holds
+    assert verify(tmp_path / "fw", sequence=QUICK).with_checks(regenerated(tmp_path / "fw")).holds
