@@ -262,22 +262,22 @@ class Evidence(Artefact):
     mutants: Annotated[MutationScore | None, about("Wrong versions of the C, where --mutate was given.")]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "holds", all(check.holds for check in (*self.checks, *self.without_check)))
+        object.__setattr__(self, "holds", all(check.holds for check in self.all_checks))
 
     @property
-    def without_check(self) -> tuple[Check, ...]:
-        """What every `verify` checks and is not here, as not checked; none where a failure kept it from being tried."""
+    def all_checks(self) -> tuple[Check, ...]:
+        """The checks, and as not checked what every `verify` checks and is not here, unless a failure is the reason."""
         if any(check.holds is False for check in self.checks):
-            return ()
+            return self.checks
         tried = {check.id for check in self.checks}
         text = "the evidence has no check of it; make it again with `dzdesign verify`"
-        return tuple(each.check(holds=None, text=text) for each in ALWAYS if each.id not in tried)
+        return (*self.checks, *(each.check(holds=None, text=text) for each in ALWAYS if each.id not in tried))
 
     @property
     def verdict(self) -> str:
         """One sentence: what does not hold stands before what could not be checked."""
         missed = [check.name for check in self.checks if check.holds is False]
-        unknown = [check.name for check in (*self.checks, *self.without_check) if check.holds is None]
+        unknown = [check.name for check in self.all_checks if check.holds is None]
         parts = [f"{DOES_NOT_HOLD}: {', '.join(missed)}"] if missed else []
         parts += [f"{NOT_CHECKED}: {', '.join(unknown)}"] if unknown else []
         return "; ".join(parts) or "Every requirement holds."
