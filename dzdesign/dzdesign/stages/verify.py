@@ -83,7 +83,8 @@ def verify(arguments: VerifyArguments, plant_source: str = "") -> "Verification"
         if arguments.output is not None:
             output = Path(arguments.output)
             manifest = evidence_manifest(verification.evidence)
-            write_folder(output, with_report(evidence_files(verification), folder, output), manifest)
+            files = with_report(evidence_files(verification), folder, output, verification.derived)
+            write_folder(output, files, manifest)
     return verification
 
 
