@@ -188,10 +188,10 @@ def test_a_fault_in_a_later_piece_is_found_in_its_row(tmp_path, monkeypatch, spo
     assert words.replace("row 26", "row 28" if before else "row 26") in str(caught.value)
 
 
-def test_a_short_row_is_not_made_up_for_by_a_long_one(tmp_path):
+def test_a_short_row_is_not_made_up_for_by_a_long_one(tmp_path, wording):
     rows = ["0,1,2,", "1,2"]  # as many separators as two rows should have
     (tmp_path / "a.csv").write_text("\n".join(["time_s,u_V,Q_Lmin", *(["0,1,2"] * 30), *rows]))
-    with pytest.raises(InputError, match=r"row 32 has 4 cells, expected 3"):
+    with wording.refusal(InputError):
         read_ramp_file(tmp_path / "a.csv")
 
 
