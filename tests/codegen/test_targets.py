@@ -122,15 +122,15 @@ def test_list_targets_is_a_line_each(capsys):
 
 
 @pytest.mark.parametrize("command", [["design", str(VALVE)], ["codegen", str(VALVE)]])
-def test_a_wrong_target_names_the_nearest_and_writes_nothing(command, tmp_path, capsys):
+def test_a_wrong_target_names_the_nearest_and_writes_nothing(command, tmp_path, capsys, wording):
     assert main([*command, "--target", "cortex-m3", "-o", str(tmp_path / "out")]) == 2
-    assert "did you mean 'cortex-m4'?" in capsys.readouterr().err
+    wording.of_test(capsys.readouterr().err)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_codegen_without_a_source_says_so(capsys):
+def test_codegen_without_a_source_says_so(capsys, wording):
     assert main(["codegen"]) == 2
-    assert "COMPENSATOR.json" in capsys.readouterr().err
+    wording.of_test(capsys.readouterr().err)
 
 
 @pytest.mark.slow
