@@ -81,30 +81,31 @@ def test_a_difference_of_unlike_sensors_stands_for_every_drop_that_makes_it(sign
         assert counted <= signals.largest_difference(sign)
 
 
-WRONG = [
-    "10 V", "0..10 V", "10..0 V x 0.3", "-10..8 V x 0.15 + 1.5 V", "0..10 bar x 0.3", "4..20 mA x 0.3", "0..10 V x 0",
-]  # fmt: skip
-
-
-@pytest.mark.parametrize("text", WRONG)
+@pytest.mark.parametrize(
+    "text",
+    ["10 V", "0..10 V", "10..0 V x 0.3", "-10..8 V x 0.15 + 1.5 V", "0..10 bar x 0.3", "4..20 mA x 0.3", "0..10 V x 0"],
+)
 def test_a_command_that_cannot_be(text, wording):
-    with wording.refusal(InputError):
+    with pytest.raises(InputError) as caught:
         command(text)
+    wording(f"a signal: {text}", str(caught.value))
 
 
 def test_a_pressure_signal_may_not_start_below_zero(wording):
-    with wording.refusal(InputError):
+    with pytest.raises(InputError) as caught:
         sensor("-1..1 V + 1 V")
+    wording("a signal: pressure below zero", str(caught.value))
 
 
 def test_sensors_too_unlike_are_refused(wording):
-    with wording.refusal(InputError):
+    with pytest.raises(InputError) as caught:
         Signals(
             pressure_a=sensor("0..3 V = 1 MPa"),
             pressure_b=sensor("4..20 mA on 150 ohm = 60 MPa"),
             swapped=True,
             command=command("-10..10 V x 0.15 + 1.5 V"),
         )
+    wording("a signal: sensors too unlike", str(caught.value))
 
 
 def test_the_integers_of_the_drive_functions():

@@ -68,7 +68,8 @@ class Wording:
     def __call__(self, name: str, text: str) -> None:
         """Fail unless `text` is what is kept under `name`; a hash, which hangs on last digits, is not kept."""
         text = text.replace(str(self._folder), "FOLDER").replace(str(self._folder.parent), "FOLDERS").rstrip("\n")
-        text = HASH.sub("HASH", text)
+        # A NUL, in a name that can't be one, would make the file binary for git.
+        text = HASH.sub("HASH", text).replace("\0", "\\0")
         messages = read_messages(self._path)
         if self._update:
             write_messages(messages | {name: text}, self._path)

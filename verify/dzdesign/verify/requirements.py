@@ -22,20 +22,13 @@ class Check:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Requirement:
-    """One requirement.
+    """One requirement."""
 
-    Attributes
-    ----------
-    id : str
-        Short name, the same in every version.
-    title : str
-        What is required.
-    how : str
-        What to do to have it checked; a command stands in backticks.
-    """
-
+    #: The same in every version.
     id: str
+    #: What is required.
     title: str
+    #: What to do to have it checked; a command stands in backticks.
     how: str = "`verify`"
 
     def check(self, *, holds: bool | None, text: str, name: str = "") -> Check:

@@ -13,7 +13,7 @@ from dzdesign.verify.closed_loop.loop_checks import loop_checks
 from dzdesign.verify.closed_loop.plant import Plant, plants_from_tests
 from dzdesign.verify.closed_loop.scenarios import Scene, run_scenarios
 from dzdesign.verify.closed_loop.tolerances import Tolerances, monte_carlo, scatter
-from dzdesign.verify.evidence import IdentifiedPlant, MonteCarlo, PressureResult, ScenarioResult, Side
+from dzdesign.verify.evidence import ClosedLoopResult, IdentifiedPlant, MonteCarlo, ScenarioResult, Side
 from dzdesign.verify.requirements import Check
 
 #: Shows how far a stage is: pieces and their number in, the pieces out.
@@ -33,10 +33,15 @@ class FirmwareLoop:
     scenarios: tuple[ScenarioResult, ...] = ()
     monte_carlo: MonteCarlo | None = None
 
-    @property
-    def ramps(self) -> tuple[PressureResult, ...]:
-        """What was read from the ramps, one entry a side and pressure drop."""
-        return tuple(loop.result for loop in self.loops)
+    def result(self, plant: Plant | None, source: str, sha256: str | None) -> ClosedLoopResult:
+        """Return what the evidence has of the ramps and of the plant, given from a file or made from the thresholds."""
+        return ClosedLoopResult(
+            plant=plant,
+            plant_source=source or "made from the identified thresholds",
+            plant_sha256=sha256,
+            plants=() if plant else self.plants,
+            pressures=tuple(loop.result for loop in self.loops),
+        )
 
 
 def scenes_of(folder: Path, compensator: Compensator, plant: Plant | None) -> tuple[Scene, ...]:
