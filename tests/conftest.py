@@ -12,7 +12,7 @@ import pytest
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.example import example_folder as bundled_folder
 from dzdesign.identify.reading.ramp_files import read_ramp_file
-from tests.support.wording import Wording
+from tests.support.wording import Wording, name_of_tests
 
 
 def pytest_addoption(parser):
@@ -28,8 +28,11 @@ def page_of_a_file(monkeypatch):
 
 @pytest.fixture
 def wording(request, tmp_path) -> Wording:
-    """Compare whole messages with tests/goldens/messages.txt: `wording("group: case", text)`."""
-    return Wording(request.config.getoption("--update-goldens"), tmp_path)
+    """Compare whole messages with those kept: `wording("group: case", text)`, `with wording.refusal(Error):`."""
+    node = request.node
+    case = f" [{node.callspec.id}]" if hasattr(node, "callspec") else ""
+    test = f"{name_of_tests(node.path.stem)}: {name_of_tests(node.originalname)}{case}"
+    return Wording(request.config.getoption("--update-goldens"), tmp_path, test=test)
 
 
 @pytest.fixture(scope="session")
