@@ -1,6 +1,5 @@
 """What `dzdesign batch` prints: counts, spread, the cost of the lot setting, and why valves failed."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from dzdesign.core.errors import and_more
@@ -27,7 +26,8 @@ def print_lot(summary: LotSummary, folder: Path, report: Path | None) -> None:
         put_line(console, line)
     warned = sorted(summary.warnings.items(), key=lambda item: len(item[1]))
     if warned:
-        put_line(console, "warnings: " + ", ".join(_warned(code, names) for code, names in warned))
+        few = {code: f" ({', '.join(names)})" if len(names) <= NAMED else "" for code, names in warned}  # where to look
+        put_line(console, "warnings: " + ", ".join(f"{code} {len(names)}{few[code]}" for code, names in warned))
     for each in summary.failed:
         put_line(console, f"{each.status}  {each.name}: {each.reason}")
     for line in summary.anomalies:
@@ -43,11 +43,6 @@ def _in_words(column: str) -> str:
     """Return a column's name with its unit in brackets."""
     name, _, unit = column.rpartition("_")
     return f"{name.replace('_', ' ')} ({UNITS[unit]})" if unit in UNITS else column.replace("_", " ")
-
-
-def _warned(code: str, names: Sequence[str]) -> str:
-    """Return a code with how many valves have it; a few are named, for those are where to look."""
-    return f"{code} {len(names)}" + (f" ({', '.join(names)})" if len(names) <= NAMED else "")
 
 
 def _setting_lines(summary: LotSummary) -> list[str]:

@@ -50,10 +50,8 @@ def find_compilers() -> tuple[str, ...]:
     Each as a person would write it: a path, or with $CC words such as ``ccache gcc``.
     """
     wanted = (_found(name) for name in (os.environ.get("CC"), "cc", "gcc", "clang") if name)
-    found = {compiler: None for compiler in wanted if compiler}
-    if not found and (zig := find_zig()):
-        found = {zig: None}
-    return tuple(found)
+    found = tuple(dict.fromkeys(compiler for compiler in wanted if compiler))
+    return found or ((zig,) if (zig := find_zig()) else ())
 
 
 def _found(name: str) -> str | None:
