@@ -32,11 +32,6 @@ def chain_of(
     a stranger's, named and no fault. Evidence that `verify`
     has made this moment is not `sealed`: no manifest states its hash yet, and its own verdict stands whatever else lies
     there.
-
-    Raises
-    ------
-    InputError
-        If there are two pieces of evidence, or no artefact can be read.
     """
     return _Search(files, asked, sealed, known or {}).chain()
 

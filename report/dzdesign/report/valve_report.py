@@ -29,11 +29,6 @@ OF_A_VALVE = ("data", "thresholds", "beta", "loop")
 
 def report_of_folder(folder: Path) -> Report:
     """Make the report of an artefact folder: of demo, evidence or firmware, or with valve.json or compensator.json.
-
-    Raises
-    ------
-    InputError
-        If there is nothing to report, or an artefact is none.
     """
     return make_report(chain_of(read_artefact_folder(folder), asked=asked_prefixes(folder)))
 
