@@ -3,6 +3,7 @@
 Where a machine has no compiler, Zig's serves: a clang with its own headers and linker, in the wheel `ziglang`.
 """
 
+import atexit
 import ctypes
 import importlib.util
 import logging
@@ -35,13 +36,11 @@ logger = logging.getLogger(__name__)
 
 
 @cache
-def _build_folder() -> tempfile.TemporaryDirectory[str]:
-    return tempfile.TemporaryDirectory(prefix="dzdesign-", ignore_cleanup_errors=True)
-
-
 def build_folder() -> Path:
     """Return the folder that everything is built in; it goes when the process ends."""
-    return Path(_build_folder().name)
+    folder = tempfile.mkdtemp(prefix="dzdesign-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return Path(folder)
 
 
 def find_compilers() -> tuple[str, ...]:
