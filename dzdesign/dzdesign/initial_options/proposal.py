@@ -238,10 +238,6 @@ def _rendered(**content: object) -> str:
         lstrip_blocks=True,
         finalize=lambda value: one_line(str(value)),  # labels come from the recordings
     )
-    environment.filters["quoted"] = _quoted
+    # A string of TOML: as in JSON, and without DEL.
+    environment.filters["quoted"] = lambda text: json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
     return str(environment.get_template("dzdesign.toml.jinja").render(check_dp=CHECK_DP, **content))
-
-
-def _quoted(text: str) -> str:
-    """Return a string of TOML: as in JSON, and without DEL."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -74,9 +74,8 @@ def read_recordings(
     from dzdesign.identify.reading.column_labels import parse_columns
     from dzdesign.identify.reading.ramp_files import read_ramp_file
 
-    chosen, skipped = parse_columns(columns) if columns else {}, None
-    if skip_rows is not None:
-        skipped = read_skip_rows(skip_rows, "--skip-rows")
+    chosen = parse_columns(columns) if columns else {}
+    skipped = None if skip_rows is None else read_skip_rows(skip_rows, "--skip-rows")
     paths = expand(patterns)
     names = distinct_names(paths)
     tests = [
