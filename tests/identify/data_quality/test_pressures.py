@@ -9,8 +9,8 @@ import pytest
 from dzdesign.core.errors import InputError
 from dzdesign.identify.data_quality.catalogue import catalogue
 from dzdesign.identify.data_quality.pressures import about_mixtures
-from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
+from tests.support.repeatable_valves import REPEATABLE, identify
 from tests.support.synthetic import MPA, Truth, synthetic_ramp
 
 #: Bounds of a mixture lie volts below its knees; at this confidence they are below zero.
@@ -35,7 +35,7 @@ def scattering(test, seed=0):
     return replace(test, dp=np.round(test.dp / MPA + 0.01 * noise, 4) * MPA)
 
 
-def warned(tests, code, options=IdentifyOptions()):
+def warned(tests, code, options=REPEATABLE):
     return [warning for warning in identify(tests, options).warnings if warning.code == code]
 
 

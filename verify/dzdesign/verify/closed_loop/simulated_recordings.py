@@ -17,7 +17,6 @@ from dzdesign.verify.closed_loop.loop import RECORD_S, ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.firmware.folder import check_firmware_inside, read_compensator
 
-
 #: Beginning of a series, in its time stamps; any day serves, and the same day gives the same bytes.
 SERIES_BEGINS = datetime.datetime(2026, 1, 1, 8)
 #: Between two ramps of a series: the pressure is set, s.
@@ -60,6 +59,9 @@ class Series:
             raise InputError(f"{self.repeats} ramps at each pressure drop were asked for, expected 1 to {MOST_REPEATS}")
 
 
+ONE_OF_EACH = Series()
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulationManifest(Artefact):
     """A folder of simulated ramp tests; made from the compensator of the firmware that drove the valve, if any."""
@@ -71,7 +73,7 @@ class SimulationManifest(Artefact):
     simulated: Annotated[Literal[True], Meta(description="No measurement.")] = True
     plant: Annotated[Plant, Meta(description="The valve.")]
     bench: Annotated[Bench, Meta(description="What recorded it.")]
-    series: Annotated[Series, Meta(description="How often, and how well it repeats.")] = Series()
+    series: Annotated[Series, Meta(description="How often, and how well it repeats.")] = ONE_OF_EACH
 
 
 def simulate_ramp(
@@ -81,7 +83,7 @@ def simulate_ramp(
     bench: Bench,
     sequence: RampSequence,
     mode: str = "direct",
-    series: Series = Series(),
+    series: Series = ONE_OF_EACH,
     number: int = 1,
 ) -> dict[str, np.ndarray]:
     """Record one ramp test of the plant, without compensator ("direct") or with it ("compensated").
@@ -124,7 +126,7 @@ def simulated_files(
     bench: Bench,
     say: Callable[[str], None],
     firmware: Path | None = None,
-    series: Series = Series(),
+    series: Series = ONE_OF_EACH,
 ) -> tuple[dict[str, bytes], SimulationManifest]:
     """Simulate ramp tests, up and down, at each pressure drop; with a firmware folder, of the compensated valve.
 
