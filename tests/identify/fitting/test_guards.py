@@ -17,13 +17,13 @@ from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import DesignOptions, design
-from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes
 from dzdesign.identify.side import identify_side
 from dzdesign.identify.valve.guard_curve import GUARDS
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.staircase import staircase
+from tests.support.repeatable_valves import REPEATABLE, identify
 from tests.support.synthetic import L_MIN, MPA, Truth, needs_compiler, synthetic_ramp
 
 PRESSURES = (0.5, 1.0, 2.0, 4.0)
@@ -58,7 +58,7 @@ def falling_only(test):
 
 def fitted(tests):
     """Return the positive side as it was fitted, before it is rounded for valve.json."""
-    return identify_side(tests, IdentifyOptions()).model
+    return identify_side(tests, REPEATABLE).model
 
 
 def offset_at(curve, dp):

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_files import read_ramp_file
+from tests.support.repeatable_valves import identify
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
 
 

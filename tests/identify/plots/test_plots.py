@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from dzdesign.command_line.cli import main
-from dzdesign.identify.identification import identify_sides
 from dzdesign.identify.plots.frame import plot_style, pressure_names
 from dzdesign.identify.plots.valve_plots import MOST_POINTS, RESIDUAL_EDGE, draw_figures, plot_files
+from tests.support.repeatable_valves import identify_sides
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
 
 PRESSURES = (0.5, 1.0, 4.0)

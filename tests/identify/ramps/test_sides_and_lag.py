@@ -12,10 +12,10 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import as_document, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.designing import design
-from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes
 from dzdesign.identify.valve.model import ValveModel
+from tests.support.repeatable_valves import identify
 from tests.support.synthetic import L_MIN, MPA, Truth, synthetic_ramp
 
 PRESSURES = (1.0, 2.0, 4.0)

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import as_document, to_json_bytes
 from dzdesign.core.errors import InputError
-from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.splitting import split_ramps
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes, read_ramp_file
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.model import ValveModel
+from tests.support.repeatable_valves import identify
 from tests.support.synthetic import MPA, Truth, synthetic_ramp
 
 laws = settings(

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading import thinning
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes, read_ramp_file
@@ -19,6 +18,7 @@ from dzdesign.identify.reading.text import table_reader
 from dzdesign.identify.reading.thinning import thin
 from tests.identify.reading.test_dirty_recordings import changed, jittered, spiked, staircase
 from tests.identify.reading.test_ramp_files import assert_is_the_ramp, table
+from tests.support.repeatable_valves import identify
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
 
 LIMIT = 21_000

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.identification import identify
 from dzdesign.identify.reading.missing_values import PLACEHOLDERS, describe_placeholders, without_placeholders
 from dzdesign.identify.reading.ramp_files import read_ramp_file
 from tests.dzdesign.command_line.test_bad_input import csv, ramp
+from tests.support.repeatable_valves import identify
 
 COLUMNS = {"time_s": 0, "u_V": 1, "dP_MPa": 2, "Q_Lmin": 3}
 LOST = slice(350, 360)
