@@ -11,7 +11,7 @@ import sys
 import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import corpus_plant as plant
@@ -105,7 +105,8 @@ def _misread(case: Case, sides) -> Iterator[str]:
                     continue
                 off = knee - known[branch]
                 if se > LARGEST_SE_V or abs(off) > max(TOLERANCE_V, TOLERANCE_SE * se):
-                    yield f"{branch} knee at {test.dp_MPa:.3f} MPa, {name}: off by {1e3 * off:+.0f} mV (se {1e3 * se:.1f})"
+                    at = f"{test.dp_MPa:.3f} MPa, {name}"
+                    yield f"{branch} knee at {at}: off by {1e3 * off:+.0f} mV (se {1e3 * se:.1f})"
 
 
 def cases() -> list[Case]:
@@ -113,7 +114,10 @@ def cases() -> list[Case]:
     return [case for kind in KINDS for case in kind()]
 
 
-def _one(kind: str, name: str, command=ramp(), supply=steady(), **changes) -> Case:
+ONCE, AT_1_MPa = ramp(), steady()
+
+
+def _one(kind: str, name: str, command=ONCE, supply=AT_1_MPa, **changes) -> Case:
     """Return a case of one recording; what is a field of `Bench` goes there."""
     of_bench = {key: changes.pop(key) for key in list(changes) if key in Bench.__dataclass_fields__}
     return Case(name=name, kind=kind, benches=(Bench(command=command, supply=supply, **of_bench),), **changes)

@@ -8,6 +8,7 @@ sensors have noise and a converter's steps. A recording is the text that a logge
 import datetime
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -140,7 +141,7 @@ def levels(*at: tuple[float, float], settles_s: float = 0.4) -> Supply:
 
     def supply(time: np.ndarray) -> np.ndarray:
         dp = np.full(time.size, at[0][1])
-        for (_, before), (start, level) in zip(at, at[1:], strict=False):
+        for (_, before), (start, level) in pairwise(at):
             dp += (level - before) * (1 - np.exp(-np.maximum(time - start, 0) / settles_s))
         return dp
 
