@@ -1,4 +1,4 @@
-"""Reference text that is made when the pages are built: commands, files and API, each from its one source."""
+"""Reference text that is made when the pages are built: commands, files, warnings and API, each from its one source."""
 
 import importlib
 import inspect
@@ -9,6 +9,7 @@ from typing import Any, get_type_hints
 from dzdesign.command_line.command_table import COMMANDS
 from dzdesign.command_line.parser import arguments_of_command, command_module, usage_of
 from dzdesign.commands.schema import SCHEMAS, schema_document
+from dzdesign.identify.data_quality.catalogue import catalogue
 
 #: What a caller of the rooms needs.
 API = (
@@ -140,6 +141,19 @@ def api() -> str:
     return "\n".join(parts)
 
 
+def warnings() -> str:
+    """Return the catalogue of warnings: a chapter for each thing they are about, the codes in the order of letters."""
+    entries = sorted(catalogue().items())
+    lines = []
+    for chapter in ("the recordings", "the flow meter", "the pressure"):
+        lines += [f"## About {chapter}", ""]
+        for code, entry in entries:
+            if entry.about == chapter:
+                lines += [f"({code})=", f"### {code}", f"**Meaning:** {entry.meaning.strip()}", ""]
+                lines += [f"**What to do:** {entry.remedy.strip()}", ""]
+    return "\n".join(lines)
+
+
 def key_lines(artefact: type) -> list[str]:
     """Return a field of reStructuredText for each key of an artefact, which its annotation describes."""
     hints = get_type_hints(artefact, include_extras=True)
@@ -151,4 +165,4 @@ def key_lines(artefact: type) -> list[str]:
 
 
 #: What a page asks for by ``<!-- made: NAME -->``.
-MADE: dict[str, Callable[[], str]] = {"commands": commands, "files": files, "api": api}
+MADE: dict[str, Callable[[], str]] = {"commands": commands, "files": files, "warnings": warnings, "api": api}

@@ -26,17 +26,7 @@ SECTION = re.compile(r"( *)\w+\n *-+\n")
 def with_keywords(declaration: Callable[P, A], stage: Callable[[A], R]) -> Callable[P, R]:
     """Return a stage as a function of the fields of its arguments, which reports no progress.
 
-    Parameters
-    ----------
-    declaration : type
-        Dataclass of the stage's arguments.
-    stage : callable
-        Takes an instance of it.
-
-    Returns
-    -------
-    callable
-        Refuses, in one sentence, an option that the stage lacks, and a value of another kind than is declared.
+    It refuses, in one sentence, an option that the stage lacks, and a value of another kind than is declared.
 
     Examples
     --------

@@ -65,28 +65,30 @@ def test_gain_and_offset_make_up_the_output(name):
     assert sympy.expand(law(name).gain * s.u_i + law(name).offset - law(name).output) == 0
 
 
-def test_unknown_law_names_the_nearest():
-    with pytest.raises(InputError, match=r"unknown law 'papper' \(did you mean 'paper'\?\).*paper, target"):
+def test_unknown_law_names_the_nearest(wording):
+    with pytest.raises(InputError) as caught:
         law("papper")
+    wording("a law: unknown", str(caught.value))
 
 
 GAIN, OFFSET = s.k * s.x_max / s.u_max, s.beta * s.u_min0
 
 
 @pytest.mark.parametrize(
-    ("output", "rises_if", "complaint"),
+    ("fault", "output", "rises_if"),
     [
-        (s.u_i**2, sympy.true, "not affine"),
-        (s.beta**2 * s.u_i + OFFSET, sympy.true, "not affine"),
-        (s.u_i * FOREIGN, sympy.true, "foreign"),
-        (GAIN * s.u_i, sympy.true, r"at zero command the output is 0, expected beta\*u_min0"),
-        ((s.beta * (GAIN - 1) + 1) * s.u_i + OFFSET, sympy.true, "not positive exactly if True"),
-        (GAIN * s.u_i + OFFSET, s.beta < 1, "not positive exactly if beta < 1"),
+        ("a square of the command", s.u_i**2, sympy.true),
+        ("a square of beta", s.beta**2 * s.u_i + OFFSET, sympy.true),
+        ("another symbol", s.u_i * FOREIGN, sympy.true),
+        ("no offset", GAIN * s.u_i, sympy.true),
+        ("may fall", (s.beta * (GAIN - 1) + 1) * s.u_i + OFFSET, sympy.true),
+        ("rises always", GAIN * s.u_i + OFFSET, s.beta < 1),
     ],
 )
-def test_a_law_checks_what_it_states(output, rises_if, complaint):
-    with pytest.raises(ValueError, match=complaint):
+def test_a_law_checks_what_it_states(fault, output, rises_if, wording):
+    with pytest.raises(ValueError) as caught:
         Law(name="wrong", equation="", output=output, rises_if=rises_if, note="")
+    wording(f"a law: {fault}", str(caught.value))
 
 
 def test_a_law_of_its_own_is_a_choice_of_the_account():
@@ -95,10 +97,11 @@ def test_a_law_of_its_own_is_a_choice_of_the_account():
     assert stated.statements[0].kind.is_given and stated.statements[0].members == (stated.output,)
 
 
-def test_a_law_with_a_fraction_is_not_lowered_to_floats():
+def test_a_law_with_a_fraction_is_not_lowered_to_floats(wording):
     halved = Law(name="halved", equation="", output=s.k * s.x_max / s.u_max * s.u_i / 2 + s.beta * s.u_min0, note="")
-    with pytest.raises(ValueError, match="integer coefficients"):
+    with pytest.raises(ValueError) as caught:
         halved.evaluate_gain(1, 1)
+    wording("a law: a fraction", str(caught.value))
 
 
 # --- the plant ----------------------------------------------------------------------------------------------

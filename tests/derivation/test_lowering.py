@@ -99,21 +99,22 @@ def test_the_flow(sqrt, draw):
 
 
 @pytest.mark.parametrize(
-    ("expression", "complaint"),
+    "expression",
     [
-        (s.u_i / 2, "integer coefficients, got 1/2"),
-        (s.u_i * sympy.Float(0.1), "integer coefficients, got 0.1"),
-        (s.u_i + s.u_max, "u_max is not among the arguments"),
-        (sympy.sqrt(s.u_i**2 + 1), "needs an implementation of sqrt"),
-        (s.u_i ** sympy.Rational(1, 3), "is not a whole power"),
-        (sympy.sin(s.u_i), "needs an implementation of sin"),
-        (sympy.Piecewise((s.u_i, s.u_i > 0), (0, True)), "Piecewise"),
+        s.u_i / 2,
+        s.u_i * sympy.Float(0.1),
+        s.u_i + s.u_max,
+        sympy.sqrt(s.u_i**2 + 1),
+        s.u_i ** sympy.Rational(1, 3),
+        sympy.sin(s.u_i),
+        sympy.Piecewise((s.u_i, s.u_i > 0), (0, True)),
     ],
     ids=str,
 )
-def test_what_would_lose_digits_is_not_lowered(expression, complaint):
-    with pytest.raises(ValueError, match=complaint):
+def test_what_would_lose_digits_is_not_lowered(expression, wording):
+    with pytest.raises(ValueError) as caught:
         lower(expression, (s.u_i,))
+    wording(f"lowering: {expression}", str(caught.value))
 
 
 def test_ints_are_not_divided_to_floats():

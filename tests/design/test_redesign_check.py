@@ -169,13 +169,14 @@ def test_another_target_goes_on_with_a_word_where_it_counts_alike(example_valve,
     assert "designed for target cortex-m4; f28335 has the same converter and timer" in said
 
 
-def test_another_target_is_refused_where_a_code_is_another_voltage(example_valve, tmp_path, capsys):
+def test_another_target_is_refused_where_a_code_is_another_voltage(example_valve, tmp_path, capsys, wording):
     """The F280049C's converter has 3.3 V, the F28335's 3 V: with equal counts nothing else would tell."""
     compensator = designed_for(example_valve, "cortex-m4", pressure_a="4..20 mA on 140 ohm")
     inputs = target_named("f280049c").inputs()
     alike = replace(compensator, target=inputs)
-    with pytest.raises(InputError, match=r"a converter's range in V: 3\.3\), but f28335 has 3; design it again"):
+    with pytest.raises(InputError) as caught:
         generate(alike, "f28335")
+    wording("design: another converter", str(caught.value))
     path = tmp_path / "compensator.json"
     path.write_bytes(to_json_bytes(compensator))
     assert main(["codegen", str(path), "-o", str(tmp_path / "firmware"), "--target", "f280049c"]) == 2
@@ -188,9 +189,10 @@ def test_a_target_without_a_converter_is_wired_for_the_one_of_the_design(example
     assert "10 V" in firmware.files["cortex_m4/README.md"]
 
 
-def test_an_unknown_target_in_the_file_is_named(document):
-    with pytest.raises(InputError, match=r"there is no target 'f28336' \(did you mean 'f28335'"):
+def test_an_unknown_target_in_the_file_is_named(document, wording):
+    with pytest.raises(InputError) as caught:
         generate(read(edited(document, ("target", "name"), lambda _: "f28336")))
+    wording("design: an unknown target", str(caught.value))
 
 
 @pytest.mark.parametrize("name", ["", "F28335", "f28335 ", "a/b"])

@@ -81,36 +81,31 @@ def test_a_difference_of_unlike_sensors_stands_for_every_drop_that_makes_it(sign
         assert counted <= signals.largest_difference(sign)
 
 
-WRONG = [
-    ("10 V", "'10 V' is no signal"),
-    ("0..10 V", "reaches 10 V at the converter's pin, expected 0 to 3 V"),
-    ("10..0 V x 0.3", "expected it to rise"),
-    ("-10..8 V x 0.15 + 1.5 V", "ends of unlike size"),
-    ("0..10 bar x 0.3", "is not a unit of voltage"),
-    ("4..20 mA x 0.3", "is not a unit of voltage"),
-    ("0..10 V x 0", "has gain 0"),
-]
-
-
-@pytest.mark.parametrize(("text", "words"), WRONG)
-def test_a_command_that_cannot_be(text, words):
-    with pytest.raises(InputError, match=words.replace("(", r"\(").replace(".", r"\.")):
+@pytest.mark.parametrize(
+    "text",
+    ["10 V", "0..10 V", "10..0 V x 0.3", "-10..8 V x 0.15 + 1.5 V", "0..10 bar x 0.3", "4..20 mA x 0.3", "0..10 V x 0"],
+)
+def test_a_command_that_cannot_be(text, wording):
+    with pytest.raises(InputError) as caught:
         command(text)
+    wording(f"a signal: {text}", str(caught.value))
 
 
-def test_a_pressure_signal_may_not_start_below_zero():
-    with pytest.raises(InputError, match="starts below zero"):
+def test_a_pressure_signal_may_not_start_below_zero(wording):
+    with pytest.raises(InputError) as caught:
         sensor("-1..1 V + 1 V")
+    wording("a signal: pressure below zero", str(caught.value))
 
 
-def test_sensors_too_unlike_are_refused():
-    with pytest.raises(InputError, match="too unlike"):
+def test_sensors_too_unlike_are_refused(wording):
+    with pytest.raises(InputError) as caught:
         Signals(
             pressure_a=sensor("0..3 V = 1 MPa"),
             pressure_b=sensor("4..20 mA on 150 ohm = 60 MPa"),
             swapped=True,
             command=command("-10..10 V x 0.15 + 1.5 V"),
         )
+    wording("a signal: sensors too unlike", str(caught.value))
 
 
 def test_the_integers_of_the_drive_functions():

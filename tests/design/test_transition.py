@@ -85,10 +85,11 @@ def test_no_leak_and_one_per_cent_of_dead_zone_on_valve_a(tmp_path, capsys):
     assert all(loop["residual_opening"] <= 0.01 and loop["q_zero_L_min"] <= 1e-9 for loop in loops)
 
 
-def test_an_edge_needs_the_opening_branch(example_valve):
+def test_an_edge_needs_the_opening_branch(example_valve, wording):
     side = dataclasses.replace(example_valve.positive, opening_curve=None)
-    with pytest.raises(InputError, match="leave out --transition"):
+    with pytest.raises(InputError) as caught:
         design(dataclasses.replace(example_valve, sides={"positive": side}), TRANSITION)
+    wording("design: a transition without an opening branch", str(caught.value))
 
 
 @pytest.mark.slow
@@ -108,11 +109,18 @@ def test_a_dither_stands_under_the_certified_bound_at_its_top(example_valve):
         assert dithered.compare(0, dp_code) + peak <= plain.compare(0, dp_code) + 2
 
 
-def test_both_signs_need_both_sides(example_valve):
+def test_both_signs_need_both_sides(example_valve, wording):
     from dzdesign.design.signal_text import command_signal, parse_signal
     from dzdesign.design.signals import Signals
     from dzdesign.design.target_inputs import Converter
 
     both = command_signal(parse_signal("-10..10 V x 0.15 + 1.5 V", "--command-signal"), Converter())
-    with pytest.raises(InputError, match="negative side was not tested"):
+    with pytest.raises(InputError) as caught:
         design(example_valve, DesignOptions(signals=Signals(command=both)))
+    wording("design: an untested side", str(caught.value))
+
+
+def test_a_command_of_one_sign_needs_the_positive_side(example_valve, wording):
+    with pytest.raises(InputError) as caught:
+        design(dataclasses.replace(example_valve, sides={"negative": example_valve.positive}))
+    wording("design: no positive side", str(caught.value))

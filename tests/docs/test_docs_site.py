@@ -15,6 +15,7 @@ from dzdesign.command_line.command_table import COMMANDS
 from dzdesign.command_line.parser import arguments_of_command
 from dzdesign.commands.schema import SCHEMAS, schema_document, schema_text
 from dzdesign.core.version import __version__
+from dzdesign.identify.data_quality.catalogue import catalogue
 from tests.support.paths import ROOMS, ROOT
 from tests.support.synthetic import needs_compiler
 
@@ -144,29 +145,26 @@ def described_keys(schema):
             yield from described_keys(value)
 
 
-def codes_in(*sources):
-    """Return the codes of all warnings that these files make."""
-    found = set()
-    for source in sources:
-        for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Warning_":
-                found |= {
-                    word.value.value for word in node.keywords if word.arg == "code" and hasattr(word.value, "value")
-                }
-    return found
+def test_the_page_of_warnings_is_the_catalogue(site):
+    """Of each code what it means and what to do, under its own heading."""
+    page = (site / "reference" / "warnings.html").read_text(encoding="utf-8")
+    for code in catalogue():
+        assert f'id="{code}"' in page, code
+    assert page.count("<strong>Meaning:</strong>") == page.count("<strong>What to do:</strong>") == len(catalogue())
 
 
-def test_every_warning_code_is_documented_and_none_is_invented():
+def test_every_note_of_assess_is_documented_and_none_is_invented():
     text = (DOCS / "reference" / "warnings.md").read_text(encoding="utf-8")
-    own, _, of_assess = text.partition("## Notes of `assess`")
-    made = codes_in(*(ROOT / "identify").rglob("*.py"))
-    assert len(made) > 20 and "one-branch" in made
-    assert set(re.findall(r"^### (\S+)$", own, re.MULTILINE)) == made
-    for section in own.split("\n### ")[1:]:
-        assert "**Meaning:**" in section and "**What to do:**" in section, section.splitlines()[0]
-    notes = codes_in(*(ROOT / "assess").rglob("*.py"))
-    assert len(notes) > 5
-    assert set(re.findall(r"^\| `(\S+)` \|", of_assess, re.MULTILINE)) == notes
+    made = {
+        word.value.value
+        for source in (ROOT / "assess").rglob("*.py")
+        for node in ast.walk(ast.parse(source.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Warning_"
+        for word in node.keywords
+        if word.arg == "code" and hasattr(word.value, "value")
+    }
+    assert len(made) > 5
+    assert set(re.findall(r"^\| `(\S+)` \|", text, re.MULTILINE)) == made
 
 
 def test_every_figure_is_shown_with_words_for_those_who_cannot_see_it(site):

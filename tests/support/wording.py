@@ -40,7 +40,8 @@ class Wording:
 
     def __call__(self, name: str, text: str) -> None:
         """Fail unless `text` is what is kept under `name`."""
-        text = text.replace(str(self._folder), "FOLDER").rstrip("\n")
+        # A NUL, in a name that can't be one, would make the file binary for git.
+        text = text.replace(str(self._folder), "FOLDER").replace("\0", "\\0").rstrip("\n")
         messages = read_messages(self._path)
         if self._update:
             write_messages(messages | {name: text}, self._path)

@@ -30,13 +30,8 @@ Readings = dict[Set, dict[str, Reading]]
 def assess(before: Sequence[RampTest], after: Sequence[RampTest], options: AssessOptions | None = None) -> Assessment:
     """Compare ramps recorded without and with the compensator.
 
-    Parameters
-    ----------
-    before, after : sequence of RampTest
-        Recordings in any order, as `identify` takes them: several ramps in one, both sides of a bipolar valve. The
-        command of `after` is what enters the compensator.
-    options : AssessOptions, optional
-        Choices of the engineer.
+    The recordings come in any order, as `identify` takes them: several ramps in one, both sides of a bipolar valve. The
+    command of `after` is what enters the compensator.
 
     Raises
     ------

@@ -46,12 +46,7 @@ class LimitResult:
 def parse_limits(text: str | Mapping[str, str], u_max: float) -> dict[str, float]:
     """Read what ``--limits`` or the table ``[limits]`` says: quantity -> largest value, a share or SI.
 
-    Parameters
-    ----------
-    text : str or mapping
-        ``"dead_zone_opening = 5 %, flow_at_zero = 0.1 L/min"``, or the same as a mapping.
-    u_max : float
-        Full command in V, of which a limit in volts is a share.
+    A limit in volts is a share of full command `u_max` (V).
 
     Raises
     ------

@@ -95,7 +95,7 @@ def targets() -> tuple[Target, ...]:
 def generate(
     compensator: Compensator, target_name: str | None = None, compensator_bytes: bytes | None = None
 ) -> Firmware:
-    """Generate the C project of a compensator for a target, by default the one that it was designed for.
+    """Generate the C project of a compensator for the target of that name, by default the one that it was designed for.
 
     `compensator_bytes` is the file that the compensator was read from; without it the document as it would be written.
     An unknown target is an `InputError`; so is one whose converter or PWM differs from those that the compensator was

@@ -84,12 +84,12 @@ def pressures_MPa(signals: Signals, first: int, last: int) -> tuple[Fraction, ..
 
 
 def offset_ceiling(
-    curve: OffsetCurve, signals: Signals, u_max_V: Fraction, *, sign: int = 1, reserve: Fraction = Fraction(0)
+    curve: OffsetCurve, signals: Signals, u_max_V: Fraction, *, sign: int = 1, dither_counts: int = 0
 ) -> OffsetCeiling:
     """Return the limit of the offset at every pressure code, the converter's error and the rounding counted.
 
-    `reserve`, of u_max, is kept free beside the rounding: the dither's peak. A curve that lies above the staircase of
-    its bounds somewhere is refused: valve.json contradicts itself.
+    The dither's peak is kept free beside the rounding. A curve that lies above the staircase of its bounds somewhere
+    is refused: valve.json contradicts itself.
     """
     first, last = (signals.dp_code(end) for end in (curve.dp_MPa[0], curve.dp_MPa[-1]))
     code_max = signals.largest_difference(sign)
@@ -100,7 +100,7 @@ def offset_ceiling(
         )
     low, high = signals.difference_error(sign)
     pressures = pressures_MPa(signals, low, code_max + high)
-    kept = Fraction(1, 2 * signals.compare_max) + reserve
+    kept = (Fraction(1, 2) + dither_counts) / signals.compare_max
     values = []
     for dp_MPa in pressures:
         offset, bound = curve.at(dp_MPa), curve.bound(dp_MPa)

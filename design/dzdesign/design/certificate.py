@@ -58,8 +58,7 @@ def prove_certificates(compensator: Compensator) -> None:
             raise InputError(f"the compensator drives the {name} side, but its valve has none; design it again")
         stated = law.certificate
         curve = guarded_curve(model, stated.guard, compensator.below_dp0)
-        reserve = Fraction(dither, signals.compare_max)
-        ceiling = offset_ceiling(curve, signals, compensator.u_max_V, sign=sign, reserve=reserve)
+        ceiling = offset_ceiling(curve, signals, compensator.u_max_V, sign=sign, dither_counts=dither)
         try:
             proved = certify(
                 model,
@@ -75,10 +74,10 @@ def prove_certificates(compensator: Compensator) -> None:
         except RequirementError as error:
             raise InputError(f"the {name} side's certificate does not hold: {error}; design it again") from error
         for field in fields(Certificate):
-            said, found = getattr(stated, field.name), getattr(proved, field.name)
-            if said != found:
+            claim, found = getattr(stated, field.name), getattr(proved, field.name)
+            if claim != found:
                 raise InputError(
-                    f"the {name} side's certificate says {field.name} = {_words(said)}, but {_words(found)} follows "
+                    f"the {name} side's certificate says {field.name} = {_words(claim)}, but {_words(found)} follows "
                     "from its valve; design it again"
                 )
 

@@ -96,8 +96,8 @@ def _side_law(side: SideModel, options: DesignOptions, u_max: Fraction, sign: in
     if u_min0 <= 0:
         raise InputError(f"u_min0 is {float(top):.4f} V, less than one count of the PWM: no dead zone")
     above_one = side.trend == "increasing" or options.below_dp0 == "extend"
-    dither = Fraction(options.drive_functions().dither_counts, signals.compare_max)
-    ceiling = offset_ceiling(certified, signals, u_max, sign=sign, reserve=dither)
+    dither = options.drive_functions().dither_counts
+    ceiling = offset_ceiling(certified, signals, u_max, sign=sign, dither_counts=dither)
     if min(ceiling.limit) <= 0:
         raise InputError("the dither's peak leaves no offset under the certified one; make it smaller")
 

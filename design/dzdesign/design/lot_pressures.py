@@ -43,11 +43,11 @@ def lacking_in(lot: Sequence[LotValve]) -> tuple[Lacking, ...]:
     for sign in (1, -1):
         tested = {valve.name: side for valve in lot if (side := valve.side(sign))}
         wanted = _pressures_of_lot([side.dp_MPa for side in tested.values()])
-        for name, own in tested.items():
-            missing = [(low, high) for low, high in wanted if not any(low <= dp <= high for dp in own.dp_MPa)]
+        for name, side in tested.items():
+            missing = [(low, high) for low, high in wanted if not any(low <= dp <= high for dp in side.dp_MPa)]
             if missing:
                 middles = tuple(round((low + high) / 2, 6) for low, high in missing)
-                coarser = max(_coarser_V(own, dp) for dp in middles)
+                coarser = max(_coarser_V(side, dp) for dp in middles)
                 found.append(Lacking(name=name, sign=sign, dp_MPa=middles, coarser_V=coarser))
     return tuple(found)
 
@@ -83,7 +83,7 @@ def _coarser_V(side: LotSide, dp_MPa: float) -> float:
 
 def _pressures_of_lot(tested: Sequence[Sequence[float]]) -> list[tuple[float, float]]:
     """Return from where to where the tests of each pressure drop lie at which half of the valves or more was tested."""
-    places = sorted((dp, valve) for valve, own in enumerate(tested) for dp in own)
+    places = sorted((dp, valve) for valve, pressures in enumerate(tested) for dp in pressures)
     groups: list[list[tuple[float, int]]] = []
     for dp, valve in places:
         if groups and dp <= groups[-1][-1][0] * (1 + SAME):

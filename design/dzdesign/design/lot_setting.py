@@ -162,14 +162,14 @@ def _common_interval(sides: Iterable[Mapping[str, OffsetCurve]]) -> tuple[float,
 def _side(batch: Mapping[str, Compensator], first: Compensator, sign: int) -> _Side:
     """Find the least ceiling of one sign of command: in doubles over all valves, exactly over those near it."""
     signals, u_max = first.signals, first.u_max_V
-    reserve = Fraction(first.drive_functions.dither_counts, signals.compare_max)
+    dither = first.drive_functions.dither_counts
     models = {name: each.valve.sides[SIDE_NAMES[sign]] for name, each in batch.items()}
     guard = first.side(sign).certificate.guard
     curves = {name: guarded_curve(model, guard, first.below_dp0) for name, model in models.items()}
     low, high = _common_interval([curves])
     least, near = _near_the_least(curves, signals, float(u_max), sign)
     exact = {
-        name: offset_ceiling(curves[name], signals, u_max, sign=sign, reserve=reserve)
+        name: offset_ceiling(curves[name], signals, u_max, sign=sign, dither_counts=dither)
         for name, distance in near.items()
         if distance < CLEAR
     }
@@ -250,13 +250,15 @@ def _law(side: _Side, carrier: str, first: Compensator) -> SideLaw:
 
 def _certified(side: _Side, name: str, law: SideLaw, first: Compensator) -> Certificate:
     """Prove the common law for one valve, on the whole interval that it was tested over."""
-    reserve = Fraction(first.drive_functions.dither_counts, first.signals.compare_max)
+    dither = first.drive_functions.dither_counts
     curve = side.curves[name]
-    own = side.exact.get(name) or offset_ceiling(curve, first.signals, first.u_max_V, sign=side.sign, reserve=reserve)
+    ceiling = side.exact.get(name) or offset_ceiling(
+        curve, first.signals, first.u_max_V, sign=side.sign, dither_counts=dither
+    )
     return certify(
         side.models[name],
         curve,
-        own,
+        ceiling,
         guard=first.side(side.sign).certificate.guard,
         signals=first.signals,
         u_max_V=first.u_max_V,

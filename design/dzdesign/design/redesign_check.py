@@ -17,7 +17,7 @@ from dzdesign.design.signals import SIDE_NAMES
 COARSEST = Fraction(1, 2**12)
 
 
-def refuse_unsaid(compensator: Compensator, source: str) -> None:
+def refuse_without_options(compensator: Compensator, source: str) -> None:
     """Refuse a file that does not say what it was designed with: nothing in it could be derived again."""
     if compensator.target is None:
         raise InputError(
@@ -39,29 +39,29 @@ def prove_derived(compensator: Compensator) -> None:
     if compensator.target is None or compensator.options is None:
         return
     try:
-        own = design(compensator.valve, options_of(compensator.options, compensator.target))
+        redesigned = design(compensator.valve, options_of(compensator.options, compensator.target))
     except InputError as error:
         raise InputError(f"its valve can't be designed with its options: {error}; {Compensator.REMEDY}") from error
     if compensator.lot:
-        _prove_lot_setting(compensator, own)
-        own = replace(own, sides=compensator.sides, lot=compensator.lot, costs=compensator.costs)
+        _prove_lot_setting(compensator, redesigned)
+        redesigned = replace(redesigned, sides=compensator.sides, lot=compensator.lot, costs=compensator.costs)
     # The hash of valve.json counts its spacing, which is not kept.
-    own = replace(own, tool=compensator.tool, made_from=compensator.made_from)
-    for place, one, other in _differences(compensator, own):
+    redesigned = replace(redesigned, tool=compensator.tool, made_from=compensator.made_from)
+    for place, one, other in _differences(compensator, redesigned):
         raise InputError(
             f"'{place}' is {_words(one)}, but {_words(other)} follows from its valve and its options; "
             f"{Compensator.REMEDY}"
         )
 
 
-def _prove_lot_setting(compensator: Compensator, own: Compensator) -> None:
+def _prove_lot_setting(compensator: Compensator, redesigned: Compensator) -> None:
     """Bound what follows from all valves by what follows from the one in the file: no larger offset, all of its travel.
 
     Full command must not ask for more than full drive either. That valve is one of the lot, with the bounds it has.
     """
     of_carrier = [each for each in compensator.lot if each.valve_sha256 == compensator.valve_json_sha256]
     for sign in compensator.signals.signs:
-        common, single, name = compensator.side(sign), own.side(sign), SIDE_NAMES[sign]
+        common, single, name = compensator.side(sign), redesigned.side(sign), SIDE_NAMES[sign]
         drive_range, offset = common.drive_range_over_u_max, common.u_min0_over_u_max
         for place, value, low, high in (
             ("u_min0_over_u_max", offset, Fraction(0), single.u_min0_over_u_max),

@@ -25,7 +25,7 @@ def _overlapping(valves: Sequence[Valve]) -> dict[tuple[str, ...], str]:
     owners: dict[str, dict[str, str]] = {}
     for valve in valves:
         try:
-            for path, pattern in valve.matched().items():
+            for path, pattern in valve.recordings().items():
                 owners.setdefault(os.path.abspath(path), {})[valve.name] = pattern
         except InputError:  # such a valve has failed, and says so itself
             continue

@@ -102,7 +102,10 @@ def calibrate(task: Task) -> Outcome:
         # The worker's own folder is no place that the user knows.
         for place in (folder / "recordings", folder):
             reason = reason.replace(f"{place}{os.sep}", "")
-        return task.outcome(status, reason, _files(folder / "out"), again=again)
+        out = folder / "out"
+        paths = sorted(path for path in out.rglob("*") if path.is_file())  # none where nothing came to be written
+        files = {path.relative_to(out).as_posix(): path.read_bytes() for path in paths}
+        return task.outcome(status, reason, files, again=again)
 
 
 def _run(task: Task, folder: Path) -> tuple[Status, str]:
@@ -130,7 +133,7 @@ def _run(task: Task, folder: Path) -> tuple[Status, str]:
     verification = verify(VerifyArguments(out / FIRMWARE, plant=plant, output=out / "evidence"))
     if verification.holds:
         return OK, ""
-    check = next(check for check in verification.evidence.checks if not check.holds)
+    check = next(check for check in verification.evidence.all_checks if not check.holds)
     return DOES_NOT_HOLD, f"{check.name}: {check.text}"
 
 
@@ -144,9 +147,3 @@ def _write_recordings(task: Task, folder: Path) -> list[Path]:
         path.write_bytes(content)
         paths.append(path)
     return paths
-
-
-def _files(folder: Path) -> dict[str, bytes]:
-    """Return the files of a folder, which may be missing."""
-    paths = sorted(path for path in folder.rglob("*") if path.is_file())
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}

@@ -12,14 +12,7 @@ from dzdesign.batch.arguments import BatchArguments
 from dzdesign.batch.calibration import Outcome, Task
 from dzdesign.batch.results import Results
 from dzdesign.batch.runners import run_local, run_on_cluster
-from dzdesign.batch.summary import (
-    SETTING_NAME,
-    designed_valves,
-    lot_setting_of,
-    setting_files,
-    setting_summary,
-    summary_of,
-)
+from dzdesign.batch.summary import SETTING_NAME, lot_setting_of, setting_files, setting_summary, summary_of
 from dzdesign.batch.valves import Valve, valves_of
 from dzdesign.core.artefact_files import MANIFEST_NAME, read_bytes, write_file, write_files
 from dzdesign.core.errors import InputError
@@ -43,14 +36,8 @@ MOST_A_PROCESSOR = 4
 IDENTIFY = tuple(argument.name for argument in arguments_of(IdentifyChoices) if argument.name != "record")
 
 
-def calibrate_lot(args: BatchArguments) -> tuple[LotSummary, Path | None]:
-    """Calibrate the valves of a folder or a list; return batch.json, and where the report is if there is one.
-
-    Raises
-    ------
-    InputError
-        If no valve could be calibrated so: a wrong option, list or folder. A valve that can't is no error.
-    """
+def calibrate_lot(args: BatchArguments) -> LotSummary:
+    """Calibrate the valves of a folder or a list, and make their table and report; return batch.json."""
     source, output = Path(args.source), Path(args.output)
     jobs = _jobs(args)
     _check_options(args)
@@ -59,13 +46,26 @@ def calibrate_lot(args: BatchArguments) -> tuple[LotSummary, Path | None]:
     valves = valves_of(source, args.pattern, (*IDENTIFY, *DEFAULTS, "target"))
     plant = _plant(args)
     results = Results(output)
-    with _only_batch(output), _room_in(output):
-        return _calibrate(args, valves, plant, results, jobs)
+    with _taken(output):
+        results.begin([valve.name for valve in valves])
+        digests = {valve.name: _task(valve, args, plant).digest for valve in with_bar(valves, "reading")}
+        waiting = [valve for valve in valves if not results.is_done(valve.name, digests[valve.name])]
+        say(f"{len(valves)} valves, {len(valves) - len(waiting)} of them done before")
+        tasks = (_task(valve, args, plant) for valve in waiting)
+        outcomes = run_on_cluster(tasks, args.dask) if args.dask else run_local(tasks, useful_jobs(jobs, len(waiting)))
+        unwritten = _write_all(results, outcomes, len(waiting))
+        summary = _finished(args, valves, results, unwritten)
+        _write_report(output)
+    return summary
 
 
 @contextlib.contextmanager
-def _only_batch(output: Path) -> Iterator[None]:
-    """Keep a second batch out of the folder: each would take up the other's half, with other options perhaps."""
+def _taken(output: Path) -> Iterator[None]:
+    """Keep a second batch out of the folder, and say of a full disk what to do.
+
+    A second batch would take up the first one's half, with other options perhaps. Another place for the output, which
+    every command proposes where one is full, would leave behind what is done.
+    """
     with contextlib.ExitStack() as stack:
         try:
             stack.enter_context(alone_in(output))
@@ -73,38 +73,19 @@ def _only_batch(output: Path) -> Iterator[None]:
             raise InputError(
                 f"another batch is writing into '{output}'; wait until it has ended, or choose another folder with -o"
             ) from error
-        yield
-
-
-@contextlib.contextmanager
-def _room_in(output: Path) -> Iterator[None]:
-    """Say of a full disk what to do: another place, as every command says, would leave behind what is done."""
-    try:
-        yield
-    except InputError as error:
-        if not _is_full(error):
-            raise
-        raise InputError(
-            f"no space is left to write into '{output}'; make room and give the same command again: it takes up the "
-            "valves that are done"
-        ) from error
+        try:
+            yield
+        except InputError as error:
+            if not _is_full(error):
+                raise
+            raise InputError(
+                f"no space is left to write into '{output}'; make room and give the same command again: it takes up "
+                "the valves that are done"
+            ) from error
 
 
 def _is_full(error: InputError) -> bool:
     return isinstance(error.__cause__, OSError) and error.__cause__.errno in FULL
-
-
-def _calibrate(
-    args: BatchArguments, valves: list[Valve], plant: tuple[str, bytes] | None, results: Results, jobs: int
-) -> tuple[LotSummary, Path | None]:
-    results.begin([valve.name for valve in valves])
-    waiting = [valve for valve in with_bar(valves, "reading") if not _is_done(results, _task(valve, args, plant))]
-    say(f"{len(valves)} valves, {len(valves) - len(waiting)} of them done before")
-    tasks = (_task(valve, args, plant) for valve in waiting)
-    outcomes = run_on_cluster(tasks, args.dask) if args.dask else run_local(tasks, useful_jobs(jobs, len(waiting)))
-    unwritten = _write_all(results, outcomes, len(waiting))
-    summary = _finished(args, valves, results, unwritten)
-    return summary, _write_report(results.folder)
 
 
 def _finished(
@@ -113,7 +94,7 @@ def _finished(
     """Write table, lot setting and batch.json, from the valves' folders alone; return the last."""
     output = results.folder
     found = [results.read(valve.name, unwritten) for valve in with_bar(valves, "making the table")]
-    designed = designed_valves(found)
+    designed = {each.name: each.compensator for each in found if each.compensator is not None}
     setting, why_not = lot_setting_of(designed)
     rows = table_rows(
         found, setting.compensator if setting else None, {valve.name: _record(valve, args) for valve in valves}
@@ -135,11 +116,11 @@ def _finished(
     if setting is None:
         (output / SETTING_NAME).unlink(missing_ok=True)  # of an earlier run with other valves
     write_files(output, {**table, **(setting_files(setting) if setting else {})}, "-o")
-    results.finish(summary)
+    results.write_summary(summary)
     return summary
 
 
-def _write_report(output: Path) -> Path | None:
+def _write_report(output: Path) -> None:
     """Write the report of the lot from the files, as `dzdesign report` does; a lot too large for one has its table."""
     path = output / REPORT_NAME
     try:
@@ -147,8 +128,6 @@ def _write_report(output: Path) -> Path | None:
     except InputError as error:
         path.unlink(missing_ok=True)  # of an earlier run: it would pass for one of this
         say(f"no {REPORT_NAME}: {error}")
-        return None
-    return path
 
 
 def _jobs(args: BatchArguments) -> int:
@@ -213,10 +192,6 @@ def _task(valve: Valve, args: BatchArguments, plant: tuple[str, bytes] | None) -
 
 def _record(valve: Valve, args: BatchArguments) -> dict[str, str]:
     return {**record_of(args.record), **valve.record}
-
-
-def _is_done(results: Results, task: Task) -> bool:
-    return results.is_done(task.name, task.digest)
 
 
 def _write_all(results: Results, outcomes: Iterator[Outcome], count: int) -> dict[str, str]:

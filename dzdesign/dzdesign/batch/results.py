@@ -9,7 +9,7 @@ from pathlib import Path
 
 from dzdesign.batch.calibration import Outcome
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of, write_file, write_folder
-from dzdesign.core.artefact_types import THIS_TOOL, Artefact, to_json_bytes
+from dzdesign.core.artefact_types import THIS_TOOL, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.report.lot.folder import is_lot
 from dzdesign.report.lot.summary import FAILED, SUMMARY_NAME, LotSummary, UnfinishedLot
@@ -24,13 +24,7 @@ from dzdesign.report.lot.valve_folder import (
 
 
 class Results:
-    """The folder that a batch is written into: new, empty, or of an earlier run, which is then taken up.
-
-    Raises
-    ------
-    InputError
-        If it holds anything else, or can't be written.
-    """
+    """The folder that a batch is written into: new, empty, or of an earlier run, which is then taken up; no other."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -48,18 +42,15 @@ class Results:
 
     def begin(self, names: Collection[str]) -> None:
         """Mark the folder as a lot's, and take away what a killed run left half-written of these valves."""
-        self._write(UnfinishedLot(tool=THIS_TOOL, made_from=(), names=tuple(names)))
+        self.write_summary(UnfinishedLot(tool=THIS_TOOL, made_from=(), names=tuple(names)))
         left = re.compile(r"\.(.+)\.[a-z0-9_]{8}")
         for path in (self.folder / VALVES).iterdir():
             found = left.fullmatch(path.name)
             if found and found[1] in names and path.is_dir():
                 shutil.rmtree(path, ignore_errors=True)
 
-    def finish(self, summary: LotSummary) -> None:
-        """Write batch.json of a lot that has come to its end."""
-        self._write(summary)
-
-    def _write(self, summary: Artefact) -> None:
+    def write_summary(self, summary: LotSummary | UnfinishedLot) -> None:
+        """Write batch.json, of a lot that has come to its end or not."""
         write_file(self.folder / SUMMARY_NAME, to_json_bytes(summary))
 
     def of(self, name: str) -> Path:
@@ -71,7 +62,9 @@ class Results:
         files = dict(outcome.files)
         if outcome.manifest.reason:
             files["reason.txt"] = f"{outcome.manifest.reason}\n".encode()
-        write_folder(self.of(outcome.name), files, replace(outcome.manifest, board=_board_files(files)))
+        firmware = files.get(f"{FIRMWARE}/{MANIFEST_NAME}")  # its board files are the user's to fill in
+        board = tuple(f"{FIRMWARE}/{name}" for name in json.loads(firmware)["board"]) if firmware else ()
+        write_folder(self.of(outcome.name), files, replace(outcome.manifest, board=board))
 
     def read(self, name: str, unwritten: Mapping[str, str]) -> ValveFolder:
         """Read a valve's folder; one that could not be written has failed, whatever an earlier run left there."""
@@ -95,9 +88,3 @@ class Results:
             )
         except (InputError, OSError):
             return False
-
-
-def _board_files(files: Mapping[str, bytes]) -> tuple[str, ...]:
-    """Return which files of a valve's folder are its user's to fill in: those of its firmware."""
-    manifest = files.get(f"{FIRMWARE}/{MANIFEST_NAME}")
-    return tuple(f"{FIRMWARE}/{name}" for name in json.loads(manifest)["board"]) if manifest else ()

@@ -88,11 +88,6 @@ def run_on_cluster(tasks: Iterable[Task], address: str, work: Work = calibrate) 
     The scheduler gives what a dead worker had, finished or not, to another. After several deaths it gives up all that
     lay on each of those workers: these valves are tried again one at a time, so that only the one that kills is blamed.
     The workers must be able to import `work`.
-
-    Raises
-    ------
-    InputError
-        If the scheduler can't be reached or goes away, or a worker runs another version of dzdesign.
     """
     with _scheduler_lost(address), _client(address) as client, _workers_missed(client, address):
         suspects = []
@@ -169,7 +164,8 @@ def _ended(client: "Client", source: Iterator[Task], work: Work) -> "Iterator[tu
         tasks[future] = task
         return future
 
-    completed = as_completed([submit(task) for task in islice(source, _ahead(client))], loop=client.loop)
+    ahead = AHEAD * max(sum(client.nthreads().values()), 8)  # workers that come later take from the same heap
+    completed = as_completed([submit(task) for task in islice(source, ahead)], loop=client.loop)
     for future in completed:
         task = tasks.pop(future)
         if future.status in ("cancelled", "lost"):
@@ -200,12 +196,6 @@ def _client(address: str) -> "Client":
             f"no Dask scheduler answers at '{address}' within {CONNECT_S} s ({type(error).__name__}); start one with "
             "`dask scheduler`, and give its address such as tcp://10.0.0.5:8786"
         ) from error
-
-
-def _ahead(client: "Client") -> int:
-    """Return how many tasks are handed over at first; workers that come later take from the same heap."""
-    threads: dict[str, int] = client.nthreads()
-    return AHEAD * max(sum(threads.values()), 8)
 
 
 def _outcome(future: "Future", task: Task) -> Outcome:

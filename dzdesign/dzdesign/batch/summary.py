@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
-from dzdesign.core.artefact_types import THIS_TOOL, SourceFile
+from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.compensator import Compensator
 from dzdesign.report.lot.spread import quantiles, spreads_of
@@ -18,7 +18,7 @@ from dzdesign.report.lot.summary import (
 )
 from dzdesign.report.lot.table import TableRow, column_of
 from dzdesign.report.lot.table_rows import SIGNS, extra_dead_zone
-from dzdesign.report.lot.valve_folder import VALVES, ValveFolder
+from dzdesign.report.lot.valve_folder import VALVES
 
 if TYPE_CHECKING:
     from dzdesign.design.lot_setting import LotSetting
@@ -36,15 +36,8 @@ def lot_setting_of(designed: "Mapping[str, Compensator]") -> "tuple[LotSetting |
         return None, str(error)
 
 
-def designed_valves(valves: Sequence[ValveFolder]) -> "dict[str, Compensator]":
-    """Return the calibrated valves with their compensators, by name."""
-    return {each.name: each.compensator for each in valves if each.compensator is not None}
-
-
 def setting_files(setting: "LotSetting") -> dict[str, bytes]:
     """Return the file of the lot setting."""
-    from dzdesign.core.artefact_types import to_json_bytes
-
     return {SETTING_NAME: to_json_bytes(setting.compensator)}
 
 

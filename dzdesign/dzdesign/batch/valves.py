@@ -32,18 +32,8 @@ class Valve:
     overrides: Mapping[str, str] = field(default_factory=dict)
     record: Mapping[str, str] = field(default_factory=dict)
 
-    def recordings(self) -> list[Path]:
-        """Return its recordings.
-
-        Raises
-        ------
-        InputError
-            If there are none, or one is named twice.
-        """
-        return list(self.matched())
-
-    def matched(self) -> dict[Path, str]:
-        """Return its recordings, each with the pattern that names it; see `recordings`."""
+    def recordings(self) -> dict[Path, str]:
+        """Return its recordings, each with the pattern that names it; refuse none, and one that is named twice."""
         if not self.patterns:
             raise InputError(f"valve '{self.name}' has no recording; expected files such as ramp_1MPa.csv")
         found: dict[Path, str] = {}
@@ -66,11 +56,6 @@ def valves_of(source: Path, pattern: str | None, options: Collection[str]) -> li
     A folder has one subfolder a valve, whose recordings the pattern matches (None: all that are called as recordings
     are). A CSV file has the columns name, files, record.NAME and any of the options, which that valve then has of its
     own.
-
-    Raises
-    ------
-    InputError
-        If there is no valve, or a name or a column can't be one.
     """
     if source.is_dir():
         valves = _of_folder(source, pattern)
@@ -97,9 +82,7 @@ def _of_folder(folder: Path, pattern: str | None) -> list[Valve]:
     # A link to a folder that is gone was a valve: its reason is that the file can't be read.
     gone = {path: (str(path),) for path in visible if path.is_symlink() and not path.exists()}
     folders = [path for path in visible if path in gone or path.is_dir()]
-    return [
-        Valve(name=path.name, patterns=gone.get(path) or tuple(_recordings_in(path, pattern))) for path in folders
-    ]
+    return [Valve(name=path.name, patterns=gone.get(path) or tuple(_recordings_in(path, pattern))) for path in folders]
 
 
 def _recordings_in(folder: Path, pattern: str | None) -> list[str]:

@@ -1,9 +1,8 @@
 """`dzdesign completion SHELL`: the script by which a shell completes commands, options, targets and files, by shtab."""
 
 import argparse
-from collections.abc import Iterable
 from dataclasses import dataclass
-from importlib import import_module
+from pkgutil import resolve_name
 from typing import Annotated
 
 from dzdesign.core.errors import InputError, nearest
@@ -53,18 +52,10 @@ def parser_with_values() -> argparse.ArgumentParser:
         for action in command._actions:
             argument = declared.get(action.dest)
             if argument is not None and argument.option.choices:
-                action.choices = tuple(_words(argument.option.choices))
+                choices = argument.option.choices
+                action.choices = tuple(resolve_name(choices) if isinstance(choices, str) else choices)
             elif action.metavar == "DIR":
                 setattr(action, COMPLETE, shtab.DIRECTORY)
             elif action.dest == "config" or (argument is not None and argument.is_path):
                 setattr(action, COMPLETE, shtab.FILE)
     return parser
-
-
-def _words(choices: tuple[str, ...] | str) -> Iterable[str]:
-    """Return the words of an option; ``module:NAME`` says where they stand."""
-    if isinstance(choices, tuple):
-        return choices
-    module, _, name = choices.partition(":")
-    words: Iterable[str] = getattr(import_module(module), name)
-    return words

@@ -5,9 +5,8 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from operator import attrgetter
 
 from dzdesign.core.errors import DzdesignError
 from dzdesign.terminal.page import new_console, print_json, put_line, put_rows
@@ -17,50 +16,40 @@ TINY = "int dz_tiny(int a);\nint dz_tiny(int a) { return 3 * a; }\n"
 PATIENCE_S = 20
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Tool:
-    """A program that dzdesign can use: how it says its version, what it is for, and where it comes from."""
+    """A program that dzdesign can use: what it is for, where it comes from, and how it says its version."""
 
     name: str
-    ask: tuple[str, ...] = ("--version",)
     purpose: str
     debian: str
     macos: str
     windows: str
+    ask: tuple[str, ...] = ("--version",)
 
 
-TI = "https://www.ti.com/tool/C2000-CGT"
+XCODE, PIP, TI = "xcode-select --install", "pip install dzdesign[zig]", "https://www.ti.com/tool/C2000-CGT"
 #: One of these is the main job: without it nothing can be verified.
 COMPILERS = (
-    Tool(name="gcc", purpose="verify", debian="apt install gcc libc6-dev", macos="xcode-select --install",
-         windows="winget install BrechtSanders.WinLibs.POSIX.UCRT"),
-    Tool(name="clang", purpose="verify", debian="apt install clang", macos="xcode-select --install",
-         windows="winget install LLVM.LLVM"),
-    Tool(name="zig", ask=("version",), purpose="verify, where there is no other compiler",
-         debian="pip install dzdesign[zig]", macos="pip install dzdesign[zig]", windows="pip install dzdesign[zig]"),
-)  # fmt: skip
+    Tool("gcc", "verify", "apt install gcc libc6-dev", XCODE, "winget install BrechtSanders.WinLibs.POSIX.UCRT"),
+    Tool("clang", "verify", "apt install clang", XCODE, "winget install LLVM.LLVM"),
+    Tool("zig", "verify, where there is no other compiler", PIP, PIP, PIP, ask=("version",)),
+)
 OPTIONAL = (
-    Tool(name="arm-none-eabi-gcc", purpose="verify --machine-code: Cortex-M4",
-         debian="apt install gcc-arm-none-eabi libnewlib-arm-none-eabi", macos="brew install --cask gcc-arm-embedded",
-         windows="winget install Arm.GnuArmEmbeddedToolchain"),
-    Tool(name="qemu-system-arm", purpose="verify --machine-code: Cortex-M4", debian="apt install qemu-system-arm",
-         macos="brew install qemu", windows="winget install SoftwareFreedomConservancy.QEMU"),
-    Tool(name="avr-gcc", purpose="verify --machine-code: AVR", debian="apt install gcc-avr avr-libc",
-         macos="brew install osx-cross/avr/avr-gcc", windows="winget install ZakKemble.avr-gcc"),
-    Tool(name="simavr", ask=("--help",), purpose="verify --machine-code: AVR", debian="apt install simavr",
-         macos="brew install osx-cross/avr/simavr", windows="only in WSL: apt install simavr"),
-    Tool(name="frama-c", purpose="verify --proof", debian="apt install frama-c-base", macos="opam install frama-c",
-         windows="only in WSL: apt install frama-c-base"),
-    Tool(name="cl2000", ask=("-version",), purpose="to build for f28335 and f280049c; dzdesign does not call it",
-         debian=TI, macos=TI, windows=TI),
-    Tool(name="make", purpose="make demo, make test", debian="apt install make", macos="xcode-select --install",
-         windows="winget install ezwinports.make"),
+    Tool("arm-none-eabi-gcc", "verify --machine-code: Cortex-M4",
+         "apt install gcc-arm-none-eabi libnewlib-arm-none-eabi", "brew install --cask gcc-arm-embedded",
+         "winget install Arm.GnuArmEmbeddedToolchain"),
+    Tool("qemu-system-arm", "verify --machine-code: Cortex-M4", "apt install qemu-system-arm", "brew install qemu",
+         "winget install SoftwareFreedomConservancy.QEMU"),
+    Tool("avr-gcc", "verify --machine-code: AVR", "apt install gcc-avr avr-libc", "brew install osx-cross/avr/avr-gcc",
+         "winget install ZakKemble.avr-gcc"),
+    Tool("simavr", "verify --machine-code: AVR", "apt install simavr", "brew install osx-cross/avr/simavr",
+         "only in WSL: apt install simavr", ask=("--help",)),
+    Tool("frama-c", "verify --proof", "apt install frama-c-base", "opam install frama-c",
+         "only in WSL: apt install frama-c-base"),
+    Tool("cl2000", "to build for f28335 and f280049c; dzdesign does not call it", TI, TI, TI, ask=("-version",)),
+    Tool("make", "make demo, make test", "apt install make", XCODE, "winget install ezwinports.make"),
 )  # fmt: skip
-#: Columns of the table of where the tools come from.
-SOURCES: Mapping[str, Callable[[Tool], str]] = {
-    "program": attrgetter("name"), "Debian, Ubuntu": attrgetter("debian"), "macOS": attrgetter("macos"),
-    "Windows": attrgetter("windows"),
-}  # fmt: skip
 EXAMPLES = ("dzdesign doctor", "dzdesign doctor --json")
 
 
@@ -165,7 +154,7 @@ def _lacking(programs: dict[str, dict[str, str] | None]) -> list[Tool]:
 def _print(found: Installation, missing: list[str]) -> None:
     console = new_console()
     put_line(console, f"dzdesign {found.dzdesign}, Python {found.python}, {found.system}")
-    programs = {
+    programs: dict[str, Callable[[Tool], str]] = {
         "program": lambda tool: tool.name,
         "version": lambda tool: (found.programs[tool.name] or {"version": "not found"})["version"] or "found",
         "for": lambda tool: tool.purpose,
@@ -173,8 +162,14 @@ def _print(found: Installation, missing: list[str]) -> None:
     put_rows(console, "Programs", (*COMPILERS, *OPTIONAL), programs, words=(0, 1, 2))
     versions = ", ".join(f"{name} {version or 'MISSING'}" for name, version in found.packages.items())
     put_line(console, f"Python packages: {versions.replace('ziglang MISSING', 'ziglang (optional) not there')}")
+    sources: dict[str, Callable[[Tool], str]] = {
+        "program": lambda tool: tool.name,
+        "Debian, Ubuntu": lambda tool: tool.debian,
+        "macOS": lambda tool: tool.macos,
+        "Windows": lambda tool: tool.windows,
+    }
     if found.to_get:
-        put_rows(console, "How to get the rest", found.to_get, SOURCES, words=(0, 1, 2, 3))
+        put_rows(console, "How to get the rest", found.to_get, sources, words=(0, 1, 2, 3))
     if missing:
         put_line(console, f"Missing packages: {sys.executable} -m pip install {' '.join(missing)}")
     if found.compiles:

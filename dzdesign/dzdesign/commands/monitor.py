@@ -106,11 +106,7 @@ def _open_port(name: str, baud: float) -> "serial.Serial":
 
 
 def _record(
-    port: "serial.Serial",
-    recording: "Recording",
-    reader: "FrameReader",
-    stop: threading.Event,
-    seconds: float | None,
+    port: "serial.Serial", recording: "Recording", reader: "FrameReader", stop: threading.Event, seconds: float | None
 ) -> str:
     """Record until told to stop or the time is over; return why it ended before that, or nothing."""
     begin, first = time.monotonic(), None

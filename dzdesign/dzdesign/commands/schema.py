@@ -1,7 +1,7 @@
 """`dzdesign schema`: the JSON Schemas of the artefacts, as their types state them."""
 
 from dataclasses import dataclass
-from importlib import import_module
+from pkgutil import resolve_name
 from typing import Annotated, Any
 
 from dzdesign.core.documents import to_json
@@ -32,8 +32,7 @@ def schema_document(name: str) -> dict[str, Any]:
         raise InputError(
             f"there is no schema '{name[:40]}'{nearest(name, SCHEMAS)}; expected one of {', '.join(SCHEMAS)}"
         )
-    module, _, kind = SCHEMAS[name][0].partition(":")
-    return json_schema(getattr(import_module(module), kind))
+    return json_schema(resolve_name(SCHEMAS[name][0]))
 
 
 def schema_text(name: str) -> str:

@@ -13,7 +13,6 @@ from dzdesign.design.designing import design
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_files import SIMULATED_MARK, ramp_file_bytes, read_ramp_file
-from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.report.reproduction import Hashes, ReproducedValve
 from dzdesign.reproduce.recovered_valves import RecoveredValve
 from dzdesign.reproduce.valve_runs import ValveRuns, run_valve
@@ -43,7 +42,10 @@ def run_chain(valve: RecoveredValve, say: Callable[[str], None] = lambda _: None
         say(f"{name}: ramp tests of the recovered valve")
         ramps = _ramp_tests(valve, bench)
         say(f"{name}: identify, design, codegen")
-        identified = identify(_read_all(ramps, Path(scratch)), identify_options(valve))
+        for file, content in ramps.items():
+            (Path(scratch) / file).write_bytes(content)
+        tests = [read_ramp_file(Path(scratch) / file) for file in ramps]  # as a user's are read
+        identified = identify(tests, identify_options(valve))
         valve_json = to_json_bytes(identified)
         compensator = design(identified, valve_bytes=valve_json)
         compensator_json = to_json_bytes(compensator).decode()
@@ -71,9 +73,7 @@ def run_chain(valve: RecoveredValve, say: Callable[[str], None] = lambda _: None
                 valve_json=sha256_of(valve_json),
                 compensator_json=sha256_of(compensator_json.encode()),
                 core={
-                    path: sha256_of(text.encode())
-                    for path, text in firmware.files.items()
-                    if path.startswith("core/")
+                    path: sha256_of(text.encode()) for path, text in firmware.files.items() if path.startswith("core/")
                 },
             ),
         ),
@@ -110,13 +110,6 @@ def _ramp_tests(valve: RecoveredValve, bench: Bench) -> dict[str, bytes]:
         )
         for dp_MPa in TESTED_MPA
     }
-
-
-def _read_all(ramps: dict[str, bytes], folder: Path) -> list[RampTest]:
-    """Read the recordings as files, as a user's are."""
-    for name, content in ramps.items():
-        (folder / name).write_bytes(content)
-    return [read_ramp_file(folder / name) for name in ramps]
 
 
 def _plant_toml(valve: RecoveredValve) -> str:

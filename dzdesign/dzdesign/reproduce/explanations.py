@@ -1,48 +1,57 @@
 """Why our numbers may differ from the paper's, and by how much: each reason with its own figures."""
 
-from types import MappingProxyType
+from collections.abc import Mapping
 
 from dzdesign.derivation.account.published import (
     DP0_MPA,
     DP1_MPA,
     DROP_ASSUMED,
+    FIRST,
     METER_ACCURACY_L_MIN,
     METER_FLOOR_L_MIN,
     SATURATED_FROM_V,
     U_MAX_V,
 )
-from dzdesign.reproduce.recovered_valves import at_rest
+from dzdesign.reproduce.recovered_valves import at_rest, printed_at
 from dzdesign.reproduce.valve_runs import DIRECT, PAPER, PRODUCT, Drive, ValveRuns
 
 #: What reading our own runs may cost: per cent of full command, share of a flow, L/min at zero command; and what
 #: "about" is taken to mean, as a share.
-READING = MappingProxyType({"%": 0.1, "L/min": 0.005, "L/min at zero": 0.05, "about": 0.1})
+READING: Mapping[str, float] = {"%": 0.1, "L/min": 0.005, "L/min at zero": 0.05, "about": 0.1}
 #: A flow that prints as none, L/min.
 PRINTED_NONE = 0.005
 #: Per cent of command that the certified margin may cost: identification's own goal.
 MARGIN_PERCENT = 0.8
 #: What "little effect" on the step response is taken to mean: a share of its time.
 LITTLE = 0.2
-TOLERANCES = MappingProxyType(
-    {
-        "fitted": f"half a unit of the last printed digit, and for reading the closed loop {READING['%']:g} % of full "
-        f"command, {100 * READING['L/min']:g} % of a flow",
-        "rounding": "half a unit of the last printed digit",
-        "flow": f"half a unit of the last printed digit, and {100 * READING['L/min']:g} % for reading the closed loop",
-        "metered flow": f"half a unit of the last printed digit, and the meter's accuracy, 0.5 % of its range: "
-        f"{float(METER_ACCURACY_L_MIN):g} L/min",
-        "residual": "at most what is printed and half a unit of its last digit: a smaller dead zone is no fault",
-        "metered residual": "at most what is printed and half a unit of its last digit, or, if that is more, the "
-        "command that the meter's floor takes where no flow is hidden at zero command, and "
-        f"{MARGIN_PERCENT:g} % for the certified margin",
-        "about": f"{100 * READING['about']:g} %: the paper says 'about', and reads it off a figure; required of the "
-        "paper's law alone",
-        "none": f"of the product none ({PRINTED_NONE:g} L/min prints as 0.00); of the paper's law what its meter does "
-        f"not show, and {READING['L/min at zero']:g} L/min for the rounding of the thresholds that it is made of",
-        "step": f"'little' is taken as {100 * LITTLE:g} %",
-    }
-)
+TOLERANCES: Mapping[str, str] = {
+    "fitted": f"half a unit of the last printed digit, and for reading the closed loop {READING['%']:g} % of full "
+    f"command, {100 * READING['L/min']:g} % of a flow",
+    "rounding": "half a unit of the last printed digit",
+    "flow": f"half a unit of the last printed digit, and {100 * READING['L/min']:g} % for reading the closed loop",
+    "metered flow": f"half a unit of the last printed digit, and the meter's accuracy, 0.5 % of its range: "
+    f"{float(METER_ACCURACY_L_MIN):g} L/min",
+    "residual": "at most what is printed and half a unit of its last digit: a smaller dead zone is no fault",
+    "metered residual": "at most what is printed and half a unit of its last digit, or, if that is more, the "
+    "command that the meter's floor takes where no flow is hidden at zero command, and "
+    f"{MARGIN_PERCENT:g} % for the certified margin",
+    "about": f"{100 * READING['about']:g} %: the paper says 'about', and reads it off a figure; required of the "
+    "paper's law alone",
+    "none": f"of the product none ({PRINTED_NONE:g} L/min prints as 0.00); of the paper's law what its meter does "
+    f"not show, and {READING['L/min at zero']:g} L/min for the rounding of the thresholds that it is made of",
+    "step": f"'little' is taken as {100 * LITTLE:g} %",
+}
 DROP = f"taken {DROP_ASSUMED}"
+#: Which valve Fig. 13 may be of.
+DUTY_OF_SECOND = (
+    "Fig. 13 does not name its valve; the product's offset lies below the threshold, the paper's at the first flow seen"
+)
+DUTY_OF_FIRST = "not required: Fig. 13 does not name its valve, and its 55 % fits the second"
+#: The paper has three numbers for one flow.
+ABOUT_LARGEST = (
+    f"not required: the paper prints {FIRST.flow1} without and {FIRST.flow1_with} L/min with compensator for the same "
+    "valve and pressure drop; the fit follows the former"
+)
 TEMPERATURE = (
     "not compared: the paper gives neither the temperatures nor the oil. In Eqs. (19)-(24) no threshold depends on it"
 )
@@ -62,12 +71,11 @@ def displacement_beside(runs: ValveRuns) -> str:
 
 def displacement_before_flow(runs: ValveRuns, dp_MPa: float) -> str:
     """Say why the displacement's dead zone can't exceed the flow's."""
-    valve = runs.valve.published
-    flow = valve.dead_zone0_percent if dp_MPa == DP0_MPA else valve.dead_zone1_percent
-    moves = valve.displacement_dead_zone0_percent if dp_MPa == DP0_MPA else valve.displacement_dead_zone1_percent
+    printed = printed_at(runs.valve.published, dp_MPa)
     return (
-        f"the paper contradicts itself: by Eq. (24) no flow starts before the spool moves, but it reads {moves} % of "
-        f"displacement and {flow} % of flow; the fit follows the flow"
+        "the paper contradicts itself: by Eq. (24) no flow starts before the spool moves, but it reads "
+        f"{printed.displacement_dead_zone_percent} % of displacement and {printed.dead_zone_percent} % of flow; the "
+        "fit follows the flow"
     )
 
 
@@ -75,8 +83,9 @@ def residual(runs: ValveRuns, dp_MPa: float) -> str:
     """Say what the printed dead zone with compensator tells of the paper's offset, which it does not print."""
     recovered = runs.valve
     valve = recovered.published
-    onset = {by: runs.onset_percent(Drive(by), dp_MPa) for by in (PRODUCT,) if (Drive(by), dp_MPa) in runs.ramps}
-    ours = f"; the product's is {onset[PRODUCT]:.2f} % without a meter between" if onset else ""
+    ours = ""
+    if (Drive(PRODUCT), dp_MPa) in runs.ramps:
+        ours = f"; the product's is {runs.onset_percent(Drive(PRODUCT), dp_MPa):.2f} % without a meter between"
     if not recovered.level_L_min:
         return "the paper does not say how far below the threshold its offset stays, nor at what flow it reads" + ours
     printed = float(valve.residual_percent) / 100
@@ -144,15 +153,6 @@ def step(runs: ValveRuns) -> str:
     return f"the text gives no time and no parameters of the motion; those of the default plant: {times}"
 
 
-def about_27(runs: ValveRuns) -> str:
-    """Say that the paper has three numbers for one flow."""
-    valve = runs.valve.published
-    return (
-        f"not required: the paper prints {valve.flow1} without and {valve.flow1_with} L/min with compensator for the "
-        "same valve and pressure drop; the fit follows the former"
-    )
-
-
 def saturation(runs: ValveRuns) -> str:
     """Say why the recovered valve has no stop."""
     valve = runs.valve.published
@@ -162,14 +162,4 @@ def saturation(runs: ValveRuns) -> str:
         f"not required: a spool that meets its stop from {SATURATED_FROM_V[0]} V on at both pressure drops would by "
         f"Eq. (24) pass {stopped:.2f} times the flow at {DP1_MPA} MPa, the paper prints {printed:.2f} times; the fit "
         "follows the flows, by a flow force and without a stop"
-    )
-
-
-def duty(runs: ValveRuns, printed: bool) -> str:
-    """Say which valve Fig. 13 may be of."""
-    if not printed:
-        return "not required: Fig. 13 does not name its valve, and its 55 % fits the second"
-    return (
-        "Fig. 13 does not name its valve; the product's offset lies below the threshold, the paper's at the first flow "
-        "seen"
     )

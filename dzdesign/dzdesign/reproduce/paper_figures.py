@@ -9,7 +9,7 @@ from dzdesign.derivation.account.published import DP0_MPA, DP1_MPA, U_MAX_V
 from dzdesign.derivation.law import law
 from dzdesign.identify.plots.frame import finish, new_figure, plot_style, saved
 from dzdesign.report.reproduction import Driver
-from dzdesign.reproduce.recovered_valves import at_rest
+from dzdesign.reproduce.recovered_valves import at_rest, printed_at
 from dzdesign.reproduce.valve_runs import DIRECT, PAPER, PRESSURES_MPA, PRODUCT, STEP_AT_S, Drive, ValveRuns
 
 if TYPE_CHECKING:
@@ -70,21 +70,14 @@ def _panels(number: int, title: str, draw: Callable[["Axes", Driver], None], dri
 
 
 def _draw_ramp(
-    axes: "Axes",
-    runs: ValveRuns,
-    drive: Drive,
-    dp_MPa: float,
-    line: Line,
-    label: str,
-    *,
-    color: str | None = None,
-    width: float = 1.8,
-) -> None:
-    """Draw the rising branch of a ramp."""
+    axes: "Axes", runs: ValveRuns, drive: Drive, dp_MPa: float, line: Line, label: str, *,
+    color: str = "", width: float = 1.8, of: str = "q_mean_L_min",
+) -> None:  # fmt: skip
+    """Draw the rising branch of a ramp: the flow, or another quantity `of` the run."""
     run = runs.ramps[drive, dp_MPa]
     rising = slice(0, int(np.argmax(run.command)) + 1, EVERY)
     axes.plot(
-        U_MAX_V * run.command[rising], run.q_mean_L_min[rising], ls=line, label=label, lw=width,
+        U_MAX_V * run.command[rising], getattr(run, of)[rising], ls=line, label=label, lw=width,
         color=color or COLOURS[dp_MPa],
     )  # fmt: skip
 
@@ -100,20 +93,18 @@ def _mark(axes: "Axes", u_V: float, y: float, dp_MPa: float, marker: str, what: 
 
 def _mark_without(axes: "Axes", runs: ValveRuns, dp_MPa: float) -> None:
     """Mark dead zone and largest flow without compensator."""
-    valve, at_reference = runs.valve.published, dp_MPa == DP0_MPA
-    dead_zone = valve.dead_zone0_percent if at_reference else valve.dead_zone1_percent
-    flow = valve.flow0 if at_reference else valve.flow1
-    _mark(axes, float(dead_zone) / 100 * U_MAX_V, runs.valve.level_L_min, dp_MPa, "^", "dead zone")
-    _mark(axes, U_MAX_V, float(flow), dp_MPa, "s", "largest flow")
+    printed = printed_at(runs.valve.published, dp_MPa)
+    dead_zone_V = float(printed.dead_zone_percent) / 100 * U_MAX_V
+    _mark(axes, dead_zone_V, runs.valve.level_L_min, dp_MPa, "^", "dead zone")
+    _mark(axes, U_MAX_V, float(printed.flow), dp_MPa, "s", "largest flow")
 
 
 def _mark_with(axes: "Axes", runs: ValveRuns, dp_MPa: float) -> None:
     """Mark dead zone and largest flow with compensator."""
     valve = runs.valve.published
-    flow = valve.flow0_with if dp_MPa == DP0_MPA else valve.flow1_with
     dead_zone_V = float(valve.residual_percent) / 100 * U_MAX_V
     _mark(axes, dead_zone_V, runs.valve.level_L_min, dp_MPa, "v", "dead zone, with", hollow=True)
-    _mark(axes, U_MAX_V, float(flow), dp_MPa, "o", "largest flow, with", hollow=True)
+    _mark(axes, U_MAX_V, float(printed_at(valve, dp_MPa).flow_with), dp_MPa, "o", "largest flow, with", hollow=True)
 
 
 def _draw_floor(axes: "Axes", runs: ValveRuns) -> None:
@@ -172,24 +163,16 @@ def _static_without(runs: ValveRuns) -> "Figure":
     """Fig. 6: displacement and flow over the command."""
     figure = _titled(6, 4.8, "static characteristics without compensator (simulated valve)", MARKS)
     travel, flow = figure.subplots(1, 2)
-    valve = runs.valve.published
     for dp_MPa in PRESSURES_MPA:
-        run = runs.ramps[Drive(DIRECT), dp_MPa]
-        rising = slice(0, int(np.argmax(run.command)) + 1, EVERY)
-        line = WITH if dp_MPa == DP0_MPA else NO_BETA
-        travel.plot(U_MAX_V * run.command[rising], run.position_mm[rising], ls=line, color=COLOURS[dp_MPa], lw=1.8)
+        printed, line = printed_at(runs.valve.published, dp_MPa), WITH if dp_MPa == DP0_MPA else NO_BETA
+        _draw_ramp(travel, runs, Drive(DIRECT), dp_MPa, line, "", of="position_mm")
         _draw_ramp(flow, runs, Drive(DIRECT), dp_MPa, line, f"{dp_MPa:g} MPa")
-        at_reference = dp_MPa == DP0_MPA
-        stroke, moves = (
-            (valve.stroke0_mm, valve.displacement_dead_zone0_percent)
-            if at_reference
-            else (valve.stroke1_mm, valve.displacement_dead_zone1_percent)
-        )
-        _mark(travel, U_MAX_V, float(stroke), dp_MPa, "D", "largest displacement")
-        _mark(travel, float(moves) / 100 * U_MAX_V, 0.0, dp_MPa, ">", "dead zone of displacement")
+        moves_V = float(printed.displacement_dead_zone_percent) / 100 * U_MAX_V
+        _mark(travel, U_MAX_V, float(printed.stroke_mm), dp_MPa, "D", "largest displacement")
+        _mark(travel, moves_V, 0.0, dp_MPa, ">", "dead zone of displacement")
         _mark_without(flow, runs, dp_MPa)
-    travel.set(xlabel="command u_i (V)", ylabel="displacement x_e (mm)", xlim=(0, 1.02 * U_MAX_V), ylim=(0, None))
-    flow.set(xlabel="command u_i (V)", ylabel="flow Q (L/min)", xlim=(0, 1.02 * U_MAX_V), ylim=(0, None))
+    for axes, quantity in ((travel, "displacement x_e (mm)"), (flow, "flow Q (L/min)")):
+        axes.set(xlabel="command u_i (V)", ylabel=quantity, xlim=(0, 1.02 * U_MAX_V), ylim=(0, None))
     return finish(figure, 3)
 
 

@@ -17,7 +17,7 @@ from dzdesign.derivation.account.published import (
 from dzdesign.report.reproduction import Driver, Outcome, PaperNumber
 from dzdesign.reproduce import explanations
 from dzdesign.reproduce.explanations import LITTLE, MARGIN_PERCENT, PRINTED_NONE, READING, TOLERANCES
-from dzdesign.reproduce.recovered_valves import half_digit
+from dzdesign.reproduce.recovered_valves import half_digit, printed_at
 from dzdesign.reproduce.valve_runs import DIRECT, PAPER, PRESSURES_MPA, PRODUCT, Drive, ValveRuns, paper_duty_percent
 
 #: Decimals in reproduction.json: more than the paper prints, fewer than a compiler's last bits reach.
@@ -90,10 +90,6 @@ def _around(published: str, room: float) -> Range:
     return float(published) - reach, float(published) + reach
 
 
-def _at(dp_MPa: float, at_reference: str, beside: str) -> str:
-    return at_reference if dp_MPa == DP0_MPA else beside
-
-
 def _read_at(runs: ValveRuns) -> str:
     """Say at what flow a dead zone is read, where a meter stands between."""
     return f" (at {runs.valve.level_L_min:g} L/min)" if runs.valve.level_L_min else ""
@@ -106,35 +102,29 @@ def _drivers(runs: ValveRuns) -> tuple[Driver, ...]:
 
 def _without_compensator(runs: ValveRuns, dp_MPa: float) -> Iterator[PaperNumber]:
     valve, bare = runs.valve.published, Drive(DIRECT)
-    dead_zone = _at(dp_MPa, valve.dead_zone0_percent, valve.dead_zone1_percent)
-    flow = _at(dp_MPa, valve.flow0, valve.flow1)
+    printed = printed_at(valve, dp_MPa)
     assumed = explanations.DROP if valve is SECOND and dp_MPa != DP0_MPA else ""
     yield _number(
-        runs, dp_MPa, f"dead zone without{_read_at(runs)}", "%", dead_zone,
-        {DIRECT: runs.dead_zone_percent(bare, dp_MPa)}, _around(dead_zone, READING["%"]),
+        runs, dp_MPa, f"dead zone without{_read_at(runs)}", "%", printed.dead_zone_percent,
+        {DIRECT: runs.dead_zone_percent(bare, dp_MPa)}, _around(printed.dead_zone_percent, READING["%"]),
         in_fit=True, tolerance=TOLERANCES["fitted"], why=assumed,
     )  # fmt: skip
     yield _number(
-        runs, dp_MPa, "largest flow without", "L/min", flow,
-        {DIRECT: runs.largest_L_min(bare, dp_MPa)}, _around(flow, READING["L/min"] * float(flow)),
+        runs, dp_MPa, "largest flow without", "L/min", printed.flow,
+        {DIRECT: runs.largest_L_min(bare, dp_MPa)}, _around(printed.flow, READING["L/min"] * float(printed.flow)),
         in_fit=True, tolerance=TOLERANCES["fitted"], why=assumed,
     )  # fmt: skip
-    if not valve.stroke0_mm:
+    if not printed.stroke_mm:
         return
-    fitted, largest_mm = dp_MPa == DP0_MPA, float(runs.ramps[bare, dp_MPa].position_mm.max())
-    if fitted:
-        yield _number(
-            runs, dp_MPa, "largest displacement", "mm", valve.stroke0_mm,
-            {DIRECT: largest_mm}, _around(valve.stroke0_mm, 0.0), in_fit=True, tolerance=TOLERANCES["fitted"],
-        )  # fmt: skip
-    else:
-        yield _number(
-            runs, dp_MPa, "largest displacement", "mm", valve.stroke1_mm, {DIRECT: largest_mm},
-            why=explanations.displacement_beside(runs),
-        )  # fmt: skip
+    fitted = dp_MPa == DP0_MPA
     yield _number(
-        runs, dp_MPa, "displacement's dead zone", "%",
-        _at(dp_MPa, valve.displacement_dead_zone0_percent, valve.displacement_dead_zone1_percent),
+        runs, dp_MPa, "largest displacement", "mm", printed.stroke_mm,
+        {DIRECT: float(runs.ramps[bare, dp_MPa].position_mm.max())},
+        _around(printed.stroke_mm, 0.0) if fitted else None, in_fit=fitted,
+        tolerance=TOLERANCES["fitted"] if fitted else "", why="" if fitted else explanations.displacement_beside(runs),
+    )  # fmt: skip
+    yield _number(
+        runs, dp_MPa, "displacement's dead zone", "%", printed.displacement_dead_zone_percent,
         {DIRECT: runs.displacement_dead_zone_percent(dp_MPa)},
         in_fit=fitted, why=explanations.displacement_before_flow(runs, dp_MPa),
     )  # fmt: skip
@@ -142,7 +132,7 @@ def _without_compensator(runs: ValveRuns, dp_MPa: float) -> Iterator[PaperNumber
 
 def _with_compensator(runs: ValveRuns, dp_MPa: float) -> Iterator[PaperNumber]:
     level_L_min, valve = runs.valve.level_L_min, runs.valve.published
-    without, flow = _at(dp_MPa, valve.flow0, valve.flow1), _at(dp_MPa, valve.flow0_with, valve.flow1_with)
+    _, without, flow, *_ = printed_at(valve, dp_MPa)
     most = float(valve.residual_percent) + half_digit(valve.residual_percent)
     if level_L_min:
         most = max(most, 100 * level_L_min / float(flow) + MARGIN_PERCENT)
@@ -195,7 +185,7 @@ def _of_the_first_valve_alone(runs: ValveRuns) -> Iterator[PaperNumber]:
     reference, beside = PRESSURES_MPA
     yield _number(
         runs, beside, "largest flow, about", "L/min", ABOUT_LARGEST_L_MIN,
-        {DIRECT: runs.largest_L_min(Drive(DIRECT), beside)}, why=explanations.about_27(runs),
+        {DIRECT: runs.largest_L_min(Drive(DIRECT), beside)}, why=explanations.ABOUT_LARGEST,
     )  # fmt: skip
     yield _number(
         runs, reference, "largest flow with: reached at", "V", "-".join(SATURATED_FROM_V),
@@ -213,12 +203,12 @@ def _duty_cycles(first: ValveRuns, second: ValveRuns) -> Iterator[PaperNumber]:
         second, dp_MPa, f"{at} without", "%", DUTY_WITHOUT_PERCENT,
         {DIRECT: 100 * DUTY_COMMAND_V / U_MAX_V}, _around(DUTY_WITHOUT_PERCENT, 0.0), tolerance=TOLERANCES["rounding"],
     )  # fmt: skip
-    for runs, printed in ((second, True), (first, False)):
+    for runs, why in ((second, explanations.DUTY_OF_SECOND), (first, explanations.DUTY_OF_FIRST)):
         values: dict[Driver, float | None] = {PAPER: paper_duty_percent(runs.valve.published)}
         if runs.product_duty_percent is not None:
             values[PRODUCT] = runs.product_duty_percent
+        allowed: dict[Driver, Range] | None = {PAPER: _around(DUTY_WITH_PERCENT, 0.0)} if runs is second else None
         yield _number(
-            runs, dp_MPa, f"{at} with", "%", DUTY_WITH_PERCENT, values,
-            {PAPER: _around(DUTY_WITH_PERCENT, 0.0)} if printed else None,
-            tolerance=TOLERANCES["rounding"] if printed else "", why=explanations.duty(runs, printed),
+            runs, dp_MPa, f"{at} with", "%", DUTY_WITH_PERCENT, values, allowed,
+            tolerance=TOLERANCES["rounding"] if allowed else "", why=why,
         )  # fmt: skip

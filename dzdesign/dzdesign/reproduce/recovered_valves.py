@@ -55,17 +55,29 @@ RECOVERED: Mapping[str, tuple[float, float]] = MappingProxyType(
     }
 )
 SOLVER: Mapping[str, int | float | str] = MappingProxyType(
-    {
-        "ipopt.print_level": 0,
-        "ipopt.sb": "yes",
-        "print_time": False,
-        "ipopt.tol": 1e-12,
-        "ipopt.bound_relax_factor": 0.0,
-    }
-)
+    {"ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": False, "ipopt.tol": 1e-12,
+     "ipopt.bound_relax_factor": 0.0}
+)  # fmt: skip
 #: What only the simulated valve's displacement tells; the tested ones are "identical" (section 2.1), so they take it.
 FROM_DISPLACEMENT = ("K_et_N_m", "overlap_mm")
 NOT_PRINTED = ("hysteresis_V", "droop_MPa_L_min2", "stroke_mm")
+
+
+class PrintedAt(NamedTuple):
+    """What the paper prints of a valve at one pressure drop, as printed; empty where it prints nothing."""
+
+    dead_zone_percent: str
+    flow: str
+    flow_with: str
+    stroke_mm: str
+    displacement_dead_zone_percent: str
+
+
+def printed_at(valve: PublishedValve, dp_MPa: float) -> PrintedAt:
+    """Return what is printed of a valve at the reference dP0, or at dP1."""
+    at = "0" if dp_MPa == DP0_MPA else "1"
+    names = (f"dead_zone{at}_percent", f"flow{at}", f"flow{at}_with", f"stroke{at}_mm")
+    return PrintedAt(*(getattr(valve, name) for name in (*names, f"displacement_dead_zone{at}_percent")))
 
 
 class Printed(NamedTuple):
@@ -96,14 +108,12 @@ class RecoveredValve:
     def parameters(self) -> dict[str, Parameter]:
         """Return the parameters of the plant, each marked as recovered or not."""
         return {
-            field.name: Parameter(
-                value=getattr(self.plant, field.name),
-                recovered=field.name in self.rounding,
-                origin=self._origin(field.name),
-                rounding=self.rounding.get(field.name),
+            name: Parameter(
+                value=getattr(self.plant, name), recovered=name in self.rounding, origin=self._origin(name),
+                rounding=self.rounding.get(name),
             )
-            for field in fields(Plant)
-        }
+            for name in (field.name for field in fields(Plant))
+        }  # fmt: skip
 
     def _origin(self, name: str) -> str:
         if name in self.rounding:
@@ -126,13 +136,7 @@ def half_digit(published: str) -> float:
 
 @cache
 def recover_valves() -> tuple[RecoveredValve, ...]:
-    """Recover the simulated valve, then both tested ones with its spring and its edge.
-
-    Raises
-    ------
-    RequirementError
-        If a fit misses a figure that determines it.
-    """
+    """Recover the simulated valve, then both tested ones with its spring and its edge."""
     simulated = _recover(SIMULATION, Plant(), tuple(RECOVERED), 0.0)
     free = tuple(name for name in RECOVERED if name not in FROM_DISPLACEMENT)
     tested = (_recover(valve, simulated.plant, free, float(METER_FLOOR_L_MIN)) for valve in (FIRST, SECOND))
@@ -186,15 +190,12 @@ def _with_digits(names: tuple[str, ...], values: np.ndarray, digits: int) -> dic
 def _printed_at_rest(valve: PublishedValve, values: Mapping[str, Any], level_L_min: float) -> list[Printed]:
     """Return every figure that the fit may use, for the plant at rest."""
     printed = []
-    for dp_MPa, dead_zone, flow in (
-        (DP0_MPA, valve.dead_zone0_percent, valve.flow0),
-        (DP1_MPA, valve.dead_zone1_percent, valve.flow1),
-    ):
-        rest = AtRest(values, dp_MPa)
+    for dp_MPa in (DP0_MPA, DP1_MPA):
+        rest, figures = AtRest(values, dp_MPa), printed_at(valve, dp_MPa)
         seen_V = rest.opens_V + level_L_min / rest.flow_per_volt
         largest = rest.flow_per_volt * (U_MAX_V - rest.opens_V)
-        printed.append(Printed(f"dead zone at {dp_MPa} MPa", "%", dead_zone, 100 * seen_V / U_MAX_V))
-        printed.append(Printed(f"largest flow at {dp_MPa} MPa", "L/min", flow, largest))
+        printed.append(Printed(f"dead zone at {dp_MPa} MPa", "%", figures.dead_zone_percent, 100 * seen_V / U_MAX_V))
+        printed.append(Printed(f"largest flow at {dp_MPa} MPa", "L/min", figures.flow, largest))
     if valve.stroke0_mm:
         rest, at = AtRest(values, DP0_MPA), f"at {DP0_MPA} MPa"
         moves_percent = 100 * rest.moves_V / U_MAX_V

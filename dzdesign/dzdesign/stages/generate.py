@@ -70,10 +70,10 @@ def generate(arguments: GenerateArguments) -> "Firmware":
 def _read_compensator(content: bytes, source: str, choices: DesignChoices) -> "Compensator":
     from dzdesign.core.artefact_reading import read_artefact
     from dzdesign.design.compensator import Compensator
-    from dzdesign.design.redesign_check import refuse_unsaid
+    from dzdesign.design.redesign_check import refuse_without_options
 
     compensator = read_artefact(content, Compensator, source)
-    refuse_unsaid(compensator, source)
+    refuse_without_options(compensator, source)
     return _proven(compensator, f"'{source}'", choices)
 
 

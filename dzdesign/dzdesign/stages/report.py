@@ -1,5 +1,6 @@
 """`report`: a folder of artefacts, of a valve or of a lot -> one HTML page."""
 
+from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -53,16 +54,11 @@ def report(arguments: ReportArguments) -> "Report":
 
 def _write_report(output: Path, html: str) -> None:
     """Write the report; in a folder whose manifest lists it the manifest follows, both or neither."""
-    manifest_path = output.parent / MANIFEST_NAME
-    if not manifest_path.is_file():
-        write_file(output, html)
-        return
-    try:
-        manifest = parse_document(read_bytes(manifest_path, "manifest"), str(manifest_path), ("dzdesign.evidence/1",))
-        listed = manifest["files"] if isinstance(manifest.get("files"), dict) else {}
-    except InputError:
-        listed = {}
-    if output.name not in listed:
+    place, manifest = output.parent / MANIFEST_NAME, {}
+    with suppress(InputError):  # none, or none of an evidence
+        manifest = parse_document(read_bytes(place, "manifest"), str(place), ("dzdesign.evidence/1",))
+    listed = manifest.get("files")
+    if not isinstance(listed, dict) or output.name not in listed:
         write_file(output, html)
         return
     files: dict[str, str | bytes] = {name: read_bytes(output.parent / name, "evidence") for name in listed}

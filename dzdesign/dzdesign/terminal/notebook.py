@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from dzdesign.codegen.project import Firmware
     from dzdesign.design.compensator import Compensator
     from dzdesign.identify.valve.model import ValveModel
-    from dzdesign.verify.verification import Verification
 
 #: A page in a notebook; rich has escaped what stands in it.
 FRAME = '<pre style="white-space:pre;overflow-x:auto">{code}</pre>'
@@ -32,10 +31,6 @@ def _compensator_heading(compensator: "Compensator") -> str:
     return f"Compensator{target}, law {compensator.law}, of a valve of {float(compensator.u_max_V):g} V"
 
 
-def _firmware_heading(firmware: "Firmware") -> str:
-    return f"Firmware for {firmware.manifest.target}, law {firmware.manifest.law}, {len(firmware.files)} files"
-
-
 def _print_firmware(firmware: "Firmware", console: "Console") -> None:
     """Print its files, and the note that the command line has on standard error."""
     print_firmware(firmware, console)
@@ -43,16 +38,15 @@ def _print_firmware(firmware: "Firmware", console: "Console") -> None:
         put_line(console, firmware.note)
 
 
-def _verification_heading(verification: "Verification") -> str:
-    return f"Verification: {verification.verdict}"
-
-
 #: Class of a result -> its heading, and what prints it.
 PAGES: Mapping[str, tuple[Callable[[Any], str], Callable[[Any, "Console"], None]]] = {
     "ValveModel": (_valve_heading, print_valve),
     "Compensator": (_compensator_heading, print_compensator),
-    "Firmware": (_firmware_heading, _print_firmware),
-    "Verification": (_verification_heading, print_verification),
+    "Firmware": (
+        lambda made: f"Firmware for {made.manifest.target}, law {made.manifest.law}, {len(made.files)} files",
+        _print_firmware,
+    ),
+    "Verification": (lambda verification: f"Verification: {verification.verdict}", print_verification),
 }
 
 

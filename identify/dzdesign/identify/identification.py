@@ -7,10 +7,10 @@ from dzdesign.core.artefact_reading import rounded
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile
 from dzdesign.core.errors import InputError
 from dzdesign.identify.constants import L_MIN
+from dzdesign.identify.data_quality.catalogue import most_serious_first, warn
 from dzdesign.identify.data_quality.clipped_meter import without_clipping
 from dzdesign.identify.data_quality.pressures import about_mixed_pressures, about_single_pressures
 from dzdesign.identify.data_quality.recordings import about_recordings
-from dzdesign.identify.data_quality.severity import most_serious_first
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.sides import tests_of_side
 from dzdesign.identify.reading.ramp_test import RampTest
@@ -73,7 +73,7 @@ def identify_sides(
             reason = f"{error}; it may be that {mixed[0].text}" if mixed else str(error)
             if not sides:
                 raise InputError(reason) from error
-            warnings.append(Warning_(code="side-refused", text=f"the {name} side is missing: {reason}", source=None))
+            warnings.append(warn("side-refused", side=name, reason=reason))
             continue
         prefix = f"{name} side: " if len(sides) > 1 else ""
         found = [item for item in sides[name].warnings if not mixed or item.code not in EXPLAINED_BY_MIXED_PRESSURES]
@@ -94,24 +94,11 @@ def identify_sides(
         knee_window=options.knee_window,
         sides={name: side.model for name, side in sides.items()},
         warnings=most_serious_first(
-            (*about_recordings(tests), *([_about_two_sides()] if len(sides) > 1 else []), *warnings)
+            (*about_recordings(tests), *([warn("two-sides")] if len(sides) > 1 else []), *warnings)
         ),
         record=dict(record or {}),
     )
     model = rounded(model, DECIMALS)
     return Identification(
         model=model, sides={name: replace(side, model=model.sides[name]) for name, side in sides.items()}
-    )
-
-
-def _about_two_sides() -> Warning_:
-    """Say that a design for commands of one sign, which is the default, leaves one side out."""
-    return Warning_(
-        code="two-sides",
-        text=(
-            "both sides are identified, but a command of one sign, which `design` assumes, drives the positive side "
-            "only: the negative one is then left out of the firmware. Give `design` a --command-signal of both signs, "
-            "such as '-10..10 V x 0.15 + 1.5 V'"
-        ),
-        source=None,
     )

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 
@@ -11,12 +12,10 @@ from dzdesign.identify.data_quality.side_warnings import find_warnings
 from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, Trend, find_trend
 from dzdesign.identify.fitting.constrained_fits import KneeFit, fit_knees
 from dzdesign.identify.fitting.guarding import (
-    COLUMNS,
     OrderedKnees,
     Threshold,
     bound_threshold,
-    fit_guard_curve,
-    further_guards,
+    fit_guard_curves,
     mean_threshold,
     opening_curve,
     order_knees,
@@ -27,7 +26,7 @@ from dzdesign.identify.knees.prepared_tests import describe_tests
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.results import SideIdentification
-from dzdesign.identify.valve.guard_curve import GUARDS, Guard, GuardCurve, OpeningCurve
+from dzdesign.identify.valve.guard_curve import GUARDS, Guard, GuardCurve
 from dzdesign.identify.valve.ramp_result import BRANCHES, TestResult
 from dzdesign.identify.valve.repeatability import Repeatability
 from dzdesign.identify.valve.side_model import BoundsBasis, Reference, SideModel
@@ -61,7 +60,7 @@ def _fit_with_trend(group: DescribedTests, options: IdentifyOptions) -> tuple[Tr
     """Fit the knees freely, see which way the guarded ones run, and fit them again under that direction."""
     free = fit_knees([item.shapes for item in group.tests], floor=group.floor, u_max=options.u_max, trend="flat")
     dp = np.array([item.dp or math.nan for item in group.tests])
-    column = _guarded_column(group.tests)
+    column = 1 if group.tests[0].shapes[1] else 0  # falling wherever there is one: zero command comes after closing
     budget = options.flat_below * options.u_max
     between, knee_se = group.between(column), free.knee_se[:, column]
     degrees = float(between.degrees_of_freedom(knee_se, DEGREES_OF_FREEDOM).min())
@@ -69,11 +68,6 @@ def _fit_with_trend(group: DescribedTests, options: IdentifyOptions) -> tuple[Tr
         dp, free.knee[:, column], between.covariance_of_mean(knee_se), degrees, options.u_max, budget
     )
     return trend, free, order_knees(group, free, trend.direction, column, options)
-
-
-def _guarded_column(described: tuple[DescribedTest, ...]) -> int:
-    """Return 1 (the falling branch) wherever there is one, else 0: zero command comes after closing."""
-    return 1 if described[0].shapes[1] else 0
 
 
 def _reference(described: tuple[DescribedTest, ...], dp0: float | None) -> int:
@@ -97,12 +91,12 @@ def _side_model(
 ) -> SideModel:
     """Assemble one side: guarded thresholds, the curves that may be certified of them, and k x_max."""
     described, knees = group.tests, guarded.fit
-    threshold = bound_threshold(group, guarded, options)
     reference = _reference(described, options.dp0)
+    thresholds, rising = _all_thresholds(group, free, guarded, trend, options)
+    guard, threshold = next(iter(thresholds.items()))
     dp = [item.dp for item in described]
-    curve, active = fit_guard_curve(threshold, dp, reference, trend.direction, options.u_max)
-    guard = next(name for name, column in COLUMNS.items() if column == guarded.column)
-    guards, opening = _all_curves(group, free, {guard: (guarded, threshold, curve)}, trend, reference, options)
+    found = fit_guard_curves(thresholds, dp, reference, trend.direction, options.u_max)
+    guards: dict[str, GuardCurve] = {name: found[name][0] for name in GUARDS if name in found}
     slope = float(np.nanmean(knees.slope[reference]))
     y_max = float(np.mean([shape.y_max for shape in described[reference].branches]))
     k_x_max = y_max / slope  # Eq. (11) at full stroke: Q_max = slope (k x_max)
@@ -124,9 +118,9 @@ def _side_model(
             repeatability=_repeatability(group.between(guarded.column)),
         ),
         guards=guards,
-        opening_curve=opening,
+        opening_curve=opening_curve(rising, trend.direction, guards, options.u_max) if rising else None,
         active_constraints=knees.active
-        + tuple(f"offset at test {row + 1}" for row, holds in enumerate(active) if holds),
+        + tuple(f"offset at test {row + 1}" for row, holds in enumerate(found[guard][1]) if holds),
     )
 
 
@@ -141,38 +135,25 @@ def _repeatability(found: BetweenRamps) -> Repeatability:
     )
 
 
-def _all_curves(
-    group: DescribedTests,
-    free: KneeFit,
-    found: dict[Guard, tuple[OrderedKnees, Threshold, GuardCurve]],
-    trend: Trend,
-    reference: int,
-    options: IdentifyOptions,
-) -> tuple[dict[str, GuardCurve], OpeningCurve | None]:
-    """Return the curve of every guard that the branches allow, and where the valve opens.
+def _all_thresholds(
+    group: DescribedTests, free: KneeFit, guarded: OrderedKnees, trend: Trend, options: IdentifyOptions
+) -> tuple[dict[Guard, Threshold], OrderedKnees | None]:
+    """Return the threshold of every guard that the branches allow, the default one first, and the rising knees.
 
     The trend is the one found on the guarded branch: one edge opens and closes. A branch that runs otherwise departs
     from it, and its bounds are lowered by the departure.
     """
-    ((guard, (guarded, threshold, curve)),) = found.items()
-    knees, thresholds = {guard: guarded}, {guard: threshold}
-    other: Guard = "opening" if guard == "closing" else "closing"
-    if group.tests[0].shapes[COLUMNS[other]]:
-        try:
-            knees[other] = order_knees(group, free, trend.direction, COLUMNS[other], options, alone=True)
-        except InputError:
-            # Its knees have no order that the solver finds: that guard is not on offer, and `design` says so.
-            pass
-        else:
-            thresholds[other] = bound_threshold(group, knees[other], options)
-            thresholds["mean"] = mean_threshold(threshold, thresholds[other])
-    further = {name: item for name, item in thresholds.items() if name != guard}
-    dp = [item.dp for item in group.tests]
-    curves = {guard: curve} | further_guards(further, dp, reference, trend.direction, options.u_max)
-    guards: dict[str, GuardCurve] = {name: curves[name] for name in GUARDS if name in curves}
-    if "opening" not in knees:
-        return guards, None
-    return guards, opening_curve(knees["opening"], trend.direction, guards, options.u_max)
+    guard: Guard = "closing" if guarded.column else "opening"
+    other: Guard = "opening" if guarded.column else "closing"
+    knees, thresholds = {guard: guarded}, {guard: bound_threshold(group, guarded, options)}
+    # Where the solver finds no order of the other branch's knees, that guard is not on offer, and `design` says so.
+    with suppress(InputError):
+        if group.tests[0].shapes[1 - guarded.column]:
+            knees[other] = order_knees(group, free, trend.direction, 1 - guarded.column, options, alone=True)
+    if other in knees:
+        thresholds[other] = bound_threshold(group, knees[other], options)
+        thresholds["mean"] = mean_threshold(thresholds[guard], thresholds[other])
+    return thresholds, knees.get("opening")
 
 
 def _test_result(group: DescribedTests, knees: KneeFit, row: int, guarded: Threshold) -> TestResult:
@@ -193,6 +174,7 @@ def _test_result(group: DescribedTests, knees: KneeFit, row: int, guarded: Thres
         saturates=all(shape.saturates for shape in item.branches),
         noise_L_min=max(shape.sigma for shape in item.branches) / L_MIN,
         noise_variance_inflation=max(shape.variance_inflation for shape in item.branches),
+        spool_ripple_V=max(shape.ripple for shape in item.branches),
         outliers=sum(shape.outliers for shape in item.branches),
         ramps=item.ramps,
     )

@@ -8,10 +8,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
-from dzdesign.core.artefact_types import Artefact, to_json_bytes
+from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.artefact_types import THIS_TOOL, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest
+from dzdesign.design.redesign_check import prove_derived
 from dzdesign.report.artefact_folder import VERIFICATION_NAME, is_of, listed_files
 from dzdesign.report.chain import KINDS, Chain, Place
 
@@ -142,12 +144,12 @@ class _Search:
     def _valve(self, compensator: Compensator) -> None:
         """Take the valve's file; where it is not here, the valve that the compensator holds."""
         held, place = compensator.valve, self.places["compensator"]
-        stated, named = place.made_from[0].sha256, place.made_from[0].source
+        stated, named = compensator.made_from[0].sha256, compensator.made_from[0].source
         name = self._of_hash(stated)
         if name is None:
             self._name_other("valve", stated, "the compensator was made from", named)
             self.found["valve"] = held
-            self.places["valve"] = _place(f"{place.name}, its key “valve”", sha256_of(to_json_bytes(held)), held)
+            self.places["valve"] = Place(f"{place.name}, its key “valve”", sha256_of(to_json_bytes(held)))
             return
         self._take("valve", name)
         if self.hashes.get(named) != stated and self._other("valve", named) == named:
@@ -158,7 +160,7 @@ class _Search:
     def _assessment_fits(self) -> None:
         """Leave out an assessment whose recordings BEFORE are not the valve's."""
         known, compared = (
-            {each.sha256 for each in self.places[role].made_from} if role in self.places else set()
+            {each.sha256 for each in self.found[role].made_from} if role in self.found else set()
             for role in ("valve", "assessment")
         )
         if "assessment" in self.found and known and not known & compared:
@@ -179,10 +181,11 @@ class _Search:
             return None
         if role == "firmware":
             return str(self.found[role].origin.compensator_json)
-        place = self.places[role]
-        if not place.made_from:
-            raise InputError(f"'{place.name}': 'made_from' is empty, expected what it was made from; make it again")
-        return place.made_from[0].sha256
+        made_from = self.found[role].made_from
+        if not made_from:
+            place = self.places[role].name
+            raise InputError(f"'{place}': 'made_from' is empty, expected what it was made from; make it again")
+        return str(made_from[0].sha256)
 
     def _of_hash(self, stated: str) -> str | None:
         """Return the file of a hash: of copies of a manifest that in the folder asked for, then where all fits."""
@@ -223,15 +226,13 @@ class _Search:
     def _take(self, role: str, name: str) -> None:
         """Keep an artefact; one that can't be read is missing, and the rest is reported without it."""
         try:
-            self.found[role] = KINDS[role].read(self.files[name], name)
+            artefact = read_artefact(self.files[name], KINDS[role].type, name)
+            if isinstance(artefact, Compensator) and artefact.tool == THIS_TOOL:
+                prove_derived(artefact)  # another version may have chosen other tables
         except InputError as error:
             # What the evidence rests on must not go missing without a word: its verdict would stand.
             lines = self.faults if role == "compensator" and self.found else self.unreadable
             lines.append(f"{KINDS[role].label}: {error}")
             return
-        self.places[role] = _place(name, self.hashes[name], self.found[role])
-
-
-def _place(name: str, sha256: str, artefact: Artefact) -> Place:
-    tool = artefact.tool
-    return Place(name=name, sha256=sha256, made_by=f"{tool.name} {tool.version}", made_from=artefact.made_from)
+        self.found[role] = artefact
+        self.places[role] = Place(name, self.hashes[name])

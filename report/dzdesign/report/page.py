@@ -72,8 +72,8 @@ class Section:
     """What a section holds, in the order in which it is shown.
 
     `groups` are further lines, each group under a heading of its own. `missing` says what the section lacks and which
-    command makes it; the page is whole without an `optional` one. In a `note` a command stands between backticks. Of a
-    lot setting a section may be of one valve, the carrier.
+    command makes it; the page is whole without an `optional` one. Of a lot setting a section may be of one valve, the
+    carrier.
     """
 
     figures: tuple[ReportFigure, ...] = ()
@@ -82,7 +82,6 @@ class Section:
     groups: tuple[tuple[str, tuple[str, ...]], ...] = ()
     missing: str = ""
     optional: bool = False
-    note: str = ""
     of_valve: bool = False
 
 
@@ -90,7 +89,7 @@ class Section:
 class Page:
     """What a page holds.
 
-    `headings` has anchor and heading of every section, in their order, ``provenance`` and ``warnings`` among them;
+    `template` has the heading of every section, and what no report proves; `sections` by anchor what this one found;
     `missing` what is not there or not used, and which command makes it; `record` who and what, in the engineer's words.
     Of a lot setting `lot` stands before all other figures, and `carrier` is the one valve that `record` and `figures`
     are of.
@@ -99,7 +98,7 @@ class Page:
     title: str
     verdict: Headline
     figures: Sequence[Figure]
-    headings: Sequence[tuple[str, str]]
+    template: str
     sections: Mapping[str, Section]
     missing: Sequence[str] = ()
     law: "LawAccount | None" = None
@@ -157,7 +156,7 @@ def render(page: Page) -> str:
     )
     environment.filters.update(data_uri=data_uri, anchor=anchor, words=_words, cell=_cell)
     content = {each.name: getattr(page, each.name) for each in fields(page)}
-    html: str = environment.get_template("report.html.jinja").render(tool=TOOL, palette=PALETTE, **content)
+    html: str = environment.get_template(page.template).render(tool=TOOL, palette=PALETTE, **content)
     return html
 
 

@@ -11,6 +11,7 @@ from dzdesign.report.chain import Chain
 from dzdesign.report.compensator_sides import laws_of
 from dzdesign.report.page import Figure, Headline, misfit
 from dzdesign.report.sections.cells import counted, whole
+from dzdesign.verify.contradictions import contradictions
 from dzdesign.verify.evidence import Evidence, InputCheck, PressureResult
 from dzdesign.verify.requirements import Check
 from dzdesign.verify.untried import not_tried
@@ -42,11 +43,11 @@ def _verdict(chain: Chain) -> Headline:
     if evidence is None:
         what = "a design" if chain.compensator else "an identified valve"
         return Headline(kind="open", text=f"NOT VERIFIED: there is no evidence here, only {what}")
-    faults = sum(each.faults + each.over_compensated for each in evidence.inputs)
-    if faults and all(check.holds is not False for check in evidence.checks):
-        text = f"THE EVIDENCE CONTRADICTS ITSELF: {whole(faults)} faults counted, and every check holds"
-        return Headline(kind="bad", text=text)
-    return _judged([*evidence.checks, *evidence.without_check, *_limits(chain)])
+    if others := contradictions(evidence, chain.compensator):
+        reasons = tuple(f"{check.name}: {check.text}" for check in others)
+        text = "THE EVIDENCE CONTRADICTS ITSELF: what it says to hold does not follow from its figures"
+        return Headline(kind="bad", text=text, reasons=reasons)
+    return _judged([*evidence.all_checks, *_limits(chain)])
 
 
 def _judged(checks: Sequence[Check]) -> Headline:

@@ -21,21 +21,6 @@ from dzdesign.report.sections.valve import valve_sections
 from dzdesign.report.summary import headline, key_figures
 
 REPORT_NAME = "report.html"
-#: Anchor and heading of every section, in their order; the first is of a lot setting alone.
-SECTIONS = (
-    ("lot", "The lot"),
-    ("data", "Data and fit"),
-    ("thresholds", "Thresholds"),
-    ("beta", "β over the pressure drop"),
-    ("law", "The law and where it comes from"),
-    ("integers", "The integers and their error"),
-    ("inputs", "Every input"),
-    ("loop", "Closed loop"),
-    ("acceptance", "Acceptance"),
-    ("checks", "All requirements"),
-    ("warnings", "Warnings, and what is not covered"),
-    ("provenance", "Provenance"),
-)
 #: Of a lot setting, these are of the one valve that its file holds.
 OF_A_VALVE = ("data", "thresholds", "beta", "loop")
 
@@ -91,7 +76,7 @@ def make_report(chain: Chain) -> Report:
         figures=figures,
         lot=lot,
         carrier=carrier_of(compensator) if compensator and compensator.lot else "",
-        headings=[(name, heading) for name, heading in SECTIONS if name in sections],
+        template="valve.html.jinja",
         sections=sections,
         missing=chain.missing,
         law=account_of(compensator.law) if compensator else None,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dzdesign.command_line.cli import main
-from dzdesign.identify.reading.named_pressure import pressure_in_name
+from dzdesign.identify.reading.named_pressure import pressures_in_name
 from dzdesign.identify.reading.proposed_columns import propose_columns
 from tests.support.synthetic import L_MIN, MPA, Truth, synthetic_ramp
 
@@ -202,6 +202,10 @@ def test_a_command_in_per_cent_under_another_name(here):
     write("ramp.csv", "t_s,Sollwert [%],dP_MPa,Q_Lmin", time, 10 * u, dp, q)
     text, _ = init_then_identify("ramp.csv")
     assert tomllib.loads(text)["columns"] == {"u": "Sollwert [%]"} and "recordings in per cent don't say it" in text
+    write("current.csv", "t_s,I [mA],dP_MPa,Q_Lmin", time, 4 + 1.6 * u, dp, q)
+    Path("dzdesign.toml").unlink()
+    text, _ = init_then_identify("current.csv", more=("--columns", "u=I [mA]:4..20 mA = 0..100 %"))
+    assert "recordings in per cent don't say it" in text
 
 
 @pytest.mark.parametrize(
@@ -373,4 +377,4 @@ def test_the_look_is_of_labels_and_units(here):
     assert {name: column.label for name, column in found.proposed.items()} == {"u": "Vin (V)"}
     assert set(found.known) == {"time", "Q"}
     assert "is it the drop, pA or pB?" in found.unclear["dP"]
-    assert pressure_in_name("a_1.5MPa_40bar.csv") is None and pressure_in_name("ramp 12,5 Bar up.csv") == "12.5 bar"
+    assert pressures_in_name("a_1.5MPa_40bar.csv") == () and pressures_in_name("ramp 12,5 Bar up.csv") == ("12.5 bar",)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from dzdesign.core.errors import InputError
+from dzdesign.identify.data_quality.catalogue import catalogue
 from dzdesign.identify.data_quality.pressures import about_mixtures
-from dzdesign.identify.data_quality.severity import MOST_SERIOUS_FIRST
 from dzdesign.identify.identification import identify
 from tests.support.synthetic import MPA, Truth, synthetic_ramp
 
@@ -64,7 +64,8 @@ class TestFlowAgainstPressure:
         assert not warned([ramp(2), ramp(1.5, said=2.2)], "flow-contradicts-dp")
 
     def test_it_stands_high(self):
-        assert MOST_SERIOUS_FIRST.index("flow-contradicts-dp") < MOST_SERIOUS_FIRST.index("pressure-stuck")
+        order = list(catalogue())
+        assert order.index("flow-contradicts-dp") < order.index("pressure-stuck")
 
     @pytest.mark.parametrize("sign", [1, -1])
     def test_recordings_taken_as_one_test_are_named(self, sign):

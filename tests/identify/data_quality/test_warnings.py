@@ -1,8 +1,10 @@
 """What the quality gate says of whole recordings, and what follows from it down to the C and the report."""
 
+import ast
 import gzip
 import json
 import re
+import string
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +19,7 @@ from dzdesign.design.designing import design
 from dzdesign.design.option_texts import options_of
 from dzdesign.design.options import DesignOptions
 from dzdesign.identify.data_quality import knee_errors
-from dzdesign.identify.data_quality.severity import MOST_SERIOUS_FIRST, most_serious_first
+from dzdesign.identify.data_quality.catalogue import catalogue, most_serious_first, warn
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes, read_ramp_file
@@ -398,15 +400,31 @@ class TestOrder:
             assert [warning.code for warning in valve.warnings[:3]] == ["branch-order"] * 3
         codes = [warning.code for warning in valve.warnings]
         assert codes[3] == "simulated"
-        assert [MOST_SERIOUS_FIRST.index(code) for code in codes] == sorted(map(MOST_SERIOUS_FIRST.index, codes))
+        places = list(map(list(catalogue()).index, codes))
+        assert places == sorted(places)
 
-    def test_every_code_has_its_place(self):
-        written = {
-            code
+    def test_the_catalogue_is_what_the_checks_say(self):
+        """Each text is used, and every place in it is filled: seen in the calls of `warn`."""
+        calls = [
+            node
             for path in (ROOT / "identify").rglob("*.py")
-            for code in re.findall(r'code="([a-z-]+)"', path.read_text("utf-8"))
-        }
-        assert written == set(MOST_SERIOUS_FIRST) and len(MOST_SERIOUS_FIRST) == len(written)
+            for node in ast.walk(ast.parse(path.read_text("utf-8")))
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "warn"
+        ]
+        used = {call.args[0].value for call in calls}
+        assert used == set(catalogue()) and len(used) == 35
+        for call in calls:
+            filled = {word.arg for word in call.keywords}
+            text = catalogue()[call.args[0].value].text
+            for each in text.values() if isinstance(text, dict) else [text]:
+                places = {name for _, name, _, _ in string.Formatter().parse(each) if name}
+                assert places <= filled or isinstance(text, dict), (call.args[0].value, places ^ filled)
+            cases = [ast.unparse(each) for each in call.args[2:3]]
+            assert bool(cases) == isinstance(text, dict), call.args[0].value
+
+    def test_a_place_that_nobody_fills_is_an_error(self):
+        with pytest.raises(KeyError, match="zero_L_min"):
+            warn("meter-zero", "ramp.csv", leak="")
 
     def test_an_unknown_one_comes_last(self):
         two = [Warning_(code=code, text="", source=None) for code in ("unheard-of", "thinned")]

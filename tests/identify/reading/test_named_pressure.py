@@ -2,7 +2,7 @@
 
 import pytest
 
-from dzdesign.identify.reading.named_pressure import claimed_pressures, contradicts, pressure_in_name, pressures_in_name
+from dzdesign.identify.reading.named_pressure import claimed_pressures, contradicts, pressures_in_name
 
 
 @pytest.mark.parametrize(
@@ -34,7 +34,6 @@ from dzdesign.identify.reading.named_pressure import claimed_pressures, contradi
 )
 def test_what_can_be_read_in_two_ways_is_not_guessed(name, readings):
     assert list(pressures_in_name(name)) == readings
-    assert pressure_in_name(name) == (readings[0] if len(readings) == 1 else None)
 
 
 def test_a_column_that_agrees_with_either_reading_is_no_contradiction():

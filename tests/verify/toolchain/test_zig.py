@@ -55,7 +55,6 @@ def test_the_same_source_is_the_same_object_anywhere(no_compiler, tmp_path, monk
     for name in ("one", "another"):
         (tmp_path / name).mkdir()
         monkeypatch.setattr(host_compiler, "build_folder", lambda name=name: tmp_path / name)
-        monkeypatch.setattr("dzdesign.verify.toolchain.machines.build_folder", lambda name=name: tmp_path / name)
         monkeypatch.chdir(tmp_path)
         found.append(HOST.compile("f.c", SOURCE, HOST.core_flags, "f").read_bytes())
     assert found[0] == found[1]

@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, Literal
 
 from msgspec import Meta
 
-from dzdesign.core.artefact_types import Artefact, quantity
+from dzdesign.core.artefact_types import Artefact, Sha256, quantity
 from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED
 from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.requirements import ALWAYS, Check
@@ -26,7 +26,6 @@ PressureDrop = Annotated[float, quantity("MPa", "Pressure drop at no flow.", ge=
 Count = Annotated[int, Meta(ge=0, le=2**60)]
 Share = Annotated[float, Meta(ge=-1, le=1, extra_json_schema={"unit": "1"})]
 Flow = Annotated[float, Meta(ge=-1e6, le=1e6, extra_json_schema={"unit": "L/min"})]
-Sha256 = Annotated[str, Meta(pattern="^[0-9a-f]{64}$", max_length=64)]
 Names = tuple[str, ...]
 #: Voltages are bounded so that no arithmetic on them overflows.
 MOST_V = 1e4
@@ -263,22 +262,22 @@ class Evidence(Artefact):
     mutants: Annotated[MutationScore | None, about("Wrong versions of the C, where --mutate was given.")]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "holds", all(check.holds for check in (*self.checks, *self.without_check)))
+        object.__setattr__(self, "holds", all(check.holds for check in self.all_checks))
 
     @property
-    def without_check(self) -> tuple[Check, ...]:
-        """What every `verify` checks and is not here, as not checked; none where a failure kept it from being tried."""
+    def all_checks(self) -> tuple[Check, ...]:
+        """The checks, and as not checked what every `verify` checks and is not here, unless a failure is the reason."""
         if any(check.holds is False for check in self.checks):
-            return ()
+            return self.checks
         tried = {check.id for check in self.checks}
         text = "the evidence has no check of it; make it again with `dzdesign verify`"
-        return tuple(each.check(holds=None, text=text) for each in ALWAYS if each.id not in tried)
+        return (*self.checks, *(each.check(holds=None, text=text) for each in ALWAYS if each.id not in tried))
 
     @property
     def verdict(self) -> str:
         """One sentence: what does not hold stands before what could not be checked."""
         missed = [check.name for check in self.checks if check.holds is False]
-        unknown = [check.name for check in (*self.checks, *self.without_check) if check.holds is None]
+        unknown = [check.name for check in self.all_checks if check.holds is None]
         parts = [f"{DOES_NOT_HOLD}: {', '.join(missed)}"] if missed else []
         parts += [f"{NOT_CHECKED}: {', '.join(unknown)}"] if unknown else []
         return "; ".join(parts) or "Every requirement holds."

@@ -22,20 +22,13 @@ class Check:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Requirement:
-    """One requirement.
+    """One requirement."""
 
-    Attributes
-    ----------
-    id : str
-        Short name, the same in every version.
-    title : str
-        What is required.
-    how : str
-        What to do to have it checked; a command stands in backticks.
-    """
-
+    #: The same in every version.
     id: str
+    #: What is required.
     title: str
+    #: What to do to have it checked; a command stands in backticks.
     how: str = "`verify`"
 
     def check(self, *, holds: bool | None, text: str, name: str = "") -> Check:
@@ -83,6 +76,9 @@ NEED_A_PLANT = (
     Requirement(id="load-steps", title="load steps and frozen sensors in the closed loop", how="`verify --plant`"),
 )
 SERIES = Requirement(id="series", title="a series of plants, with tolerances", how="`verify --tolerances`")
+#: What follows from the figures that stand beside the checks: of every input, and of the closed loop.
+FROM_INPUTS = (EXACT_LAW, MONOTONE, ZERO_COMMAND, PRESSURE_DIFFERENCE, FALLBACK)
+FROM_LOOP = (PLANT_OPENS, PLANT_IS_THE_VALVE, ZERO_FLOW, ZERO_FLOW_AFTER_SCENARIOS)
 #: What every `verify` checks, in the order of the report.
 ALWAYS = (
     FILES, MANIFEST, COMPILES, EXACT_LAW, MONOTONE, ZERO_COMMAND, PRESSURE_DIFFERENCE, FALLBACK, DRIVE, PLANT_OPENS,

@@ -10,13 +10,14 @@ from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, as_document, sch
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.verify.closed_loop.dead_zone import LoopComparison
 from dzdesign.verify.closed_loop.evidence_curves import curve_files
 from dzdesign.verify.closed_loop.firmware_loop import FirmwareLoop, Watch, close_the_loop, scenes_of
 from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.closed_loop.tolerances import Tolerances
-from dzdesign.verify.evidence import ClosedLoopResult, Evidence, InputCheck
+from dzdesign.verify.evidence import Evidence, InputCheck
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs, input_checks
 from dzdesign.verify.exhaustive.drive_check import drive_follows
 from dzdesign.verify.exhaustive.input_map import InputMap, map_inputs
@@ -34,20 +35,13 @@ SCHEMA = schema_of(Evidence)
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Verification(ShownInNotebooks):
-    """The evidence about one firmware folder, and the runs and maps that its figures are drawn from.
+    """The evidence about one firmware folder, and the runs and maps that its figures are drawn from."""
 
-    Attributes
-    ----------
-    evidence : Evidence
-        Every requirement that was tried, with its figures; stored as verification.json.
-    maps : tuple of InputMap
-        What the core gives over its inputs, one a sign of command, to be drawn.
-    loops : tuple of LoopComparison
-        The ramps in closed loop, one a side and tested pressure drop.
-    """
-
+    #: Every requirement that was tried, with its figures; stored as verification.json.
     evidence: Evidence
+    #: What the core gives over its inputs, one a sign of command, to be drawn.
     maps: tuple[InputMap, ...]
+    #: The ramps in closed loop, one a side and tested pressure drop.
     loops: tuple[LoopComparison, ...]
 
     @property
@@ -61,13 +55,7 @@ class Verification(ShownInNotebooks):
         return self.evidence.verdict
 
     def with_checks(self, *checks: Check) -> "Verification":
-        """Return the verification with further requirements.
-
-        Parameters
-        ----------
-        *checks : Check
-            In their order.
-        """
+        """Return the verification with further requirements."""
         return replace(self, evidence=self.evidence.with_checks(*checks))
 
 
@@ -82,52 +70,39 @@ def verify(
     say: Callable[[str], None] = lambda _: None,
     watch: Watch = lambda items, _: items,
 ) -> Verification:
-    """Verify a firmware folder.
+    """Verify a firmware folder, made by `dzdesign codegen`.
 
-    Parameters
-    ----------
-    folder : Path
-        Made by `dzdesign codegen`.
-    plant : Plant, optional
-        For the closed loop; without it one is made from the identified thresholds.
-    plant_source : str
-        Name of the plant's file, for the evidence.
-    plant_sha256 : str, optional
-        Its hash.
-    sequence : RampSequence, optional
-        The command over time; 0-10 V in 100 s and back by default.
-    tolerances : Tolerances, optional
-        Of a series of plants about `plant`, which is then needed.
-    include : sequence of Path
-        Where headers lie that the user's board files include.
-    say : callable
-        Told each stage before it begins.
-    watch : callable
-        Handed the pieces of a long stage and their number; gives them back one by one, as they are done.
+    Without a `plant` for the closed loop one is made from the identified thresholds; `plant_source` and `plant_sha256`
+    are name and hash of its file, for the evidence, and `tolerances` those of a series of plants about it. `sequence`
+    is the command over time, by default 0-10 V in 100 s and back. In `include` lie headers of the user's board files.
+    `say` is told each stage before it begins; `watch` is handed the pieces of a long one and their number, and gives
+    them back one by one, as they are done.
 
-    Raises
-    ------
-    InputError
-        If the folder is no firmware, or there is no C compiler.
+    A folder that is no firmware, and a machine without a C compiler, are an `InputError`.
     """
     if tolerances and plant is None:
         raise InputError("tolerances are about a plant; give it with --plant PLANT.toml")
-    folder = Path(folder)
     manifest = read_firmware_manifest(folder)
     check_include(include, manifest)
     compensator = read_compensator(folder)
     host_compiler()
     say("compiling the core with every warning an error")
-    compiles = compiles_strictly(folder, manifest)
-    core, loop = _Core(), FirmwareLoop()
-    if compiles.holds:
-        say("comparing every input with the exact law")
-        building = ThreadPoolExecutor(1).submit(scenes_of, folder, compensator, plant)  # a compiler's time, not ours
-        core = _try_core(folder, compensator)
-        if core.inputs:
-            scenes = building.result()
-            loop = close_the_loop(scenes, compensator, plant, sequence or RampSequence(), tolerances, say, watch)
+    building = ThreadPoolExecutor(1).submit(scenes_of, folder, compensator, plant)  # a compiler's time, not ours
+    core, loop = _try_core(folder, manifest, compensator, say), FirmwareLoop()
+    if core.inputs:
+        sequence = sequence or RampSequence()
+        loop = close_the_loop(building.result(), compensator, plant, sequence, tolerances, say, watch)
     board = board_compiles(folder, manifest, include)
+    checks = (
+        files_unchanged(folder, manifest),
+        manifest_follows(folder, manifest, compensator),
+        *core.checks,
+        *loop.checks,
+        certificate_follows(compensator),
+        law_follows(compensator),
+        valve_follows(folder, compensator),
+        *board.checks,
+    )
     digest = sha256_of((folder / MANIFEST_NAME).read_bytes())
     evidence = Evidence(
         tool=THIS_TOOL,
@@ -136,25 +111,9 @@ def verify(
         changed_board_files=tuple(changed_board_files(folder, manifest)),
         user_files=tuple(user_files(folder, manifest)),
         board_not_compiled=board.not_compiled,
-        checks=(
-            files_unchanged(folder, manifest),
-            manifest_follows(folder, manifest, compensator),
-            compiles,
-            *core.checks,
-            *loop.checks,
-            certificate_follows(compensator),
-            law_follows(compensator),
-            valve_follows(folder, compensator),
-            *board.checks,
-        ),
+        checks=checks,
         inputs=core.inputs,
-        closed_loop=ClosedLoopResult(
-            plant=plant,
-            plant_source=plant_source or "made from the identified thresholds",
-            plant_sha256=plant_sha256,
-            plants=() if plant else loop.plants,
-            pressures=loop.ramps,
-        ),
+        closed_loop=loop.result(plant, plant_source, plant_sha256),
         scenarios=loop.scenarios,
         monte_carlo=loop.monte_carlo,
         mutants=None,
@@ -164,22 +123,27 @@ def verify(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Core:
-    """What trying the compiled core showed; nothing of it where it does not compile."""
+    """What trying the core showed; of one that does not compile nothing more."""
 
-    checks: tuple[Check, ...] = ()
+    checks: tuple[Check, ...]
     inputs: tuple[InputCheck, ...] = ()
     maps: tuple[InputMap, ...] = ()
 
 
-def _try_core(folder: Path, compensator: Compensator) -> _Core:
-    """Compare every input with the exact law, and the drive with its model."""
+def _try_core(folder: Path, manifest: FirmwareManifest, compensator: Compensator, say: Callable[[str], None]) -> _Core:
+    """Compile the core; then compare every input with the exact law, and the drive with its model."""
+    compiles = compiles_strictly(folder, manifest)
+    if not compiles.holds:
+        return _Core(checks=(compiles,))
+    say("comparing every input with the exact law")
     signs = compensator.signals.signs
     try:
         inputs = tuple(check_all_inputs(folder, sign, compensator) for sign in signs)
     except RequirementError as error:
-        return _Core(checks=(EXACT_LAW.check(holds=False, text=str(error)),))
+        return _Core(checks=(compiles, EXACT_LAW.check(holds=False, text=str(error))))
     return _Core(
         checks=(
+            compiles,
             *(check for each in inputs for check in input_checks(each, both_signs=len(inputs) > 1)),
             *lot_checked(inputs, compensator),
             drive_follows(folder, compensator),

@@ -2,7 +2,8 @@
 
 from collections.abc import Iterator
 
-from dzdesign.identify.knees.between_ramps import ASSUMED_REPEATABILITY, FEWEST_DEGREES
+from dzdesign.identify.data_quality.catalogue import warn
+from dzdesign.identify.knees.between_ramps import ASSUMED_REPEATABILITY
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.repeatability import Repeatability
@@ -15,66 +16,17 @@ FEW_DEGREES = 4
 
 def about_ramps(found: Repeatability, count: int, options: IdentifyOptions) -> Iterator[Warning_]:
     """Yield the warnings about what differs from ramp to ramp, of the guarded branch of `count` tests."""
-    mV, share = 1e3 * found.sd_V, 100 * found.sd_V / options.u_max
+    sd_mV, degrees = 1e3 * found.sd_V, found.degrees_of_freedom
     if found.origin == "assumed":
-        yield Warning_(
-            code="no-repeats",
-            text=(
-                "no ramp was repeated, so nothing shows by how much the threshold scatters from ramp to ramp: a "
-                f"standard deviation of {100 * ASSUMED_REPEATABILITY:g} % of full command, {mV:.3g} mV, is assumed, "
-                "and the bounds hold only if the valve repeats as well as that. Record two more ramps at each "
-                'pressure drop, or declare it by --repeatability "0.1 %"'
-            ),
-            source=None,
-        )
-    elif found.origin == "repeats" and options.repeatability is not None:
-        yield Warning_(
-            code="repeatability",
-            text=(
-                f"the repeats scatter by {mV:.3g} mV ({share:.2g} % of full command, one standard deviation), more "
-                f"than the declared {100 * options.repeatability:g} %, so the bounds count what was measured. "
-                "Correct --repeatability, or look for what differs between the ramps"
-            ),
-            source=None,
-        )
-    elif FEWEST_DEGREES <= (found.degrees_of_freedom or FEW_DEGREES) < FEW_DEGREES:
-        yield Warning_(
-            code="few-repeats",
-            text=(
-                f"the scatter from ramp to ramp, {mV:.3g} mV, is known from {found.degrees_of_freedom:.0f} differences "
-                "only, and the bounds lie several times that lower. Two or three more repeats raise them"
-            ),
-            source=None,
-        )
-    if found.no_drift == "order unknown" and count > 1:
-        yield Warning_(
-            code="order",
-            text=(
-                "the order of the recordings is not known, so a drift of the valve (oil or coil warming up) can't be "
-                "told from the effect of the pressure drop, and the bounds do not count it. Record with date and "
-                "time, or give --order"
-            ),
-            source=None,
-        )
-    elif found.no_drift == "order of pressure":
-        yield Warning_(
-            code="order",
-            text=(
-                "no pressure drop was recorded both early and late in the series, so a drift of the valve (oil or coil "
-                "warming up) can't be told from the effect of the pressure drop, and the bounds do not count it. "
-                "Repeat the first ramp at the end, or record repeats in random order"
-            ),
-            source=None,
-        )
-    elif found.drift_V is not None and found.drift_se_V is not None:
+        yield warn("no-repeats", percent=100 * ASSUMED_REPEATABILITY, sd_mV=sd_mV)
+    elif degrees is not None and options.repeatability is not None:
+        percent = 100 * found.sd_V / options.u_max
+        yield warn("repeatability", sd_mV=sd_mV, percent=percent, declared=100 * options.repeatability)
+    elif degrees is not None and degrees < FEW_DEGREES:
+        yield warn("few-repeats", sd_mV=sd_mV, differences=degrees)
+    if found.no_drift == "order of pressure" or (found.no_drift == "order unknown" and count > 1):
+        yield warn("order", case="unknown" if found.no_drift == "order unknown" else "of-pressure")
+    if found.drift_V is not None and found.drift_se_V is not None:
         least = max(DRIFT_SIGNIFICANCE * found.drift_se_V, SMALLEST_DRIFT * options.u_max)
         if abs(found.drift_V) > least:
-            yield Warning_(
-                code="drift",
-                text=(
-                    f"the threshold drifts by {1e3 * found.drift_V:+.0f} mV from the first ramp to the last (standard "
-                    f"error {1e3 * found.drift_se_V:.1f} mV): the bounds hold in every state that the series has seen, "
-                    "and in no other. Warm the valve up before recording, and record the temperature"
-                ),
-                source=None,
-            )
+            yield warn("drift", drift_mV=1e3 * found.drift_V, se_mV=1e3 * found.drift_se_V)

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from dzdesign.identify.constants import L_MIN
+from dzdesign.identify.data_quality.catalogue import warn
 from dzdesign.identify.knees.prepared_tests import FEWEST_AT_REST, readings_at_rest
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_test import RampTest
@@ -28,12 +29,7 @@ def without_clipping(
 ) -> tuple[list[RampTest], IdentifyOptions, tuple[Warning_, ...]]:
     """Return the recordings with a zero wherever the meter was cut off, the floor that this means, and what to say.
 
-    Parameters
-    ----------
-    tests : sequence of RampTest
-        Of one side, its commands and flows positive.
-    options : IdentifyOptions
-        Choices of the engineer; a floor that is declared stays, unless the meter was cut off above it.
+    A floor that is declared stays, unless the meter was cut off above it.
     """
     lowest = [_clipped_at(test, options.u_max) for test in tests]
     if not any(lowest):
@@ -43,7 +39,11 @@ def without_clipping(
         for test, low in zip(tests, lowest, strict=True)
     ]
     floor = max(options.meter_floor or 0.0, *lowest, 0.0)
-    warnings = tuple(_warning(test, low) for test, low in zip(tests, lowest, strict=True) if low)
+    warnings = tuple(
+        warn("meter-clipped", test.source, flow_L_min=low / L_MIN, rows=int(np.sum(test.q <= low + _one_reading(test))))
+        for test, low in zip(tests, lowest, strict=True)
+        if low
+    )
     return seen, replace(options, meter_floor=floor), warnings
 
 
@@ -67,18 +67,3 @@ def _clipped_at(test: RampTest, u_max: float) -> float:
 
 def _one_reading(test: RampTest) -> float:
     return ONE_READING * float(test.q.max())
-
-
-def _warning(test: RampTest, low: float) -> Warning_:
-    return Warning_(
-        code="meter-clipped",
-        text=(
-            f"the flow never reads less than {low / L_MIN:.3g} L/min, and reads that to the last digit in "
-            f"{int(np.sum(test.q <= low + _one_reading(test)))} rows. Either the meter or the logger cuts it off, "
-            "or the meter has a zero error of that much and does not scatter: the recordings can't tell which. It is "
-            "taken as cut off, which is safe: those rows are no flow seen, below a floor of that much; if it is a zero "
-            "error, the thresholds come out too low by it over the flow gain. Let the logger write what the meter "
-            "reads, or zero below its floor; a zero error is best set to zero, and the ramps recorded again"
-        ),
-        source=test.source,
-    )

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from dzdesign.identify.data_quality.catalogue import warn
 from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.knees.described_tests import DescribedTest
 from dzdesign.identify.valve.model import Warning_
@@ -26,19 +27,7 @@ PARTS, FEWEST_PARTS = 8, 4
 def about_errors(
     side: SideModel, tests: tuple[DescribedTest, ...], u_max: float, window: tuple[float, float]
 ) -> Iterator[Warning_]:
-    """Yield a warning for each test whose knees are known badly, with the reason.
-
-    Parameters
-    ----------
-    side : SideModel
-        What was identified.
-    tests : tuple of DescribedTest
-        What it was identified from.
-    u_max : float
-        Full command, V.
-    window : tuple of float
-        Of --knee-window, as shares.
-    """
+    """Yield a warning for each test whose knees are known badly, with the reason."""
     if all(test.u_knee_se_V <= NOISY * u_max for test in side.tests):
         return
     left = _left_without_the_bend([shape for item in tests for shape in item.branches if _has_noise(shape)])
@@ -46,11 +35,15 @@ def about_errors(
         if test.u_knee_se_V <= NOISY * u_max:
             continue
         if not any(map(_has_noise, group)):
-            yield _coarse(test)
+            yield warn("coarse-levels", test.source, knee_se_mV=1e3 * test.u_knee_se_V)
         elif left < BLAME:
             yield _bent(test, left, window)
         else:
-            yield _noisy(test, alone=len(tests) == len(group) == 1)
+            alone = "; one branch alone can't tell noise from a bend of the flow, see --plots"
+            yield warn(
+                "noise", test.source, knee_se_mV=1e3 * test.u_knee_se_V, noise_L_min=test.noise_L_min,
+                inflation=test.noise_variance_inflation, alone=alone if len(tests) == len(group) == 1 else "",
+            )  # fmt: skip
 
 
 def _has_noise(shape: BranchShape) -> bool:
@@ -78,45 +71,11 @@ def _departures(shape: BranchShape, count: int) -> np.ndarray:
     return np.array([part.mean() for part in np.array_split(residual, count)])
 
 
-def _noisy(test: TestResult, alone: bool) -> Warning_:
-    return Warning_(
-        code="noise",
-        text=(
-            f"a knee is known to {1e3 * test.u_knee_se_V:.0f} mV only (one standard error; noise "
-            f"{test.noise_L_min:.3g} L/min, {test.noise_variance_inflation:.0f} times as harmful as white noise): its "
-            "bound lies several times that lower. Record slower ramps, or repeat them"
-            + ("; one branch alone can't tell noise from a bend of the flow, see --plots" if alone else "")
-        ),
-        source=test.source,
-    )
-
-
 def _bent(test: TestResult, left: float, declared: tuple[float, float]) -> Warning_:
     of_rising = test.u_knee_rising_se_V == test.u_knee_se_V
     straight = (test.straight_rising if of_rising else test.straight_falling) or declared
     (low, high), asked = ([100 * share for share in shares] for shares in (straight, declared))
     widened = f" (--knee-window {asked[0]:.3g}-{asked[1]:.3g}, widened as far as a line goes)"
     widened = widened if straight != declared else ""
-    return Warning_(
-        code="bend",
-        text=(
-            f"a knee is known to {1e3 * test.u_knee_se_V:.0f} mV only (one standard error), because the flow bends "
-            f"between {low:.3g} and {high:.3g} % of its largest{widened}, where a straight line is laid; the meter's "
-            f"noise would leave {1e3 * left * test.u_knee_se_V:.0f} mV at most, so slower ramps help little. The "
-            "knee's bound lies several times the error lower. See --plots, and give the --knee-window in which the "
-            "flow is straight"
-        ),
-        source=test.source,
-    )
-
-
-def _coarse(test: TestResult) -> Warning_:
-    return Warning_(
-        code="coarse-levels",
-        text=(
-            f"a knee is known to {1e3 * test.u_knee_se_V:.0f} mV only, because so few levels of the command lie in the "
-            "straight part that the line goes from level to level: the bound lies several times that lower. Record a "
-            "ramp, or levels closer together"
-        ),
-        source=test.source,
-    )
+    se_mV = 1e3 * test.u_knee_se_V
+    return warn("bend", test.source, knee_se_mV=se_mV, low=low, high=high, widened=widened, left_mV=left * se_mV)

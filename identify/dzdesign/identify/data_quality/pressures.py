@@ -1,4 +1,7 @@
-"""What is weak in the pressure drop of recordings: a stuck sensor, a number typed in, flows that contradict it."""
+"""What is weak in the pressure drop of recordings: a stuck sensor, a number typed in, flows that contradict it.
+
+Recordings are those of one side, their commands and flows positive.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -6,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from dzdesign.identify.constants import FULL_SWEEP, L_MIN, MPA
+from dzdesign.identify.data_quality.catalogue import warn
 from dzdesign.identify.ramps.command import despiked
 from dzdesign.identify.ramps.pooling import SAME_PRESSURE
 from dzdesign.identify.ramps.splitting import SHUT
@@ -38,30 +42,17 @@ GROSSLY_APART = 0.3
 #: other, or differs by these factors from the root: by 0.70 from 0.5 to 5 MPa does that of the paper's valve, and one
 #: that keeps its flow the same by less than 2.5 up to a range of 1 to 6.
 FALLS, GROWS_TOO_LITTLE, GROWS_TOO_MUCH = 0.9, 2.5, 1.75
-#: Said of both kinds of contradiction.
-CONSEQUENCE = "Thresholds may be assigned to wrong pressure drops, so the certificate may not hold"
 
 
 def about_mixed_pressures(tests: Sequence[RampTest]) -> tuple[Warning_, ...]:
-    """Return what tells that recordings of several pressure drops pass for one: a stuck sensor, or else their flows.
-
-    Parameters
-    ----------
-    tests : sequence of RampTest
-        Of one side, its commands and flows positive.
-    """
+    """Return what tells that recordings of several pressure drops pass for one: a stuck sensor, or else their flows."""
     return tuple(about_a_stuck_sensor(tests)) or tuple(about_mixtures(tests))
 
 
 def about_single_pressures(tests: Sequence[RampTest], mixed: Sequence[Warning_]) -> tuple[Warning_, ...]:
     """Return what is weak in the pressure drop of single recordings; of a stuck one not that it was typed in.
 
-    Parameters
-    ----------
-    tests : sequence of RampTest
-        Of one side, its commands and flows positive.
-    mixed : sequence of Warning_
-        Of `about_mixed_pressures`: beside a stuck sensor there is nothing more to say.
+    Beside a stuck sensor, which `mixed` may tell of, there is nothing more to say.
     """
     if any(item.code == "pressure-stuck" for item in mixed):
         return ()
@@ -71,13 +62,7 @@ def about_single_pressures(tests: Sequence[RampTest], mixed: Sequence[Warning_])
 
 
 def about_a_stuck_sensor(tests: Sequence[RampTest]) -> Iterator[Warning_]:
-    """Yield a warning if the recordings of one side show one pressure drop, noise aside, and must have several.
-
-    Parameters
-    ----------
-    tests : sequence of RampTest
-        Of one side, its commands and flows positive.
-    """
+    """Yield a warning if the recordings of one side show one pressure drop, noise aside, and must have several."""
     recorded = [test.dp for test in tests if test.dp is not None and not test.dp_is_declared]
     if len(tests) < 2 or len(recorded) < len(tests):
         return
@@ -99,17 +84,7 @@ def about_a_stuck_sensor(tests: Sequence[RampTest]) -> Iterator[Warning_]:
     if signs:
         one = high - low <= ONE_NUMBER * high
         about = f"{high / MPA:.6g} MPa in every row of" if one else f"{low / MPA:.4g} to {high / MPA:.4g} MPa in"
-        yield Warning_(
-            code="pressure-stuck",
-            text=(
-                f"the pressure drop is {about} all {len(tests)} recordings, but "
-                f"{' and '.join(signs)}: the sensor is stuck, or the column is another's, and ramps of different "
-                "pressure drops are taken for one test, whose knees are known badly for that reason (or it is one "
-                "pressure drop, and the valve, its supply or oil was not the same). Leave that column out and declare "
-                "the pressure drops by [dp], or record again"
-            ),
-            source=None,
-        )
+        yield warn("pressure-stuck", None, "all", about=about, count=len(tests), signs=" and ".join(signs))
 
 
 def _stands_still(every: np.ndarray, low: float, middle: float, high: float) -> bool:
@@ -135,11 +110,6 @@ def about_stuck_recordings(tests: Sequence[RampTest]) -> Iterator[Warning_]:
     """Yield a warning for each recording whose pressure drop is one number to the last digit, and should not be.
 
     That is so where other recordings' readings scatter, or where the file's name says another pressure.
-
-    Parameters
-    ----------
-    tests : sequence of RampTest
-        Of one side, its commands and flows positive.
     """
     scatters = any(_scatters(test) for test in tests)
     for test in sorted(tests, key=lambda test: test.source):
@@ -150,38 +120,15 @@ def about_stuck_recordings(tests: Sequence[RampTest]) -> Iterator[Warning_]:
         signs = ["that of other recordings scatters"] if scatters and test.u.size >= ROWS else []
         signs += [f"the file's name says {stated}"] if stated else []
         if signs:
-            yield Warning_(
-                code="pressure-stuck",
-                text=(
-                    f"the pressure drop is {dp / MPA:.6g} MPa to the last digit in every row, but "
-                    f"{' and '.join(signs)}: the sensor is stuck or too coarse to show anything, or the number "
-                    f"was typed in. {CONSEQUENCE}. Leave that column out and declare the pressure drop by [dp], or "
-                    "record again"
-                ),
-                source=test.source,
-            )
+            yield warn("pressure-stuck", test.source, "one", dp_MPa=dp / MPA, signs=" and ".join(signs))
 
 
 def about_typed_pressures(tests: Sequence[RampTest]) -> Iterator[Warning_]:
-    """Yield a warning for each recording, if the pressure drop of every one is one number: nothing was measured.
-
-    Parameters
-    ----------
-    tests : sequence of RampTest
-        Of one side, its commands and flows positive.
-    """
+    """Yield a warning for each recording, if the pressure drop of every one is one number: nothing was measured."""
     recorded = [test for test in tests if test.dp is not None and not test.dp_is_declared]
     typed = [(dp, test.source) for test in recorded if (dp := _one_number(test)) is not None]
     for dp, source in sorted(typed) if len(typed) == len(recorded) else ():
-        yield Warning_(
-            code="declared-pressure",
-            text=(
-                f"the pressure drop is {dp / MPA:.6g} MPa in every row: typed in, not measured "
-                "(or the sensor is too coarse to show anything): if it sags under flow, the knee is found too low "
-                "(21 mV for 5 % on a 10 V valve like the example's). Record what a sensor reads"
-            ),
-            source=source,
-        )
+        yield warn("declared-pressure", source, "typed", dp_MPa=dp / MPA)
 
 
 def _one_number(test: RampTest) -> float | None:
@@ -201,13 +148,7 @@ def _scatters(test: RampTest) -> bool:
 
 
 def about_mixtures(tests: Sequence[RampTest]) -> Iterator[Warning_]:
-    """Yield a warning for each pressure drop at which recordings, taken as one test, differ grossly in their flow.
-
-    Parameters
-    ----------
-    tests : sequence of RampTest
-        Of one side, its commands and flows positive.
-    """
+    """Yield a warning for each pressure drop at which recordings, taken as one test, differ grossly in their flow."""
     highest = max(float(despiked(test.u).max()) for test in tests)
     whole = [test for test in tests if despiked(test.u).max() >= FULL_SWEEP * highest]
     for dp, group in _at_one_pressure(whole):
@@ -215,17 +156,10 @@ def about_mixtures(tests: Sequence[RampTest]) -> Iterator[Warning_]:
         if min(flows) <= 0 or max(flows) <= (1 + GROSSLY_APART) * min(flows):
             continue
         least, most = (group[flows.index(extreme(flows))].source for extreme in (min, max))
-        yield Warning_(
-            code="flow-contradicts-dp",
-            text=(
-                f"recordings that are taken as one test, at {dp / MPA:.4g} MPa, differ in their flow at {top:.3g} V: "
-                f"{min(flows) / L_MIN:.3g} L/min in '{least}', {max(flows) / L_MIN:.3g} L/min in '{most}'. Flow grows "
-                "as the root of the pressure drop (Eq. 1), so one of them was recorded at another pressure drop "
-                "(misread from its name, declared wrongly, a stuck sensor), or its unit of Q or its supply is "
-                f"another. {CONSEQUENCE}. Correct [dp] or the columns, or leave that recording out"
-            ),
-            source=None,
-        )
+        yield warn(
+            "flow-contradicts-dp", None, "one-test", dp_MPa=dp / MPA, u_V=top, least_L_min=min(flows) / L_MIN,
+            least=least, most_L_min=max(flows) / L_MIN, most=most,
+        )  # fmt: skip
 
 
 def _at_one_pressure(tests: Sequence[RampTest]) -> Iterator[tuple[float, list[RampTest]]]:
@@ -255,12 +189,7 @@ def about_flow_gains(tests: Sequence[TestResult]) -> Iterator[Warning_]:
     """Yield a warning for each test whose flow gain contradicts its pressure drop, by those of the other tests.
 
     The gain beyond the knee, and not the flow at one command, is compared: a supply at its limit and a knee that moves
-    leave it as it is.
-
-    Parameters
-    ----------
-    tests : sequence of TestResult
-        Of one side, in the order of rising pressure drop.
+    leave it as it is. The tests stand in the order of rising pressure drop.
     """
     left = [test for test in tests if test.dp_MPa is not None and test.slope_L_min_V > 0]
     # Without the worst one the others may agree; of two, either may be wrong, and both are named.
@@ -274,18 +203,10 @@ def about_flow_gains(tests: Sequence[TestResult]) -> Iterator[Warning_]:
         test, other = left.pop(worst), against[worst][0]
         expected = float(np.median([value for at, value in enumerate(per_root) if at != worst]))
         expected *= float(test.dp_MPa or 1) ** 0.5
-        yield Warning_(
-            code="flow-contradicts-dp",
-            text=(
-                f"beyond the knee the flow grows by {test.slope_L_min_V:.3g} L/min a volt at {test.dp_MPa:.4g} MPa, "
-                f"expected about {expected:.3g}, as the root of the pressure drop (Eq. 1), since it grows by "
-                f"{other.slope_L_min_V:.3g} at {other.dp_MPa:.4g} MPa ('{other.source}'): a pressure drop of one of "
-                "them is wrong (misread from a file's name, a wrong unit, a stuck sensor, ports swapped), or the unit "
-                f"of Q, or the supply is at its limit, or the valve compensates its pressure. {CONSEQUENCE}. Correct "
-                "it, or leave that recording out"
-            ),
-            source=test.source,
-        )
+        yield warn(
+            "flow-contradicts-dp", test.source, "flow-gains", gain=test.slope_L_min_V, dp_MPa=test.dp_MPa,
+            expected=expected, other_gain=other.slope_L_min_V, other_dp_MPa=other.dp_MPa, other=other.source,
+        )  # fmt: skip
 
 
 def _contradict(one: TestResult, other: TestResult) -> bool:

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,8 +15,6 @@ from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.guard_curve import Guard, GuardCurve, OpeningCurve
 from dzdesign.identify.valve.staircase import Direction, staircase
 
-#: Branch (column of the fit) whose threshold a guard protects; "mean" is of both.
-COLUMNS: dict[Guard, int] = {"opening": 0, "closing": 1}
 #: Standard errors by which the tail's zero must lie below the knee, in one test or in all together, to be taken for a
 #: soft edge. At 3 one sharp valve in a hundred was, and beta(5 MPa) scattered by 7e-4 instead of 2.6e-4; which soft
 #: edges are found hardly changes (a width of 0.6 V always is, with any meter).
@@ -99,7 +96,9 @@ def bound_threshold(group: DescribedTests, knees: OrderedKnees, options: Identif
     knee, knee_se = knees.knee, knees.knee_se
     zero = np.array([shape.tail.zero for shape in shapes])
     zero_se = np.array([shape.tail.zero_se for shape in shapes])
-    shared = knees.departure.max() + _lag_budget(group, knees.column)
+    # Steps of equal height stop the spool anywhere within the root of three standard deviations of its mean course.
+    stops = math.sqrt(3) * np.array([shape.ripple for shape in shapes])
+    shared = knees.departure.max() + _lag_budget(group, knees.column) + stops
     # What was subtracted as the meter's zero has an error of its own, which moves all readings of a test together.
     inflations = [shape.variance_inflation for shape in shapes]
     subtracted = np.array([se * math.sqrt(factor) for se, factor in zip(group.zero_se, inflations, strict=True)])
@@ -142,19 +141,37 @@ def mean_threshold(one: Threshold, other: Threshold) -> Threshold:
     return Threshold((one.value + other.value) / 2, (one.se + other.se) / 2, (one.bound + other.bound) / 2)
 
 
-def fit_guard_curve(
-    threshold: Threshold, dp: Sequence[float | None], reference: int, direction: Direction, u_max: float
-) -> tuple[GuardCurve, np.ndarray]:
-    """Fit the law's offset under the staircase of one threshold's bounds.
+def fit_guard_curves(
+    thresholds: Mapping[Guard, Threshold],
+    dp: Sequence[float | None],
+    reference: int,
+    direction: Direction,
+    u_max: float,
+) -> dict[Guard, tuple[GuardCurve, np.ndarray]]:
+    """Fit the law's offset under the staircase of the bounds of the first threshold, which must succeed, and of others.
 
-    Returns the curve, and which of its bounds hold with equality, (T,) bool. The pressure drops (Pa) of the tests rise;
-    `reference` is the index of the test at dP0.
+    One of the others whose bounds leave no positive offset is left out: `design` then refuses that guard and says which
+    there are. A curve comes with which of its bounds hold with equality, (T,) bool. The tests come in the order of
+    rising pressure drop (Pa); `reference` is the index of that at dP0.
 
     Raises
     ------
     InputError
-        If no positive offset meets the bounds.
+        If the first threshold's bounds leave no positive offset.
     """
+    curves: dict[Guard, tuple[GuardCurve, np.ndarray]] = {}
+    for name, threshold in thresholds.items():
+        try:
+            curves[name] = _fit_guard_curve(threshold, dp, reference, direction, u_max)
+        except InputError:
+            if not curves:
+                raise
+    return curves
+
+
+def _fit_guard_curve(
+    threshold: Threshold, dp: Sequence[float | None], reference: int, direction: Direction, u_max: float
+) -> tuple[GuardCurve, np.ndarray]:
     steps, ceiling = staircase(threshold.bound, direction)
     offset = fit_offset(threshold.value, threshold.se, ceiling, reference, u_max=u_max, trend=direction)
     nodes = tuple(value / MPA for value in dp if value is not None)
@@ -185,21 +202,3 @@ def opening_curve(
     # The larger of two curves that run one way runs that way too.
     highest = np.max([knee, *(np.array(curve.u_offset_V) for curve in guards.values())], axis=0)
     return OpeningCurve(dp_MPa=dp, u_V=tuple(map(float, highest)), u_se_V=tuple(map(float, se)))
-
-
-def further_guards(
-    thresholds: Mapping[Guard, Threshold],
-    dp: Sequence[float | None],
-    reference: int,
-    direction: Direction,
-    u_max: float,
-) -> dict[Guard, GuardCurve]:
-    """Fit the curves of further thresholds; one whose bounds leave no positive offset is left out.
-
-    `design` then refuses that guard and says which there are, so nothing is lost without a word.
-    """
-    curves: dict[Guard, GuardCurve] = {}
-    for name, threshold in thresholds.items():
-        with suppress(InputError):
-            curves[name], _ = fit_guard_curve(threshold, dp, reference, direction, u_max)
-    return curves

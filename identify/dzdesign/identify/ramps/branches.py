@@ -46,17 +46,16 @@ def at_nominal_pressure(branch: Branch, dp: float | None) -> np.ndarray:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bins:
-    """Sufficient statistics of samples per bin of u, each (B,); a straight line's least squares needs no more."""
+    """Sufficient statistics of samples per bin of u, each (B,): all that the best straight line depends on."""
 
     #: Samples; bins without any are left out.
     n: np.ndarray
     #: Means of command (V) and of flow at the nominal pressure drop (m³/s).
     u: np.ndarray
     y: np.ndarray
-    #: Sums of squares and products about the means.
+    #: Sums of squares and products about the means; those of y alone are the same for every line.
     c_uu: np.ndarray
     c_uy: np.ndarray
-    c_yy: np.ndarray
     #: Samples in the bin that read below the meter's floor; they are not in the other sums. Their mean command, 0 where
     #: there are none.
     censored: np.ndarray
@@ -89,7 +88,6 @@ def bin_branch(u: np.ndarray, y: np.ndarray, censored: np.ndarray, u_max: float)
         y=y_mean,
         c_uu=total(du * du, seen),
         c_uy=total(du * dy, seen),
-        c_yy=total(dy * dy, seen),
         censored=cut,
         u_censored=total(u, censored) / np.maximum(cut, 1),
     )

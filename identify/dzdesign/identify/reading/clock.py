@@ -23,12 +23,7 @@ ASSUMED_MS, LIKE_MS = "taken as ms", "like ms"
 def seconds_of_day_times(table: Table, label: str) -> np.ndarray:
     """Return the seconds since the first row, of a column of dates or times of day.
 
-    Parameters
-    ----------
-    table : Table
-        Milliseconds that stand in a column of their own, as some loggers part them, are added.
-    label : str
-        A column for which `Table.is_clock` holds.
+    Milliseconds that stand in a column of their own, as some loggers part them, are added.
 
     Raises
     ------
@@ -76,14 +71,7 @@ def _usual_step(time: np.ndarray) -> float:
 def never_back(table: Table, time: np.ndarray, complete: np.ndarray) -> np.ndarray:
     """Return times that stand still where they jitter back by less than a sample; refuse a clock that was set back.
 
-    Parameters
-    ----------
-    table : Table
-        The recording.
-    time : (M,) array
-        Of its complete rows.
-    complete : (N,) array of bool
-        Which of its rows they are.
+    The times are those of the table's complete rows.
     """
     latest = np.maximum.accumulate(time)
     backwards = np.flatnonzero(latest - time > _usual_step(time))
@@ -102,14 +90,7 @@ def clock_doubt(time: np.ndarray, u: np.ndarray, *, unit_stated: bool) -> str:
     That it is in ms is plain where a ramp would take longer than any does in seconds, and takes long enough in
     milliseconds.
 
-    Parameters
-    ----------
-    time : (N,) array
-        As read, in s where a unit is stated.
-    u : (N,) array
-        Command, V.
-    unit_stated : bool
-        True if the column of time has a unit.
+    The time is as read, in s where a unit is stated.
     """
     size = np.abs(u)
     level = np.where(size > HIGH * size.max(), 1, np.where(size < LOW * size.max(), -1, 0))

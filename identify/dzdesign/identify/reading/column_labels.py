@@ -92,13 +92,6 @@ def parse_columns(text: str | Mapping[str, str]) -> dict[str, str]:
 def find_columns(table: Table, chosen: Mapping[str, str]) -> dict[str, Column]:
     """Return quantity -> column of a table: those that were chosen, the others by their labels.
 
-    Parameters
-    ----------
-    table : Table
-        As recorded.
-    chosen : mapping
-        Quantity -> label, or label and unit with a colon between them, as `parse_columns` gives it.
-
     Raises
     ------
     InputError

@@ -17,12 +17,7 @@ def without_placeholders(numbers: np.ndarray, *, rises: bool) -> tuple[np.ndarra
     One is taken for that only where it lies far beyond all others: a flow of 9999 mL/min among others of its size
     is a flow. A column of nothing but 999 may be a pressure in kPa, one of nothing but -999 is none.
 
-    Parameters
-    ----------
-    numbers : (N,) array
-        A column, in the unit of the file.
-    rises : bool
-        True for the time, which may well go on after a pause at 999 s.
+    The numbers are in the unit of the file; of the time, which `rises`, 999 s may well be a number after a pause.
     """
     found: Counter[float] = Counter()
     while (number := _outermost(numbers, rises=rises)) is not None:
@@ -33,13 +28,7 @@ def without_placeholders(numbers: np.ndarray, *, rises: bool) -> tuple[np.ndarra
 
 
 def describe_placeholders(found: Mapping[str, Mapping[float, int]]) -> str:
-    """Return what was found, such as ``-9999 in 12 rows of 'dP_bar'``, or nothing.
-
-    Parameters
-    ----------
-    found : mapping
-        Label of a column -> what `without_placeholders` found in it.
-    """
+    """Return what was found, such as ``-9999 in 12 rows of 'dP_bar'``, or nothing."""
     return ", ".join(
         f"{number:g} in {count} row{'s' if count > 1 else ''} of '{label}'"
         for label, counts in found.items()

@@ -34,18 +34,6 @@ def pressures_in_name(name: str) -> tuple[str, ...]:
     return found.pop() if len(found) == 1 else ()
 
 
-def pressure_in_name(name: str) -> str | None:
-    """Return the one pressure that a file's name states, such as ``4 MPa``; None where it says none, or may say two.
-
-    Examples
-    --------
-    >>> pressure_in_name("ramp_4MPa_2.csv"), pressure_in_name("ramp_2.csv"), pressure_in_name("ramp_2_5MPa.csv")
-    ('4 MPa', None, None)
-    """
-    stated = pressures_in_name(name)
-    return stated[0] if len(stated) == 1 else None
-
-
 def _readings(before: str, mark: str, number: str, after: str) -> tuple[str, ...]:
     """Return the decimal number, and the other reading if there is one; `after`: that of digits with a mark between."""
     whole, _, fraction = number.replace(",", ".").partition(".")
@@ -75,10 +63,7 @@ def claimed_pressures(names: Sequence[str]) -> list[float]:
     In Pa where each states a unit, and else as they stand. Where names can be read in two ways, the readings that lie
     closest together.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Of the files; folders before them count for nothing.
+    Folders before a name count for nothing.
 
     Examples
     --------
@@ -115,13 +100,6 @@ def _closest(readings: Sequence[Sequence[float]]) -> list[float]:
 
 def contradicts(name: str, dp: float) -> str:
     """Return what a file's name states if the measured pressure, in Pa, is plainly another in any reading; or nothing.
-
-    Parameters
-    ----------
-    name : str
-        Of the file.
-    dp : float
-        As measured, Pa.
 
     Examples
     --------

@@ -63,12 +63,7 @@ class ProposedColumns:
 def propose_columns(path: Path, chosen: Mapping[str, str], skip_rows: int | None = None) -> ProposedColumns:
     """Tell which column of a recording is which quantity.
 
-    Parameters
-    ----------
-    path, skip_rows
-        As for `read_ramp_file`.
-    chosen : mapping
-        What the engineer has declared, as `parse_columns` gives it.
+    `chosen` is what the engineer has declared, as `parse_columns` gives it.
 
     Raises
     ------

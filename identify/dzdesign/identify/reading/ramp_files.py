@@ -124,15 +124,6 @@ def _is_marked(comments: str) -> bool:
 def read_table(file: BinaryIO, path: Path, skip_rows: int | None = None) -> Table:
     """Read a table of any known format; its first bytes tell which, not its name.
 
-    Parameters
-    ----------
-    file : binary file
-        Text (plain or gzip), or one of `binary.formats`.
-    path : Path
-        For messages.
-    skip_rows : int, optional
-        Of `read_text_table`.
-
     Raises
     ------
     InputError

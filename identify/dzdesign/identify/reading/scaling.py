@@ -32,16 +32,7 @@ class Scaling:
 def scaling_of(path: Path, quantity: str, column: Column, u_max: float) -> Scaling:
     """Return how a column's numbers become SI.
 
-    Parameters
-    ----------
-    path : Path
-        For messages.
-    quantity : str
-        Of a ramp test.
-    column : Column
-        Its unit may be a range such as ``4..20 mA = 0..50 L/min``.
-    u_max : float
-        Command in V that 100 % means.
+    A column's unit may be a range such as ``4..20 mA = 0..50 L/min``; 100 % of a command is `u_max`, V.
 
     Raises
     ------
@@ -102,13 +93,6 @@ def _hint(quantity: str, column: Column) -> str:
 
 def range_example(quantity: str, label: str, unit: str) -> str:
     """Return how a range is declared.
-
-    Parameters
-    ----------
-    quantity : str
-        Of a ramp test.
-    label, unit : str
-        Of the column.
 
     Examples
     --------

@@ -95,16 +95,6 @@ class Table(ABC):
 
 
 def unreadable(path: Path, name: str, error: Exception) -> InputError:
-    """Return the error for a file that a library can't read.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    name : str
-        Of its format.
-    error : Exception
-        The library's own.
-    """
+    """Return the error for a file that a library can't read."""
     reason = one_line(str(error).strip().partition("\n")[0])[:LONGEST_REASON] or type(error).__name__
     return InputError(f"'{path}' is not a {name} file that can be read ({reason}); save it again, or export it as CSV")

@@ -26,15 +26,7 @@ PART = 1 << 17
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Thinned:
-    """What is left of a recording.
-
-    Attributes
-    ----------
-    rows : (C, M) array
-        Medians.
-    run : int
-        Rows that became one, an odd number (1: nothing was thinned).
-    """
+    """What is left of a recording: `rows` (C, M), medians of an odd number `run` of them (1: nothing was thinned)."""
 
     rows: np.ndarray
     run: int

@@ -49,14 +49,7 @@ def is_unclear(cell: str) -> bool:
 
 
 def seconds_of_stamps(cells: "pl.Series", where: str) -> np.ndarray:
-    """Return stamps as seconds since the first of a file, NaN where a cell is blank.
-
-    Parameters
-    ----------
-    cells : polars.Series
-        Strings without blanks around them.
-    where : str
-        File and column, for messages.
+    """Return stamps, without blanks around them, as seconds since the first of a file; NaN where a cell is empty.
 
     Raises
     ------

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from dzdesign.core.errors import and_more
 from dzdesign.report.lot.folder import Lot, read_lot
-from dzdesign.report.lot.sections import HEADINGS, sections_of
+from dzdesign.report.lot.sections import sections_of
 from dzdesign.report.lot.setting_text import untested_lines
 from dzdesign.report.lot.spread import FAR, TWENTY, Spread, spreads_of
 from dzdesign.report.lot.summary import DOES_NOT_HOLD
@@ -41,7 +41,7 @@ def make_lot_report(lot: Lot) -> Report:
         title=f"Lot of {whole(lot.expected)} valve{'' if lot.expected == 1 else 's'}",
         verdict=verdict,
         figures=key_figures_of_lot(lot, spreads),
-        headings=HEADINGS,
+        template="lot.html.jinja",
         sections=sections_of(lot, spreads),
         missing=missing,
     )

@@ -24,18 +24,6 @@ from dzdesign.report.lot.tables import (
 from dzdesign.report.page import Section
 from dzdesign.report.sections.cells import counted, whole
 
-#: Anchor and heading of every section, in their order.
-HEADINGS = (
-    ("failed", "Not calibrated"),
-    ("spread", "Spread of the lot"),
-    ("far", "Far from the rest"),
-    ("left", "Dead zone that remains"),
-    ("setting", "One setting for all"),
-    ("valves", "The valves"),
-    ("recordings", "What the recordings leave open"),
-    ("warnings", "Warnings: what is not covered"),
-    ("provenance", "Provenance"),
-)
 #: Name of a figure, columns of the quantities in it, caption, and whether they are on one scale.
 FigureKind = tuple[str, tuple[str, ...], str, bool]
 SPREAD_FIGURES: tuple[FigureKind, ...] = (
@@ -62,17 +50,6 @@ LEFT_FIGURE: FigureKind = (
     "where it is largest.",
     True,
 )
-#: Of every report of a lot.
-NOT_PROVED = (
-    "A valve counts as calibrated if it was identified, its compensator designed and its C made. That the C does what "
-    "the law says is known of those that were verified.",
-    "The lot setting is certified for each valve of this lot with the confidence of that valve's own bounds, not "
-    "for all of them at once. Of a valve that is not in the lot it says nothing.",
-    "Spread is of the valves and of the bench: a meter or an oil temperature that drifts while a lot is measured looks "
-    "like valves that differ. Measure one valve again at the end of the lot to tell.",
-    "Far from the rest is a place to look, no verdict: such a valve is calibrated as certainly as any other.",
-    "Quantiles are those of the valves that were calibrated; the others have no numbers.",
-)
 
 
 def sections_of(lot: Lot, spreads: Sequence[Spread]) -> dict[str, Section]:
@@ -86,7 +63,7 @@ def sections_of(lot: Lot, spreads: Sequence[Spread]) -> dict[str, Section]:
             "setting": _setting_section(lot, spreads),
             "valves": _valves_section(lot, spreads),
             "recordings": _recordings_section(lot),
-            "warnings": Section(lines=NOT_PROVED),
+            "warnings": Section(),
             "provenance": _provenance_section(lot),
         }
 
@@ -109,8 +86,6 @@ def _failed_section(lot: Lot) -> Section:
     groups = reason_groups(lot.failed)
     many, kinds = counted(len(lot.failed), "valve"), counted(len(groups), "kind")
     return Section(
-        note="The reason of a valve also stands in its `reason.txt`. Correct what it says, then run the same "
-        "`dzdesign batch` again: only what changed is done anew.",
         lines=(
             f"{many}, {kinds} of reason; what differs between the valves of a kind is … in the reason and stands "
             "behind the name.",
@@ -236,9 +211,6 @@ def _without_lines(without: SettingOfOthers | None, count: int) -> list[str]:
 def _valves_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
     table = valves_table(lot, {name for spread in spreads for name, _ in spread.far()})
     return Section(
-        note="Each calibrated valve has a folder `valves/NAME` beside this page, with its valve.json, "
-        "compensator.json and firmware: `dzdesign report valves/NAME`, run in the folder of this page, makes its own "
-        "report.",
         tables=(table,) if table else (),
     )
 
@@ -251,8 +223,6 @@ def _recordings_section(lot: Lot) -> Section:
         return Section(lines=(*odd, *none))
     return Section(
         lines=odd,
-        note="None of these stops a calibration. The text of each valve, with its numbers, stands in its report and in "
-        "its valve.json; what to do about a code stands in the documentation under “Warning codes”.",
         tables=(table,),
     )
 

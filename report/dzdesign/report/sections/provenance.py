@@ -1,24 +1,12 @@
 """Sections on what the report was made from, and on what it does not cover."""
 
+from dzdesign.core.artefact_types import Artefact
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.signal_descriptions import signals_in_words
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.chain import KINDS, Chain
 from dzdesign.report.page import Section
 from dzdesign.report.sections.cells import Cell, Table, table_of, whole
-
-#: Of every report, whatever it finds.
-NOT_PROVED = (
-    "Pressure drops beyond the tested interval: the nearest tested β is held there, and nothing is certified.",
-    "Commands above code 0: one code more is 1 to 2 mV more drive, and the law has no dead band.",
-    "What the certificate rests on: a threshold that runs one way with the pressure drop, also between the tests, and "
-    "a meter's lag that is as declared or found.",
-    "A leak or a soft edge below the flow that counts as flow; a meter's zero error that does not show at rest.",
-    "Errors of the pressure sensors beyond their converters', and failures that their signals hide.",
-    "Oil temperature and the spread between valves of a type: the compensator is certified for the valve of its tests.",
-    "The target's compiler and silicon: the C was compiled and tried on the host that made the evidence.",
-    "The closed loop is a simulation of the stated plant; it is no measurement.",
-)
 
 
 def warnings_section(valve: ValveModel | None, compensator: Compensator | None) -> Section:
@@ -36,7 +24,6 @@ def warnings_section(valve: ValveModel | None, compensator: Compensator | None) 
             ("Warnings of the recordings", tuple(warnings) or (("None.",) if valve else ())),
             ("What the design costs", compensator.costs if compensator else ()),
             ("What the codes stand for", tuple(signals)),
-            ("What this report does not prove", NOT_PROVED),
         )
     )
 
@@ -48,22 +35,30 @@ def provenance_section(chain: Chain) -> Section:
 
 def _provenance_table(chain: Chain) -> Table:
     """Return which file made which, from the firmware's evidence back to the recordings."""
-    rows: list[tuple[Cell | str, ...]] = []
+    rows: list[tuple[str, Cell | str, Cell | str, str, str]] = []
     for role, kind in KINDS.items():
-        place = chain.places.get(role)
-        if place:
-            sources = ", ".join(each.source for each in place.made_from) or "–"
-            rows.append((kind.label, place.name, Cell(text=place.sha256, kind="hash"), place.made_by, sources))
+        artefact: Artefact | None = getattr(chain, role)
+        if artefact:
+            place, tool = chain.places[role], artefact.tool
+            sources = ", ".join(each.source for each in artefact.made_from) or "–"
+            rows.append((kind.label, place.name, _hash(place.sha256), f"{tool.name} {tool.version}", sources))
         elif kind.command:
             rows.append((kind.label, Cell(text="missing or not used", kind="open"), "", "", ""))
-    for source in chain.places["valve"].made_from if "valve" in chain.places else ():
-        rows.append(("recording", source.source, Cell(text=source.sha256, kind="hash"), "–", "–"))
-    headings = ("artefact", "file", "SHA-256", "made by", "made from")
+    for source in chain.valve.made_from if chain.valve else ():
+        rows.append(("recording", source.source, _hash(source.sha256), "–", "–"))
     return table_of(
         "Each artefact with the SHA-256 of its bytes, and what it was made from",
         rows,
-        *((heading, lambda row, place=place: row[place]) for place, heading in enumerate(headings)),
+        ("artefact", lambda row: row[0]),
+        ("file", lambda row: row[1]),
+        ("SHA-256", lambda row: row[2]),
+        ("made by", lambda row: row[3]),
+        ("made from", lambda row: row[4]),
     )
+
+
+def _hash(digest: str) -> Cell:
+    return Cell(text=digest, kind="hash")
 
 
 def _hashes_table(chain: Chain) -> Table | None:

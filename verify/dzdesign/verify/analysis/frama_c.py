@@ -47,31 +47,18 @@ class Alarm(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proof:
-    """What is left of Eva's alarms when each place counts as shown by the analysis that shows it.
+    """What is left of Eva's alarms when each place counts as shown by the analysis that shows it."""
 
-    Attributes
-    ----------
-    version : str
-        Of Frama-C.
-    functions : tuple of str
-        That were analysed for all inputs.
-    alarms : tuple of Alarm
-        Not excluded by any of the analyses; none: there is no undefined behaviour.
-    """
-
+    #: Of Frama-C.
     version: str
+    #: That were analysed for all inputs.
     functions: tuple[str, ...]
+    #: Not excluded by any of the analyses; none: there is no undefined behaviour.
     alarms: tuple[Alarm, ...]
 
 
 def proof_check(folder: Path) -> Check:
-    """Return the requirement that no input makes the core's C overflow, index beyond a table or shift too far.
-
-    Returns
-    -------
-    Check
-        Not checked, with the reason, where Frama-C is not installed or does not end.
-    """
+    """Return the requirement that no input makes the core's C overflow, index beyond a table or shift too far."""
     if not shutil.which(PROGRAM):
         return UNDEFINED_BEHAVIOUR.check(holds=None, text=f"not run: {PROGRAM} not found; apt install frama-c-base")
     try:
@@ -92,19 +79,10 @@ def prove(folder: Path, rows: int | None = None) -> Proof:
     """Analyse each side's core, and the drive.
 
     Each analysis gives the core every input, cut to pieces in another way. A place that one of them shows to be sound
-    is sound: the first undefined behaviour of a run, were there one, would be an alarm of each.
+    is sound: the first undefined behaviour of a run, were there one, would be an alarm of each. With `rows`, so many
+    codes of sensor B, from its first sound one on, stand for all: no proof, but a quick look.
 
-    Parameters
-    ----------
-    folder : Path
-        Firmware folder.
-    rows : int, optional
-        So many codes of sensor B, from its first sound one on, in place of all: no proof, but a quick look.
-
-    Raises
-    ------
-    RequirementError
-        If Frama-C fails or takes longer than `TIMEOUT_S`.
+    Frama-C that fails or takes longer than `TIMEOUT_S` is a `RequirementError`.
     """
     compensator = read_compensator(folder)
     sources = sorted(path.name for path in (folder / "core").glob("*.[ch]"))

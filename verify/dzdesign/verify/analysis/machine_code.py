@@ -31,22 +31,10 @@ class MachineCheck:
 
 
 def check_on_machine(folder: Path, machine: Machine, host: InputCheck) -> MachineCheck:
-    """Check one side's machine code for another processor.
+    """Check one side's machine code for another processor, of which `host` is the host's check.
 
-    Parameters
-    ----------
-    folder : Path
-        Firmware folder.
-    machine : Machine
-        For which; on a small one a sample is tried, there and on the host. Elsewhere all inputs are, but without the
-        host's second look at the pairs of pressures.
-    host : InputCheck
-        The host's check of that side.
-
-    Raises
-    ------
-    RequirementError
-        If the core does not compile or the program does not end there.
+    On a small machine a sample is tried, there and on the host. Elsewhere all inputs are, but without the host's second
+    look at the pairs of pressures. A core that does not compile, or does not end there, is a `RequirementError`.
     """
     core = CompiledCore(folder, host.sign)
     prepared = PreparedInputs(ExactLaw(read_compensator(folder), host.sign))

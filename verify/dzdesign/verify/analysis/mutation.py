@@ -55,13 +55,7 @@ class MutationBench:
         return {name: text.decode(errors="surrogateescape") for name, text in self._drive.sources.items()}
 
     def check_original(self) -> None:
-        """Run every check on the firmware as it is.
-
-        Raises
-        ------
-        RequirementError
-            If it fails one: then no mutant's failing says anything.
-        """
+        """Run every check on the firmware as it is; if it fails one, no mutant's failing says anything."""
         _ = self._drive_samples
         for verdict in self._tried(self._cores, self._drive):
             if verdict:
@@ -84,7 +78,7 @@ class MutationBench:
             objects = drive.objects()
         except RequirementError:
             return outcome(REFUSED)
-        if _contents(objects) == _contents(self._drive.objects()):
+        if [*map(Path.read_bytes, objects)] == [*map(Path.read_bytes, self._drive.objects())]:
             return outcome(SAME_OBJECT)
         for killer in self._tried(cores, drive):
             if killer:
@@ -119,10 +113,6 @@ class MutationBench:
             program = HOST.link([*each, main], "the random triples")
             results.append(HOST.run(program, [str(RANDOM_TRIPLES)], "the core"))
         return results[0] == results[1]
-
-
-def _contents(objects: Sequence[Path]) -> list[bytes]:
-    return [each.read_bytes() for each in objects]
 
 
 def all_mutants(bench: MutationBench) -> list[Mutant]:

@@ -25,7 +25,7 @@ def curve_files(loops: Sequence[LoopComparison], maps: Sequence[InputMap]) -> di
     for side in dict.fromkeys(loop.result.side for loop in loops):
         files[closed_loop_name(side)] = _ramps([loop for loop in loops if loop.result.side == side])
     for one in maps:
-        files[input_map_name(one.side)] = _csv(("command_code", "dp_code", "compare", "error", "status"), one.rows())
+        files[input_map_name(one.side)] = _csv(("command_code", "dp_code", "compare", "error", "status"), one.grid)
         files[zero_command_name(one.side)] = _csv(
             ("dp_code", "dp_MPa", "drive_V", "bound_V"),
             ((code, f"{dp:.4f}", f"{drive:.5f}", f"{bound:.5f}") for code, dp, drive, bound in one.zero_command),
@@ -57,13 +57,7 @@ def _csv(header: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
 
 
 def read_curves(text: str) -> Mapping[str, np.ndarray]:
-    """Read one of these files back: column to numbers.
-
-    Raises
-    ------
-    ValueError
-        If it is no table of numbers.
-    """
+    """Read one of these files back, column to numbers; what is no table of numbers is a `ValueError`."""
     lines = text.splitlines()
     header = lines[0].split(",") if lines else []
     table = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]])

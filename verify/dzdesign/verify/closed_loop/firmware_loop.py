@@ -9,16 +9,11 @@ from typing import Any
 from dzdesign.design.compensator import Compensator
 from dzdesign.verify.closed_loop.dead_zone import LoopComparison, compare_at_pressure
 from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence
-from dzdesign.verify.closed_loop.loop_checks import (
-    no_flow_at_zero,
-    plant_is_the_valve,
-    plant_opens,
-    shut_after_scenarios,
-)
+from dzdesign.verify.closed_loop.loop_checks import loop_checks
 from dzdesign.verify.closed_loop.plant import Plant, plants_from_tests
 from dzdesign.verify.closed_loop.scenarios import Scene, run_scenarios
 from dzdesign.verify.closed_loop.tolerances import Tolerances, monte_carlo, scatter
-from dzdesign.verify.evidence import IdentifiedPlant, MonteCarlo, PressureResult, ScenarioResult, Side
+from dzdesign.verify.evidence import ClosedLoopResult, IdentifiedPlant, MonteCarlo, ScenarioResult, Side
 from dzdesign.verify.requirements import Check
 
 #: Shows how far a stage is: pieces and their number in, the pieces out.
@@ -38,10 +33,15 @@ class FirmwareLoop:
     scenarios: tuple[ScenarioResult, ...] = ()
     monte_carlo: MonteCarlo | None = None
 
-    @property
-    def ramps(self) -> tuple[PressureResult, ...]:
-        """What was read from the ramps, one entry a side and pressure drop."""
-        return tuple(loop.result for loop in self.loops)
+    def result(self, plant: Plant | None, source: str, sha256: str | None) -> ClosedLoopResult:
+        """Return what the evidence has of the ramps and of the plant, given from a file or made from the thresholds."""
+        return ClosedLoopResult(
+            plant=plant,
+            plant_source=source or "made from the identified thresholds",
+            plant_sha256=sha256,
+            plants=() if plant else self.plants,
+            pressures=tuple(loop.result for loop in self.loops),
+        )
 
 
 def scenes_of(folder: Path, compensator: Compensator, plant: Plant | None) -> tuple[Scene, ...]:
@@ -78,7 +78,6 @@ def close_the_loop(
     watch: Watch,
 ) -> FirmwareLoop:
     """Run the ramps, the scenarios and, where tolerances are given, the series of plants."""
-    given = plant is not None
     say("running the closed loop")
     with ThreadPoolExecutor(WORKERS) as pool:
         ramps = pool.map(
@@ -95,15 +94,8 @@ def close_the_loop(
         say(f"running {tolerances.plants} plants at {len(scenes)} pressure drops")
         pieces = watch(scenes, len(scenes))
         series = monte_carlo(tolerances, [scatter(s.loop, plant, tolerances, s.dp_MPa, s.side) for s in pieces])
-    results = [loop.result for loop in loops]
-    zero_flow = no_flow_at_zero(results, compensator, plant_given=given)
     return FirmwareLoop(
-        checks=(
-            plant_opens(results),
-            plant_is_the_valve(results, compensator.valve),
-            zero_flow,
-            shut_after_scenarios(scenarios, zero_flow, plant_given=given),
-        ),
+        checks=loop_checks([loop.result for loop in loops], scenarios, compensator, plant_given=plant is not None),
         plants=tuple(IdentifiedPlant(side=scene.side, dp_MPa=scene.dp_MPa, parameters=scene.plant) for scene in scenes),
         loops=loops,
         scenarios=scenarios,

@@ -79,18 +79,10 @@ def _slowest_ramp_s(compensator: Compensator, sign: int) -> float:
 
 
 class ClosedLoop:
-    """One plant and, where given, one generated core, compiled into one native loop.
+    """One plant and, where given, the core of one firmware folder, compiled into one native loop.
 
-    Parameters
-    ----------
-    plant : Plant
-        Parameters.
-    firmware : Path or None
-        Firmware folder; None leaves only the direct drive.
-    compensator : Compensator
-        Of the firmware: scalings of its inputs and output, and its ramps.
-    sign : {1, -1}
-        Side of the valve: the sign of the command that opens it.
+    Without a firmware there is only the direct drive; with one, its compensator gives scalings and ramps. `sign` is
+    that of the command that opens the side.
     """
 
     def __init__(
@@ -140,22 +132,11 @@ class ClosedLoop:
         seen_MPa: np.ndarray | None = None,
         periods_per_record: int = PERIODS_PER_RECORD,
     ) -> LoopRun:
-        """Run the loop from rest.
+        """Run the loop from rest, in one of `MODES`.
 
-        Parameters
-        ----------
-        command : (N,) array
-            Share of u_max, one value a record.
-        supply_MPa : float or (N,) array
-            Pressure drop at no flow.
-        mode : {"direct", "compensated", "without beta"}
-            What drives the PWM.
-        dp_frozen_MPa : float
-            The pressure drop that mode "without beta" shows to the core.
-        seen_MPa : (N,) array, optional
-            Pressure drop that the sensors show, of sensors that fail; not a number: the plant's own.
-        periods_per_record : int
-            Periods of the PWM that a value of the command is held for, and a record is of.
+        `command` (N,) is a share of u_max, one value a record of `periods_per_record` periods of the PWM; `supply_MPa`
+        is the pressure drop at no flow, (N,) where it changes. Of sensors that fail `seen_MPa` (N,) is what they show;
+        not a number: the plant's own. Mode "without beta" shows `dp_frozen_MPa` to the core.
         """
         if mode not in MODES:
             raise ValueError(f"mode is '{mode}', expected one of {', '.join(MODES)}")

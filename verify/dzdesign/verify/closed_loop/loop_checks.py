@@ -12,6 +12,19 @@ from dzdesign.verify.requirements import PLANT_IS_THE_VALVE, PLANT_OPENS, ZERO_F
 SAME_THRESHOLD = 0.03
 
 
+def loop_checks(
+    ramps: Sequence[PressureResult], scenarios: Sequence[ScenarioResult], compensator: Compensator, *, plant_given: bool
+) -> tuple[Check, ...]:
+    """Return all of them, in the order of the report."""
+    zero_flow = no_flow_at_zero(ramps, compensator, plant_given=plant_given)
+    return (
+        plant_opens(ramps),
+        plant_is_the_valve(ramps, compensator.valve),
+        zero_flow,
+        shut_after_scenarios(scenarios, zero_flow, plant_given=plant_given),
+    )
+
+
 def plant_opens(ramps: Sequence[PressureResult]) -> Check:
     """Tell whether flow passes at full command: of a plant that stays shut, or whose motion is not finite, the other
     figures of the closed loop say nothing."""

@@ -45,20 +45,13 @@ MAP = (
 
 
 class Equations(NamedTuple):
-    """The plant's equations with every parameter a symbol.
+    """The plant's equations with every parameter a symbol."""
 
-    Attributes
-    ----------
-    linear : casadi.Function
-        plant -> d rates / d state (3, 3), d rates / d inputs (3, 3), where no pressure acts.
-    extracted : casadi.Function
-        plant -> what of the next two depends on the parameters only.
-    nonlinear : casadi.Function
-        (x, supply, plant, extracted) -> acceleration beyond the linear part, m/s²; dP, MPa; Q, L/min.
-    """
-
+    #: plant -> d rates / d state (3, 3), d rates / d inputs (3, 3), where no pressure acts.
     linear: "casadi.Function"
+    #: plant -> what of `nonlinear` depends on the parameters only.
     extracted: "casadi.Function"
+    #: (x, supply, plant, extracted) -> acceleration beyond the linear part, m/s²; dP, MPa; Q, L/min.
     nonlinear: "casadi.Function"
 
 
@@ -91,22 +84,15 @@ def equations() -> Equations:
 
 @dataclass(frozen=True, slots=True)
 class Numbers:
-    """One plant as plant_period.h takes it.
+    """One plant as plant_period.h takes it."""
 
-    Attributes
-    ----------
-    flat : (P,) array
-        `NAMED`, `MAP`, the parameters, and what `Equations.extracted` makes of them.
-    coarse : (G, 4) array
-        Current, position, speed and charge that full voltage makes, from rest, in 0, 1, ... times `FINE` half counts of
-        the compare value.
-    fine : (FINE, 12) array
-        The same in 0, 1, ... half counts, after the first eight entries of `MAP` for that time: what it does to a
-        state that is there already.
-    """
-
+    #: `NAMED`, `MAP`, the parameters, and what `Equations.extracted` makes of them.
     flat: np.ndarray
+    #: (G, 4): current, position, speed and charge that full voltage makes, from rest, in 0, 1, ... times `FINE` half
+    #: counts of the compare value.
     coarse: np.ndarray
+    #: (FINE, 12): the same in 0, 1, ... half counts, after the first eight entries of `MAP` for that time, which are
+    #: what it does to a state that is there already.
     fine: np.ndarray
 
 

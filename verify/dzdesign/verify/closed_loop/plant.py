@@ -6,7 +6,7 @@ that moves the threshold, flow force, a play in the magnetic force (hysteresis),
 
 import math
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -106,34 +106,31 @@ class Plant:
 def read_plant(path: Path, say: Callable[[str], None] = lambda _: None) -> Plant:
     """Read a plant from TOML; a key that is none of `Plant`'s is refused, with the nearest that is.
 
-    Parameters
-    ----------
-    path : Path
-    say : callable
-        Told which parameters the file leaves as the default plant has them.
-
-    Raises
-    ------
-    InputError
-        If the file can't be read or a value does not fit.
+    `say` is told which parameters the file leaves as the default plant has them.
     """
-    content = read_bytes(path, "plant file")
-    try:
-        values = tomllib.loads(content.decode("utf-8-sig"))
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"'{path}' is not TOML: {error}") from error
-    known = [field.name for field in fields(Plant)]
-    for key in values:
-        if key not in known:
-            raise InputError(f"'{path}': there is no plant parameter {quoted(key)}{nearest(key[:LONGEST_KEY], known)}")
+    values = read_parameters(path, "plant file")
     try:
         plant = Plant(**values)
     except InputError as error:
         raise InputError(f"'{path}': {error}") from error
-    missing = [name for name in known if name not in values]
+    missing = [field.name for field in fields(Plant) if field.name not in values]
     if missing:
         say(f"'{path}' leaves {', '.join(missing)} as the default plant has them")
     return plant
+
+
+def read_parameters(path: Path, what: str, others: Sequence[str] = ()) -> dict[str, Any]:
+    """Read TOML whose keys are parameters of `Plant`, or `others`; of any other the `InputError` names the nearest."""
+    content = read_bytes(path, what)
+    try:
+        values = tomllib.loads(content.decode("utf-8-sig"))
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"'{path}' is not TOML: {error}") from error
+    known = [*(field.name for field in fields(Plant)), *others]
+    for key in values:
+        if key not in known:
+            raise InputError(f"'{path}': there is no plant parameter {quoted(key)}{nearest(key[:LONGEST_KEY], known)}")
+    return values
 
 
 def plants_from_tests(side: SideModel, u_max_V: float) -> dict[float, Plant]:
@@ -168,13 +165,10 @@ def plants_from_tests(side: SideModel, u_max_V: float) -> dict[float, Plant]:
 
 
 def derivatives(plant: Plant) -> tuple["casadi.SX", "casadi.SX", "casadi.SX"]:
-    """Return state, inputs and their derivatives of Eqs. (19)-(24), lowered from SymPy to CasADi.
+    """Return state, inputs and their derivatives of Eqs. (19)-(24), lowered from SymPy to CasADi, free of the stops.
 
-    Returns
-    -------
-    tuple
-        state (i in A, x_e in m, v in m/s); inputs (amplifier voltage in V, force offset of the play in N, supply
-        pressure drop in MPa); d state/dt, free of the stops.
+    The state is (i in A, x_e in m, v in m/s); the inputs are (amplifier voltage in V, force offset of the play in N,
+    supply pressure drop in MPa).
     """
     import casadi as ca
 

@@ -31,26 +31,18 @@ NO_FIGURES: Mapping[str, float] = MappingProxyType({})
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
-    """The loop of one side at one pressure drop.
+    """The loop of one side at one pressure drop."""
 
-    Attributes
-    ----------
-    loop : ClosedLoop
-        With the compensator, and the plant of this pressure drop.
-    plant : Plant
-    side : {"positive", "negative"}
-    dp_MPa, reference_MPa : float
-        Pressure drop at no flow, and the law's dP0.
-    tested_MPa : (float, float) or None
-        Lowest and highest tested pressure drop; None where the plant holds at `dp_MPa` only.
-    """
-
+    #: With the compensator, and the plant of this pressure drop.
     loop: ClosedLoop
     plant: Plant
     side: Side
+    #: At no flow.
     dp_MPa: float
+    #: The law's dP0.
     reference_MPa: float
-    tested_MPa: tuple[float, float] | None
+    #: Of the tests; None where the plant holds at `dp_MPa` only.
+    tested_MPa: Ends | None
 
     @property
     def settle_s(self) -> float:
@@ -160,17 +152,11 @@ def _load_step_at_zero(scene: Scene, tested_MPa: Ends) -> ScenarioResult:
 
 def _load_step_in_motion(scene: Scene, tested_MPa: Ends) -> ScenarioResult:
     """The pressure drop jumps in the middle of a ramp of the command."""
-    command = np.concatenate([scene.opened_and_closed(), _ramp(0, 0.6), _ramp(0.6, 0), scene.held(0, 2)])
-    jump = scene.opened_and_closed().size + _ramp(0, 1).size // 2
-    supply = np.full(command.size, scene.dp_MPa)
-    supply[jump:] = tested_MPa[1] if scene.dp_MPa < sum(tested_MPa) / 2 else tested_MPa[0]
-    run = scene.run(command, supply_MPa=supply)
+    then_MPa = tested_MPa[1] if scene.dp_MPa < sum(tested_MPa) / 2 else tested_MPa[0]
+    run, jump = _changed_in_mid_ramp(scene, np.nan, then_MPa)
     change = run.q_L_min[jump + round(SETTLE_S / STEP_S)] - run.q_L_min[jump - 1]
-    return scene.result(
-        "load step in the middle of a ramp",
-        run,
-        figures={"pressure_drop_then_MPa": supply[-1], "flow_change_L_min": change},
-    )
+    figures = {"pressure_drop_then_MPa": then_MPa, "flow_change_L_min": change}
+    return scene.result("load step in the middle of a ramp", run, figures=figures)
 
 
 def _failing_sensors(scene: Scene) -> Iterator[ScenarioResult]:
@@ -180,24 +166,27 @@ def _failing_sensors(scene: Scene) -> Iterator[ScenarioResult]:
         ("sensor ahead breaks, or the one behind shows full", -beyond),
         ("sensor ahead shows full, or the one behind breaks", beyond),
     ):
-        yield scene.result(name, _fail(scene, signal_MPa, scene.dp_MPa))
+        yield scene.result(name, _changed_in_mid_ramp(scene, signal_MPa, scene.dp_MPa)[0])
 
 
 def _frozen_sensors(scene: Scene, tested_MPa: Ends) -> ScenarioResult:
     """The sensors freeze, then the pressure drop rises. The codes are sound: what it costs is stated, not required."""
     low, high = tested_MPa
     name = f"sensors frozen at {low:.2f} MPa, then {high:.2f} MPa"
-    return scene.result(name, _fail(scene, low, high), must_shut=False)
+    return scene.result(name, _changed_in_mid_ramp(scene, low, high)[0], must_shut=False)
 
 
-def _fail(scene: Scene, signal_MPa: float, supply_MPa: float) -> LoopRun:
-    """Run a ramp up and down; in mid-ramp the sensors begin to show something, and the supply becomes another."""
+def _changed_in_mid_ramp(scene: Scene, seen_MPa: float, supply_MPa: float) -> tuple[LoopRun, int]:
+    """Run a ramp up and down, and tell at which record, in mid-ramp, what the sensors show and the supply change.
+
+    Sensors that show not a number show the plant's own pressure drop.
+    """
     before = scene.opened_and_closed()
     command = np.concatenate([before, _ramp(0, 0.6), _ramp(0.6, 0), scene.held(0, 2)])
-    failure = before.size + _ramp(0, 1).size // 2
+    change = before.size + _ramp(0, 1).size // 2
     seen, supply = np.full(command.size, np.nan), np.full(command.size, scene.dp_MPa)
-    seen[failure:], supply[failure:] = signal_MPa, supply_MPa
-    return scene.run(command, supply_MPa=supply, seen_MPa=seen)
+    seen[change:], supply[change:] = seen_MPa, supply_MPa
+    return scene.run(command, supply_MPa=supply, seen_MPa=seen), change
 
 
 def _noise_at_zero(scene: Scene) -> ScenarioResult:

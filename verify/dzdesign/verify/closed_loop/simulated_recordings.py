@@ -52,13 +52,7 @@ class SimulationManifest(Artefact):
 def simulate_ramp(
     loop: ClosedLoop, plant: Plant, dp_MPa: float, bench: Bench, sequence: RampSequence, mode: str = "direct"
 ) -> dict[str, np.ndarray]:
-    """Record one ramp test of the plant, without compensator ("direct") or with it ("compensated").
-
-    Returns
-    -------
-    dict
-        Columns of a ramp file: time_s, u_V, dP_MPa, Q_Lmin.
-    """
+    """Record one ramp test of the plant, without compensator ("direct") or with it ("compensated"), as columns."""
     from scipy.signal import lfilter
 
     run = loop.run(sequence.no_faster_than(loop.slowest_ramp_s).command(), dp_MPa, mode)
@@ -89,10 +83,7 @@ def simulated_files(
 ) -> tuple[dict[str, bytes], SimulationManifest]:
     """Simulate one ramp test per pressure drop, up and down; with a firmware folder, of the compensated valve.
 
-    Returns
-    -------
-    tuple
-        File name -> gzipped CSV, each marked as simulated in its first lines; manifest of the folder.
+    Each file is a gzipped CSV, marked as simulated in its first lines; the manifest is that of the folder.
     """
     if not 1 <= ramp_s <= 1000:
         raise InputError(f"the ramp time is {ramp_s:g} s, expected 1 to 1000 s")

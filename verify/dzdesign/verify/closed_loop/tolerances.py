@@ -1,23 +1,22 @@
 """Monte Carlo over the tolerances of a plant: how the compensated valve scatters where no two valves are alike."""
 
 import re
-import tomllib
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from dzdesign.core.artefact_files import read_bytes
-from dzdesign.core.errors import InputError, nearest, quoted
+from dzdesign.core.errors import InputError, quoted
 from dzdesign.verify.closed_loop.dead_zone import FLOW_SHARE, dead_zone
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN, ClosedLoop, RampSequence
-from dzdesign.verify.closed_loop.plant import LONGEST_KEY, Plant
+from dzdesign.verify.closed_loop.plant import Plant, read_parameters
 from dzdesign.verify.evidence import MonteCarlo, Scatter, Side, Spread
 
-PARAMETERS = tuple(field.name for field in fields(Plant))
+#: Keys of a file of tolerances beside the parameters.
+COUNTS = ("plants", "seed")
 #: Ramps quick enough for hundreds of plants; the lag of a spool is a thousandth of them.
 SEQUENCE = RampSequence(rest=1.0, ramp=10.0, top=0.5)
 QUANTILES = (0.01, 0.05, 0.5, 0.95, 0.99)
@@ -27,17 +26,10 @@ MOST_PLANTS = 100_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tolerances:
-    """How the plants of a series scatter.
+    """How the plants of a series scatter."""
 
-    Attributes
-    ----------
-    spreads : dict of str to (float, str)
-        Parameter of `Plant` to its relative spread and the distribution: "uniform" (plus and minus that much) or
-        "normal" (its standard deviation).
-    plants, seed : int
-        How many plants, and of which random numbers.
-    """
-
+    #: Parameter of `Plant` to its relative spread and the distribution: "uniform" (plus and minus that much) or
+    #: "normal" (its standard deviation).
     spreads: dict[str, tuple[float, str]]
     plants: int = 200
     seed: int = 1
@@ -45,10 +37,7 @@ class Tolerances:
     def draw(self, nominal: Plant) -> list[Plant]:
         """Return the plants; the first n of a larger number are the same.
 
-        Raises
-        ------
-        InputError
-            If one of them is no plant: its parameters contradict each other.
+        One whose parameters contradict each other is an `InputError`.
         """
         drawn = []
         for index in range(self.plants):
@@ -62,23 +51,9 @@ class Tolerances:
 
 
 def read_tolerances(path: Path) -> Tolerances:
-    """Read tolerances from TOML: parameters as "3 %" (uniform) or "1 % sd" (normal), ``plants`` and ``seed``.
-
-    Raises
-    ------
-    InputError
-        If the file can't be read, or a key or value does not fit.
-    """
-    content = read_bytes(path, "file of tolerances")
-    try:
-        values = tomllib.loads(content.decode("utf-8-sig"))
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"'{path}' is not TOML: {error}") from error
-    counts = {name: _count(path, name, values.pop(name)) for name in ("plants", "seed") if name in values}
-    for name in values:
-        if name not in PARAMETERS:
-            near = nearest(name[:LONGEST_KEY], PARAMETERS)
-            raise InputError(f"'{path}': there is no plant parameter {quoted(name)}{near}")
+    """Read tolerances from TOML: parameters as "3 %" (uniform) or "1 % sd" (normal), ``plants`` and ``seed``."""
+    values = read_parameters(path, "file of tolerances", COUNTS)
+    counts = {name: _count(path, name, values.pop(name)) for name in COUNTS if name in values}
     if not values:
         raise InputError(f"'{path}' names no plant parameter; write one such as preload_N = \"3 %\"")
     return Tolerances(spreads={name: _spread(path, name, value) for name, value in values.items()}, **counts)

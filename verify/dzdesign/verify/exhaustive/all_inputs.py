@@ -24,10 +24,7 @@ def check_all_inputs(folder: Path, sign: int = 1, compensator: Compensator | Non
     every input is tried once, and with it every pair of sound pressure codes of which there are no more than commands;
     at zero command, where it matters most, all pairs that the law follows are tried, and all that are not sound.
 
-    Raises
-    ------
-    RequirementError
-        If the core does not compile, crashes, or hangs.
+    A core that does not compile, crashes or hangs is a `RequirementError`.
     """
     prepared = PreparedInputs(ExactLaw(compensator or read_compensator(folder), sign))
     core = CompiledCore(folder, sign)
@@ -35,13 +32,7 @@ def check_all_inputs(folder: Path, sign: int = 1, compensator: Compensator | Non
 
 
 def input_check(prepared: PreparedInputs, core: CompiledCore, found: Findings) -> InputCheck:
-    """Return what was found, with the bound at zero command.
-
-    Raises
-    ------
-    RequirementError
-        If no pair of pressure codes makes a pressure drop that was tested.
-    """
+    """Return what was found, with the bound at zero command."""
     exact, differences = prepared.exact, prepared.differences
     (margin,) = zero_command_margins(exact, differences, found.at_zero, [guarded_bounds(exact.compensator, exact.sign)])
     if margin is None:

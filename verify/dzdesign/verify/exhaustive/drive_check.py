@@ -1,5 +1,6 @@
 """The compiled drive against its model, tick by tick: outputs and state, over corners and random samples."""
 
+import copy
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -126,7 +127,7 @@ class CompiledDrive:
 
     def edited(self, name: str, text: bytes) -> "CompiledDrive":
         """Return the drive with another text in one of its files."""
-        other = object.__new__(CompiledDrive)
+        other = copy.copy(self)
         other.sources = {**self.sources, name: text}
         return other
 
@@ -140,13 +141,7 @@ class CompiledDrive:
         ]
 
     def check(self, prepared: PreparedDrive) -> DriveCheck:
-        """Run the drive beside its model.
-
-        Raises
-        ------
-        RequirementError
-            If the drive does not compile, crashes, or hangs.
-        """
+        """Run the drive beside its model; a drive that does not compile, crashes or hangs is a `RequirementError`."""
         main = {name: text for name, text in self.sources.items() if name.endswith(".h")}
         main["drive.c"] = (PROGRAMS / "drive.c").read_bytes()
         objects = [*self.objects(), HOST.compile("drive.c", main, HOST.check_flags, "the check of the drive")]

@@ -15,27 +15,19 @@ STEP_UNIT = 65536
 
 @dataclass
 class DriveModel:
-    """One drive: state, and what it puts out after each tick.
-
-    Attributes
-    ----------
-    compensator : Compensator
-        The law and what is around it.
-    compare_a, compare_b, status : int
-        Outputs.
-    law, side, tick_of_wave : int
-        The law's compare value, the driven side (1, -1; 0: neither) and the place in the dither's wave.
-    position : Fraction
-        Command after the ramps, in codes from zero; positive commands above zero.
-    """
+    """One drive: state, and what it puts out after each tick."""
 
     compensator: Compensator
     compare_a: int = 0
     compare_b: int = 0
     status: int = 0
+    #: The law's compare value.
     law: int = 0
+    #: The driven side: 1, -1; 0: neither.
     side: int = 0
+    #: The place in the dither's wave.
     tick_of_wave: int = 0
+    #: Command after the ramps, in codes from zero; positive commands above zero.
     position: Fraction = field(default_factory=Fraction)
 
     def __post_init__(self) -> None:

@@ -118,13 +118,7 @@ class ExactLaw:
         return min(max((counts + Fraction(1, 2)).__floor__(), 0), self.compare_limit)
 
     def lines_in_beta(self) -> list[tuple[int, Fraction, Fraction]]:
-        """Return the corners as lines in their beta: command, counts at beta 0, counts that a beta of 1 adds.
-
-        Raises
-        ------
-        RequirementError
-            If the law is no line in beta.
-        """
+        """Return the corners as lines in their beta: command, counts at beta 0, counts that a beta of 1 adds."""
         at = [self.corners(Betas(Fraction(beta), Fraction(beta))) for beta in (0, 1, 2)]
         lines = [(code, none, one - none) for (code, none), (_, one) in zip(at[0], at[1], strict=True)]
         if any(two != none + 2 * more for (_, none, more), (_, two) in zip(lines, at[2], strict=True)):

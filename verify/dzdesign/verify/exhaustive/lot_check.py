@@ -19,13 +19,7 @@ from dzdesign.verify.requirements import LOT, Check
 
 
 def check_lot(exact: ExactLaw, found: Differences, at_zero: np.ndarray) -> LotCheck | None:
-    """Compare the drive at zero command with the bounds of every valve of the lot; None of a valve's own setting.
-
-    Raises
-    ------
-    InputError
-        If a valve of the lot has no bounds of this side.
-    """
+    """Compare the drive at zero command with the bounds of every valve of the lot; None of a valve's own setting."""
     lot = exact.compensator.lot
     if not lot:
         return None

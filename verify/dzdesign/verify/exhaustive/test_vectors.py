@@ -40,21 +40,14 @@ PAIR = np.dtype([("a", "<u2"), ("b", "<u2"), ("sound", "<u2")])
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Differences:
-    """Every difference of sound pressure codes from the lowest to the highest, and the pairs (a, b) that make it.
+    """Every difference of sound pressure codes from the lowest to the highest, and the pairs (a, b) that make it."""
 
-    Attributes
-    ----------
-    values : (D,) array
-        Differences, rising by one.
-    b_first, b_last : (D,) array
-        Codes of sensor B of the first and last pair; between them every code belongs to one pair. None: last < first.
-    slant : (N,) array
-        Code of sensor A less turn * difference, by code of sensor B.
-    """
-
+    #: (D,): differences, rising by one.
     values: np.ndarray
+    #: (D,): codes of sensor B of the first and last pair, all between them belong to one pair. None: last < first.
     b_first: np.ndarray
     b_last: np.ndarray
+    #: By code of sensor B: code of sensor A less turn * difference.
     slant: np.ndarray
 
     @property

@@ -40,13 +40,7 @@ class Staircase:
 
 
 def guarded_bounds(compensator: Compensator, sign: int) -> LotSide:
-    """Return the lower bounds of the threshold that a compensator was certified for.
-
-    Raises
-    ------
-    InputError
-        If its valve has none.
-    """
+    """Return the lower bounds of the threshold that a compensator was certified for."""
     side = compensator.valve.sides["positive" if sign > 0 else "negative"]
     guard = compensator.side(sign).certificate.guard
     if guard not in side.guards:
@@ -59,20 +53,14 @@ def guarded_bounds(compensator: Compensator, sign: int) -> LotSide:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PressureDrops:
-    """The least and the largest pressure drop that may have made each difference, over all its pairs.
+    """The least and the largest pressure drop that may have made each difference, over all its pairs."""
 
-    Attributes
-    ----------
-    scale : int
-        What they are over, in MPa.
-    least, most : (D,) array of int
-    made : (D,) array of bool
-        Which differences sound codes make.
-    """
-
+    #: 1 MPa, in the unit of `least` and `most`.
     scale: int
+    #: (D,) whole numbers.
     least: np.ndarray
     most: np.ndarray
+    #: (D,): which differences sound codes make.
     made: np.ndarray
 
     def steps_of(self, staircase: Staircase) -> np.ndarray:

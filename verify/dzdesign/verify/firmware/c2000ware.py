@@ -43,26 +43,10 @@ typedef long double float64;
 
 
 def check_against_c2000ware(folder: Path, ware: Path, say: Callable[[str], None] = lambda _: None) -> Check:
-    """Compile every C file of a firmware folder against the headers of a C2000Ware folder.
+    """Compile every C file of a firmware folder for the f28335 against the headers of a C2000Ware folder.
 
-    Parameters
-    ----------
-    folder : Path
-        Made by `dzdesign codegen --target f28335`.
-    ware : Path
-        The user's C2000Ware: it holds ``device_support/f2833x``.
-    say : callable
-        Told what begins.
-
-    Returns
-    -------
-    Check
-        Holds if every file compiles as RAM and as FLASH build, and every file of TI's that the project links is there.
-
-    Raises
-    ------
-    InputError
-        If either folder is none of its kind, or there is no C compiler.
+    That holds if each compiles as RAM and as FLASH build, and every file of TI's that the project links is there. A
+    folder that is none of its kind, and a machine without a C compiler, are an `InputError`.
     """
     manifest = read_firmware_manifest(folder)
     if manifest.target != TARGET:

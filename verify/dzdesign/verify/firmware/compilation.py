@@ -48,13 +48,7 @@ def changed_board_files(folder: Path, manifest: FirmwareManifest) -> list[str]:
 
 
 def check_include(include: Sequence[Path], manifest: FirmwareManifest) -> None:
-    """Refuse folders of headers that are none, or of a target whose board files are not compiled here.
-
-    Raises
-    ------
-    InputError
-        Naming the first that is none.
-    """
+    """Refuse folders of headers that are none, or of a target whose board files are not compiled here."""
     for place in include:
         if not place.is_dir():
             raise InputError(f"'{place}' is no folder, expected one with headers after --include; check the name")

@@ -15,11 +15,6 @@ def read_firmware_manifest(folder: Path) -> FirmwareManifest:
     """Return the manifest of a firmware folder.
 
     What is read, compiled and run afterwards are the files that it names, and C: each must be a file in this folder.
-
-    Raises
-    ------
-    InputError
-        If the folder is no firmware, or leads elsewhere.
     """
     path = folder / MANIFEST_NAME
     if folder.is_file() or (folder.is_dir() and not path.exists()):
@@ -32,13 +27,7 @@ def read_firmware_manifest(folder: Path) -> FirmwareManifest:
 
 
 def read_compensator(folder: Path) -> Compensator:
-    """Return the compensator of a firmware folder.
-
-    Raises
-    ------
-    InputError
-        If it is missing or none.
-    """
+    """Return the compensator of a firmware folder."""
     path = folder / "compensator.json"
     return _compensator(read_bytes(path, "compensator of the firmware"), str(path))
 

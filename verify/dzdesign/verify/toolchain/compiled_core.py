@@ -1,5 +1,6 @@
 """The generated core as a black box: compiled by itself for a machine, and every input tried there."""
 
+import copy
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -47,8 +48,7 @@ class CompiledCore:
 
     def edited(self, name: str, text: bytes) -> "CompiledCore":
         """Return the core with another text in one of its files."""
-        other = object.__new__(CompiledCore)
-        other.__dict__.update(self.__dict__)
+        other = copy.copy(self)
         other.sources = {**self.sources, name: text}
         return other
 

@@ -16,6 +16,9 @@ import time
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
+from threading import Lock
+
+import platformdirs
 
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.errors import InputError, RequirementError
@@ -88,15 +91,7 @@ def environment() -> dict[str, str]:
 
     Without a home it would refuse to work; with ours for all it would build the C library at every start, for seconds.
     """
-    caches = (
-        {
-            "win32": os.environ.get("LOCALAPPDATA"),
-            "darwin": str(Path("~/Library/Caches").expanduser()),
-        }.get(sys.platform)
-        or os.environ.get("XDG_CACHE_HOME")
-        or str(Path("~/.cache").expanduser())
-    )
-    kept = Path(caches) / "dzdesign" / "zig"
+    kept = platformdirs.user_cache_path("dzdesign", appauthor=False) / "zig"
     try:
         kept.mkdir(parents=True, exist_ok=True)
         may_write = os.access(kept, os.W_OK)
@@ -156,24 +151,41 @@ def check_strictly(source: Path, compiler: str, options: Sequence[str] = ()) -> 
     build(command, f"{source.name} ({Path(compiler).name})")
 
 
+_guard = Lock()
+_locks: dict[Path, Lock] = {}
+
+
+def alone(file: Path) -> Lock:
+    """Return the lock of a file: mutants are built side by side, and share what is the same."""
+    with _guard:
+        return _locks.setdefault(file, Lock())
+
+
+def built(name: str, command: Sequence[str], sources: Mapping[str, bytes], what: str) -> Path:
+    """Return the file `name` that a command makes beside `sources`, made once, in a folder named by all of it.
+
+    The command names no output; a file that is there is whole.
+    """
+    parts = [part for source in sorted(sources.items()) for part in (source[0].encode(), source[1])]
+    folder = build_folder() / sha256_of(b"\0".join([*parts, *map(os.fsencode, command), name.encode()]))[:32]
+    with alone(folder):
+        if not (folder / name).exists():
+            folder.mkdir(exist_ok=True)
+            for each, text in sources.items():
+                (folder / each).write_bytes(text)
+            build([*command, "-o", f"new-{name}"], what, folder)
+            (folder / f"new-{name}").replace(folder / name)
+    return folder / name
+
+
 def load_library(sources: Mapping[str, str], what: str, options: Sequence[str] = ()) -> ctypes.CDLL:
     """Compile C files, with the headers among them, together and load them."""
-    compiler = host_compiler()
-    key = sha256_of(
-        "\0".join([compiler, *options, *(f"{name}\0{text}" for name, text in sorted(sources.items()))]).encode(
-            errors="surrogateescape"
-        )
-    )
-    folder = build_folder() / key[:32]
-    library = folder / f"{key[:32]}{'.dll' if sys.platform == 'win32' else '.so'}"
-    if not library.exists():
-        folder.mkdir(exist_ok=True)
-        for name, text in sources.items():
-            (folder / name).write_text(text, encoding="utf-8", errors="surrogateescape")
-        units = [str(folder / name) for name in sources if name.endswith(".c")]
-        position = [] if sys.platform == "win32" else ["-fPIC"]
-        command = [*words_of(compiler), "-std=c99", "-O2", *options, *position, "-shared", *units]
-        build([*command, "-o", str(library), "-lm"], what)
+    on_windows = sys.platform == "win32"
+    units = [name for name in sources if name.endswith(".c")]
+    position = [] if on_windows else ["-fPIC"]
+    command = [*words_of(host_compiler()), "-std=c99", "-O2", *options, *position, "-shared", *units, "-lm"]
+    texts = {name: text.encode(errors="surrogateescape") for name, text in sources.items()}
+    library = built(f"library{'.dll' if on_windows else '.so'}", command, texts, what)
     try:
         return ctypes.CDLL(str(library))
     except OSError as error:

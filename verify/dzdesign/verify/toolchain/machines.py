@@ -14,11 +14,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
-from threading import Lock
 
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.errors import RequirementError
-from dzdesign.verify.toolchain.host_compiler import build, build_folder, host_compiler, words_of
+from dzdesign.verify.toolchain.host_compiler import alone, build_folder, built, host_compiler, words_of
 
 logger = logging.getLogger(__name__)
 
@@ -66,34 +65,15 @@ class Machine:
         return self.compiler or host_compiler()
 
     def compile(self, name: str, sources: Mapping[str, bytes], flags: tuple[str, ...], what: str) -> Path:
-        """Return the object of one file of `sources`, compiled once, in a folder named by all of it."""
-        key = (
-            b"\0".join(part for name, text in sorted(sources.items()) for part in (name.encode(), text))
-            + "\0".join([self._compiler, *flags, name]).encode()
-        )
-        folder = build_folder() / sha256_of(key)[:32]
-        target = folder / f"{name}.o"
-        with _alone(target):
-            if target.exists():
-                return target
-            folder.mkdir(exist_ok=True)
-            for each, text in sources.items():
-                (folder / each).write_bytes(text)
-            command = [*words_of(self._compiler), *flags, "-c", name, "-o", f"{name}.new"]
-            build(command, f"{what} ({Path(self._compiler).name})", folder)
-            (folder / f"{name}.new").replace(target)
-        return target
+        """Return the object of one file of `sources`, compiled once."""
+        command = [*words_of(self._compiler), *flags, "-c", name]
+        return built(f"{name}.o", command, sources, f"{what} ({Path(self._compiler).name})")
 
     def link(self, objects: list[Path], what: str) -> Path:
         """Link objects to a program, once."""
-        key = sha256_of("\0".join(map(str, objects)).encode())[:32]
-        program = build_folder() / f"{key}{'.exe' if sys.platform == 'win32' and not self.compiler else ''}"
-        with _alone(program):
-            if not program.exists():
-                flags = [flag.replace("{programs}", str(PROGRAMS)) for flag in self.link_flags]
-                command = [*words_of(self._compiler), *map(str, objects), *flags, "-o", str(program)]
-                build(command, what, build_folder())
-        return program
+        flags = [flag.replace("{programs}", str(PROGRAMS)) for flag in self.link_flags]
+        ending = ".exe" if sys.platform == "win32" and not self.compiler else ""
+        return built(f"program{ending}", [*words_of(self._compiler), *map(str, objects), *flags], {}, what)
 
     def run(self, program: Path, arguments: list[str], what: str) -> list[list[int]]:
         """Run a program and return the lines of numbers that it printed; if it fails or hangs, `RequirementError`."""
@@ -118,20 +98,10 @@ class Machine:
 def stored(content: bytes) -> Path:
     """Return a file of that content, written once."""
     file = build_folder() / f"{sha256_of(content)[:32]}.bin"
-    with _alone(file):
+    with alone(file):
         if not file.exists():
             file.write_bytes(content)
     return file
-
-
-_guard = Lock()
-_locks: dict[Path, Lock] = {}
-
-
-def _alone(file: Path) -> Lock:
-    """Return the lock of a file: mutants are built side by side, and share what is the same."""
-    with _guard:
-        return _locks.setdefault(file, Lock())
 
 
 HOST = Machine(name="host", core_flags=HOST_FLAGS, check_flags=("-std=c99", "-O3"), main="host.c")

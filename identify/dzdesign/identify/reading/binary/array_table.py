@@ -59,15 +59,6 @@ class ArrayTable(Table):
 def read_binary_table(file: BinaryIO, path: Path, file_format: FileFormat) -> ArrayTable:
     """Read a table of a binary format.
 
-    Parameters
-    ----------
-    file : binary file
-        Open.
-    path : Path
-        Of the file.
-    file_format : FileFormat
-        As `registry.format_of` tells it.
-
     Raises
     ------
     InputError

@@ -84,12 +84,7 @@ def columns_of_array(array: Any, name: str, group: str = "", unit: str = "") -> 
 
     The longer side of a matrix is time.
 
-    Parameters
-    ----------
-    array : array
-        Anything with NumPy's ``dtype``, ``shape`` and slices.
-    name, group, unit : str
-        Of the array.
+    `array` has NumPy's ``dtype``, ``shape`` and slices.
     """
     if array.dtype.kind not in COLUMN_KINDS or array.ndim > 2 or array.size < 2:
         return

@@ -34,22 +34,12 @@ SPARE_ROWS, ROWS_PER_BYTE = 1_000_000, 32
 PATIENCE_S, SLOWEST_BYTES_S = 60.0, 2e6
 #: The other process imports from where this one does, but never from the working folder.
 START = (
-    "import sys; sys.path[:] = sys.argv[1:]; "
-    "from dzdesign.identify.reading.binary.reader_server import serve; serve()"
+    "import sys; sys.path[:] = sys.argv[1:]; from dzdesign.identify.reading.binary.reader_server import serve; serve()"
 )
 
 
 def list_columns(file: BinaryIO, path: Path, format_name: str) -> tuple[ListedColumn, ...]:
     """Return the columns of a file.
-
-    Parameters
-    ----------
-    file : binary file
-        Opened.
-    path : Path
-        Its name.
-    format_name : str
-        Of its format.
 
     Raises
     ------
@@ -73,12 +63,7 @@ def list_columns(file: BinaryIO, path: Path, format_name: str) -> tuple[ListedCo
 def read_columns(file: BinaryIO, path: Path, format_name: str, numbers: Sequence[int]) -> list[np.ndarray]:
     """Return the samples of columns as float64, NaN where one is missing.
 
-    Parameters
-    ----------
-    file, path, format_name
-        As for `list_columns`.
-    numbers : sequence of int
-        Places of the columns in what `list_columns` returns.
+    `numbers` are the places of the columns in what `list_columns` returns.
 
     Raises
     ------

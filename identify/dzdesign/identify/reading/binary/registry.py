@@ -23,12 +23,7 @@ def file_formats() -> tuple[FileFormat, ...]:
 def format_of(start: bytes, path: Path) -> FileFormat | None:
     """Return the format of a file, None if it is text or nothing that dzdesign knows.
 
-    Parameters
-    ----------
-    start : bytes
-        The first `LONGEST_MARK` bytes of the file, or all of them. They decide, where the format has a mark.
-    path : Path
-        Its suffix decides for a format without a mark.
+    The file's first `LONGEST_MARK` bytes decide where the format has a mark, its suffix where it has none.
     """
     for item in file_formats():
         if start.startswith(item.mark) if item.mark else path.suffix.lower() == item.suffix:

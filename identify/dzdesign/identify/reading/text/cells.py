@@ -43,31 +43,12 @@ def is_number(cell: str) -> bool:
 
 
 def labels_of(header: str, separator: str, number: int, path: Path) -> list[str]:
-    """Return the labels of a header.
-
-    Parameters
-    ----------
-    header, separator : str
-        The line, and what parts its cells.
-    number : int
-        Of the line, for messages.
-    path : Path
-        For messages.
-    """
+    """Return the labels of a header."""
     return _words(header) if separator == BLANKS else split_line(header, separator, number, path)
 
 
 def split_line(line: str, separator: str, number: int, path: Path) -> list[str]:
     """Return the cells of a line; inside quotes the separator is a character as any other.
-
-    Parameters
-    ----------
-    line, separator : str
-        A row, and what parts its cells.
-    number : int
-        Of the line, for messages.
-    path : Path
-        For messages.
 
     Raises
     ------

@@ -40,13 +40,7 @@ ADVICE = "export numbers with one mark and no separator of thousands"
 
 @final
 class DecimalMarks:
-    """What the columns of one file that were read have shown.
-
-    Parameters
-    ----------
-    path : Path
-        For messages.
-    """
+    """What the columns of one file that were read have shown."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -58,16 +52,7 @@ class DecimalMarks:
     ) -> None:
         """Check a column that was read with decimal points.
 
-        Parameters
-        ----------
-        label : str
-            Of the column.
-        numbers : (N,) array
-            As read.
-        texts : callable
-            Gives its cells as they stand in the file, which takes longer.
-        place : callable
-            Row -> where it stands, for messages.
+        `texts` gives its cells as they stand in the file, which takes longer; `place` says where a row stands.
 
         Raises
         ------
@@ -111,15 +96,6 @@ class DecimalMarks:
 
     def with_points(self, label: str, texts: "pl.Series", place: "Callable[[int], str]") -> "pl.Series":
         """Return numbers with a decimal point, whatever their decimal mark is, and without one between thousands.
-
-        Parameters
-        ----------
-        label : str
-            Of the column.
-        texts : polars.Series
-            Its cells.
-        place : callable
-            Row -> where it stands, for messages.
 
         Raises
         ------

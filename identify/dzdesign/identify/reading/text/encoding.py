@@ -34,13 +34,6 @@ logger = logging.getLogger(__name__)
 def read_text(file: BinaryIO, path: Path) -> bytes:
     """Return the text of a file in UTF-8, without a byte order mark; every line but the last ends in a line feed.
 
-    Parameters
-    ----------
-    file : binary file
-        Text, plain or gzip.
-    path : Path
-        For messages.
-
     Raises
     ------
     InputError

@@ -44,13 +44,7 @@ def _is_statistic(cell: str) -> bool:
 
 @final
 class Footer:
-    """The lines below the samples of one file.
-
-    Parameters
-    ----------
-    path : Path
-        For messages.
-    """
+    """The lines below the samples of one file."""
 
     def __init__(self, path: Path) -> None:
         self.path = path

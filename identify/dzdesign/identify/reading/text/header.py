@@ -71,16 +71,7 @@ class Header:
 def find_header(text: bytes, number: int, path: Path, *, at_first_line: bool) -> tuple[Header, int] | None:
     """Return the header and where in a text its rows begin; None if all is comments and blank lines.
 
-    Parameters
-    ----------
-    text : bytes
-        UTF-8.
-    number : int
-        Of its first line in the file.
-    path : Path
-        For messages.
-    at_first_line : bool
-        True if the first line is the header by the engineer's word, comments and blank lines aside.
+    `at_first_line`: the first line is the header by the engineer's word, comments and blank lines aside.
 
     Raises
     ------

@@ -1,0 +1,31 @@
+"""Whether the checks of evidence follow from its figures: who edits one of both contradicts the other."""
+
+from dzdesign.core.artefact_types import THIS_TOOL
+from dzdesign.design.compensator import Compensator
+from dzdesign.verify.closed_loop.loop_checks import loop_checks
+from dzdesign.verify.evidence import Evidence
+from dzdesign.verify.exhaustive.all_inputs import input_checks
+from dzdesign.verify.exhaustive.lot_check import lot_checked
+from dzdesign.verify.requirements import FROM_INPUTS, FROM_LOOP, LOT, Check
+
+
+def contradictions(evidence: Evidence, compensator: Compensator | None) -> tuple[Check, ...]:
+    """Return the checks that are said to hold and do not follow from the figures, here counted and compared again.
+
+    Without a compensator the figures of the inputs alone are looked at.
+    """
+    inputs, loop = evidence.inputs, evidence.closed_loop
+    follow = [check for each in inputs for check in input_checks(each, both_signs=len(inputs) > 1)]
+    kinds = set(FROM_INPUTS)
+    if compensator:
+        kinds |= {LOT, *FROM_LOOP}
+        follow += lot_checked(inputs, compensator)
+        if loop.pressures and evidence.scenarios:
+            given = loop.plant is not None
+            follow += loop_checks(loop.pressures, evidence.scenarios, compensator, plant_given=given)
+
+    def key(check: Check) -> tuple[object, ...]:  # another version may word it otherwise
+        return (check.id, check.name, check.holds, check.text if evidence.tool == THIS_TOOL else "")
+
+    ids, derived = {kind.id for kind in kinds}, {key(check) for check in follow}
+    return tuple(each for each in evidence.checks if each.holds and each.id in ids and key(each) not in derived)
