@@ -14,7 +14,8 @@ from dzdesign.identify.knees.between_ramps import BetweenRamps, RampKnees, compa
 from dzdesign.identify.knees.characteristic import find_meter_floor
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.branches import bin_branch
-from dzdesign.identify.ramps.splitting import split_ramps, sweep_direction
+from dzdesign.identify.ramps.command import sweep_direction
+from dzdesign.identify.ramps.splitting import split_ramps
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.staircase import staircase
 from tests.support.repeatable_valves import identify

@@ -7,7 +7,7 @@ import pytest
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.ramps.splitting import despiked, lagged_command
+from dzdesign.identify.ramps.command import despiked, lagged_command
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes, read_ramp_file
 from dzdesign.identify.reading.ramp_test import RampTest
 from tests.support.repeatable_valves import identify

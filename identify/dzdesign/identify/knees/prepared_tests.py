@@ -18,8 +18,9 @@ from dzdesign.identify.knees.noise import robust_sigma
 from dzdesign.identify.knees.profile import largest_flow
 from dzdesign.identify.knees.refusals import refuse_a_jump, refuse_a_shut_valve, refuse_a_wrong_pressure
 from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.ramps.command import despiked
 from dzdesign.identify.ramps.pooling import PooledTest, pool_ramps
-from dzdesign.identify.ramps.splitting import Ramp, despiked, nominal_dp, split_ramps
+from dzdesign.identify.ramps.splitting import Ramp, nominal_dp, split_ramps
 from dzdesign.identify.reading.ramp_test import RampTest
 
 #: A recording whose command moves by less than this share of u_max is no part of a ramp.
