@@ -28,7 +28,8 @@ class ColumnArguments:
     """How the columns of recordings are found."""
 
     columns: Annotated[Table, Option("MAP", RECORDINGS)] = None
-    """Columns, such as "u=AO0:V, Q=Flow (L/min)": a quantity (time, u, dP, pA, pB, Q), its label in the file and, after
+    """Columns, such as "u=AO0:V, Q=Flow (L/min)": a quantity (time, u, Q, dP, or pressures of the
+    ports of the metering edge, pP, pA, pB, pT), its label in the file and, after
     a colon, the unit that the label lacks. In the options file a table [columns]."""
     dp: Annotated[Table, Option("P", RECORDINGS, example="1 MPa")] = None
     """Pressure drop of files without a column of it, such as "1 MPa". In the options file also a table [dp] from file

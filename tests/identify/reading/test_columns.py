@@ -65,7 +65,7 @@ def test_a_comma_or_a_colon_in_a_label_is_no_end_of_it():
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("uu=AO0:V", "--columns names 'uu', expected time, u, dP, pA, pB, Q (did you mean 'u'?)"),
+        ("uu=AO0:V", "--columns names 'uu', expected time, u, dP, pP, pA, pB, pT, Q (did you mean 'u'?)"),
         ("dP1=AO0:V", "(did you mean 'dP'?)"),
         ("AO0", "--columns names 'AO0', expected"),
         ("u=", "--columns gives no label for u; write for example u=AO0:V"),
