@@ -96,7 +96,9 @@ def bound_threshold(group: DescribedTests, knees: OrderedKnees, options: Identif
     knee, knee_se = knees.knee, knees.knee_se
     zero = np.array([shape.tail.zero for shape in shapes])
     zero_se = np.array([shape.tail.zero_se for shape in shapes])
-    shared = knees.departure.max() + _lag_budget(group, knees.column)
+    # Steps of equal height stop the spool anywhere within the root of three standard deviations of its mean course.
+    stops = math.sqrt(3) * np.array([shape.ripple for shape in shapes])
+    shared = knees.departure.max() + _lag_budget(group, knees.column) + stops
     # What was subtracted as the meter's zero has an error of its own, which moves all readings of a test together.
     inflations = [shape.variance_inflation for shape in shapes]
     subtracted = np.array([se * math.sqrt(factor) for se, factor in zip(group.zero_se, inflations, strict=True)])
