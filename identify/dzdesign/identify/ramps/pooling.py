@@ -74,7 +74,9 @@ def _pooled(group: list[Ramp]) -> PooledTest:
 
 def _different_columns(group: list[Ramp]) -> tuple[str, str]:
     """Return which columns make the pressure drop, at positive and negative commands; of several recordings all."""
-    positive, negative = (" or ".join(dict.fromkeys(each)) for each in zip(*(r.test.dp_from for r in group), strict=True))
+    positive, negative = (
+        " or ".join(dict.fromkeys(each)) for each in zip(*(r.test.dp_from for r in group), strict=True)
+    )
     return positive, negative
 
 

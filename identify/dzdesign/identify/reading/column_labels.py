@@ -57,8 +57,8 @@ def parse_columns(text: str | Mapping[str, str]) -> dict[str, str]:
     ----------
     text : str or mapping
         ``"u=AO0:V, Q=Flow (L/min)"``, or the same as a mapping. A quantity is one of time, u, dP, pP, pA, pB, pT, Q; a
-        label stands as in the file, and a unit that it lacks follows after a colon. A comma parts two entries only before
-        another ``quantity=``, so a label may hold one.
+        label stands as in the file, and a unit that it lacks follows after a colon. A comma parts two entries only
+        before another ``quantity=``, so a label may hold one.
 
     Raises
     ------

@@ -95,8 +95,8 @@ def which_edge(labels: Mapping[str, str]) -> str:
     """Return what to say where all four ports were recorded, under these labels."""
     named = ", ".join(f"{port}={labels[port]}" for port in PORTS[:3])
     return (
-        "the pressures of P, A, B and T, so the drop of either edge: pP - pA (pP - pB at negative commands), or pB - pT "
-        f'(pA - pT); name the ports of the metering edge only, for example --columns "{named}"'
+        "the pressures of P, A, B and T, so the drop of either edge: pP - pA (pP - pB at negative commands), or pB - "
+        f'pT (pA - pT); name the ports of the metering edge only, for example --columns "{named}"'
     )
 
 
