@@ -139,7 +139,7 @@ def _pressure_table(
 
     if declared:
         return dict(declared) if isinstance(declared, Mapping) else dict.fromkeys(names, declared), {}
-    recorded = [has_column or "dP" in look.known or {"pA", "pB"} <= look.known.keys() for look in looks]
+    recorded = [has_column or look.has_dp for look in looks]
     readings = {name: pressures_in_name(name) for name, has in zip(names, recorded, strict=True) if not has}
     table = {name: texts[0] for name, texts in readings.items() if len(texts) == 1}
     readings = {name: texts for name, texts in readings.items() if len(texts) != 1}

@@ -35,8 +35,9 @@ class ColumnArguments:
     """How the columns of recordings are found."""
 
     columns: Annotated[Table, Option("MAP", RECORDINGS)] = None
-    """Columns, such as "u=AO0:V, Q=Flow (L/min)": a quantity (time, u, dP, pA, pB, Q), its label in the file and, after
-    a colon, the unit that the label lacks. In the options file a table [columns]."""
+    """Columns, such as "u=AO0:V, Q=Flow (L/min)": a quantity, its label in the file and, after a colon, the unit that
+    the label lacks. Quantities are time, u, Q and dP, or in its place pressures of ports of the metering edge: pP, pA,
+    pB, pT. In the options file a table [columns]."""
     dp: Annotated[Table, Option("P", RECORDINGS, example="1 MPa")] = None
     """Pressure drop of files without a column of it, such as "1 MPa". In the options file also a table [dp] from file
     name or pattern to pressure."""
