@@ -20,6 +20,7 @@ from measured import print_measured  # noqa: E402
 from random_valves import print_random_valves  # noqa: E402
 from reading import print_reading  # noqa: E402
 from scoreboard import run_parts  # noqa: E402
+from stops import print_stops  # noqa: E402
 from timing import print_timing  # noqa: E402
 
 PARTS = {
@@ -28,6 +29,7 @@ PARTS = {
     "over-compensation": (print_over_compensation, 203),
     "residual": (print_residual, 303),
     "between-ramps": (print_between_ramps, 808),
+    "stops": (print_stops, 909),
     "random": (print_random_valves, 404),
     "measured": (print_measured, 0),
     "timing": (print_timing, 0),

@@ -68,6 +68,7 @@ def write_lot_folder(folder: Path, rows: Sequence[TableRow], *, verified: bool =
     files = table_files(rows)
     for name, content in files.items():
         (folder / name).write_bytes(content)
-    results.write_summary(summary_of(rows, files=files, verified=verified, why_no_setting="made on paper", made_from={}))
+    summary = summary_of(rows, files=files, verified=verified, why_no_setting="made on paper", made_from={})
+    results.write_summary(summary)
     (folder / "valves").rmdir()
     return folder

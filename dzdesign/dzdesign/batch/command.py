@@ -36,8 +36,8 @@ MOST_A_PROCESSOR = 4
 IDENTIFY = tuple(argument.name for argument in arguments_of(IdentifyChoices) if argument.name != "record")
 
 
-def calibrate_lot(args: BatchArguments) -> tuple[LotSummary, Path | None]:
-    """Calibrate the valves of a folder or a list; return batch.json, and where the report is if there is one."""
+def calibrate_lot(args: BatchArguments) -> LotSummary:
+    """Calibrate the valves of a folder or a list, and make their table and report; return batch.json."""
     source, output = Path(args.source), Path(args.output)
     jobs = _jobs(args)
     _check_options(args)
@@ -55,7 +55,8 @@ def calibrate_lot(args: BatchArguments) -> tuple[LotSummary, Path | None]:
         outcomes = run_on_cluster(tasks, args.dask) if args.dask else run_local(tasks, useful_jobs(jobs, len(waiting)))
         unwritten = _write_all(results, outcomes, len(waiting))
         summary = _finished(args, valves, results, unwritten)
-        return summary, _write_report(output)
+        _write_report(output)
+    return summary
 
 
 @contextlib.contextmanager
@@ -119,7 +120,7 @@ def _finished(
     return summary
 
 
-def _write_report(output: Path) -> Path | None:
+def _write_report(output: Path) -> None:
     """Write the report of the lot from the files, as `dzdesign report` does; a lot too large for one has its table."""
     path = output / REPORT_NAME
     try:
@@ -127,8 +128,6 @@ def _write_report(output: Path) -> Path | None:
     except InputError as error:
         path.unlink(missing_ok=True)  # of an earlier run: it would pass for one of this
         say(f"no {REPORT_NAME}: {error}")
-        return None
-    return path
 
 
 def _jobs(args: BatchArguments) -> int:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from dzdesign.batch.arguments import BatchArguments
 from dzdesign.core.errors import RequirementError
+from dzdesign.stages.batch import batch
 from dzdesign.terminal.page import print_json
 
 Arguments = BatchArguments
@@ -15,12 +16,12 @@ EXAMPLES = (
 
 def run(arguments: Arguments, json: bool) -> int:
     """Calibrate the valves of a folder or a list; raise at the end if any could not be."""
-    from dzdesign.batch.command import calibrate_lot
     from dzdesign.batch.printing import print_lot
     from dzdesign.core.artefact_types import as_document
+    from dzdesign.report.valve_report import REPORT_NAME
 
-    output = Path(arguments.output)
-    summary, report = calibrate_lot(arguments)
+    output, summary = Path(arguments.output), batch(arguments)
+    report = output / REPORT_NAME if (output / REPORT_NAME).is_file() else None
     if json:
         print_json({**as_document(summary), "report": report and str(report)})
     else:

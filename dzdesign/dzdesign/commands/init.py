@@ -1,10 +1,8 @@
 """`dzdesign init RAMP...`: look at recordings, write a commented dzdesign.toml with what was seen and what was not."""
 
 import os
-from typing import Any
 
 from dzdesign.core.options import paths_of
-from dzdesign.initial_options.proposal import Proposal
 from dzdesign.stages.init import InitArguments, init
 from dzdesign.terminal.page import print_json
 
@@ -19,7 +17,13 @@ def run(arguments: Arguments, json: bool) -> int:
     proposal = init(arguments)
     output = os.fspath(arguments.output or "")
     if json:
-        print_json(_document(proposal, output))
+        keys = ("labels", "columns", "dp", "u_max_V", "u_seen_V", "valve")
+        print_json({
+            "file": output,
+            "recordings": [path.as_posix() for path in proposal.recordings],
+            **{key: getattr(proposal, key) for key in keys},
+            "open": proposal.opens,
+        })  # fmt: skip
         return 1 if proposal.opens else 0
     for line in (*proposal.seen, *(f"open: {line}" for line in proposal.opens)):
         print(line)
@@ -33,17 +37,3 @@ def run(arguments: Arguments, json: bool) -> int:
 def _word(name: str) -> str:
     """Return a name as one word of any shell; a pattern stays one."""
     return f'"{name}"' if " " in name else name
-
-
-def _document(proposal: Proposal, output: str) -> dict[str, Any]:
-    return {
-        "file": output,
-        "recordings": [path.as_posix() for path in proposal.recordings],
-        "labels": proposal.labels,
-        "columns": proposal.columns,
-        "dp": proposal.dp,
-        "u_max_V": proposal.u_max_V,
-        "u_seen_V": proposal.u_seen_V,
-        "valve": proposal.valve,
-        "open": proposal.opens,
-    }

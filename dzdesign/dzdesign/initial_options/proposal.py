@@ -30,35 +30,22 @@ CHECK_DP = "check that it is the drop over the valve, and not the pressure of on
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proposal:
-    """What a look at recordings proposes.
-
-    Attributes
-    ----------
-    text : str
-        Of the file of options.
-    seen : tuple of str
-        What was seen, for a person.
-    opens : tuple of str
-        What is open: without it `identify` can't run.
-    recordings, labels : tuple
-        The files, and the labels of each.
-    columns, dp : dict
-        The tables of the file; empty where the recordings need none.
-    u_max_V, u_seen_V : float
-        Full command to declare, and the largest one seen (None: not looked at).
-    valve : ValveModel or None
-        What `identify` finds; None while something is open.
-    """
+    """What a look at recordings proposes: the text of the file of options, and what was seen, for a person."""
 
     text: str
     seen: tuple[str, ...]
+    #: What is open: without it `identify` can't run.
     opens: tuple[str, ...]
+    #: The files, and the labels of each.
     recordings: tuple[Path, ...]
     labels: tuple[tuple[str, ...], ...]
+    #: The tables of the file; empty where the recordings need none.
     columns: dict[str, str]
     dp: dict[str, str]
+    #: Full command to declare, and the largest one seen (None: not looked at).
     u_max_V: float
     u_seen_V: float | None
+    #: What `identify` finds; None while something is open.
     valve: "ValveModel | None"
 
 
@@ -71,13 +58,7 @@ class _Remarks:
 
 
 def propose(ramps: Paths, *, columns: Table, dp: Table, skip_rows: int | None) -> Proposal:
-    """Look at recordings, and return the file of options that this gives.
-
-    Raises
-    ------
-    InputError
-        If a recording can't be read.
-    """
+    """Look at recordings, and return the file of options that this gives."""
     from dzdesign.identify.reading.column_labels import PER_CENT, parse_columns
     from dzdesign.identify.reading.proposed_columns import propose_columns
 
@@ -200,8 +181,7 @@ def _identified(tests: "list[RampTest]", u_max: float, guessed_dp: str, remarks:
             for source, stated, dp_MPa in wrong
         )
         return None
-    with stage_progress() as stage:
-        stage(f"looking at {len(tests)} recording{'s' if len(tests) > 1 else ''}")
+    with stage_progress(f"looking at {len(tests)} recording{'s' if len(tests) > 1 else ''}"):
         try:
             refuse_copies(tests)
             valve = identify(tests, IdentifyOptions(u_max=u_max))

@@ -1,15 +1,13 @@
 """`assess`: recordings without and with the compensator -> Assessment."""
 
 from dataclasses import KW_ONLY, dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from dzdesign.core.artefact_files import check_file_may_be_written, write_file, write_files
 from dzdesign.core.errors import InputError
 from dzdesign.core.option_readers import percent_range, quantity
 from dzdesign.core.options import FIT, RECORDINGS, AnyPath, Option, Paths, Table, Text, read_options
 from dzdesign.core.units import parse_quantity
-from dzdesign.stages.recordings import RampArguments, check_plots, read_recordings, refuse_copies
+from dzdesign.stages.recordings import RampArguments, check_places, read_recordings, refuse_copies, write_results
 from dzdesign.terminal.progress import say, stage_progress
 
 if TYPE_CHECKING:
@@ -64,12 +62,10 @@ def assess(arguments: AssessArguments) -> "Assessment":
     from dzdesign.assess.assessing import assess_curves
     from dzdesign.assess.assessment import Assessment
     from dzdesign.assess.curve_pairs import compare_curves
-    from dzdesign.core.artefact_types import schema_of, to_json_bytes
+    from dzdesign.assess.plots import plot_files
 
     options = assess_options(arguments)
-    if arguments.output is not None:
-        check_file_may_be_written(Path(arguments.output), schema_of(Assessment))
-    check_plots(arguments.plots, arguments.output)
+    check_places(Assessment, arguments.output, arguments.plots)
     before = _read_set("before", arguments.before, arguments.columns, arguments, options.of_set("before").u_max)
     columns = arguments.after_columns or arguments.columns
     after = _read_set("after", arguments.after, columns, arguments, options.of_set("after").u_max)
@@ -77,13 +73,7 @@ def assess(arguments: AssessArguments) -> "Assessment":
     with stage_progress(f"comparing {len(before)} recordings before with {len(after)} after"):
         comparison = compare_curves(before, after, options)
     found = assess_curves(comparison)
-    if arguments.output is not None:
-        write_file(Path(arguments.output), to_json_bytes(found), schema_of(Assessment))
-    if arguments.plots is not None:
-        from dzdesign.assess.plots import plot_files
-
-        with stage_progress("drawing"):
-            write_files(Path(arguments.plots), plot_files(comparison, found), "--plots")
+    write_results(found, arguments.output, arguments.plots, lambda: plot_files(comparison, found))
     return found
 
 

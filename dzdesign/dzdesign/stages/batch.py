@@ -23,4 +23,4 @@ def batch(arguments: BatchArguments) -> "LotSummary":
     """
     from dzdesign.batch.command import calibrate_lot
 
-    return calibrate_lot(arguments)[0]
+    return calibrate_lot(arguments)

@@ -3,13 +3,18 @@
 import datetime
 from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass, fields
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from dzdesign.core.artefact_files import check_file_may_be_written, write_file, write_files
 from dzdesign.core.option_readers import number, percent, quantity
 from dzdesign.core.options import FIT, METER, RECORDINGS, AnyPath, Option, Paths, Text, Texts, read_options
-from dzdesign.stages.recordings import RampArguments, check_plots, in_order, read_recordings, refuse_copies
+from dzdesign.stages.recordings import (
+    RampArguments,
+    check_places,
+    in_order,
+    read_recordings,
+    refuse_copies,
+    write_results,
+)
 from dzdesign.terminal.progress import stage_progress
 
 if TYPE_CHECKING:
@@ -85,14 +90,12 @@ def identify(arguments: IdentifyArguments) -> "ValveModel":
     InputError
         If a file or an option can't be read, or no threshold can be given; the reason.
     """
-    from dzdesign.core.artefact_types import to_json_bytes
     from dzdesign.identify.identification import identify_sides
-    from dzdesign.identify.valve.model import SCHEMA
+    from dzdesign.identify.plots.valve_plots import plot_files
+    from dzdesign.identify.valve.model import ValveModel
 
     options, record = identify_options(arguments), record_of(arguments.record)
-    if arguments.output is not None:
-        check_file_may_be_written(Path(arguments.output), SCHEMA)
-    check_plots(arguments.plots, arguments.output)
+    check_places(ValveModel, arguments.output, arguments.plots)
     tests = read_recordings(
         arguments.ramps, u_max=options.u_max, columns=arguments.columns, dp=arguments.dp, skip_rows=arguments.skip_rows
     )
@@ -100,11 +103,5 @@ def identify(arguments: IdentifyArguments) -> "ValveModel":
     tests = in_order(tests, arguments.order)
     with stage_progress(f"fitting {len(tests)} recording{'s' if len(tests) > 1 else ''}"):
         found = identify_sides(tests, options, record)
-    if arguments.output is not None:
-        write_file(Path(arguments.output), to_json_bytes(found.model), SCHEMA)
-    if arguments.plots is not None:
-        from dzdesign.identify.plots.valve_plots import plot_files
-
-        with stage_progress("drawing"):
-            write_files(Path(arguments.plots), plot_files(found), "--plots")
+    write_results(found.model, arguments.output, arguments.plots, lambda: plot_files(found))
     return found.model

@@ -3,19 +3,26 @@
 import fnmatch
 import glob
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from dzdesign.core.artefact_files import MANIFEST_NAME, check_place_of_files
+from dzdesign.core.artefact_files import (
+    MANIFEST_NAME,
+    check_file_may_be_written,
+    check_place_of_files,
+    write_file,
+    write_files,
+)
 from dzdesign.core.errors import InputError, nearest, neighbour
 from dzdesign.core.option_readers import percent_range, quantity, whole_number
 from dzdesign.core.options import FIT, METER, RECORDINGS, AnyPath, Option, Paths, Table, Text, Texts, paths_of
 from dzdesign.core.units import parse_quantity
-from dzdesign.terminal.progress import say, with_bar
+from dzdesign.terminal.progress import say, stage_progress, with_bar
 
 if TYPE_CHECKING:
+    from dzdesign.core.artefact_types import Artefact
     from dzdesign.identify.reading.ramp_test import RampTest
 
 
@@ -194,13 +201,30 @@ def in_order(tests: list["RampTest"], order: Texts | None) -> list["RampTest"]:
     return list(known.values())
 
 
-def check_plots(folder: AnyPath | None, output: AnyPath | None) -> None:
-    """Refuse a folder for plots that can't be one, or in whose place the output goes."""
-    if folder is None:
+def check_places(kind: "type[Artefact]", output: AnyPath | None, plots: AnyPath | None) -> None:
+    """Refuse places where the artefact or its plots can't be written, or which would take each other's."""
+    from dzdesign.core.artefact_types import schema_of
+
+    if output is not None:
+        check_file_may_be_written(Path(output), schema_of(kind))
+    if plots is None:
         return
-    if not os.fspath(folder):
+    if not os.fspath(plots):
         raise InputError("--plots is empty, expected the name of a folder, such as plots")
-    place = Path(folder)
-    check_place_of_files(place, "--plots")
-    if output is not None and Path(output).absolute() in (place.absolute(), *place.absolute().parents):
-        raise InputError(f"--plots '{folder}' lies at '{output}', where -o puts a file; choose another --plots")
+    folder = Path(plots)
+    check_place_of_files(folder, "--plots")
+    if output is not None and Path(output).absolute() in (folder.absolute(), *folder.absolute().parents):
+        raise InputError(f"--plots '{plots}' lies at '{output}', where -o puts a file; choose another --plots")
+
+
+def write_results(
+    artefact: "Artefact", output: AnyPath | None, plots: AnyPath | None, draw: Callable[[], Mapping[str, bytes]]
+) -> None:
+    """Write an artefact, and the plots that `draw` returns, where places are named for them."""
+    from dzdesign.core.artefact_types import to_json_bytes
+
+    if output is not None:
+        write_file(Path(output), to_json_bytes(artefact), artefact.schema)
+    if plots is not None:
+        with stage_progress("drawing"):
+            write_files(Path(plots), draw(), "--plots")

@@ -176,6 +176,7 @@ def _test_result(group: DescribedTests, knees: KneeFit, row: int, guarded: Thres
         saturates=all(shape.saturates for shape in item.branches),
         noise_L_min=max(shape.sigma for shape in item.branches) / L_MIN,
         noise_variance_inflation=max(shape.variance_inflation for shape in item.branches),
+        spool_ripple_V=max(shape.ripple for shape in item.branches),
         outliers=sum(shape.outliers for shape in item.branches),
         ramps=item.ramps,
     )

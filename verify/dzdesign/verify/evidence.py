@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, Literal
 
 from msgspec import Meta
 
-from dzdesign.core.artefact_types import Artefact, quantity
+from dzdesign.core.artefact_types import Artefact, Sha256, quantity
 from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED
 from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.requirements import ALWAYS, Check
@@ -26,7 +26,6 @@ PressureDrop = Annotated[float, quantity("MPa", "Pressure drop at no flow.", ge=
 Count = Annotated[int, Meta(ge=0, le=2**60)]
 Share = Annotated[float, Meta(ge=-1, le=1, extra_json_schema={"unit": "1"})]
 Flow = Annotated[float, Meta(ge=-1e6, le=1e6, extra_json_schema={"unit": "L/min"})]
-Sha256 = Annotated[str, Meta(pattern="^[0-9a-f]{64}$", max_length=64)]
 Names = tuple[str, ...]
 #: Voltages are bounded so that no arithmetic on them overflows.
 MOST_V = 1e4

@@ -1,5 +1,6 @@
 """Warnings about one side, after its identification: what is weak, with the numbers and what to do."""
 
+import math
 from collections.abc import Iterator, Mapping
 
 import numpy as np
@@ -27,6 +28,8 @@ OVERLAP, LEAK_SIGNIFICANCE = (0.6, 0.85), 5.0
 COARSE_STEP = 5e-4
 #: The same where it is more than the bounds' distance from the threshold: a certificate that counts on less is none.
 SMALL_SHIFT = 5e-5
+#: Distance of opening and closing knee over u_max above which dither is missing, or there is play.
+WIDE_HYSTERESIS = 0.03
 #: Readings a level, from which on a flow is one of steps.
 READINGS_A_LEVEL = 5
 #: A leak below this share of the largest flow is not worth a word.
@@ -51,12 +54,25 @@ def find_warnings(
             for test, gap in zip(side.tests, departure, strict=True)
             if gap > 0
         ),
+        *(
+            warn("stick-slip", test.source, ripple_mV=1e3 * test.spool_ripple_V, stop_mV=1.732e3 * test.spool_ripple_V)
+            for test in side.tests
+            if test.spool_ripple_V > 0
+        ),
+        *_about_hysteresis(side, options.u_max),
         *about_flow_gains(side.tests),
         *_about_pressure(side, group.tests),
         *about_sweeps(side, group.tests, options.u_max),
         *about_errors(side, group.tests, options.u_max, options.knee_window),
         *_about_the_edge(side, group, options.u_max),
     )
+
+
+def _about_hysteresis(side: SideModel, u_max: float) -> Iterator[Warning_]:
+    for test in side.tests:
+        gap = (test.u_knee_rising_V or 0.0) - (test.u_knee_falling_V or math.inf)
+        if gap > WIDE_HYSTERESIS * u_max:
+            yield warn("hysteresis", test.source, gap_mV=1e3 * gap, percent=100 * gap / u_max)
 
 
 def _about_steps(side: SideModel, tests: tuple[DescribedTest, ...], options: IdentifyOptions) -> Iterator[Warning_]:

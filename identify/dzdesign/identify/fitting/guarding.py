@@ -97,7 +97,9 @@ def bound_threshold(group: DescribedTests, knees: OrderedKnees, options: Identif
     zero = np.array([shape.tail.zero for shape in shapes])
     zero_se = np.array([shape.tail.zero_se for shape in shapes])
     lag_budget = group.lag.shift_at(group.rates(knees.column), rising=knees.column == 0)
-    shared = knees.departure.max() + lag_budget
+    # Steps of equal height stop the spool anywhere within the root of three standard deviations of its mean course.
+    stops = math.sqrt(3) * np.array([shape.ripple for shape in shapes])
+    shared = knees.departure.max() + lag_budget + stops
     # What was subtracted as the meter's zero has an error of its own, which moves all readings of a test together.
     inflations = [shape.variance_inflation for shape in shapes]
     subtracted = np.array([se * math.sqrt(factor) for se, factor in zip(group.zero_se, inflations, strict=True)])

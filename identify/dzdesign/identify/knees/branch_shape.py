@@ -43,5 +43,7 @@ class BranchShape:
     #: Where the valve opens (or closes), as far as the meter shows it.
     onset: float
     onset_se: float
+    #: Standard deviation of the spool about its mean course, as a command: stick and slip.
+    ripple: float
     #: True if the flow at full command lies clearly below the straight line.
     saturates: bool

@@ -11,6 +11,7 @@ from dzdesign.identify.knees.line_fitting import inflation_by_blocks
 from dzdesign.identify.knees.linear_region import find_straight_parts
 from dzdesign.identify.knees.noise import measure_roughness, robust_sigma, variance_inflation
 from dzdesign.identify.knees.profile import crossing, flow_at_top, hole_within, smooth_profile
+from dzdesign.identify.knees.spool_ripple import spool_ripple
 from dzdesign.identify.ramps.branches import bin_branch
 
 #: Standard deviations of a shut reading above which the mean of a bin is flow.
@@ -61,6 +62,7 @@ def _describe(
         tail=tail,
         onset=onset,
         onset_se=onset_se,
+        ripple=spool_ripple(read, line, u_max),
         saturates=read.y_max < 0.93 * line.slope * (branch.u.max() - line.knee),
     )
 

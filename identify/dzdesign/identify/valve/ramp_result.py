@@ -84,6 +84,10 @@ class TestResult:
         float,
         quantity("1", "Variance of a mean of the flow over that under white noise of the same size.", ge=0, le=1e6),
     ]
+    spool_ripple_V: Annotated[
+        VoltageError,
+        Meta(description="Standard deviation of the spool about its mean course, as a command: stick and slip."),
+    ]
     outliers: Annotated[int, Meta(description="Samples of the straight part that were left out.", ge=0, le=10**12)]
     ramps: Annotated[tuple[str, ...], Meta(description="The ramps that were pooled.", min_length=1)]
 

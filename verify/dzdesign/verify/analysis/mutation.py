@@ -78,7 +78,7 @@ class MutationBench:
             objects = drive.objects()
         except RequirementError:
             return outcome(REFUSED)
-        if _contents(objects) == _contents(self._drive.objects()):
+        if [*map(Path.read_bytes, objects)] == [*map(Path.read_bytes, self._drive.objects())]:
             return outcome(SAME_OBJECT)
         for killer in self._tried(cores, drive):
             if killer:
@@ -113,10 +113,6 @@ class MutationBench:
             program = HOST.link([*each, main], "the random triples")
             results.append(HOST.run(program, [str(RANDOM_TRIPLES)], "the core"))
         return results[0] == results[1]
-
-
-def _contents(objects: Sequence[Path]) -> list[bytes]:
-    return [each.read_bytes() for each in objects]
 
 
 def all_mutants(bench: MutationBench) -> list[Mutant]:

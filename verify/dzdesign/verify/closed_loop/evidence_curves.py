@@ -25,7 +25,7 @@ def curve_files(loops: Sequence[LoopComparison], maps: Sequence[InputMap]) -> di
     for side in dict.fromkeys(loop.result.side for loop in loops):
         files[closed_loop_name(side)] = _ramps([loop for loop in loops if loop.result.side == side])
     for one in maps:
-        files[input_map_name(one.side)] = _csv(("command_code", "dp_code", "compare", "error", "status"), one.rows())
+        files[input_map_name(one.side)] = _csv(("command_code", "dp_code", "compare", "error", "status"), one.grid)
         files[zero_command_name(one.side)] = _csv(
             ("dp_code", "dp_MPa", "drive_V", "bound_V"),
             ((code, f"{dp:.4f}", f"{drive:.5f}", f"{bound:.5f}") for code, dp, drive, bound in one.zero_command),

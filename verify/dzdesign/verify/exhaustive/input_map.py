@@ -3,7 +3,6 @@
 The check of all inputs (`all_inputs`) counts; this shows. The grid is denser where the valve was tested.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,27 +24,15 @@ BEYOND = 0.15
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InputMap:
-    """Compare values of one side on a grid of U command codes and D differences of pressure codes."""
+    """What one side gives on a grid of command codes and differences of pressure codes, and at zero command."""
 
     side: Side
-    command_codes: tuple[int, ...]
-    #: Differences of pressure codes, rising.
-    dp_codes: tuple[int, ...]
-    #: (D, U): what the core gives, the exactly rounded law, and the status word. Of a command that is not sound the
-    #: law says nothing, and `exact` is what the core gives.
-    compare: np.ndarray
-    exact: np.ndarray
-    status: np.ndarray
+    #: Command code, difference of pressure codes, compare value, its error in counts, and status word; along the
+    #: commands first. Of a command that is not sound the law says nothing, and there is no error.
+    grid: tuple[tuple[int, int, int, int, int], ...]
     #: At every difference of the tested interval: its code, pressure drop in MPa, drive at zero command in V (with a
     #: dither its peak), and the lower bound of the threshold in V.
     zero_command: tuple[tuple[int, float, float, float], ...]
-
-    def rows(self) -> Iterator[tuple[int, int, int, int, int]]:
-        """Return command code, difference, compare value, its error in counts and status word of every point."""
-        for i, dp_code in enumerate(self.dp_codes):
-            for j, code in enumerate(self.command_codes):
-                given = int(self.compare[i, j])
-                yield code, dp_code, given, given - int(self.exact[i, j]), int(self.status[i, j])
 
 
 def map_inputs(folder: Path, compensator: Compensator, sign: int = 1) -> InputMap:
@@ -59,29 +46,28 @@ def map_inputs(folder: Path, compensator: Compensator, sign: int = 1) -> InputMa
     library = load_library(texts, f"the core {name}")
     core, status = (getattr(library, f"dz_{what}{ending}") for what in ("comp", "status"))
     found = differences(exact)
-    made = np.flatnonzero(found.made)
     bounds = Staircase(guarded_bounds(compensator, sign))
     steps = pressure_drops(exact, found, bounds.dp_MPa).steps_of(bounds)
     tested = np.flatnonzero(steps >= 0)
-    rows, commands = _grid_rows(found, made, tested), _commands(exact)
-    pairs = {row: _pair(exact, found, row) for row in {*rows.tolist(), *tested.tolist()}}
-    values = [[core(code, *pairs[row]) for code in commands] for row in rows.tolist()]
-    compare = np.array(values)
+    commands, grid = _commands(exact), []
+    for row in _grid_rows(found, tested).tolist():
+        dp_code, pair = int(found.values[row]), _pair(exact, found, row)
+        corners = exact.corners(exact.betas(dp_code))
+        for code in commands:
+            given = core(code, *pair)
+            error = given - exact.compare_value(code, corners) if code in exact.sound_commands else 0
+            grid.append((code, dp_code, given, error, status(code, *pair)))
     a_MPa = float(exact.a.span_MPa) / (exact.a.full_code - exact.a.zero_code)
     volt = float(compensator.u_max_V) / exact.compare_max
     peak = compensator.drive_functions.dither_counts
     return InputMap(
         side=exact.side,
-        command_codes=tuple(commands),
-        dp_codes=tuple(found.values[rows].tolist()),
-        compare=compare,
-        exact=_exact_values(exact, found.values[rows].tolist(), commands, compare),
-        status=np.array([[status(code, *pairs[row]) for code in commands] for row in rows.tolist()]),
+        grid=tuple(grid),
         zero_command=tuple(
             (
                 int(found.values[row]),
                 float(found.values[row]) * a_MPa,
-                (core(exact.zero, *pairs[row]) + peak) * volt,
+                (core(exact.zero, *_pair(exact, found, row)) + peak) * volt,
                 float(bounds.bounds_V[steps[row]]),
             )
             for row in tested.tolist()
@@ -95,8 +81,9 @@ def _commands(exact: ExactLaw) -> list[int]:
     return sorted({*spread, exact.zero, exact.full})
 
 
-def _grid_rows(found: Differences, made: np.ndarray, tested: np.ndarray) -> np.ndarray:
+def _grid_rows(found: Differences, tested: np.ndarray) -> np.ndarray:
     """Return places of differences that sound codes make: over all of them, and closer over the tested ones."""
+    made = np.flatnonzero(found.made)
     wide = made[np.linspace(0, made.size - 1, WIDE_ROWS).round().astype(int)]
     if tested.size == 0:
         return np.unique(wide)
@@ -110,14 +97,3 @@ def _pair(exact: ExactLaw, found: Differences, row: int) -> tuple[int, int]:
     """Return a pair of sound pressure codes that makes a difference."""
     b = int(found.b_first[row])
     return int(exact.turn * found.values[row] + found.slant[b]), b
-
-
-def _exact_values(exact: ExactLaw, dp_codes: list[int], commands: list[int], given: np.ndarray) -> np.ndarray:
-    """Return the exactly rounded law on the grid."""
-    values = given.copy()
-    for row, dp_code in enumerate(dp_codes):
-        corners = exact.corners(exact.betas(dp_code))
-        for column, code in enumerate(commands):
-            if code in exact.sound_commands:
-                values[row, column] = exact.compare_value(code, corners)
-    return values

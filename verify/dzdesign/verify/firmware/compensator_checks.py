@@ -60,14 +60,8 @@ def law_follows(compensator: Compensator) -> Check:
 def valve_follows(folder: Path, compensator: Compensator) -> Check:
     """Tell whether the valve in a compensator is that of the file it names; not checked where that is not at hand.
 
-    The name alone says nothing: a valve.json of another hash and another content is a stranger's.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the firmware; valve.json is looked for in it, beside it and in the folders beside it.
-    compensator : Compensator
-        Of that firmware.
+    It is looked for in the firmware's folder, beside it and in the folders beside it. The name alone says nothing: a
+    valve.json of another hash and another content is a stranger's.
     """
     (source,), valve = compensator.made_from, compensator.valve
     stated = source.sha256
