@@ -95,7 +95,11 @@ def bench_of(valve: RecoveredValve) -> Bench:
 def identify_options(valve: RecoveredValve) -> IdentifyOptions:
     """Return what an engineer who read Section 4.1 would declare."""
     return IdentifyOptions(
-        u_max=float(U_MAX_V), dp0=DP0_MPA * MPA, meter_floor=valve.level_L_min * L_MIN, meter_lag=0.0
+        u_max=float(U_MAX_V),
+        dp0=DP0_MPA * MPA,
+        meter_floor=valve.level_L_min * L_MIN,
+        meter_lag=0.0,
+        meter_lag_tolerance=0.0,
     )
 
 

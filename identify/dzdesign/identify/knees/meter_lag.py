@@ -17,7 +17,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.constants import FULL_SWEEP
-from dzdesign.identify.knees.gated_line import prepare_branch
+from dzdesign.identify.knees.gated_line import fit_line, prepare_branch
 from dzdesign.identify.knees.line_fitting import lay_line
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.pooling import group_by_pressure
@@ -35,6 +35,8 @@ LAG_ERRORS = 3.0
 LAG_TOLERANCE, LEAST_TOLERANCE = 0.2, 0.05
 #: Longest lag, s, that the bounds allow for where nothing tells it.
 LONGEST_UNKNOWN = 0.2
+#: Points of the course that a filter's reading takes near a sharp edge.
+FILTER_POINTS = 2000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,6 +82,24 @@ def find_lag(ramps: Sequence[Ramp], options: IdentifyOptions) -> MeterLag:
         longer=max(seconds - taken, 0.0) + LAG_ERRORS * se,
         shorter=min(taken, LAG_ERRORS * se),
     )
+
+
+def softness_of_filter(shift: float, at_level: float, ratio: float, *, rising: bool) -> float:
+    """Return by how much a meter that is a first-order filter softens a sharp edge, V: knee less the tail's zero.
+
+    Far from the edge the filter shifts the flow by `shift` (rate times lag, V), which was taken out; at the edge it
+    rounds it. The tail is the line between the flow that the straight part reaches `at_level` (V) above the knee and
+    `ratio` times that.
+    """
+    if not shift > 0:
+        return 0.0
+    lowest = at_level / shift
+    # Of a ramp of unit slope: x is the command beyond the knee over the shift, put right for it.
+    x = np.linspace(-1.0 if rising else 1 + math.log(min(lowest, 1.0)), max(ratio * lowest, 1.0), FILTER_POINTS)
+    reading = x + np.exp(-1 - x) if rising else np.where(x >= 1, x, np.exp(np.minimum(x, 1.0) - 1))
+    tail = (reading >= lowest) & (reading <= ratio * lowest)
+    _, zero = fit_line(x[tail], reading[tail])
+    return max(-zero * shift, 0.0)
 
 
 def _declared(seconds: float, stated: float | None, left: tuple[float, float] | None) -> MeterLag:
