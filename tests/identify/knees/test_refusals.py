@@ -151,3 +151,12 @@ def test_what_loggers_write_is_refused_with_what_to_do(tmp_path, text, wording):
     path.write_text(text)
     with wording.refusal(InputError):
         read_ramp_file(path)
+
+
+@pytest.mark.parametrize("way", ["opening", "closing"])
+def test_a_knee_outside_the_command_that_was_swept_is_refused(way):
+    test = synthetic_ramp(1.0, Truth())
+    bent = (np.arange(test.u.size) < test.u.size // 2) == (way == "opening")
+    flow = np.where(bent, 6.0 * np.sqrt(np.clip(test.u - 1.0, 0, None)) * L_MIN, test.q)
+    with pytest.raises(InputError, match=rf"synthetic_1.* {way} .*-\d+\.\d\d V.* 0\.00 to 10\.00 V.*knee-window"):
+        identify([dataclasses.replace(test, q=flow)], IdentifyOptions(knee_window=(0.9, 0.98)))
