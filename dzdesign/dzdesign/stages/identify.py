@@ -6,11 +6,12 @@ from dataclasses import KW_ONLY, dataclass, fields
 from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.core.option_readers import number, percent, quantity
-from dzdesign.core.options import FIT, METER, RECORDINGS, AnyPath, Option, Paths, Text, Texts, read_options
+from dzdesign.core.options import FIT, METER, RECORDINGS, AnyPath, Option, Paths, Text, Texts
 from dzdesign.stages.recordings import (
     RampArguments,
     check_places,
     in_order,
+    meter_choices,
     read_recordings,
     refuse_copies,
     write_results,
@@ -68,7 +69,8 @@ def identify_options(choices: IdentifyChoices) -> "IdentifyOptions":
     """Return the engineer's choices for `identify`, SI."""
     from dzdesign.identify.options import IdentifyOptions
 
-    return IdentifyOptions(**read_options(choices, [field.name for field in fields(IdentifyOptions)]))
+    names = [field.name for field in fields(IdentifyOptions) if field.name != "meter_lag_tolerance"]
+    return IdentifyOptions(**meter_choices(choices, names))
 
 
 def record_of(given: Mapping[str, object] | None) -> dict[str, str]:

@@ -211,10 +211,10 @@ class TestFile:
         assert json.loads(to_json_bytes(self.read(document))) == document
         assert list(document["sides"]["positive"]["guards"]) == list(GUARDS)
 
-    def test_a_guard_of_another_name_is_refused(self, document):
+    def test_a_guard_of_another_name_is_refused(self, document, wording):
         newer = json.loads(json.dumps(document))
         newer["sides"]["positive"]["guards"]["future"] = newer["sides"]["positive"]["guards"]["mean"]
-        with pytest.raises(InputError, match=r"'sides\.positive': .* no others than closing, mean, opening"):
+        with wording.refusal(InputError):
             self.read(newer)
 
 
@@ -243,22 +243,22 @@ class TestDesign:
         assert said == [False, True, True]
 
     @pytest.mark.parametrize(
-        ("falling", "asked", "words"),
+        ("falling", "asked"),
         [
-            (False, "closing", "record the falling branch too, or accept .* --guard opening"),
-            (False, "mean", "record the falling branch too"),
-            (True, "mean", "record the rising branch too, or take --guard closing"),
-            (True, "opening", "record the rising branch too"),
+            (False, "closing"),
+            (False, "mean"),
+            (True, "mean"),
+            (True, "opening"),
         ],
     )
-    def test_a_guard_without_its_branch_is_refused(self, falling, asked, words):
+    def test_a_guard_without_its_branch_is_refused(self, falling, asked, wording):
         tests = ramps(OPENS["flat"], falling=falling)
         valve = identify([falling_only(test) for test in tests] if falling else tests)
-        with pytest.raises(InputError, match=words):
+        with wording.refusal(InputError):
             design(valve, DesignOptions(guard=asked))
 
-    def test_an_unknown_guard_is_refused(self):
-        with pytest.raises(InputError, match=r"did you mean 'mean'.*expected closing, mean or opening"):
+    def test_an_unknown_guard_is_refused(self, wording):
+        with wording.refusal(InputError):
             DesignOptions(guard="meen")
 
 

@@ -322,8 +322,8 @@ class TestBadFolder:
         assert {path.name for path in bench.iterdir()} == before
 
     @pytest.mark.slow
-    def test_a_folder_in_the_place_of_a_plot_is_left_alone(self, bench, capsys):
+    def test_a_folder_in_the_place_of_a_plot_is_left_alone(self, bench, capsys, wording):
         (bench / "plots" / "thresholds.svg").mkdir(parents=True)
         assert main(["identify", "a.csv", "-o", "valve.json", "--plots", "plots"]) == 2
-        assert "choose another with --plots" in capsys.readouterr().err
+        wording.of_test(capsys.readouterr().err)
         assert (bench / "plots" / "thresholds.svg").is_dir()

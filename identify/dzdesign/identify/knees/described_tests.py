@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from dzdesign.identify.knees.between_ramps import BetweenRamps
 from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.knees.meter_lag import MeterLag
@@ -64,3 +66,7 @@ class DescribedTests:
         if found is None:
             raise ValueError(f"there is no {('rising', 'falling')[column]} branch")
         return found
+
+    def rates(self, column: int) -> np.ndarray:
+        """Return the pace of the command on that branch of each test, V/s (T,); NaN where it is not known."""
+        return np.array([item.branch(column).prepared.branch.rate for item in self.tests])

@@ -16,10 +16,16 @@ from dzdesign.identify.knees.gated_line import prepare_branch
 from dzdesign.identify.knees.meter_lag import find_lag
 from dzdesign.identify.knees.noise import robust_sigma
 from dzdesign.identify.knees.profile import largest_flow
-from dzdesign.identify.knees.refusals import refuse_a_jump, refuse_a_shut_valve, refuse_a_wrong_pressure
+from dzdesign.identify.knees.refusals import (
+    refuse_a_jump,
+    refuse_a_shut_valve,
+    refuse_a_wrong_pressure,
+    refuse_an_impossible_knee,
+)
 from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.ramps.command import despiked
 from dzdesign.identify.ramps.pooling import PooledTest, pool_ramps
-from dzdesign.identify.ramps.splitting import Ramp, despiked, nominal_dp, split_ramps
+from dzdesign.identify.ramps.splitting import Ramp, nominal_dp, split_ramps
 from dzdesign.identify.reading.ramp_test import RampTest
 
 #: A recording whose command moves by less than this share of u_max is no part of a ramp.
@@ -178,8 +184,11 @@ def _described(pooled: list[PooledTest], floor: float, options: IdentifyOptions)
     ]
     for read in reads:
         refuse_a_jump(read, options.u_max)
-    shapes = iter(describe_branches(reads, u_max=options.u_max, window=options.knee_window))
-    return [_describe(item, shapes, options.u_max) for item in pooled]
+    shapes = describe_branches(reads, u_max=options.u_max, window=options.knee_window)
+    for shape in shapes:
+        refuse_an_impossible_knee(shape.prepared.branch, shape.knee, shape.prepared.source, options.u_max)
+    of_tests = iter(shapes)
+    return [_describe(item, of_tests, options.u_max) for item in pooled]
 
 
 def _between_ramps(described: list[DescribedTest], column: int, options: IdentifyOptions) -> BetweenRamps | None:
