@@ -116,10 +116,12 @@ def bound_threshold(group: DescribedTests, knees: OrderedKnees, options: Identif
     between = group.between(knees.column)
     knee_bound = lower_bounds(knee, knee_se, between, options.confidence, knee_budget)
     zero_bound = lower_bounds(zero, zero_se, between, options.confidence, zero_budget)
+    # What averages show below the knee at one pressure drop is one edge's, which all tests have.
+    depth = max(shape.dead_zone.depth for shape in shapes)
     return Threshold(
-        np.where(soft, zero, knee),
+        np.minimum(np.where(soft, zero, knee), knee - depth),
         np.where(soft, zero_se, knee_se),
-        np.where(soft, np.minimum(knee_bound, zero_bound), knee_bound),
+        np.minimum(np.where(soft, np.minimum(knee_bound, zero_bound), knee_bound), knee_bound - depth),
         lag_budget,
     )
 

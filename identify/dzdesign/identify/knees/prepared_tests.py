@@ -183,7 +183,9 @@ def _described(pooled: list[PooledTest], floor: float, options: IdentifyOptions)
     ]
     for read in reads:
         refuse_a_jump(read, options.u_max)
-    shapes = describe_branches(reads, u_max=options.u_max, window=options.knee_window)
+    shapes = describe_branches(
+        reads, u_max=options.u_max, window=options.knee_window, noise_level=options.noise_level
+    )
     for shape in shapes:
         refuse_an_impossible_knee(shape.prepared.branch, shape.knee, shape.prepared.source, options.u_max)
     of_tests = iter(shapes)
