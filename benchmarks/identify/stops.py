@@ -71,7 +71,7 @@ def print_stops(*, quick: bool, seed: int) -> list[Row]:
             what = f"{name}, {repeats} ramp{'s' if repeats > 1 else ''} a pressure drop"
             rows.append(Row(what=f"{what}: flow above the level", value=opened, limit=LIMIT, note=note))
             rows.append(Row(what=f"{what}: without its warning", value=silent, limit=0))
-    print_rows(f"9. Flow above the stated level at zero command, after a stop at each pressure drop (seed {seed})", rows)
+    print_rows(f"9. Flow above the stated level at zero command, after a stop at each test (seed {seed})", rows)
     return rows
 
 

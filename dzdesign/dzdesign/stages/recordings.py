@@ -47,8 +47,9 @@ class ColumnArguments:
     """How the columns of recordings are found."""
 
     columns: Annotated[Table, Option("MAP", RECORDINGS)] = None
-    """Columns, such as "u=AO0:V, Q=Flow (L/min)": a quantity (time, u, dP, pA, pB, Q), its label in the file and, after
-    a colon, the unit that the label lacks. In the options file a table [columns]."""
+    """Columns, such as "u=AO0:V, Q=Flow (L/min)": a quantity, its label in the file and, after a colon, the unit that
+    the label lacks. Quantities are time, u, Q and dP, or in its place pressures of ports of the metering edge: pP, pA,
+    pB, pT. In the options file a table [columns]."""
     dp: Annotated[Table, Option("P", RECORDINGS, example="1 MPa")] = None
     """Pressure drop of files without a column of it, such as "1 MPa". In the options file also a table [dp] from file
     name or pattern to pressure."""
@@ -94,9 +95,8 @@ def read_recordings(
     from dzdesign.identify.reading.column_labels import parse_columns
     from dzdesign.identify.reading.ramp_files import read_ramp_file
 
-    chosen, skipped = parse_columns(columns) if columns else {}, None
-    if skip_rows is not None:
-        skipped = read_skip_rows(skip_rows, "--skip-rows")
+    chosen = parse_columns(columns) if columns else {}
+    skipped = None if skip_rows is None else read_skip_rows(skip_rows, "--skip-rows")
     paths = expand(patterns)
     names = distinct_names(paths)
     tests = [

@@ -69,7 +69,9 @@ def _put_thresholds(console: "Console", side: "SideModel", title: str) -> None:
 def _side_lines(side: "SideModel") -> tuple[str, ...]:
     at = "" if side.reference.dp_MPa is None else f" at dP0 = {side.reference.dp_MPa:.3f} MPa"
     certificate = side.certificate
+    made_of = dict.fromkeys(test.dp_from or "not recorded" for test in side.tests)
     return (
+        f"pressure drop: {', '.join(made_of)}",
         f"bound: {100 * certificate.confidence:.6g}% lower bound, for all tests together, of the {certificate.guard} "
         "threshold (the knee, or the tail's zero where the edge is soft); flow below "
         f"{certificate.level_L_min:.2f} L/min (meter's floor, its noise, or 0.5 % of the largest flow) counts as none",

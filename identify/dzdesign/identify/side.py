@@ -165,6 +165,7 @@ def _test_result(group: DescribedTests, knees: KneeFit, row: int, guarded: Thres
     return TestResult(
         source=item.test.source,
         dp_MPa=None if item.dp is None else item.dp / MPA,
+        dp_from="declared" if item.test.dp_is_declared else item.test.dp_from[0] or None,
         **_thresholds(item, knees, row),
         straight_rising=rising.line.window if rising else None,
         straight_falling=falling.line.window if falling else None,

@@ -1,5 +1,6 @@
 """What the report leads with: the verdict, and the few numbers that matter."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -107,17 +108,12 @@ def _dead_zone(loops: Sequence[PressureResult], branch: str) -> Figure:
 
 def worst_of(loops: Sequence[PressureResult]) -> str:
     """Say of how many runs a figure is the worst: of two sides the pressure drops of each."""
-    counts: dict[str, int] = {}
-    for each in loops:
-        counts[each.side] = counts.get(each.side, 0) + 1
-    if len(set(counts.values())) > 1:
-        return "the worst of " + " and ".join(f"{counted(n, 'pressure drop')} {name}" for name, n in counts.items())
-    count = next(iter(counts.values()))
-    if count > 1:
-        return f"the worst of {count} pressure drops" + (f" on each of {len(counts)} sides" if len(counts) > 1 else "")
-    if len(counts) > 1:
-        return "the worse of both sides, each at one pressure drop"
-    return f"at {loops[0].dp_MPa:.2f} MPa, the one pressure drop tested"
+    if len(loops) == 1:
+        return f"at {loops[0].dp_MPa:.2f} MPa, the one pressure drop tested"
+    counts = Counter(each.side for each in loops)
+    if len(counts) == 1:
+        return f"the worst of {len(loops)} pressure drops"
+    return "the worst of " + " and ".join(f"{counted(n, 'pressure drop')} {side}" for side, n in counts.items())
 
 
 def _at_zero(loops: Sequence[PressureResult]) -> Figure:

@@ -23,8 +23,9 @@ from dzdesign.identify.knees.refusals import (
     refuse_an_impossible_knee,
 )
 from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.ramps.command import despiked
 from dzdesign.identify.ramps.pooling import PooledTest, pool_ramps
-from dzdesign.identify.ramps.splitting import Ramp, despiked, nominal_dp, split_ramps
+from dzdesign.identify.ramps.splitting import Ramp, nominal_dp, split_ramps
 from dzdesign.identify.reading.ramp_test import RampTest
 
 #: A recording whose command moves by less than this share of u_max is no part of a ramp.

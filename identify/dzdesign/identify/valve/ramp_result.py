@@ -29,6 +29,13 @@ class TestResult:
     dp_MPa: Annotated[
         PressureDrop | None, Meta(description="Pressure drop at no flow; null where none was recorded or declared.")
     ]
+    dp_from: Annotated[
+        str | None,
+        Meta(
+            description="Columns of the recordings that make it, such as pP_MPa - pA_MPa; 'declared' by --dp or [dp]; "
+            "null where it is unknown."
+        ),
+    ]
     u_knee_rising_V: Annotated[
         Voltage | None, Meta(description="Knee on opening: the straight part of Q/sqrt(dP), extrapolated to zero.")
     ]

@@ -26,11 +26,10 @@ def valve_sections(valve: ValveModel | None, compensator: Compensator | None) ->
         thresholds.append(thresholds_figure(side, guard, name, both))
         tables.append(thresholds_table(side, guard, f"Thresholds, {name} commands"))
         betas.append(beta_figure(side, guard, name, both, compensator if law else None))
-    drawn = tuple(figure for figure in betas if figure)
     meter = valve.meter
     return {
         "data": Section(
-            figures=tuple(fits),
+            figures=fits,
             lines=(
                 f"{counted(sum(len(side.tests) for side in valve.sides.values()), 'ramp test')}; full command "
                 f"{valve.u_max_V:g} V.",
@@ -40,10 +39,10 @@ def valve_sections(valve: ValveModel | None, compensator: Compensator | None) ->
                 *(f"{name.capitalize()} commands: not tested." for name in valve.untested_sides),
             ),
         ),
-        "thresholds": Section(figures=tuple(thresholds), tables=tuple(tables)),
+        "thresholds": Section(figures=thresholds, tables=tables),
         "beta": Section(
-            figures=drawn,
-            missing="" if drawn else "One pressure drop was tested, so β is 1 and its trend is not known.",
+            figures=betas,
+            missing="" if any(betas) else "One pressure drop was tested, so β is 1 and its trend is not known.",
         ),
     }
 
