@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -47,6 +48,9 @@ def _describe(parts: StraightParts, index: int, read: PreparedBranch, u_max: flo
     )
     tail = _find_tail(read, level, line, noise, parts.correlation, u_max)
     onset, onset_se = _find_onset(read, tail, level, noise)
+    if dead_zone.depth > 0:  # averages show what no reading does
+        first = line.knee - dead_zone.depth
+        tail, onset = replace(tail, at_level=min(tail.at_level, first)), min(onset, first)
     return BranchShape(
         prepared=read,
         line=line,

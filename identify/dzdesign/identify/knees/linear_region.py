@@ -39,8 +39,8 @@ class StraightParts:
 
     #: One per branch, as wide as the characteristic goes on straight.
     lines: tuple[GatedLine, ...]
-    #: Per branch, m³/s: the flow that is no use or below the meter's floor, that from which on a single reading is flow,
-    #: and the noise of a reading while the valve is shut.
+    #: Per branch, m³/s: the flow that is no use or below the meter's floor, the one from which on a single reading is
+    #: flow, and the noise of a reading while the valve is shut.
     least: tuple[float, ...]
     levels: tuple[float, ...]
     noises: tuple[float, ...]
