@@ -47,7 +47,13 @@ def run_chain(valve: RecoveredValve, say: Callable[[str], None] = lambda _: None
         tests = [read_ramp_file(Path(scratch) / file) for file in ramps]  # as a user's are read
         floor = valve.level_L_min * L_MIN  # as an engineer who read Section 4.1 would declare it
         options = IdentifyOptions(
-            u_max=float(U_MAX_V), dp0=DP0_MPA * MPA, meter_floor=floor, meter_lag=0.0, meter_lag_tolerance=0.0
+            u_max=float(U_MAX_V),
+            dp0=DP0_MPA * MPA,
+            meter_floor=floor,
+            # The simulated meter has no lag, and the simulated valve closes the same way each time.
+            meter_lag=0.0,
+            meter_lag_tolerance=0.0,
+            repeatability=0.0,
         )
         identified = identify(tests, options)
         valve_json = to_json_bytes(identified)

@@ -36,6 +36,10 @@ def valve_sections(valve: ValveModel | None, compensator: Compensator | None) ->
                 f"Flow meter: floor {meter.floor_L_min:.2f} L/min; lag taken as {meter.lag_s:.3g} s "
                 f"({LAG[meter.lag_is]}).",
                 *(_trend(name, side) for name, side in valve.sides.items()),
+                *(
+                    f"{name.capitalize()} commands, from ramp to ramp: {side.certificate.repeatability.in_words()}."
+                    for name, side in valve.sides.items()
+                ),
                 *(f"{name.capitalize()} commands: not tested." for name in valve.untested_sides),
             ),
         ),
