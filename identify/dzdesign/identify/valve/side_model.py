@@ -147,10 +147,10 @@ class SideModel:
         """What the bounds between the tests rest on, in words."""
         if len(self.tests) < 2:
             return "one pressure drop was tested: the bound holds there, and nothing is certified at another"
-        tested = "two pressure drops were" if len(self.tests) == 2 else f"{len(self.tests)} pressure drops were"
         return (
-            f"{tested} tested. Between two of them the bound is the lower one's, on the premise that the threshold runs "
-            "one way there, which no test checks: a threshold that is lowest between two tests would lie below it"
+            f"{len(self.tests)} pressure drops were tested. Between two of them the bound is the lower one's, on the "
+            "premise that the threshold runs one way there, which no test checks: a threshold that is lowest between "
+            "two tests would lie below it"
         )
 
     @property
