@@ -36,6 +36,9 @@ class IdentifyOptions:
     flat_below : float
         Change of the threshold over the tested range, as a share of u_max, that systematic errors may make: a smaller
         one is no trend, however significant.
+    repeatability : float or None
+        Standard deviation of the threshold from ramp to ramp, as a share of u_max; None measures it where ramps are
+        repeated, and takes 0.25 % elsewhere.
     """
 
     u_max: float = 10.0
