@@ -61,8 +61,8 @@ class Outcomes:
 
 
 def options_for(bench: Bench, **changes: object) -> IdentifyOptions:
-    """Return what an engineer with this bench declares: the meter's floor and lag."""
-    known = {"meter_floor": bench.floor_L_min * L_MIN, "meter_lag": bench.lag_s}
+    """Return what an engineer declares: the meter's floor and lag, and that the bench's valve repeats exactly."""
+    known = {"meter_floor": bench.floor_L_min * L_MIN, "meter_lag": bench.lag_s, "repeatability": 0.0}
     return IdentifyOptions(**(known | changes))
 
 

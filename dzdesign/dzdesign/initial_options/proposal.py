@@ -169,7 +169,7 @@ def _pressure_table(
 
 def _full_command(tests: "Sequence[RampTest]") -> tuple[float, float]:
     """Return the full command to declare, and the largest one seen, both in V."""
-    from dzdesign.identify.ramps.splitting import despiked
+    from dzdesign.identify.ramps.command import despiked
 
     seen = max(float(abs(despiked(test.u)).max()) for test in tests)
     return next((usual for usual in USUAL_U_MAX if seen <= 1.02 * usual), math.ceil(seen)), seen
@@ -245,10 +245,6 @@ def _rendered(**content: object) -> str:
         lstrip_blocks=True,
         finalize=lambda value: one_line(str(value)),  # labels come from the recordings
     )
-    environment.filters["quoted"] = _quoted
+    # A string of TOML: as in JSON, and without DEL.
+    environment.filters["quoted"] = lambda text: json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
     return str(environment.get_template("dzdesign.toml.jinja").render(check_dp=CHECK_DP, **content))
-
-
-def _quoted(text: str) -> str:
-    """Return a string of TOML: as in JSON, and without DEL."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

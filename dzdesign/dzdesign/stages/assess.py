@@ -7,7 +7,14 @@ from dzdesign.core.errors import InputError
 from dzdesign.core.option_readers import percent_range, quantity
 from dzdesign.core.options import FIT, RECORDINGS, AnyPath, Option, Paths, Table, Text, read_options
 from dzdesign.core.units import parse_quantity
-from dzdesign.stages.recordings import RampArguments, check_places, read_recordings, refuse_copies, write_results
+from dzdesign.stages.recordings import (
+    RampArguments,
+    check_places,
+    meter_choices,
+    read_recordings,
+    refuse_copies,
+    write_results,
+)
 from dzdesign.terminal.progress import say, stage_progress
 
 if TYPE_CHECKING:
@@ -104,7 +111,7 @@ def assess_options(arguments: AssessArguments) -> "AssessOptions":
     from dzdesign.assess.options import AssessOptions
     from dzdesign.identify.options import IdentifyOptions
 
-    reading = IdentifyOptions(**read_options(arguments, ["u_max", "meter_floor", "meter_lag", "knee_window"]))
+    reading = IdentifyOptions(**meter_choices(arguments, ["u_max", "meter_floor", "meter_lag", "knee_window"]))
     read = read_options(arguments, ["after_u_max", "level", "linearity_window"])
     after_u_max = read["after_u_max"]
     if after_u_max is not None and not after_u_max > 0:

@@ -3,10 +3,10 @@
 import fnmatch
 import glob
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from dzdesign.core.artefact_files import (
     MANIFEST_NAME,
@@ -16,8 +16,20 @@ from dzdesign.core.artefact_files import (
     write_files,
 )
 from dzdesign.core.errors import InputError, nearest, neighbour
-from dzdesign.core.option_readers import percent_range, quantity, whole_number
-from dzdesign.core.options import FIT, METER, RECORDINGS, AnyPath, Option, Paths, Table, Text, Texts, paths_of
+from dzdesign.core.option_readers import percent_range, quantity, whole_number, with_tolerance
+from dzdesign.core.options import (
+    FIT,
+    METER,
+    RECORDINGS,
+    AnyPath,
+    Option,
+    Paths,
+    Table,
+    Text,
+    Texts,
+    paths_of,
+    read_options,
+)
 from dzdesign.core.units import parse_quantity
 from dzdesign.terminal.progress import say, stage_progress, with_bar
 
@@ -63,10 +75,18 @@ class RampArguments(ColumnArguments):
     """Full command."""
     meter_floor: Annotated[Text, Option("Q", METER, example="0.6 L/min", read=quantity("flow"))] = None
     """Flow below which the meter reads zero (default: found)."""
-    meter_lag: Annotated[Text, Option("T", METER, example="0.1 s", read=quantity("time"))] = None
-    """Lag of the flow meter (default: found from ramps of two rates)."""
+    meter_lag: Annotated[Text, Option("T", METER, example="0.1 s", read=with_tolerance("time"))] = None
+    """Lag of the flow meter, with its tolerance: "0.1 s +- 0.02 s" (default: found from ramps of two rates; without a
+    tolerance 20 %, and at least 0.05 s)."""
     knee_window: Annotated[str, Option("A-B", FIT, read=percent_range("the largest flow such as '12-50'"))] = "12-50"
     """Flow range of the straight-line fit, in percent of maximum flow."""
+
+
+def meter_choices(arguments: RampArguments, names: Iterable[str]) -> dict[str, Any]:
+    """Return options of those names, each read; the lag's tolerance under a name of its own."""
+    read = read_options(arguments, names)
+    seconds, tolerance = read["meter_lag"] or (None, None)
+    return {**read, "meter_lag": seconds, "meter_lag_tolerance": tolerance}
 
 
 def read_recordings(
@@ -86,10 +106,9 @@ def read_recordings(
     from dzdesign.identify.reading.column_labels import parse_columns
     from dzdesign.identify.reading.ramp_files import read_ramp_file
 
-    chosen, skipped = parse_columns(columns) if columns else {}, None
-    if skip_rows is not None:
-        skipped = read_skip_rows(skip_rows, "--skip-rows")
-    rate = read_sample_rate(sample_rate, "--sample-rate") if sample_rate else None
+    chosen = parse_columns(columns) if columns else {}
+    skipped = None if skip_rows is None else read_skip_rows(skip_rows, "--skip-rows")
+    rate = None if sample_rate is None else read_sample_rate(sample_rate, "--sample-rate")
     paths = expand(patterns)
     names = distinct_names(paths)
     tests = [

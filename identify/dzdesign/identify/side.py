@@ -61,7 +61,9 @@ def _fit_with_trend(group: DescribedTests, options: IdentifyOptions) -> tuple[Tr
     free = fit_knees([item.shapes for item in group.tests], floor=group.floor, u_max=options.u_max, trend="flat")
     dp = np.array([item.dp or math.nan for item in group.tests])
     column = 1 if group.tests[0].shapes[1] else 0  # falling wherever there is one: zero command comes after closing
-    budget = options.flat_below * options.u_max
+    # A lag that is a little wrong feigns a trend where the tests were run at different rates.
+    feigned = float(np.ptp(np.nan_to_num(group.rates(column)))) * max(group.lag.longer, group.lag.shorter)
+    budget = options.flat_below * options.u_max + feigned
     between, knee_se = group.between(column), free.knee_se[:, column]
     degrees = float(between.degrees_of_freedom(knee_se, DEGREES_OF_FREEDOM).min())
     trend = find_trend(
@@ -152,7 +154,7 @@ def _all_thresholds(
             knees[other] = order_knees(group, free, trend.direction, 1 - guarded.column, options, alone=True)
     if other in knees:
         thresholds[other] = bound_threshold(group, knees[other], options)
-        thresholds["mean"] = mean_threshold(thresholds[guard], thresholds[other])
+        thresholds["mean"] = mean_threshold(group, thresholds["opening"], thresholds["closing"])
     return thresholds, knees.get("opening")
 
 
@@ -178,6 +180,7 @@ def _test_result(group: DescribedTests, knees: KneeFit, row: int, guarded: Thres
         spool_ripple_V=max(shape.ripple for shape in item.branches),
         outliers=sum(shape.outliers for shape in item.branches),
         ramps=item.ramps,
+        left_out=item.left_out,
     )
 
 

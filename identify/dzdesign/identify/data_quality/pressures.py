@@ -10,8 +10,9 @@ import numpy as np
 
 from dzdesign.identify.constants import FULL_SWEEP, L_MIN, MPA
 from dzdesign.identify.data_quality.catalogue import warn
+from dzdesign.identify.ramps.command import despiked
 from dzdesign.identify.ramps.pooling import SAME_PRESSURE
-from dzdesign.identify.ramps.splitting import SHUT, despiked
+from dzdesign.identify.ramps.splitting import SHUT
 from dzdesign.identify.reading.named_pressure import claimed_pressures, contradicts
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.model import Warning_

@@ -2,10 +2,13 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from dzdesign.identify.knees.between_ramps import BetweenRamps
 from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.knees.meter_lag import MeterLag
 from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.valve.left_out import LeftOut
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,6 +27,7 @@ class DescribedTest:
     when: tuple[float, ...]
     #: Source and SHA-256 of every file in it.
     files: tuple[tuple[str, str], ...]
+    left_out: tuple[LeftOut, ...]
 
     @property
     def branches(self) -> list[BranchShape]:
@@ -64,3 +68,7 @@ class DescribedTests:
         if found is None:
             raise ValueError(f"there is no {('rising', 'falling')[column]} branch")
         return found
+
+    def rates(self, column: int) -> np.ndarray:
+        """Return the pace of the command on that branch of each test, V/s (T,); NaN where it is not known."""
+        return np.array([item.branch(column).prepared.branch.rate for item in self.tests])

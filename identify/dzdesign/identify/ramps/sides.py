@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from dzdesign.identify.ramps.splitting import despiked
+from dzdesign.identify.ramps.command import despiked
 from dzdesign.identify.reading.ramp_test import RampTest
 
 #: A recording shows a side if its command goes that far into it, over u_max.

@@ -1,26 +1,35 @@
 """Ramps of a recording: parted at the turning points of the command, put right for the meter's lag.
 
-The rule. The command's sweeps run from one turning point to the next (`sweep_direction`); two sweeps in a row, up and
-down, are one ramp, and the next two the next. Where two ramps meet in a hold at the bottom, the cut lies where the
-pressure drop steps, or in the middle of the hold if it is not known. A ramp whose two sweeps were run at pressure drops
-more than `TWO_PRESSURES` apart is two ramps. A sweep of a few samples, or much faster than the recording's longest, is
-the jump back of a saw-tooth and no branch. Which ramps are one test is said by their pressure drops: see `pooling`.
+The rule. The command's sweeps run from one turning point to the next (`command.sweep_direction`); two sweeps in a row,
+up and down, are one ramp, and the next two the next. Where two ramps meet in a hold at the bottom, the cut lies where
+the pressure drop steps, or in the middle of the hold if it is not known. Two sweeps that were run at pressure drops
+more than `TWO_PRESSURES` apart are of two ramps. A sweep of a few samples, or much faster than the slowest, is the jump
+back of a saw-tooth and no branch. What was not run at the ramp's pressure drop is left out: see `sweep_pressure`. Which
+ramps are one test is said by their pressure drops: see `pooling`.
 """
 
+import bisect
+import itertools
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.ramps.branches import Branch
+from dzdesign.identify.ramps.command import (
+    SMALLEST_MOVE,
+    despiked,
+    lagged_command,
+    sweep_direction,
+    without_command_spikes,
+)
+from dzdesign.identify.ramps.sweep_pressure import SweepLevel, joined, off_level, stretches, sweep_level, without_flow
 from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.valve.left_out import LeftOut
 
-#: A change of direction is real when the command has gone back by this share of its range.
-TURN = 0.1
-#: Points to which a recording is thinned before the search for changes of direction.
-TURN_SEARCH_POINTS = 4000
 #: The valve is shut, and the pressure drop nominal, below this share of the range.
 SHUT = 0.05
 #: So near to the lowest command, as a share of the range, the command holds.
@@ -31,10 +40,8 @@ PRESSURE_STEP = 0.02
 STEP_SIGNIFICANCE = 5.0
 #: A ramp whose sweeps' pressure drops differ by more than this share was run at two.
 TWO_PRESSURES = 0.1
-#: Fewest samples of a sweep that is a branch, and how many times faster than the longest it may be.
+#: Fewest samples of a sweep that is a branch, and how many times faster than the slowest it may be.
 SWEEP_SAMPLES, FASTEST = 5, 20
-#: A command is a spike if it stands out of its neighbours by this share of the range and this many usual steps.
-SPIKE, SPIKE_STEPS = 0.02, 10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,11 +57,27 @@ class Ramp:
     dp: float | None
     #: Its sweeps from zero up, command put right for the meter's lag.
     branches: tuple[Branch, ...]
+    #: What was left out of it, or between it and the ramp before.
+    left_out: tuple[LeftOut, ...] = ()
 
     @property
     def when(self) -> float:
         """When it was recorded, s on a clock common to all recordings; NaN if that is not known."""
         return math.nan if self.test.started is None else self.test.started + float(self.test.time.mean())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Sweep:
+    """The samples from one turning point of the command to the next."""
+
+    rows: slice
+    #: Those samples, command as recorded.
+    test: RampTest
+    #: 1 (up), -1 (down), or 0 where the command does not move.
+    direction: int
+    #: Whether it is slow and long enough for a branch.
+    is_branch: bool
+    level: SweepLevel
 
 
 def split_ramps(test: RampTest, lag: float) -> list[Ramp]:
@@ -67,35 +90,119 @@ def split_ramps(test: RampTest, lag: float) -> list[Ramp]:
     InputError
         Where the command jumps back and forth within a ramp.
     """
-    test = _without_command_spikes(test)
+    test = without_command_spikes(test)
     u = lagged_command(test.time, test.u, lag)
+    sweeps = _sweeps(test, u)
+    idle = _idle(sweeps)
+    groups = _groups([sweep for sweep, is_idle in zip(sweeps, idle, strict=True) if not is_idle])
+    kept = test.time >= test.time[0] + lag  # before that, the command that the flow belongs to was not recorded
+    found, left_out = [], list(test.left_out)
+    for sweep in itertools.compress(sweeps, idle):
+        left_out += stretches(test, np.arange(sweep.rows.start, sweep.rows.stop), "no-flow")
+    for group in groups:
+        rows = np.arange(group[0].rows.start, group[-1].rows.stop)
+        off = rows[_off_level(group, test)]
+        whole = np.setdiff1d(rows, off, assume_unique=True)
+        in_ramp = kept.copy()
+        in_ramp[off] = False
+        branches = [_branch(test, u, in_ramp, sweep.rows, sweep.direction) for sweep in group if sweep.is_branch]
+        branches = [branch for branch in branches if branch.u.size >= SWEEP_SAMPLES]
+        left_out += stretches(test, off if branches else rows, "pressure" if branches else "no-ramp")
+        found.append((test.part(whole if whole.size else rows), tuple(branches)))
+    if any(branches for _, branches in found):
+        found = [(part, branches) for part, branches in found if branches]
+    return _numbered(found, joined(left_out, test))
+
+
+def _idle(sweeps: Sequence[_Sweep]) -> list[bool]:
+    """Tell of each sweep whether it is none of a ramp test; a jump goes with a ramp."""
+    slow = [sweep for sweep in sweeps if sweep.is_branch]
+    idle = iter(without_flow([sweep.level for sweep in slow], [float(np.ptp(sweep.test.u)) for sweep in slow]))
+    return [sweep.is_branch and next(idle) for sweep in sweeps]
+
+
+def _numbered(found: list[tuple[RampTest, tuple[Branch, ...]]], left_out: list[LeftOut]) -> list[Ramp]:
+    """Return the ramps that a recording's parts and their branches are; what was left out goes with the next one."""
+    ends = [float(part.time[-1]) for part, _ in found]
+    owner = [min(bisect.bisect_left(ends, item.from_s), len(ends) - 1) for item in left_out]
+    return [
+        Ramp(
+            test=part,
+            number=index + 1,
+            of=len(found),
+            dp=nominal_dp(part),
+            branches=branches,
+            left_out=tuple(item for item, ramp in zip(left_out, owner, strict=True) if ramp == index),
+        )
+        for index, (part, branches) in enumerate(found)
+    ]
+
+
+def _sweeps(test: RampTest, u: np.ndarray) -> list[_Sweep]:
+    """Return the sweeps of a recording, `u` its command put right for the lag."""
     direction = sweep_direction(u)
     turns = np.flatnonzero(np.diff(direction)) + 1
     cuts = [0, *(_cut(u, test.dp, int(turn), direction) for turn in turns), u.size]
-    sweeps = [(slice(*ends), int(direction[turn])) for ends, turn in zip(pairwise(cuts), [0, *turns], strict=True)]
-    if any(part.stop <= part.start for part, _ in sweeps):
+    rows = [slice(*ends) for ends in pairwise(cuts)]
+    if any(part.stop <= part.start for part in rows):
         raise InputError(
             f"'{test.source}': the command jumps back and forth ({turns.size} turns), expected ramps; if the logger "
             "lost samples of the command, leave their cells blank"
         )
-    known = test.time >= test.time[0] + lag  # before that, the command that the flow belongs to was not recorded
-    pace = [_pace(u[part]) for part, _ in sweeps]
-    slowest = pace[int(np.argmax([part.stop - part.start for part, _ in sweeps]))]
-    groups: list[list[int]] = []
-    for index in range(0, len(sweeps), 2):
-        pair = [index, index + 1][: len(sweeps) - index]
-        levels = [nominal_dp(test.part(sweeps[one][0])) or 0.0 for one in pair]
-        apart = max(levels) - min(levels) > TWO_PRESSURES * max(levels)
-        groups += [[one] for one in pair] if apart else [pair]
-    ramps = []
-    for number, group in enumerate(groups, start=1):
-        whole = test.part(slice(sweeps[group[0]][0].start, sweeps[group[-1]][0].stop))
-        branches = tuple(
-            _branch(test, u, known, *sweeps[one]) for one in group if pace[one] <= FASTEST * slowest and sweeps[one][1]
-        )
-        branches = tuple(branch for branch in branches if branch.u.size >= SWEEP_SAMPLES)
-        ramps.append(Ramp(test=whole, number=number, of=len(groups), dp=nominal_dp(whole), branches=branches))
-    return ramps
+    pace = [_pace(u[part]) for part in rows]
+    slowest = min(one for one, part in zip(pace, rows, strict=True) if np.ptp(u[part]) >= 0.5 * np.ptp(u))
+    sweeps = []
+    for part, one, turn in zip(rows, pace, [0, *turns], strict=True):
+        samples = test.part(part)
+        way = int(direction[turn])
+        level = sweep_level(samples, nominal_dp(samples), SHUT)
+        is_branch = way != 0 and one <= FASTEST * slowest and samples.u.size >= SWEEP_SAMPLES
+        sweeps.append(_Sweep(rows=part, test=samples, direction=way, is_branch=is_branch, level=level))
+    return sweeps
+
+
+def _groups(sweeps: Sequence[_Sweep]) -> list[list[_Sweep]]:
+    """Return sweeps that make a ramp together: two in a row, and the jump before or after them."""
+    groups: list[list[_Sweep]] = []
+    for sweep in sweeps:
+        if groups and groups[-1][-1].rows.stop == sweep.rows.start and _belongs(sweep, groups[-1]):
+            groups[-1].append(sweep)
+        else:
+            groups.append([sweep])
+    return groups
+
+
+def _belongs(sweep: _Sweep, group: Sequence[_Sweep]) -> bool:
+    """Tell whether a sweep goes on with the ramp that the sweeps before it make."""
+    last = group[-1]
+    if not sweep.is_branch:
+        return sweep.direction < 0  # a jump down leads back from a rising ramp, a jump up to a falling one
+    if not last.is_branch:
+        return last.direction >= 0
+    return sum(one.is_branch for one in group) == 1 and not _apart(last.level, sweep.level)
+
+
+def _apart(one: SweepLevel, other: SweepLevel) -> bool:
+    """Tell whether two sweeps were run at two pressure drops; one that shows none goes with the other."""
+    if one.sure is not other.sure:
+        return False
+    levels = one.dp or 0.0, other.dp or 0.0
+    return max(levels) - min(levels) > TWO_PRESSURES * max(levels)
+
+
+def _off_level(group: Sequence[_Sweep], test: RampTest) -> np.ndarray:
+    """Return which samples of a ramp were not run at its pressure drop (N,)."""
+    sure = [sweep.level for sweep in group if sweep.level.sure]
+    found = []
+    for sweep in group:
+        level = sweep.level
+        if not level.sure and sure:
+            level = replace(level, dp=sure[0].dp, spread=sure[0].spread, sure=True)
+        part = sweep.test if sweep.test.dp is None else replace(sweep.test, dp=despiked(sweep.test.dp))
+        lowest = min(float(despiked(one.test.u).min()) for one in group)
+        at_bottom = part.u <= lowest + SMALLEST_MOVE * np.ptp(test.u)
+        found.append(off_level(part, at_bottom, level))
+    return np.concatenate(found)
 
 
 def _pace(u: np.ndarray) -> float:
@@ -113,37 +220,6 @@ def nominal_dp(test: RampTest) -> float | None:
         return None
     shut = test.dp[(test.u >= 0) & (test.u <= SHUT * max(test.u.max(), 0))]
     return float(np.median(shut if shut.size >= 5 else test.dp[test.q <= np.quantile(test.q, 0.1)]))
-
-
-def lagged_command(time: np.ndarray, u: np.ndarray, lag: float) -> np.ndarray:
-    """Return the command to which each reading of a meter with a lag (s) belongs.
-
-    The clock (s) may stand still, as of a logger that stamps in whole seconds.
-    """
-    if lag <= 0:
-        return u
-    clock = _spread(time)
-    return np.asarray(np.interp(clock - lag, clock, u))
-
-
-def _spread(time: np.ndarray) -> np.ndarray:
-    """Return the clock with stamps that repeat spread evenly over the time to the next stamp, lost rows apart."""
-    stamps, first, count = np.unique(time, return_index=True, return_counts=True)
-    if count.max() == 1 or stamps.size < 2:
-        return time
-    gaps = np.diff(stamps, append=np.nan)
-    usual = float(np.nanmedian(gaps))
-    gaps = np.minimum(np.where(np.isnan(gaps), usual, gaps), usual)
-    rank = np.arange(time.size) - np.repeat(first, count)
-    return time + rank * np.repeat(gaps / count, count)
-
-
-def _without_command_spikes(test: RampTest) -> RampTest:
-    """Leave out samples whose command stands alone: their flow belongs to another command."""
-    away = np.abs(test.u - despiked(test.u))
-    usual = float(np.median(np.abs(np.diff(test.u))))
-    kept = away <= max(SPIKE * np.ptp(despiked(test.u)), SPIKE_STEPS * usual)
-    return test if kept.all() else test.part(kept)
 
 
 def _branch(test: RampTest, u: np.ndarray, known: np.ndarray, rows: slice, direction: int) -> Branch:
@@ -195,38 +271,3 @@ def _middle_of_hold(u: np.ndarray, turn: int, start: int, stop: int) -> int:
     lowest = u[start:stop].min() + HOLD * np.ptp(u)
     at_bottom = start + np.flatnonzero(u[start:stop] <= lowest)
     return int(at_bottom[at_bottom.size // 2]) if at_bottom.size else turn
-
-
-def despiked(u: np.ndarray) -> np.ndarray:
-    """Return the running median of three: a single sample that stands out is gone, a step stays where it was."""
-    if u.size < 3:
-        return u
-    left, middle, right = u[:-2], u[1:-1], u[2:]
-    inner = np.maximum(np.minimum(left, middle), np.minimum(np.maximum(left, middle), right))
-    return np.concatenate([u[:1], inner, u[-1:]])
-
-
-def sweep_direction(u: np.ndarray) -> np.ndarray:
-    """Return +1 or -1 for every sample: the direction of the sweep it lies in, deaf to noise and holds.
-
-    A turning point is an extreme after which the command has gone back by `TURN` of its range.
-    """
-    step = max(1, u.size // TURN_SEARCH_POINTS)
-    blocks = despiked(u)[: u.size // step * step].reshape(-1, step)
-    thinned = despiked(np.median(blocks, axis=1))
-    threshold = TURN * np.ptp(thinned)
-    direction = np.zeros(u.size, dtype=int)
-    low = high = start = 0
-    heading = 0
-    values = thinned.tolist()  # one number after the other: a list is several times faster than an array
-    for index, value in enumerate(values):
-        low = index if value < values[low] else low
-        high = index if value > values[high] else high
-        if heading >= 0 and values[high] - value > threshold:
-            direction[start * step : high * step] = 1
-            heading, start, low = -1, high, index
-        elif heading <= 0 and value - values[low] > threshold:
-            direction[start * step : low * step] = -1
-            heading, start, high = 1, low, index
-    direction[start * step :] = heading
-    return direction

@@ -236,7 +236,7 @@ def ramp_file_bytes(columns: Mapping[str, np.ndarray], comments: tuple[str, ...]
     Parameters
     ----------
     columns : mapping
-        Label with unit, such as ``"u_V"``, to an (N,) array.
+        Label with unit, such as ``"u_V"``, to an (N,) array, of numbers or of texts.
     comments : tuple of str
         Lines without the leading ``#``.
     compress : bool
@@ -246,6 +246,7 @@ def ramp_file_bytes(columns: Mapping[str, np.ndarray], comments: tuple[str, ...]
     for line in comments:
         out.write(f"# {line}\n")
     out.write(",".join(columns) + "\n")
-    np.savetxt(out, np.column_stack(list(columns.values())), fmt="%.4f", delimiter=",")
+    cells = [array if array.dtype.kind == "U" else np.char.mod("%.4f", array) for array in columns.values()]
+    np.savetxt(out, np.column_stack(cells), fmt="%s", delimiter=",")
     data = out.getvalue().encode()
     return gzip.compress(data, mtime=0) if compress else data

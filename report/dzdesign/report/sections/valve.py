@@ -26,24 +26,34 @@ def valve_sections(valve: ValveModel | None, compensator: Compensator | None) ->
         thresholds.append(thresholds_figure(side, guard, name, both))
         tables.append(thresholds_table(side, guard, f"Thresholds, {name} commands"))
         betas.append(beta_figure(side, guard, name, both, compensator if law else None))
-    drawn = tuple(figure for figure in betas if figure)
     meter = valve.meter
     return {
         "data": Section(
-            figures=tuple(fits),
+            figures=fits,
             lines=(
                 f"{counted(sum(len(side.tests) for side in valve.sides.values()), 'ramp test')}; full command "
                 f"{valve.u_max_V:g} V.",
                 f"Flow meter: floor {meter.floor_L_min:.2f} L/min; lag taken as {meter.lag_s:.3g} s "
                 f"({LAG[meter.lag_is]}).",
                 *(_trend(name, side) for name, side in valve.sides.items()),
+                *(
+                    f"{name.capitalize()} commands, from ramp to ramp: {side.certificate.repeatability.in_words()}."
+                    for name, side in valve.sides.items()
+                ),
                 *(f"{name.capitalize()} commands: not tested." for name in valve.untested_sides),
             ),
         ),
-        "thresholds": Section(figures=tuple(thresholds), tables=tuple(tables)),
+        "thresholds": Section(
+            figures=thresholds,
+            tables=tables,
+            lines=(
+                *(f"Premise, {name} commands: {side.premise}." for name, side in valve.sides.items()),
+                *(f"{warning.text}." for warning in valve.warnings if warning.code == "order"),
+            ),
+        ),
         "beta": Section(
-            figures=drawn,
-            missing="" if drawn else "One pressure drop was tested, so β is 1 and its trend is not known.",
+            figures=betas,
+            missing="" if any(betas) else "One pressure drop was tested, so β is 1 and its trend is not known.",
         ),
     }
 

@@ -1,0 +1,159 @@
+"""The pressure drop of a sweep, and what of a recording was not run at it.
+
+A pump is started, set and stopped while the logger runs. The rule. The level of a sweep is the pressure drop over the
+shut valve that goes with its first flow: what the supply did before it came up, or after it went, is none. A hold at
+the bottom whose pressure drop is off that level is left out, and so is a part of a sweep where the pressure is gone;
+a flow at another pressure drop stays, for it is brought to the nominal one sample by sample.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+
+from dzdesign.identify.constants import L_MIN, MPA
+from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.valve.left_out import LeftOut
+
+#: The first flow lies between these shares of the largest, and the valve is shut below the third.
+FIRST_FLOW, SHUT_FLOW = (0.05, 0.3), 0.03
+#: A flow counts from so many standard deviations of a reading on.
+FLOW_SIGNIFICANCE = 4.0
+#: The pressure drop over the shut valve goes with one at the first flow within this share of it: supplies sag.
+GOES_WITH = 0.25
+#: A first flow was run at one pressure drop if that of its two halves differs by less than this share.
+ONE_LEVEL = 0.15
+#: Fewest samples of the first flow, and of the shut valve, that show a level.
+FIRST_SAMPLES, SHUT_SAMPLES = 5, 10
+#: A hold's pressure drop is off the level by more than this share of it, and so many spreads of the shut valve's.
+OFF_LEVEL, OFF_SPREADS = 0.05, 5.0
+#: Within a sweep the pressure is another where it is off by this factor with no flow, and gone below this share of it.
+ANOTHER, GONE = 2.0, 0.1
+#: Samples between two stretches that are left out which go with them.
+BETWEEN = 5
+#: Usual steps of the clock beyond which rows are missing, as those of the other side.
+LOST_ROWS = 20
+
+Reason = Literal["option", "pressure", "no-flow", "no-ramp"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SweepLevel:
+    """The pressure drop of one sweep at (almost) no flow, Pa; None if it is unknown."""
+
+    dp: float | None
+    #: Whether a flow shows that it is the sweep's.
+    sure: bool
+    #: Whether there is a flow at its largest command.
+    flows: bool
+    #: Largest flow at which the valve counts as shut, m³/s, and spread of the pressure drop there, Pa.
+    shut_below: float
+    spread: float
+
+
+def sweep_level(test: RampTest, nominal: float | None, shut_share: float) -> SweepLevel:
+    """Return the level of a sweep.
+
+    Parameters
+    ----------
+    test : RampTest
+        Samples of the sweep, holds included.
+    nominal : float or None
+        What its samples below `shut_share` of the largest command show all together, Pa: the level where no flow tells.
+    shut_share : float
+        Share of the largest command below which the pressure drop is read.
+    """
+    top = float(test.u.max())
+    full = float(np.median(test.q[test.u >= 0.9 * top]))
+    noise = 1.4826 * float(np.median(np.abs(np.diff(test.q)))) / 2**0.5 if test.q.size > 1 else 0.0
+    flows = full > max(FLOW_SIGNIFICANCE * noise, 0.01 * L_MIN)
+    shut_below = max(SHUT_FLOW * full, FLOW_SIGNIFICANCE * noise)
+    unknown = SweepLevel(dp=nominal, sure=False, flows=flows, shut_below=shut_below, spread=0.0)
+    if test.dp is None or nominal is None or not flows:
+        return unknown
+    low, high = (share * full for share in FIRST_FLOW)
+    first = test.dp[(test.q > max(low, shut_below)) & (test.q < high)]
+    if first.size < FIRST_SAMPLES:
+        return unknown
+    at_first = float(np.median(first))
+    halves = [float(np.median(half)) for half in np.array_split(first, 2)]
+    if at_first <= 0 or abs(halves[0] - halves[1]) > ONE_LEVEL * at_first:
+        return unknown
+    goes_with = (test.q <= shut_below) & (np.abs(test.dp - at_first) <= GOES_WITH * at_first)
+    if np.count_nonzero(goes_with) < SHUT_SAMPLES:
+        return unknown
+    near_zero = goes_with & (test.u >= 0) & (test.u <= shut_share * top)
+    dp = float(np.median(test.dp[near_zero if np.count_nonzero(near_zero) >= FIRST_SAMPLES else goes_with]))
+    spread = 1.4826 * float(np.median(np.abs(test.dp[goes_with] - dp)))
+    return SweepLevel(dp=dp, sure=True, flows=flows, shut_below=shut_below, spread=spread)
+
+
+def off_level(test: RampTest, at_bottom: np.ndarray, level: SweepLevel) -> np.ndarray:
+    """Return which samples of a sweep were not run at its level (N,).
+
+    Parameters
+    ----------
+    test : RampTest
+        Samples of the sweep, their pressure drop freed of single odd ones.
+    at_bottom : (N,) array of bool
+        Where the command rests at its lowest.
+    level : SweepLevel
+        Of this sweep, or of the one that it makes a ramp with.
+    """
+    if test.dp is None or not level.dp or level.dp < 0 or not level.sure:
+        return np.zeros(test.u.size, dtype=bool)
+    shut, away = test.q <= level.shut_below, np.abs(test.dp - level.dp)
+    resting = shut & at_bottom & (away > OFF_LEVEL * level.dp)
+    moving = shut & ((test.dp * ANOTHER < level.dp) | (test.dp > ANOTHER * level.dp))
+    off: np.ndarray = (resting | moving | (test.dp < GONE * level.dp)) & (away > OFF_SPREADS * level.spread)
+    # A few samples between two such stretches are where a moving pressure crosses the level.
+    for start, end in pairwise(np.flatnonzero(off).tolist()):
+        if 1 < end - start <= BETWEEN + 1:
+            off[start:end] = True
+    return off
+
+
+def stretches(test: RampTest, rows: np.ndarray, reason: Reason) -> list[LeftOut]:
+    """Return the stretches that some rows of a recording make, given by number in rising order."""
+    step = float(np.median(np.diff(test.time))) if test.time.size > 1 else 0.0
+    ends = np.flatnonzero((np.diff(rows) > 1) | (np.diff(test.time[rows]) > LOST_ROWS * step)) + 1
+    return [left_out(test, part, reason) for part in np.split(rows, ends) if part.size]
+
+
+def joined(parts: Sequence[LeftOut], test: RampTest) -> list[LeftOut]:
+    """Return what was left out of a recording in the order of time, stretches that follow each other as one."""
+    found: list[LeftOut] = []
+    for part in sorted(parts, key=lambda part: part.from_s):
+        last = found[-1] if found else None
+        if last and last.reason == part.reason and not np.any((test.time > last.to_s) & (test.time < part.from_s)):
+            dp = (*(last.dp_MPa or ()), *(part.dp_MPa or ()))
+            found[-1] = replace(last, to_s=part.to_s, dp_MPa=(min(dp), max(dp)) if dp else None)
+        else:
+            found.append(part)
+    return found
+
+
+def left_out(test: RampTest, rows: np.ndarray, reason: Reason) -> LeftOut:
+    """Return what the record says of rows in a row."""
+    return LeftOut(
+        recording=test.source,
+        from_s=float(test.time[rows[0]]),
+        to_s=float(test.time[rows[-1]]),
+        reason=reason,
+        dp_MPa=None if test.dp is None else (float(test.dp[rows].min()) / MPA, float(test.dp[rows].max()) / MPA),
+    )
+
+
+def without_flow(levels: Sequence[SweepLevel], reach: Sequence[float]) -> list[bool]:
+    """Tell of each sweep whether it is none of a ramp test: no flow, with no pressure or far from full command.
+
+    `reach` is how far the command of each runs, V. Where all are, none is: the valve is shut, and that is to be said.
+    """
+    best = max((level.dp for level in levels if level.flows and level.dp), default=0.0)
+    idle = [
+        not level.flows and best > 0 and ((level.dp or best) < GONE * best or far < 0.5 * max(reach))
+        for level, far in zip(levels, reach, strict=True)
+    ]
+    return [False] * len(idle) if all(idle) else idle
