@@ -119,9 +119,7 @@ def command_ends(signal: PinSignal) -> tuple[Fraction, Fraction]:
         return signal.low, signal.high
     bottom, top, unit = signal.meaning.bottom, signal.meaning.top, signal.meaning.unit
     if not (measures(unit, "voltage") or measures(unit, "ratio")):
-        raise InputError(
-            f"the command '{signal.text}' stands for '{unit}', expected V or %, such as {COMMAND_EXAMPLE}"
-        )
+        raise InputError(f"the command '{signal.text}' stands for '{unit}', expected V or %, such as {COMMAND_EXAMPLE}")
     if not (bottom < top and bottom <= 0):
         raise InputError(
             f"the command '{signal.text}' runs from {float(bottom):g} to {float(top):g} {unit}, expected it to rise "
@@ -167,5 +165,7 @@ def _span_MPa(signal: PinSignal, meaning: Meaning) -> Fraction:
     """Return the pressure at a signal's upper end."""
     factor = si_factor(meaning.unit, "pressure")
     if meaning.bottom != 0:
-        raise InputError(f"the pressure signal '{signal.text}' begins at {float(meaning.bottom):g} {meaning.unit}, expected 0")
+        raise InputError(
+            f"the pressure signal '{signal.text}' begins at {float(meaning.bottom):g} {meaning.unit}, expected 0"
+        )
     return Fraction(round(meaning.top * Fraction(repr(factor))), 10**6)

@@ -108,8 +108,9 @@ def identify(arguments: IdentifyArguments) -> "ValveModel":
     options, record = identify_options(arguments), record_of(arguments.record)
     check_places(ValveModel, arguments.output, arguments.plots)
     tests = read_recordings(
-        arguments.ramps, u_max=options.u_max, columns=arguments.columns, dp=arguments.dp, skip_rows=arguments.skip_rows
-    )
+        arguments.ramps, u_max=options.u_max, columns=arguments.columns, dp=arguments.dp,
+        sample_rate=arguments.sample_rate, skip_rows=arguments.skip_rows,
+    )  # fmt: skip
     refuse_copies(tests)
     tests = in_order(parts_of(tests, arguments.from_, arguments.to), arguments.order)
     with stage_progress(f"fitting {len(tests)} recording{'s' if len(tests) > 1 else ''}"):

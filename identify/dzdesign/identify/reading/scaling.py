@@ -18,8 +18,9 @@ from dzdesign.identify.reading.column_labels import (
     same_unit,
 )
 
-#: What a transmitter gives, or an amplifier takes; beside these, numbers without a unit and per cent.
-SIGNALS = ("current", "voltage", "frequency")
+#: What a transmitter gives, or an amplifier takes; a range may also be of a frequency, per cent or bare numbers.
+TRANSMITTED = ("current", "voltage")
+SIGNALS = (*TRANSMITTED, "frequency")
 #: Full scale in the examples of messages.
 FULL_SCALE: Mapping[str, str] = {"u": "0..10 V", "Q": "0..50 L/min"}
 
@@ -107,7 +108,7 @@ def _full_scale(quantity: str) -> str:
 
 def _hint(quantity: str, column: Column) -> str:
     """Return what to write for a column that holds a transmitter's signal."""
-    if quantity == "time" or not any(measures(column.unit, kind) for kind in SIGNALS):
+    if quantity == "time" or not any(measures(column.unit, kind) for kind in TRANSMITTED):
         return ""
     return f"; say what the signal means, {range_example(quantity, column.label, column.unit)}"
 
