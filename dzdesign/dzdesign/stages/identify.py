@@ -6,7 +6,8 @@ from dataclasses import KW_ONLY, dataclass, fields
 from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.core.option_readers import number, percent, quantity
-from dzdesign.core.options import FIT, METER, RECORDINGS, AnyPath, Option, Paths, Text, Texts
+from dzdesign.core.options import FIT, METER, RECORDINGS, AnyPath, Option, Paths, Table, Text, Texts
+from dzdesign.stages.recording_parts import parts_of
 from dzdesign.stages.recordings import (
     RampArguments,
     check_places,
@@ -63,6 +64,11 @@ class IdentifyArguments(IdentifyChoices):
     order: Annotated[Texts | None, Option("FILE", RECORDINGS)] = None
     """Recordings in the order in which they were taken, such as "p1.csv, p5.csv, p1_again.csv", to tell a drift of the
     valve from the pressure drop (default: from date and time in the recordings)."""
+    from_: Annotated[Table, Option("T", RECORDINGS, example="12.3 s")] = None
+    """Time of a recording's clock before which its rows are left out, such as "12.3 s" (dates count from the first
+    row). In the options file also a table [from] from file name or pattern to time."""
+    to: Annotated[Table, Option("T", RECORDINGS, example="62.1 s")] = None
+    """Time after which its rows are left out. In the options file also a table [to]."""
     plots: Annotated[AnyPath | None, Option("DIR")] = None
     """Folder for plots in SVG and PNG: flow of each pressure drop with its knees, onsets and residuals; thresholds,
     bounds and beta over dP."""
@@ -105,7 +111,7 @@ def identify(arguments: IdentifyArguments) -> "ValveModel":
         arguments.ramps, u_max=options.u_max, columns=arguments.columns, dp=arguments.dp, skip_rows=arguments.skip_rows
     )
     refuse_copies(tests)
-    tests = in_order(tests, arguments.order)
+    tests = in_order(parts_of(tests, arguments.from_, arguments.to), arguments.order)
     with stage_progress(f"fitting {len(tests)} recording{'s' if len(tests) > 1 else ''}"):
         found = identify_sides(tests, options, record)
     write_results(found.model, arguments.output, arguments.plots, lambda: plot_files(found))

@@ -76,8 +76,9 @@ def _side_lines(side: "SideModel") -> tuple[str, ...]:
         f"{certificate.level_L_min:.2f} L/min (noise level: the meter's floor, what averages resolve, or 0.5 % of the "
         "largest flow) counts as none",
         f"from ramp to ramp: {certificate.repeatability.in_words()}",
-        f"u_min0 = {side.reference.u_min_V:.4f} V{at}: the largest certified offset. Between two tests only the lower "
-        "of their bounds is certain, so each offset stays under the neighbour's; more tests raise it",
+        f"u_min0 = {side.reference.u_min_V:.4f} V{at}: the largest certified offset, under the bounds of both "
+        "neighbouring tests; more tests raise it",
+        f"premise: {side.premise}",
         f"drive range of the valve k x_max/u_max = {side.k_x_max_over_u_max:.4f}: command from the knee to full "
         "stroke, as a share of full command; the law's counts from its offset, which lies lower"
         + (f"; k = {side.k_V_mm:.4f} V/mm" if side.k_V_mm is not None else ""),

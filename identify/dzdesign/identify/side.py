@@ -185,6 +185,7 @@ def _test_result(group: DescribedTests, knees: KneeFit, row: int, guarded: Thres
         spool_ripple_V=max(shape.ripple for shape in item.branches),
         outliers=sum(shape.outliers for shape in item.branches),
         ramps=item.ramps,
+        left_out=item.left_out,
     )
 
 

@@ -8,6 +8,7 @@ from dzdesign.identify.knees.between_ramps import BetweenRamps
 from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.knees.meter_lag import MeterLag
 from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.valve.left_out import LeftOut
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,6 +27,7 @@ class DescribedTest:
     when: tuple[float, ...]
     #: Source and SHA-256 of every file in it.
     files: tuple[tuple[str, str], ...]
+    left_out: tuple[LeftOut, ...]
 
     @property
     def branches(self) -> list[BranchShape]:

@@ -1,5 +1,6 @@
 """Ramp tests made comparable: zero error out, branches apart, at the nominal pressure drop, in order, described."""
 
+import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -23,9 +24,11 @@ from dzdesign.identify.knees.refusals import (
 )
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.command import despiked
-from dzdesign.identify.ramps.pooling import PooledTest, pool_ramps
+from dzdesign.identify.ramps.pooling import PooledTest, name_of_ramp, pool_ramps
 from dzdesign.identify.ramps.splitting import Ramp, nominal_dp, split_ramps
 from dzdesign.identify.reading.ramp_test import RampTest
+
+logger = logging.getLogger(__name__)
 
 #: A recording whose command moves by less than this share of u_max is no part of a ramp.
 SMALLEST_SWEEP = 0.1
@@ -47,6 +50,8 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
     lag = find_lag(ramps, options)
     pooled = pool_ramps(ramps if lag.origin != "identified" else split_recordings(tests, options, lag.seconds))
     pooled = _in_order_of_pressure(pooled)
+    for left_out in dict.fromkeys(part for item in pooled for part in item.left_out):
+        logger.info("%s", left_out)
     _refuse_what_shows_no_dead_zone(pooled, options)
     floor = options.meter_floor if options.meter_floor is not None else found_floor(pooled, options)
     described = _described(pooled, floor, lag, options)
@@ -94,7 +99,7 @@ def split_recordings(tests: Sequence[RampTest], options: IdentifyOptions, lag: f
         if np.ptp(test.u) < SMALLEST_SWEEP * options.u_max or not any(ramp.branches for ramp in found):
             raise _no_ramp(test)
         for ramp in found:
-            refuse_a_wrong_pressure(test.source, ramp.dp)
+            refuse_a_wrong_pressure(name_of_ramp(ramp), ramp.dp)
         for item in pool_ramps(found) if top >= FULL_SWEEP * highest else ():  # a fragment may well see no flow
             refuse_a_shut_valve(item.test.source, item.branches, options.u_max)
         ramps += found
@@ -176,6 +181,7 @@ def _describe(item: PooledTest, shapes: Iterator[BranchShape], u_max: float) -> 
         ramps=item.ramps,
         when=item.when,
         files=item.files,
+        left_out=item.left_out,
     )
 
 

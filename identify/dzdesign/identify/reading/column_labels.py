@@ -71,7 +71,7 @@ def parse_columns(text: str | Mapping[str, str]) -> dict[str, str]:
     {'u': 'AO0:V', 'Q': 'Flow (L/min)'}
     """
     if isinstance(text, str):
-        entries = [entry.partition("=")[::2] for entry in re.split(r"[,;]\s*(?=\w+\s*=)", text)]
+        entries = [entry.partition("=")[::2] for entry in re.split(r"[,;]\s*(?=[^\W\d]\w*\s*=)", text)]
     else:
         entries = list(text.items())
     columns: dict[str, str] = {}
@@ -168,6 +168,7 @@ def _chosen_column(table: Table, quantity: str, text: str) -> Column:
         raise InputError(
             f"'{table.path}' column '{label}' has no unit; write for example "
             f'--columns "{quantity}={label}:{EXAMPLE_UNITS[quantity]}"'
+            + (f', or what its numbers mean, --columns "u={label}:0..1 = 0..100 %"' if quantity == "u" else "")
         )
     return Column(label=label, unit=unit, stated=stated)
 

@@ -142,6 +142,17 @@ class SideModel:
                 raise RuleError(f"the tests' guarded thresholds and bounds are not those of the {guard} curve")
 
     @property
+    def premise(self) -> str:
+        """What the bounds between the tests rest on, in words."""
+        if len(self.tests) < 2:
+            return "one pressure drop was tested: the bound holds there, and nothing is certified at another"
+        return (
+            f"{len(self.tests)} pressure drops were tested. Between two of them the bound is the lower one's, on the "
+            "premise that the threshold runs one way there, which no test checks: a threshold that is lowest between "
+            "two tests would lie below it"
+        )
+
+    @property
     def curve(self) -> GuardCurve:
         """The curve of the guard that is protected by default."""
         return self.guards[self.certificate.guard]

@@ -43,7 +43,14 @@ def valve_sections(valve: ValveModel | None, compensator: Compensator | None) ->
                 *(f"{name.capitalize()} commands: not tested." for name in valve.untested_sides),
             ),
         ),
-        "thresholds": Section(figures=thresholds, tables=tables),
+        "thresholds": Section(
+            figures=thresholds,
+            tables=tables,
+            lines=(
+                *(f"Premise, {name} commands: {side.premise}." for name, side in valve.sides.items()),
+                *(f"{warning.text}." for warning in valve.warnings if warning.code == "order"),
+            ),
+        ),
         "beta": Section(
             figures=betas,
             missing="" if any(betas) else "One pressure drop was tested, so β is 1 and its trend is not known.",
