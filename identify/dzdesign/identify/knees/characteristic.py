@@ -29,22 +29,34 @@ TAIL_ROUNDS = 8
 
 
 def describe_branches(
-    reads: Sequence[PreparedBranch], *, u_max: float, window: tuple[float, float], noise_level: float | None = None
+    reads: Sequence[PreparedBranch],
+    *,
+    u_max: float,
+    window: tuple[float, float],
+    noise_level: float | None = None,
+    longest_lag: float = 0.0,
 ) -> list[BranchShape]:
     """Describe all branches of a valve: where the straight part lies, its line, its noise, and the tail below it.
 
-    One meter has read them all, so they tell its noise together; `window`, `noise_level` and errors are those of
-    `find_straight_parts`.
+    One meter has read them all, so they tell its noise together, and its lag, s, is at most `longest_lag`; `window`,
+    `noise_level` and errors are those of `find_straight_parts`.
     """
     parts = find_straight_parts(reads, u_max=u_max, window=window, noise_level=noise_level)
-    return [_describe(parts, index, read, u_max) for index, read in enumerate(reads)]
+    return [_describe(parts, index, read, longest_lag, u_max) for index, read in enumerate(reads)]
 
 
-def _describe(parts: StraightParts, index: int, read: PreparedBranch, u_max: float) -> BranchShape:
+def _describe(parts: StraightParts, index: int, read: PreparedBranch, longest_lag: float, u_max: float) -> BranchShape:
     line, level, noise = parts.lines[index], parts.levels[index], parts.noises[index]
     branch, kept = read.branch, line.kept
     dead_zone = look_into_dead_zone(
-        read, line, least=parts.least[index], level=level, noise=noise, correlation=parts.correlation, u_max=u_max
+        read,
+        line,
+        least=parts.least[index],
+        level=level,
+        noise=noise,
+        correlation=parts.correlation,
+        shift=longest_lag * branch.rate if math.isfinite(branch.rate) else 0.0,
+        u_max=u_max,
     )
     tail = _find_tail(read, level, line, noise, parts.correlation, u_max)
     onset, onset_se = _find_onset(read, tail, level, noise)

@@ -21,7 +21,8 @@ STRETCHES, STEP, OF_THE_LEVEL = (0.03, 0.015, 0.0075), 0.25, 0.015
 RESOLVED, SEEN = 6.0, 0.6
 #: Commands that tell what the meter reads while the valve is shut: from this share of u_max to this of the knee.
 SHUT_FROM, SHUT_TO = 0.01, 0.4
-#: Fewest readings of an average, and standard errors of the knee that the uppermost stretch keeps off it.
+#: Fewest readings of an average, and standard errors of the knee, and shifts by the meter's lag, that the uppermost
+#: stretch keeps off it.
 FEWEST, OFF_THE_KNEE = 10, 2.0
 
 
@@ -34,7 +35,15 @@ class DeadZone:
 
 
 def look_into_dead_zone(
-    read: PreparedBranch, line: GatedLine, *, least: float, level: float, noise: float, correlation: float, u_max: float
+    read: PreparedBranch,
+    line: GatedLine,
+    *,
+    least: float,
+    level: float,
+    noise: float,
+    correlation: float,
+    shift: float,
+    u_max: float,
 ) -> DeadZone:
     """Average the readings below the knee.
 
@@ -50,6 +59,8 @@ def look_into_dead_zone(
         Standard deviation of a reading while the valve is shut, m³/s.
     correlation : float
         Of the noise of neighbouring samples.
+    shift : float
+        What the meter's lag shifts the flow by at most, V: so near to the knee a filter rounds any edge.
     u_max : float
         Full command, V.
     """
@@ -57,7 +68,7 @@ def look_into_dead_zone(
     order = np.argsort(u, kind="stable")
     u, y = u[order], y[order]
     shut = y[slice(*np.searchsorted(u, [SHUT_FROM * u_max, SHUT_TO * line.knee]))]
-    top = line.knee - OFF_THE_KNEE * line.knee_se
+    top = line.knee - OFF_THE_KNEE * (line.knee_se + shift)
     highest = _stretch(u, top, OF_THE_LEVEL * u_max)
     if min(shut.size, np.ptp(highest)) < FEWEST:
         return DeadZone(level, 0.0)

@@ -13,7 +13,7 @@ from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.knees.characteristic import describe_branches, find_meter_floor
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
 from dzdesign.identify.knees.gated_line import prepare_branch
-from dzdesign.identify.knees.meter_lag import find_lag
+from dzdesign.identify.knees.meter_lag import MeterLag, find_lag
 from dzdesign.identify.knees.profile import largest_flow
 from dzdesign.identify.knees.readings_at_rest import find_rest_flows
 from dzdesign.identify.knees.refusals import (
@@ -54,12 +54,12 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
         logger.info("%s", left_out)
     _refuse_what_shows_no_dead_zone(pooled, options)
     floor = options.meter_floor if options.meter_floor is not None else found_floor(pooled, options)
-    described = _described(pooled, floor, options)
+    described = _described(pooled, floor, lag, options)
     _refuse_mixed_branches(described)
     between = [_between_ramps(described, column, options) for column in (0, 1)]
     if any(np.any(shift != 0) for found in between if found for shift in found.shifts):
         moved = [_with_ramps_together(item, row, between) for row, item in enumerate(pooled)]
-        described = _described(moved, floor, options)
+        described = _described(moved, floor, lag, options)
     return DescribedTests(
         tests=tuple(described),
         between_ramps=(between[0], between[1]),
@@ -129,7 +129,7 @@ def found_floor(pooled: list[PooledTest], options: IdentifyOptions) -> float:
     return max((floor for floor in floors if floor is not None), default=0.0)
 
 
-def _described(pooled: list[PooledTest], floor: float, options: IdentifyOptions) -> list[DescribedTest]:
+def _described(pooled: list[PooledTest], floor: float, lag: MeterLag, options: IdentifyOptions) -> list[DescribedTest]:
     """Describe the branches of all tests."""
     reads = [
         prepare_branch(branch, item.test, u_max=options.u_max, floor=floor)
@@ -138,7 +138,13 @@ def _described(pooled: list[PooledTest], floor: float, options: IdentifyOptions)
     ]
     for read in reads:
         refuse_a_jump(read, options.u_max)
-    shapes = describe_branches(reads, u_max=options.u_max, window=options.knee_window, noise_level=options.noise_level)
+    shapes = describe_branches(
+        reads,
+        u_max=options.u_max,
+        window=options.knee_window,
+        noise_level=options.noise_level,
+        longest_lag=lag.seconds + lag.longer,
+    )
     for shape in shapes:
         refuse_an_impossible_knee(shape.prepared.branch, shape.knee, shape.prepared.source, options.u_max)
     of_tests = iter(shapes)
