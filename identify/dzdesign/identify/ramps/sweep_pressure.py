@@ -27,10 +27,16 @@ GOES_WITH = 0.25
 ONE_LEVEL = 0.15
 #: Fewest samples of the first flow, and of the shut valve, that show a level.
 FIRST_SAMPLES, SHUT_SAMPLES = 5, 10
-#: A hold's pressure drop is off the level by more than this share of it, and so many spreads of the shut valve's.
-OFF_LEVEL, OFF_SPREADS = 0.05, 5.0
+#: Share of the shut valve's samples, those of the largest commands, that stand nearest to the edge.
+NEAR_EDGE = 0.25
+#: The pressure drop near zero is off the level by more than this share of it, and so many spreads of the shut valve's.
+OFF_LEVEL, OFF_SPREADS = 0.02, 5.0
 #: Within a sweep the pressure is another where it is off by this factor with no flow, and gone below this share of it.
 ANOTHER, GONE = 2.0, 0.1
+#: A sweep with no flow has no pressure below this share of the largest level.
+NO_PRESSURE = 0.02
+#: Samples whose median is no spike.
+RUN = 5
 #: Samples between two stretches that are left out which go with them.
 BETWEEN = 5
 #: Usual steps of the clock beyond which rows are missing, as those of the other side.
@@ -66,7 +72,7 @@ def sweep_level(test: RampTest, nominal: float | None, shut_share: float) -> Swe
         Share of the largest command below which the pressure drop is read.
     """
     top = float(test.u.max())
-    full = float(np.median(test.q[test.u >= 0.9 * top]))
+    full = _largest_flow(test.q[test.u >= 0.9 * top])
     noise = 1.4826 * float(np.median(np.abs(np.diff(test.q)))) / 2**0.5 if test.q.size > 1 else 0.0
     flows = full > max(FLOW_SIGNIFICANCE * noise, 0.01 * L_MIN)
     shut_below = max(SHUT_FLOW * full, FLOW_SIGNIFICANCE * noise)
@@ -85,9 +91,21 @@ def sweep_level(test: RampTest, nominal: float | None, shut_share: float) -> Swe
     if np.count_nonzero(goes_with) < SHUT_SAMPLES:
         return unknown
     near_zero = goes_with & (test.u >= 0) & (test.u <= shut_share * top)
-    dp = float(np.median(test.dp[near_zero if np.count_nonzero(near_zero) >= FIRST_SAMPLES else goes_with]))
-    spread = 1.4826 * float(np.median(np.abs(test.dp[goes_with] - dp)))
+    # Near zero the pressure may not have come up yet, or have gone already: below the edge it has been there longest.
+    near_edge = test.dp[goes_with & (test.u >= np.quantile(test.u[goes_with], 1 - NEAR_EDGE))]
+    dp = float(np.median(near_edge))
+    spread = 1.4826 * float(np.median(np.abs(near_edge - dp)))
+    at_zero = float(np.median(test.dp[near_zero])) if np.count_nonzero(near_zero) >= FIRST_SAMPLES else dp
+    if abs(at_zero - dp) <= max(OFF_LEVEL * dp, 3 * spread / max(np.count_nonzero(near_zero), 1) ** 0.5):
+        dp = at_zero
     return SweepLevel(dp=dp, sure=True, flows=flows, shut_below=shut_below, spread=spread)
+
+
+def _largest_flow(q: np.ndarray) -> float:
+    """Return the largest flow that is no spike; a pump may have run for a part of the time only."""
+    if q.size < RUN:
+        return float(np.median(q))
+    return float(np.median(q[: q.size // RUN * RUN].reshape(-1, RUN), axis=1).max())
 
 
 def off_level(test: RampTest, at_bottom: np.ndarray, level: SweepLevel) -> np.ndarray:
@@ -153,7 +171,7 @@ def without_flow(levels: Sequence[SweepLevel], reach: Sequence[float]) -> list[b
     """
     best = max((level.dp for level in levels if level.flows and level.dp), default=0.0)
     idle = [
-        not level.flows and best > 0 and ((level.dp or best) < GONE * best or far < 0.5 * max(reach))
+        not level.flows and best > 0 and ((level.dp or best) < NO_PRESSURE * best or far < 0.5 * max(reach))
         for level, far in zip(levels, reach, strict=True)
     ]
     return [False] * len(idle) if all(idle) else idle
