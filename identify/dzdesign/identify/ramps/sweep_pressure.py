@@ -6,6 +6,7 @@ the bottom whose pressure drop is off that level is left out, and so is a part o
 a flow at another pressure drop stays, for it is brought to the nominal one sample by sample.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -27,8 +28,8 @@ GOES_WITH = 0.25
 ONE_LEVEL = 0.15
 #: Fewest samples of the first flow, and of the shut valve, that show a level.
 FIRST_SAMPLES, SHUT_SAMPLES = 5, 10
-#: Share of the shut valve's samples, those of the largest commands, that stand nearest to the edge.
-NEAR_EDGE = 0.25
+#: Share of the command at the first flow from which the shut valve is near its edge.
+NEAR_EDGE = 0.5
 #: The pressure drop near zero is off the level by more than this share of it, and so many spreads of the shut valve's.
 OFF_LEVEL, OFF_SPREADS = 0.02, 5.0
 #: Within a sweep the pressure is another where it is off by this factor with no flow, and gone below this share of it.
@@ -57,6 +58,8 @@ class SweepLevel:
     #: Largest flow at which the valve counts as shut, m³/s, and spread of the pressure drop there, Pa.
     shut_below: float
     spread: float
+    #: Whether the pressure drop near zero is another, all in all: it had not come up yet, or had gone.
+    moves_at_zero: bool = False
 
 
 def sweep_level(test: RampTest, nominal: float | None, shut_share: float) -> SweepLevel:
@@ -80,25 +83,30 @@ def sweep_level(test: RampTest, nominal: float | None, shut_share: float) -> Swe
     if test.dp is None or nominal is None or not flows:
         return unknown
     low, high = (share * full for share in FIRST_FLOW)
-    first = test.dp[(test.q > max(low, shut_below)) & (test.q < high)]
-    if first.size < FIRST_SAMPLES:
+    first = (test.q > max(low, shut_below)) & (test.q < high)
+    if np.count_nonzero(first) < FIRST_SAMPLES:
         return unknown
-    at_first = float(np.median(first))
-    halves = [float(np.median(half)) for half in np.array_split(first, 2)]
+    at_first, edge = float(np.median(test.dp[first])), float(np.median(test.u[first]))
+    halves = [float(np.median(half)) for half in np.array_split(test.dp[first], 2)]
     if at_first <= 0 or abs(halves[0] - halves[1]) > ONE_LEVEL * at_first:
         return unknown
     goes_with = (test.q <= shut_below) & (np.abs(test.dp - at_first) <= GOES_WITH * at_first)
     if np.count_nonzero(goes_with) < SHUT_SAMPLES:
         return unknown
-    near_zero = goes_with & (test.u >= 0) & (test.u <= shut_share * top)
+    near_zero = test.dp[goes_with & (test.u >= 0) & (test.u <= shut_share * top)]
     # Near zero the pressure may not have come up yet, or have gone already: below the edge it has been there longest.
-    near_edge = test.dp[goes_with & (test.u >= np.quantile(test.u[goes_with], 1 - NEAR_EDGE))]
+    near_edge = test.dp[goes_with & (test.u >= NEAR_EDGE * edge) & (test.u <= edge)]
+    if near_edge.size < FIRST_SAMPLES:
+        near_edge = test.dp[goes_with]
     dp = float(np.median(near_edge))
     spread = 1.4826 * float(np.median(np.abs(near_edge - dp)))
-    at_zero = float(np.median(test.dp[near_zero])) if np.count_nonzero(near_zero) >= FIRST_SAMPLES else dp
-    if abs(at_zero - dp) <= max(OFF_LEVEL * dp, 3 * spread / max(np.count_nonzero(near_zero), 1) ** 0.5):
-        dp = at_zero
-    return SweepLevel(dp=dp, sure=True, flows=flows, shut_below=shut_below, spread=spread)
+    moves = False
+    if near_zero.size >= FIRST_SAMPLES:
+        at_zero = float(np.median(near_zero))
+        error = 3 * spread / math.sqrt(min(near_zero.size, near_edge.size))
+        moves = abs(at_zero - dp) > max(OFF_LEVEL * dp, error)
+        dp = dp if moves else at_zero
+    return SweepLevel(dp=dp, sure=True, flows=flows, shut_below=shut_below, spread=spread, moves_at_zero=moves)
 
 
 def _largest_flow(q: np.ndarray) -> float:
@@ -126,6 +134,8 @@ def off_level(test: RampTest, at_bottom: np.ndarray, level: SweepLevel) -> np.nd
     resting = shut & at_bottom & (away > OFF_LEVEL * level.dp)
     moving = shut & ((test.dp * ANOTHER < level.dp) | (test.dp > ANOTHER * level.dp))
     off: np.ndarray = (resting | moving | (test.dp < GONE * level.dp)) & (away > OFF_SPREADS * level.spread)
+    if level.moves_at_zero:  # of noisy readings each may be the level's
+        off |= shut & at_bottom
     # A few samples between two such stretches are where a moving pressure crosses the level.
     for start, end in pairwise(np.flatnonzero(off).tolist()):
         if 1 < end - start <= BETWEEN + 1:
