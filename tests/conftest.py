@@ -12,7 +12,7 @@ import pytest
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.example import example_folder as bundled_folder
 from dzdesign.identify.reading.ramp_files import read_ramp_file
-from tests.support.wording import Wording
+from tests.support.wording import Wording, name_of_tests
 
 
 def pytest_addoption(parser):
@@ -28,8 +28,11 @@ def page_of_a_file(monkeypatch):
 
 @pytest.fixture
 def wording(request, tmp_path) -> Wording:
-    """Compare whole messages with tests/goldens/messages.txt: `wording("group: case", text)`."""
-    return Wording(request.config.getoption("--update-goldens"), tmp_path)
+    """Compare whole messages with those kept: `wording("group: case", text)`, `with wording.refusal(Error):`."""
+    node = request.node
+    case = f" [{node.callspec.id}]" if hasattr(node, "callspec") else ""
+    test = f"{name_of_tests(node.path.stem)}: {name_of_tests(node.originalname)}{case}"
+    return Wording(request.config.getoption("--update-goldens"), tmp_path, test=test)
 
 
 @pytest.fixture(scope="session")
@@ -85,7 +88,7 @@ def reported_demo(example_valve, tmp_path_factory):
     from dzdesign.codegen.project import generate
     from dzdesign.core.artefact_types import to_json_bytes
     from dzdesign.design.designing import design
-    from dzdesign.regeneration import with_regenerated
+    from dzdesign.regeneration import regenerated
     from dzdesign.report.valve_report import with_report
     from dzdesign.verify.closed_loop.loop import RampSequence
     from dzdesign.verify.verification import evidence_files, evidence_manifest, verify
@@ -99,7 +102,7 @@ def reported_demo(example_valve, tmp_path_factory):
     firmware = generate(compensator, "f28335", compensator_json.encode())
     write_folder(folder / "firmware", firmware.files, firmware.manifest)
     evidence = verify(folder / "firmware", sequence=RampSequence(rest=0.5, ramp=10.0, top=0.5))
-    evidence = with_regenerated(evidence, folder / "firmware")
+    evidence = evidence.with_checks(regenerated(folder / "firmware"))
     files = with_report(evidence_files(evidence), folder / "firmware", folder / "evidence")
     write_folder(folder / "evidence", files, evidence_manifest(evidence.evidence))
     return folder

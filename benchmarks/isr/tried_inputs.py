@@ -44,7 +44,7 @@ def expected_compares(compensator: Compensator, inputs: Sequence[Codes]) -> list
     compares = []
     for u, p_a, p_b in inputs:
         possible = max(p_a, p_b) <= exact.code_max
-        corners = exact.corners(exact.betas(p_a - p_b if possible else None))
+        corners = exact.corners(exact.betas(p_a - p_b if possible else -exact.reverse - 1))
         # An impossible command lets the valve go.
         compares.append(exact.compare_value(u, corners) if u <= exact.code_max else 0)
     return compares

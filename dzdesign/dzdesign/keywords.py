@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
 from typing import Any, ForwardRef, ParamSpec, TypeVar, get_args
 
-from dzdesign.core.errors import InputError, nearest, quoted
+from dzdesign.core.errors import DzdesignError, InputError, nearest, quoted
 from dzdesign.core.options import Argument, arguments_of
 from dzdesign.terminal.progress import reporting
 
@@ -46,14 +46,24 @@ def with_keywords(declaration: Callable[P, A], stage: Callable[[A], R]) -> Calla
         bound = signature.bind(*args, **kwargs)
         for key, value in bound.arguments.items():
             bound.arguments[key] = _checked(declared[key], value)
-        with reporting(quiet=True, verbose=False):
-            return stage(declaration(*bound.args, **bound.kwargs))
+        try:
+            with reporting(quiet=True, verbose=False):
+                return stage(declaration(*bound.args, **bound.kwargs))
+        except DzdesignError as error:
+            raise type(error)(_in_keywords(str(error), declared)) from error
 
     plain = [each.replace(annotation=_plain(each.annotation)) for each in signature.parameters.values()]
     result = inspect.signature(stage).return_annotation
     call.__signature__ = inspect.Signature(plain, return_annotation=result)  # type: ignore[attr-defined]
     call.__doc__ = SECTION.sub(lambda found: _parameters(declared, found[1]) + found[0], stage.__doc__ or "", count=1)
     return call
+
+
+def _in_keywords(message: str, declared: Mapping[str, Argument]) -> str:
+    """Return a message with options as keywords: stages name them as the command line does, by which most call them."""
+    keywords = {argument.flag: argument.name for argument in declared.values()}
+    keywords |= {argument.option.short: argument.name for argument in declared.values() if argument.option.short}
+    return re.sub(r"(?<![\w-])--?[a-z][\w-]*", lambda found: keywords.get(found[0], found[0]), message)
 
 
 def _plain(annotation: Any) -> Any:
@@ -87,24 +97,22 @@ def _kind(argument: Argument) -> str:
 def _checked(argument: Argument, value: Any) -> Any:
     """Return a value, an iterable as a list; refuse one that does not fit."""
     kinds, name = argument.kinds, argument.name
-    if {int, float} & kinds:  # read by what it is for, which refuses what can't be a number
-        return value
-    if argument.result_class in (one.__name__ for one in type(value).__mro__):
+    # A number is read by what it is for, which refuses what can't be one.
+    fits = bool({int, float} & kinds) or isinstance(value, tuple(kinds - {Mapping, Iterable}))
+    if fits or argument.result_class in (one.__name__ for one in type(value).__mro__):
         return value
     if isinstance(value, Mapping) and argument.is_table:
-        for key, item in value.items():
-            if not argument.option.by_entry and not isinstance(item, str):
-                raise _of_another_kind(f"{name}[{key!r}]", item, argument)
-        return value
-    if isinstance(value, tuple(kinds - {Mapping, Iterable})):
-        return value
-    if Iterable not in kinds or not isinstance(value, Iterable) or isinstance(value, bytes | bytearray | Mapping):
-        raise _of_another_kind(name, value, argument)
-    items = list(value)
-    for index, item in enumerate(items):
-        if not isinstance(item, str | os.PathLike):
-            raise _of_another_kind(f"{name}[{index}]", item, argument)
-    return items
+        items = {} if argument.option.by_entry else {f"{name}[{key!r}]": item for key, item in value.items()}
+        wanted: tuple[type, ...] = (str,)
+    elif Iterable in kinds and isinstance(value, Iterable) and not isinstance(value, bytes | bytearray | Mapping):
+        value = list(value)
+        items, wanted = {f"{name}[{index}]": item for index, item in enumerate(value)}, (str, os.PathLike)
+    else:
+        items, wanted = {name: value}, ()
+    for place, item in items.items():
+        if not isinstance(item, wanted):
+            raise _of_another_kind(place, item, argument)
+    return value
 
 
 def _of_another_kind(place: str, value: object, argument: Argument) -> InputError:

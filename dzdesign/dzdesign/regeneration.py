@@ -14,22 +14,13 @@ from dzdesign.core.errors import InputError, quoted
 if TYPE_CHECKING:
     from dzdesign.design.firmware_manifest import FirmwareManifest
     from dzdesign.verify.requirements import Check
-    from dzdesign.verify.verification import Verification
-
-
-def with_regenerated(verification: "Verification", folder: Path) -> "Verification":
-    """Return a verification with the check of `regenerated`."""
-    return verification.with_checks(regenerated(folder))
 
 
 def regenerated(folder: Path) -> "Check":
     """Tell whether every file is what `codegen` makes of compensator.json, but for those that are the user's.
 
-    Returns
-    -------
-    Check
-        Not checked where another version of dzdesign generated the firmware, or one with other targets: then nothing
-        tells an edited file from a generated one, so the firmware does not hold.
+    It is not checked where another version of dzdesign generated the firmware, or one with other targets: then nothing
+    tells an edited file from a generated one, so the firmware does not hold.
     """
     from dzdesign.codegen.project import generate
     from dzdesign.verify.firmware.folder import read_compensator, read_firmware_manifest

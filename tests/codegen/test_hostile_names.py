@@ -233,21 +233,21 @@ def manifest_with(folder: Path, change) -> None:
 
 @pytest.mark.parametrize("name", OUTSIDE)
 @pytest.mark.parametrize("key", ["files", "core"])
-def test_a_manifest_that_names_what_lies_outside(place, name, key):
+def test_a_manifest_that_names_what_lies_outside(place, name, key, wording):
     folder = place / "firmware"
     digest = sha256_of(b"years of work")
     manifest_with(folder, lambda it: it["files"].update({name: digest}) if key == "files" else it["core"].append(name))
-    with pytest.raises(InputError, match=r"no file inside of the folder|expected text that is not empty"):
+    with wording.refusal(InputError):
         read_firmware_manifest(folder)
     if key == "files":
-        with pytest.raises(InputError, match="was not made by dzdesign"):
+        with wording.refusal(InputError, "hostile names: a folder whose manifest is none"):
             write_folder(folder, {"core/a.c": "int b;\n"}, {"schema": "dzdesign.firmware/1"})
     assert (place / "secret").read_text() == "years of work" and (folder / "core/a.c").read_text() == "int a;\n"
 
 
 @pytest.mark.skipif(os.name == "nt", reason="links need a privilege on Windows")
 @pytest.mark.parametrize("kind", ["link", "folder", "loop", "pipe", "header"])
-def test_a_firmware_that_leads_elsewhere_is_not_compiled(place, kind):
+def test_a_firmware_that_leads_elsewhere_is_not_compiled(place, kind, wording):
     core = place / "firmware" / "core"
     if kind == "folder":
         (place / "other").mkdir()
@@ -262,7 +262,7 @@ def test_a_firmware_that_leads_elsewhere_is_not_compiled(place, kind):
             os.mkfifo(core / "a.c")
         else:
             (core / "a.c").symlink_to(place / "secret" if kind == "link" else core / "a.c")
-    with pytest.raises(InputError, match=r"outside of|is no file|can't be read"):
+    with wording.refusal(InputError):
         read_firmware_manifest(place / "firmware")
 
 
@@ -296,7 +296,7 @@ def test_verify_and_simulate_refuse_it_on_the_command_line(firmware_folder, tmp_
 
 
 @pytest.mark.skipif(os.name == "nt", reason="links need a privilege on Windows")
-def test_nothing_is_written_or_deleted_through_a_link(place):
+def test_nothing_is_written_or_deleted_through_a_link(place, wording):
     folder, secret = place / "firmware", place / "secret"
     (place / "plots").mkdir()
     (place / "plots" / "a.svg").symlink_to(secret)
@@ -307,7 +307,7 @@ def test_nothing_is_written_or_deleted_through_a_link(place):
     (folder / "notes").symlink_to(place / "elsewhere")
     write_folder(folder, {"core/a.c": "int b;\n"}, {"schema": "dzdesign.firmware/1"})
     assert (folder / "notes").is_symlink() and (place / "elsewhere" / "notes.txt").read_text() == "mine"
-    with pytest.raises(InputError, match=r"stands where a new file goes|can't be written"):
+    with wording.refusal(InputError):
         write_folder(folder, {"core/a.c": "int b;\n", "notes/x": "x"}, {"schema": "dzdesign.firmware/1"})
     assert sorted(path.name for path in (place / "elsewhere").iterdir()) == ["notes.txt"]
 

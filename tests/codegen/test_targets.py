@@ -122,15 +122,15 @@ def test_list_targets_is_a_line_each(capsys):
 
 
 @pytest.mark.parametrize("command", [["design", str(VALVE)], ["codegen", str(VALVE)]])
-def test_a_wrong_target_names_the_nearest_and_writes_nothing(command, tmp_path, capsys):
+def test_a_wrong_target_names_the_nearest_and_writes_nothing(command, tmp_path, capsys, wording):
     assert main([*command, "--target", "cortex-m3", "-o", str(tmp_path / "out")]) == 2
-    assert "did you mean 'cortex-m4'?" in capsys.readouterr().err
+    wording.of_test(capsys.readouterr().err)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_codegen_without_a_source_says_so(capsys):
+def test_codegen_without_a_source_says_so(capsys, wording):
     assert main(["codegen"]) == 2
-    assert "COMPENSATOR.json" in capsys.readouterr().err
+    wording.of_test(capsys.readouterr().err)
 
 
 @pytest.mark.slow
@@ -151,8 +151,8 @@ def test_design_and_codegen_fit_the_target(name, tmp_path, capsys):
     assert json.loads((one / "manifest.json").read_text())["target"] == name
 
 
-def test_a_compensator_of_another_target_is_refused_with_the_way_out():
-    with pytest.raises(InputError, match=r"60000.*40000.*dzdesign design --target f280049c"):
+def test_a_compensator_of_another_target_is_refused_with_the_way_out(wording):
+    with wording.refusal(InputError):
         generate(golden_compensator("f28335"), "f280049c")
     for name in ("host", "avr", "cortex-m4"):  # these have no converter and timer of their own
         assert "DZ_COMPARE_MAX 40000u" in generate(golden_compensator("f280049c"), name).files["core/dz_comp.h"]
@@ -176,16 +176,16 @@ def test_a_target_with_a_wrong_name_or_arithmetic_is_refused(change):
 
 
 @pytest.mark.parametrize(
-    ("module", "name", "value", "derived", "said"),
+    ("module", "name", "value", "derived"),
     [
-        (avr, "BAUD", 115_200, "baud_divider", "off at 16000000 Hz"),
-        (cortex_m4, "CLOCK_HZ", 25_000_001, "systick_counts", "SysTick"),
-        (cortex_m4, "CLOCK_HZ", 2_500 * (2**24 + 1), "systick_counts", "SysTick"),
+        (avr, "BAUD", 115_200, "baud_divider"),
+        (cortex_m4, "CLOCK_HZ", 25_000_001, "systick_counts"),
+        (cortex_m4, "CLOCK_HZ", 2_500 * (2**24 + 1), "systick_counts"),
     ],
 )
-def test_a_clock_that_does_not_divide_is_refused(monkeypatch, module, name, value, derived, said):
+def test_a_clock_that_does_not_divide_is_refused(monkeypatch, module, name, value, derived, wording):
     monkeypatch.setattr(module, name, value)
-    with pytest.raises(DzdesignError, match=said):
+    with wording.refusal(DzdesignError):
         getattr(module, derived)()
 
 

@@ -14,7 +14,7 @@ from dzdesign.design.designing import design
 from dzdesign.design.drive_functions import DriveFunctions
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.signals import CommandSignal, Signals
-from dzdesign.identify.identification import identify
+from tests.support.repeatable_valves import identify
 from tests.support.synthetic import Truth, signals_with_span, synthetic_ramp, with_side
 
 

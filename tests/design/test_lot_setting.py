@@ -14,9 +14,9 @@ from dzdesign.design.lot_setting import _limit, lot_setting
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.signal_text import command_signal, parse_signal
 from dzdesign.design.signals import Signals
-from dzdesign.identify.identification import identify
 from dzdesign.identify.valve.model import ValveModel
 from tests.support.paths import GOLDENS_FULL
+from tests.support.repeatable_valves import identify
 from tests.support.synthetic import Truth, synthetic_ramp
 
 BOTH_SIDES = GOLDENS_FULL / "valve.json"

@@ -14,7 +14,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.designing import design
 from dzdesign.design.option_texts import options_of
 from dzdesign.design.options import DesignOptions
-from dzdesign.regeneration import with_regenerated
+from dzdesign.regeneration import regenerated
 from dzdesign.verify.closed_loop.loop import RampSequence
 from tests.support.synthetic import SHARED, needs_compiler
 
@@ -62,7 +62,7 @@ def test_no_leak_and_one_per_cent_of_dead_zone_on_the_example(with_transition, e
     write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
     plant = read_plant(example_folder / "plant.toml")
     result = verify(tmp_path / "fw", plant, sequence=RampSequence(rest=1.0, ramp=40.0, top=1.0))
-    result = with_regenerated(result, tmp_path / "fw")
+    result = result.with_checks(regenerated(tmp_path / "fw"))
     assert result.holds, [check for check in result.evidence.checks if not check.holds]
     for loop in result.loops:
         assert loop.result.q_zero_L_min <= 1e-9

@@ -75,16 +75,16 @@ def test_the_options_are_those_of_the_commands():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda ramps: api.identify(ramps, u_max="10 bar"), "--u-max"),
+        (lambda ramps: api.identify(ramps, u_max="10 bar"), "u_max is '10 bar'"),
         (lambda ramps: api.identify("nothing_*.csv"), "no file matches 'nothing_*.csv'"),
         (lambda ramps: api.identify([ramps[0], ramps[0]]), "byte for byte the same recording"),
-        (lambda ramps: api.identify(ramps, output=ramps[0]), "left alone; choose another name with -o"),
+        (lambda ramps: api.identify(ramps, output=ramps[0]), "left alone; choose another name with output"),
         (lambda ramps: api.design("nothing.json"), "'nothing.json' does not exist"),
         (lambda ramps: api.design("nothing.json", target="f28334"), "did you mean 'f28335'?"),
         (lambda ramps: api.verify("nothing"), "does not exist"),
         (lambda ramps: api.init("nothing_*.csv"), "no file matches 'nothing_*.csv'"),
-        (lambda ramps: api.simulate(dp=["1 MPa", "1 MPa"]), "--dp repeats a pressure drop"),
-        (lambda ramps: api.simulate(dp="1 MPa", seed=-1), "--seed is -1, expected a whole number"),
+        (lambda ramps: api.simulate(dp=["1 MPa", "1 MPa"]), "dp repeats a pressure drop"),
+        (lambda ramps: api.simulate(dp="1 MPa", seed=-1), "seed is -1, expected a whole number"),
         (lambda ramps: api.assess(ramps, ramps), "byte for byte the same recording"),
         (lambda ramps: api.assess(ramps, ramps, limits={"linearty": "5 %"}), "did you mean 'linearity'?"),
         (lambda ramps: api.report("nothing"), "nothing"),
@@ -185,7 +185,7 @@ def test_a_valve_of_a_lot_that_fails_is_no_error_of_the_api(ramps, tmp_path):
 
 def test_print_sums_a_result_up(example_valve, example_compensator, example_firmware):
     side, text = example_valve.positive, str(example_valve)
-    assert text.startswith("Valve of 10 V, positive side, from 6 recordings\n")
+    assert text.startswith("Valve of 10 V, positive side, from 18 recordings\n")
     for test in side.tests:
         numbers = f"{test.dp_MPa:.3f} {test.u_knee_rising_V:.3f} {test.u_knee_falling_V:.3f} {test.u_knee_se_V:.4f}"
         assert re.search(r" +".join(map(re.escape, numbers.split())), text)

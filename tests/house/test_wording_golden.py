@@ -5,7 +5,7 @@ import re
 import pytest
 
 from tests.support.paths import TESTS
-from tests.support.wording import Wording, read_messages, write_messages
+from tests.support.wording import Wording, name_of_tests, read_messages, write_messages
 
 
 def test_a_changed_text_is_seen_and_an_update_keeps_it(tmp_path):
@@ -22,10 +22,11 @@ def test_a_changed_text_is_seen_and_an_update_keeps_it(tmp_path):
 
 
 def test_every_message_is_of_a_test():
-    """A name is ``group: case``; the group stands in the tests as it is written."""
+    """A name is ``group: case``; the group stands in the tests as it is written, or is the name of their file."""
     groups = {name.partition(": ")[0] for name in read_messages()}
-    sources = "".join(path.read_text(encoding="utf-8") for path in TESTS.rglob("test_*.py"))
-    asked = set(re.findall(r"wording\(\s*f?[\"']([^:\"'{]+): ", sources))
+    sources = {path.stem: path.read_text(encoding="utf-8") for path in TESTS.rglob("test_*.py")}
+    asked = set(re.findall(r"wording\(\s*f?[\"']([^:\"'{]+): ", "".join(sources.values())))
+    asked |= {name_of_tests(stem) for stem, text in sources.items() if re.search(r"wording\.(refusal|of_test)\(", text)}
     assert groups and groups == asked
 
 

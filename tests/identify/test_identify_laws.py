@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dzdesign.identify.identification import identify_sides
 from dzdesign.identify.options import IdentifyOptions
+from tests.support.repeatable_valves import identify_sides
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
 
 RATE_HZ = 20

@@ -4,11 +4,16 @@ A test gives a text and says which it is; ``pytest --update-goldens`` writes the
 """
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+
+import pytest
 
 from tests.support.paths import GOLDENS
 
 MESSAGES = GOLDENS / "messages.txt"
+HASH = re.compile(r"\b(?=\d*[a-f])[0-9a-f]{39,64}\b")
 ABOUT = "Messages as users see them, each under the name by which its test asks for it."
 
 
@@ -24,6 +29,11 @@ def write_messages(messages: dict[str, str], path: Path = MESSAGES) -> None:
     path.write_text("\n".join([f"{ABOUT}\n", *blocks]), encoding="utf-8", newline="")
 
 
+def name_of_tests(name: str) -> str:
+    """Return the name of a test or of their file as words."""
+    return name.removeprefix("test_").replace("_", " ")
+
+
 class Wording:
     """Compares texts with those that are kept.
 
@@ -33,15 +43,33 @@ class Wording:
         Keep what comes, in place of comparing.
     folder : Path
         Of the test: its path stands in no text.
+    test : str
+        Under which a text is kept to which the test gives no name.
     """
 
-    def __init__(self, update: bool, folder: Path, path: Path = MESSAGES) -> None:
-        self._update, self._folder, self._path = update, folder, path
+    def __init__(self, update: bool, folder: Path, path: Path = MESSAGES, test: str = "") -> None:
+        self._update, self._folder, self._path, self._test, self._count = update, folder, path, test, 0
+
+    @contextmanager
+    def refusal(self, error: type[Exception], name: str = "") -> Iterator[pytest.ExceptionInfo[Exception]]:
+        """Fail unless what follows raises `error` with the text that is kept under `name`, or else for this test."""
+        with pytest.raises(error) as caught:
+            yield caught
+        if name:
+            self(name, str(caught.value))
+        else:
+            self.of_test(str(caught.value))
+
+    def of_test(self, text: str) -> None:
+        """Fail unless `text` is what is kept for this test; several are counted."""
+        self._count += 1
+        self(self._test + (f" ({self._count})" if self._count > 1 else ""), text)
 
     def __call__(self, name: str, text: str) -> None:
-        """Fail unless `text` is what is kept under `name`."""
+        """Fail unless `text` is what is kept under `name`; a hash, which hangs on last digits, is not kept."""
+        text = text.replace(str(self._folder), "FOLDER").replace(str(self._folder.parent), "FOLDERS").rstrip("\n")
         # A NUL, in a name that can't be one, would make the file binary for git.
-        text = text.replace(str(self._folder), "FOLDER").replace("\0", "\\0").rstrip("\n")
+        text = HASH.sub("HASH", text).replace("\0", "\\0")
         messages = read_messages(self._path)
         if self._update:
             write_messages(messages | {name: text}, self._path)

@@ -45,11 +45,11 @@ def test_what_holds_follows_from_the_checks():
     assert not both.holds and both.verdict == f"{DOES_NOT_HOLD}: b; {NOT_CHECKED}: c"
 
 
-def test_evidence_is_read_as_it_was_written_and_not_where_it_contradicts_itself():
+def test_evidence_is_read_as_it_was_written_and_not_where_it_contradicts_itself(wording):
     failed = EVIDENCE.with_checks(replace(EVIDENCE.checks[0], holds=False))
     assert read_artefact(to_json_bytes(failed), Evidence, "verification.json") == failed
     document = json.loads(to_json_bytes(failed))
-    with pytest.raises(InputError, match="'holds' is True, but False follows"):
+    with wording.refusal(InputError, "evidence: said to hold, and does not"):
         read_artefact(to_json({**document, "holds": True}).encode(), Evidence, "verification.json")
 
 
@@ -63,11 +63,11 @@ def test_a_requirement_is_not_tried_until_a_check_of_it_is_there():
 
 
 @pytest.mark.parametrize("requirement", ALWAYS, ids=lambda each: each.id)
-def test_evidence_without_a_required_check_is_not_checked(requirement):
+def test_evidence_without_a_required_check_is_not_checked(requirement, wording):
     """Seeded: somebody took the check out, and made every hash anew."""
     document = json.loads(to_json_bytes(EVIDENCE))
     document["checks"] = [check for check in document["checks"] if check["id"] != requirement.id]
-    with pytest.raises(InputError, match="'holds' is True, but False follows"):
+    with wording.refusal(InputError, "evidence: said to hold, and does not"):
         read_artefact(to_json(document).encode(), Evidence, "verification.json")
     found = read_artefact(to_json({**document, "holds": False}).encode(), Evidence, "verification.json")
     assert not found.holds and found.verdict == f"{NOT_CHECKED}: {requirement.title}"

@@ -6,8 +6,8 @@ from dzdesign.assess.assessment import PressureAssessment
 from dzdesign.assess.curve_pairs import Comparison, CurvePair
 from dzdesign.assess.options import SETS, AssessOptions, Set
 from dzdesign.identify.constants import L_MIN, MPA
+from dzdesign.identify.data_quality.flow_meter import LIKELY_LAG
 from dzdesign.identify.data_quality.recordings import about_recordings
-from dzdesign.identify.data_quality.side_warnings import LIKELY_LAG
 from dzdesign.identify.valve.model import Warning_
 
 #: A command that ends below this share of u_max, and a dead zone that keeps this share of itself, are worth a word.

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from dzdesign.codegen.banner import Banner, banner_of, board_lines
 from dzdesign.codegen.core.certificate_text import zero_command
 from dzdesign.codegen.core.files import CORE_HEADERS, CORE_SOURCES, Values, core_files
-from dzdesign.codegen.provenance import constants_of, origin_of
+from dzdesign.codegen.provenance import constants_of
 from dzdesign.codegen.target import Target, folder_of
 from dzdesign.codegen.wiring import wiring_of
 from dzdesign.core.artefact_files import MANIFEST_NAME, read_bytes, sha256_of, write_folder
@@ -21,7 +21,7 @@ from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.firmware_manifest import FirmwareManifest
+from dzdesign.design.firmware_manifest import FirmwareManifest, FirmwareOrigin
 from dzdesign.design.target_inputs import Converter
 
 if TYPE_CHECKING:
@@ -122,7 +122,11 @@ def generate(
         law=compensator.law,
         core=tuple(sorted(core)),
         board=tuple(sorted(target.board)),
-        origin=origin_of(compensator, digest),
+        origin=FirmwareOrigin(
+            compensator_json=digest,
+            valve_json=compensator.valve_json_sha256,
+            ramp_tests=compensator.valve.made_from,
+        ),
         constants=constants_of(compensator, {path: file.constants for path, file in core.items()}),
         files={path: sha256_of(text.encode()) for path, text in files.items()},
     )

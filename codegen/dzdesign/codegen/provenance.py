@@ -4,16 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from dzdesign.codegen.core.constants import Constant
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.firmware_manifest import FirmwareConstant, FirmwareOrigin
-
-
-def origin_of(compensator: Compensator, compensator_sha256: str) -> FirmwareOrigin:
-    """Return the hashes of the files that a firmware was made from, compensator.json as it stands in it."""
-    return FirmwareOrigin(
-        compensator_json=compensator_sha256,
-        valve_json=compensator.valve_json_sha256,
-        ramp_tests=compensator.valve.made_from,
-    )
+from dzdesign.design.firmware_manifest import FirmwareConstant
 
 
 def constants_of(compensator: Compensator, constants: Mapping[str, Sequence[Constant]]) -> tuple[FirmwareConstant, ...]:

@@ -150,7 +150,7 @@ def _written(path: Path) -> str:
 
 def _differences(found: Any, written: Any, place: str, unknown: list[str]) -> Iterator[tuple[str, object, object]]:
     """Yield place, value and what would be written, of each that differs; collect keys that would not be written."""
-    if isinstance(written, dict):
+    if isinstance(written, dict) and isinstance(found, dict):
         for key in written:
             if key not in found:
                 yield f"{place}.{key}" if place else key, MISSING, written[key]
@@ -160,7 +160,7 @@ def _differences(found: Any, written: Any, place: str, unknown: list[str]) -> It
                 yield from _differences(value, written[key], path, unknown)
             else:
                 unknown.append(path)
-    elif isinstance(written, list | tuple) and len(found) == len(written):
+    elif isinstance(written, list | tuple) and isinstance(found, list | tuple) and len(found) == len(written):
         for index, (one, other) in enumerate(zip(found, written, strict=True)):
             yield from _differences(one, other, f"{place}[{index}]", unknown)
     elif found != written:

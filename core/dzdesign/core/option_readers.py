@@ -13,6 +13,25 @@ def quantity(kind: str) -> Callable[[str, str], float]:
     return lambda text, option: parse_quantity(text, kind, option)
 
 
+def with_tolerance(kind: str) -> Callable[[str, str], tuple[float, float | None]]:
+    """Return what reads a quantity and, after ± or +-, its tolerance, such as ``0.1 s +- 0.02 s``; None without one.
+
+    Examples
+    --------
+    >>> with_tolerance("time")("0.1 s ± 20 ms", "--lag"), with_tolerance("time")("0.1 s", "--lag")
+    ((0.1, 0.02), (0.1, None))
+    """
+
+    def read(text: str, option: str) -> tuple[float, float | None]:
+        value, *tolerance = re.split(r"\+/?-|±", text) if isinstance(text, str) else [text]
+        if len(tolerance) > 1:
+            raise InputError(f"{option} is {quoted(text)}, expected one tolerance, such as '0.1 s +- 0.02 s'")
+        found = [parse_quantity(each, kind, option) for each in (value, *tolerance)]
+        return found[0], (found[1] if tolerance else None)
+
+    return read
+
+
 def number(expected: str, between: tuple[float, float] | None = None) -> Callable[[str | float, str], float]:
     """Return what reads a number without a unit, inside `between`; a message says what is `expected`."""
 

@@ -39,7 +39,9 @@ IDENTIFY = tuple(argument.name for argument in arguments_of(IdentifyChoices) if 
 def calibrate_lot(args: BatchArguments) -> LotSummary:
     """Calibrate the valves of a folder or a list, and make their table and report; return batch.json."""
     source, output = Path(args.source), Path(args.output)
-    jobs = _jobs(args)
+    if args.jobs is not None and args.dask:
+        raise InputError("--jobs is for this machine; with --dask its workers decide, so leave it out")
+    jobs = read_options(args, ["jobs"])["jobs"] or os.cpu_count() or 1
     _check_options(args)
     if source.is_dir() and output.resolve().is_relative_to(source.resolve()):
         raise InputError(f"'{output}' lies in '{source}', whose subfolders are the valves; choose another with -o")
@@ -130,14 +132,6 @@ def _write_report(output: Path) -> None:
         say(f"no {REPORT_NAME}: {error}")
 
 
-def _jobs(args: BatchArguments) -> int:
-    """Return how many processes --jobs asks for."""
-    if args.jobs is not None and args.dask:
-        raise InputError("--jobs is for this machine; with --dask its workers decide, so leave it out")
-    jobs: int | None = read_options(args, ["jobs"])["jobs"]
-    return jobs or os.cpu_count() or 1
-
-
 def useful_jobs(jobs: int, waiting: int) -> int:
     """Return as many of the processes asked for as the waiting valves keep busy: a thousand would fill a machine."""
     most = MOST_A_PROCESSOR * (os.cpu_count() or 1)
@@ -153,7 +147,7 @@ def _check_options(args: BatchArguments) -> None:
     identify_options(args)
     record_of(args.record)
     design_options(args, args.target)
-    read_options(args, ["skip_rows"])
+    read_options(args, ["skip_rows", "sample_rate"])
     if args.columns:
         parse_columns(args.columns)
 

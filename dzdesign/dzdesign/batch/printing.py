@@ -1,17 +1,14 @@
 """What `dzdesign batch` prints: counts, spread, the cost of the lot setting, and why valves failed."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from dzdesign.core.errors import and_more
-from dzdesign.report.lot.setting_text import checked_line, span, untested_lines
-from dzdesign.report.lot.spread import TWENTY
+from dzdesign.report.lot.setting_text import checked_line, cost_lines, span, untested_lines
 from dzdesign.report.lot.summary import LotSummary
 from dzdesign.terminal.page import Table, new_console, put_line, put_table
 
 #: Valves of one warning that are named, and of those that hold the lot setting down.
 NAMED, BINDING_NAMED = 3, 5
-COST = "lot_extra_dead_zone_percent"
 UNITS = {"V": "V", "percent": "%"}
 
 
@@ -29,7 +26,8 @@ def print_lot(summary: LotSummary, folder: Path, report: Path | None) -> None:
         put_line(console, line)
     warned = sorted(summary.warnings.items(), key=lambda item: len(item[1]))
     if warned:
-        put_line(console, "warnings: " + ", ".join(_warned(code, names) for code, names in warned))
+        few = {code: f" ({', '.join(names)})" if len(names) <= NAMED else "" for code, names in warned}  # where to look
+        put_line(console, "warnings: " + ", ".join(f"{code} {len(names)}{few[code]}" for code, names in warned))
     for each in summary.failed:
         put_line(console, f"{each.status}  {each.name}: {each.reason}")
     for line in summary.anomalies:
@@ -47,28 +45,15 @@ def _in_words(column: str) -> str:
     return f"{name.replace('_', ' ')} ({UNITS[unit]})" if unit in UNITS else column.replace("_", " ")
 
 
-def _warned(code: str, names: Sequence[str]) -> str:
-    """Return a code with how many valves have it; a few are named, for those are where to look."""
-    return f"{code} {len(names)}" + (f" ({', '.join(names)})" if len(names) <= NAMED else "")
-
-
 def _setting_lines(summary: LotSummary) -> list[str]:
     """Say what one setting for all would cost, or why there is none."""
     setting = summary.lot_setting
     if setting is None:
         return [f"no lot setting: {summary.why_no_lot_setting}"]
-    lines = [
+    return [
         f"one lot setting, safe for each of these valves {span(*setting.dp_MPa)}, is held down by "
         f"{and_more(setting.binding, BINDING_NAMED)}; it is in {setting.file}",
         checked_line(setting),
         *untested_lines(setting),
+        *cost_lines(summary),
     ]
-    for column, at in summary.quantiles.items():
-        if column.endswith(COST):
-            one_in_twenty = f"{at.q95:.2f} % at one in twenty, " if summary.calibrated >= TWENTY else ""
-            side = f"{column.removesuffix(COST).rstrip('_')} side: " if column != COST else ""
-            lines.append(
-                f"{side}it leaves more dead zone than each valve's own setting: {at.median:.2f} % of command at the "
-                f"median valve, {one_in_twenty}{at.largest:.2f} % at most"
-            )
-    return lines

@@ -7,6 +7,7 @@ from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.compensator import Compensator
+from dzdesign.report.compensator_sides import SIGNS
 from dzdesign.report.lot.spread import quantiles, spreads_of
 from dzdesign.report.lot.summary import (
     FailedValve,
@@ -17,7 +18,7 @@ from dzdesign.report.lot.summary import (
     UntestedPressures,
 )
 from dzdesign.report.lot.table import TableRow, column_of
-from dzdesign.report.lot.table_rows import SIGNS, extra_dead_zone
+from dzdesign.report.lot.table_rows import extra_dead_zone
 from dzdesign.report.lot.valve_folder import VALVES
 
 if TYPE_CHECKING:

@@ -104,7 +104,8 @@ def _of_table(path: Path, options: Collection[str]) -> list[Valve]:
             f"'{path}' parts its columns by {'a tab' if other == chr(9) else repr(other)}, expected a comma; save it "
             "as CSV with commas (a ';' parts the patterns in the column files)"
         )
-    heading = [_heading(label.strip()) for label in rows[0]]
+    labels = [label.strip() for label in rows[0]]  # an entry of the record keeps its own spelling
+    heading = [label if label.startswith(RECORD) else label.replace("-", "_") for label in labels]
     known = ("name", "files", *options)
     for label in heading:
         if label not in known and not label.startswith(RECORD):
@@ -130,11 +131,6 @@ def _of_table(path: Path, options: Collection[str]) -> list[Valve]:
         overrides = {label: cell for label, cell in filled.items() if not label.startswith(RECORD)}
         valves.append(Valve(name=name, patterns=tuple(patterns), overrides=overrides, record=record))
     return valves
-
-
-def _heading(label: str) -> str:
-    """Return a column's name as options are spelt inside; an entry of the record keeps its own spelling."""
-    return label if label.startswith(RECORD) else label.replace("-", "_")
 
 
 def _check_names(names: Sequence[str], source: Path) -> None:

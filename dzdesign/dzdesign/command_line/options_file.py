@@ -16,25 +16,12 @@ LONGEST_KEY = 80
 Value = str | list[str] | dict[str, str]
 
 
-class _AsWritten(float):
-    """A number with a point that is text as it stands in the file: an oil of viscosity 46.10 stays one."""
-
-    text: str
-
-    def __new__(cls, text: str) -> "_AsWritten":
-        made = super().__new__(cls, text)
-        made.text = text.replace("_", "")
-        return made
-
-    def __str__(self) -> str:
-        return self.text
-
-
 def options_from_file(path: str, declared: Iterable[Argument]) -> dict[str, Value]:
     """Read options; a key may be written ``meter-floor`` or ``meter_floor``, values as on the command line."""
     content = read_bytes(Path(path), "config file")
     try:
-        document = tomllib.loads(content.decode("utf-8-sig"), parse_float=_AsWritten)
+        # A number with a point stays the text that it is: an oil of viscosity 46.10 stays one.
+        document = tomllib.loads(content.decode("utf-8-sig"), parse_float=lambda number: number.replace("_", ""))
     except (ValueError, RecursionError) as error:
         raise InputError(f"'{path}' is not TOML: {error}; expected lines such as u-max = \"10 V\"") from error
     known: dict[str, list[Argument]] = {}
@@ -78,7 +65,7 @@ def _is_text(item: object, free: bool) -> bool:
     """Tell whether an item is text, or a number (or a date) that is short enough to be written as text."""
     if isinstance(item, int) and (isinstance(item, bool) or item.bit_length() > 64):
         return False
-    return isinstance(item, str | int | float) or (free and isinstance(item, datetime.date | datetime.time))
+    return isinstance(item, str | int) or (free and isinstance(item, datetime.date | datetime.time))
 
 
 def in_words_of_the_file(message: str, path: str, values: Mapping[str, Value]) -> str:

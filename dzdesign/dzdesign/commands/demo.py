@@ -1,6 +1,5 @@
 """`dzdesign demo DIR`: the whole pipeline on the bundled example, from ramp tests to checked C."""
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -62,5 +61,5 @@ def run(arguments: Arguments, json: bool) -> int:
     if json:
         print_json(verification.evidence)
     else:
-        print_demo(valve, verification, os.fspath(folder))
+        print_demo(valve, verification, str(folder))
     return 0 if verification.holds and expected == len(verdicts) else 1

@@ -80,10 +80,12 @@ def run(arguments: Arguments, json: bool) -> int:
     packages = _packages()
     works, compiler = _compiles()
     missing = [name for name, version in packages.items() if version is None and name != "ziglang"]
+    one_is_there = any(programs[tool.name] for tool in COMPILERS)  # which is enough
+    wanted = OPTIONAL if one_is_there else (*COMPILERS, *OPTIONAL)
     found = Installation(
         dzdesign=_version("dzdesign"), python=platform.python_version(), system=platform.platform(), compiles=works,
-        compiler=compiler, programs=programs, packages=packages, to_get=_lacking(programs),
-        holds=works and not missing,
+        compiler=compiler, programs=programs, packages=packages, holds=works and not missing,
+        to_get=[tool for tool in wanted if not programs[tool.name]],
     )  # fmt: skip
     if json:
         print_json(found)
@@ -141,14 +143,6 @@ def _compiles() -> tuple[bool, str]:
     except (DzdesignError, OSError, AttributeError) as error:
         return False, str(error)
     return (True, compiler) if answer == 42 else (False, f"{compiler}: its library counts 3 * 14 = {answer}")
-
-
-def _lacking(programs: dict[str, dict[str, str] | None]) -> list[Tool]:
-    """Return the tools to name: one compiler is enough, and cl2000 is for those who flash with CCS."""
-    one_is_there = any(programs[tool.name] for tool in COMPILERS)
-    return [
-        tool for tool in (*COMPILERS, *OPTIONAL) if not programs[tool.name] and not (tool in COMPILERS and one_is_there)
-    ]
 
 
 def _print(found: Installation, missing: list[str]) -> None:

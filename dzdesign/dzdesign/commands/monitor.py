@@ -28,8 +28,7 @@ if TYPE_CHECKING:
 FIRST_FRAME_S = 3.0
 #: The longest that a look at the line takes: Ctrl-C is noticed after it.
 LOOK_S = 0.1
-
-
+POSITIVE = (0.0, 1e9)
 EXAMPLES = ("dzdesign monitor COM5 --firmware firmware --seconds 100 -o ramp.csv",)
 
 
@@ -44,11 +43,9 @@ class Arguments:
     """File to write."""
     firmware: Annotated[AnyPath, Option("DIR")] = "firmware"
     """Folder made by `dzdesign codegen`, with the scalings."""
-    baud: Annotated[Text, Option("N", read=number("a positive number such as 115200", between=(0, 1000000000.0)))] = (
-        None
-    )
+    baud: Annotated[Text, Option("N", read=number("a positive number such as 115200", between=POSITIVE))] = None
     """Bits per second (default: what the firmware sends)."""
-    seconds: Annotated[Text, Option("S", read=number("a positive number such as 60", between=(0, 1000000000.0)))] = None
+    seconds: Annotated[Text, Option("S", read=number("a positive number such as 60", between=POSITIVE))] = None
     """Time to record from the first frame on (default: until Ctrl-C)."""
 
 

@@ -17,15 +17,13 @@ EXAMPLES = (
 def run(arguments: Arguments, json: bool) -> int:
     """Verify a firmware and print every requirement; 1 if one does not hold."""
     from dzdesign.report.valve_report import REPORT_NAME
-    from dzdesign.terminal.verification_tables import print_firmware_mutants, print_verification
+    from dzdesign.terminal.verification_tables import print_verification
 
     verification = verify(arguments)
     if json:
         print_json(verification.evidence)
     else:
         print_verification(verification)
-        if mutants := verification.evidence.mutants:
-            print_firmware_mutants(mutants)
         output = Path(arguments.output or "")
         print(one_line(f"Evidence: {output}, to be read: {output / REPORT_NAME}"))
     return 0 if verification.holds else 1

@@ -45,7 +45,17 @@ def run_chain(valve: RecoveredValve, say: Callable[[str], None] = lambda _: None
         for file, content in ramps.items():
             (Path(scratch) / file).write_bytes(content)
         tests = [read_ramp_file(Path(scratch) / file) for file in ramps]  # as a user's are read
-        identified = identify(tests, identify_options(valve))
+        floor = valve.level_L_min * L_MIN  # as an engineer who read Section 4.1 would declare it
+        options = IdentifyOptions(
+            u_max=float(U_MAX_V),
+            dp0=DP0_MPA * MPA,
+            meter_floor=floor,
+            # The simulated meter has no lag, and the simulated valve closes the same way each time.
+            meter_lag=0.0,
+            meter_lag_tolerance=0.0,
+            repeatability=0.0,
+        )
+        identified = identify(tests, options)
         valve_json = to_json_bytes(identified)
         compensator = design(identified, valve_bytes=valve_json)
         compensator_json = to_json_bytes(compensator).decode()
@@ -90,13 +100,6 @@ def bench_of(valve: RecoveredValve) -> Bench:
     if valve.level_L_min:
         return bench
     return replace(bench, meter_noise_L_min=0.0, command_noise_V=0.0, pressure_noise_MPa=0.0)
-
-
-def identify_options(valve: RecoveredValve) -> IdentifyOptions:
-    """Return what an engineer who read Section 4.1 would declare."""
-    return IdentifyOptions(
-        u_max=float(U_MAX_V), dp0=DP0_MPA * MPA, meter_floor=valve.level_L_min * L_MIN, meter_lag=0.0
-    )
 
 
 def _ramp_tests(valve: RecoveredValve, bench: Bench) -> dict[str, bytes]:

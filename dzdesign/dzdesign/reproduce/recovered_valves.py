@@ -9,7 +9,6 @@ forces: both are those of the default plant. Nor does the paper show a closing b
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cache
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -44,20 +43,16 @@ AT_BOUND = 1e-6
 #: moves, Eq. (24), but the paper reads 54 % of displacement and 53.5 % of flow.
 LARGEST_MISFIT = 1.5
 #: Parameter -> size to scale it by, least value.
-RECOVERED: Mapping[str, tuple[float, float]] = MappingProxyType(
-    {
-        "preload_N": (30.0, 0.0),
-        "pressure_force_N_MPa": (0.3, 0.0),
-        "flow_force_N_mm_MPa": (1.5, 0.0),
-        "C_d_W_mm": (3.0, 1e-3),
-        "K_et_N_m": (15000.0, 100.0),
-        "overlap_mm": (0.1, LEAST_OVERLAP_MM),
-    }
-)
-SOLVER: Mapping[str, int | float | str] = MappingProxyType(
-    {"ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": False, "ipopt.tol": 1e-12,
-     "ipopt.bound_relax_factor": 0.0}
-)  # fmt: skip
+RECOVERED: Mapping[str, tuple[float, float]] = {
+    "preload_N": (30.0, 0.0),
+    "pressure_force_N_MPa": (0.3, 0.0),
+    "flow_force_N_mm_MPa": (1.5, 0.0),
+    "C_d_W_mm": (3.0, 1e-3),
+    "K_et_N_m": (15000.0, 100.0),
+    "overlap_mm": (0.1, LEAST_OVERLAP_MM),
+}
+SILENT: Mapping[str, int | str] = {"ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": False}
+SOLVER: Mapping[str, int | float | str] = {**SILENT, "ipopt.tol": 1e-12, "ipopt.bound_relax_factor": 0.0}
 #: What only the simulated valve's displacement tells; the tested ones are "identical" (section 2.1), so they take it.
 FROM_DISPLACEMENT = ("K_et_N_m", "overlap_mm")
 NOT_PRINTED = ("hysteresis_V", "droop_MPa_L_min2", "stroke_mm")

@@ -30,8 +30,8 @@ def reproduce(folder: Path) -> Reproduction:
             valves=tuple(chain.valve for chain in chains),
         )
         stage("drawing")
-        files: dict[str, str | bytes] = {**figure_files([chain.runs for chain in chains])}
-    files[Reproduction.FILE_NAME] = to_json_bytes(reproduction)
+        figures = figure_files([chain.runs for chain in chains])
+    files: dict[str, str | bytes] = {**figures, Reproduction.FILE_NAME: to_json_bytes(reproduction)}
     for chain in chains:
         files |= chain.files
     write_folder(folder, files, {"schema": schema, "tool": TOOL})

@@ -7,7 +7,14 @@ from dzdesign.core.errors import InputError
 from dzdesign.core.option_readers import percent_range, quantity
 from dzdesign.core.options import FIT, RECORDINGS, AnyPath, Option, Paths, Table, Text, read_options
 from dzdesign.core.units import parse_quantity
-from dzdesign.stages.recordings import RampArguments, check_places, read_recordings, refuse_copies, write_results
+from dzdesign.stages.recordings import (
+    RampArguments,
+    check_places,
+    meter_choices,
+    read_recordings,
+    refuse_copies,
+    write_results,
+)
 from dzdesign.terminal.progress import say, stage_progress
 
 if TYPE_CHECKING:
@@ -84,8 +91,8 @@ def _read_set(name: str, patterns: Paths, columns: Table, arguments: AssessArgum
         say("recordings after: columns as those before, by --columns or [columns]; --after-columns says others")
     try:
         return read_recordings(
-            patterns, u_max=u_max, columns=columns, dp=arguments.dp, skip_rows=arguments.skip_rows,
-            what=f"reading recordings {name}",
+            patterns, u_max=u_max, columns=columns, dp=arguments.dp, sample_rate=arguments.sample_rate,
+            skip_rows=arguments.skip_rows, what=f"reading recordings {name}",
         )  # fmt: skip
     except InputError as error:
         if name == "before" or "--columns" not in str(error):
@@ -104,7 +111,7 @@ def assess_options(arguments: AssessArguments) -> "AssessOptions":
     from dzdesign.assess.options import AssessOptions
     from dzdesign.identify.options import IdentifyOptions
 
-    reading = IdentifyOptions(**read_options(arguments, ["u_max", "meter_floor", "meter_lag", "knee_window"]))
+    reading = IdentifyOptions(**meter_choices(arguments, ["u_max", "meter_floor", "meter_lag", "knee_window"]))
     read = read_options(arguments, ["after_u_max", "level", "linearity_window"])
     after_u_max = read["after_u_max"]
     if after_u_max is not None and not after_u_max > 0:

@@ -45,6 +45,7 @@ def generate(arguments: GenerateArguments) -> "Firmware":
     from dzdesign.design.compensator import Compensator
     from dzdesign.design.designing import design as design_valve
     from dzdesign.design.firmware_manifest import FirmwareManifest
+    from dzdesign.design.redesign_check import refuse_without_options
     from dzdesign.identify.valve.model import SCHEMA as VALVE_SCHEMA
     from dzdesign.identify.valve.model import ValveModel
 
@@ -63,18 +64,10 @@ def generate(arguments: GenerateArguments) -> "Firmware":
             compensator = design_valve(valve, design_options(arguments, target), content)
             firmware = generate_project(compensator, target)
         else:
-            firmware = generate_project(_read_compensator(content, source, arguments), arguments.target, content)
+            compensator = read_artefact(content, Compensator, source)
+            refuse_without_options(compensator, source)
+            firmware = generate_project(_proven(compensator, f"'{source}'", arguments), arguments.target, content)
     return firmware if arguments.output is None else write_firmware(firmware, Path(arguments.output))
-
-
-def _read_compensator(content: bytes, source: str, choices: DesignChoices) -> "Compensator":
-    from dzdesign.core.artefact_reading import read_artefact
-    from dzdesign.design.compensator import Compensator
-    from dzdesign.design.redesign_check import refuse_without_options
-
-    compensator = read_artefact(content, Compensator, source)
-    refuse_without_options(compensator, source)
-    return _proven(compensator, f"'{source}'", choices)
 
 
 def _proven(compensator: "Compensator", source: str, choices: DesignChoices) -> "Compensator":

@@ -6,12 +6,13 @@ from dataclasses import KW_ONLY, dataclass, fields
 from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.core.option_readers import number, percent, quantity
-from dzdesign.core.options import FIT, METER, RECORDINGS, AnyPath, Option, Paths, Table, Text, Texts, read_options
+from dzdesign.core.options import FIT, METER, RECORDINGS, AnyPath, Option, Paths, Table, Text, Texts
 from dzdesign.stages.recording_parts import parts_of
 from dzdesign.stages.recordings import (
     RampArguments,
     check_places,
     in_order,
+    meter_choices,
     read_recordings,
     refuse_copies,
     write_results,
@@ -29,6 +30,9 @@ class IdentifyChoices(RampArguments):
 
     meter_zero: Annotated[str, Option("Q", METER, example="0.1 L/min", read=quantity("flow"))] = "0 L/min"
     """Bound of the flow meter's zero error."""
+    noise_level: Annotated[Text, Option("Q", METER, example="0.1 L/min", read=quantity("flow"))] = None
+    """Flow below which there is none, if averages over the dead zone resolve it (default: what they resolve, and at
+    least 0.5 % of the largest flow)."""
     dp0: Annotated[Text, Option("P", FIT, example="1 MPa", read=quantity("pressure"))] = None
     """Reference pressure drop (default: the test nearest to "1 MPa")."""
     x_max: Annotated[Text, Option("X", FIT, example="1.8 mm", read=quantity("length"))] = None
@@ -74,7 +78,8 @@ def identify_options(choices: IdentifyChoices) -> "IdentifyOptions":
     """Return the engineer's choices for `identify`, SI."""
     from dzdesign.identify.options import IdentifyOptions
 
-    return IdentifyOptions(**read_options(choices, [field.name for field in fields(IdentifyOptions)]))
+    names = [field.name for field in fields(IdentifyOptions) if field.name != "meter_lag_tolerance"]
+    return IdentifyOptions(**meter_choices(choices, names))
 
 
 def record_of(given: Mapping[str, object] | None) -> dict[str, str]:
@@ -103,8 +108,9 @@ def identify(arguments: IdentifyArguments) -> "ValveModel":
     options, record = identify_options(arguments), record_of(arguments.record)
     check_places(ValveModel, arguments.output, arguments.plots)
     tests = read_recordings(
-        arguments.ramps, u_max=options.u_max, columns=arguments.columns, dp=arguments.dp, skip_rows=arguments.skip_rows
-    )
+        arguments.ramps, u_max=options.u_max, columns=arguments.columns, dp=arguments.dp,
+        sample_rate=arguments.sample_rate, skip_rows=arguments.skip_rows,
+    )  # fmt: skip
     refuse_copies(tests)
     tests = in_order(parts_of(tests, arguments.from_, arguments.to), arguments.order)
     with stage_progress(f"fitting {len(tests)} recording{'s' if len(tests) > 1 else ''}"):

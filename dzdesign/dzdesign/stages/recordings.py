@@ -3,10 +3,10 @@
 import fnmatch
 import glob
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from dzdesign.core.artefact_files import (
     MANIFEST_NAME,
@@ -16,14 +16,34 @@ from dzdesign.core.artefact_files import (
     write_files,
 )
 from dzdesign.core.errors import InputError, nearest, neighbour
-from dzdesign.core.option_readers import percent_range, quantity, whole_number
-from dzdesign.core.options import FIT, METER, RECORDINGS, AnyPath, Option, Paths, Table, Text, Texts, paths_of
+from dzdesign.core.option_readers import percent_range, quantity, whole_number, with_tolerance
+from dzdesign.core.options import (
+    FIT,
+    METER,
+    RECORDINGS,
+    AnyPath,
+    Option,
+    Paths,
+    Table,
+    Text,
+    Texts,
+    paths_of,
+    read_options,
+)
 from dzdesign.core.units import parse_quantity
 from dzdesign.terminal.progress import say, stage_progress, with_bar
 
 if TYPE_CHECKING:
     from dzdesign.core.artefact_types import Artefact
     from dzdesign.identify.reading.ramp_test import RampTest
+
+
+def read_sample_rate(text: str, option: str) -> float:
+    """Read --sample-rate, Hz."""
+    rate = parse_quantity(text, "frequency", option)
+    if not rate > 0:
+        raise InputError(f"{option} is '{text}', expected more than zero, such as '100 Hz'")
+    return rate
 
 
 #: Reads --skip-rows.
@@ -35,11 +55,14 @@ class ColumnArguments:
     """How the columns of recordings are found."""
 
     columns: Annotated[Table, Option("MAP", RECORDINGS)] = None
-    """Columns, such as "u=AO0:V, Q=Flow (L/min)": a quantity (time, u, dP, pA, pB, Q), its label in the file and, after
-    a colon, the unit that the label lacks. In the options file a table [columns]."""
+    """Columns, such as "u=AO0:V, Q=Flow (L/min)": a quantity, its label in the file and, after a colon, the unit that
+    the label lacks. Quantities are time, u, Q and dP, or in its place pressures of ports of the metering edge: pP, pA,
+    pB, pT. In the options file a table [columns]."""
     dp: Annotated[Table, Option("P", RECORDINGS, example="1 MPa")] = None
     """Pressure drop of files without a column of it, such as "1 MPa". In the options file also a table [dp] from file
     name or pattern to pressure."""
+    sample_rate: Annotated[Text, Option("F", RECORDINGS, example="100 Hz", read=read_sample_rate)] = None
+    """Samples a second of files without a column of time, such as "100 Hz"."""
     skip_rows: Annotated[int | str | None, Option("N", RECORDINGS, read=read_skip_rows)] = None
     """Rows above the header of a text file, such as a logger's preamble (default: found)."""
 
@@ -52,10 +75,18 @@ class RampArguments(ColumnArguments):
     """Full command."""
     meter_floor: Annotated[Text, Option("Q", METER, example="0.6 L/min", read=quantity("flow"))] = None
     """Flow below which the meter reads zero (default: found)."""
-    meter_lag: Annotated[Text, Option("T", METER, example="0.1 s", read=quantity("time"))] = None
-    """Lag of the flow meter (default: found from ramps of two rates)."""
+    meter_lag: Annotated[Text, Option("T", METER, example="0.1 s", read=with_tolerance("time"))] = None
+    """Lag of the flow meter, with its tolerance: "0.1 s +- 0.02 s" (default: found from ramps of two rates; without a
+    tolerance 20 %, and at least 0.05 s)."""
     knee_window: Annotated[str, Option("A-B", FIT, read=percent_range("the largest flow such as '12-50'"))] = "12-50"
     """Flow range of the straight-line fit, in percent of maximum flow."""
+
+
+def meter_choices(arguments: RampArguments, names: Iterable[str]) -> dict[str, Any]:
+    """Return options of those names, each read; the lag's tolerance under a name of its own."""
+    read = read_options(arguments, names)
+    seconds, tolerance = read["meter_lag"] or (None, None)
+    return {**read, "meter_lag": seconds, "meter_lag_tolerance": tolerance}
 
 
 def read_recordings(
@@ -64,6 +95,7 @@ def read_recordings(
     u_max: float,
     columns: Table,
     dp: Table,
+    sample_rate: Text = None,
     skip_rows: int | str | None = None,
     what: str = "reading recordings",
 ) -> "list[RampTest]":
@@ -74,13 +106,16 @@ def read_recordings(
     from dzdesign.identify.reading.column_labels import parse_columns
     from dzdesign.identify.reading.ramp_files import read_ramp_file
 
-    chosen, skipped = parse_columns(columns) if columns else {}, None
-    if skip_rows is not None:
-        skipped = read_skip_rows(skip_rows, "--skip-rows")
+    chosen = parse_columns(columns) if columns else {}
+    skipped = None if skip_rows is None else read_skip_rows(skip_rows, "--skip-rows")
+    rate = None if sample_rate is None else read_sample_rate(sample_rate, "--sample-rate")
     paths = expand(patterns)
     names = distinct_names(paths)
     tests = [
-        replace(read_ramp_file(path, u_max, columns=chosen, dp=_declared_dp(name, dp), skip_rows=skipped), source=name)
+        replace(
+            read_ramp_file(path, u_max, columns=chosen, dp=_declared_dp(name, dp), sample_rate=rate, skip_rows=skipped),
+            source=name,
+        )
         for path, name in with_bar(list(zip(paths, names, strict=True)), what)
     ]
     _refuse_unnamed(tests, dp)

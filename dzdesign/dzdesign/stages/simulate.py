@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.core.artefact_files import check_folder_may_be_written, write_folder
 from dzdesign.core.errors import InputError
-from dzdesign.core.option_readers import quantity, whole_number
-from dzdesign.core.options import AnyPath, Option, Texts, read_options, texts_of
+from dzdesign.core.option_readers import percent, quantity, whole_number
+from dzdesign.core.options import AnyPath, Option, Text, Texts, read_options, texts_of
 from dzdesign.core.units import parse_quantity
 from dzdesign.terminal.progress import say, stage_progress
 
@@ -30,6 +30,12 @@ class SimulateArguments:
     """Folder made by `dzdesign codegen`, whose compensator then drives the valve."""
     dp: Annotated[Texts, Option("P", example="1 MPa")] = ()
     """Pressure drop of a ramp test; repeatable (default: 0.5, 1, 2, 3, 4 and 5 MPa)."""
+    repeats: Annotated[
+        int | str, Option("N", read=whole_number("a whole number such as 3", least=1, digits=3))
+    ] = "1"
+    """Ramps at each pressure drop, one file each; from 2 on in random order, with date and time."""
+    repeatability: Annotated[Text, Option("S", example="0.1 %", read=percent("0.1 %"))] = None
+    """Standard deviation of the threshold from ramp to ramp, in percent of full command (default: 0)."""
     ramp_time: Annotated[str, Option("T", example="100 s", read=quantity("time"))] = "100 s"
     """Time from zero to full command."""
     seed: Annotated[
@@ -55,7 +61,7 @@ def simulate(arguments: SimulateArguments) -> SimulatedRamps:
         If a file or an option can't be read.
     """
     from dzdesign.verify.closed_loop.plant import Plant, read_plant
-    from dzdesign.verify.closed_loop.simulated_recordings import Bench, simulated_files
+    from dzdesign.verify.closed_loop.simulated_recordings import Bench, Series, simulated_files
 
     if arguments.output is not None:
         check_folder_may_be_written(Path(arguments.output))
@@ -64,11 +70,12 @@ def simulate(arguments: SimulateArguments) -> SimulatedRamps:
     pressures = [parse_quantity(text, "pressure", "--dp") / 1e6 for text in texts]
     if len({f"{dp_MPa:g}" for dp_MPa in pressures}) < len(pressures):  # one file each, named by it
         raise InputError(f"--dp repeats a pressure drop ({', '.join(texts)}); give each of them once")
-    read = read_options(arguments, ["ramp_time", "seed"])
+    read = read_options(arguments, ["repeats", "repeatability", "ramp_time", "seed"])
+    series = Series(repeats=read["repeats"], scatter_V=(read["repeatability"] or 0.0) * plant.u_max_V)
     firmware = Path(arguments.firmware) if arguments.firmware is not None else None
     with stage_progress() as stage:
         files, manifest = simulated_files(
-            plant, pressures, read["ramp_time"], Bench(seed=read["seed"]), say=stage, firmware=firmware
+            plant, pressures, read["ramp_time"], Bench(seed=read["seed"]), say=stage, firmware=firmware, series=series
         )
     if arguments.output is not None:
         write_folder(Path(arguments.output), files, manifest)

@@ -47,19 +47,12 @@ class VerifyArguments:
 def verify(arguments: VerifyArguments, plant_source: str = "") -> "Verification":
     """Verify a firmware: every input against the exact law, then the closed loop; needs a C compiler.
 
-    Parameters
-    ----------
-    arguments : VerifyArguments
-        Of the stage.
-    plant_source : str
-        How the evidence calls the plant; by default the name of its file.
-
     Raises
     ------
     InputError
         If a file can't be read, or there is no C compiler. A requirement that does not hold is no error: see ``holds``.
     """
-    from dzdesign.regeneration import with_regenerated
+    from dzdesign.regeneration import regenerated
     from dzdesign.report.valve_report import with_report
     from dzdesign.verify.closed_loop.plant import read_plant
     from dzdesign.verify.closed_loop.tolerances import read_tolerances
@@ -69,27 +62,29 @@ def verify(arguments: VerifyArguments, plant_source: str = "") -> "Verification"
 
     if arguments.output is not None:
         check_folder_may_be_written(Path(arguments.output), SCHEMA)
-    plant_path = None if arguments.plant is None else Path(arguments.plant)
-    plant = read_plant(plant_path, say) if plant_path else None
-    digest = sha256_of(read_bytes(plant_path, "plant file")) if plant_path else None
+    plant, digest = None, None
+    if arguments.plant is not None:
+        plant = read_plant(Path(arguments.plant), say)
+        digest = sha256_of(read_bytes(Path(arguments.plant), "plant file"))
+        plant_source = plant_source or Path(arguments.plant).name  # how the evidence calls the plant
     tolerances = read_tolerances(Path(arguments.tolerances)) if arguments.tolerances is not None else None
     with _firmware_folder(arguments.firmware) as folder:
         ware = arguments.c2000ware
         added = [check_against_c2000ware(folder, Path(ware), say)] if ware is not None else []
         with stage_progress() as stage:
             verification = verify_folder(
-                folder, plant, plant_source or (plant_path.name if plant_path else ""), digest, tolerances=tolerances,
+                folder, plant, plant_source, digest, tolerances=tolerances,
                 include=[Path(place) for place in paths_of(arguments.include)], say=stage, watch=stage.each,
             )  # fmt: skip
-        verification = with_regenerated(verification, folder)
         more, mutants = _further_checks(arguments, folder, verification)
-        verification = verification.with_checks(*added, *more)
+        verification = verification.with_checks(regenerated(folder), *added, *more)
         if mutants:
             verification = replace(verification, evidence=replace(verification.evidence, mutants=mutants))
         if arguments.output is not None:
             output = Path(arguments.output)
             manifest = evidence_manifest(verification.evidence)
-            write_folder(output, with_report(evidence_files(verification), folder, output), manifest)
+            files = with_report(evidence_files(verification), folder, output, verification.derived)
+            write_folder(output, files, manifest)
     return verification
 
 
@@ -124,17 +119,11 @@ def _further_checks(
             checks.append(proof_check(folder))
     if not arguments.mutate:
         return checks, None
-    from dzdesign.verify.analysis.mutation import (
-        MutationBench,
-        all_mutants,
-        judge_all,
-        mutation_check,
-        mutation_score,
-    )
+    from dzdesign.verify.analysis import mutation
 
-    bench = MutationBench(folder)
-    mutants = all_mutants(bench)
+    bench = mutation.MutationBench(folder)
+    mutants = mutation.all_mutants(bench)
     say(f"checking the core with {len(mutants)} faults, one at a time")
     bench.check_original()
-    found = mutation_score(judge_all(bench, mutants, lambda work: with_bar(work, "mutants")))
-    return [*checks, mutation_check(found)], found
+    found = mutation.mutation_score(mutation.judge_all(bench, mutants, lambda work: with_bar(work, "mutants")))
+    return [*checks, mutation.mutation_check(found)], found

@@ -34,6 +34,8 @@ def print_verification(verification: "Verification", console: "Console | None" =
     if verification.evidence.monte_carlo:
         print_scatter(verification.evidence.monte_carlo, console)
     put_line(console, verification.verdict)
+    if verification.evidence.mutants:
+        print_firmware_mutants(verification.evidence.mutants, console)
 
 
 def _put_closed_loop(console: "Console", verification: "Verification") -> None:
@@ -75,26 +77,19 @@ def print_scenarios(scenarios: "Sequence[ScenarioResult]", console: "Console") -
             put_line(console, f"{each.name}: {_figures(each.figures)}")
 
 
-#: How a figure's name begins -> of which valve it is.
-VALVES = {"compensated_": "with the compensator ", "direct_": "without it "}
+#: How a figure's name begins -> of which valve it is; and how it ends -> its unit.
+VALVES = {"compensated_": "with the compensator ", "direct_": "without it ", "": ""}
+UNITS = {"_L_min": " L/min", "_MPa": " MPa", "_ms": " ms", "_mL": " mL", "_percent": " %", "": ""}
 
 
 def _figures(figures: "Mapping[str, float]") -> str:
-    """Return figures as words, those of one valve together."""
-    groups = {
-        words: [_figure(key.removeprefix(start), value) for key, value in figures.items() if key.startswith(start)]
-        for start, words in VALVES.items()
-    }
-    groups[""] = [_figure(key, value) for key, value in figures.items() if not key.startswith(tuple(VALVES))]
-    return "; ".join(words + ", ".join(each) for words, each in groups.items() if each)
-
-
-def _figure(key: str, value: float) -> str:
-    """Return a figure whose name ends in its unit as words: rise_ms is a rise in ms."""
-    for ending, unit in (("_L_min", "L/min"), ("_MPa", "MPa"), ("_ms", "ms"), ("_mL", "mL"), ("_percent", "%")):
-        if key.endswith(ending):
-            return f"{key.removesuffix(ending).replace('_', ' ')} {value:.3g} {unit}"
-    return f"{key} {value:.3g}"
+    """Return figures as words, those of one valve together: rise_ms is a rise in ms."""
+    groups: dict[str, list[str]] = {start: [] for start in VALVES}
+    for key, value in figures.items():
+        start, end = next(filter(key.startswith, VALVES)), next(filter(key.endswith, UNITS))
+        name = key.removeprefix(start).removesuffix(end).replace("_", " ")
+        groups[start].append(f"{name} {value:.3g}{UNITS[end]}")
+    return "; ".join(VALVES[start] + ", ".join(each) for start, each in groups.items() if each)
 
 
 def print_scatter(series: "MonteCarlo", console: "Console") -> None:
@@ -150,9 +145,8 @@ def print_demo(valve: "ValveModel", verification: "Verification", folder: str) -
     put_line(console, f"Artefacts: {folder}")
 
 
-def print_firmware_mutants(score: "MutationScore") -> None:
+def print_firmware_mutants(score: "MutationScore", console: "Console") -> None:
     """Print what of the wrong C was not killed, and why."""
-    console = new_console()
     put_line(console, f"Mutants that were not killed; equivalent: {score.equivalent_means}")
     for each in score.not_killed:
         put_line(console, f"{each.verdict}, {each.file} line {each.line}: {each.change}")

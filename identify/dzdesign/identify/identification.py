@@ -89,6 +89,8 @@ def identify_sides(
             floor_L_min=max(side.described.floor for side in sides.values()) / L_MIN,
             lag_s=lag.seconds,
             lag_is=lag.origin,
+            lag_longer_s=lag.longer,
+            lag_shorter_s=lag.shorter,
             zero_L_min=options.meter_zero / L_MIN,
         ),
         knee_window=options.knee_window,

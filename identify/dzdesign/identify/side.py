@@ -19,6 +19,7 @@ from dzdesign.identify.fitting.guarding import (
     mean_threshold,
     opening_curve,
     order_knees,
+    systematic_change,
 )
 from dzdesign.identify.knees.between_ramps import BetweenRamps
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
@@ -61,11 +62,15 @@ def _fit_with_trend(group: DescribedTests, options: IdentifyOptions) -> tuple[Tr
     free = fit_knees([item.shapes for item in group.tests], floor=group.floor, u_max=options.u_max, trend="flat")
     dp = np.array([item.dp or math.nan for item in group.tests])
     column = 1 if group.tests[0].shapes[1] else 0  # falling wherever there is one: zero command comes after closing
-    budget = options.flat_below * options.u_max
     between, knee_se = group.between(column), free.knee_se[:, column]
     degrees = float(between.degrees_of_freedom(knee_se, DEGREES_OF_FREEDOM).min())
     trend = find_trend(
-        dp, free.knee[:, column], between.covariance_of_mean(knee_se), degrees, options.u_max, budget
+        dp,
+        free.knee[:, column],
+        between.covariance_of_mean(knee_se),
+        degrees,
+        options.u_max,
+        systematic_change(group, column, options),
     )
     return trend, free, order_knees(group, free, trend.direction, column, options)
 
@@ -114,7 +119,7 @@ def _side_model(
         certificate=BoundsBasis(
             confidence=options.confidence,
             guard=guard,
-            level_L_min=max(shape.level for item in described for shape in item.branches) / L_MIN,
+            level_L_min=max(shape.dead_zone.noise_level for item in described for shape in item.branches) / L_MIN,
             repeatability=_repeatability(group.between(guarded.column)),
         ),
         guards=guards,
@@ -152,7 +157,7 @@ def _all_thresholds(
             knees[other] = order_knees(group, free, trend.direction, 1 - guarded.column, options, alone=True)
     if other in knees:
         thresholds[other] = bound_threshold(group, knees[other], options)
-        thresholds["mean"] = mean_threshold(thresholds[guard], thresholds[other])
+        thresholds["mean"] = mean_threshold(group, thresholds["opening"], thresholds["closing"])
     return thresholds, knees.get("opening")
 
 
@@ -163,6 +168,7 @@ def _test_result(group: DescribedTests, knees: KneeFit, row: int, guarded: Thres
     return TestResult(
         source=item.test.source,
         dp_MPa=None if item.dp is None else item.dp / MPA,
+        dp_from="declared" if item.test.dp_is_declared else item.test.dp_from[0] or None,
         **_thresholds(item, knees, row),
         straight_rising=rising.line.window if rising else None,
         straight_falling=falling.line.window if falling else None,
@@ -172,6 +178,8 @@ def _test_result(group: DescribedTests, knees: KneeFit, row: int, guarded: Thres
         slope_L_min_V=float(np.nanmean(knees.slope[row])) / L_MIN,
         q_max_L_min=item.q_max / L_MIN,
         saturates=all(shape.saturates for shape in item.branches),
+        leak_L_min=group.leak[row] / L_MIN,
+        noise_level_L_min=max(shape.dead_zone.noise_level for shape in item.branches) / L_MIN,
         noise_L_min=max(shape.sigma for shape in item.branches) / L_MIN,
         noise_variance_inflation=max(shape.variance_inflation for shape in item.branches),
         spool_ripple_V=max(shape.ripple for shape in item.branches),

@@ -9,7 +9,7 @@ from typing import Any
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
 from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.core.artefact_types import THIS_TOOL, to_json_bytes
+from dzdesign.core.artefact_types import THIS_TOOL, Artefact, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest
@@ -18,27 +18,31 @@ from dzdesign.report.artefact_folder import VERIFICATION_NAME, is_of, listed_fil
 from dzdesign.report.chain import KINDS, Chain, Place
 
 
-def chain_of(files: Mapping[str, bytes], *, asked: tuple[str, ...] = ("",), sealed: bool = True) -> Chain:
+def chain_of(
+    files: Mapping[str, bytes],
+    *,
+    asked: tuple[str, ...] = ("",),
+    sealed: bool = True,
+    known: Mapping[str, Compensator] | None = None,
+) -> Chain:
     """Follow the chain from the evidence back to the valve, as far as the files go.
 
-    Of two files of a kind the first one counts. `asked` is how the names of the files begin that the report is asked
-    for: what else lies there and belongs to another chain is a stranger's, named and no fault. Evidence that `verify`
+    Of two files of a kind the first one counts, and what is `known` by its hash was read and proved before. `asked` is
+    how the names of the files begin that the report is asked for: what else lies there and belongs to another chain is
+    a stranger's, named and no fault. Evidence that `verify`
     has made this moment is not `sealed`: no manifest states its hash yet, and its own verdict stands whatever else lies
     there.
-
-    Raises
-    ------
-    InputError
-        If there are two pieces of evidence, or no artefact can be read.
     """
-    return _Search(files, asked, sealed).chain()
+    return _Search(files, asked, sealed, known or {}).chain()
 
 
 class _Search:
     """Follows hashes over the files of a folder."""
 
-    def __init__(self, files: Mapping[str, bytes], asked: tuple[str, ...], sealed: bool) -> None:
-        self.files, self.asked, self.sealed = files, asked, sealed
+    def __init__(
+        self, files: Mapping[str, bytes], asked: tuple[str, ...], sealed: bool, known: Mapping[str, Compensator]
+    ) -> None:
+        self.files, self.asked, self.sealed, self.known = files, asked, sealed, known
         self.hashes = {name: sha256_of(content) for name, content in files.items()}
         self.faults: list[str] = []
         self.missing: list[str] = []
@@ -226,9 +230,11 @@ class _Search:
     def _take(self, role: str, name: str) -> None:
         """Keep an artefact; one that can't be read is missing, and the rest is reported without it."""
         try:
-            artefact = read_artefact(self.files[name], KINDS[role].type, name)
-            if isinstance(artefact, Compensator) and artefact.tool == THIS_TOOL:
-                prove_derived(artefact)  # another version may have chosen other tables
+            artefact: Artefact | None = self.known.get(self.hashes[name])
+            if artefact is None:
+                artefact = read_artefact(self.files[name], KINDS[role].type, name)
+                if isinstance(artefact, Compensator) and artefact.tool == THIS_TOOL:
+                    prove_derived(artefact)  # another version may have chosen other tables
         except InputError as error:
             # What the evidence rests on must not go missing without a word: its verdict would stand.
             lines = self.faults if role == "compensator" and self.found else self.unreadable

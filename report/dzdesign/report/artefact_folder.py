@@ -21,11 +21,6 @@ def read_artefact_folder(folder: Path) -> dict[str, bytes]:
     """Return what dzdesign made in a folder and in the folders in it, by name below it.
 
     Of an evidence or firmware folder the folder around it is looked at too: what it was made from lies there.
-
-    Raises
-    ------
-    InputError
-        If it is no folder, can't be read, or has nothing of dzdesign's.
     """
     folder = Path(folder)
     if not folder.is_dir():

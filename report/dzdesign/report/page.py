@@ -71,13 +71,14 @@ class Figure:
 class Section:
     """What a section holds, in the order in which it is shown.
 
-    `groups` are further lines, each group under a heading of its own. `missing` says what the section lacks and which
+    None stands for a figure or a table of which there is nothing to show. `groups` are further lines, each group under
+    a heading of its own. `missing` says what the section lacks and which
     command makes it; the page is whole without an `optional` one. Of a lot setting a section may be of one valve, the
     carrier.
     """
 
-    figures: tuple[ReportFigure, ...] = ()
-    tables: tuple[Table, ...] = ()
+    figures: Sequence[ReportFigure | None] = ()
+    tables: Sequence[Table | None] = ()
     lines: tuple[str, ...] = ()
     groups: tuple[tuple[str, tuple[str, ...]], ...] = ()
     missing: str = ""

@@ -1,5 +1,6 @@
 """What the report leads with: the verdict, and the few numbers that matter."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -107,17 +108,12 @@ def _dead_zone(loops: Sequence[PressureResult], branch: str) -> Figure:
 
 def worst_of(loops: Sequence[PressureResult]) -> str:
     """Say of how many runs a figure is the worst: of two sides the pressure drops of each."""
-    counts: dict[str, int] = {}
-    for each in loops:
-        counts[each.side] = counts.get(each.side, 0) + 1
-    if len(set(counts.values())) > 1:
-        return "the worst of " + " and ".join(f"{counted(n, 'pressure drop')} {name}" for name, n in counts.items())
-    count = next(iter(counts.values()))
-    if count > 1:
-        return f"the worst of {count} pressure drops" + (f" on each of {len(counts)} sides" if len(counts) > 1 else "")
-    if len(counts) > 1:
-        return "the worse of both sides, each at one pressure drop"
-    return f"at {loops[0].dp_MPa:.2f} MPa, the one pressure drop tested"
+    if len(loops) == 1:
+        return f"at {loops[0].dp_MPa:.2f} MPa, the one pressure drop tested"
+    counts = Counter(each.side for each in loops)
+    if len(counts) == 1:
+        return f"the worst of {len(loops)} pressure drops"
+    return "the worst of " + " and ".join(f"{counted(n, 'pressure drop')} {side}" for side, n in counts.items())
 
 
 def _at_zero(loops: Sequence[PressureResult]) -> Figure:
@@ -162,7 +158,21 @@ def _certificate(compensator: Compensator, inputs: Sequence[InputCheck]) -> Figu
         f"{span_MPa(low, high)}; smallest margin {1e3 * float(worst.smallest_margin_V):.3f} mV of the exact law under "
         "the certified offset, half a count kept for the rounding"
         + (f"; {least:.3f} mV of the C's compare values under the threshold's bound" if inputs else "")
-        + f". Flow below {worst.level_L_min:.2f} L/min counts as none",
+        + f". Flow below {worst.level_L_min:.2f} L/min counts as none"
+        + _premise(compensator),
+    )
+
+
+def _premise(compensator: Compensator) -> str:
+    """Return what is assumed of the valve's repeatability, where no repeated ramps show it; the warning's own code."""
+    sides = [compensator.valve.sides[name] for name in laws_of(compensator)]
+    assumed = [side.certificate.repeatability for side in sides]
+    largest = max((1e3 * each.sd_V for each in assumed if each.origin == "assumed"), default=None)
+    if largest is None:
+        return ""
+    return (
+        f". It holds only if the valve repeats to {largest:.3g} mV (standard deviation from ramp to ramp), which is "
+        "assumed: no repeated ramps show it (no-repeats)"
     )
 
 

@@ -4,7 +4,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.artefact_types import schema_of
+from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.artefact_chain import chain_of
 from dzdesign.report.artefact_folder import asked_prefixes, is_of, read_artefact_folder
@@ -27,20 +29,18 @@ OF_A_VALVE = ("data", "thresholds", "beta", "loop")
 
 def report_of_folder(folder: Path) -> Report:
     """Make the report of an artefact folder: of demo, evidence or firmware, or with valve.json or compensator.json.
-
-    Raises
-    ------
-    InputError
-        If there is nothing to report, or an artefact is none.
     """
     return make_report(chain_of(read_artefact_folder(folder), asked=asked_prefixes(folder)))
 
 
-def with_report(files: Mapping[str, str | bytes], firmware: Path, output: Path) -> dict[str, str | bytes]:
+def with_report(
+    files: Mapping[str, str | bytes], firmware: Path, output: Path, derived: Compensator | None = None
+) -> dict[str, str | bytes]:
     """Return the files of an evidence folder, not written yet, with the report of what `verify` used alone.
 
     Its verdict is the evidence's own. Files that lie about, an assessment or a stranger's valve.json, have no part in
-    it; `dzdesign report` looks at them. The valve.json that the firmware was made from is looked for around it.
+    it; `dzdesign report` looks at them. The valve.json that the firmware was made from is looked for around it. The
+    firmware's compensator that `verify` has read and `derived` again is not read again.
     """
     name, place = Path(output).resolve().name, Path(firmware).resolve().name
     if name == place:  # in two folders of one name
@@ -57,7 +57,8 @@ def with_report(files: Mapping[str, str | bytes], firmware: Path, output: Path) 
         if not file.startswith(f"{name}/")
         and (file.startswith(f"{place}/") or content == compensator or is_of(content, schema_of(ValveModel)))
     }
-    chain = chain_of(new | used, asked=(f"{name}/", f"{place}/"), sealed=False)
+    known = {sha256_of(compensator): derived} if compensator and derived else {}
+    chain = chain_of(new | used, asked=(f"{name}/", f"{place}/"), sealed=False, known=known)
     return {**files, REPORT_NAME: make_report(chain).html}
 
 

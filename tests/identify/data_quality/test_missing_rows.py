@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from tests.support.bench_recordings import L_MIN, Valve, record
+from tests.support.repeatable_valves import identify
 
 PRESSURES = (1.0, 3.0, 5.0)
 

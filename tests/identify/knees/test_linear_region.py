@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dzdesign.identify.identification import identify
 from dzdesign.identify.knees import linear_region as straight_part
 from dzdesign.identify.knees.prepared_tests import describe_tests
 from dzdesign.identify.knees.profile import crossing, flow_at_top
 from dzdesign.identify.options import IdentifyOptions
+from tests.support.repeatable_valves import identify
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
 
 PRESSURES = (0.5, 1.0, 2.0, 3.0, 4.0, 5.0)

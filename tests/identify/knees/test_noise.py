@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from dzdesign.identify.identification import identify
 from dzdesign.identify.knees.noise import (
     correlation_upper_limit,
     measure_roughness,
@@ -16,6 +15,7 @@ from dzdesign.identify.knees.noise import (
 )
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_test import RampTest
+from tests.support.repeatable_valves import identify
 from tests.support.synthetic import L_MIN, MPA
 
 SEED = 20261121

@@ -21,7 +21,7 @@ def identified(seed: int, noise: float, floor: float):
     for dp in PRESSURES_MPa:
         test = synthetic_ramp(dp, Truth(slope=4 * dp**0.5, noise=noise), seed=seed, rate_Hz=100.0)
         tests.append(replace(test, q=np.where(test.q < floor * L_MIN, 0.0, test.q)))
-    return identify_side(tests, IdentifyOptions(meter_lag=0.0, meter_floor=floor * L_MIN))
+    return identify_side(tests, IdentifyOptions(meter_lag=0.0, meter_floor=floor * L_MIN, repeatability=0.0))
 
 
 @pytest.mark.slow

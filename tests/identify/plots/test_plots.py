@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from dzdesign.command_line.cli import main
-from dzdesign.identify.identification import identify_sides
 from dzdesign.identify.plots.frame import plot_style, pressure_names
 from dzdesign.identify.plots.valve_plots import MOST_POINTS, RESIDUAL_EDGE, draw_figures, plot_files
+from tests.support.repeatable_valves import identify_sides
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
 
 PRESSURES = (0.5, 1.0, 4.0)
@@ -322,8 +322,8 @@ class TestBadFolder:
         assert {path.name for path in bench.iterdir()} == before
 
     @pytest.mark.slow
-    def test_a_folder_in_the_place_of_a_plot_is_left_alone(self, bench, capsys):
+    def test_a_folder_in_the_place_of_a_plot_is_left_alone(self, bench, capsys, wording):
         (bench / "plots" / "thresholds.svg").mkdir(parents=True)
         assert main(["identify", "a.csv", "-o", "valve.json", "--plots", "plots"]) == 2
-        assert "choose another with --plots" in capsys.readouterr().err
+        wording.of_test(capsys.readouterr().err)
         assert (bench / "plots" / "thresholds.svg").is_dir()

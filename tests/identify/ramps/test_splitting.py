@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import as_document, to_json_bytes
 from dzdesign.core.errors import InputError
-from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.splitting import split_ramps
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes, read_ramp_file
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.model import ValveModel
+from tests.support.repeatable_valves import identify
 from tests.support.synthetic import MPA, Truth, synthetic_ramp
 
 laws = settings(
@@ -177,9 +177,9 @@ class TestSplitting:
         valve = identify([one_after_another(tooth, tooth, tooth)])
         assert valve.positive.certificate.guard == "opening" and valve.positive.tests[0].u_knee_falling_V is None
 
-    def test_a_shut_valve_is_not_hidden_by_a_good_recording(self):
+    def test_a_shut_valve_is_not_hidden_by_a_good_recording(self, wording):
         shut = dataclasses.replace(ramp(1.0, 2, knee_rising=50.0), source="shut.csv")
-        with pytest.raises(InputError, match=r"'shut.csv': the valve never opens"):
+        with wording.refusal(InputError):
             identify([ramp(1.0, 1), shut])
 
     def test_a_recording_without_pressure_may_hold_several_ramps(self):

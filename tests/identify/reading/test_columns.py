@@ -62,20 +62,10 @@ def test_a_comma_or_a_colon_in_a_label_is_no_end_of_it():
     assert parse_columns("u=data(:,2):V; Q = a, b (L/min),dp=x") == {"u": "data(:,2):V", "Q": "a, b (L/min)", "dP": "x"}
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("uu=AO0:V", "--columns names 'uu', expected time, u, dP, pA, pB, Q (did you mean 'u'?)"),
-        ("dP1=AO0:V", "(did you mean 'dP'?)"),
-        ("AO0", "--columns names 'AO0', expected"),
-        ("u=", "--columns gives no label for u; write for example u=AO0:V"),
-        ("u=a:V,U=b:V", "--columns names u twice"),
-    ],
-)
-def test_what_is_no_map_of_columns(text, words):
-    with pytest.raises(InputError) as caught:
+@pytest.mark.parametrize("text", ["uu=AO0:V", "dP1=AO0:V", "AO0", "u=", "u=a:V,U=b:V"])
+def test_what_is_no_map_of_columns(text, wording):
+    with wording.refusal(InputError):
         parse_columns(text)
-    assert words in str(caught.value)
 
 
 @pytest.mark.parametrize(

@@ -64,12 +64,12 @@ def test_no_number_hangs_on_it(here):
     assert with_record == without
 
 
-def test_valve_json_is_read_back_with_it(here):
+def test_valve_json_is_read_back_with_it(here, wording):
     valve = identify([synthetic_ramp(1.0, Truth(noise=0.02), ramp_s=20, rate_Hz=25)], record=HOSTILE)
     document = as_document(valve)
     assert as_document(read_artefact(to_json(document).encode(), ValveModel, "valve.json")) == document
     for wrong in ([], {"serial": 4711}, {"": "x"}, {"a": "b\nc"}, {"a": "x" * 201}, {str(n): "x" for n in range(41)}):
-        with pytest.raises(InputError, match=r"'valve.json'.*record"):
+        with wording.refusal(InputError):
             read_artefact(to_json({**document, "record": wrong}).encode(), ValveModel, "valve.json")
         if wrong != {"a": "b\nc"}:  # a schema counts, and does not look at characters
             assert problems("valve", {**document, "record": wrong}) != []
@@ -89,32 +89,31 @@ def test_none_of_it_reaches_the_c(here):
 
 
 @pytest.mark.parametrize(
-    ("entries", "words"),
+    "entries",
     [
-        (["serial"], "--record is 'serial', expected a name and a text such as \"serial = 4711\""),
-        (["= 4711"], "--record: a name is empty"),
-        (["serial = "], "--record: serial is empty"),
-        (["serial = 1", "serial = 1"], "--record has 'serial' twice"),
-        (["serial = 1", "Serial = 2"], "--record has 'serial' and 'Serial' twice"),
-        (["a = b\nc"], "expected one line of characters that are printed"),
-        (["a = \x1b[2J"], "expected one line of characters that are printed"),
-        (["a = \u202egnp"], "expected one line of characters that are printed"),
-        ([f"{'n' * (LONGEST_NAME + 1)} = x"], f"61 characters, expected up to {LONGEST_NAME}"),
-        ([f"a = {'x' * (LONGEST_TEXT + 1)}"], f"201 characters, expected up to {LONGEST_TEXT}"),
-        ([f"n{n} = x" for n in range(MOST_ENTRIES + 1)], f"more than {MOST_ENTRIES} entries"),
-        ({"tested": True}, "tested is True, expected text"),
-        ({"bench": {"number": 2}}, "bench is {'number': 2}, expected text"),
-        ({7: "x"}, "a name is 7, expected text"),
+        ["serial"],
+        ["= 4711"],
+        ["serial = "],
+        ["serial = 1", "serial = 1"],
+        ["serial = 1", "Serial = 2"],
+        ["a = b\nc"],
+        ["a = \x1b[2J"],
+        ["a = \u202egnp"],
+        [f"{'n' * (LONGEST_NAME + 1)} = x"],
+        [f"a = {'x' * (LONGEST_TEXT + 1)}"],
+        [f"n{n} = x" for n in range(MOST_ENTRIES + 1)],
+        {"tested": True},
+        {"bench": {"number": 2}},
+        {7: "x"},
     ],
 )
-def test_what_is_no_record_is_refused(entries, words):
-    with pytest.raises(InputError) as error:
+def test_what_is_no_record_is_refused(entries, wording):
+    with wording.refusal(InputError):
         record_of(entries) if isinstance(entries, dict) else merged_entries("--record", None, entries)
-    assert words in str(error.value)
 
 
-def test_a_name_of_the_file_and_of_the_command_line_that_differ_in_a_capital_are_refused():
-    with pytest.raises(InputError, match="the record has 'Serial' and 'serial' twice"):
+def test_a_name_of_the_file_and_of_the_command_line_that_differ_in_a_capital_are_refused(wording):
+    with wording.refusal(InputError):
         merged_entries("--record", {"Serial": "1"}, ["serial = 2"])
 
 
@@ -150,7 +149,7 @@ def test_the_file_that_init_writes_has_a_record_to_fill_in(here):
     assert mark and record["date"] == "2026-01-31" and record["oil-temperature"] == "40 °C" and len(record) == 8
 
 
-def test_each_valve_of_a_list_has_its_own_beside_that_of_all(here):
+def test_each_valve_of_a_list_has_its_own_beside_that_of_all(here, wording):
     from dzdesign.batch.command import _task
     from dzdesign.batch.valves import valves_of
     from dzdesign.command_line.invocation import parse
@@ -164,7 +163,7 @@ def test_each_valve_of_a_list_has_its_own_beside_that_of_all(here):
     ]
     assert tasks[0].digest != tasks[1].digest
     Path("lot.csv").write_text("name,files,record.\na,ramp.csv,4711\n")
-    with pytest.raises(InputError, match="a name is empty"):
+    with wording.refusal(InputError):
         valves_of(Path("lot.csv"), None, ())
 
 

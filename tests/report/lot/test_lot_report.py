@@ -117,7 +117,7 @@ def test_a_lot_without_a_report_has_its_table(made, tmp_path, monkeypatch, capsy
 
 
 def test_a_table_too_large_for_a_page_is_one_sentence_and_leaves_no_page_of_an_earlier_run(
-    made, tmp_path, monkeypatch, capsys
+    made, tmp_path, monkeypatch, capsys, wording
 ):
     out = shutil.copytree(made, tmp_path / "out")
     size = (out / "valves.csv").stat().st_size
@@ -127,13 +127,14 @@ def test_a_table_too_large_for_a_page_is_one_sentence_and_leaves_no_page_of_an_e
     (line,) = [line for line in said.err.splitlines() if "no report.html" in line]
     assert "too large for one page; read the table itself, or calibrate the lot in parts" in line
     assert not (out / "report.html").exists() and "to be read" not in said.out
-    assert main(["report", str(out)]) == 2 and "too large for one page" in capsys.readouterr().err
+    assert main(["report", str(out)]) == 2
+    wording.of_test(capsys.readouterr().err)
     monkeypatch.setattr("dzdesign.report.lot.folder.MOST_TABLE", size)
     assert main(["report", str(out)]) == 1 and (out / "report.html").exists()
 
 
 @pytest.mark.slow
-def test_what_is_odd_is_in_the_verdict_and_all_of_it_below(copied, tmp_path):
+def test_what_is_odd_is_in_the_verdict_and_all_of_it_below(copied, tmp_path, wording):
     document = json.loads((copied / "batch.json").read_bytes())
     assert document["anomalies"] == [] and "odd:" not in head(report_of_lot(copied).html)
     document["anomalies"] = [f"V{at}, <b>V{at + 1}</b> share a recording" for at in range(5)]
@@ -143,7 +144,7 @@ def test_what_is_odd_is_in_the_verdict_and_all_of_it_below(copied, tmp_path):
     assert html.count("share a recording.") == 5 and "<b>V1</b>" not in html
     document["anomalies"] = "two"
     (copied / "batch.json").write_text(json.dumps(document))
-    with pytest.raises(InputError, match="'anomalies'"):
+    with wording.refusal(InputError):
         report_of_lot(copied)
 
 
@@ -162,19 +163,19 @@ def test_batch_json_fits_its_schema_and_every_fault_in_it_is_seen(made):
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    "change",
     [
-        ({"calibrated": 5}, "'calibrated' is 5, but 4 follows"),
-        ({"valves": 1}, "'failed' names 2 valves"),
-        ({"why_no_lot_setting": "both"}, "expected one of them"),
-        ({"lot_setting": None}, "expected one of them"),
-        ({"quantiles": {"offset_V": {"least": 1.0}}}, "'quantiles.offset_V"),
+        {"calibrated": 5},
+        {"valves": 1},
+        {"why_no_lot_setting": "both"},
+        {"lot_setting": None},
+        {"quantiles": {"offset_V": {"least": 1.0}}},
     ],
 )
-def test_a_batch_json_that_contradicts_itself_is_refused(change, said, copied):
+def test_a_batch_json_that_contradicts_itself_is_refused(change, copied, wording):
     document = json.loads((copied / "batch.json").read_bytes())
     (copied / "batch.json").write_text(to_json({**document, **change}))
-    with pytest.raises(InputError, match=re.escape(said)):
+    with wording.refusal(InputError):
         report_of_lot(copied)
 
 
@@ -265,37 +266,37 @@ def test_files_that_are_gone_are_missing(copied):
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    "change",
     [
-        (lambda text: text.replace("5.", "wide", 1), "is 'wide"),
-        (lambda text: text.replace("1.0,", "nan,", 1), "is 'nan', expected a number"),
-        (lambda text: text.replace("1.0,", "1e300,", 1), "is '1e300', expected a number"),
-        (lambda text: text.replace("offset_V", "ofset_V", 1), "lacks the column 'offset_V'"),
-        (lambda text: text + "V9,ok\n", "has 2 cells, expected"),
-        (lambda text: text.partition("\n")[0] + "\n", "has no valve"),
-        (lambda text: "", "lacks the column 'name'"),
-        (lambda text: text.replace(",ok,", ",fine,", 1), "'status' is 'fine', expected a status"),
-        (lambda text: text.replace("ok", "\ud800"), "no table in UTF-8"),
+        lambda text: text.replace("5.", "wide", 1),
+        lambda text: text.replace("1.0,", "nan,", 1),
+        lambda text: text.replace("1.0,", "1e300,", 1),
+        lambda text: text.replace("offset_V", "ofset_V", 1),
+        lambda text: text + "V9,ok\n",
+        lambda text: text.partition("\n")[0] + "\n",
+        lambda text: "",
+        lambda text: text.replace(",ok,", ",fine,", 1),
+        lambda text: text.replace("ok", "\ud800"),
     ],
 )
-def test_a_table_that_is_none_is_named(change, said, copied, capsys):
+def test_a_table_that_is_none_is_named(change, copied, capsys, wording):
     text = change((copied / "valves.csv").read_text(encoding="utf-8"))
     content = text.encode(errors="surrogatepass")
     (copied / "valves.csv").write_bytes(content)
     document = json.loads((copied / "batch.json").read_bytes())
     document["files"]["valves.csv"] = sha256_of(content)
     (copied / "batch.json").write_text(to_json(document))
-    with pytest.raises(InputError, match=said):
+    with wording.refusal(InputError):
         report_of_lot(copied)
     assert main(["report", str(copied)]) == 2 and "Traceback" not in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("key", ["files", "valves", "verified", "lot_setting"])
-def test_a_batch_json_without_a_key_is_refused(key, copied):
+def test_a_batch_json_without_a_key_is_refused(key, copied, wording):
     document = json.loads((copied / "batch.json").read_bytes())
     del document[key]
     (copied / "batch.json").write_text(to_json(document))
-    with pytest.raises(InputError, match=f"lacks the key '{key}"):
+    with wording.refusal(InputError):
         report_of_lot(copied)
 
 

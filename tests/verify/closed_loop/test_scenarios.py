@@ -93,11 +93,12 @@ def test_a_core_that_holds_its_offset_when_a_sensor_fails_leaks(firmware, exampl
 
 
 @pytest.mark.slow
-def test_a_plant_that_is_not_the_identified_valve_is_seen(firmware, plant):
+def test_a_plant_that_is_not_the_identified_valve_is_seen(firmware, plant, wording):
     """With 45 N of preload it opens at 83 % of command and not at 54 %: the residual dead zone would be the plant's."""
     found = verify(firmware, replace(plant, preload_N=45.0), sequence=QUICK)
     (check,) = [check for check in found.evidence.checks if "identified valve" in check.name]
-    assert check.holds is False and "preload" in check.text
+    assert check.holds is False
+    wording.of_test(check.text)
 
 
 def test_what_a_plant_file_leaves_out_is_named(tmp_path):
@@ -165,8 +166,8 @@ class TestSeries:
         run = loop.with_plant(replace(plant, **worst.worst_plant)).run(SEQUENCE.command(), 5.0, "compensated")
         assert run.q_largest_L_min[-1] == pytest.approx(worst.worst) and worst.worst > 0.3
 
-    def test_a_series_needs_its_plant(self, firmware):
-        with pytest.raises(InputError, match="--plant"):
+    def test_a_series_needs_its_plant(self, firmware, wording):
+        with wording.refusal(InputError):
             verify(firmware, tolerances=Tolerances(spreads=SPREADS))
 
     def test_the_example_file_is_read(self, example_folder):
@@ -174,21 +175,21 @@ class TestSeries:
         assert tolerances.plants == 200 and tolerances.spreads["B_e_N_s_m"] == (0.5, "uniform")
 
     @pytest.mark.parametrize(
-        ("text", "message"),
+        "text",
         [
-            ('preload = "3 %"', "preload_N"),
-            ("preload_N = 3", "expected plus and minus some per cent"),
-            ('preload_N = "300 %"', "expected plus and minus some per cent"),
-            ('preload_N = "-3 %"', "expected plus and minus some per cent"),
-            ("stroke_mm = 0.03", 'write for example stroke_mm = "3 %", or stroke_mm = "1 % sd"'),
-            ('plants = 0\npreload_N = "3 %"', "expected a whole number from 1"),
-            ('plants = true\npreload_N = "3 %"', "expected a whole number"),
-            ("plants = 3", "names no plant parameter"),
-            ("plants = ", "is not TOML"),
+            'preload = "3 %"',
+            "preload_N = 3",
+            'preload_N = "300 %"',
+            'preload_N = "-3 %"',
+            "stroke_mm = 0.03",
+            'plants = 0\npreload_N = "3 %"',
+            'plants = true\npreload_N = "3 %"',
+            "plants = 3",
+            "plants = ",
         ],
     )
-    def test_what_does_not_fit_is_refused(self, tmp_path, text, message):
+    def test_what_does_not_fit_is_refused(self, tmp_path, text, wording):
         path = tmp_path / "t.toml"
         path.write_text(text)
-        with pytest.raises(InputError, match=message):
+        with wording.refusal(InputError):
             read_tolerances(path)

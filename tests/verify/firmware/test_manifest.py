@@ -29,12 +29,12 @@ def follows(folder, manifest):
 @pytest.mark.parametrize(
     ("root", "target"), [*((GOLDENS, one.name) for one in targets()), *((FULL, name) for name in FULL_TARGETS)]
 )
-def test_every_constant_of_every_target_is_found_in_its_c(root, target, tmp_path):
+def test_every_constant_of_every_target_is_found_in_its_c(root, target, tmp_path, wording):
     firmware = generate(golden_compensator(target, root), target)
     write_folder(tmp_path / "firmware", firmware.files, firmware.manifest)
     check = follows(tmp_path / "firmware", manifest_of(tmp_path / "firmware"))
     assert check.holds, check.text
-    assert f" {len(firmware.manifest.constants)} constants" in check.text
+    wording.of_test(check.text)
 
 
 def change(manifest, path, value):
@@ -59,31 +59,32 @@ def test_every_wrong_value_is_named(firmware_folder):
 
 
 @pytest.mark.parametrize(
-    ("path", "value", "said"),
+    ("path", "value"),
     [
-        (("law",), "target", "the manifest's law is target, the compensator's paper"),
-        (("target",), "cortex-m4", "the manifest's target is cortex-m4, but the files are those of f28335"),
-        (("target",), "core", "the manifest's target is core, but the files are those of f28335"),
-        (("constants",), [], "is not in the manifest, and "),
-        (("origin", "compensator_json"), "0" * 64, "origin.compensator_json is not that of compensator.json"),
-        (("origin", "valve_json"), "0" * 64, "origin.valve_json is not that of compensator.json"),
-        (("origin", "ramp_tests"), [], "origin.ramp_tests is not that of compensator.json"),
-        (("made_from",), [], "made_from is not that of compensator.json"),
+        (("law",), "target"),
+        (("target",), "cortex-m4"),
+        (("target",), "core"),
+        (("constants",), []),
+        (("origin", "compensator_json"), "0" * 64),
+        (("origin", "valve_json"), "0" * 64),
+        (("origin", "ramp_tests"), []),
+        (("made_from",), []),
     ],
 )
-def test_what_else_is_wrong_is_named(firmware_folder, path, value, said):
+def test_what_else_is_wrong_is_named(firmware_folder, path, value, wording):
     manifest = manifest_of(firmware_folder)
     change(manifest, path, value)
     check = follows(firmware_folder, manifest)
-    assert check.holds is False and said in check.text
+    assert check.holds is False
+    wording.of_test(check.text)
 
 
-def test_a_constant_that_only_one_of_both_has_is_named(firmware_folder):
+def test_a_constant_that_only_one_of_both_has_is_named(firmware_folder, wording):
     manifest = manifest_of(firmware_folder)
     entry = manifest["constants"].pop(place_of(manifest, "SUM_SHIFT"))
-    assert "SUM_SHIFT of core/dz_comp.c is not in the manifest" in follows(firmware_folder, manifest).text
+    wording.of_test(follows(firmware_folder, manifest).text)
     manifest["constants"] += [entry, {**entry, "symbol": "OTHER"}]
-    assert "the manifest's OTHER is not in core/dz_comp.c" in follows(firmware_folder, manifest).text
+    wording.of_test(follows(firmware_folder, manifest).text)
 
 
 @pytest.mark.parametrize(
@@ -93,14 +94,13 @@ def test_a_constant_that_only_one_of_both_has_is_named(firmware_folder):
         (("constants", 0, "value"), True), (("constants", 0, "value"), "64"), (("board",), "f28335/main.c"),
     ],
 )  # fmt: skip
-def test_a_manifest_of_another_shape_is_refused(firmware_folder, path, value):
+def test_a_manifest_of_another_shape_is_refused(firmware_folder, path, value, wording):
     manifest = manifest_of(firmware_folder)
     change(manifest, path, value)
-    named = str(path[0])
-    with pytest.raises(InputError, match=named):
+    with wording.refusal(InputError):
         follows(firmware_folder, manifest)
     del manifest[path[0]]
-    with pytest.raises(InputError, match=f"lacks the key '{named}'"):
+    with wording.refusal(InputError):
         follows(firmware_folder, manifest)
 
 

@@ -43,6 +43,8 @@ class Verification(ShownInNotebooks):
     maps: tuple[InputMap, ...]
     #: The ramps in closed loop, one a side and tested pressure drop.
     loops: tuple[LoopComparison, ...]
+    #: What the firmware was made from, where designing it again gave every number.
+    derived: Compensator | None
 
     @property
     def holds(self) -> bool:
@@ -90,16 +92,15 @@ def verify(
     building = ThreadPoolExecutor(1).submit(scenes_of, folder, compensator, plant)  # a compiler's time, not ours
     core, loop = _try_core(folder, manifest, compensator, say), FirmwareLoop()
     if core.inputs:
-        sequence = sequence or RampSequence()
-        loop = close_the_loop(building.result(), compensator, plant, sequence, tolerances, say, watch)
-    board = board_compiles(folder, manifest, include)
+        loop = close_the_loop(building.result(), compensator, plant, sequence or RampSequence(), tolerances, say, watch)
+    board, law = board_compiles(folder, manifest, include), law_follows(compensator)
     checks = (
         files_unchanged(folder, manifest),
         manifest_follows(folder, manifest, compensator),
         *core.checks,
         *loop.checks,
         certificate_follows(compensator),
-        law_follows(compensator),
+        law,
         valve_follows(folder, compensator),
         *board.checks,
     )
@@ -118,7 +119,8 @@ def verify(
         monte_carlo=loop.monte_carlo,
         mutants=None,
     )
-    return Verification(evidence=evidence, maps=core.maps, loops=loop.loops)
+    derived = compensator if law.holds else None
+    return Verification(evidence=evidence, maps=core.maps, loops=loop.loops, derived=derived)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -2,8 +2,8 @@
 
 from textwrap import wrap
 
+from dzdesign.codegen.banner import lot_in_words
 from dzdesign.codegen.core.constants import COLUMNS
-from dzdesign.codegen.lot_banner import lot_in_words
 from dzdesign.core.units import span_MPa
 from dzdesign.design.compensator import Compensator
 

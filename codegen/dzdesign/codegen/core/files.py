@@ -13,12 +13,7 @@ from dzdesign.codegen.core.drive_constants import (
     status_constants,
 )
 from dzdesign.codegen.core.integer_form import integer_form
-from dzdesign.codegen.core.law_constants import (
-    KAPPA_ROUNDING,
-    U_MIN0_ROUNDING,
-    LawConstants,
-    equation_of,
-)
+from dzdesign.codegen.core.law_constants import KAPPA_ROUNDING, U_MIN0_ROUNDING, LawConstants, equation_of
 from dzdesign.codegen.core.misra import misra_lines
 from dzdesign.codegen.core.signal_constants import SignalConstants
 from dzdesign.codegen.core.table_form import TableForm, table_form

@@ -25,7 +25,7 @@ def about_ramps(found: Repeatability, count: int, options: IdentifyOptions) -> I
     elif degrees is not None and degrees < FEW_DEGREES:
         yield warn("few-repeats", sd_mV=sd_mV, differences=degrees)
     if found.no_drift == "order of pressure" or (found.no_drift == "order unknown" and count > 1):
-        yield warn("order", case="unknown" if found.no_drift == "order unknown" else "of-pressure")
+        yield warn("order", None, "unknown" if found.no_drift == "order unknown" else "of-pressure")
     if found.drift_V is not None and found.drift_se_V is not None:
         least = max(DRIFT_SIGNIFICANCE * found.drift_se_V, SMALLEST_DRIFT * options.u_max)
         if abs(found.drift_V) > least:

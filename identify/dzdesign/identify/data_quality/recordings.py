@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from dzdesign.identify.data_quality.catalogue import most_serious_first, warn
 from dzdesign.identify.reading.clock import ASSUMED_MS
+from dzdesign.identify.reading.metering_edge import EDGES
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.model import Warning_
 
@@ -19,6 +20,13 @@ def about_recordings(tests: Sequence[RampTest]) -> tuple[Warning_, ...]:
 def _about_one(test: RampTest) -> Iterator[Warning_]:
     if test.clock_doubt:
         yield warn("time-unit", test.source, "taken" if test.clock_doubt == ASSUMED_MS else "not-taken")
+    if test.side_without_dp:
+        edges = EDGES[1 if test.side_without_dp == "positive" else -1]
+        reason = (
+            f"{''.join(test.dp_from)} is the pressure drop of the other side's edge; name columns of "
+            f"{' or '.join(' and '.join(edge) for edge in edges)} too, or of dP"
+        )
+        yield warn("side-refused", test.source, side=test.side_without_dp, reason=reason)
     if test.no_values:
         yield warn("missing-samples", test.source, numbers=test.no_values)
     if test.run > 1:

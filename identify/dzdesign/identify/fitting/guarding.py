@@ -19,8 +19,6 @@ from dzdesign.identify.valve.staircase import Direction, staircase
 #: soft edge. At 3 one sharp valve in a hundred was, and beta(5 MPa) scattered by 7e-4 instead of 2.6e-4; which soft
 #: edges are found hardly changes (a width of 0.6 V always is, with any meter).
 SOFT_SIGNIFICANCE = 3.5
-#: Standard errors of a lag that was found, against which the bounds guard.
-LAG_ERRORS = 3.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,6 +51,19 @@ class Threshold:
     value: np.ndarray
     se: np.ndarray
     bound: np.ndarray
+    #: By how much the bounds were lowered for the tolerance of the meter's lag, V, (T,).
+    lag_budget: np.ndarray
+
+
+def systematic_change(group: DescribedTests, column: int, options: IdentifyOptions) -> float:
+    """Return by how much systematic errors may make the knees of one branch differ from test to test, V.
+
+    Beside what the engineer allows for, a lag that is a little wrong does so where tests were run at different rates,
+    and a leak that was subtracted, if it stops where the valve opens.
+    """
+    by_lag = float(np.ptp(np.nan_to_num(group.rates(column)))) * max(group.lag.longer, group.lag.shorter)
+    shifts = [leak / item.branch(column).slope for leak, item in zip(group.leak, group.tests, strict=True)]
+    return options.flat_below * options.u_max + by_lag + float(np.ptp(shifts))
 
 
 def order_knees(
@@ -78,7 +89,7 @@ def order_knees(
         return OrderedKnees(column=column, fit=free, departure=np.zeros(1))
     knee = free.knee[:, column]
     knee_se = np.sqrt(np.diag(group.between(column).covariance_of_mean(free.knee_se[:, column])))
-    budget = options.flat_below * options.u_max
+    budget = systematic_change(group, column, options)
     if direction == "flat":
         departure = excess_departure(np.abs(knee - knee.mean()), knee_se, budget)
         return OrderedKnees(column=column, fit=free, departure=departure)
@@ -96,17 +107,20 @@ def bound_threshold(group: DescribedTests, knees: OrderedKnees, options: Identif
     knee, knee_se = knees.knee, knees.knee_se
     zero = np.array([shape.tail.zero for shape in shapes])
     zero_se = np.array([shape.tail.zero_se for shape in shapes])
+    lag_budget = group.lag.shift_at(group.rates(knees.column), rising=knees.column == 0)
     # Steps of equal height stop the spool anywhere within the root of three standard deviations of its mean course.
     stops = math.sqrt(3) * np.array([shape.ripple for shape in shapes])
-    shared = knees.departure.max() + _lag_budget(group, knees.column) + stops
+    shared = knees.departure.max() + lag_budget + stops
     # What was subtracted as the meter's zero has an error of its own, which moves all readings of a test together.
     inflations = [shape.variance_inflation for shape in shapes]
     subtracted = np.array([se * math.sqrt(factor) for se, factor in zip(group.zero_se, inflations, strict=True)])
     knee_se = np.hypot(knee_se, subtracted / [shape.slope for shape in shapes])
     zero_se = np.hypot(zero_se, subtracted / [shape.tail.slope for shape in shapes])
-    # A zero error of the meter moves each zero by the error over the slope of the line that was extrapolated.
-    knee_budget = shared + np.array([options.meter_zero / shape.slope for shape in shapes])
-    zero_budget = shared + np.array([options.meter_zero / shape.tail.slope for shape in shapes])
+    # A zero error of the meter moves each zero by the error over the slope of the line that was extrapolated; so does a
+    # leak that was subtracted, if it stops where the valve opens.
+    amiss = options.meter_zero + np.array(group.leak)
+    knee_budget = shared + amiss / [shape.slope for shape in shapes]
+    zero_budget = shared + amiss / [shape.tail.slope for shape in shapes]
     # A soft edge passes flow below the knee. Where the tail agrees with the knee's line, that line is all there is.
     gap, error = knee - zero, np.hypot(knee_se, zero_se)
     # One edge has passed the flow of all tests, so together they show a softness that none shows alone.
@@ -115,30 +129,33 @@ def bound_threshold(group: DescribedTests, knees: OrderedKnees, options: Identif
     between = group.between(knees.column)
     knee_bound = lower_bounds(knee, knee_se, between, options.confidence, knee_budget)
     zero_bound = lower_bounds(zero, zero_se, between, options.confidence, zero_budget)
+    # What averages show below the knee at one pressure drop is one edge's, which all tests have.
+    depth = max(shape.dead_zone.depth for shape in shapes)
     return Threshold(
-        np.where(soft, zero, knee),
+        np.minimum(np.where(soft, zero, knee), knee - depth),
         np.where(soft, zero_se, knee_se),
-        np.where(soft, np.minimum(knee_bound, zero_bound), knee_bound),
+        np.minimum(np.where(soft, np.minimum(knee_bound, zero_bound), knee_bound), knee_bound - depth),
+        lag_budget,
     )
 
 
-def _lag_budget(group: DescribedTests, column: int) -> float:
-    """Return by how much an error of a lag that was found may have moved the guarded thresholds, V."""
-    if group.lag.origin != "identified":
-        return 0.0
-    rates = [item.branch(column).prepared.branch.rate for item in group.tests]
-    return LAG_ERRORS * group.lag.se * float(np.nanmax(rates))
-
-
-def mean_threshold(one: Threshold, other: Threshold) -> Threshold:
+def mean_threshold(group: DescribedTests, opening: Threshold, closing: Threshold) -> Threshold:
     """Return the mean of both branches' thresholds, its error as large as their covariance could make it.
 
     The branches have no sample in common, but slow noise, the correction of the lag and the meter's zero act on both,
     and how much they share is not known. The standard error of a sum is never above the sum of standard errors (their
     correlation is at most 1), so half of that is taken; the mean of two bounds, each of the same number of standard
-    errors, is then the mean's bound at the same confidence, with no allowance for a second set of tests.
+    errors, is then the mean's bound at the same confidence, with no allowance for a second set of tests. The meter's
+    lag moves the branches against each other, so what the bounds allow for it does not add up.
     """
-    return Threshold((one.value + other.value) / 2, (one.se + other.se) / 2, (one.bound + other.bound) / 2)
+    lag_budget = group.lag.shift_of_mean_at(group.rates(0), group.rates(1))
+    credit = (opening.lag_budget + closing.lag_budget) / 2 - lag_budget
+    return Threshold(
+        (opening.value + closing.value) / 2,
+        (opening.se + closing.se) / 2,
+        (opening.bound + closing.bound) / 2 + credit,
+        lag_budget,
+    )
 
 
 def fit_guard_curves(

@@ -24,7 +24,7 @@ from dzdesign.identify.valve.repeatability import NoDrift, Origin
 #: Standard deviation of the thresholds from ramp to ramp, over u_max, taken where nothing tells it: data sheets of
 #: valves without a position sensor state a repeatability of about 1 %, as a band of two standard deviations each way.
 ASSUMED_REPEATABILITY = 2.5e-3
-#: Fewest degrees of freedom of a scatter that is believed: the one difference of two ramps may be small by chance.
+#: Fewest degrees of freedom of a small scatter that is believed: the one difference of two ramps may be so by chance.
 FEWEST_DEGREES = 2
 #: A ramp tells its own knee with at least so many samples, over this share of the straight part.
 RAMP_SAMPLES, RAMP_SPAN = 5, 0.5
@@ -130,8 +130,8 @@ def compare_ramps(known: RampKnees, counts: Sequence[int], *, declared: float | 
     counts : sequence of int
         Ramps of each of the T tests.
     declared : float or None
-        Standard deviation from ramp to ramp, V; None measures it where ramps were repeated. A declared one that the
-        repeats contradict is not taken.
+        Standard deviation from ramp to ramp, V; None measures it where ramps were repeated, and assumes it elsewhere.
+        A declared or assumed one that the repeats contradict is not taken.
     u_max : float
         Full command, V.
     """
@@ -144,7 +144,7 @@ def compare_ramps(known: RampKnees, counts: Sequence[int], *, declared: float | 
     residual = known.knee - design @ found
     degrees = residual.size - design.shape[1]
     squares, noise = float(residual @ residual), float(known.noise.mean()) if residual.size else 0.0
-    origin = _origin(squares, noise, degrees, declared)
+    origin = _origin(squares, noise, degrees, declared, u_max)
     measured = origin == "repeats"
     sd = math.sqrt(squares / degrees) if measured else ASSUMED_REPEATABILITY * u_max if declared is None else declared
     covariance = np.eye(count if no_drift else count + 1)
@@ -222,12 +222,14 @@ def _error_of_last(design: np.ndarray) -> float:
     return 1 / math.sqrt(squares) if squares > NOTHING else math.inf
 
 
-def _origin(squares: float, noise: float, degrees: int, declared: float | None) -> Origin:
-    """Return where the scatter is from: a declared one counts unless the repeats contradict it."""
-    enough = degrees >= FEWEST_DEGREES
-    if declared is None:
-        return "repeats" if enough else "assumed"
+def _origin(squares: float, noise: float, degrees: int, declared: float | None, u_max: float) -> Origin:
+    """Return where the scatter is from: what is declared or assumed counts, unless the repeats contradict it."""
     from scipy.special import chdtrc
 
-    expected = max(declared**2 + noise, np.finfo(float).tiny)
-    return "repeats" if enough and chdtrc(degrees, squares / expected) < CONTRADICTED else "declared"
+    if declared is None and degrees >= FEWEST_DEGREES:
+        return "repeats"
+    taken = ASSUMED_REPEATABILITY * u_max if declared is None else declared
+    expected = max(taken**2 + noise, np.finfo(float).tiny)
+    if degrees > 0 and chdtrc(degrees, squares / expected) < CONTRADICTED:
+        return "repeats"
+    return "assumed" if declared is None else "declared"

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from dzdesign.identify.knees.between_ramps import BetweenRamps
 from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.knees.meter_lag import MeterLag
@@ -57,6 +59,8 @@ class DescribedTests:
     zero_L_min: dict[str, float]
     #: Standard error of what was subtracted from each of `tests`, as of white noise, m³/s; 0 where nothing was.
     zero_se: tuple[float, ...]
+    #: Leak that was subtracted from each of `tests`, m³/s; 0 where there is none.
+    leak: tuple[float, ...]
     #: What differs from ramp to ramp, of the rising and of the falling branch; None where there is none.
     between_ramps: tuple[BetweenRamps | None, BetweenRamps | None]
 
@@ -66,3 +70,7 @@ class DescribedTests:
         if found is None:
             raise ValueError(f"there is no {('rising', 'falling')[column]} branch")
         return found
+
+    def rates(self, column: int) -> np.ndarray:
+        """Return the pace of the command on that branch of each test, V/s (T,); NaN where it is not known."""
+        return np.array([item.branch(column).prepared.branch.rate for item in self.tests])

@@ -2,6 +2,9 @@
 
 At a rate of r V/s a meter that lags by tau shows the rising knee r tau too high and the falling one r tau too low. On
 one ramp rate that can't be told from hysteresis; a second rate moves the knees and leaves the hysteresis where it was.
+
+A lag that is taken out wrongly moves both knees, and one of them to the unsafe side: taken too long it puts the closing
+knee too high, too short the opening knee. So a lag comes with how much longer and shorter the true one may be.
 """
 
 import math
@@ -14,7 +17,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.constants import FULL_SWEEP
-from dzdesign.identify.knees.gated_line import prepare_branch
+from dzdesign.identify.knees.gated_line import fit_line, prepare_branch
 from dzdesign.identify.knees.line_fitting import lay_line
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.pooling import group_by_pressure
@@ -26,41 +29,122 @@ TWO_RATES = 1.5
 LAG_SIGNIFICANCE = 3.0
 #: A lag known no better than this, s, is not known.
 USELESS = 0.1
+#: Standard errors of a lag that was found, against which the bounds guard.
+LAG_ERRORS = 3.0
+#: Tolerance of a declared lag where none is stated: a share of it, and at least so many seconds.
+LAG_TOLERANCE, LEAST_TOLERANCE = 0.2, 0.05
+#: Longest lag, s, that the bounds allow for where nothing tells it.
+LONGEST_UNKNOWN = 0.2
+#: Points of the course that a filter's reading takes near a sharp edge.
+FILTER_POINTS = 2000
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class MeterLag:
-    """Lag of the flow meter and its standard error, s; `origin` says how it is known.
+    """Lag of the flow meter that was taken out, s; `origin` says how it is known.
 
     `origin` is "declared", "identified" (from ramps of two rates) or "unknown": then none is taken.
     """
 
     seconds: float
-    se: float
     origin: Literal["declared", "identified", "unknown"]
+    #: By how much the true lag may be longer and shorter, s.
+    longer: float
+    shorter: float
+    #: What ramps of two rates tell, and its standard error, s, where that contradicts the declared one.
+    contradicted_by: tuple[float, float] | None = None
+
+    def shift_at(self, rates: np.ndarray, *, rising: bool) -> np.ndarray:
+        """Return by how much knees, at ramps of such rates (V/s), may be too high, V; an unknown rate (NaN) tells 0."""
+        shift: np.ndarray = np.nan_to_num(rates) * (self.longer if rising else self.shorter)
+        return shift
+
+    def shift_of_mean_at(self, rising: np.ndarray, falling: np.ndarray) -> np.ndarray:
+        """Return by how much the mean of both branches' knees may be too high, V: of equal rates it is right."""
+        faster = np.nan_to_num(rising) - np.nan_to_num(falling)
+        shift: np.ndarray = np.where(faster > 0, self.longer * faster, -self.shorter * faster) / 2
+        return shift
 
 
 def find_lag(ramps: Sequence[Ramp], options: IdentifyOptions) -> MeterLag:
-    """Find the meter's lag, unless it is declared, from all ramps, split as if there were no lag."""
+    """Return the meter's lag, declared or found, from all ramps, which were put right for the declared one, if any."""
+    found = _lag_of_two_rates(ramps, options)
     if options.meter_lag is not None:
-        return MeterLag(options.meter_lag, 0.0, "declared")
-    total = weighted = 0.0
+        return _declared(options.meter_lag, options.meter_lag_tolerance, found)
+    if found is None:
+        return MeterLag(seconds=0.0, origin="unknown", longer=LONGEST_UNKNOWN, shorter=0.0)
+    seconds, se = found
+    # Below its error there may be none; the error counts in the bounds either way.
+    taken = seconds if seconds > LAG_SIGNIFICANCE * se else 0.0
+    return MeterLag(
+        seconds=taken,
+        origin="identified",
+        longer=max(seconds - taken, 0.0) + LAG_ERRORS * se,
+        shorter=min(taken, LAG_ERRORS * se),
+    )
+
+
+def softness_of_filter(shift: float, at_level: float, ratio: float, *, rising: bool) -> float:
+    """Return by how much a meter that is a first-order filter softens a sharp edge, V: knee less the tail's zero.
+
+    Far from the edge the filter shifts the flow by `shift` (rate times lag, V), which was taken out; at the edge it
+    rounds it. The tail is the line between the flow that the straight part reaches `at_level` (V) above the knee and
+    `ratio` times that.
+    """
+    if not shift > 0:
+        return 0.0
+    lowest = at_level / shift
+    # Of a ramp of unit slope: x is the command beyond the knee over the shift, put right for it.
+    x = np.linspace(-1.0 if rising else 1 + math.log(min(lowest, 1.0)), max(ratio * lowest, 1.0), FILTER_POINTS)
+    reading = x + np.exp(-1 - x) if rising else np.where(x >= 1, x, np.exp(np.minimum(x, 1.0) - 1))
+    tail = (reading >= lowest) & (reading <= ratio * lowest)
+    _, zero = fit_line(x[tail], reading[tail])
+    return max(-zero * shift, 0.0)
+
+
+def _declared(seconds: float, stated: float | None, left: tuple[float, float] | None) -> MeterLag:
+    """Return a declared lag with its tolerance; `left` is what two rates show to be left of it, and its error, s."""
+    tolerance = max(LAG_TOLERANCE * seconds, LEAST_TOLERANCE) if stated is None else stated
+    longer, shorter, contradicted_by = tolerance, tolerance, None
+    if left is not None and abs(left[0]) > tolerance + LAG_ERRORS * left[1]:
+        contradicted_by = (max(seconds + left[0], 0.0), left[1])
+        longer = max(longer, left[0] + LAG_ERRORS * left[1])
+        shorter = max(shorter, LAG_ERRORS * left[1] - left[0])
+    return MeterLag(
+        seconds=seconds,
+        origin="declared",
+        longer=longer,
+        shorter=min(shorter, seconds),  # no meter runs ahead of the flow
+        contradicted_by=contradicted_by,
+    )
+
+
+def _lag_of_two_rates(ramps: Sequence[Ramp], options: IdentifyOptions) -> tuple[float, float] | None:
+    """Return the lag that ramps of two rates tell, and its standard error, s; None if they tell none."""
+    paces: list[np.ndarray] = []
+    knees: list[np.ndarray] = []
+    weights: list[np.ndarray] = []
+    scatter = (options.repeatability or 0.0) * options.u_max
     for group in group_by_pressure(ramps):
         for rising in (True, False):
-            rates, knees, errors = _knees(group, rising, options)
+            rates, of_group, errors = _knees(group, rising, options)
             if rates.size < 2 or rates.max() < TWO_RATES * rates.min():
                 continue
             # Each group and direction has a knee of its own, so only departures from its mean tell the lag.
-            weight = errors**-2.0
-            pace = (rates - np.average(rates, weights=weight)) * (1 if rising else -1)
-            total += float(np.sum(weight * pace**2))
-            weighted += float(np.sum(weight * pace * knees))
-    se = 1 / math.sqrt(total) if total > 0 else math.inf
-    if se > USELESS:
-        return MeterLag(0.0, math.nan, "unknown")
-    seconds = weighted / total
-    # Below its error there may be none; the error counts in the bounds either way.
-    return MeterLag(seconds if seconds > LAG_SIGNIFICANCE * se else 0.0, se, "identified")
+            weight = 1 / (errors**2 + scatter**2)
+            paces.append((rates - np.average(rates, weights=weight)) * (1 if rising else -1))
+            knees.append(of_group - np.average(of_group, weights=weight))
+            weights.append(weight)
+    if not paces:
+        return None
+    pace, knee, weight = np.concatenate(paces), np.concatenate(knees), np.concatenate(weights)
+    total = float(np.sum(weight * pace**2))
+    seconds = float(np.sum(weight * pace * knee)) / total
+    # What the knees scatter by from ramp to ramp, beyond their noise, is in the lag too.
+    degrees = pace.size - len(paces) - 1
+    excess = float(np.sum(weight * (knee - seconds * pace) ** 2)) / degrees if degrees > 0 else 1.0
+    se = math.sqrt(max(excess, 1.0) / total)
+    return None if se > USELESS else (seconds, se)
 
 
 def _knees(group: Sequence[Ramp], rising: bool, options: IdentifyOptions) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

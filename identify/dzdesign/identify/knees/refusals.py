@@ -17,6 +17,8 @@ MIDDLE = (0.15, 0.45)
 LARGEST_FLOOR = 0.55
 #: Fewest of the readings there, as a share, and width over u_max above which few readings are a coarse staircase's.
 FEWEST_IN_THE_MIDDLE, WIDEST_JUMP = 0.25, 0.05
+#: So far below the lowest command of a ramp, over u_max, a knee may lie: it is extrapolated, and a warning says so.
+EXTRAPOLATED = 0.1
 
 
 def refuse_a_wrong_pressure(source: str, dp: float | None) -> None:
@@ -78,4 +80,16 @@ def refuse_a_jump(read: PreparedBranch, u_max: float) -> None:
         f"lies between {MIDDLE[0]:.0%} and {MIDDLE[1]:.0%} of the largest flow of {read.y_max / L_MIN:.3g} L/min, "
         "expected a straight rise; either the meter starts above that (take one of a smaller range, or leave out this "
         "pressure drop) or the valve only switches"
+    )
+
+
+def refuse_an_impossible_knee(branch: Branch, knee: float, source: str, u_max: float) -> None:
+    """Refuse a knee (V) outside the command that a test's branch has swept, as a line through a bent part gives it."""
+    lowest, highest = float(branch.u.min()), float(branch.u.max())
+    if max(lowest - EXTRAPOLATED * u_max, 0.0) <= knee <= highest:
+        return
+    raise InputError(
+        f"'{source}': the knee on {'opening' if branch.rising else 'closing'} comes out at {knee:.2f} V, expected it "
+        f"within the command that was swept, {lowest:.2f} to {highest:.2f} V; look at the flow below it for a leak or "
+        "a pump that came up late, and choose a --knee-window in which the flow is straight"
     )

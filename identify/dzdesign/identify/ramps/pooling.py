@@ -63,6 +63,7 @@ def _pooled(group: list[Ramp]) -> PooledTest:
         u=u,
         q=q,
         dp=dp,
+        dp_from=_different_columns(group),
         dp_is_declared=any(ramp.test.dp_is_declared for ramp in group),
     )
     return PooledTest(
@@ -73,6 +74,14 @@ def _pooled(group: list[Ramp]) -> PooledTest:
         files=tuple(dict.fromkeys((ramp.test.source, ramp.test.sha256) for ramp in group)),
         left_out=tuple(item for ramp in group for item in ramp.left_out),
     )
+
+
+def _different_columns(group: list[Ramp]) -> tuple[str, str]:
+    """Return which columns make the pressure drop, at positive and negative commands; of several recordings all."""
+    positive, negative = (
+        " or ".join(dict.fromkeys(each)) for each in zip(*(r.test.dp_from for r in group), strict=True)
+    )
+    return positive, negative
 
 
 def _joined(group: list[Ramp], rising: bool) -> Branch | None:

@@ -42,4 +42,4 @@ def _mirrored(test: RampTest) -> RampTest:
     dp = test.dp
     if dp is not None and np.median(dp[open_]) < 0:
         dp = np.abs(dp)  # at rest it may still have the other side's sign
-    return replace(test, u=-test.u, q=q, dp=dp)
+    return replace(test, u=-test.u, q=q, dp=dp, dp_from=test.dp_from[::-1])

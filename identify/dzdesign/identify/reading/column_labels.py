@@ -8,6 +8,7 @@ from math import isclose
 
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.units import measures, si_factor
+from dzdesign.identify.reading.metering_edge import PORTS, metering_edge, which_edge
 from dzdesign.identify.reading.table import Table, clean_label
 
 #: Spelling in a header (lower case, letters only) -> quantity of a ramp test.
@@ -15,13 +16,14 @@ COLUMN_NAMES = {
     "time": "time", "t": "time",
     "u": "u", "command": "u",
     "dp": "dP", "δp": "dP", "deltap": "dP",
-    "pa": "pA", "pb": "pB",
+    "pp": "pP", "pa": "pA", "pb": "pB", "pt": "pT",
     "q": "Q", "flow": "Q",
 }  # fmt: skip
-QUANTITY_OF_COLUMN = {"time": "time", "u": "voltage", "dP": "pressure", "pA": "pressure", "pB": "pressure", "Q": "flow"}
+PRESSURES = ("dP", *PORTS)
+QUANTITY_OF_COLUMN = {"time": "time", "u": "voltage", **dict.fromkeys(PRESSURES, "pressure"), "Q": "flow"}
 #: How a column is best named, for the messages.
-EXAMPLE_LABELS = {"time": "time_s", "u": "u_V", "dP": "dP_MPa", "pA": "pA_MPa", "pB": "pB_MPa", "Q": "Q_Lmin"}
-EXAMPLE_UNITS = {"time": "s", "u": "V", "dP": "MPa", "pA": "MPa", "pB": "MPa", "Q": "L/min"}
+EXAMPLE_UNITS = {"time": "s", "u": "V", **dict.fromkeys(PRESSURES, "MPa"), "Q": "L/min"}
+EXAMPLE_LABELS = {name: f"{name}_{unit.replace('/', '')}" for name, unit in EXAMPLE_UNITS.items()}
 #: Labels among which the one that was meant is looked for.
 MOST_MEANT = 200
 #: Units of a command that is a share of u_max.
@@ -54,9 +56,9 @@ def parse_columns(text: str | Mapping[str, str]) -> dict[str, str]:
     Parameters
     ----------
     text : str or mapping
-        ``"u=AO0:V, Q=Flow (L/min)"``, or the same as a mapping. A quantity is one of time, u, dP, pA, pB, Q; a label
-        stands as in the file, and a unit that it lacks follows after a colon. A comma parts two entries only before
-        another ``quantity=``, so a label may hold one.
+        ``"u=AO0:V, Q=Flow (L/min)"``, or the same as a mapping. A quantity is one of time, u, dP, pP, pA, pB, pT, Q; a
+        label stands as in the file, and a unit that it lacks follows after a colon. A comma parts two entries only
+        before another ``quantity=``, so a label may hold one.
 
     Raises
     ------
@@ -69,7 +71,7 @@ def parse_columns(text: str | Mapping[str, str]) -> dict[str, str]:
     {'u': 'AO0:V', 'Q': 'Flow (L/min)'}
     """
     if isinstance(text, str):
-        entries = [entry.partition("=")[::2] for entry in re.split(r"[,;]\s*(?=\w+\s*=)", text)]
+        entries = [entry.partition("=")[::2] for entry in re.split(r"[,;]\s*(?=[^\W\d]\w*\s*=)", text)]
     else:
         entries = list(text.items())
     columns: dict[str, str] = {}
@@ -89,31 +91,58 @@ def parse_columns(text: str | Mapping[str, str]) -> dict[str, str]:
     return columns
 
 
-def find_columns(table: Table, chosen: Mapping[str, str]) -> dict[str, Column]:
+def find_columns(table: Table, chosen: Mapping[str, str], sample_rate: float | None = None) -> dict[str, Column]:
     """Return quantity -> column of a table: those that were chosen, the others by their labels.
+
+    Of the pressures only those that make the drop of the metering edge are there. With a declared `sample_rate`, Hz,
+    there is no column of time, and one is refused.
 
     Raises
     ------
     InputError
-        If a quantity has no column, or two, or a chosen label is not in the table.
+        If a quantity has no column, or two, or a chosen label is not in the table; if pressures could make the drop of
+        two edges, or a working port's makes none.
     """
     columns = labelled_columns(table, chosen)
-    if ("pA" in columns) != ("pB" in columns) and "dP" not in columns:
-        have, lack = ("pA", "pB") if "pA" in columns else ("pB", "pA")
+    if "time" not in chosen and "time" in columns and columns["time"].unit and not fits(columns["time"].unit, "time"):
+        del columns["time"]  # T_degC is no time
+    if sample_rate is not None:
+        columns = _without_time(table, columns, sample_rate)
+    edge = metering_edge(columns)
+    if edge.ambiguous:
+        labels = {quantity: column.label for quantity, column in columns.items()}
+        raise InputError(f"'{table.path}'{table.header} has {which_edge(labels)}")
+    have = next((port for port in ("pA", "pB") if port in columns), "")
+    if have and not edge.quantities:
+        lack = "pB" if have == "pA" else "pA"
         raise InputError(
-            f"'{table.path}'{table.header} has a column of {have} but none of {lack}; expected both, or dP"
+            f"'{table.path}'{table.header} has a column of {have} but none of {lack}; expected both, or that of "
+            "P or T, or dP"
         )
-    for quantity in ("time", "u", "Q"):
+    columns = {name: column for name, column in columns.items() if name not in PRESSURES or name in edge.quantities}
+    for quantity in ("time", "u", "Q") if sample_rate is None else ("u", "Q"):
         if quantity not in columns:
             raise _missing_column(quantity, table, columns)
     return columns
+
+
+def _without_time(table: Table, columns: dict[str, Column], sample_rate: float) -> dict[str, Column]:
+    """Return columns without one of time whose unit nobody knows; refuse a clock."""
+    time = columns.get("time")
+    if time is not None and fits(time.unit, "time"):
+        raise InputError(
+            f"'{table.path}' has a column of time ('{time.label}'), and --sample-rate declares {sample_rate:g} Hz too; "
+            "leave one of them out"
+        )
+    return {quantity: column for quantity, column in columns.items() if quantity != "time"}
 
 
 def labelled_columns(table: Table, chosen: Mapping[str, str]) -> dict[str, Column]:
     """Return what `find_columns` does, without a word on quantities that have no column."""
     columns = {quantity: _chosen_column(table, quantity, label) for quantity, label in chosen.items()}
     taken = {column.label for column in columns.values()}
-    pressures = {"dP", "pA", "pB"} if "dP" in chosen or {"pA", "pB"} <= chosen.keys() else set()
+    edge = metering_edge(chosen)
+    pressures = set(PRESSURES) if edge.ambiguous or edge.quantities else set()
     for label in table.labels:
         quantity, in_label = split_label(label)
         if quantity is None or label in taken or quantity in chosen.keys() | pressures:
@@ -123,6 +152,8 @@ def labelled_columns(table: Table, chosen: Mapping[str, str]) -> dict[str, Colum
         unit = "s" if quantity == "time" and not fits(unit, "time") and table.is_clock(label) else unit
         if quantity in columns and not fits(unit, quantity):
             continue  # an oil temperature T_degC beside the time t_s, a set point Q_set beside Q_Lmin
+        if quantity in ("pP", "pT") and unit and not fits(unit, quantity):
+            continue  # a thermometer Pt_degC
         if quantity in columns and fits(columns[quantity].unit, quantity):
             raise InputError(
                 f"'{table.path}'{table.header} has two columns of {quantity}: '{columns[quantity].label}' and "
@@ -153,6 +184,7 @@ def _chosen_column(table: Table, quantity: str, text: str) -> Column:
         raise InputError(
             f"'{table.path}' column '{label}' has no unit; write for example "
             f'--columns "{quantity}={label}:{EXAMPLE_UNITS[quantity]}"'
+            + (f', or what its numbers mean, --columns "u={label}:0..1 = 0..100 %"' if quantity == "u" else "")
         )
     return Column(label=label, unit=unit, stated=stated)
 
@@ -242,9 +274,10 @@ def _missing_column(quantity: str, table: Table, columns: Collection[str]) -> In
     kind = QUANTITY_OF_COLUMN[quantity]
     meant += [label for label in unused if measures(table.units.get(label, "") or split_label(label)[1], kind)]
     hint = f" (did you mean '{meant[0]}'? name it {EXAMPLE_LABELS[quantity]})" if meant else ""
+    rate = ', or --sample-rate "100 Hz"' if quantity == "time" else ""
     return InputError(
         f"'{table.path}' has no column of {quantity} (columns found: {table.found_labels()}){hint}; "
-        "expected names with units such as time_s,u_V,dP_MPa,Q_Lmin, or --columns"
+        f"expected names with units such as time_s,u_V,dP_MPa,Q_Lmin, or --columns{rate}"
     )
 
 

@@ -17,6 +17,7 @@ from dzdesign.identify.reading.clock import is_milliseconds
 from dzdesign.identify.reading.column_labels import (
     COLUMN_NAMES,
     EXAMPLE_UNITS,
+    PRESSURES,
     QUANTITY_OF_COLUMN,
     Column,
     fits,
@@ -24,6 +25,7 @@ from dzdesign.identify.reading.column_labels import (
     names_a_quantity,
     split_label,
 )
+from dzdesign.identify.reading.metering_edge import PORTS, MeteringEdge, metering_edge, which_edge
 from dzdesign.identify.reading.ramp_files import read_table
 from dzdesign.identify.reading.scaling import range_example, scaling_of
 from dzdesign.identify.reading.table import Table
@@ -59,8 +61,15 @@ class ProposedColumns:
     unclear: dict[str, str]
     bare_pressures: tuple[str, ...]
 
+    @property
+    def has_dp(self) -> bool:
+        """Whether columns that are known make the pressure drop."""
+        return bool(metering_edge(self.known).quantities)
 
-def propose_columns(path: Path, chosen: Mapping[str, str], skip_rows: int | None = None) -> ProposedColumns:
+
+def propose_columns(
+    path: Path, chosen: Mapping[str, str], skip_rows: int | None = None, *, time_is_declared: bool = False
+) -> ProposedColumns:
     """Tell which column of a recording is which quantity.
 
     `chosen` is what the engineer has declared, as `parse_columns` gives it.
@@ -75,16 +84,20 @@ def propose_columns(path: Path, chosen: Mapping[str, str], skip_rows: int | None
         known = labelled_columns(table, chosen)
         if "time" in known and known["time"].unit and not fits(known["time"].unit, "time"):
             del known["time"]  # T_degC is no time
+        edge = metering_edge(known)
+        known = {name: column for name, column in known.items() if not _is_unused(name, column, edge)}
         unclear = {name: why for name, column in known.items() if (why := _why_unreadable(path, name, column))}
         taken = {column.label for column in known.values()}
         proposed: dict[str, Column] = {}
-        for quantity in ("time", "u", "Q", "dP"):
-            if quantity in known or (quantity == "dP" and {"pA", "pB"} <= known.keys()):
+        for quantity in ("u", "Q", "dP") if time_is_declared else ("time", "u", "Q", "dP"):
+            if quantity in known or (quantity == "dP" and edge.quantities):
                 continue
             candidates = [label for label in _candidates(table, quantity) if label not in taken]
             named = [label for label in candidates if nearest(re.split(r"[_\[( ]", label)[0], _spellings(quantity))]
-            port = next((known[name].label for name in ("pA", "pB") if name in known and quantity == "dP"), None)
-            if port is not None:
+            port = next((known[name].label for name in PORTS if name in known and quantity == "dP"), None)
+            if quantity == "dP" and edge.ambiguous:
+                unclear["dP"] = which_edge({name: column.label for name, column in known.items()})
+            elif port is not None:
                 unclear["dP"] = f"'{port}' is the pressure of one port; which column is that of the other, or the drop?"
             elif len(candidates) == 1 or (len(named) == 1 and quantity != "dP"):
                 label = candidates[0] if len(candidates) == 1 else named[0]
@@ -92,12 +105,18 @@ def propose_columns(path: Path, chosen: Mapping[str, str], skip_rows: int | None
                 taken.add(label)
             elif why := _why_none(table, quantity, candidates):
                 unclear[quantity] = why
-    has_pressure = "dP" in known or {"pA", "pB"} <= known.keys() or "dP" in proposed
+    has_pressure = bool(edge.quantities) or "dP" in proposed
     bare = (label for label in table.labels if label not in taken and not table.units.get(label))
     return ProposedColumns(
         labels=table.labels, known=known, proposed=proposed, unclear=unclear,
         bare_pressures=() if has_pressure else tuple(label for label in bare if PRESSURE_LIKE.fullmatch(label)),
     )  # fmt: skip
+
+
+def _is_unused(quantity: str, column: Column, edge: MeteringEdge) -> bool:
+    """Tell whether a pressure is none that the reader takes: one beside the edge's, or a supply's without a unit."""
+    beside = bool(edge.quantities) and quantity not in edge.quantities
+    return quantity in PRESSURES and (beside or (not edge.ambiguous and quantity in ("pP", "pT") and not column.unit))
 
 
 def _why_unreadable(path: Path, quantity: str, column: Column) -> str:
@@ -156,7 +175,7 @@ def _why_none(table: Table, quantity: str, candidates: list[str]) -> str:
     words = " ".join(table.labels).lower()
     if "varname" in words and "varvalue" in words:  # an archive of WinCC
         why += "; the table has a row for each variable (VarName, VarValue): export a column for each"
-    return why + _or_first_column(table) if quantity == "time" else why
+    return f'{why}{_or_first_column(table)}; if there is none, --sample-rate "100 Hz"' if quantity == "time" else why
 
 
 def _or_first_column(table: Table) -> str:

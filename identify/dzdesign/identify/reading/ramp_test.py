@@ -19,6 +19,11 @@ class RampTest:
         Time in s, command in V, flow in m³/s; rows with a missing value are left out.
     dp : (N,) array or None
         Pressure drop in Pa, or None if it is unknown.
+    dp_from : tuple of str
+        Which columns make the pressure drop at positive and at negative commands, such as ``pP_MPa - pA_MPa``; empty
+        where none does.
+    side_without_dp : str
+        Side whose metering edge has no pressure drop, "positive" or "negative": its samples were left out.
     dp_is_declared : bool
         True if the pressure drop is the engineer's word (one constant) and not a recording.
     rows_read, run : int
@@ -37,6 +42,8 @@ class RampTest:
     u: np.ndarray
     q: np.ndarray
     dp: np.ndarray | None
+    dp_from: tuple[str, str] = ("", "")
+    side_without_dp: str = ""
     dp_is_declared: bool = False
     rows_read: int = 0
     run: int = 1

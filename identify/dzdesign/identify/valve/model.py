@@ -29,6 +29,12 @@ class Meter:
         Literal["declared", "identified", "unknown"],
         Meta(description="Where the lag is from; unknown: it was taken as zero."),
     ]
+    lag_longer_s: Annotated[
+        float, quantity("s", "By how much the true lag may be longer: lowers the bounds of the opening.", ge=0, le=1e6)
+    ]
+    lag_shorter_s: Annotated[
+        float, quantity("s", "By how much it may be shorter: lowers the bounds of the closing.", ge=0, le=1e6)
+    ]
     zero_L_min: Annotated[Flow, Meta(description="Bound of its zero error, by which all bounds are lowered.")]
 
 

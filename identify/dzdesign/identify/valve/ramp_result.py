@@ -30,6 +30,13 @@ class TestResult:
     dp_MPa: Annotated[
         PressureDrop | None, Meta(description="Pressure drop at no flow; null where none was recorded or declared.")
     ]
+    dp_from: Annotated[
+        str | None,
+        Meta(
+            description="Columns of the recordings that make it, such as pP_MPa - pA_MPa; 'declared' by --dp or [dp]; "
+            "null where it is unknown."
+        ),
+    ]
     u_knee_rising_V: Annotated[
         Voltage | None, Meta(description="Knee on opening: the straight part of Q/sqrt(dP), extrapolated to zero.")
     ]
@@ -79,6 +86,20 @@ class TestResult:
     q_max_L_min: Annotated[Flow, Meta(description="Largest flow, brought to the test's pressure drop.")]
     saturates: Annotated[
         bool, Meta(description="Whether the flow stops growing before full command: the spool is at its stop.")
+    ]
+    leak_L_min: Annotated[
+        Flow,
+        Meta(
+            description="Flow at zero command that grows with the pressure drop: a leak. The knees are those of the "
+            "flow beyond it, the bounds allow for its end where the valve opens."
+        ),
+    ]
+    noise_level_L_min: Annotated[
+        Flow,
+        Meta(
+            description="Flow below which there is none: the largest of the meter's floor, what averages over the dead "
+            "zone resolve, and 0.5 % of the largest flow or what was declared."
+        ),
     ]
     noise_L_min: Annotated[Flow, Meta(description="Standard deviation of the flow's noise.")]
     noise_variance_inflation: Annotated[

@@ -88,11 +88,6 @@ class ReportFigure:
     svg: str
     csv: str
 
-    @property
-    def href(self) -> str:
-        """The numbers as an address that needs no network."""
-        return data_uri(self.csv)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Curves:
@@ -118,7 +113,7 @@ def csv_text(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(header)
-    writer.writerows(["" if cell is None else cell for cell in row] for row in rows)
+    writer.writerows(rows)
     return out.getvalue()
 
 

@@ -78,13 +78,7 @@ def _is_of(path: Path, *schemas: str) -> bool:
 
 
 def refuse_uncalibrated(folder: Path) -> None:
-    """Refuse the folder of a valve of a lot that was not calibrated: there is nothing to report but its reason.
-
-    Raises
-    ------
-    InputError
-        With that reason.
-    """
+    """Refuse the folder of a valve of a lot that was not calibrated: there is nothing to report but its reason."""
     if not _is_of(folder / MANIFEST_NAME, schema_of(ValveManifest)) or (folder / "valve.json").exists():
         return
     manifest = read_manifest(folder)
@@ -93,13 +87,7 @@ def refuse_uncalibrated(folder: Path) -> None:
 
 
 def read_lot(folder: Path) -> Lot:
-    """Read the folder of a lot, finished or stopped.
-
-    Raises
-    ------
-    InputError
-        If batch.json or the table is not what `dzdesign batch` writes.
-    """
+    """Read the folder of a lot, finished or stopped."""
     content = read_bytes(folder / SUMMARY_NAME, "summary of a lot")
     kinds: tuple[type[LotSummary | UnfinishedLot], ...] = (LotSummary, UnfinishedLot)
     found = read_artefact(content, kinds, str(folder / SUMMARY_NAME), AGAIN)

@@ -28,10 +28,6 @@ class ReasonGroup:
 def reason_groups(failed: Sequence[TableRow]) -> tuple[ReasonGroup, ...]:
     """Return the groups, the largest first.
 
-    Parameters
-    ----------
-    failed : sequence of TableRow
-
     Examples
     --------
     >>> rows = [

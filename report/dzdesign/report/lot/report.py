@@ -20,13 +20,7 @@ IN_VERDICT, ANOMALIES_IN_VERDICT = 8, 3
 
 
 def report_of_lot(folder: Path) -> Report:
-    """Make the report of the folder of a lot, finished or stopped.
-
-    Raises
-    ------
-    InputError
-        If it is not what `dzdesign batch` writes.
-    """
+    """Make the report of the folder of a lot, finished or stopped."""
     return make_lot_report(read_lot(folder))
 
 

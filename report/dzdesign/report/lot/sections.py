@@ -8,9 +8,9 @@ from dzdesign.report.figures.figure import ReportFigure, figure_style
 from dzdesign.report.lot.figures import spread_figure
 from dzdesign.report.lot.folder import Lot
 from dzdesign.report.lot.reasons import reason_groups
-from dzdesign.report.lot.setting_text import checked_line, span, untested_lines
-from dzdesign.report.lot.spread import EXTRA, FAR, FEWEST, TWENTY, Spread
-from dzdesign.report.lot.summary import Quantiles, SettingOfOthers
+from dzdesign.report.lot.setting_text import checked_line, cost_lines, cost_text, span, untested_lines
+from dzdesign.report.lot.spread import EXTRA, FAR, FEWEST, Spread
+from dzdesign.report.lot.summary import SettingOfOthers
 from dzdesign.report.lot.tables import (
     NAMED,
     failed_table,
@@ -22,7 +22,7 @@ from dzdesign.report.lot.tables import (
     warnings_table,
 )
 from dzdesign.report.page import Section
-from dzdesign.report.sections.cells import counted, whole
+from dzdesign.report.sections.cells import counted, from_to, whole
 
 #: Name of a figure, columns of the quantities in it, caption, and whether they are on one scale.
 FigureKind = tuple[str, tuple[str, ...], str, bool]
@@ -68,7 +68,7 @@ def sections_of(lot: Lot, spreads: Sequence[Spread]) -> dict[str, Section]:
         }
 
 
-def _figures(lot: Lot, spreads: Sequence[Spread], *kinds: FigureKind) -> tuple[ReportFigure, ...]:
+def _figures(lot: Lot, spreads: Sequence[Spread], *kinds: FigureKind) -> list[ReportFigure | None]:
     """Return figures of each side, of those of their quantities that some valve has."""
     found = []
     for side in lot.sides:
@@ -77,7 +77,7 @@ def _figures(lot: Lot, spreads: Sequence[Spread], *kinds: FigureKind) -> tuple[R
         for name, columns, caption, one_scale in kinds:
             shown = [of_side[column] for column in columns if column in of_side]
             found.append(spread_figure(name + of, shown, caption + words, one_scale=one_scale))
-    return tuple(figure for figure in found if figure)
+    return found
 
 
 def _failed_section(lot: Lot) -> Section:
@@ -115,20 +115,13 @@ def _lot_lines(lot: Lot) -> list[str]:
             continue
         trends = Counter(each.trend or "not known" for each in tested)
         counts = ", ".join(f"{word} in {whole(count)}" for word, count in trends.most_common())
+        dp0 = from_to([each.dp0_MPa for each in tested], ".3g")
+        highest = from_to([each.highest_dp_MPa for each in tested], ".3g")
         lines.append(
-            f"{of}dP0 is {_from_to([each.dp0_MPa for each in tested])} MPa, the highest tested pressure drop "
-            f"{_from_to([each.highest_dp_MPa for each in tested])} MPa. Threshold over the pressure drop: {counts} "
-            "valves."
+            f"{of}dP0 is {dp0} MPa, the highest tested pressure drop {highest} MPa. Threshold over the pressure drop: "
+            f"{counts} valves."
         )
     return lines
-
-
-def _from_to(values: Sequence[float | None]) -> str:
-    known = [value for value in values if value is not None]
-    if not known:
-        return "not known"
-    low, high = f"{min(known):.3g}", f"{max(known):.3g}"
-    return low if low == high else f"{low} to {high}"
 
 
 def _far_section(spreads: Sequence[Spread]) -> Section:
@@ -143,7 +136,7 @@ def _far_section(spreads: Sequence[Spread]) -> Section:
         "by chance. No verdict: these valves are calibrated; look for a mix-up, a part, or the recording."
     )
     table = far_table(judged)
-    return Section(lines=(rule, *([] if table else ["No valve lies there."])), tables=(table,) if table else ())
+    return Section(lines=(rule,) if table else (rule, "No valve lies there."), tables=(table,))
 
 
 def _left_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
@@ -159,13 +152,12 @@ def _setting_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
     if setting is None:
         return Section(missing=f"There is no lot setting: {lot.summary.why_no_lot_setting}.", optional=True)
     costs = [spread for spread in spreads if spread.quantity.column == EXTRA]
-    checked = checked_line(setting)
     lines = (
         "The largest offset that over-compensates none of the valves, certified for each of them "
         f"{span(*setting.dp_MPa)}, is in {setting.file}; its trend is that of {setting.carrier}.",
-        f"{checked[0].upper()}{checked[1:]}. The C made of the file is compared with all bounds by dzdesign verify.",
+        f"{_sentence(checked_line(setting))} The C made of the file is compared with all bounds by dzdesign verify.",
         *(f"{line}." for line in untested_lines(setting)),
-        *(_cost_line(spread) for spread in costs),
+        *map(_sentence, cost_lines(lot.summary)),
         f"It is held down by {and_more(setting.binding, NAMED)}.",
         *_without_lines(setting.without_binding, len(lot.calibrated)),
     )
@@ -175,21 +167,11 @@ def _setting_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
         "setting leaves, at the worst pressure drop of its tests. The valves that hold the setting down are the "
         "lowest.", one_scale=True,
     )  # fmt: skip
-    return Section(lines=lines, figures=(figure,) if figure else (), tables=(holding_table(lot, setting),))
+    return Section(lines=lines, figures=(figure,), tables=(holding_table(lot, setting),))
 
 
-def _cost_line(spread: Spread) -> str:
-    side = f"{spread.side.capitalize()} side: it" if spread.side else "It"
-    return (
-        f"{side} leaves more dead zone than each valve's own setting: {_three(spread.at, len(spread.values))} "
-        f"({spread.ends[1]})."
-    )
-
-
-def _three(at: Quantiles, count: int) -> str:
-    """Say a cost at the median valve, at one in twenty if there are so many, and at worst."""
-    twentieth = f"{at.q95:.2f} % at one in twenty, " if count >= TWENTY else ""
-    return f"{at.median:.2f} % of command at the median valve, {twentieth}{at.largest:.2f} % at worst"
+def _sentence(line: str) -> str:
+    return f"{line[0].upper()}{line[1:]}."
 
 
 def _without_lines(without: SettingOfOthers | None, count: int) -> list[str]:
@@ -203,28 +185,20 @@ def _without_lines(without: SettingOfOthers | None, count: int) -> list[str]:
         side = f" on the {column.partition('_')[0]} side" if column.startswith(("positive", "negative")) else ""
         lines.append(
             f"With settings of their own for {and_more(without.left_out, 5)}, the lot setting of the others would "
-            f"cost{side} {_three(at, count - len(without.left_out))}."
+            f"cost{side} {cost_text(at, count - len(without.left_out))}."
         )
     return lines
 
 
 def _valves_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
-    table = valves_table(lot, {name for spread in spreads for name, _ in spread.far()})
-    return Section(
-        tables=(table,) if table else (),
-    )
+    return Section(tables=(valves_table(lot, {name for spread in spreads for name, _ in spread.far()}),))
 
 
 def _recordings_section(lot: Lot) -> Section:
     table = warnings_table(lot)
     odd = tuple(f"Odd: {text}." for text in (lot.summary.anomalies if lot.summary else ()))
-    if table is None:
-        none = ("No recording of a calibrated valve has a warning.",) if lot.calibrated else ()
-        return Section(lines=(*odd, *none))
-    return Section(
-        lines=odd,
-        tables=(table,),
-    )
+    none = ("No recording of a calibrated valve has a warning.",) if lot.calibrated and not table else ()
+    return Section(lines=(*odd, *none), tables=(table,))
 
 
 def _provenance_section(lot: Lot) -> Section:

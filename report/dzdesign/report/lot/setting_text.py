@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 
 from dzdesign.core.errors import and_more
-from dzdesign.report.lot.summary import LotSettingSummary, UntestedPressures
+from dzdesign.report.lot.spread import EXTRA, TWENTY
+from dzdesign.report.lot.summary import LotSettingSummary, LotSummary, Quantiles, UntestedPressures
 
 #: Valves of one sentence that are named.
 NAMED = 3
@@ -51,6 +52,22 @@ def _coarse_lines(inside: Sequence[UntestedPressures]) -> list[str]:
     if same := [each for each in free if each.coarser_V == 0]:
         lines.append(f"{_untested(same)}: that costs the lot setting nothing")
     return lines
+
+
+def cost_lines(summary: LotSummary) -> list[str]:
+    """Say of each side what one setting for all costs."""
+    return [
+        (f"{column.removesuffix(EXTRA).rstrip('_')} side: " if column != EXTRA else "")
+        + f"it leaves more dead zone than each valve's own setting: {cost_text(at, summary.calibrated)}"
+        for column, at in summary.quantiles.items()
+        if column.endswith(EXTRA)
+    ]
+
+
+def cost_text(at: Quantiles, count: int) -> str:
+    """Say a cost at the median valve, at one in twenty if there are so many, and at most."""
+    one_in_twenty = f"{at.q95:.2f} % at one in twenty, " if count >= TWENTY else ""
+    return f"{at.median:.2f} % of command at the median valve, {one_in_twenty}{at.largest:.2f} % at most"
 
 
 def _untested(lacking: Sequence[UntestedPressures]) -> str:

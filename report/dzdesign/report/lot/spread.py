@@ -127,11 +127,6 @@ def quantiles(values: Sequence[float]) -> Quantiles:
 
     The median of an even number is then the mean of the two middle ones, the ends are values of valves.
 
-    Parameters
-    ----------
-    values : sequence of float
-        One at least.
-
     Examples
     --------
     >>> quantiles([1.0, 2.0, 5.0, 4.0]).median

@@ -135,13 +135,7 @@ def _is_text(column: str) -> bool:
 
 
 def read_table(content: bytes, source: str) -> list[TableRow]:
-    """Read valves.csv; a number is finite and of a size that a valve can have.
-
-    Raises
-    ------
-    InputError
-        If it is no such table; naming it by `source`.
-    """
+    """Read valves.csv; a number is finite and of a size that a valve can have."""
     try:
         reader = csv.reader(io.StringIO(content.decode("utf-8"), newline=""), strict=True)
         heading, *lines = [*reader] or [[]]
@@ -161,10 +155,7 @@ def _row(heading: Sequence[str], line: Sequence[str], sides: Sequence[str], wher
         raise InputError(f"{where} has {len(line)} cells, expected {len(heading)}; {AGAIN}")
     cells = dict(zip(heading, line, strict=True))
     words = {name: cell[1:] if SAFE.match(cell) else cell for name, cell in cells.items() if _is_text(name)}
-
-    def side_value(column: str) -> Cell:
-        return (words[column] or None) if column in words else _number(cells[column], column, where)
-
+    values = {name: words[name] or None if name in words else _number(cells[name], name, where) for name in heading}
     status = next((each for each in get_args(Status) if each == words["status"]), None)
     if status is None:
         raise InputError(f"{where}, column 'status' is {quoted(words['status'])}, expected a status; {AGAIN}")
@@ -173,7 +164,7 @@ def _row(heading: Sequence[str], line: Sequence[str], sides: Sequence[str], wher
         status=status,
         reason=words["reason"],
         sides={
-            side: SideFigures(**{column: side_value(column_of(side, column)) for column in SIDE_COLUMNS})  # type: ignore[arg-type]
+            side: SideFigures(**{column: values[column_of(side, column)] for column in SIDE_COLUMNS})  # type: ignore[arg-type]
             for side in sides
         },
         warnings=tuple(words["warnings"].split()),

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.valve.test_record import checked_record
+from dzdesign.report.compensator_sides import SIGNS
 from dzdesign.report.lot.table import HASHED, SideFigures, TableRow
 from dzdesign.report.lot.valve_folder import ValveFolder
 from dzdesign.report.lot.valve_names import by_name
@@ -13,8 +14,6 @@ from dzdesign.report.lot.valve_names import by_name
 if TYPE_CHECKING:
     from dzdesign.design.compensator import Compensator
     from dzdesign.identify.valve.side_model import SideModel
-
-SIGNS = {"positive": 1, "negative": -1}
 
 
 def table_rows(

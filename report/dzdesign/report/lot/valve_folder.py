@@ -53,25 +53,13 @@ class ValveFolder:
 
 
 def read_manifest(folder: Path) -> ValveManifest:
-    """Return what a valve's folder says of itself.
-
-    Raises
-    ------
-    InputError
-        If it is not there or is no such folder.
-    """
+    """Return what a valve's folder says of itself."""
     path = folder / MANIFEST_NAME
     return read_artefact(read_bytes(path, "manifest of a valve"), ValveManifest, str(path), AGAIN)
 
 
 def read_valve_folder(folder: Path) -> ValveFolder:
-    """Read a valve's folder.
-
-    Raises
-    ------
-    InputError
-        If it is no such folder, or the compensator in it is not as it was written.
-    """
+    """Read a valve's folder."""
     manifest = read_manifest(folder)
     if manifest.status != OK:
         return ValveFolder(manifest=manifest)

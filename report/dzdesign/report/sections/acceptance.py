@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from dzdesign.assess.assessment import Assessment
-from dzdesign.assess.quantities import Reading
+from dzdesign.assess.quantities import Quantity, Reading
 from dzdesign.report.page import Section
 from dzdesign.report.reproduction import Outcome, PaperNumber, Reproduction
 from dzdesign.report.sections.cells import Cell, Table, in_number_font, number, table_of, verdict
@@ -25,7 +25,7 @@ def acceptance_section(assessment: Assessment | None, reproduction: Reproduction
         "No acceptance table is here: `dzdesign assess` compares recordings with limits, `dzdesign reproduce` the "
         "paper's numbers."
     )
-    return Section(tables=tuple(tables), missing="" if tables else missing, optional=True)
+    return Section(tables=tables, missing="" if tables else missing, optional=True)
 
 
 def _paper_table(valve: str, rows: Sequence[PaperNumber]) -> Table:
@@ -64,7 +64,7 @@ def _limits_table(assessment: Assessment) -> Table:
         "The limits that were set",
         assessment.limits,
         ("verdict", lambda one: verdict(one.holds)),
-        ("quantity", lambda one: _name(assessment, one.quantity)),
+        ("quantity", lambda one: _quantity(assessment, one.quantity).name),
         ("where", lambda one: one.place),
         ("limit", lambda one: in_number_font(f"{one.limit:.4g} {one.unit}")),
         ("found", lambda one: one.text),
@@ -75,35 +75,31 @@ def _before_after_table(assessment: Assessment) -> Table:
     """Return each quantity before and after, at every pressure drop."""
     compared = [item for item in assessment.pressures if item.readings("after")]
     rows = [
-        (item, key, _reading(assessment, key, both.before), _reading(assessment, key, both.after))
+        (item, quantity, _reading(quantity.unit, both.before), _reading(quantity.unit, both.after))
         for item in compared or assessment.pressures
-        for key, both in item.quantities.items()
+        for quantity, both in ((_quantity(assessment, key), both) for key, both in item.quantities.items())
     ]
     return table_of(
         "Recordings without and with the compensator, at the pressure drops that have both",
         [row for row in rows if {row[2], row[3]} - {"–", "not seen"}],
         ("dP (MPa)", lambda row: number(row[0].dp_MPa, 2)),
         ("commands", lambda row: row[0].side),
-        ("quantity", lambda row: _name(assessment, row[1])),
+        ("quantity", lambda row: row[1].name),
         ("before", lambda row: in_number_font(row[2])),
         ("after", lambda row: in_number_font(row[3])),
-        ("unit", lambda row: _unit(assessment, row[1])),
+        ("unit", lambda row: row[1].unit),
     )
 
 
-def _name(assessment: Assessment, key: str) -> str:
-    return assessment.quantities[key].name if key in assessment.quantities else key
+def _quantity(assessment: Assessment, key: str) -> Quantity:
+    return assessment.quantities.get(key) or Quantity(name=key, unit="", formula="")
 
 
-def _unit(assessment: Assessment, key: str) -> str:
-    return assessment.quantities[key].unit if key in assessment.quantities else ""
-
-
-def _reading(assessment: Assessment, key: str, reading: Reading | None) -> str:
+def _reading(unit: str, reading: Reading | None) -> str:
     """Return a value, or the bound of what can't be seen."""
     if reading is None:
         return "–"
-    digits = DECIMALS.get(_unit(assessment, key), 3)
+    digits = DECIMALS.get(unit, 3)
     if reading.value is not None:
         return number(reading.value, digits).text
     return "not seen" if reading.at_most is None else f"≤ {number(reading.at_most, digits).text}"

@@ -79,6 +79,18 @@ def in_number_font(text: str) -> Cell:
     return Cell(text=text, kind="number")
 
 
+def from_to(values: Iterable[float | None], form: str) -> str:
+    """Return from where to where the known values run; a single one where both ends read alike.
+
+    Examples
+    --------
+    >>> from_to([1.0, 5.0, 2.0], ".2f"), from_to([2.5, None], ".1f"), from_to([], ".1f")
+    ('1.00 to 5.00', '2.5', 'not known')
+    """
+    known = [value for value in values if value is not None]
+    return " to ".join(dict.fromkeys(f"{end(known):{form}}" for end in (min, max))) if known else "not known"
+
+
 def whole(value: int) -> str:
     """Return a whole number with a thin gap at each thousand.
 

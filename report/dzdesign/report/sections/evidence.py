@@ -12,7 +12,7 @@ from dzdesign.report.figures.figure import Curves, ReportFigure
 from dzdesign.report.figures.input_map import map_figure
 from dzdesign.report.figures.zero_command import zero_figure
 from dzdesign.report.page import Section
-from dzdesign.report.sections.cells import Cell, Table, in_number_font, number, table_of, verdict, whole
+from dzdesign.report.sections.cells import Cell, Table, from_to, in_number_font, number, table_of, verdict, whole
 from dzdesign.verify.closed_loop.evidence_curves import closed_loop_name, input_map_name, read_curves, zero_command_name
 from dzdesign.verify.evidence import (
     ClosedLoopResult,
@@ -57,7 +57,7 @@ def inputs_section(chain: Chain) -> Section:
                 missing = f"{name} or its compensator is missing; `dzdesign verify` makes it."
     if not chain.evidence.inputs:
         missing = f"{NOT_CHECKED}: the C did not compile or did not run, see the requirements."
-    return Section(figures=tuple(figures), lines=tuple(lines), missing=missing)
+    return Section(figures=figures, lines=tuple(lines), missing=missing)
 
 
 def _input_lines(found: InputCheck) -> list[str]:
@@ -87,15 +87,14 @@ def loop_section(chain: Chain) -> Section:
             missing = f"{closed_loop_name(side)} is missing, so the ramps are not drawn; `dzdesign verify` makes it."
         else:
             figures.append(loop_figure(curves, side, len(sides) > 1))
-    tables = (
-        loops_table(loop.pressures),
-        scenarios_table(evidence.scenarios),
-        series_table(evidence.monte_carlo),
-        plant_table(loop),
-    )
     return Section(
-        figures=tuple(figures),
-        tables=tuple(table for table in tables if table),
+        figures=figures,
+        tables=(
+            loops_table(loop.pressures),
+            scenarios_table(evidence.scenarios),
+            series_table(evidence.monte_carlo),
+            plant_table(loop),
+        ),
         lines=(_plant_line(loop),),
         missing=missing,
     )
@@ -114,13 +113,12 @@ def _plant_line(loop: ClosedLoopResult) -> str:
 def plant_table(loop: ClosedLoopResult) -> Table | None:
     """Return the parameters of the closed loop's plant; from where to where, of one for each pressure drop."""
     plants = [asdict(loop.plant)] if loop.plant else [asdict(each.parameters) for each in loop.plants]
-    cells = []
-    for name in plants[0] if plants else ():
-        values = sorted(plant[name] for plant in plants)
-        ends = dict.fromkeys(f"{value:.6g}" for value in (values[0], values[-1]))
-        cells.append((Cell(text=name, kind="symbol"), in_number_font(" to ".join(ends))))
-    if not cells:
+    if not plants:
         return None
+    cells = [
+        (Cell(text=name, kind="symbol"), in_number_font(from_to([plant[name] for plant in plants], ".6g")))
+        for name in plants[0]
+    ]
     half = -(-len(cells) // 2)  # in two columns, or they would take a page of paper
     right = [*cells[half:], (Cell(text=""), Cell(text=""))]
     of = "" if len(plants) == 1 else f", from the least to the largest of {len(plants)} pressure drops"

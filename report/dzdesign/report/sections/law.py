@@ -1,6 +1,5 @@
 """The law's derivation, as the report shows it: proved anew when the report is made."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -9,7 +8,7 @@ from dzdesign.derivation.account.proof import prove
 from dzdesign.derivation.account.statement import Outcome
 from dzdesign.derivation.account.target_flow import TARGET, TIES
 from dzdesign.derivation.law import law
-from dzdesign.derivation.presentation.content import Entry, Term
+from dzdesign.derivation.presentation.content import DerivationReport, Entry
 from dzdesign.derivation.presentation.html import HtmlWriter
 from dzdesign.derivation.presentation.prose import Words, parse_prose
 from dzdesign.derivation.presentation.report import closure, compose
@@ -20,21 +19,16 @@ STATEMENTS = (*APPROACH, *AT_REFERENCE, *OFF_REFERENCE, *TIES, *TARGET)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LawAccount:
-    """Where a law comes from: the law and before it what it rests on directly, with their steps; the rest, in order.
+    """Where a law comes from: what it and all that it rests on are derived to be.
 
-    `note` says what the law does and does not achieve; `page` writes words and formulas.
+    `note` says what the law does and does not achieve; `main` has the numbers of the law and of what it rests on
+    directly, whose steps are shown; `page` writes words and formulas.
     """
 
     note: Words
-    main: tuple[Entry, ...]
-    rest: tuple[Entry, ...]
-    glossary: tuple[Term, ...]
+    derived: DerivationReport
+    main: frozenset[str]
     page: HtmlWriter
-
-    @property
-    def holds(self) -> bool:
-        """Whether every statement has the verdict that the account expects."""
-        return all(entry.as_expected for entry in (*self.main, *self.rest))
 
     def outcome(self, entry: Entry) -> str:
         """Return the kind of a verdict's cell."""
@@ -49,16 +43,9 @@ def account_of(law_name: str) -> LawAccount:
     number = law(law_name).stated_as
     numbers = closure(STATEMENTS, [number])
     statements = [statement for statement in STATEMENTS if statement.number in numbers]
-    content = compose(prove(statements), numbers)
-    direct = {ground.number for ground in statements[-1].grounds} | {number}
     return LawAccount(
         note=parse_prose(law(law_name).note),
-        main=_in(content.statements, direct),
-        rest=_in(content.statements, set(numbers) - direct),
-        glossary=content.symbols,
+        derived=compose(prove(statements), numbers),
+        main=frozenset(ground.number for ground in statements[-1].grounds) | {number},
         page=HtmlWriter(numbers),
     )
-
-
-def _in(entries: Sequence[Entry], numbers: set[str]) -> tuple[Entry, ...]:
-    return tuple(entry for entry in entries if entry.number in numbers)

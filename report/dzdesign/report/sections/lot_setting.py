@@ -1,10 +1,11 @@
 """A lot setting in the report of its firmware: of how many valves it is, the worst of them, and what each pays."""
 
 from collections.abc import Iterator
-from dataclasses import astuple, dataclass, fields
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
-from itertools import pairwise
+
+import numpy as np
 
 from dzdesign.core.verdicts import NOT_CHECKED
 from dzdesign.design.compensator import Compensator
@@ -13,23 +14,26 @@ from dzdesign.report.chain import Chain
 from dzdesign.report.compensator_sides import SIGNS, laws_of
 from dzdesign.report.figures.figure import csv_text
 from dzdesign.report.page import Figure, Section
-from dzdesign.report.sections.cells import in_number_font, number, table_of
+from dzdesign.report.sections.cells import from_to, in_number_font, number, table_of
 from dzdesign.verify.evidence import Evidence
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 
 #: Valves in the table of the page; all of them stand in the CSV.
 ROWS = 40
+#: Numbers of a valve that stand in the CSV.
+NUMBERS = ("least_percent", "least_dp_MPa", "most_percent", "most_dp_MPa")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LotCost:
-    """What a lot setting costs one valve on one side, as shares of full command.
+    """What a lot setting costs one valve on one side, in percent of command, at the pressure drops of its tests.
 
-    The command that passes before the drive reaches the valve's own lower bound, at a tested pressure drop.
+    The command that passes before the drive reaches the valve's own lower bound.
     """
 
     valve: str
     side: str
+    bounds: LotSide
     least_percent: float
     least_dp_MPa: float
     most_percent: float
@@ -53,36 +57,23 @@ def _costs_of_side(compensator: Compensator, name: str) -> Iterator[LotCost]:
     counts_per_V = exact.compare_max / float(compensator.u_max_V)
 
     @cache  # the valves of a lot are tested at the same few pressure drops
-    def corners_at(dp_code: int) -> list[tuple[float, float]]:
-        return [(away / exact.span, float(counts)) for away, counts in exact.corners(exact.betas(dp_code))]
+    def corners_at(dp_code: int) -> tuple[list[float], list[float]]:
+        corners = exact.corners(exact.betas(dp_code))
+        return [float(counts) for _, counts in corners], [100 * away / exact.span for away, _ in corners]
 
-    for valve_name, side in _lot_sides(compensator, name):
-        shares = [
-            (_share(corners_at(round(compensator.signals.dp_code(Fraction(dp)))), bound * counts_per_V), dp)
-            for dp, bound in zip(side.dp_MPa, side.u_lower_V, strict=True)
-        ]
-        (least, least_at), (most, most_at) = min(shares), max(shares)
+    for valve in compensator.lot:
+        side: LotSide | None = getattr(valve, name)
+        if side is None:
+            continue
+        percents = []
+        for dp, bound in zip(side.dp_MPa, side.u_lower_V, strict=True):
+            corners = corners_at(round(compensator.signals.dp_code(Fraction(dp))))
+            percents.append((float(np.interp(bound * counts_per_V, *corners, left=0.0, right=100.0)), dp))
+        (least, least_at), (most, most_at) = min(percents), max(percents)
         yield LotCost(
-            valve=valve_name, side=name, least_percent=100 * least, least_dp_MPa=least_at, most_percent=100 * most,
+            valve=valve.name, side=name, bounds=side, least_percent=least, least_dp_MPa=least_at, most_percent=most,
             most_dp_MPa=most_at,
         )  # fmt: skip
-
-
-def _lot_sides(compensator: Compensator, name: str) -> Iterator[tuple[str, LotSide]]:
-    for valve in compensator.lot:
-        side = valve.positive if name == "positive" else valve.negative
-        if side is not None:
-            yield valve.name, side
-
-
-def _share(corners: list[tuple[float, float]], counts: float) -> float:
-    """Return the share of full command at which the drive reaches so many counts: 0 if at zero command, 1 if never."""
-    if corners[0][1] >= counts:
-        return 0.0
-    for (left, low), (right, high) in pairwise(corners):
-        if high >= counts:
-            return left + (right - left) * (counts - low) / (high - low)
-    return 1.0
 
 
 def lot_figures(chain: Chain) -> tuple[Figure, ...]:
@@ -134,26 +125,22 @@ def lot_section(compensator: Compensator) -> Section:
     count, costs = len(compensator.lot), lot_costs(compensator)
     if not costs:
         return Section(missing=f"The file is of {count} valves and names none but one; run `dzdesign batch` again.")
-    sides = {(valve, name): side for name in SIGNS for valve, side in _lot_sides(compensator, name)}
     more = f": the first {ROWS} of {len(costs)}" if len(costs) > ROWS else ""
-
-    def side_of(cost: LotCost) -> LotSide:
-        return sides[cost.valve, cost.side]
 
     table = table_of(
         f"What the lot setting costs each valve, the dearest first{more}",
         costs[:ROWS],
         ("valve", lambda one: one.valve),
         ("commands", lambda one: one.side),
-        ("tested (MPa)", lambda one: in_number_font(_from_to(side_of(one).dp_MPa))),
-        ("least bound (V)", lambda one: number(min(side_of(one).u_lower_V), 3)),
-        ("confidence (%)", lambda one: in_number_font(f"{100 * side_of(one).confidence:.6g}")),
+        ("tested (MPa)", lambda one: in_number_font(from_to(one.bounds.dp_MPa, ".2f"))),
+        ("least bound (V)", lambda one: number(min(one.bounds.u_lower_V), 3)),
+        ("confidence (%)", lambda one: in_number_font(f"{100 * one.bounds.confidence:.6g}")),
         ("cost, least (%)", lambda one: number(one.least_percent, 2)),
         ("cost, most (%)", lambda one: number(one.most_percent, 2)),
         ("most at (MPa)", lambda one: number(one.most_dp_MPa, 2)),
         csv=csv_text(
-            [each.name for each in fields(LotCost)],
-            ([each if isinstance(each, str) else round(each, 4) for each in astuple(cost)] for cost in costs),
+            ("valve", "side", *NUMBERS),
+            ((cost.valve, cost.side, *(round(getattr(cost, name), 4) for name in NUMBERS)) for cost in costs),
         ),
         name="lot",
     )
@@ -168,8 +155,3 @@ def lot_section(compensator: Compensator) -> Section:
         ),
         tables=(table,),
     )
-
-
-def _from_to(pressures: tuple[float, ...]) -> str:
-    low, high = pressures[0], pressures[-1]
-    return f"{low:.2f}" if low == high else f"{low:.2f} to {high:.2f}"

@@ -30,7 +30,7 @@ def warnings_section(valve: ValveModel | None, compensator: Compensator | None) 
 
 def provenance_section(chain: Chain) -> Section:
     """Return the section with every hash."""
-    return Section(tables=tuple(table for table in (_provenance_table(chain), _hashes_table(chain)) if table))
+    return Section(tables=(_provenance_table(chain), _hashes_table(chain)))
 
 
 def _provenance_table(chain: Chain) -> Table:

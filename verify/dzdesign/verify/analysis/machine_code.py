@@ -20,7 +20,6 @@ class MachineCheck:
     """What a machine found of one side, and the hash of the same inputs' compare values on the host."""
 
     machine: Machine
-    sign: int
     found: Findings
     host_hash: str
 
@@ -43,7 +42,7 @@ def check_on_machine(folder: Path, machine: Machine, host: InputCheck) -> Machin
         found, host_hash = core.check(sample, machine), core.check(sample, sample=True).outputs_hash
     else:
         found, host_hash = core.check(prepared.everything(cube=False), machine), host.outputs_hash
-    return MachineCheck(machine=machine, sign=host.sign, found=found, host_hash=host_hash)
+    return MachineCheck(machine=machine, found=found, host_hash=host_hash)
 
 
 def machine_code_checks(folder: Path, inputs: tuple[InputCheck, ...]) -> list[Check]:

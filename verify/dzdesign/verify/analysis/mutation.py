@@ -19,12 +19,12 @@ from typing import Any
 from dzdesign.core.errors import RequirementError
 from dzdesign.verify.analysis.c_mutants import Mutant, mutants_of
 from dzdesign.verify.evidence import MutantOutcome, MutationScore
-from dzdesign.verify.exhaustive.drive_check import CompiledDrive, PreparedDrive
+from dzdesign.verify.exhaustive.drive_check import CompiledDrive, DriveCheck, PreparedDrive
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
 from dzdesign.verify.firmware.folder import read_compensator
 from dzdesign.verify.requirements import MUTATION, Check
-from dzdesign.verify.toolchain.compiled_core import CompiledCore
+from dzdesign.verify.toolchain.compiled_core import CompiledCore, Findings
 from dzdesign.verify.toolchain.machines import HOST, PROGRAMS
 
 KILLED, REFUSED, SAME_OBJECT, SAME_OUTPUTS, SURVIVED = (
@@ -68,38 +68,31 @@ class MutationBench:
         cores = {
             sign: core.edited(mutant.file, text) for sign, core in self._cores.items() if mutant.file in core.sources
         }
-
-        def outcome(verdict: str, killer: str = "") -> MutantOutcome:
-            return MutantOutcome(
-                file=mutant.file, line=mutant.line, change=mutant.change, verdict=verdict, killer=killer
-            )
-
+        outcome = partial(MutantOutcome, file=mutant.file, line=mutant.line, change=mutant.change)
         try:
             objects = drive.objects()
         except RequirementError:
-            return outcome(REFUSED)
+            return outcome(verdict=REFUSED)
         if [*map(Path.read_bytes, objects)] == [*map(Path.read_bytes, self._drive.objects())]:
-            return outcome(SAME_OBJECT)
+            return outcome(verdict=SAME_OBJECT)
         for killer in self._tried(cores, drive):
             if killer:
-                return outcome(KILLED, killer)
-        return outcome(SAME_OUTPUTS if self._agree(objects) else SURVIVED)
+                return outcome(verdict=KILLED, killer=killer)
+        return outcome(verdict=SAME_OUTPUTS if self._agree(objects) else SURVIVED)
 
     def _tried(self, cores: dict[int, CompiledCore], drive: CompiledDrive) -> Iterable[str]:
         """Yield, check by check, what found a fault, or an empty text: first what is quick."""
-
-        def sampled(sign: int) -> int:
-            return cores[sign].check(self._samples[sign], sample=True).faults
-
-        def all_of(sign: int) -> int:
-            return cores[sign].check(self._everything[sign]).faults
-
-        runs: list[tuple[str, Callable[[], int]]] = [("sample of inputs", partial(sampled, sign)) for sign in cores]
-        runs.append(("drive", lambda: drive.check(self._drive_samples).wrong))
-        runs += [("all inputs", partial(all_of, sign)) for sign in cores]
+        runs: tuple[tuple[str, Callable[[], Findings | DriveCheck]], ...] = (
+            *(
+                ("sample of inputs", partial(core.check, self._samples[sign], sample=True))
+                for sign, core in cores.items()
+            ),
+            ("drive", partial(drive.check, self._drive_samples)),
+            *(("all inputs", partial(core.check, self._everything[sign])) for sign, core in cores.items()),
+        )
         for name, run in runs:
             try:
-                yield name if run() else ""
+                yield name if run().faults else ""
             except RequirementError as error:
                 yield f"{name}: {str(error).partition(':')[0]}"
 

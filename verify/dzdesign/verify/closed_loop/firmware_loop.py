@@ -85,8 +85,7 @@ def close_the_loop(
             scenes,
         )
         loops = tuple(watch(ramps, len(scenes)))
-    say("running the scenarios")
-    with ThreadPoolExecutor(WORKERS) as pool:
+        say("running the scenarios")
         done = pool.map(lambda scene: tuple(run_scenarios(scene)), scenes)
         scenarios = tuple(result for results in watch(done, len(scenes)) for result in results)
     series = None

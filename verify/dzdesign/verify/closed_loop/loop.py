@@ -19,8 +19,8 @@ from dzdesign.verify.toolchain.host_compiler import load_library
 #: Periods of the PWM between two records: 100 a second, as in the paper's tests.
 PERIODS_PER_RECORD = 25
 RECORD_S = PERIODS_PER_RECORD * PWM_PERIOD_S
-#: Numbers in a record; loop.c has the same.
-RECORDED = 6
+#: Numbers in a record, as loop.c has them.
+RECORDED = ("compare", "dp_MPa", "q_L_min", "q_mean_L_min", "q_largest_L_min", "position_m")
 #: Pressure behind the edge: what both sensors see beside the drop.
 BACK_PRESSURE_MPA = 1.0
 #: Flow at zero command below this is none: the edge is shut, only the last bits of a number remain.
@@ -147,7 +147,7 @@ class ClosedLoop:
         if mode == "without beta":
             seen_MPa = np.full(command.shape, dp_frozen_MPa)
         seen = np.full(command.shape, np.nan) if seen_MPa is None else np.ascontiguousarray(seen_MPa, dtype=float)
-        record = np.empty((command.size, RECORDED))
+        record = np.empty((command.size, len(RECORDED)))
         signals, plant, negative = self._signals, self._plant, self._negative
         span, highest = float(self._scalings[2][1:].min()), float(supply.max())
         back_MPa = min(BACK_PRESSURE_MPA, span - highest)
@@ -161,13 +161,6 @@ class ClosedLoop:
         given = (*self._scalings, plant.flat, plant.coarse, plant.fine, record)
         pointers = [[array.ctypes.data_as(ctypes.c_void_p) for array in arrays] for arrays in (series, given)]
         self._library.dz_loop(*pointers[0], ctypes.c_double(back_MPa), *pointers[1])
-        return LoopRun(
-            time=np.arange(command.size) * periods_per_record * PWM_PERIOD_S,
-            command=command,
-            compare=record[:, 0],
-            dp_MPa=record[:, 1],
-            q_L_min=record[:, 2],
-            q_mean_L_min=record[:, 3],
-            q_largest_L_min=record[:, 4],
-            position_mm=1e3 * record[:, 5],
-        )
+        recorded = dict(zip(RECORDED, record.T, strict=True))
+        time = np.arange(command.size) * periods_per_record * PWM_PERIOD_S
+        return LoopRun(time=time, command=command, position_mm=1e3 * recorded.pop("position_m"), **recorded)

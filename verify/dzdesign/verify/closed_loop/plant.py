@@ -75,16 +75,13 @@ class Plant:
                 raise InputError(f"plant parameter {name} is {getattr(self, name)}, expected a positive number")
         if self.stroke_mm <= self.overlap_mm:
             raise InputError(f"the stroke of {self.stroke_mm} mm ends inside the overlap of {self.overlap_mm} mm")
-        if self.fastest_rad_s > FASTEST_RAD_S:
-            raise InputError(
-                f"the plant's spool moves at {self.fastest_rad_s:.3g} rad/s, expected at most {FASTEST_RAD_S:.3g}; "
-                "correct m_e_kg, K_et_N_m or B_e_N_s_m"
-            )
-        if self.coil_rad_s > FASTEST_RAD_S:
-            raise InputError(
-                f"the plant's coil follows at {self.coil_rad_s:.3g} rad/s, expected at most {FASTEST_RAD_S:.3g}; "
-                "correct L_c_H, K_a or K_fi_V_A"
-            )
+        for what, rate, keys in (
+            ("spool moves", self.fastest_rad_s, "m_e_kg, K_et_N_m or B_e_N_s_m"),
+            ("coil follows", self.coil_rad_s, "L_c_H, K_a or K_fi_V_A"),
+        ):
+            if rate > FASTEST_RAD_S:
+                limit = f"expected at most {FASTEST_RAD_S:.3g}"
+                raise InputError(f"the plant's {what} at {rate:.3g} rad/s, {limit}; correct {keys}")
 
     @property
     def fastest_rad_s(self) -> float:

@@ -1,7 +1,8 @@
 """`simulate`: ramp tests as a bench would record them, from the plant; always marked as simulated."""
 
+import datetime
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
@@ -15,6 +16,14 @@ from dzdesign.identify.reading.ramp_files import SIMULATED_MARK, ramp_file_bytes
 from dzdesign.verify.closed_loop.loop import RECORD_S, ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.firmware.folder import check_firmware_inside, read_compensator
+
+#: Beginning of a series, in its time stamps; any day serves, and the same day gives the same bytes.
+SERIES_BEGINS = datetime.datetime(2026, 1, 1, 8)
+#: Between two ramps of a series: the pressure is set, s.
+PAUSE_S = 60.0
+MOST_REPEATS = 100
+#: A valve that scatters by more than this share of u_max has no threshold to speak of.
+LARGEST_SCATTER = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,6 +46,23 @@ class Bench:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Series:
+    """Ramps at every pressure drop, each by itself, in random order, and by how much the valve scatters over them."""
+
+    repeats: Annotated[int, Meta(description="Ramps at each pressure drop.")] = 1
+    scatter_V: Annotated[
+        float, quantity("V", "Standard deviation of the threshold from ramp to ramp.", ge=0, le=1e6)
+    ] = 0.0
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.repeats <= MOST_REPEATS:
+            raise InputError(f"{self.repeats} ramps at each pressure drop were asked for, expected 1 to {MOST_REPEATS}")
+
+
+ONE_OF_EACH = Series()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SimulationManifest(Artefact):
     """A folder of simulated ramp tests; made from the compensator of the firmware that drove the valve, if any."""
 
@@ -47,23 +73,43 @@ class SimulationManifest(Artefact):
     simulated: Annotated[Literal[True], Meta(description="No measurement.")] = True
     plant: Annotated[Plant, Meta(description="The valve.")]
     bench: Annotated[Bench, Meta(description="What recorded it.")]
+    series: Annotated[Series, Meta(description="How often, and how well it repeats.")] = ONE_OF_EACH
 
 
 def simulate_ramp(
-    loop: ClosedLoop, plant: Plant, dp_MPa: float, bench: Bench, sequence: RampSequence, mode: str = "direct"
+    loop: ClosedLoop,
+    plant: Plant,
+    dp_MPa: float,
+    bench: Bench,
+    sequence: RampSequence,
+    mode: str = "direct",
+    series: Series = ONE_OF_EACH,
+    number: int = 1,
 ) -> dict[str, np.ndarray]:
-    """Record one ramp test of the plant, without compensator ("direct") or with it ("compensated"), as columns."""
+    """Record one ramp test of the plant, without compensator ("direct") or with it ("compensated").
+
+    `number` tells which ramp of the series it is at this pressure drop, from 1.
+
+    Returns
+    -------
+    dict
+        Columns of a ramp file: time_s, u_V, dP_MPa, Q_Lmin.
+    """
     from scipy.signal import lfilter
 
+    with_core = mode != "direct"
+    # One stream of numbers per ramp, so that adding a test changes none of the others.
+    stream = [bench.seed, round(dp_MPa * 1e6), *([1] if with_core else [])]
+    random = np.random.default_rng(stream if number == 1 else [*stream, 0, number])
+    # Friction and remanence hold the spool back differently at every ramp, as another preload would.
+    scatter_N = series.scatter_V * plant.force_per_volt * np.random.default_rng([*stream, 1, number]).standard_normal()
+    loop = loop.with_plant(replace(plant, preload_N=max(plant.preload_N + scatter_N, 0.0)))
     run = loop.run(sequence.no_faster_than(loop.slowest_ramp_s).command(), dp_MPa, mode)
     share = 1 - np.exp(-RECORD_S / bench.meter_lag_s) if bench.meter_lag_s > 0 else 1.0
-    with_core = mode != "direct"
     # Of a dither a meter sees the mean.
     metered = lfilter([share], [1, share - 1], run.q_mean_L_min if with_core else run.q_L_min)
     rows = np.round(np.arange(0, run.time[-1], 1 / bench.rate_Hz) / RECORD_S).astype(int)
-    # One stream of numbers per pressure drop, so that adding a test changes none of the others.
-    stream = [bench.seed, round(dp_MPa * 1e6), *([1] if with_core else [])]
-    noise = np.random.default_rng(stream).standard_normal((3, rows.size))
+    noise = random.standard_normal((3, rows.size))
     seen = np.where(metered[rows] < bench.meter_floor_L_min, 0.0, metered[rows])
     return {
         "time_s": run.time[rows],
@@ -80,18 +126,33 @@ def simulated_files(
     bench: Bench,
     say: Callable[[str], None],
     firmware: Path | None = None,
+    series: Series = ONE_OF_EACH,
 ) -> tuple[dict[str, bytes], SimulationManifest]:
-    """Simulate one ramp test per pressure drop, up and down; with a firmware folder, of the compensated valve.
+    """Simulate ramp tests, up and down, at each pressure drop; with a firmware folder, of the compensated valve.
 
-    Each file is a gzipped CSV, marked as simulated in its first lines; the manifest is that of the folder.
+    A series with repeats is in random order, so that a drift of the valve could be told from the pressure drop, and
+    its time stamps tell that order.
+
+    Returns
+    -------
+    tuple
+        File name -> gzipped CSV, each marked as simulated in its first lines; manifest of the folder.
     """
     if not 1 <= ramp_s <= 1000:
         raise InputError(f"the ramp time is {ramp_s:g} s, expected 1 to 1000 s")
+    if not 0 <= series.scatter_V <= LARGEST_SCATTER * plant.u_max_V:
+        raise InputError(
+            f"the repeatability is {100 * series.scatter_V / plant.u_max_V:.3g} % of full command, expected 0 to "
+            f"{100 * LARGEST_SCATTER:g} %"
+        )
     loop, made_from = (ClosedLoop(plant), ()) if firmware is None else _loop_of(plant, firmware)
     name, mode = ("ramp", "direct") if firmware is None else ("compensated", "compensated")
     sequence = RampSequence(ramp=ramp_s)
+    ramps = [(dp_MPa, number) for dp_MPa in pressures_MPa for number in range(1, series.repeats + 1)]
+    begins = SERIES_BEGINS
     contents = {}
-    for dp_MPa in pressures_MPa:
+    for place in _order(len(ramps), bench.seed) if series.repeats > 1 else range(len(ramps)):
+        dp_MPa, number = ramps[place]
         if not 0.01 <= dp_MPa <= 18:
             raise InputError(f"a pressure drop of {dp_MPa:g} MPa can't be simulated, expected 0.01 to 18 MPa")
         say(f"simulating {dp_MPa:g} MPa")
@@ -102,9 +163,25 @@ def simulated_files(
             f"noise {bench.meter_noise_L_min:g} L/min; seed {bench.seed}",
             *(["with the compensator; u is its command"] if firmware else []),
         )
-        columns = simulate_ramp(loop, plant, dp_MPa, bench, sequence, mode)
-        contents[f"{name}_dP{dp_MPa:g}.csv.gz"] = ramp_file_bytes(columns, comments, compress=True)
-    return contents, SimulationManifest(tool=THIS_TOOL, made_from=made_from, plant=plant, bench=bench)
+        columns = simulate_ramp(loop, plant, dp_MPa, bench, sequence, mode, series, number)
+        ramp = f"{name}_dP{dp_MPa:g}"
+        if series.repeats > 1:
+            ramp, seconds = f"{ramp}_{number}", columns.pop("time_s")
+            columns = {"time": _time_stamps(begins, seconds), **columns}
+            begins += datetime.timedelta(seconds=round(float(seconds[-1]) + PAUSE_S))
+        contents[f"{ramp}.csv.gz"] = ramp_file_bytes(columns, comments, compress=True)
+    return contents, SimulationManifest(tool=THIS_TOOL, made_from=made_from, plant=plant, bench=bench, series=series)
+
+
+def _order(count: int, seed: int) -> list[int]:
+    """Return in which order so many ramps are taken."""
+    return [int(place) for place in np.random.default_rng([seed, count]).permutation(count)]
+
+
+def _time_stamps(begins: datetime.datetime, seconds: np.ndarray) -> np.ndarray:
+    """Return date and time of each row, as text to the millisecond."""
+    times = np.datetime64(begins, "ms") + np.round(1e3 * seconds).astype("timedelta64[ms]")
+    return np.char.replace(np.datetime_as_string(times), "T", " ")
 
 
 def _loop_of(plant: Plant, firmware: Path) -> tuple[ClosedLoop, tuple[SourceFile, ...]]:

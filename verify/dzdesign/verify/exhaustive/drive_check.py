@@ -26,7 +26,7 @@ class DriveCheck:
     """What running the drive beside its model found."""
 
     ticks: int
-    wrong: int
+    faults: int
     first_wrong: str | None
 
 
@@ -155,7 +155,7 @@ class CompiledDrive:
             sample = (tick - 1) // prepared.ticks_per_sample - 1
             when = f"sample {sample} with codes {prepared.samples[sample]}" if sample >= 0 else "before any sample"
             words = f"{FIELDS[field]} after {tick} PWM periods, {when}"
-        return DriveCheck(ticks=ticks, wrong=wrong, first_wrong=words)
+        return DriveCheck(ticks=ticks, faults=wrong, first_wrong=words)
 
 
 def drive_follows(folder: Path, compensator: Compensator) -> Check:
@@ -166,6 +166,6 @@ def drive_follows(folder: Path, compensator: Compensator) -> Check:
     except RequirementError as error:
         return DRIVE.check(holds=False, text=str(error))
     text = f"outputs and state after each of {found.ticks} PWM periods, {len(prepared.samples)} samples of corners, "
-    text += f"steps, noise and random codes (seed {SEED}): {found.wrong} wrong"
-    text += f" ({found.first_wrong})" if found.wrong else ""
-    return DRIVE.check(holds=found.wrong == 0, text=text)
+    text += f"steps, noise and random codes (seed {SEED}): {found.faults} wrong"
+    text += f" ({found.first_wrong})" if found.faults else ""
+    return DRIVE.check(holds=found.faults == 0, text=text)

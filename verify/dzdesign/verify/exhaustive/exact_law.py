@@ -74,10 +74,9 @@ class ExactLaw:
         away = (np.arange(self.code_max + 1) - self.b.zero_code) * self._weight
         return self.a.zero_code - self.turn * np.floor_divide(-self.turn * away, WEIGHT_UNIT)
 
-    def betas(self, dp_code: int | None) -> Betas:
-        """Return both betas at a difference; None, and one below ``-reverse``: the signal can't be right."""
-        failed = -self.reverse - 1
-        both = self.beta_numerators(np.array([failed if dp_code is None else dp_code]))
+    def betas(self, dp_code: int) -> Betas:
+        """Return both betas at a difference; one below ``-reverse`` says that the signal can't be right."""
+        both = self.beta_numerators(np.array([dp_code]))
         law, zero = (Fraction(int(numerators[0]), both.denominator) for numerators in (both.law, both.zero))
         return Betas(law, zero)
 

@@ -3,6 +3,7 @@
 Where a machine has no compiler, Zig's serves: a clang with its own headers and linker, in the wheel `ziglang`.
 """
 
+import atexit
 import ctypes
 import importlib.util
 import logging
@@ -35,13 +36,11 @@ logger = logging.getLogger(__name__)
 
 
 @cache
-def _build_folder() -> tempfile.TemporaryDirectory[str]:
-    return tempfile.TemporaryDirectory(prefix="dzdesign-", ignore_cleanup_errors=True)
-
-
 def build_folder() -> Path:
     """Return the folder that everything is built in; it goes when the process ends."""
-    return Path(_build_folder().name)
+    folder = tempfile.mkdtemp(prefix="dzdesign-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return Path(folder)
 
 
 def find_compilers() -> tuple[str, ...]:
@@ -50,10 +49,8 @@ def find_compilers() -> tuple[str, ...]:
     Each as a person would write it: a path, or with $CC words such as ``ccache gcc``.
     """
     wanted = (_found(name) for name in (os.environ.get("CC"), "cc", "gcc", "clang") if name)
-    found = {compiler: None for compiler in wanted if compiler}
-    if not found and (zig := find_zig()):
-        found = {zig: None}
-    return tuple(found)
+    found = tuple(dict.fromkeys(compiler for compiler in wanted if compiler))
+    return found or ((zig,) if (zig := find_zig()) else ())
 
 
 def _found(name: str) -> str | None:

@@ -1,0 +1,382 @@
+"""Recordings of four ports, of commands in any unit, without a clock, and staircases, as loggers write them.
+
+Each case is a valve's recordings as text, the command line that reads them, and the truth beside them: where each side
+opens and closes at the pressure drop of its metering edge. NumPy only, no code shared with the product, which is asked
+through its command line. ``corpus_units.py FOLDER`` writes all files.
+"""
+
+import contextlib
+import datetime
+import io
+import json
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+TOLERANCE_V, TOLERANCE_SE, LARGEST_SE_V, SAME_DP = 0.015, 3.0, 0.03, 0.02
+#: Volts at which the valve's sides open and close, whatever the unit of the command.
+OPENS, CLOSES = {"positive": 4.66, "negative": 3.26}, {"positive": 4.54, "negative": 3.14}
+GAIN, PLAY = 3.5, 0.12
+Rows = dict[str, np.ndarray]
+Segment = tuple[float, float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """One valve's recordings: file name -> text, the options that they need, the pressure drops that are true."""
+
+    name: str
+    kind: str
+    files: dict[str, str]
+    options: Sequence[str] = ()
+    pressures: tuple[float, ...] = (1.0,)
+    sides: tuple[str, ...] = ("positive",)
+    #: What the line of the pressure drop must name.
+    dp_from: str = ""
+    #: Words of the refusal, where asking back is right; and what must not stand among the warnings.
+    asks: str = ""
+    not_warned: tuple[str, ...] = ()
+    #: Smallest and largest meter floor that is right, L/min.
+    floor: tuple[float, float] | None = None
+    #: Standard error beyond which a knee is no result, V.
+    largest_se: float = LARGEST_SE_V
+
+
+# The bench.
+
+
+def ramp(up_s: float = 40.0, top: float = 10.0) -> tuple[Segment, ...]:
+    """Hold, up, hold, down, hold; each (seconds, from V, to V)."""
+    return (3.0, 0.0, 0.0), (up_s, 0.0, top), (1.0, top, top), (up_s, top, 0.0), (3.0, 0.0, 0.0)
+
+
+BOTH_WAYS = (*ramp(), *ramp(top=-10.0))
+
+
+def staircase(step: float, dwell: float, top: float = 10.0) -> tuple[Segment, ...]:
+    """Levels held from zero to the top and back."""
+    up = np.arange(0, top + step / 2, step)
+    return tuple((dwell, float(level), float(level)) for level in (*up, *up[::-1]))
+
+
+def bench(
+    command: Sequence[Segment],
+    *,
+    edge: float = 1.0,
+    seed: int = 1,
+    rate_Hz: float = 50.0,
+    noise: float = 0.1,
+    command_noise: float = 0.003,
+    rise_s: float = 0.0,
+    floor: float = 0.0,
+    positive: bool = True,
+    load_MPa: float = 0.0,
+) -> Rows:
+    """Return what stands on a bench: time (s), command (V), pressures of the ports (MPa), flow (L/min).
+
+    Inlet and outlet edge of a side open alike; each takes `edge` MPa of the shut valve, and less under flow, when
+    supply and lines take their share. A load between the working ports takes `load_MPa`; with
+    none they are joined, as for a test of both directions. `rise_s` is
+    the time constant of the spool and the flow, `floor` the meter's.
+    """
+    rng = np.random.default_rng([seed, 77])
+    ends = np.cumsum([0.0, *(seconds for seconds, _, _ in command)])
+    time = np.arange(0.0, ends[-1], 1 / rate_Hz)
+    which = np.searchsorted(ends, time, side="right") - 1
+    seconds, start, stop = np.array(command).T
+    u = start[which] + (stop - start)[which] * (time - ends[which]) / seconds[which]
+    spool = _with_play(u)
+    if rise_s:
+        spool = _lagged(spool, rise_s * rate_Hz)
+    right = np.maximum(spool - (OPENS["positive"] - PLAY / 2), 0)
+    left = np.maximum(-spool - (OPENS["negative"] - PLAY / 2), 0)
+    opened = np.minimum(right + left, 4.6)
+    drop = edge / (1 + 0.06 * (opened / 4) ** 2)
+    flow = GAIN * opened * np.sqrt(drop)
+    tank = 0.3 + 0.0005 * flow**2
+    load = load_MPa + 0.002 * flow**2
+    supply = tank + 2 * drop + load
+    inlet, outlet = supply - drop, tank + drop
+    forwards = u >= 0
+    read = (flow if positive else flow * np.where(forwards, 1, -1)) + noise * rng.standard_normal(u.size)
+    if floor:
+        read = np.where(np.abs(read) < floor, 0.0, read)
+    ports = {"P": supply, "A": np.where(forwards, inlet, outlet), "B": np.where(forwards, outlet, inlet), "T": tank}
+    noisy = {f"p{port}": value + 0.003 * rng.standard_normal(u.size) for port, value in ports.items()}
+    noisy["dP"] = drop + 0.004 * rng.standard_normal(u.size)
+    return {"t": time, "u": u + command_noise * rng.standard_normal(u.size), "Q": read, **noisy}
+
+
+def _with_play(u: np.ndarray) -> np.ndarray:
+    at, found = 0.0, []
+    for value in u.tolist():
+        at = min(max(at, value - PLAY / 2), value + PLAY / 2)
+        found.append(at)
+    return np.array(found)
+
+
+def _lagged(values: np.ndarray, samples: float) -> np.ndarray:
+    pole, at, late = float(np.exp(-1 / samples)), float(values[0]), []
+    for value in values.tolist():
+        at = pole * at + (1 - pole) * value
+        late.append(at)
+    return np.array(late)
+
+
+# The loggers.
+
+
+def table(columns: dict[str, tuple[np.ndarray, int]], separator: str = ",", comma: bool = False) -> str:
+    """Return a table: label -> column and its decimals."""
+    cells = [[f"{value:.{digits}f}" for value in column.tolist()] for column, digits in columns.values()]
+    rows = "\n".join(separator.join(row) for row in zip(*cells, strict=True))
+    return separator.join(columns) + "\n" + (rows.replace(".", ",") if comma else rows) + "\n"
+
+
+def plain(rows: Rows, *names: str) -> str:
+    """Return time, command, some pressures in MPa and the flow, the unit in each label."""
+    pressures = {f"{name}_MPa": (rows[name], 5) for name in names}
+    return table({"time_s": (rows["t"], 3), "u_V": (rows["u"], 4), **pressures, "Q_Lmin": (rows["Q"], 3)})
+
+
+def german(rows: Rows, *names: str) -> str:
+    """Return the same in bar, with decimal commas and stamps."""
+    begin = datetime.datetime(2026, 3, 4, 9, 30)
+    pressures = {f"{name} [bar]": (10 * rows[name], 3) for name in names}
+    text = table({"u [V]": (rows["u"], 4), **pressures, "Q [l/min]": (rows["Q"], 3)}, ";", comma=True)
+    head, *lines = text.splitlines()
+    stamps = (f"{begin + datetime.timedelta(seconds=at):%d.%m.%Y %H:%M:%S,%f}" for at in rows["t"].tolist())
+    return "\n".join([f"t;{head}", *(f"{at};{line}" for at, line in zip(stamps, lines, strict=True))]) + "\n"
+
+
+def with_units_below(rows: Rows, *names: str) -> str:
+    """Return the same with a row of units below the labels, pressures in psi."""
+    columns = {"t": (1e3 * rows["t"], 1), "u": (rows["u"], 4)}
+    columns |= {name: (rows[name] * 145.0377, 3) for name in names} | {"Q": (rows["Q"], 3)}
+    head, *lines = table(columns, "\t").splitlines()
+    return "\n".join([head, "\t".join(["ms", "V", *["psi"] * len(names), "l/min"]), *lines]) + "\n"
+
+
+def command(rows: Rows, label: str, values: np.ndarray, digits: int = 4, clock: bool = True) -> str:
+    """Return a recording whose command stands under another label, in its own unit."""
+    time = {"time_s": (rows["t"], 3)} if clock else {}
+    return table({**time, label: (values, digits), "dP_bar": (10 * rows["dP"], 3), "Q_Lmin": (rows["Q"], 3)})
+
+
+# The cases.
+
+
+def four_ports() -> Iterator[Case]:
+    kind, both = "four ports", ("positive", "negative")
+    inlet = "pP_MPa - pA_MPa"
+    for number, (logger, names, dp_from) in enumerate(
+        [
+            (plain, ("pP", "pA"), inlet),
+            (plain, ("pP", "pA", "pB"), inlet),
+            (german, ("pP", "pA", "pB"), "pP [bar] - pA [bar]"),
+            (german, ("pB", "pT"), "pB [bar] - pT [bar]"),
+            (plain, ("pA", "pB", "pT"), "pB_MPa - pT_MPa"),
+            (with_units_below, ("pP", "pA", "pT"), "pP - pA"),
+            (with_units_below, ("pB", "pP", "pT"), "pB - pT"),
+            (plain, ("dP", "pP", "pA", "pB", "pT"), "dP_MPa"),
+        ]
+    ):
+        texts = {
+            f"ports_{number}_{dp:g}.csv": logger(bench(ramp(), edge=dp, seed=number, load_MPa=2 * dp), *names)
+            for dp in (1.0, 2.5)
+        }
+        yield Case(name=f"ports_{number}", kind=kind, files=texts, dp_from=dp_from, pressures=(1.0, 2.5))
+    for number, (logger, names, dp_from) in enumerate(
+        [
+            (plain, ("pP", "pA", "pB"), "pP_MPa - pB_MPa"),
+            (german, ("pA", "pB", "pT"), "pA [bar] - pT [bar]"),
+            (plain, ("pP", "pA", "pT"), "pA_MPa - pT_MPa"),
+        ]
+    ):
+        texts = {f"both_{number}.csv": logger(bench(BOTH_WAYS, seed=20 + number, positive=number == 1), *names)}
+        yield Case(name=f"both_{number}", kind=kind, files=texts, sides=both, dp_from=dp_from)
+    texts = {"negative.csv": plain(bench(ramp(top=-10.0), seed=30), "pP", "pB")}
+    yield Case(name="negative", kind=kind, files=texts, sides=("negative",), dp_from="pP_MPa - pB_MPa")
+    every = {
+        f"all_{dp:g}.csv": plain(bench(ramp(), edge=dp, seed=31, load_MPa=2 * dp), "pP", "pA", "pB", "pT")
+        for dp in (1.0, 5.0)
+    }
+    yield Case(name="all_asked", kind=kind, files=every, asks='--columns "pP=pP_MPa, pA=pA_MPa, pB=pB_MPa"')
+    for number, named in enumerate(("pP=pP_MPa, pA=pA_MPa, pB=pB_MPa", "pA=pA_MPa, pB=pB_MPa, pT=pT_MPa")):
+        dp_from = (inlet, "pB_MPa - pT_MPa")[number]
+        yield Case(
+            name=f"all_named_{number}", kind=kind, files=every, options=("--columns", named), pressures=(1.0, 5.0),
+            dp_from=dp_from,
+        )  # fmt: skip
+    texts = {"one_side.csv": plain(bench(BOTH_WAYS, seed=32), "pP", "pA")}
+    yield Case(name="one_side", kind=kind, files=texts, dp_from=inlet)
+    texts = {"wrong_port.csv": plain(bench(ramp(), seed=33), "pP", "pB")}
+    yield Case(name="wrong_port", kind=kind, files=texts, asks="pP and pA")
+    rows = bench(ramp(), seed=34)
+    rows["thermometer"] = np.full(rows["t"].size, 41.3)
+    text = table({
+        "time_s": (rows["t"], 3), "u_V": (rows["u"], 4), "PT_degC": (rows["thermometer"], 1),
+        "dP_MPa": (rows["dP"], 5), "Q_Lmin": (rows["Q"], 3),
+    })  # fmt: skip
+    yield Case(name="thermometer", kind=kind, files={"thermometer.csv": text}, dp_from="dP_MPa")
+
+
+def units() -> Iterator[Case]:
+    kind, both = "units of the command", ("positive", "negative")
+    for number, (label, scale, declared) in enumerate(
+        [
+            ("duty", lambda u: 0.09 * u, "0..0.9 = 0..100 %"),
+            ("PWM (counts)", lambda u: 400 * u, "0..4000 = 0..100 %"),
+            ("AO raw", lambda u: 2764.8 * u, "0..27648 = 0..10 V"),
+            ("I_cmd_mA", lambda u: 4 + 1.6 * u, "4..20 mA = 0..10 V"),
+            ("I_coil [A]", lambda u: 0.08 * u, "0..800 mA = 0..100 %"),
+            ("set (%)", lambda u: 10 * u, ""),
+            ("set", lambda u: 10 * u, "%"),
+            ("set %", lambda u: 100 - 10 * u, "100..0 % = 0..10 V"),
+            ("AI3 (V)", lambda u: 0.15 * (4 + 1.6 * u), "4..20 mA on 150 ohm = 0..10 V"),
+            ("AI3 (mV)", lambda u: 150 * (4 + 1.6 * u), "4..20 mA on 150 ohm = 0..100 %"),
+        ]
+    ):
+        digits = 6 if label in ("duty", "I_coil [A]") else 4
+        rows = {f"unit_{number}_{dp:g}.csv": bench(ramp(), edge=dp, seed=40 + number) for dp in (1.0, 2.5)}
+        files = {name: command(each, label, scale(each["u"]), digits) for name, each in rows.items()}
+        named = ("--columns", f"u={label}:{declared}") if declared else ("--columns", f"u={label}")
+        if "[A]" in label:
+            named = ("--columns", f"u={label}:0..0.8 A = 0..100 %")
+        yield Case(name=f"unit_{number}", kind=kind, files=files, options=named, pressures=(1.0, 2.5))
+    for number, (label, scale, declared) in enumerate(
+        [
+            ("I_cmd_mA", lambda u: 12 + 0.8 * u, "4..20 mA = -10..10 V"),
+            ("AI3 (V)", lambda u: 0.15 * (12 + 0.8 * u), "4..20 mA on 150 ohm = -10..10 V"),
+            ("duty", lambda u: 0.5 + 0.04 * u, "0,1..0,9 = -100..100 %"),
+            ("set (%)", lambda u: 10 * u, ""),
+        ]
+    ):
+        each = bench(BOTH_WAYS, seed=60 + number, positive=False)
+        files = {f"bipolar_{number}.csv": command(each, label, scale(each["u"]), 6)}
+        named = ("--columns", f"u={label}:{declared}") if declared else ("--columns", f"u={label}")
+        yield Case(name=f"bipolar_{number}", kind=kind, files=files, options=named, sides=both)
+    each = bench(ramp(), seed=70)
+    text = {"no_unit.csv": command(each, "duty", 0.09 * each["u"], 6)}
+    yield Case(name="no_unit", kind=kind, files=text, options=("--columns", "u=duty"), asks="u=duty:0..1 = 0..100 %")
+
+
+def without_a_clock() -> Iterator[Case]:
+    kind = "no column of time"
+    for number, rate in enumerate((50.0, 10.0, 1000.0)):
+        each = bench(ramp(20.0), seed=80 + number, rate_Hz=rate)
+        text = {f"no_time_{rate:g}.csv": command(each, "u_V", each["u"], clock=False)}
+        yield Case(name=f"no_time_{rate:g}", kind=kind, files=text, options=("--sample-rate", f"{rate:g} Hz"))
+    each = bench(ramp(), seed=83)
+    hot = {"T_degC": (np.full(each["t"].size, 44.0), 1), "u_V": (each["u"], 4), "dP_MPa": (each["dP"], 5)}
+    text = {"thermometer_no_time.csv": table({**hot, "Q_Lmin": (each["Q"], 3)})}
+    yield Case(name="thermometer_no_time", kind=kind, files=text, options=("--sample-rate", "50 Hz"))
+    yield Case(name="no_time_asked", kind=kind, files=text, asks="--sample-rate")
+    text = {"both_clocks.csv": plain(each, "dP")}
+    yield Case(name="both_clocks", kind=kind, files=text, options=("--sample-rate", "50 Hz"), asks="leave one of them")
+
+
+KINDS: tuple[Callable[[], Iterator[Case]], ...] = (four_ports, units, without_a_clock)
+
+
+def cases() -> list[Case]:
+    """Return all."""
+    return [case for kind in KINDS for case in kind()]
+
+
+# What the product makes of them.
+
+
+def fault_of(case: Case, folder: Path) -> str:
+    """Return what the product makes wrong of a case, "" for nothing; it begins with "refused" or "misread"."""
+    from dzdesign.command_line.cli import main
+
+    paths = []
+    for name, text in case.files.items():
+        (folder / name).write_text(text, encoding="utf-8")
+        paths.append(str(folder / name))
+    output = folder / "valve.json"
+    output.unlink(missing_ok=True)
+    out, errors = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(errors):
+        status = main(["identify", *paths, *case.options, "-o", str(output)])
+    if case.asks:
+        right = status == 2 and case.asks in errors.getvalue()
+        return "" if right else f"misread: not asked for '{case.asks}': {errors.getvalue() or out.getvalue()}"
+    if status:
+        return f"refused: {errors.getvalue()}"
+    faults = list(_misread(case, json.loads(output.read_text()), " ".join(out.getvalue().split())))
+    return f"misread: {'; '.join(faults)}" if faults else ""
+
+
+def _misread(case: Case, valve: dict, printed: str) -> Iterator[str]:
+    line = printed.partition("pressure drop: ")[2]
+    if case.dp_from and case.dp_from not in line:
+        yield f"the pressure drop is said to be {line[:60]}"
+    codes = {warning["code"] for warning in valve["warnings"]}
+    yield from (f"warning {code}" for code in case.not_warned if code in codes)
+    floor = valve["meter"]["floor_L_min"]
+    if case.floor and not case.floor[0] <= floor <= case.floor[1]:
+        yield f"a floor of {floor:.3g} L/min"
+    for name in case.sides:
+        tests = valve["sides"].get(name, {}).get("tests", [])
+        if len(tests) != len(case.pressures):
+            yield f"{len(tests)} tests on the {name} side"
+            continue
+        for test, dp in zip(tests, case.pressures, strict=True):
+            if abs(test["dp_MPa"] / dp - 1) > SAME_DP:
+                yield f"{test['dp_MPa']:.3f} MPa for {dp:g}"
+            for branch, truth in (("rising", OPENS[name]), ("falling", CLOSES[name])):
+                knee, se = (test[f"u_knee_{branch}_{key}V"] for key in ("", "se_"))
+                if knee is None:
+                    yield f"no {branch} branch at {dp:g} MPa, {name}"
+                elif se > case.largest_se or abs(knee - truth) > max(TOLERANCE_V, TOLERANCE_SE * se):
+                    off = 1e3 * (knee - truth)
+                    yield f"{branch} knee at {dp:g} MPa, {name}: off by {off:+.0f} mV (se {1e3 * se:.1f})"
+
+
+def print_corpus_of_units(*, quick: bool, seed: int) -> list:
+    """Print and return the rows of part 10."""
+    from scoreboard import Row, print_rows, say
+
+    every = cases()[:: 4 if quick else 1]
+    counts = {kind: Counter() for kind in dict.fromkeys(case.kind for case in every)}
+    with tempfile.TemporaryDirectory() as folder:
+        for case in every:
+            fault = fault_of(case, Path(folder))
+            counts[case.kind][fault.partition(":")[0]] += 1
+            if fault:
+                say(f"{case.name}: {fault}")
+    rows = [
+        Row(
+            what=kind, value=float(found.total() - found[""]), limit=0.0,
+            note=f"of {found.total()}: {found['refused']} refused, {found['misread']} misread",
+        )
+        for kind, found in counts.items()
+    ]  # fmt: skip
+    print_rows(f"10. Ports, units and staircases: refused or misread (seed {seed})", rows)
+    return rows
+
+
+def main(folder: Path) -> None:
+    """Write all recordings, and the options and the truth of each case."""
+    folder.mkdir(parents=True, exist_ok=True)
+    known = {}
+    for case in cases():
+        for name, text in case.files.items():
+            (folder / name).write_text(text, encoding="utf-8")
+        known[case.name] = {
+            "files": list(case.files), "options": list(case.options), "dp_MPa": case.pressures, "asks": case.asks,
+            "opens_V": {side: OPENS[side] for side in case.sides},
+            "closes_V": {side: CLOSES[side] for side in case.sides},
+        }  # fmt: skip
+    (folder / "truth.json").write_text(json.dumps(known, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

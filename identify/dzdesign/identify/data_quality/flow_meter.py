@@ -1,0 +1,107 @@
+"""What is weak in the flow meter's readings: its steps, its lag, its noise, what it reads at rest."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from dzdesign.identify.constants import L_MIN
+from dzdesign.identify.data_quality.catalogue import warn
+from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
+from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.valve.model import Warning_
+from dzdesign.identify.valve.side_model import SideModel
+
+#: Shift of the knees by the meter's lag, over u_max, above which a tenth of it matters.
+LARGE_LAG = 1e-2
+#: Lag that a flow meter without a word about it may well have, s.
+LIKELY_LAG = 0.1
+#: Half a step of the flow, as a shift of the threshold over u_max, above which it matters whether it was cut off.
+COARSE_STEP = 5e-4
+#: The same where it is more than the bounds' distance from the threshold: a certificate that counts on less is none.
+SMALL_SHIFT = 5e-5
+#: Readings a level, from which on a flow is one of steps.
+READINGS_A_LEVEL = 5
+
+
+def about_the_meter(side: SideModel, group: DescribedTests, options: IdentifyOptions) -> Iterator[Warning_]:
+    """Yield the warnings about the flow meter, of one side."""
+    yield from _about_zeros(group.zero_L_min)
+    yield from _about_a_leak(side)
+    yield from _about_the_noise_level(side, options)
+    yield from _about_steps(side, group.tests, options)
+    yield from _about_the_lag(group, options)
+    yield from _about_lag_and_order(side, group)
+
+
+def _about_zeros(zero_L_min: Mapping[str, float]) -> Iterator[Warning_]:
+    leak = "; if it is a leak, the valve passes it whatever the compensator does"
+    for source, zero in zero_L_min.items():
+        yield warn("meter-zero", source, zero_L_min=zero, leak=leak if zero > 0 else "")
+
+
+def _about_a_leak(side: SideModel) -> Iterator[Warning_]:
+    worst = max(side.tests, key=lambda test: test.leak_L_min)
+    if worst.leak_L_min > 0 and worst.dp_MPa:
+        shift_mV = 1e3 * max(test.leak_L_min / test.slope_L_min_V for test in side.tests)
+        leak = worst.leak_L_min
+        yield warn("leak", worst.source, "at-rest", per_MPa=leak / worst.dp_MPa, leak_L_min=leak, shift_mV=shift_mV)
+
+
+def _about_the_noise_level(side: SideModel, options: IdentifyOptions) -> Iterator[Warning_]:
+    if options.noise_level is None:
+        return
+    declared, worst = options.noise_level / L_MIN, max(side.tests, key=lambda test: test.noise_level_L_min)
+    if worst.noise_level_L_min > 1.001 * declared:
+        yield warn("noise-level", worst.source, declared_L_min=declared, level_L_min=worst.noise_level_L_min)
+
+
+def _about_steps(side: SideModel, tests: tuple[DescribedTest, ...], options: IdentifyOptions) -> Iterator[Warning_]:
+    """Say of a flow in coarse steps that a logger which cuts off, instead of rounding, puts all thresholds too high."""
+    levels = [np.unique(item.test.q) for item in tests]
+    steps = [
+        float(np.median(np.diff(known))) if 2 < known.size * READINGS_A_LEVEL < item.test.q.size else 0.0
+        for known, item in zip(levels, tests, strict=True)
+    ]
+    shifts = [0.5 * step / L_MIN / test.slope_L_min_V for step, test in zip(steps, side.tests, strict=True)]
+    worst = int(np.argmax(shifts))
+    # Half a step matters as well where it is more than what the bounds leave to the noise.
+    beyond = any(
+        shift > max(test.u_guard_V - test.u_guard_lower_V, SMALL_SHIFT * options.u_max)
+        for shift, test in zip(shifts, side.tests, strict=True)
+    )
+    if options.meter_zero < 0.49 * steps[worst] and (beyond or shifts[worst] > COARSE_STEP * options.u_max):
+        half = 0.5 * steps[worst] / L_MIN
+        yield warn(
+            "coarse-flow", tests[worst].test.source, step_L_min=2 * half, shift_mV=1e3 * shifts[worst], half_L_min=half
+        )
+
+
+def _about_the_lag(group: DescribedTests, options: IdentifyOptions) -> Iterator[Warning_]:
+    rates = [shape.prepared.branch.rate for item in group.tests for shape in item.branches]
+    rates = [rate for rate in rates if rate > 0]
+    fastest, lag = max(rates, default=0.0), group.lag
+    if not rates:
+        yield warn("clock")
+    elif lag.origin == "unknown":
+        shift_mV = 1e3 * fastest * LIKELY_LAG
+        yield warn("lag-unknown", lag_s=LIKELY_LAG, shift_mV=shift_mV, rate_V_s=fastest, longest_s=lag.longer)
+    elif fastest * lag.seconds > LARGE_LAG * options.u_max:
+        shift_mV = 1e3 * fastest * lag.seconds
+        yield warn("lag-large", lag_s=lag.seconds, shift_mV=shift_mV, rate_V_s=fastest, tenth_mV=0.1 * shift_mV)
+    if lag.contradicted_by is not None:
+        found, se = lag.contradicted_by
+        yield warn("lag-contradicted", None, "rates", lag_s=lag.seconds, found_s=found, se_s=se)
+
+
+def _about_lag_and_order(side: SideModel, group: DescribedTests) -> Iterator[Warning_]:
+    """Say of a declared lag that it puts the closing knee above the opening one by more than its tolerance may."""
+    lag = group.lag
+    if lag.origin != "declared" or lag.seconds == 0:
+        return
+    for test, opening, closing in zip(side.tests, *(group.rates(column) for column in (0, 1)), strict=True):
+        opens, closes = test.u_knee_rising_V, test.u_knee_falling_V
+        if opens is None or closes is None or not test.closes_above_opening:
+            continue
+        longer_s = (closes - opens) / (opening + closing)
+        if longer_s > lag.shorter:
+            yield warn("lag-contradicted", test.source, "branches", lag_s=lag.seconds, longer_s=longer_s)

@@ -1,0 +1,139 @@
+"""The metering edge whose pressure drop a recording holds, where the ports' pressures are its columns.
+
+A valve of four ports opens two edges at once: P to A and B to T at positive commands, P to B and A to T at negative
+ones. Which pressures were recorded says which edge is meant; with all four both edges are there.
+"""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import final
+
+import numpy as np
+
+from dzdesign.core.errors import InputError
+
+#: Pressures of a valve's ports, as columns are called.
+PORTS = ("pP", "pA", "pB", "pT")
+#: Sign of the command -> its edges, inlet first, each from the port ahead to the port behind.
+EDGES = {1: (("pP", "pA"), ("pB", "pT")), -1: (("pP", "pB"), ("pA", "pT"))}
+#: Sensors named A and B alone stand ahead of the edge and behind it, whatever the command's sign.
+AHEAD_AND_BEHIND = ("pA", "pB")
+#: Commands within this share of u_max are at rest: noise about zero does not turn the valve round.
+AT_REST = 0.01
+#: A recording shows a side if so many samples of its command go that far into it, over u_max.
+SMALLEST_SWEEP, SWEEP_SAMPLES = 0.1, 5
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeteringEdge:
+    """Which quantities make the pressure drop at each sign of the command: dP itself, or those ahead and behind.
+
+    None where nothing makes it at that sign; `ambiguous` where both edges could be meant.
+    """
+
+    positive: tuple[str, ...] | None = None
+    negative: tuple[str, ...] | None = None
+    ambiguous: bool = False
+
+    def at(self, sign: int) -> tuple[str, ...] | None:
+        """Return the quantities for a sign of the command."""
+        return self.positive if sign > 0 else self.negative
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """The quantities that are read; none where there is no pressure drop."""
+        return tuple(dict.fromkeys((*(self.positive or ()), *(self.negative or ()))))
+
+    @property
+    def side_without(self) -> str:
+        """The one side without a pressure drop beside another with it, or nothing."""
+        if not self.quantities:
+            return ""
+        return "positive" if self.positive is None else "negative" if self.negative is None else ""
+
+    def drop(self, data: Mapping[str, np.ndarray], u: np.ndarray, u_max: float) -> np.ndarray | None:
+        """Return the pressure drop of samples at commands `u`, NaN where none is known; None without any column."""
+        if not self.quantities:
+            return None
+        both = [_difference(data, names, u.size) for names in (self.positive, self.negative)]
+        if self.positive == self.negative:
+            return both[0]
+        return np.where(_side_of_samples(u, u_max) > 0, *both)
+
+    def in_words(self, labels: Mapping[str, str]) -> tuple[str, str]:
+        """Return which columns make it, such as ``pP_MPa - pA_MPa``, at positive and negative commands."""
+        positive, negative = (
+            " - ".join(labels[name] for name in self.at(sign) or ()) if self.quantities else "" for sign in (1, -1)
+        )
+        return positive, negative
+
+
+def metering_edge(quantities: Collection[str]) -> MeteringEdge:
+    """Return what makes the pressure drop of recorded quantities.
+
+    Examples
+    --------
+    >>> metering_edge(["pP", "pA", "pB"])
+    MeteringEdge(positive=('pP', 'pA'), negative=('pP', 'pB'), ambiguous=False)
+    >>> metering_edge(["pA", "pB"]).negative, metering_edge(["pP", "pA"]).negative
+    (('pA', 'pB'), None)
+    """
+    if "dP" in quantities:
+        return MeteringEdge(positive=("dP",), negative=("dP",))
+    known = set(quantities) & set(PORTS)
+    if known == set(PORTS):
+        return MeteringEdge(ambiguous=True)
+    if known == set(AHEAD_AND_BEHIND):
+        return MeteringEdge(positive=AHEAD_AND_BEHIND, negative=AHEAD_AND_BEHIND)
+    positive, negative = (next((edge for edge in EDGES[sign] if known >= set(edge)), None) for sign in (1, -1))
+    return MeteringEdge(positive=positive, negative=negative)
+
+
+def which_edge(labels: Mapping[str, str]) -> str:
+    """Return what to say where all four ports were recorded, under these labels."""
+    named = ", ".join(f"{port}={labels[port]}" for port in PORTS[:3])
+    return (
+        "the pressures of P, A, B and T, so the drop of either edge: pP - pA (pP - pB at negative commands), or pB - "
+        f'pT (pA - pT); name the ports of the metering edge only, for example --columns "{named}"'
+    )
+
+
+def side_without_dp(edge: MeteringEdge, labels: Mapping[str, str], path: Path, u: np.ndarray, u_max: float) -> str:
+    """Return the side that a recording shows and that has no pressure drop beside the other's, or nothing.
+
+    Raises
+    ------
+    InputError
+        If the recording shows that side only.
+    """
+    if not edge.side_without:
+        return ""
+    sign = 1 if edge.side_without == "positive" else -1
+    shown = {each: np.count_nonzero(each * u >= SMALLEST_SWEEP * u_max) >= SWEEP_SAMPLES for each in (1, -1)}
+    if shown[sign] and not shown[-sign]:
+        there = " and ".join(f"'{labels[name]}'" for name in edge.quantities)
+        one, other = (" and ".join(each) for each in EDGES[sign])
+        raise InputError(
+            f"'{path}' holds {edge.side_without} commands only, and {there} make the pressure drop of the other side; "
+            f"expected {one}, or {other}, or dP. If these commands open the edge between them, name the ports so by "
+            "--columns"
+        )
+    return edge.side_without if shown[sign] else ""
+
+
+def _difference(data: Mapping[str, np.ndarray], names: tuple[str, ...] | None, size: int) -> np.ndarray:
+    if names is None:
+        return np.full(size, np.nan)
+    return data[names[0]] if len(names) == 1 else data[names[0]] - data[names[1]]
+
+
+def _side_of_samples(u: np.ndarray, u_max: float) -> np.ndarray:
+    """Return +1 or -1 for every sample: the side to which the command goes next; after the last ramp, where it was."""
+    away = np.flatnonzero(np.abs(u) > AT_REST * u_max)
+    if not away.size:
+        return np.ones(u.size)
+    coming = np.minimum(np.searchsorted(away, np.arange(u.size)), away.size - 1)
+    side: np.ndarray = np.sign(u[away])[coming]
+    return side

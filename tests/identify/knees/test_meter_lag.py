@@ -1,0 +1,138 @@
+"""The meter's lag and its tolerance: each guard's bound goes down on its unsafe side; what contradicts it is said."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from dzdesign.core.errors import InputError
+from dzdesign.core.option_readers import with_tolerance
+from dzdesign.identify.identification import identify
+from dzdesign.identify.knees.meter_lag import LONGEST_UNKNOWN, softness_of_filter
+from dzdesign.identify.options import IdentifyOptions
+from tests.support.bench_recordings import Valve, record
+
+OPENING, CLOSING = 5.4, 5.2
+TRUTH = {"opening": OPENING, "closing": CLOSING, "mean": (OPENING + CLOSING) / 2}
+
+
+def recordings(lag, *, seconds=25.0, noise=0.03, opening=OPENING, pressures=(1.0, 4.0)):
+    """Ramps of a quarter of the usual time: the same samples, four times as fast."""
+    found = []
+    for dp in pressures:
+        valve = Valve(opening=opening, closing=CLOSING, noise=noise, lag=lag * 100 / seconds)
+        test = record(valve, dp, source=f"{dp:g}_{seconds:g}.csv")
+        found.append(replace(test, time=test.time * seconds / 100))
+    return found
+
+
+def bounds(tests, **choices):
+    """The offsets of the three guards at the first test, with what the bounds allow for scatter set to none."""
+    valve = identify(tests, IdentifyOptions(repeatability=0.0, **choices))
+    return {name: guard.u_min0_V for name, guard in valve.positive.guards.items()}
+
+
+def codes(tests, **choices):
+    return [warning.code for warning in identify(tests, IdentifyOptions(repeatability=0.0, **choices)).warnings]
+
+
+class TestTolerance:
+    @pytest.mark.parametrize(("lag", "guards"), [(0.055, ("closing", "mean")), (0.145, ("opening", "mean"))])
+    def test_a_wrong_lag_within_its_tolerance_leaves_the_bounds_below_the_thresholds(self, lag, guards):
+        tests = recordings(lag, seconds=50.0)
+        found, exact = bounds(tests, meter_lag=0.1), bounds(tests, meter_lag=0.1, meter_lag_tolerance=0.0)
+        for guard in guards:
+            assert TRUTH[guard] - 0.06 < found[guard] < TRUTH[guard]
+        assert exact[guards[0]] - found[guards[0]] == pytest.approx(0.05 * 0.2, rel=0.05)
+        assert exact["mean"] == pytest.approx(found["mean"], abs=1e-4)  # both ways at the same rate: it cancels
+        assert guards[0] == "opening" or exact["closing"] > CLOSING  # it takes the tolerance
+
+    def test_no_lag_declared_is_the_safe_side_of_the_closing_and_counts_on_the_opening(self):
+        tests = recordings(0.19)
+        found = bounds(tests)
+        for guard, truth in TRUTH.items():
+            assert found[guard] < truth
+        valve = identify(tests)
+        assert (valve.meter.lag_longer_s, valve.meter.lag_shorter_s) == (LONGEST_UNKNOWN, 0.0)
+        assert "lag-unknown" in [warning.code for warning in valve.warnings]
+
+    @pytest.mark.parametrize(
+        ("lag", "stated", "longer", "shorter"),
+        [(0.1, None, 0.05, 0.05), (1.0, None, 0.2, 0.2), (0.1, 0.02, 0.02, 0.02), (0.02, None, 0.05, 0.02)],
+    )
+    def test_without_a_word_it_is_a_fifth_and_no_meter_runs_ahead_of_the_flow(self, lag, stated, longer, shorter):
+        tests = recordings(lag, seconds=100.0, pressures=(1.0,))
+        meter = identify(tests, IdentifyOptions(meter_lag=lag, meter_lag_tolerance=stated)).meter
+        assert (meter.lag_longer_s, meter.lag_shorter_s) == (pytest.approx(longer), pytest.approx(shorter))
+
+    def test_each_test_pays_at_its_own_rate(self):
+        slow, fast = recordings(0.1, seconds=100.0)[:1], recordings(0.1, seconds=20.0)[1:]
+        options = IdentifyOptions(repeatability=0.0, meter_lag=0.1)
+        some, none = (
+            identify([*slow, *fast], each).positive.guards["closing"].u_lower_V
+            for each in (options, replace(options, meter_lag_tolerance=0.0))
+        )
+        paid = [without - with_it for with_it, without in zip(some, none, strict=True)]
+        assert paid == pytest.approx([0.1 * 0.05, 0.5 * 0.05], rel=0.02)
+
+    @pytest.mark.parametrize("text", ["0.1 s +- 0.02 s", "0.1 s ± 20 ms", "100ms +/- 0.02s"])
+    def test_it_is_read_beside_the_lag(self, text):
+        assert with_tolerance("time")(text, "--meter-lag") == pytest.approx((0.1, 0.02))
+
+    @pytest.mark.parametrize("text", ["0.1 s +- 0.02", "0.1 s +-", "± 0.02 s", "0.1 s ± 1 ms ± 1 ms", "0.1 s ± 1 V"])
+    def test_half_a_tolerance_is_refused(self, text):
+        with pytest.raises(InputError, match="--meter-lag"):
+            with_tolerance("time")(text, "--meter-lag")
+
+    def test_a_negative_one_is_refused(self):
+        with pytest.raises(InputError, match="meter_lag_tolerance is negative"):
+            IdentifyOptions(meter_lag=0.1, meter_lag_tolerance=-0.1)
+
+
+class TestContradiction:
+    def test_two_rates_that_show_another_lag_are_said_and_the_bounds_allow_for_both(self):
+        tests = recordings(0.1, seconds=100.0) + recordings(0.1, seconds=20.0)
+        assert "lag-contradicted" not in codes(tests, meter_lag=0.1)
+        assert "lag-contradicted" in codes(tests, meter_lag=0.4)
+        found = bounds(tests, meter_lag=0.4)
+        assert found["closing"] < CLOSING
+        assert bounds(tests, meter_lag=0.02, meter_lag_tolerance=0.0)["opening"] < OPENING
+
+    def test_a_lag_that_turns_the_branches_round_is_said(self):
+        tests = recordings(0.1, opening=CLOSING + 0.01)
+        assert "lag-contradicted" not in codes(tests, meter_lag=0.1)
+        assert {"lag-contradicted", "branch-order"} <= set(codes(tests, meter_lag=0.2))
+
+
+class TestFilter:
+    @pytest.mark.parametrize("rising", [True, False])
+    @pytest.mark.parametrize("at_level", [0.02, 0.1, 0.3])
+    def test_what_a_filter_makes_of_a_sharp_edge(self, rising, at_level):
+        """Against a filter run over samples of a ramp of unit slope and rate: the shift is the lag."""
+        lag, step = 0.2, 1e-4
+        u = np.arange(-3, 3, step) if rising else np.arange(3, -3, -step)
+        flow = np.clip(u, 0, None)
+        pole = np.exp(-step / lag)
+        q = lfilter([1 - pole], [1, -pole], flow - flow[0]) + flow[0]
+        right = u - lag if rising else u + lag
+        settled = np.arange(u.size) > u.size // 6
+        tail = settled & (q >= at_level) & (q <= 3 * at_level)
+        slope, height = np.polyfit(right[tail], q[tail], 1)
+        assert softness_of_filter(lag, at_level, 3.0, rising=rising) == pytest.approx(height / slope, abs=2e-3)
+
+    def test_no_lag_softens_nothing(self):
+        assert softness_of_filter(0.0, 0.1, 3.0, rising=True) == 0.0
+        assert softness_of_filter(1e-6, 0.1, 3.0, rising=False) == 0.0
+
+    def test_softness_that_the_meter_explains_is_said_to_be_the_meters_perhaps(self):
+        def texts(tests, **choices):
+            found = identify(tests, IdentifyOptions(repeatability=0.0, **choices)).warnings
+            return [warning.text for warning in found if warning.code == "soft-edge"]
+
+        fast = recordings(0.5, seconds=20.0, pressures=(1.0,))
+        assert all("filter" in text for text in texts(fast, meter_lag=0.5)) and texts(fast, meter_lag=0.5)
+        soft = replace(fast[0], q=recordings(0.001, pressures=(1.0,))[0].q, u=fast[0].u)
+        gentle = np.where(soft.u < 6.2, 0.3 * np.clip(soft.u - 4.2, 0, 2), 0.6 + 4 * (soft.u - 6.2)) / 6e4
+        soft = replace(soft, q=gentle + 0.02 / 6e4 * np.random.default_rng(1).standard_normal(soft.u.size))
+        assert texts([soft], meter_lag=0.001) and not any("filter" in text for text in texts([soft], meter_lag=0.001))

@@ -1,0 +1,59 @@
+"""Ports, units and staircases as loggers write them: benchmarks/identify/corpus_units.py, and that its faults show."""
+
+import corpus_units
+import numpy as np
+import pytest
+
+from dzdesign.identify.reading import column_labels, ramp_files
+from dzdesign.identify.reading.metering_edge import MeteringEdge, metering_edge
+
+CASES = {case.name: case for case in corpus_units.cases()}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_recording_is_read_as_it_is(name, tmp_path):
+    assert not corpus_units.fault_of(CASES[name], tmp_path)
+
+
+@pytest.mark.parametrize("name", ["ports_1", "both_0", "all_asked"])
+def test_working_ports_in_silence_are_seen(name, tmp_path, monkeypatch):
+    """The fault that this was written for: pA - pB wherever both stand, whatever stands beside them."""
+
+    def in_silence(quantities) -> MeteringEdge:
+        working = {"pA", "pB"}
+        return metering_edge(working if working <= set(quantities) else quantities)
+
+    for module in (column_labels, ramp_files):
+        monkeypatch.setattr(module, "metering_edge", in_silence)
+    assert corpus_units.fault_of(CASES[name], tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("recorded", "positive", "negative"),
+    [
+        ("dP pP pA pB pT", ("dP",), ("dP",)),
+        ("pA pB", ("pA", "pB"), ("pA", "pB")),
+        ("pP pA", ("pP", "pA"), None),
+        ("pP pB", None, ("pP", "pB")),
+        ("pP pA pB", ("pP", "pA"), ("pP", "pB")),
+        ("pA pB pT", ("pB", "pT"), ("pA", "pT")),
+        ("pP pA pT", ("pP", "pA"), ("pA", "pT")),
+        ("pP pT", None, None),
+        ("pT", None, None),
+    ],
+)
+def test_the_edge_follows_from_the_ports(recorded, positive, negative):
+    edge = metering_edge(recorded.split())
+    assert (edge.at(1), edge.at(-1), edge.ambiguous) == (positive, negative, False)
+
+
+def test_four_ports_are_ambiguous():
+    assert metering_edge(["pP", "pA", "pB", "pT"]).ambiguous
+
+
+def test_noise_about_zero_does_not_turn_the_valve_round():
+    """At rest before a side is swept its own edge counts, whatever the noise says of the command's sign."""
+    u = np.array([0.01, -0.02, 0.01, 5.0, 0.02, -0.01, -5.0, 0.01, -0.01])
+    data = {"pP": np.full(u.size, 3.0), "pA": np.full(u.size, 1.0), "pB": np.full(u.size, 2.0)}
+    drop = metering_edge(data).drop(data, u, 10.0)
+    np.testing.assert_array_equal(drop, [2, 2, 2, 2, 1, 1, 1, 1, 1])
