@@ -92,7 +92,7 @@ def split_ramps(test: RampTest, lag: float) -> list[Ramp]:
         Where the command jumps back and forth within a ramp.
     """
     test = without_command_spikes(test)
-    stairs = find_staircase(test.u, test.q)
+    stairs = find_staircase(test.u, test.q, test.source)
     if stairs is not None:  # what has settled has no lag
         test = replace(test, u=stairs.u).part(stairs.settled)
     u = lagged_command(test.time, test.u, lag) if stairs is None else test.u

@@ -6,13 +6,14 @@ settled, the rest of the way is what an exponential leaves, and the command that
 level. A ramp that was recorded in coarse steps is no staircase: its flow goes on through each of them.
 """
 
+import logging
 from dataclasses import dataclass
 from typing import final
 
 import numpy as np
 
 from dzdesign.identify.constants import BIN_WIDTH
-from dzdesign.identify.knees.noise import median, robust_sigma
+from dzdesign.identify.ramps.command import despiked
 
 #: A step of the command stands out of its noise by so many standard deviations, and of its range by this share.
 STEP_SIGMAS, SMALLEST_STEP = 6.0, 2.5e-3
@@ -20,11 +21,14 @@ STEP_SIGMAS, SMALLEST_STEP = 6.0, 2.5e-3
 DWELL_SAMPLES, FEWEST_DWELLS, IN_DWELLS = 8, 8, 0.8
 #: Within a dwell the command moves by less than this share of a step.
 LEVEL = 0.1
+#: A reading that stands out of its neighbours by this share of the flow's range is a spike.
+SPIKE = 0.1
 #: The flow has settled once it is within this share of its step, and so many standard errors, of the dwell's end.
 SETTLED, SETTLED_SIGMAS = 0.01, 4.0
 #: Time constants that are tried, over the dwell: where the longest fits best, or more than this share of the step is
 #: left, the flow does not settle. It is followed from where it has gone this share of its way.
 TIME_CONSTANTS, LARGEST_REST, RISEN = np.geomspace(0.02, 0.7, 40), 0.3, 0.3
+logger = logging.getLogger(__name__)
 
 
 @final
@@ -36,25 +40,30 @@ class Staircase:
     u: np.ndarray
 
 
-def find_staircase(u: np.ndarray, q: np.ndarray) -> Staircase | None:
+def find_staircase(u: np.ndarray, q: np.ndarray, source: str = "") -> Staircase | None:
     """Return the settled samples of a staircase, None if the command is none.
 
-    Command u in V and flow q, both (N,), in the order of time.
+    Command u in V and flow q, both (N,), in the order of time; `source` is for the log.
     """
     dwells = _dwells(u)
     if dwells is None:
         return None
     starts, ends = dwells
-    levels = np.array([median(u[start:end]) for start, end in zip(starts, ends, strict=True)])
+    levels = np.array([np.median(u[start:end]) for start, end in zip(starts, ends, strict=True)])
     steps = np.diff(levels, prepend=levels[0])
     length = int(np.median(ends - starts))
-    response = _mean_response(q, starts, ends, length)
+    smooth = despiked(q)
+    spikes = np.abs(q - smooth) > SPIKE * float(np.ptp(smooth))
+    response = _mean_response(np.where(spikes, smooth, q), starts, ends, length)
     if response is None:
         return None
     first, rest = response
     # One level of the command whenever it comes again, whatever the noise.
     grid = BIN_WIDTH / 10 * float(np.ptp(levels))
     levels = np.round((levels - rest * steps) / grid) * grid
+    logger.info(
+        "'%s': a staircase of %d dwells; the flow settles in %d of their %d samples", source, starts.size, first, length
+    )
     settled, command = np.zeros(u.size, dtype=bool), np.full(u.size, np.nan)
     for start, end, level in zip(starts, ends, levels.tolist(), strict=True):
         begin = start + min(first, 3 * (end - start) // 4) if start else start
@@ -66,7 +75,7 @@ def _dwells(u: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     """Return where the dwells of a staircase begin and end, None if the command is none."""
     moves = np.abs(np.diff(u))
     span = float(np.ptp(u))
-    noise = 1.4826 * median(moves) if moves.size else 0.0
+    noise = 1.4826 * float(np.median(moves)) if moves.size else 0.0
     still = np.concatenate([[False], moves <= max(STEP_SIGMAS * noise, SMALLEST_STEP * span), [False]])
     edges = np.flatnonzero(np.diff(still.astype(np.int8)))
     starts, ends = edges[::2], edges[1::2] + 1
@@ -75,7 +84,7 @@ def _dwells(u: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     if starts.size < FEWEST_DWELLS or np.sum(ends - starts) < IN_DWELLS * u.size:
         return None
     middles = (starts + ends) // 2
-    halves = [(median(u[a:b]), median(u[b:c])) for a, b, c in zip(starts, middles, ends, strict=True)]
+    halves = [(np.median(u[a:b]), np.median(u[b:c])) for a, b, c in zip(starts, middles, ends, strict=True)]
     before, after = np.array(halves).T
     step = float(np.median(np.abs(np.diff((before + after) / 2))))
     # A ramp with a hole or two, or with holds, has stretches that are no level.
@@ -93,7 +102,7 @@ def _mean_response(q: np.ndarray, starts: np.ndarray, ends: np.ndarray, length: 
     last = np.array([np.mean(q[end - (end - start) // 4 : end]) for start, end in zip(starts, ends, strict=True)])
     way = np.diff(last)
     whole = np.flatnonzero((ends - starts)[1:] >= length) + 1
-    noise = robust_sigma(q[starts[0] : ends[0]])
+    noise = _scatter(q[starts[0] : ends[0]])
     whole = whole[np.abs(way[whole - 1]) > max(3 * noise / np.sqrt(length), 0.1 * np.abs(way).max())]
     if whole.size < 3:
         return None
@@ -102,7 +111,7 @@ def _mean_response(q: np.ndarray, starts: np.ndarray, ends: np.ndarray, length: 
     rows = q[starts[whole][:, None] + np.arange(length)]
     response = (sign @ (rows - before[:, None])) / total
     residual = rows - last[whole][:, None]
-    error = robust_sigma(residual[:, 3 * length // 4 :].ravel()) * np.sqrt(whole.size) / total
+    error = _scatter(residual[:, 3 * length // 4 :].ravel()) * np.sqrt(whole.size) / total
     away = np.flatnonzero(np.abs(response - 1) > max(SETTLED, SETTLED_SIGMAS * error))
     first = int(away[-1]) + 1 if away.size else 0
     if first <= length // 2:
@@ -117,6 +126,8 @@ def _rest_of_the_way(response: np.ndarray) -> float | None:
     Its end is 1 here, the mean of the last quarter. The best exponential through what follows the first rise tells.
     """
     tail = response[int(np.argmax(response >= RISEN)) :]
+    if tail.size < DWELL_SAMPLES // 2:
+        return None
     time = np.arange(tail.size) / response.size
     fits = []
     for constant in TIME_CONSTANTS.tolist():
@@ -128,3 +139,8 @@ def _rest_of_the_way(response: np.ndarray) -> float | None:
     _, constant, final = min(fits)
     settles = constant < TIME_CONSTANTS[-1] and final - 1 < LARGEST_REST
     return max(final - 1, 0.0) if settles else None
+
+
+def _scatter(values: np.ndarray) -> float:
+    """Return the standard deviation of the middle half."""
+    return 1.4826 * float(np.median(np.abs(values - np.median(values))))
