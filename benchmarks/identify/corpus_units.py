@@ -226,7 +226,62 @@ def four_ports() -> Iterator[Case]:
     yield Case(name="thermometer", kind=kind, files={"thermometer.csv": text}, dp_from="dP_MPa")
 
 
-KINDS: tuple[Callable[[], Iterator[Case]], ...] = (four_ports,)
+def units() -> Iterator[Case]:
+    kind, both = "units of the command", ("positive", "negative")
+    for number, (label, scale, declared) in enumerate(
+        [
+            ("duty", lambda u: 0.09 * u, "0..0.9 = 0..100 %"),
+            ("PWM (counts)", lambda u: 400 * u, "0..4000 = 0..100 %"),
+            ("AO raw", lambda u: 2764.8 * u, "0..27648 = 0..10 V"),
+            ("I_cmd_mA", lambda u: 4 + 1.6 * u, "4..20 mA = 0..10 V"),
+            ("I_coil [A]", lambda u: 0.08 * u, "0..800 mA = 0..100 %"),
+            ("set (%)", lambda u: 10 * u, ""),
+            ("set", lambda u: 10 * u, "%"),
+            ("set %", lambda u: 100 - 10 * u, "100..0 % = 0..10 V"),
+            ("AI3 (V)", lambda u: 0.15 * (4 + 1.6 * u), "4..20 mA on 150 ohm = 0..10 V"),
+            ("AI3 (mV)", lambda u: 150 * (4 + 1.6 * u), "4..20 mA on 150 ohm = 0..100 %"),
+        ]
+    ):
+        digits = 6 if label in ("duty", "I_coil [A]") else 4
+        rows = {f"unit_{number}_{dp:g}.csv": bench(ramp(), edge=dp, seed=40 + number) for dp in (1.0, 2.5)}
+        files = {name: command(each, label, scale(each["u"]), digits) for name, each in rows.items()}
+        named = ("--columns", f"u={label}:{declared}") if declared else ("--columns", f"u={label}")
+        if "[A]" in label:
+            named = ("--columns", f"u={label}:0..0.8 A = 0..100 %")
+        yield Case(name=f"unit_{number}", kind=kind, files=files, options=named, pressures=(1.0, 2.5))
+    for number, (label, scale, declared) in enumerate(
+        [
+            ("I_cmd_mA", lambda u: 12 + 0.8 * u, "4..20 mA = -10..10 V"),
+            ("AI3 (V)", lambda u: 0.15 * (12 + 0.8 * u), "4..20 mA on 150 ohm = -10..10 V"),
+            ("duty", lambda u: 0.5 + 0.04 * u, "0,1..0,9 = -100..100 %"),
+            ("set (%)", lambda u: 10 * u, ""),
+        ]
+    ):
+        each = bench(BOTH_WAYS, seed=60 + number, positive=False)
+        files = {f"bipolar_{number}.csv": command(each, label, scale(each["u"]), 6)}
+        named = ("--columns", f"u={label}:{declared}") if declared else ("--columns", f"u={label}")
+        yield Case(name=f"bipolar_{number}", kind=kind, files=files, options=named, sides=both)
+    each = bench(ramp(), seed=70)
+    text = {"no_unit.csv": command(each, "duty", 0.09 * each["u"], 6)}
+    yield Case(name="no_unit", kind=kind, files=text, options=("--columns", "u=duty"), asks="u=duty:0..1 = 0..100 %")
+
+
+def without_a_clock() -> Iterator[Case]:
+    kind = "no column of time"
+    for number, rate in enumerate((50.0, 10.0, 1000.0)):
+        each = bench(ramp(20.0), seed=80 + number, rate_Hz=rate)
+        text = {f"no_time_{rate:g}.csv": command(each, "u_V", each["u"], clock=False)}
+        yield Case(name=f"no_time_{rate:g}", kind=kind, files=text, options=("--sample-rate", f"{rate:g} Hz"))
+    each = bench(ramp(), seed=83)
+    hot = {"T_degC": (np.full(each["t"].size, 44.0), 1), "u_V": (each["u"], 4), "dP_MPa": (each["dP"], 5)}
+    text = {"thermometer_no_time.csv": table({**hot, "Q_Lmin": (each["Q"], 3)})}
+    yield Case(name="thermometer_no_time", kind=kind, files=text, options=("--sample-rate", "50 Hz"))
+    yield Case(name="no_time_asked", kind=kind, files=text, asks="--sample-rate")
+    text = {"both_clocks.csv": plain(each, "dP")}
+    yield Case(name="both_clocks", kind=kind, files=text, options=("--sample-rate", "50 Hz"), asks="leave one of them")
+
+
+KINDS: tuple[Callable[[], Iterator[Case]], ...] = (four_ports, units, without_a_clock)
 
 
 def cases() -> list[Case]:

@@ -623,7 +623,7 @@ def test_recordings_with_the_compensator_say_whose_and_the_pages_options_are_tak
     page = (root / "docs" / "before-after.md").read_text(encoding="utf-8")
     options = re.search(r"    (meter-lag = .*?)\n\n", page, re.DOTALL)[1]
     Path("options.toml").write_text(textwrap.dedent("    " + options))
-    before = str(root / "examples" / "paper_valve" / "ramps" / "ramp_dP1.csv.gz")
+    before = str(root / "examples" / "paper_valve" / "ramps" / "ramp_dP1_1.csv.gz")
     after = [str(path) for path in (tmp_path / "after").glob("*.gz")]
     assert len(after) == 1
     assert main(["assess", before, "--after", *after, "--config", "options.toml"]) in (0, 1)

@@ -6,6 +6,7 @@ from fractions import Fraction
 import pytest
 
 from dzdesign.core.errors import InputError
+from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.signal_text import command_signal, parse_signal, pressure_signal
 from dzdesign.design.signals import CommandSignal, PressureSignal, Signals
@@ -143,3 +144,28 @@ def test_choices_that_cannot_be(options, words):
     with pytest.raises(InputError) as error:
         DesignOptions(**options).transition_codes()
     assert words in str(error.value)
+
+
+def test_a_current_of_both_signs_has_its_zero_between():
+    both = command("4..20 mA on 150 ohm = -10..10 V")
+    # 12 mA on 150 ohm are 1.8 V of 3 V: 2457.6 codes.
+    assert (both.negative_full_code, both.zero_code, both.full_code) == (819, 2457, 4095)
+    assert both.valid_codes == (737, 4095)
+    assert command("4..20 mA on 150 ohm = -100..100 %") == both
+    assert command("4..20 mA on 150 ohm = 0..10 V") == command("4..20 mA on 150 ohm")
+    turned = command("4..20 mA on 150 ohm = -10..10 V", inverted=True)
+    assert (turned.negative_full_code, turned.full_code) == (4095, 819)
+
+
+@pytest.mark.parametrize(
+    "meaning", ["25 MPa", "-10..8 V", "10..-10 V", "2..10 V", "-10..-2 V", "-10..10 bar", "-10..10"]
+)
+def test_what_a_command_cannot_stand_for(meaning):
+    with pytest.raises(InputError, match=r"4\.\.20 mA on 150 ohm"):
+        command(f"4..20 mA on 150 ohm = {meaning}")
+
+
+def test_a_full_command_other_than_the_valves_is_refused(example_valve):
+    options = DesignOptions(signals=Signals(), full_command_V=Fraction(5))
+    with pytest.raises(InputError, match="stands for 5 V"):
+        design(example_valve, options)

@@ -185,7 +185,7 @@ def test_a_valve_of_a_lot_that_fails_is_no_error_of_the_api(ramps, tmp_path):
 
 def test_print_sums_a_result_up(example_valve, example_compensator, example_firmware):
     side, text = example_valve.positive, str(example_valve)
-    assert text.startswith("Valve of 10 V, positive side, from 6 recordings\n")
+    assert text.startswith("Valve of 10 V, positive side, from 18 recordings\n")
     for test in side.tests:
         numbers = f"{test.dp_MPa:.3f} {test.u_knee_rising_V:.3f} {test.u_knee_falling_V:.3f} {test.u_knee_se_V:.4f}"
         assert re.search(r" +".join(map(re.escape, numbers.split())), text)

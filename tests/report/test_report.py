@@ -25,6 +25,7 @@ from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of, to_json
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import THIS_TOOL, to_json_bytes
 from dzdesign.core.errors import InputError
+from dzdesign.design.designing import design
 from dzdesign.identify.identification import identify
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.artefact_chain import chain_of
@@ -579,6 +580,20 @@ def test_one_ramp_test_is_one(reports):
     text = Page(reports["one"]).text
     assert "1 ramp test; full command" in text and "1 ramp tests" not in text and "1 pressure drops" not in text
     assert "staircase" not in text and "One pressure drop was tested, and nothing is certified at another." in text
+
+
+def test_an_assumed_repeatability_stands_beside_the_certificate(html, tmp_path):
+    one = identify([synthetic_ramp(1.0, Truth(), seed=7, rate_Hz=10.0)])
+    valve_json = to_json_bytes(one)
+    (tmp_path / "valve.json").write_bytes(valve_json)
+    (tmp_path / "compensator.json").write_bytes(to_json_bytes(design(one, None, valve_json)))
+    page = report_of_folder(tmp_path).html
+    heads = [text[: text.index('<section id="data">')] for text in (page, html)]
+    certificate, of_repeats = (head[head.index("Certificate") :] for head in heads)
+    assert "repeats to 25 mV" in certificate and "(no-repeats)" in certificate
+    assert "no-repeats" not in of_repeats
+    assert "from ramp to ramp: standard deviation 25.0 mV (assumed" in page
+    assert "degrees of freedom), in the bound for the next closing" in html
 
 
 def test_figures_of_two_sides_say_which_they_are_of(reports):

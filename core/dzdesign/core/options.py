@@ -123,8 +123,10 @@ def flag_of(name: str) -> str:
     --------
     >>> flag_of("below_dp0")
     '--below-dp0'
+    >>> flag_of("from_")  # a word of Python
+    '--from'
     """
-    return f"--{name.replace('_', '-')}"
+    return f"--{name.rstrip('_').replace('_', '-')}"
 
 
 @cache

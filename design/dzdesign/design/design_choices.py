@@ -36,8 +36,9 @@ class DesignChoices:
     accept: Annotated[Text, Option("CODE", LAW, choices="dzdesign.design.options:ACCEPTABLE")] = None
     """Design in spite of this warning: branch-order (default: refuse)."""
     command_signal: Annotated[Text, Option("S", CONNECTIONS, example="0..10 V x 0.3")] = None
-    """Command at the converter: range, attenuator, offset, such as "-10..10 V x 0.15 + 1.5 V", which has both signs
-    (default: 0 to 10 V over the converter's whole range)."""
+    """Command at the converter: range, shunt, attenuator, offset and what it stands for, such as "-10..10 V x 0.15 +
+    1.5 V" or "4..20 mA on 150 ohm = -10..10 V", which have both signs (default: 0 to 10 V over the converter's whole
+    range)."""
     polarity: Annotated[Text, Option("P", CONNECTIONS, "normal", choices=POLARITIES)] = None
     """Polarity of the command: normal, or inverted, which counts the other way."""
     pressure_span: Annotated[Text, Option("P", CONNECTIONS, "20 MPa", example="20 MPa")] = None

@@ -49,6 +49,11 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
     signals = options.signals
     law(options.law)
     u_max = Fraction(repr(valve.u_max_V))
+    if options.full_command_V not in (None, u_max):
+        raise InputError(
+            f"the command signal's upper end stands for {float(options.full_command_V or 0):g} V, but the valve was "
+            f"identified with a full command of {valve.u_max_V:g} V; write the signal's range up to that"
+        )
     transition_codes = options.transition_codes()
     units = finest_units(signals, transition_codes)
     if len(signals.signs) == 2:

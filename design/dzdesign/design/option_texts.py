@@ -10,7 +10,7 @@ from dzdesign.core.options import flag_of
 from dzdesign.core.units import parse_quantity
 from dzdesign.design.design_choices import DEFAULTS, NEGATIVE_DP, POLARITIES, BelowDp0, DesignRequest
 from dzdesign.design.options import DesignOptions
-from dzdesign.design.signal_text import command_signal, parse_signal, pressure_signal
+from dzdesign.design.signal_text import command_signal, full_command_V, parse_signal, pressure_signal
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import TargetInputs
 from dzdesign.identify.valve.guard_curve import Guard
@@ -36,9 +36,8 @@ def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
         name: pressure_signal(parse_signal(text[name], flag_of(name)), converter, span)
         for name in ("pressure_a", "pressure_b")
     }
-    command = command_signal(
-        parse_signal(text["command_signal"], "--command-signal"), converter, inverted=text["polarity"] == "inverted"
-    )
+    signal = parse_signal(text["command_signal"], "--command-signal")
+    command = command_signal(signal, converter, inverted=text["polarity"] == "inverted")
     dither_Hz, dither_peak = _dither(text["dither"])
     return DesignOptions(
         law=text["law"],
@@ -60,6 +59,7 @@ def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
         dither_Hz=dither_Hz,
         dither_peak=dither_peak,
         output_max=_share(text["output_max"], "--output-max"),
+        full_command_V=full_command_V(signal),
         accept=tuple(text["accept"].replace(",", " ").split()),
         request=DesignRequest(target=target, options=text),
     )

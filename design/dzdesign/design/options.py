@@ -46,6 +46,8 @@ class DesignOptions:
         Frequency of the dither, a square wave, and its peak (half its height) over full drive; 0: none.
     output_max : Fraction
         Largest drive over full drive.
+    full_command_V : Fraction or None
+        Full command that the signal states, V.
     accept : tuple of str
         Codes of warnings, of `ACCEPTABLE`, for which the valve is not refused.
     request : DesignRequest or None
@@ -63,6 +65,7 @@ class DesignOptions:
     dither_Hz: float = 0.0
     dither_peak: Fraction = Fraction(0)
     output_max: Fraction = Fraction(1)
+    full_command_V: Fraction | None = None
     accept: tuple[str, ...] = ()
     request: DesignRequest | None = None
 

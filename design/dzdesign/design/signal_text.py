@@ -1,28 +1,19 @@
 """Signals as an engineer writes them, such as ``4..20 mA on 150 ohm = 25 MPa``, turned into converter codes."""
 
-import re
 from dataclasses import dataclass
 from fractions import Fraction
 
 from dzdesign.core.errors import InputError, quoted
-from dzdesign.core.units import parse_quantity, si_factor
+from dzdesign.core.signal_ranges import Meaning, read_signal_range
+from dzdesign.core.units import measures, si_factor
 from dzdesign.design.signals import CommandSignal, PressureSignal
 from dzdesign.design.target_inputs import Converter
 
 #: A sound signal may pass its ends by as much as the field's 3.6 mA and 21 mA pass those of 4-20 mA.
 BELOW_LIVE_ZERO = Fraction(9, 10)
 ABOVE_SPAN = Fraction(21, 20)
-NUMBER = r"[-+]?\d+(?:\.\d+)?"
-SIGNAL = re.compile(
-    rf"\s*(?P<low>{NUMBER})\s*\.\.\s*(?P<high>{NUMBER})\s*(?P<unit>[A-Za-z]+)"
-    rf"(?:\s+on\s+(?P<shunt>\d+(?:\.\d+)?)\s*(?P<ohm>[A-Za-zΩ]+))?"
-    rf"(?:\s+x\s+(?P<gain>\d+(?:\.\d+)?))?"
-    rf"(?:\s*\+\s*(?P<offset>\d+(?:\.\d+)?)\s*(?P<volt>[A-Za-z]+))?"
-    r"(?:\s*=\s*(?P<span>.+?))?\s*"
-)
-#: Beyond this it is none, and matching it would take the square of its length.
-LONGEST = 120
 EXAMPLE = "'0..10 V x 0.3', '-10..10 V x 0.15 + 1.5 V' or '4..20 mA on 150 ohm = 25 MPa'"
+COMMAND_EXAMPLE = "'4..20 mA on 150 ohm = -10..10 V'"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,8 +28,8 @@ class PinSignal:
     #: Of the line.
     volts_per_unit: Fraction
     offset_V: Fraction
-    #: Pressure at `high`, where it was given.
-    span_MPa: Fraction | None
+    #: What the ends stand for, where it was given.
+    meaning: Meaning | None
 
     def volts(self, value: Fraction) -> Fraction:
         """Return the voltage at the pin."""
@@ -65,46 +56,46 @@ class PinSignal:
 
 
 def parse_signal(text: str, option: str) -> PinSignal:
-    """Read a signal, ``LOW..HIGH UNIT [on SHUNT ohm] [x GAIN] [+ OFFSET V] [= PRESSURE]``, in V or A or the like.
+    """Read a signal in V or A or the like: see `SignalRange`.
 
     Examples
     --------
     >>> float(parse_signal("4..20 mA on 150 ohm = 25 MPa", "--pressure-a").volts_per_unit)
     150.0
     """
-    match = SIGNAL.fullmatch(text) if len(text) <= LONGEST else None
-    if not match:
+    found = read_signal_range(text, f"{option} is {quoted(text)}")
+    if found is None or not found.unit:
         raise InputError(f"{option}: {quoted(text)} is no signal, expected one such as {EXAMPLE}")
-    current = match["shunt"] is not None
-    factor = Fraction(repr(si_factor(match["unit"], "current" if current else "voltage")))
-    low, high = (Fraction(match[end]) * factor for end in ("low", "high"))
-    if not low < high:
-        raise InputError(f"{option}: '{text}' runs from {match['low']} to {match['high']}, expected it to rise")
-    per_unit = Fraction(match["gain"] or 1)
-    if current:
-        per_unit *= Fraction(match["shunt"]) * Fraction(repr(si_factor(match["ohm"].replace("Ω", "ohm"), "resistance")))
-    offset = Fraction(match["offset"] or 0) * (
-        Fraction(repr(si_factor(match["volt"], "voltage"))) if match["volt"] else 1
-    )
-    if per_unit == 0:
+    factor = Fraction(repr(si_factor(found.unit, "voltage" if found.shunt_ohm is None else "current")))
+    if not found.low < found.high:
+        ends = f"{float(found.low):g} to {float(found.high):g}"
+        raise InputError(f"{option}: '{text}' runs from {ends}, expected it to rise")
+    if found.gain == 0:
         raise InputError(f"{option}: '{text}' has gain 0")
-    span = None
-    if match["span"]:
-        span = Fraction(round(parse_quantity(match["span"], "pressure", option)), 10**6)
-    return PinSignal(text=text, low=low, high=high, volts_per_unit=per_unit, offset_V=offset, span_MPa=span)
+    return PinSignal(
+        text=text,
+        low=found.low * factor,
+        high=found.high * factor,
+        volts_per_unit=found.gain * (found.shunt_ohm or 1),
+        offset_V=found.offset_V,
+        meaning=found.meaning,
+    )
 
 
 def command_signal(signal: PinSignal, converter: Converter, *, inverted: bool = False) -> CommandSignal:
     """Return the codes of a command; one that runs from below zero to above it has both signs.
 
+    What it stands for goes before the signal itself: ``4..20 mA = -10..10 V`` has both signs, and zero at 12 mA.
     `inverted` exchanges the signs of a command of both, and zero and full of a command of one.
     """
     signal.check_within(converter)
-    both = signal.low < 0
-    if both and signal.low != -signal.high:
+    stands_for = command_ends(signal)
+    both = stands_for[0] < 0
+    if both and stands_for[0] != -stands_for[1]:
         raise InputError(f"the command '{signal.text}' has ends of unlike size, expected such as -10..10 V")
     low, high = (converter.code(signal.volts(end)) for end in (signal.low, signal.high))
-    zero = converter.code(signal.volts(Fraction(0))) if both else low
+    # Ends of like size: zero lies in the middle, 0 V of -10..10 V, 12 mA of 4..20 mA.
+    zero = converter.code(signal.volts((signal.low + signal.high) / 2)) if both else low
     if inverted:
         low, high = high, low
         zero = zero if both else low
@@ -116,6 +107,34 @@ def command_signal(signal: PinSignal, converter: Converter, *, inverted: bool = 
     )
 
 
+def command_ends(signal: PinSignal) -> tuple[Fraction, Fraction]:
+    """Return what a command's ends stand for, in V or in shares of full command; those of the signal if it says none.
+
+    Raises
+    ------
+    InputError
+        If that is no command.
+    """
+    if signal.meaning is None:
+        return signal.low, signal.high
+    bottom, top, unit = signal.meaning.bottom, signal.meaning.top, signal.meaning.unit
+    if not (measures(unit, "voltage") or measures(unit, "ratio")):
+        raise InputError(f"the command '{signal.text}' stands for '{unit}', expected V or %, such as {COMMAND_EXAMPLE}")
+    if not (bottom < top and bottom <= 0):
+        raise InputError(
+            f"the command '{signal.text}' runs from {float(bottom):g} to {float(top):g} {unit}, expected it to rise "
+            f"from zero, or from below it, such as {COMMAND_EXAMPLE}"
+        )
+    factor = Fraction(repr(si_factor(unit, "voltage" if measures(unit, "voltage") else "ratio")))
+    return bottom * factor, top * factor
+
+
+def full_command_V(signal: PinSignal) -> Fraction | None:
+    """Return the full command that a signal states, V; None if it states none."""
+    stated = signal.meaning is not None and measures(signal.meaning.unit, "voltage")
+    return command_ends(signal)[1] if stated else None
+
+
 def pressure_signal(signal: PinSignal, converter: Converter, span_MPa: Fraction) -> PressureSignal:
     """Return the codes of a pressure sensor, with the exact bounds of a code's error.
 
@@ -124,7 +143,7 @@ def pressure_signal(signal: PinSignal, converter: Converter, span_MPa: Fraction)
     signal.check_within(converter)
     if signal.low < 0:
         raise InputError(f"the pressure signal '{signal.text}' starts below zero, expected 0 or a live zero")
-    span = span_MPa if signal.span_MPa is None else signal.span_MPa
+    span = span_MPa if signal.meaning is None else _span_MPa(signal, signal.meaning)
     zero, full = (converter.code(signal.volts(end)) for end in (signal.low, signal.high))
     if not zero < full:
         raise InputError(f"the pressure signal '{signal.text}' spans no code of the converter")
@@ -140,3 +159,13 @@ def pressure_signal(signal: PinSignal, converter: Converter, span_MPa: Fraction)
         valid_codes=signal.sound_codes(converter),
         error_MPa=(min(errors), max(errors)),
     )
+
+
+def _span_MPa(signal: PinSignal, meaning: Meaning) -> Fraction:
+    """Return the pressure at a signal's upper end."""
+    factor = si_factor(meaning.unit, "pressure")
+    if meaning.bottom != 0:
+        raise InputError(
+            f"the pressure signal '{signal.text}' begins at {float(meaning.bottom):g} {meaning.unit}, expected 0"
+        )
+    return Fraction(round(meaning.top * Fraction(repr(factor))), 10**6)

@@ -147,7 +147,7 @@ def _check_options(args: BatchArguments) -> None:
     identify_options(args)
     record_of(args.record)
     design_options(args, args.target)
-    read_options(args, ["skip_rows"])
+    read_options(args, ["skip_rows", "sample_rate"])
     if args.columns:
         parse_columns(args.columns)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from dzdesign.core.artefact_files import read_bytes
 from dzdesign.core.errors import InputError, nearest, quoted
-from dzdesign.core.options import Argument
+from dzdesign.core.options import Argument, flag_of
 
 #: Characters of a key to which the nearest known one is looked for.
 LONGEST_KEY = 80
@@ -26,19 +26,25 @@ def options_from_file(path: str, declared: Iterable[Argument]) -> dict[str, Valu
         raise InputError(f"'{path}' is not TOML: {error}; expected lines such as u-max = \"10 V\"") from error
     known: dict[str, list[Argument]] = {}
     for argument in declared:
-        known.setdefault(argument.name, []).append(argument)
+        known.setdefault(_key(argument.name).replace("-", "_"), []).append(argument)
     options: dict[str, Value] = {}
     for key, value in document.items():
         name = key.replace("-", "_")
         if name not in known:
             hint = nearest(name[:LONGEST_KEY], known).replace("_", "-")
             raise InputError(f"'{path}': there is no option {quoted(key)}{hint}; see `dzdesign COMMAND --help`")
-        if name in options:
+        argument_name = known[name][0].name
+        if argument_name in options:
             raise InputError(f"'{path}': option '{key}' is given twice, with - and with _; keep one")
         free = any(argument.option.by_entry for argument in known[name])  # text for people: dates may stand there
         if not (free and value == {}):
-            options[name] = _texts(path, key, value, known[name], free)
+            options[argument_name] = _texts(path, key, value, known[name], free)
     return options
+
+
+def _key(name: str) -> str:
+    """Return how the file writes an option: as the command line does."""
+    return flag_of(name).removeprefix("--")
 
 
 def _texts(path: str, key: str, value: object, declared: list[Argument], free: bool) -> Value:
@@ -71,7 +77,7 @@ def in_words_of_the_file(message: str, path: str, values: Mapping[str, Value]) -
     '\'dz.toml\': u-max is \'10\' without a unit; write for example u-max = "10 V"'
     """
     for name, value in values.items():
-        key = name.replace("_", "-")
+        key = _key(name)
         if re.match(rf"--{re.escape(key)}(?= |:)", message):
             words = message.removeprefix("--") if isinstance(value, str) else message  # a table's lines are its own
             if isinstance(value, str) and words.startswith(f"{key} is '{value}'"):  # not of a part of it

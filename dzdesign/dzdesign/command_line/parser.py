@@ -169,7 +169,7 @@ def _add_option(place: argparse._ActionsContainer, argument: Argument) -> None:
         action = "append" if argument.is_repeatable and nargs is None else "store"
         place.add_argument(
             *names, action=action, nargs=nargs, required=argument.required, default=argparse.SUPPRESS,
-            metavar=option.metavar, help=text,
+            metavar=option.metavar, help=text, dest=argument.name,
         )  # fmt: skip
 
 

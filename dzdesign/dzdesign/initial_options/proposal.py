@@ -57,7 +57,9 @@ class _Remarks:
     notes: list[str] = field(default_factory=list)
 
 
-def propose(ramps: Paths, *, columns: Table, dp: Table, skip_rows: int | None) -> Proposal:
+def propose(
+    ramps: Paths, *, columns: Table, dp: Table, sample_rate: str | None = None, skip_rows: int | None = None
+) -> Proposal:
     """Look at recordings, and return the file of options that this gives."""
     from dzdesign.identify.reading.column_labels import PER_CENT, parse_columns
     from dzdesign.identify.reading.proposed_columns import propose_columns
@@ -65,7 +67,10 @@ def propose(ramps: Paths, *, columns: Table, dp: Table, skip_rows: int | None) -
     patterns, remarks = paths_of(ramps), _Remarks()
     paths = expand(patterns) if patterns else _found_recordings()
     given = parse_columns(columns) if columns else {}
-    looks = [propose_columns(path, given, skip_rows) for path in with_bar(paths, "looking at columns")]
+    looks = [
+        propose_columns(path, given, skip_rows, time_is_declared=bool(sample_rate))
+        for path in with_bar(paths, "looking at columns")
+    ]
     chosen, unclear = _columns_of_all(looks, given, bool(dp), remarks)
     guessed_dp = chosen.get("dP", "") if "dP" not in given else ""
     table, readings = _pressure_table(distinct_names(paths), looks, dp, bool(guessed_dp or "dP" in unclear), remarks)
@@ -74,7 +79,9 @@ def propose(ramps: Paths, *, columns: Table, dp: Table, skip_rows: int | None) -
         (look.known | look.proposed)["u"].unit.lower().endswith(PER_CENT) for look in looks
     )
     if not remarks.opens:
-        tests = read_recordings(paths, u_max=u_max, columns=chosen, dp=table or None, skip_rows=skip_rows)
+        tests = read_recordings(
+            paths, u_max=u_max, columns=chosen, dp=table or None, sample_rate=sample_rate, skip_rows=skip_rows
+        )
         if in_per_cent:
             remarks.notes.append('full command: in per cent, so not recorded; u-max = "10 V" is a guess, correct it')
         else:
@@ -83,8 +90,8 @@ def propose(ramps: Paths, *, columns: Table, dp: Table, skip_rows: int | None) -
     seen, opens = tuple(_summary(looks, u_seen, valve, remarks.notes)), tuple(dict.fromkeys(remarks.opens))
     text = _rendered(
         seen=seen, opens=opens, u_max=u_max, u_seen=u_seen, in_per_cent=in_per_cent, skip_rows=skip_rows,
-        meter=valve and valve.meter, first=paths[0].name, look=looks[0], columns=chosen, unclear=unclear,
-        guessed_dp=guessed_dp, dp=table, readings=readings,
+        sample_rate=sample_rate, meter=valve and valve.meter, first=paths[0].name, look=looks[0],
+        columns=chosen, unclear=unclear, guessed_dp=guessed_dp, dp=table, readings=readings,
     )  # fmt: skip
     return Proposal(
         text=text, seen=seen, opens=opens, recordings=tuple(paths), labels=tuple(look.labels for look in looks),

@@ -91,8 +91,8 @@ def _read_set(name: str, patterns: Paths, columns: Table, arguments: AssessArgum
         say("recordings after: columns as those before, by --columns or [columns]; --after-columns says others")
     try:
         return read_recordings(
-            patterns, u_max=u_max, columns=columns, dp=arguments.dp, skip_rows=arguments.skip_rows,
-            what=f"reading recordings {name}",
+            patterns, u_max=u_max, columns=columns, dp=arguments.dp, sample_rate=arguments.sample_rate,
+            skip_rows=arguments.skip_rows, what=f"reading recordings {name}",
         )  # fmt: skip
     except InputError as error:
         if name == "before" or "--columns" not in str(error):

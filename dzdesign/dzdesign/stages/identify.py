@@ -6,7 +6,8 @@ from dataclasses import KW_ONLY, dataclass, fields
 from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.core.option_readers import number, percent, quantity
-from dzdesign.core.options import FIT, METER, RECORDINGS, AnyPath, Option, Paths, Text, Texts
+from dzdesign.core.options import FIT, METER, RECORDINGS, AnyPath, Option, Paths, Table, Text, Texts
+from dzdesign.stages.recording_parts import parts_of
 from dzdesign.stages.recordings import (
     RampArguments,
     check_places,
@@ -29,6 +30,9 @@ class IdentifyChoices(RampArguments):
 
     meter_zero: Annotated[str, Option("Q", METER, example="0.1 L/min", read=quantity("flow"))] = "0 L/min"
     """Bound of the flow meter's zero error."""
+    noise_level: Annotated[Text, Option("Q", METER, example="0.1 L/min", read=quantity("flow"))] = None
+    """Flow below which there is none, if averages over the dead zone resolve it (default: what they resolve, and at
+    least 0.5 % of the largest flow)."""
     dp0: Annotated[Text, Option("P", FIT, example="1 MPa", read=quantity("pressure"))] = None
     """Reference pressure drop (default: the test nearest to "1 MPa")."""
     x_max: Annotated[Text, Option("X", FIT, example="1.8 mm", read=quantity("length"))] = None
@@ -60,6 +64,11 @@ class IdentifyArguments(IdentifyChoices):
     order: Annotated[Texts | None, Option("FILE", RECORDINGS)] = None
     """Recordings in the order in which they were taken, such as "p1.csv, p5.csv, p1_again.csv", to tell a drift of the
     valve from the pressure drop (default: from date and time in the recordings)."""
+    from_: Annotated[Table, Option("T", RECORDINGS, example="12.3 s")] = None
+    """Time of a recording's clock before which its rows are left out, such as "12.3 s" (dates count from the first
+    row). In the options file also a table [from] from file name or pattern to time."""
+    to: Annotated[Table, Option("T", RECORDINGS, example="62.1 s")] = None
+    """Time after which its rows are left out. In the options file also a table [to]."""
     plots: Annotated[AnyPath | None, Option("DIR")] = None
     """Folder for plots in SVG and PNG: flow of each pressure drop with its knees, onsets and residuals; thresholds,
     bounds and beta over dP."""
@@ -99,10 +108,11 @@ def identify(arguments: IdentifyArguments) -> "ValveModel":
     options, record = identify_options(arguments), record_of(arguments.record)
     check_places(ValveModel, arguments.output, arguments.plots)
     tests = read_recordings(
-        arguments.ramps, u_max=options.u_max, columns=arguments.columns, dp=arguments.dp, skip_rows=arguments.skip_rows
-    )
+        arguments.ramps, u_max=options.u_max, columns=arguments.columns, dp=arguments.dp,
+        sample_rate=arguments.sample_rate, skip_rows=arguments.skip_rows,
+    )  # fmt: skip
     refuse_copies(tests)
-    tests = in_order(tests, arguments.order)
+    tests = in_order(parts_of(tests, arguments.from_, arguments.to), arguments.order)
     with stage_progress(f"fitting {len(tests)} recording{'s' if len(tests) > 1 else ''}"):
         found = identify_sides(tests, options, record)
     write_results(found.model, arguments.output, arguments.plots, lambda: plot_files(found))

@@ -48,7 +48,13 @@ def init(arguments: InitArguments) -> "Proposal":
             )
         check_file_may_be_written(Path(output))
     skip_rows = read_options(arguments, ["skip_rows"])["skip_rows"]
-    proposal = propose(arguments.ramps, columns=arguments.columns, dp=arguments.dp, skip_rows=skip_rows)
+    proposal = propose(
+        arguments.ramps,
+        columns=arguments.columns,
+        dp=arguments.dp,
+        sample_rate=arguments.sample_rate,
+        skip_rows=skip_rows,
+    )
     if output is not None:
         write_file(Path(output), proposal.text)
     return proposal

@@ -38,6 +38,14 @@ if TYPE_CHECKING:
     from dzdesign.identify.reading.ramp_test import RampTest
 
 
+def read_sample_rate(text: str, option: str) -> float:
+    """Read --sample-rate, Hz."""
+    rate = parse_quantity(text, "frequency", option)
+    if not rate > 0:
+        raise InputError(f"{option} is '{text}', expected more than zero, such as '100 Hz'")
+    return rate
+
+
 #: Reads --skip-rows.
 read_skip_rows = whole_number("how many rows stand above the header, such as 12 (0: none)")
 
@@ -53,6 +61,8 @@ class ColumnArguments:
     dp: Annotated[Table, Option("P", RECORDINGS, example="1 MPa")] = None
     """Pressure drop of files without a column of it, such as "1 MPa". In the options file also a table [dp] from file
     name or pattern to pressure."""
+    sample_rate: Annotated[Text, Option("F", RECORDINGS, example="100 Hz", read=read_sample_rate)] = None
+    """Samples a second of files without a column of time, such as "100 Hz"."""
     skip_rows: Annotated[int | str | None, Option("N", RECORDINGS, read=read_skip_rows)] = None
     """Rows above the header of a text file, such as a logger's preamble (default: found)."""
 
@@ -85,6 +95,7 @@ def read_recordings(
     u_max: float,
     columns: Table,
     dp: Table,
+    sample_rate: Text = None,
     skip_rows: int | str | None = None,
     what: str = "reading recordings",
 ) -> "list[RampTest]":
@@ -97,10 +108,14 @@ def read_recordings(
 
     chosen = parse_columns(columns) if columns else {}
     skipped = None if skip_rows is None else read_skip_rows(skip_rows, "--skip-rows")
+    rate = None if sample_rate is None else read_sample_rate(sample_rate, "--sample-rate")
     paths = expand(patterns)
     names = distinct_names(paths)
     tests = [
-        replace(read_ramp_file(path, u_max, columns=chosen, dp=_declared_dp(name, dp), skip_rows=skipped), source=name)
+        replace(
+            read_ramp_file(path, u_max, columns=chosen, dp=_declared_dp(name, dp), sample_rate=rate, skip_rows=skipped),
+            source=name,
+        )
         for path, name in with_bar(list(zip(paths, names, strict=True)), what)
     ]
     _refuse_unnamed(tests, dp)

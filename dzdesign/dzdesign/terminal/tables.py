@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from dzdesign.design.compensator import Compensator
     from dzdesign.identify.valve.model import Meter, ValveModel
     from dzdesign.identify.valve.ramp_result import TestResult
-    from dzdesign.identify.valve.repeatability import Repeatability
     from dzdesign.identify.valve.side_model import SideModel
 
 
@@ -74,10 +73,12 @@ def _side_lines(side: "SideModel") -> tuple[str, ...]:
         f"pressure drop: {', '.join(made_of)}",
         f"bound: {100 * certificate.confidence:.6g}% lower bound, for all tests together, of the {certificate.guard} "
         "threshold (the knee, or the tail's zero where the edge is soft); flow below "
-        f"{certificate.level_L_min:.2f} L/min (meter's floor, its noise, or 0.5 % of the largest flow) counts as none",
-        _repeatability_line(certificate.repeatability),
-        f"u_min0 = {side.reference.u_min_V:.4f} V{at}: the largest certified offset. Between two tests only the lower "
-        "of their bounds is certain, so each offset stays under the neighbour's; more tests raise it",
+        f"{certificate.level_L_min:.2f} L/min (noise level: the meter's floor, what averages resolve, or 0.5 % of the "
+        "largest flow) counts as none",
+        f"from ramp to ramp: {certificate.repeatability.in_words()}",
+        f"u_min0 = {side.reference.u_min_V:.4f} V{at}: the largest certified offset, under the bounds of both "
+        "neighbouring tests; more tests raise it",
+        f"premise: {side.premise}",
         f"drive range of the valve k x_max/u_max = {side.k_x_max_over_u_max:.4f}: command from the knee to full "
         "stroke, as a share of full command; the law's counts from its offset, which lies lower"
         + (f"; k = {side.k_V_mm:.4f} V/mm" if side.k_V_mm is not None else ""),
@@ -85,24 +86,6 @@ def _side_lines(side: "SideModel") -> tuple[str, ...]:
         if side.trend_change_V is None or side.trend_change_se_V is None
         else f"trend with dP: {side.trend} ({1e3 * side.trend_change_V:+.1f} ± {1e3 * side.trend_change_se_V:.1f} mV "
         f"over the tested range, {chance(side.trend_p or 0.0)})",
-    )
-
-
-def _repeatability_line(found: "Repeatability") -> str:
-    """Return by how much the guarded threshold scatters from ramp to ramp, and drifts, and how that is known."""
-    how = {
-        "repeats": f"measured on repeats, {found.degrees_of_freedom or 0:.0f} degrees of freedom",
-        "declared": "declared",
-        "assumed": "assumed, no ramp was repeated",
-    }
-    drift = (
-        f"drift from the first ramp to the last {1e3 * found.drift_V:+.1f} ± {1e3 * found.drift_se_V:.1f} mV"
-        if found.drift_V is not None and found.drift_se_V is not None
-        else f"no drift in the model ({found.no_drift})"
-    )
-    return (
-        f"from ramp to ramp: standard deviation {1e3 * found.sd_V:.1f} mV ({how[found.origin]}), in the bound for the "
-        f"next closing or opening; {drift}"
     )
 
 

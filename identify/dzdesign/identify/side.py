@@ -19,6 +19,7 @@ from dzdesign.identify.fitting.guarding import (
     mean_threshold,
     opening_curve,
     order_knees,
+    systematic_change,
 )
 from dzdesign.identify.knees.between_ramps import BetweenRamps
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
@@ -61,13 +62,15 @@ def _fit_with_trend(group: DescribedTests, options: IdentifyOptions) -> tuple[Tr
     free = fit_knees([item.shapes for item in group.tests], floor=group.floor, u_max=options.u_max, trend="flat")
     dp = np.array([item.dp or math.nan for item in group.tests])
     column = 1 if group.tests[0].shapes[1] else 0  # falling wherever there is one: zero command comes after closing
-    # A lag that is a little wrong feigns a trend where the tests were run at different rates.
-    feigned = float(np.ptp(np.nan_to_num(group.rates(column)))) * max(group.lag.longer, group.lag.shorter)
-    budget = options.flat_below * options.u_max + feigned
     between, knee_se = group.between(column), free.knee_se[:, column]
     degrees = float(between.degrees_of_freedom(knee_se, DEGREES_OF_FREEDOM).min())
     trend = find_trend(
-        dp, free.knee[:, column], between.covariance_of_mean(knee_se), degrees, options.u_max, budget
+        dp,
+        free.knee[:, column],
+        between.covariance_of_mean(knee_se),
+        degrees,
+        options.u_max,
+        systematic_change(group, column, options),
     )
     return trend, free, order_knees(group, free, trend.direction, column, options)
 
@@ -116,7 +119,7 @@ def _side_model(
         certificate=BoundsBasis(
             confidence=options.confidence,
             guard=guard,
-            level_L_min=max(shape.level for item in described for shape in item.branches) / L_MIN,
+            level_L_min=max(shape.dead_zone.noise_level for item in described for shape in item.branches) / L_MIN,
             repeatability=_repeatability(group.between(guarded.column)),
         ),
         guards=guards,
@@ -175,11 +178,14 @@ def _test_result(group: DescribedTests, knees: KneeFit, row: int, guarded: Thres
         slope_L_min_V=float(np.nanmean(knees.slope[row])) / L_MIN,
         q_max_L_min=item.q_max / L_MIN,
         saturates=all(shape.saturates for shape in item.branches),
+        leak_L_min=group.leak[row] / L_MIN,
+        noise_level_L_min=max(shape.dead_zone.noise_level for shape in item.branches) / L_MIN,
         noise_L_min=max(shape.sigma for shape in item.branches) / L_MIN,
         noise_variance_inflation=max(shape.variance_inflation for shape in item.branches),
         spool_ripple_V=max(shape.ripple for shape in item.branches),
         outliers=sum(shape.outliers for shape in item.branches),
         ramps=item.ramps,
+        left_out=item.left_out,
     )
 
 

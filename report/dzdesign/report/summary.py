@@ -158,7 +158,21 @@ def _certificate(compensator: Compensator, inputs: Sequence[InputCheck]) -> Figu
         f"{span_MPa(low, high)}; smallest margin {1e3 * float(worst.smallest_margin_V):.3f} mV of the exact law under "
         "the certified offset, half a count kept for the rounding"
         + (f"; {least:.3f} mV of the C's compare values under the threshold's bound" if inputs else "")
-        + f". Flow below {worst.level_L_min:.2f} L/min counts as none",
+        + f". Flow below {worst.level_L_min:.2f} L/min counts as none"
+        + _premise(compensator),
+    )
+
+
+def _premise(compensator: Compensator) -> str:
+    """Return what is assumed of the valve's repeatability, where no repeated ramps show it; the warning's own code."""
+    sides = [compensator.valve.sides[name] for name in laws_of(compensator)]
+    assumed = [side.certificate.repeatability for side in sides]
+    largest = max((1e3 * each.sd_V for each in assumed if each.origin == "assumed"), default=None)
+    if largest is None:
+        return ""
+    return (
+        f". It holds only if the valve repeats to {largest:.3g} mV (standard deviation from ramp to ramp), which is "
+        "assumed: no repeated ramps show it (no-repeats)"
     )
 
 

@@ -8,6 +8,7 @@ from dzdesign.identify.knees.between_ramps import BetweenRamps
 from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.knees.meter_lag import MeterLag
 from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.valve.left_out import LeftOut
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,6 +27,7 @@ class DescribedTest:
     when: tuple[float, ...]
     #: Source and SHA-256 of every file in it.
     files: tuple[tuple[str, str], ...]
+    left_out: tuple[LeftOut, ...]
 
     @property
     def branches(self) -> list[BranchShape]:
@@ -57,6 +59,8 @@ class DescribedTests:
     zero_L_min: dict[str, float]
     #: Standard error of what was subtracted from each of `tests`, as of white noise, m³/s; 0 where nothing was.
     zero_se: tuple[float, ...]
+    #: Leak that was subtracted from each of `tests`, m³/s; 0 where there is none.
+    leak: tuple[float, ...]
     #: What differs from ramp to ramp, of the rising and of the falling branch; None where there is none.
     between_ramps: tuple[BetweenRamps | None, BetweenRamps | None]
 

@@ -9,6 +9,7 @@ import numpy as np
 from dzdesign.identify.ramps.branches import Branch
 from dzdesign.identify.ramps.splitting import Ramp
 from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.valve.left_out import LeftOut
 
 #: Ramps whose pressure drops differ by less than this share are one test.
 SAME_PRESSURE = 0.02
@@ -24,12 +25,14 @@ class PooledTest:
     test: RampTest
     #: Rising and falling, of all ramps; None where no ramp has any.
     branches: tuple[Branch | None, Branch | None]
-    #: Each ramp's file, and its number in it.
+    #: Each ramp's file, and its number and times in it.
     ramps: tuple[str, ...]
     #: When each ramp was recorded, s on a clock common to all; NaN if that is not known.
     when: tuple[float, ...]
     #: Source and SHA-256 of every file in it.
     files: tuple[tuple[str, str], ...]
+    #: What was left out of and before them.
+    left_out: tuple[LeftOut, ...]
 
 
 def pool_ramps(ramps: Sequence[Ramp]) -> list[PooledTest]:
@@ -66,9 +69,10 @@ def _pooled(group: list[Ramp]) -> PooledTest:
     return PooledTest(
         test=test,
         branches=(_joined(group, rising=True), _joined(group, rising=False)),
-        ramps=tuple(_name([ramp], every=True) for ramp in group),
+        ramps=tuple(name_of_ramp(ramp) for ramp in group),
         when=tuple(ramp.when for ramp in group),
         files=tuple(dict.fromkeys((ramp.test.source, ramp.test.sha256) for ramp in group)),
+        left_out=tuple(item for ramp in group for item in ramp.left_out),
     )
 
 
@@ -95,13 +99,26 @@ def _joined(group: list[Ramp], rising: bool) -> Branch | None:
     return Branch(rising=rising, u=u, q=q, dp=dp, rate=rate, counts=tuple(sizes))
 
 
-def _name(group: list[Ramp], every: bool = False) -> str:
-    """Return the files of a group of ramps, and which ramps of a file if not all are in it, or if `every` is set."""
+def name_of_ramp(ramp: Ramp) -> str:
+    """Return a ramp's file, and which one it is in it, when, if the file has several.
+
+    The times are those of its first and last sample, s on the recording's own clock.
+    """
+    if ramp.of == 1:
+        return ramp.test.source
+    return f"{ramp.test.source} (ramp {ramp.number}, {ramp.test.time[0]:.1f} to {ramp.test.time[-1]:.1f} s)"
+
+
+def _name(group: list[Ramp]) -> str:
+    """Return the files of a group of ramps, and which ramps of a file if not all are in it."""
     names = []
     for file in dict.fromkeys((ramp.test.source, ramp.test.sha256) for ramp in group):
         of_file = [ramp for ramp in group if (ramp.test.source, ramp.test.sha256) == file]
-        not_all = len(of_file) < of_file[0].of or (every and of_file[0].of > 1)
-        numbers = ", ".join(str(ramp.number) for ramp in of_file)
-        names.append(f"{file[0]} (ramp{'s' if len(of_file) > 1 else ''} {numbers})" if not_all else file[0])
+        if len(of_file) == of_file[0].of:
+            names.append(file[0])
+        elif len(of_file) == 1:
+            names.append(name_of_ramp(of_file[0]))
+        else:
+            names.append(f"{file[0]} (ramps {', '.join(str(ramp.number) for ramp in of_file)})")
     more = len(names) - NAMED_FILES
     return ", ".join(names[:NAMED_FILES]) + (f" and {more} more" if more > 0 else "")

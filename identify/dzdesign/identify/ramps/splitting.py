@@ -26,8 +26,9 @@ from dzdesign.identify.ramps.command import (
     sweep_direction,
     without_command_spikes,
 )
-from dzdesign.identify.ramps.sweep_pressure import LeftOut, SweepLevel, off_level, stretches, sweep_level, without_flow
+from dzdesign.identify.ramps.sweep_pressure import SweepLevel, joined, off_level, stretches, sweep_level, without_flow
 from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.valve.left_out import LeftOut
 
 #: The valve is shut, and the pressure drop nominal, below this share of the range.
 SHUT = 0.05
@@ -92,10 +93,10 @@ def split_ramps(test: RampTest, lag: float) -> list[Ramp]:
     test = without_command_spikes(test)
     u = lagged_command(test.time, test.u, lag)
     sweeps = _sweeps(test, u)
-    idle = without_flow([sweep.level for sweep in sweeps], [float(np.ptp(sweep.test.u)) for sweep in sweeps])
+    idle = _idle(sweeps)
     groups = _groups([sweep for sweep, is_idle in zip(sweeps, idle, strict=True) if not is_idle])
     kept = test.time >= test.time[0] + lag  # before that, the command that the flow belongs to was not recorded
-    found, left_out = [], []
+    found, left_out = [], list(test.left_out)
     for sweep in itertools.compress(sweeps, idle):
         left_out += stretches(test, np.arange(sweep.rows.start, sweep.rows.stop), "no-flow")
     for group in groups:
@@ -110,13 +111,20 @@ def split_ramps(test: RampTest, lag: float) -> list[Ramp]:
         found.append((test.part(whole if whole.size else rows), tuple(branches)))
     if any(branches for _, branches in found):
         found = [(part, branches) for part, branches in found if branches]
-    return _numbered(found, left_out)
+    return _numbered(found, joined(left_out, test))
+
+
+def _idle(sweeps: Sequence[_Sweep]) -> list[bool]:
+    """Tell of each sweep whether it is none of a ramp test; a jump goes with a ramp."""
+    slow = [sweep for sweep in sweeps if sweep.is_branch]
+    idle = iter(without_flow([sweep.level for sweep in slow], [float(np.ptp(sweep.test.u)) for sweep in slow]))
+    return [sweep.is_branch and next(idle) for sweep in sweeps]
 
 
 def _numbered(found: list[tuple[RampTest, tuple[Branch, ...]]], left_out: list[LeftOut]) -> list[Ramp]:
     """Return the ramps that a recording's parts and their branches are; what was left out goes with the next one."""
     ends = [float(part.time[-1]) for part, _ in found]
-    owner = [min(bisect.bisect_left(ends, item.start), len(ends) - 1) for item in left_out]
+    owner = [min(bisect.bisect_left(ends, item.from_s), len(ends) - 1) for item in left_out]
     return [
         Ramp(
             test=part,

@@ -7,14 +7,15 @@ a flow at another pressure drop stays, for it is brought to the nominal one samp
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 
-from dzdesign.identify.constants import L_MIN
+from dzdesign.identify.constants import L_MIN, MPA
 from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.valve.left_out import LeftOut
 
 #: The first flow lies between these shares of the largest, and the valve is shut below the third.
 FIRST_FLOW, SHUT_FLOW = (0.05, 0.3), 0.03
@@ -32,21 +33,10 @@ OFF_LEVEL, OFF_SPREADS = 0.05, 5.0
 ANOTHER, GONE = 2.0, 0.1
 #: Samples between two stretches that are left out which go with them.
 BETWEEN = 5
+#: Usual steps of the clock beyond which rows are missing, as those of the other side.
+LOST_ROWS = 20
 
-Reason = Literal["pressure", "no-flow", "no-ramp"]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LeftOut:
-    """A stretch of a recording that belongs to no ramp: s of its clock, and its pressure drops, Pa."""
-
-    source: str
-    start: float
-    end: float
-    #: "pressure": not at the ramp's pressure drop. "no-flow": a sweep that never opens the valve, as an exercise before
-    #: the pump is started. "no-ramp": a fragment without a branch.
-    reason: Reason
-    dp: tuple[float, float] | None
+Reason = Literal["option", "pressure", "no-flow", "no-ramp"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -126,13 +116,34 @@ def off_level(test: RampTest, at_bottom: np.ndarray, level: SweepLevel) -> np.nd
 
 
 def stretches(test: RampTest, rows: np.ndarray, reason: Reason) -> list[LeftOut]:
-    """Return the stretches of a recording that some of its rows, given by number in rising order, make."""
-    found = []
-    for part in np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1) if rows.size else ():
-        dp = None if test.dp is None else (float(test.dp[part].min()), float(test.dp[part].max()))
-        time = test.time[part]
-        found.append(LeftOut(source=test.source, start=float(time[0]), end=float(time[-1]), reason=reason, dp=dp))
+    """Return the stretches that some rows of a recording make, given by number in rising order."""
+    step = float(np.median(np.diff(test.time))) if test.time.size > 1 else 0.0
+    ends = np.flatnonzero((np.diff(rows) > 1) | (np.diff(test.time[rows]) > LOST_ROWS * step)) + 1
+    return [left_out(test, part, reason) for part in np.split(rows, ends) if part.size]
+
+
+def joined(parts: Sequence[LeftOut], test: RampTest) -> list[LeftOut]:
+    """Return what was left out of a recording in the order of time, stretches that follow each other as one."""
+    found: list[LeftOut] = []
+    for part in sorted(parts, key=lambda part: part.from_s):
+        last = found[-1] if found else None
+        if last and last.reason == part.reason and not np.any((test.time > last.to_s) & (test.time < part.from_s)):
+            dp = (*(last.dp_MPa or ()), *(part.dp_MPa or ()))
+            found[-1] = replace(last, to_s=part.to_s, dp_MPa=(min(dp), max(dp)) if dp else None)
+        else:
+            found.append(part)
     return found
+
+
+def left_out(test: RampTest, rows: np.ndarray, reason: Reason) -> LeftOut:
+    """Return what the record says of rows in a row."""
+    return LeftOut(
+        recording=test.source,
+        from_s=float(test.time[rows[0]]),
+        to_s=float(test.time[rows[-1]]),
+        reason=reason,
+        dp_MPa=None if test.dp is None else (float(test.dp[rows].min()) / MPA, float(test.dp[rows].max()) / MPA),
+    )
 
 
 def without_flow(levels: Sequence[SweepLevel], reach: Sequence[float]) -> list[bool]:

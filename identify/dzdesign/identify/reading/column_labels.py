@@ -71,7 +71,7 @@ def parse_columns(text: str | Mapping[str, str]) -> dict[str, str]:
     {'u': 'AO0:V', 'Q': 'Flow (L/min)'}
     """
     if isinstance(text, str):
-        entries = [entry.partition("=")[::2] for entry in re.split(r"[,;]\s*(?=\w+\s*=)", text)]
+        entries = [entry.partition("=")[::2] for entry in re.split(r"[,;]\s*(?=[^\W\d]\w*\s*=)", text)]
     else:
         entries = list(text.items())
     columns: dict[str, str] = {}
@@ -91,10 +91,11 @@ def parse_columns(text: str | Mapping[str, str]) -> dict[str, str]:
     return columns
 
 
-def find_columns(table: Table, chosen: Mapping[str, str]) -> dict[str, Column]:
+def find_columns(table: Table, chosen: Mapping[str, str], sample_rate: float | None = None) -> dict[str, Column]:
     """Return quantity -> column of a table: those that were chosen, the others by their labels.
 
-    Of the pressures only those that make the drop of the metering edge are there.
+    Of the pressures only those that make the drop of the metering edge are there. With a declared `sample_rate`, Hz,
+    there is no column of time, and one is refused.
 
     Raises
     ------
@@ -103,6 +104,10 @@ def find_columns(table: Table, chosen: Mapping[str, str]) -> dict[str, Column]:
         two edges, or a working port's makes none.
     """
     columns = labelled_columns(table, chosen)
+    if "time" not in chosen and "time" in columns and columns["time"].unit and not fits(columns["time"].unit, "time"):
+        del columns["time"]  # T_degC is no time
+    if sample_rate is not None:
+        columns = _without_time(table, columns, sample_rate)
     edge = metering_edge(columns)
     if edge.ambiguous:
         labels = {quantity: column.label for quantity, column in columns.items()}
@@ -115,10 +120,21 @@ def find_columns(table: Table, chosen: Mapping[str, str]) -> dict[str, Column]:
             "P or T, or dP"
         )
     columns = {name: column for name, column in columns.items() if name not in PRESSURES or name in edge.quantities}
-    for quantity in ("time", "u", "Q"):
+    for quantity in ("time", "u", "Q") if sample_rate is None else ("u", "Q"):
         if quantity not in columns:
             raise _missing_column(quantity, table, columns)
     return columns
+
+
+def _without_time(table: Table, columns: dict[str, Column], sample_rate: float) -> dict[str, Column]:
+    """Return columns without one of time whose unit nobody knows; refuse a clock."""
+    time = columns.get("time")
+    if time is not None and fits(time.unit, "time"):
+        raise InputError(
+            f"'{table.path}' has a column of time ('{time.label}'), and --sample-rate declares {sample_rate:g} Hz too; "
+            "leave one of them out"
+        )
+    return {quantity: column for quantity, column in columns.items() if quantity != "time"}
 
 
 def labelled_columns(table: Table, chosen: Mapping[str, str]) -> dict[str, Column]:
@@ -168,6 +184,7 @@ def _chosen_column(table: Table, quantity: str, text: str) -> Column:
         raise InputError(
             f"'{table.path}' column '{label}' has no unit; write for example "
             f'--columns "{quantity}={label}:{EXAMPLE_UNITS[quantity]}"'
+            + (f', or what its numbers mean, --columns "u={label}:0..1 = 0..100 %"' if quantity == "u" else "")
         )
     return Column(label=label, unit=unit, stated=stated)
 
@@ -257,9 +274,10 @@ def _missing_column(quantity: str, table: Table, columns: Collection[str]) -> In
     kind = QUANTITY_OF_COLUMN[quantity]
     meant += [label for label in unused if measures(table.units.get(label, "") or split_label(label)[1], kind)]
     hint = f" (did you mean '{meant[0]}'? name it {EXAMPLE_LABELS[quantity]})" if meant else ""
+    rate = ', or --sample-rate "100 Hz"' if quantity == "time" else ""
     return InputError(
         f"'{table.path}' has no column of {quantity} (columns found: {table.found_labels()}){hint}; "
-        "expected names with units such as time_s,u_V,dP_MPa,Q_Lmin, or --columns"
+        f"expected names with units such as time_s,u_V,dP_MPa,Q_Lmin, or --columns{rate}"
     )
 
 

@@ -67,7 +67,9 @@ class ProposedColumns:
         return bool(metering_edge(self.known).quantities)
 
 
-def propose_columns(path: Path, chosen: Mapping[str, str], skip_rows: int | None = None) -> ProposedColumns:
+def propose_columns(
+    path: Path, chosen: Mapping[str, str], skip_rows: int | None = None, *, time_is_declared: bool = False
+) -> ProposedColumns:
     """Tell which column of a recording is which quantity.
 
     `chosen` is what the engineer has declared, as `parse_columns` gives it.
@@ -87,7 +89,7 @@ def propose_columns(path: Path, chosen: Mapping[str, str], skip_rows: int | None
         unclear = {name: why for name, column in known.items() if (why := _why_unreadable(path, name, column))}
         taken = {column.label for column in known.values()}
         proposed: dict[str, Column] = {}
-        for quantity in ("time", "u", "Q", "dP"):
+        for quantity in ("u", "Q", "dP") if time_is_declared else ("time", "u", "Q", "dP"):
             if quantity in known or (quantity == "dP" and edge.quantities):
                 continue
             candidates = [label for label in _candidates(table, quantity) if label not in taken]
@@ -173,7 +175,7 @@ def _why_none(table: Table, quantity: str, candidates: list[str]) -> str:
     words = " ".join(table.labels).lower()
     if "varname" in words and "varvalue" in words:  # an archive of WinCC
         why += "; the table has a row for each variable (VarName, VarValue): export a column for each"
-    return why + _or_first_column(table) if quantity == "time" else why
+    return f'{why}{_or_first_column(table)}; if there is none, --sample-rate "100 Hz"' if quantity == "time" else why
 
 
 def _or_first_column(table: Table) -> str:

@@ -31,6 +31,8 @@ from dzdesign.identify.reading.thinning import thin
 MIN_ROWS = 20
 #: First word of the first comment line of a recording that is none: whoever makes one up writes it there.
 SIMULATED_MARK = "SIMULATED"
+#: Stands for the column of time where the sample rate is declared.
+DECLARED_CLOCK = Column(label="--sample-rate", unit="s")
 #: SI numbers beyond these are no measurement of a valve: a wrong unit, or what a logger writes for an overflow.
 LARGEST = {"time": 1e12, "voltage": 1e4, "pressure": 1e9, "flow": 10.0}
 
@@ -41,6 +43,7 @@ def read_ramp_file(
     *,
     columns: Mapping[str, str] | None = None,
     dp: float | None = None,
+    sample_rate: float | None = None,
     skip_rows: int | None = None,
 ) -> RampTest:
     """Read one recording from a file.
@@ -57,6 +60,8 @@ def read_ramp_file(
         Quantity -> label in the file, as `column_labels.parse_columns` gives it; it goes before what labels say.
     dp : float, optional
         Pressure drop in Pa of a file that has no column of it.
+    sample_rate : float, optional
+        Samples a second of a file that has no column of time.
     skip_rows : int, optional
         Lines above the header of a file of text. None: the header is found.
 
@@ -68,7 +73,7 @@ def read_ramp_file(
     path = Path(path)
     with open_bytes(path, "ramp file") as file:
         sha256 = sha256_of_file(file)
-        recording = _read_recording(read_table(file, path, skip_rows), columns or {}, u_max, dp)
+        recording = _read_recording(read_table(file, path, skip_rows), columns or {}, u_max, dp, sample_rate)
     _refuse_too_few_rows(path, recording)
     thinned = thin(recording.rows)
     time, u, q, *measured = (np.array(column) for column in thinned.rows)
@@ -140,14 +145,16 @@ def read_table(file: BinaryIO, path: Path, skip_rows: int | None = None) -> Tabl
     return read_binary_table(file, path, kind) if kind else read_text_table(file, path, skip_rows)
 
 
-def _read_recording(table: Table, chosen: Mapping[str, str], u_max: float, dp: float | None) -> _Recording:
+def _read_recording(
+    table: Table, chosen: Mapping[str, str], u_max: float, dp: float | None, sample_rate: float | None
+) -> _Recording:
     """Return the rows of a file that lack nothing."""
-    found = find_columns(table, chosen)
+    found = find_columns(table, chosen, sample_rate)
     _refuse_two_pressures(table, found, dp)
     _refuse_unequal_lengths(table, found)
     table.load([column.label for column in found.values()])
     data, placeholders = {}, {}
-    is_clock = table.is_clock(found["time"].label)
+    is_clock = sample_rate is None and table.is_clock(found["time"].label)
     for quantity, column in found.items():
         if quantity == "time" and is_clock:
             data[quantity] = seconds_of_day_times(table, column.label)
@@ -158,6 +165,8 @@ def _read_recording(table: Table, chosen: Mapping[str, str], u_max: float, dp: f
         unclear = quantity == "time" and not column.unit and may_count_ms(numbers)
         # The whole recording tells later what they count.
         data[quantity] = numbers if unclear else _in_SI(table, quantity, column, numbers, u_max)
+    if sample_rate is not None:
+        data["time"] = np.arange(data["u"].size) / sample_rate
     edge, labels = metering_edge(found), {quantity: column.label for quantity, column in found.items()}
     measured = edge.drop(data, data["u"], u_max)
     if measured is None and dp is not None:
@@ -170,9 +179,9 @@ def _read_recording(table: Table, chosen: Mapping[str, str], u_max: float, dp: f
     rows[0] = never_back(table, rows[0], complete)
     return _Recording(
         rows=rows,
-        clock=found["time"],
+        clock=found.get("time", DECLARED_CLOCK),
         simulated=_is_marked(table.comments),
-        may_count_ms=not is_clock and may_count_ms(rows[0], longest_step=np.inf),
+        may_count_ms=sample_rate is None and not is_clock and may_count_ms(rows[0], longest_step=np.inf),
         no_values=describe_placeholders(placeholders),
         started=table.started(found["time"].label) if is_clock else None,
         dp_from=edge.in_words(labels),
@@ -194,12 +203,13 @@ def _refuse_two_pressures(table: Table, found: Mapping[str, Column], dp: float |
 
 def _refuse_unequal_lengths(table: Table, found: Mapping[str, Column]) -> None:
     """Refuse columns that are not samples of one clock."""
-    expected = table.length(found["time"].label)
+    first = found["time" if "time" in found else "u"].label
+    expected = table.length(first)
     for column in found.values():
         if table.length(column.label) != expected:
             raise InputError(
                 f"'{table.path}' column '{column.label}' has {table.length(column.label)} samples, but "
-                f"'{found['time'].label}' has {expected}; expected one clock, so resample it before"
+                f"'{first}' has {expected}; expected one clock, so resample it before"
             )
 
 

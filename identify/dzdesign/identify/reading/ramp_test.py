@@ -4,6 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dzdesign.identify.valve.left_out import LeftOut
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RampTest:
@@ -50,6 +52,8 @@ class RampTest:
     no_values: str = ""
     #: Time of `time` = 0 on a clock common to all recordings, s; None if it is not known.
     started: float | None = None
+    #: What the engineer has left out of the file.
+    left_out: tuple[LeftOut, ...] = ()
 
     def __post_init__(self) -> None:
         for array in (self.time, self.u, self.q, self.dp):

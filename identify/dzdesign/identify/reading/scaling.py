@@ -1,21 +1,26 @@
 """From the numbers of a column to SI: by its unit, or by the range of a transmitter, ``4..20 mA = 0..50 L/min``."""
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 from typing import final
 
 from dzdesign.core.errors import InputError
-from dzdesign.core.units import measures, refuse_thousands, si_factor
-from dzdesign.identify.reading.column_labels import EXAMPLE_LABELS, PER_CENT, QUANTITY_OF_COLUMN, Column, same_unit
+from dzdesign.core.signal_ranges import SignalRange, read_signal_range
+from dzdesign.core.units import measures, si_factor
+from dzdesign.identify.reading.column_labels import (
+    EXAMPLE_LABELS,
+    LONGEST_NAME,
+    PER_CENT,
+    QUANTITY_OF_COLUMN,
+    Column,
+    same_unit,
+)
 
-_NUMBER = r"([-+]?\d{1,9}(?:[.,]\d{1,9})?)"
-_ENDS = rf"{_NUMBER}\s?\.\.\s?{_NUMBER}\s?"
-#: A range of what the column holds, and what it means.
-RANGE = re.compile(rf"{_ENDS}([^\s=][^=]{{0,39}})=\s?{_ENDS}(\S.{{0,39}})")
-#: What a transmitter gives.
-SIGNALS = ("current", "voltage")
+#: What a transmitter gives, or an amplifier takes; a range may also be of a frequency, per cent or bare numbers.
+TRANSMITTED = ("current", "voltage")
+SIGNALS = (*TRANSMITTED, "frequency")
 #: Full scale in the examples of messages.
 FULL_SCALE: Mapping[str, str] = {"u": "0..10 V", "Q": "0..50 L/min"}
 
@@ -50,27 +55,44 @@ def scaling_of(path: Path, quantity: str, column: Column, u_max: float) -> Scali
 
 
 def _of_range(quantity: str, column: Column, u_max: float) -> Scaling:
-    text = column.unit
-    found = RANGE.fullmatch(text.strip())
-    if found is None:
-        raise InputError(f"'{text[:80]}' is no range, expected one such as '4..20 mA = {_full_scale(quantity)}'")
-    refuse_thousands(text, f"'{text[:80]}'", points=True)
-    low, high, bottom, top = (float(found[index].replace(",", ".")) for index in (1, 2, 4, 5))
-    signal = found[3].strip()
-    if not any(measures(signal, kind) for kind in SIGNALS):
-        raise InputError(f"'{signal}' is no unit of a transmitter's signal, expected mA, A, V or mV")
-    if any(measures(column.stated, kind) for kind in SIGNALS) and not any(
-        same_unit(column.stated, unit, quantity) for unit in (signal, found[6].strip())
-    ):
+    text = column.unit[:LONGEST_NAME]
+    found = read_signal_range(column.unit.strip(), f"'{text}'", points=True)
+    if found is None or found.meaning is None:
+        raise InputError(f"'{text}' is no range, expected one such as '4..20 mA = {_full_scale(quantity)}'")
+    meaning = found.meaning
+    if found.unit and found.unit not in PER_CENT and not any(measures(found.unit, kind) for kind in SIGNALS):
+        raise InputError(f"'{found.unit}' is no unit of a transmitter's signal, expected mA, A, V or mV")
+    low, high = _ends_in_the_file(quantity, column, found)
+    if low == high or meaning.bottom == meaning.top:
+        raise InputError(f"the range '{text}' has no width, expected one such as '4..20 mA = 0..50 L/min'")
+    gain = (meaning.top - meaning.bottom) / (high - low)
+    factor = _factor(quantity, meaning.unit, u_max)
+    return Scaling(gain=float(gain) * factor, offset=float(meaning.bottom - gain * low) * factor)
+
+
+def _ends_in_the_file(quantity: str, column: Column, found: SignalRange) -> tuple[Fraction, Fraction]:
+    """Return the ends of a signal in the unit of the column: its own, or that of the voltage that its wiring makes."""
+    stated = column.stated
+    if not found.is_wired:
+        of_signal = (found.unit, found.meaning.unit if found.meaning else "")
+        if any(measures(stated, kind) for kind in SIGNALS) and not any(
+            same_unit(stated, unit, quantity) for unit in of_signal
+        ):
+            raise InputError(
+                f"the range '{found.text}' is of a column in {found.unit or 'bare numbers'}, but the file says "
+                f"'{stated}'; write the range in {stated}, or correct the unit in the file"
+            )
+        return found.low, found.high
+    if any(measures(stated, kind) for kind in SIGNALS) and not measures(stated, "voltage"):
         raise InputError(
-            f"the range '{text[:80]}' is of a column in {signal}, but the file says '{column.stated}'; write the range "
-            f"in {column.stated}, or correct the unit in the file"
+            f"the range '{found.text}' is of the voltage behind its wiring, but the file says '{stated}'; write the "
+            "range of that alone"
         )
-    if low == high or bottom == top:
-        raise InputError(f"the range '{text[:80]}' has no width, expected one such as '4..20 mA = 0..50 L/min'")
-    gain = (top - bottom) / (high - low)
-    factor = _factor(quantity, found[6].strip(), u_max)
-    return Scaling(gain=gain * factor, offset=(bottom - gain * low) * factor)
+    kind = "voltage" if found.shunt_ohm is None else "current"
+    volts = Fraction(repr(si_factor(found.unit, kind))) * (found.shunt_ohm or 1) * found.gain
+    per_volt = 1 / Fraction(repr(si_factor(stated, "voltage"))) if measures(stated, "voltage") else Fraction(1)
+    low, high = ((end * volts + found.offset_V) * per_volt for end in (found.low, found.high))
+    return low, high
 
 
 def _factor(quantity: str, unit: str, u_max: float) -> float:
@@ -86,7 +108,7 @@ def _full_scale(quantity: str) -> str:
 
 def _hint(quantity: str, column: Column) -> str:
     """Return what to write for a column that holds a transmitter's signal."""
-    if quantity == "time" or not any(measures(column.unit, kind) for kind in SIGNALS):
+    if quantity == "time" or not any(measures(column.unit, kind) for kind in TRANSMITTED):
         return ""
     return f"; say what the signal means, {range_example(quantity, column.label, column.unit)}"
 

@@ -7,6 +7,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
+from dzdesign.identify.valve.left_out import LeftOut
 from dzdesign.identify.valve.quantity_types import Flow, FlowGain, PressureDrop, Ratio, Voltage, VoltageError
 
 #: Standard errors by which closing must lie above opening to be no noise; and V, for a simulation has next to none.
@@ -86,6 +87,20 @@ class TestResult:
     saturates: Annotated[
         bool, Meta(description="Whether the flow stops growing before full command: the spool is at its stop.")
     ]
+    leak_L_min: Annotated[
+        Flow,
+        Meta(
+            description="Flow at zero command that grows with the pressure drop: a leak. The knees are those of the "
+            "flow beyond it, the bounds allow for its end where the valve opens."
+        ),
+    ]
+    noise_level_L_min: Annotated[
+        Flow,
+        Meta(
+            description="Flow below which there is none: the largest of the meter's floor, what averages over the dead "
+            "zone resolve, and 0.5 % of the largest flow or what was declared."
+        ),
+    ]
     noise_L_min: Annotated[Flow, Meta(description="Standard deviation of the flow's noise.")]
     noise_variance_inflation: Annotated[
         float,
@@ -97,6 +112,9 @@ class TestResult:
     ]
     outliers: Annotated[int, Meta(description="Samples of the straight part that were left out.", ge=0, le=10**12)]
     ramps: Annotated[tuple[str, ...], Meta(description="The ramps that were pooled.", min_length=1)]
+    left_out: Annotated[
+        tuple[LeftOut, ...], Meta(description="What of the recordings was left out: in these ramps, and before them.")
+    ] = ()
 
     def __post_init__(self) -> None:
         for branch in BRANCHES:

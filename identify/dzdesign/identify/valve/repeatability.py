@@ -45,3 +45,20 @@ class Repeatability:
             )
         if not (self.drift_V is None) == (self.drift_se_V is None) == bool(self.no_drift):
             raise RuleError("the drift, its standard error and the reason that there is none contradict one another")
+
+    def in_words(self) -> str:
+        """Return by how much the guarded threshold scatters from ramp to ramp, and drifts, and how that is known."""
+        how = {
+            "repeats": f"measured on repeats, {self.degrees_of_freedom or 0:.0f} degrees of freedom",
+            "declared": "declared",
+            "assumed": "assumed, for want of repeats",
+        }
+        drift = (
+            f"drift from the first ramp to the last {1e3 * self.drift_V:+.1f} ± {1e3 * self.drift_se_V:.1f} mV"
+            if self.drift_V is not None and self.drift_se_V is not None
+            else f"no drift in the model ({self.no_drift})"
+        )
+        return (
+            f"standard deviation {1e3 * self.sd_V:.1f} mV ({how[self.origin]}), in the bound for the next closing or "
+            f"opening; {drift}"
+        )

@@ -51,8 +51,7 @@ class BoundsBasis:
     level_L_min: Annotated[
         Flow,
         Meta(
-            description="Flow below which there is none: the largest of the meter's floor, its noise and 0.5 % of the "
-            "largest flow."
+            description="Flow below which there is none: the largest noise level of the tests."
         ),
     ]
     repeatability: Annotated[Repeatability, Meta(description="What differs from ramp to ramp.")]
@@ -141,6 +140,17 @@ class SideModel:
         for test, threshold, bound in zip(self.tests, curve.u_threshold_V, curve.u_lower_V, strict=True):
             if abs(test.u_guard_V - threshold) > ROUNDING_V or abs(test.u_guard_lower_V - bound) > ROUNDING_V:
                 raise RuleError(f"the tests' guarded thresholds and bounds are not those of the {guard} curve")
+
+    @property
+    def premise(self) -> str:
+        """What the bounds between the tests rest on, in words."""
+        if len(self.tests) < 2:
+            return "one pressure drop was tested: the bound holds there, and nothing is certified at another"
+        return (
+            f"{len(self.tests)} pressure drops were tested. Between two of them the bound is the lower one's, on the "
+            "premise that the threshold runs one way there, which no test checks: a threshold that is lowest between "
+            "two tests would lie below it"
+        )
 
     @property
     def curve(self) -> GuardCurve:

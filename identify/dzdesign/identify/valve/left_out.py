@@ -1,0 +1,44 @@
+"""`LeftOut`: a stretch of a recording that no threshold was found from, an entry of a test's ``left_out``."""
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from dzdesign.core.artefact_types import quantity
+
+#: Why, for people.
+REASONS = {
+    "option": "--from and --to leave it out",
+    "pressure": "the pressure drop is not the ramp's",
+    "no-flow": "the command moves, but the valve never opens: no pressure, or far from full command",
+    "no-ramp": "a fragment without a ramp",
+}
+Time = Annotated[float, quantity("s", ge=-1e12, le=1e12)]
+AnyPressure = Annotated[float, quantity("MPa", ge=-1e3, le=1e3)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LeftOut:
+    """A stretch of a recording that belongs to no ramp."""
+
+    recording: Annotated[str, Meta(description="File.")]
+    from_s: Annotated[Time, Meta(description="Its first sample, on the recording's own clock.")]
+    to_s: Annotated[Time, Meta(description="Its last sample.")]
+    reason: Annotated[
+        Literal["option", "pressure", "no-flow", "no-ramp"],
+        Meta(
+            description="'option': by --from or --to. 'pressure': a rest, or a part of a ramp, whose pressure drop is "
+            "not the ramp's, as before the pump is started. 'no-flow': a sweep that never opens the valve, with no "
+            "pressure or far from full command. 'no-ramp': a fragment without a ramp."
+        ),
+    ]
+    dp_MPa: Annotated[
+        tuple[AnyPressure, AnyPressure] | None,
+        Meta(description="Lowest and highest pressure drop in it; null where that is unknown."),
+    ]
+
+    def __str__(self) -> str:
+        """Return it as `-v` prints it."""
+        dp = "" if self.dp_MPa is None else f" ({self.dp_MPa[0]:.3g} to {self.dp_MPa[1]:.3g} MPa)"
+        return f"'{self.recording}', {self.from_s:.1f} to {self.to_s:.1f} s left out: {REASONS[self.reason]}{dp}"
