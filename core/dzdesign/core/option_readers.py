@@ -80,3 +80,29 @@ def percent_range(of: str) -> Callable[[str, str], tuple[float, float]]:
         return float(ends[1]) / 100, float(ends[2]) / 100
 
     return read
+
+
+def quantity_range(kind: str) -> Callable[[str, str], tuple[float, float]]:
+    """Return what reads two numbers with one unit, such as ``1..5 MPa``, or one for both, in SI.
+
+    Examples
+    --------
+    >>> quantity_range("time")("20..200 s", "--ramp-times"), quantity_range("time")("1 min", "--ramp-times")
+    ((20.0, 200.0), (60.0, 60.0))
+    """
+
+    def read(text: str, option: str) -> tuple[float, float]:
+        ends = text.split("..") if isinstance(text, str) else [text]
+        high = parse_quantity(ends[-1], kind, option)
+        if len(ends) == 1:
+            return high, high
+        unit = ends[1].strip().lstrip("+-0123456789.,eE").strip()
+        low = ends[0].strip()
+        if len(ends) > 2 or not low:
+            raise InputError(f"{option} is {quoted(text)}, expected two ends and a unit such as '1..5 {unit}'")
+        low_value = parse_quantity(low if low[-1].isalpha() else f"{low} {unit}", kind, option)
+        if not low_value <= high:
+            raise InputError(f"{option} is {quoted(text)}, expected the lower end first")
+        return low_value, high
+
+    return read
