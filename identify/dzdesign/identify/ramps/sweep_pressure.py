@@ -38,8 +38,8 @@ ANOTHER, GONE = 2.0, 0.1
 NO_PRESSURE = 0.02
 #: Samples whose median is no spike.
 RUN = 5
-#: Samples between two stretches that are left out which go with them.
-BETWEEN = 5
+#: Samples of the shut valve between two stretches that are left out which go with them.
+BETWEEN = 20
 #: Usual steps of the clock beyond which rows are missing, as those of the other side.
 LOST_ROWS = 20
 
@@ -139,7 +139,7 @@ def off_level(test: RampTest, at_bottom: np.ndarray, level: SweepLevel) -> np.nd
     # A few samples between two such stretches are where a moving pressure crosses the level.
     for start, end in pairwise(np.flatnonzero(off).tolist()):
         if 1 < end - start <= BETWEEN + 1:
-            off[start:end] = True
+            off[start:end] |= shut[start:end]
     return off
 
 
