@@ -26,6 +26,7 @@ from dzdesign.identify.ramps.command import (
     sweep_direction,
     without_command_spikes,
 )
+from dzdesign.identify.ramps.staircases import find_staircase
 from dzdesign.identify.ramps.sweep_pressure import SweepLevel, joined, off_level, stretches, sweep_level, without_flow
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.left_out import LeftOut
@@ -91,7 +92,10 @@ def split_ramps(test: RampTest, lag: float) -> list[Ramp]:
         Where the command jumps back and forth within a ramp.
     """
     test = without_command_spikes(test)
-    u = lagged_command(test.time, test.u, lag)
+    stairs = find_staircase(test.u, test.q, test.source)
+    if stairs is not None:  # what has settled has no lag
+        test = replace(test, u=stairs.u).part(stairs.settled)
+    u = lagged_command(test.time, test.u, lag) if stairs is None else test.u
     sweeps = _sweeps(test, u)
     idle = _idle(sweeps)
     groups = _groups([sweep for sweep, is_idle in zip(sweeps, idle, strict=True) if not is_idle])
