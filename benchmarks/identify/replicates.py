@@ -61,8 +61,9 @@ class Outcomes:
 
 
 def options_for(bench: Bench, **changes: object) -> IdentifyOptions:
-    """Return what an engineer declares: the meter's floor and lag, and that the bench's valve repeats exactly."""
-    known = {"meter_floor": bench.floor_L_min * L_MIN, "meter_lag": bench.lag_s, "repeatability": 0.0}
+    """Return what an engineer declares: the meter's floor and lag, both exact, and a valve that repeats exactly."""
+    known = {"meter_floor": bench.floor_L_min * L_MIN, "meter_lag": bench.lag_s}
+    known |= {"meter_lag_tolerance": 0.0, "repeatability": 0.0}
     return IdentifyOptions(**(known | changes))
 
 

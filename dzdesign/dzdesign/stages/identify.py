@@ -30,6 +30,9 @@ class IdentifyChoices(RampArguments):
 
     meter_zero: Annotated[str, Option("Q", METER, example="0.1 L/min", read=quantity("flow"))] = "0 L/min"
     """Bound of the flow meter's zero error."""
+    noise_level: Annotated[Text, Option("Q", METER, example="0.1 L/min", read=quantity("flow"))] = None
+    """Flow below which there is none, if averages over the dead zone resolve it (default: what they resolve, and at
+    least 0.5 % of the largest flow)."""
     dp0: Annotated[Text, Option("P", FIT, example="1 MPa", read=quantity("pressure"))] = None
     """Reference pressure drop (default: the test nearest to "1 MPa")."""
     x_max: Annotated[Text, Option("X", FIT, example="1.8 mm", read=quantity("length"))] = None

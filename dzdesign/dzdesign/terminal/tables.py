@@ -73,7 +73,8 @@ def _side_lines(side: "SideModel") -> tuple[str, ...]:
         f"pressure drop: {', '.join(made_of)}",
         f"bound: {100 * certificate.confidence:.6g}% lower bound, for all tests together, of the {certificate.guard} "
         "threshold (the knee, or the tail's zero where the edge is soft); flow below "
-        f"{certificate.level_L_min:.2f} L/min (meter's floor, its noise, or 0.5 % of the largest flow) counts as none",
+        f"{certificate.level_L_min:.2f} L/min (noise level: the meter's floor, what averages resolve, or 0.5 % of the "
+        "largest flow) counts as none",
         f"from ramp to ramp: {certificate.repeatability.in_words()}",
         f"u_min0 = {side.reference.u_min_V:.4f} V{at}: the largest certified offset, under the bounds of both "
         "neighbouring tests; more tests raise it",

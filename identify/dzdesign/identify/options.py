@@ -21,6 +21,9 @@ class IdentifyOptions:
         Lag of the flow meter, s; None finds it where ramps of two rates were recorded, and takes none otherwise.
     meter_lag_tolerance : float or None
         By how much a declared lag may be wrong, s; None takes 20 % of it, and at least 0.05 s.
+    noise_level : float or None
+        Flow below which there is none, m³/s, if the recordings resolve it; None takes what their averages over the
+        dead zone resolve, and at least 0.5 % of the largest flow.
     meter_zero : float
         Bound of the meter's zero error, m³/s, against which the certificate guards.
     x_max : float or None
@@ -33,6 +36,9 @@ class IdentifyOptions:
     flat_below : float
         Change of the threshold over the tested range, as a share of u_max, that systematic errors may make: a smaller
         one is no trend, however significant.
+    repeatability : float or None
+        Standard deviation of the threshold from ramp to ramp, as a share of u_max; None measures it where ramps are
+        repeated, and takes 0.25 % elsewhere.
     """
 
     u_max: float = 10.0
@@ -40,6 +46,7 @@ class IdentifyOptions:
     meter_floor: float | None = None
     meter_lag: float | None = None
     meter_lag_tolerance: float | None = None
+    noise_level: float | None = None
     meter_zero: float = 0.0
     x_max: float | None = None
     confidence: float = 0.99
@@ -61,7 +68,7 @@ class IdentifyOptions:
             )
         if not 0 <= self.flat_below < 1:
             raise InputError(f"the change that counts as flat is {self.flat_below}, expected a share of u_max")
-        for name in ("meter_floor", "meter_lag", "meter_lag_tolerance", "meter_zero"):
+        for name in ("meter_floor", "meter_lag", "meter_lag_tolerance", "noise_level", "meter_zero"):
             if (getattr(self, name) or 0) < 0:
                 raise InputError(f"{name} is negative, expected zero or more")
         for name in ("dp0", "x_max"):

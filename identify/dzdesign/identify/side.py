@@ -19,8 +19,9 @@ from dzdesign.identify.fitting.guarding import (
     mean_threshold,
     opening_curve,
     order_knees,
+    systematic_change,
 )
-from dzdesign.identify.knees.between_ramps import BetweenRamps
+from dzdesign.identify.knees.between_ramps import FEW_DEGREES, BetweenRamps
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
 from dzdesign.identify.knees.prepared_tests import describe_tests
 from dzdesign.identify.options import IdentifyOptions
@@ -61,13 +62,15 @@ def _fit_with_trend(group: DescribedTests, options: IdentifyOptions) -> tuple[Tr
     free = fit_knees([item.shapes for item in group.tests], floor=group.floor, u_max=options.u_max, trend="flat")
     dp = np.array([item.dp or math.nan for item in group.tests])
     column = 1 if group.tests[0].shapes[1] else 0  # falling wherever there is one: zero command comes after closing
-    # A lag that is a little wrong feigns a trend where the tests were run at different rates.
-    feigned = float(np.ptp(np.nan_to_num(group.rates(column)))) * max(group.lag.longer, group.lag.shorter)
-    budget = options.flat_below * options.u_max + feigned
     between, knee_se = group.between(column), free.knee_se[:, column]
     degrees = float(between.degrees_of_freedom(knee_se, DEGREES_OF_FREEDOM).min())
     trend = find_trend(
-        dp, free.knee[:, column], between.covariance_of_mean(knee_se), degrees, options.u_max, budget
+        dp,
+        free.knee[:, column],
+        between.covariance_of_mean(knee_se),
+        degrees,
+        options.u_max,
+        systematic_change(group, column, options),
     )
     return trend, free, order_knees(group, free, trend.direction, column, options)
 
@@ -97,6 +100,7 @@ def _side_model(
     thresholds, rising = _all_thresholds(group, free, guarded, trend, options)
     guard, threshold = next(iter(thresholds.items()))
     dp = [item.dp for item in described]
+    _refuse_unlike_repeats(group.between(guarded.column), threshold)
     found = fit_guard_curves(thresholds, dp, reference, trend.direction, options.u_max)
     guards: dict[str, GuardCurve] = {name: found[name][0] for name in GUARDS if name in found}
     slope = float(np.nanmean(knees.slope[reference]))
@@ -116,7 +120,7 @@ def _side_model(
         certificate=BoundsBasis(
             confidence=options.confidence,
             guard=guard,
-            level_L_min=max(shape.level for item in described for shape in item.branches) / L_MIN,
+            level_L_min=max(shape.dead_zone.noise_level for item in described for shape in item.branches) / L_MIN,
             repeatability=_repeatability(group.between(guarded.column)),
         ),
         guards=guards,
@@ -124,6 +128,16 @@ def _side_model(
         active_constraints=knees.active
         + tuple(f"offset at test {row + 1}" for row, holds in enumerate(found[guard][1]) if holds),
     )
+
+
+def _refuse_unlike_repeats(between: BetweenRamps, threshold: Threshold) -> None:
+    """Refuse repeats that differ so much, and are so few, that the next closing may lie anywhere."""
+    if between.origin == "repeats" and between.degrees < FEW_DEGREES and threshold.bound.min() <= 0:
+        raise InputError(
+            f"ramps at one pressure drop differ: their thresholds scatter by {1e3 * between.sd:.0f} mV (one standard "
+            f"deviation, degrees of freedom: {between.degrees:.0f}), so that no lower bound above zero follows; record "
+            "two more ramps there, or leave out the one that is unlike the rest"
+        )
 
 
 def _repeatability(found: BetweenRamps) -> Repeatability:
@@ -175,6 +189,8 @@ def _test_result(group: DescribedTests, knees: KneeFit, row: int, guarded: Thres
         slope_L_min_V=float(np.nanmean(knees.slope[row])) / L_MIN,
         q_max_L_min=item.q_max / L_MIN,
         saturates=all(shape.saturates for shape in item.branches),
+        leak_L_min=group.leak[row] / L_MIN,
+        noise_level_L_min=max(shape.dead_zone.noise_level for shape in item.branches) / L_MIN,
         noise_L_min=max(shape.sigma for shape in item.branches) / L_MIN,
         noise_variance_inflation=max(shape.variance_inflation for shape in item.branches),
         spool_ripple_V=max(shape.ripple for shape in item.branches),

@@ -11,7 +11,7 @@ import numpy as np
 
 from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.data_quality.catalogue import warn
-from dzdesign.identify.knees.prepared_tests import FEWEST_AT_REST, readings_at_rest
+from dzdesign.identify.knees.readings_at_rest import FEWEST_AT_REST, readings_at_rest
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.model import Warning_
@@ -54,7 +54,7 @@ def _clipped_at(test: RampTest, u_max: float) -> float:
     zero error of a meter that does not scatter looks the same, and is taken for this: to subtract what is a floor would
     be the wrong way, and not to subtract what is an error only lowers the bounds.
     """
-    rest = readings_at_rest(test, u_max)
+    rest = test.q[readings_at_rest(test, u_max)]
     rest = rest[rest > 0]
     if rest.size < FEWEST_AT_REST:
         return 0.0

@@ -1,4 +1,4 @@
-"""What is weak in the flow meter's readings: its steps, its lag, what it reads at rest."""
+"""What is weak in the flow meter's readings: its steps, its lag, its noise, what it reads at rest."""
 
 from collections.abc import Iterator, Mapping
 
@@ -26,6 +26,8 @@ READINGS_A_LEVEL = 5
 def about_the_meter(side: SideModel, group: DescribedTests, options: IdentifyOptions) -> Iterator[Warning_]:
     """Yield the warnings about the flow meter, of one side."""
     yield from _about_zeros(group.zero_L_min)
+    yield from _about_a_leak(side)
+    yield from _about_the_noise_level(side, options)
     yield from _about_steps(side, group.tests, options)
     yield from _about_the_lag(group, options)
     yield from _about_lag_and_order(side, group)
@@ -35,6 +37,22 @@ def _about_zeros(zero_L_min: Mapping[str, float]) -> Iterator[Warning_]:
     leak = "; if it is a leak, the valve passes it whatever the compensator does"
     for source, zero in zero_L_min.items():
         yield warn("meter-zero", source, zero_L_min=zero, leak=leak if zero > 0 else "")
+
+
+def _about_a_leak(side: SideModel) -> Iterator[Warning_]:
+    worst = max(side.tests, key=lambda test: test.leak_L_min)
+    if worst.leak_L_min > 0 and worst.dp_MPa:
+        shift_mV = 1e3 * max(test.leak_L_min / test.slope_L_min_V for test in side.tests)
+        leak = worst.leak_L_min
+        yield warn("leak", worst.source, "at-rest", per_MPa=leak / worst.dp_MPa, leak_L_min=leak, shift_mV=shift_mV)
+
+
+def _about_the_noise_level(side: SideModel, options: IdentifyOptions) -> Iterator[Warning_]:
+    if options.noise_level is None:
+        return
+    declared, worst = options.noise_level / L_MIN, max(side.tests, key=lambda test: test.noise_level_L_min)
+    if worst.noise_level_L_min > 1.001 * declared:
+        yield warn("noise-level", worst.source, declared_L_min=declared, level_L_min=worst.noise_level_L_min)
 
 
 def _about_steps(side: SideModel, tests: tuple[DescribedTest, ...], options: IdentifyOptions) -> Iterator[Warning_]:

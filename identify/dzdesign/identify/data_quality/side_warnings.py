@@ -101,9 +101,9 @@ def _about_the_edge(side: SideModel, group: DescribedTests, u_max: float) -> Ite
             by_filter = _softness_of_the_meter(item, group)
             case = "meter" if below <= by_filter else "valve"
             yield warn("soft-edge", test.source, case, below_mV=1e3 * below, filter_mV=1e3 * by_filter)
-        leak = _leak_in_overlap(item, test.u_guard_V)
+        leak = _leak_in_overlap(item, item.closing_branch.knee)
         if leak > max(LEAK_SHARE * item.q_max, group.floor):
-            yield warn("leak", test.source, leak_L_min=leak / L_MIN, share=OVERLAP[1])
+            yield warn("leak", test.source, "in-overlap", leak_L_min=leak / L_MIN, share=OVERLAP[1])
 
 
 def _softness_of_the_meter(item: DescribedTest, group: DescribedTests) -> float:

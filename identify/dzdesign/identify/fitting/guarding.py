@@ -55,6 +55,17 @@ class Threshold:
     lag_budget: np.ndarray
 
 
+def systematic_change(group: DescribedTests, column: int, options: IdentifyOptions) -> float:
+    """Return by how much systematic errors may make the knees of one branch differ from test to test, V.
+
+    Beside what the engineer allows for, a lag that is a little wrong does so where tests were run at different rates,
+    and a leak that was subtracted, if it stops where the valve opens.
+    """
+    by_lag = float(np.ptp(np.nan_to_num(group.rates(column)))) * max(group.lag.longer, group.lag.shorter)
+    shifts = [leak / item.branch(column).slope for leak, item in zip(group.leak, group.tests, strict=True)]
+    return options.flat_below * options.u_max + by_lag + float(np.ptp(shifts))
+
+
 def order_knees(
     group: DescribedTests,
     free: KneeFit,
@@ -78,7 +89,7 @@ def order_knees(
         return OrderedKnees(column=column, fit=free, departure=np.zeros(1))
     knee = free.knee[:, column]
     knee_se = np.sqrt(np.diag(group.between(column).covariance_of_mean(free.knee_se[:, column])))
-    budget = options.flat_below * options.u_max
+    budget = systematic_change(group, column, options)
     if direction == "flat":
         departure = excess_departure(np.abs(knee - knee.mean()), knee_se, budget)
         return OrderedKnees(column=column, fit=free, departure=departure)
@@ -105,9 +116,11 @@ def bound_threshold(group: DescribedTests, knees: OrderedKnees, options: Identif
     subtracted = np.array([se * math.sqrt(factor) for se, factor in zip(group.zero_se, inflations, strict=True)])
     knee_se = np.hypot(knee_se, subtracted / [shape.slope for shape in shapes])
     zero_se = np.hypot(zero_se, subtracted / [shape.tail.slope for shape in shapes])
-    # A zero error of the meter moves each zero by the error over the slope of the line that was extrapolated.
-    knee_budget = shared + np.array([options.meter_zero / shape.slope for shape in shapes])
-    zero_budget = shared + np.array([options.meter_zero / shape.tail.slope for shape in shapes])
+    # A zero error of the meter moves each zero by the error over the slope of the line that was extrapolated; so does a
+    # leak that was subtracted, if it stops where the valve opens.
+    amiss = options.meter_zero + np.array(group.leak)
+    knee_budget = shared + amiss / [shape.slope for shape in shapes]
+    zero_budget = shared + amiss / [shape.tail.slope for shape in shapes]
     # A soft edge passes flow below the knee. Where the tail agrees with the knee's line, that line is all there is.
     gap, error = knee - zero, np.hypot(knee_se, zero_se)
     # One edge has passed the flow of all tests, so together they show a softness that none shows alone.
@@ -116,10 +129,12 @@ def bound_threshold(group: DescribedTests, knees: OrderedKnees, options: Identif
     between = group.between(knees.column)
     knee_bound = lower_bounds(knee, knee_se, between, options.confidence, knee_budget)
     zero_bound = lower_bounds(zero, zero_se, between, options.confidence, zero_budget)
+    # What averages show below the knee at one pressure drop is one edge's, which all tests have.
+    depth = max(shape.dead_zone.depth for shape in shapes)
     return Threshold(
-        np.where(soft, zero, knee),
+        np.minimum(np.where(soft, zero, knee), knee - depth),
         np.where(soft, zero_se, knee_se),
-        np.where(soft, np.minimum(knee_bound, zero_bound), knee_bound),
+        np.minimum(np.where(soft, np.minimum(knee_bound, zero_bound), knee_bound), knee_bound - depth),
         lag_budget,
     )
 

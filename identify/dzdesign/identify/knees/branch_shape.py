@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from dzdesign.identify.knees.dead_zone import DeadZone
 from dzdesign.identify.knees.gated_line import GatedLine, PreparedBranch
 from dzdesign.identify.ramps.branches import Bins
 
@@ -37,8 +38,11 @@ class BranchShape:
     variance_inflation: float
     outliers: int
     dropped: float
-    #: Flow that counts as flow: the meter's floor, its noise or `USEFUL_FLOW`, whichever is largest.
+    #: Flow from which on a single reading counts as flow: the meter's floor, its noise or `USEFUL_FLOW`, whichever is
+    #: largest.
     level: float
+    #: What averages over the dead zone show below that.
+    dead_zone: DeadZone
     tail: Tail
     #: Where the valve opens (or closes), as far as the meter shows it.
     onset: float

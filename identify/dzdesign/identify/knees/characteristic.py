@@ -2,14 +2,16 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from dzdesign.identify.knees.branch_shape import BranchShape, Tail
+from dzdesign.identify.knees.dead_zone import look_into_dead_zone
 from dzdesign.identify.knees.gated_line import GATE, GatedLine, PreparedBranch, fit_line
 from dzdesign.identify.knees.level_floor import floor_of_levels
 from dzdesign.identify.knees.line_fitting import inflation_by_blocks
-from dzdesign.identify.knees.linear_region import find_straight_parts
+from dzdesign.identify.knees.linear_region import StraightParts, find_straight_parts
 from dzdesign.identify.knees.noise import measure_roughness, robust_sigma, variance_inflation
 from dzdesign.identify.knees.profile import crossing, flow_at_top, hole_within, smooth_profile
 from dzdesign.identify.knees.spool_ripple import spool_ripple
@@ -28,26 +30,40 @@ TAIL_ROUNDS = 8
 
 
 def describe_branches(
-    reads: Sequence[PreparedBranch], *, u_max: float, window: tuple[float, float]
+    reads: Sequence[PreparedBranch],
+    *,
+    u_max: float,
+    window: tuple[float, float],
+    noise_level: float | None = None,
+    longest_lag: float = 0.0,
 ) -> list[BranchShape]:
     """Describe all branches of a valve: where the straight part lies, its line, its noise, and the tail below it.
 
-    One meter has read them all, so they tell its noise together; `window` and errors are those of
-    `find_straight_parts`.
+    One meter has read them all, so they tell its noise together, and its lag, s, is at most `longest_lag`; `window`,
+    `noise_level` and errors are those of `find_straight_parts`.
     """
-    parts = find_straight_parts(reads, u_max=u_max, window=window)
-    return [
-        _describe(read, line, level, noise, parts.correlation, u_max)
-        for read, line, level, noise in zip(reads, parts.lines, parts.levels, parts.noises, strict=True)
-    ]
+    parts = find_straight_parts(reads, u_max=u_max, window=window, noise_level=noise_level)
+    return [_describe(parts, index, read, longest_lag, u_max) for index, read in enumerate(reads)]
 
 
-def _describe(
-    read: PreparedBranch, line: GatedLine, level: float, noise: float, correlation: float, u_max: float
-) -> BranchShape:
+def _describe(parts: StraightParts, index: int, read: PreparedBranch, longest_lag: float, u_max: float) -> BranchShape:
+    line, level, noise = parts.lines[index], parts.levels[index], parts.noises[index]
     branch, kept = read.branch, line.kept
-    tail = _find_tail(read, level, line, noise, correlation, u_max)
+    dead_zone = look_into_dead_zone(
+        read,
+        line,
+        least=parts.least[index],
+        level=level,
+        noise=noise,
+        correlation=parts.correlation,
+        shift=longest_lag * branch.rate if math.isfinite(branch.rate) else 0.0,
+        u_max=u_max,
+    )
+    tail = _find_tail(read, level, line, noise, parts.correlation, u_max)
     onset, onset_se = _find_onset(read, tail, level, noise)
+    if dead_zone.depth > 0:  # averages show what no reading does
+        first = line.knee - dead_zone.depth
+        tail, onset = replace(tail, at_level=min(tail.at_level, first)), min(onset, first)
     return BranchShape(
         prepared=read,
         line=line,
@@ -60,6 +76,7 @@ def _describe(
         outliers=line.outliers,
         dropped=line.dropped,
         level=level,
+        dead_zone=dead_zone,
         tail=tail,
         onset=onset,
         onset_se=onset_se,

@@ -59,6 +59,8 @@ class DescribedTests:
     zero_L_min: dict[str, float]
     #: Standard error of what was subtracted from each of `tests`, as of white noise, m³/s; 0 where nothing was.
     zero_se: tuple[float, ...]
+    #: Leak that was subtracted from each of `tests`, m³/s; 0 where there is none.
+    leak: tuple[float, ...]
     #: What differs from ramp to ramp, of the rising and of the falling branch; None where there is none.
     between_ramps: tuple[BetweenRamps | None, BetweenRamps | None]
 

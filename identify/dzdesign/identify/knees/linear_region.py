@@ -39,17 +39,22 @@ class StraightParts:
 
     #: One per branch, as wide as the characteristic goes on straight.
     lines: tuple[GatedLine, ...]
-    #: Per branch the flow that counts as flow, and the noise of a reading while the valve is shut, m³/s.
+    #: Per branch, m³/s: the flow that is no use or below the meter's floor, the one from which on a single reading is
+    #: flow, and the noise of a reading while the valve is shut.
+    least: tuple[float, ...]
     levels: tuple[float, ...]
     noises: tuple[float, ...]
     #: Of the noise of neighbouring samples, by all branches together: at most, to one standard error.
     correlation: float
 
 
-def find_straight_parts(reads: Sequence[PreparedBranch], *, u_max: float, window: tuple[float, float]) -> StraightParts:
+def find_straight_parts(
+    reads: Sequence[PreparedBranch], *, u_max: float, window: tuple[float, float], noise_level: float | None = None
+) -> StraightParts:
     """Find the straight part of each branch of all ramp tests, and what all of them tell of the noise.
 
-    `window` holds the shares of the largest flow between which the characteristic is taken as straight at first.
+    `window` holds the shares of the largest flow between which the characteristic is taken as straight at first; a
+    `noise_level` that is declared (m³/s) stands in the place of the flow that is no use.
 
     Raises
     ------
@@ -67,10 +72,8 @@ def find_straight_parts(reads: Sequence[PreparedBranch], *, u_max: float, window
     correlation, blocks = _shared_noise(narrow)
     narrow = [line.with_shared_noise(correlation, blocks) for line in narrow]
     noises = [_quiet_noise(read.branch, read.y, line.knee) for read, line in zip(reads, narrow, strict=True)]
-    levels = [
-        max(read.floor, USEFUL_FLOW * read.y_max, NOISE_LEVEL * noise)
-        for read, noise in zip(reads, noises, strict=True)
-    ]
+    least = [max(read.floor, USEFUL_FLOW * read.y_max if noise_level is None else noise_level) for read in reads]
+    levels = [max(flow, NOISE_LEVEL * noise) for flow, noise in zip(least, noises, strict=True)]
     lowest = [ABOVE_LEVEL * level / read.y_max for read, level in zip(reads, levels, strict=True)]
     lines = _widest_straight(reads, narrow, lowest, correlation, blocks, LARGEST_SHIFT * u_max)
     # The wider windows know the noise better. Errors that are believed must bear that it is not known exactly.
@@ -78,6 +81,7 @@ def find_straight_parts(reads: Sequence[PreparedBranch], *, u_max: float, window
     correlation = correlation_upper_limit(correlation, [line.roughness for line in lines])
     return StraightParts(
         lines=tuple(line.with_shared_noise(correlation, blocks) for line in lines),
+        least=tuple(least),
         levels=tuple(levels),
         noises=tuple(noises),
         correlation=correlation,

@@ -1,7 +1,6 @@
 """Ramp tests made comparable: zero error out, branches apart, at the nominal pressure drop, in order, described."""
 
 import logging
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -14,9 +13,9 @@ from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.knees.characteristic import describe_branches, find_meter_floor
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
 from dzdesign.identify.knees.gated_line import prepare_branch
-from dzdesign.identify.knees.meter_lag import find_lag
-from dzdesign.identify.knees.noise import robust_sigma
+from dzdesign.identify.knees.meter_lag import MeterLag, find_lag
 from dzdesign.identify.knees.profile import largest_flow
+from dzdesign.identify.knees.readings_at_rest import find_rest_flows
 from dzdesign.identify.knees.refusals import (
     refuse_a_jump,
     refuse_a_shut_valve,
@@ -33,12 +32,6 @@ logger = logging.getLogger(__name__)
 
 #: A recording whose command moves by less than this share of u_max is no part of a ramp.
 SMALLEST_SWEEP = 0.1
-#: Commands within this share of u_max are at rest; a wider one is taken where so few readings would be left.
-AT_REST, FEWEST_AT_REST = (0.01, 0.03, 0.1), 20
-#: Share of the largest flow that is a flow for certain, and share of the command there that lies far below it.
-FIRST_FLOW, FAR_BELOW = 0.2, 0.5
-#: A reading at rest below this share of the largest flow is no zero error.
-ZERO_SHARE = 2e-3
 
 
 def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> DescribedTests:
@@ -49,9 +42,8 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
     InputError
         For a test that holds no ramp or no flow, and for tests that can't stand beside one another.
     """
-    zeros = [_reading_at_zero(test, options.u_max) for test in tests]
-    zero_se = {test.source: se for test, (_, se) in zip(tests, zeros, strict=True)}
-    tests = [replace(test, q=test.q - zero) for test, (zero, _) in zip(tests, zeros, strict=True)]
+    rest = find_rest_flows(tests, options.u_max)
+    tests = [replace(test, q=test.q - flow) for test, flow in zip(tests, rest.flows, strict=True)]
     if len(tests) == 1 and tests[0].started is None:
         tests = [replace(tests[0], started=0.0)]  # its own clock is common to all of its ramps
     ramps = split_recordings(tests, options, options.meter_lag or 0.0)
@@ -62,65 +54,22 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
         logger.info("%s", left_out)
     _refuse_what_shows_no_dead_zone(pooled, options)
     floor = options.meter_floor if options.meter_floor is not None else found_floor(pooled, options)
-    described = _described(pooled, floor, options)
+    described = _described(pooled, floor, lag, options)
     _refuse_mixed_branches(described)
     between = [_between_ramps(described, column, options) for column in (0, 1)]
     if any(np.any(shift != 0) for found in between if found for shift in found.shifts):
         moved = [_with_ramps_together(item, row, between) for row, item in enumerate(pooled)]
-        described = _described(moved, floor, options)
+        described = _described(moved, floor, lag, options)
     return DescribedTests(
         tests=tuple(described),
         between_ramps=(between[0], between[1]),
         floor=floor,
         lag=lag,
-        zero_L_min={test.source: zero / L_MIN for test, (zero, _) in zip(tests, zeros, strict=True) if zero},
+        zero_L_min={source: zero / L_MIN for source, zero in rest.zero.items() if zero},
         # Of several recordings pooled to one test, the worst: each stands for its own part of the ramp.
-        zero_se=tuple(max(zero_se.get(name, 0.0) for name, _ in item.files) for item in described),
+        zero_se=tuple(max(rest.se.get(name, 0.0) for name, _ in item.files) for item in described),
+        leak=tuple(rest.leak_per_Pa * (item.dp or 0.0) for item in described),
     )
-
-
-def _reading_at_zero(test: RampTest, u_max: float) -> tuple[float, float]:
-    """Return what the meter reads at zero command where that is not zero, and its standard error, m³/s.
-
-    It is the meter's zero error, or a leak. Thousands of readings at rest tell it far better than any declared bound;
-    zeros are returned where it does not stand out.
-    """
-    rest = readings_at_rest(test, u_max)
-    if rest.size < FEWEST_AT_REST:
-        return 0.0, 0.0
-    zero, error = float(np.median(rest)), _error_of_median(rest)
-    stands_out = abs(zero) > max(5 * error, ZERO_SHARE * float(np.abs(test.q).max()))
-    return (zero, float(error)) if stands_out else (0.0, 0.0)
-
-
-def readings_at_rest(test: RampTest, u_max: float) -> np.ndarray:
-    """Return the flows read where the command rests, m³/s; fewer than `FEWEST_AT_REST` if it does so nowhere.
-
-    Of the hold before the first ramp only the later half counts, and none of it if it still drifts: hoses and meter may
-    be filling. Where the command hardly rests, what the meter reads far below the first flow serves as well.
-    """
-    flowing = np.abs(test.q) > FIRST_FLOW * np.abs(test.q).max()
-    opens = float(np.quantile(np.abs(test.u[flowing]), 0.01)) if flowing.any() else 0.0
-    rest = test.q[:0]
-    for share in AT_REST:
-        at_rest = np.abs(test.u) <= share * u_max
-        if share > AT_REST[0] and share * u_max > FAR_BELOW * opens:
-            break  # the valve may be open there
-        rest = _without_filling(test, at_rest)
-        if rest.size >= FEWEST_AT_REST:
-            break
-    return rest
-
-
-def _without_filling(test: RampTest, at_rest: np.ndarray) -> np.ndarray:
-    before = int(np.argmin(at_rest)) if not at_rest.all() else 0
-    third, fourth = test.q[before // 2 : 3 * before // 4], test.q[3 * before // 4 : before]
-    drifts = third.size >= 5 and abs(np.median(third) - np.median(fourth)) > 5 * _error_of_median(fourth)
-    return test.q[at_rest & (np.arange(at_rest.size) >= (before if drifts else before // 2))]
-
-
-def _error_of_median(values: np.ndarray) -> float:
-    return robust_sigma(values) / math.sqrt(values.size)
 
 
 def split_recordings(tests: Sequence[RampTest], options: IdentifyOptions, lag: float) -> list[Ramp]:
@@ -180,7 +129,7 @@ def found_floor(pooled: list[PooledTest], options: IdentifyOptions) -> float:
     return max((floor for floor in floors if floor is not None), default=0.0)
 
 
-def _described(pooled: list[PooledTest], floor: float, options: IdentifyOptions) -> list[DescribedTest]:
+def _described(pooled: list[PooledTest], floor: float, lag: MeterLag, options: IdentifyOptions) -> list[DescribedTest]:
     """Describe the branches of all tests."""
     reads = [
         prepare_branch(branch, item.test, u_max=options.u_max, floor=floor)
@@ -189,7 +138,13 @@ def _described(pooled: list[PooledTest], floor: float, options: IdentifyOptions)
     ]
     for read in reads:
         refuse_a_jump(read, options.u_max)
-    shapes = describe_branches(reads, u_max=options.u_max, window=options.knee_window)
+    shapes = describe_branches(
+        reads,
+        u_max=options.u_max,
+        window=options.knee_window,
+        noise_level=options.noise_level,
+        longest_lag=lag.seconds + lag.longer,
+    )
     for shape in shapes:
         refuse_an_impossible_knee(shape.prepared.branch, shape.knee, shape.prepared.source, options.u_max)
     of_tests = iter(shapes)

@@ -88,7 +88,7 @@ def _dwells(u: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     before, after = np.array(halves).T
     step = float(np.median(np.abs(np.diff((before + after) / 2))))
     # A ramp with a hole or two, or with holds, has stretches that are no level.
-    flat = np.abs(after - before) <= LEVEL * step
+    flat = np.abs(after - before) <= LEVEL * step + STEP_SIGMAS * noise / np.sqrt(ends - starts)
     if step < SMALLEST_STEP * span or not np.sum((ends - starts)[flat]) >= IN_DWELLS * u.size:
         return None
     return starts[flat], ends[flat]

@@ -87,6 +87,20 @@ class TestResult:
     saturates: Annotated[
         bool, Meta(description="Whether the flow stops growing before full command: the spool is at its stop.")
     ]
+    leak_L_min: Annotated[
+        Flow,
+        Meta(
+            description="Flow at zero command that grows with the pressure drop: a leak. The knees are those of the "
+            "flow beyond it, the bounds allow for its end where the valve opens."
+        ),
+    ]
+    noise_level_L_min: Annotated[
+        Flow,
+        Meta(
+            description="Flow below which there is none: the largest of the meter's floor, what averages over the dead "
+            "zone resolve, and 0.5 % of the largest flow or what was declared."
+        ),
+    ]
     noise_L_min: Annotated[Flow, Meta(description="Standard deviation of the flow's noise.")]
     noise_variance_inflation: Annotated[
         float,

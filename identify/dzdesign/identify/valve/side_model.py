@@ -51,8 +51,7 @@ class BoundsBasis:
     level_L_min: Annotated[
         Flow,
         Meta(
-            description="Flow below which there is none: the largest of the meter's floor, its noise and 0.5 % of the "
-            "largest flow."
+            description="Flow below which there is none: the largest noise level of the tests."
         ),
     ]
     repeatability: Annotated[Repeatability, Meta(description="What differs from ramp to ramp.")]

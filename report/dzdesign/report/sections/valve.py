@@ -74,6 +74,7 @@ def _trend(name: str, side: SideModel) -> str:
 
 def thresholds_table(side: SideModel, guard: str, title: str) -> Table:
     """Return the thresholds of each ramp test, with the lower bounds of the guarded one."""
+    leaks = (("leak (L/min)", lambda row: number(row[0].leak_L_min, 2)),)
     return table_of(
         title,
         zip(side.tests, side.guards[guard].u_lower_V, strict=True),
@@ -87,6 +88,8 @@ def thresholds_table(side: SideModel, guard: str, title: str) -> Table:
         ("slope (L/min/V)", lambda row: number(row[0].slope_L_min_V, 3)),
         ("largest flow (L/min)", lambda row: number(row[0].q_max_L_min, 2)),
         ("noise (L/min)", lambda row: number(row[0].noise_L_min, 3)),
+        ("noise level (L/min)", lambda row: number(row[0].noise_level_L_min, 2)),
+        *(leaks if any(test.leak_L_min for test in side.tests) else ()),
         ("outliers", lambda row: number(row[0].outliers, 0)),
         ("ramp test", lambda row: row[0].source),
     )

@@ -1,0 +1,156 @@
+"""What flows, or is read, at zero command: the meter's zero error, the same at every pressure, and a leak, which grows.
+
+A leak through the overlap is laminar, so it is proportional to the pressure drop. Whether it goes on beside the main
+flow once the valve is open, the recordings can't tell: subtracted though it stops, it puts the knee too high by the
+leak over the flow gain. So the leak is subtracted, the knees are those of the flow beyond it, and the bounds are
+lowered by what they would be without.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dzdesign.identify.knees.noise import robust_sigma
+from dzdesign.identify.reading.ramp_test import RampTest
+
+#: Commands within this share of u_max are at rest; a wider one is taken where so few readings would be left.
+AT_REST, FEWEST_AT_REST = (0.01, 0.03, 0.1), 20
+#: Share of the largest flow that is a flow for certain, and share of the command there that lies far below it.
+FIRST_FLOW, FAR_BELOW = 0.2, 0.5
+#: Standard errors by which a reading at rest must differ from zero, and share of the largest flow: below, it is none.
+ZERO_ERRORS, ZERO_SHARE = 5.0, 2e-3
+#: Pressure drops at rest that differ by more than this factor are two.
+TWO_PRESSURES = 1.1
+#: Share of the squares of the readings at rest about their mean that a leak must explain, and its standard errors.
+EXPLAINED, LEAK_ERRORS = 0.5, 4.0
+#: Blocks of the readings at rest, in the order of time, whose means say how coloured their noise is.
+BLOCKS = 8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RestFlows:
+    """What is to be subtracted from the flow of each recording, m³/s: a number, or one for each sample."""
+
+    flows: tuple[float | np.ndarray, ...]
+    #: By source: the meter's zero error in it, 0 if it does not stand out; standard error of what is subtracted; m³/s.
+    zero: dict[str, float]
+    se: dict[str, float]
+    #: Leak over the pressure drop, m³/(s Pa); 0 where there is none.
+    leak_per_Pa: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Rest:
+    """Readings at rest of one recording at one pressure drop: its median and that one's standard error, m³/s."""
+
+    recording: int
+    dp: float
+    flow: float
+    se: float
+    #: Variance of the means of their blocks over what white noise would give them.
+    colour: float
+
+
+def find_rest_flows(tests: Sequence[RampTest], u_max: float) -> RestFlows:
+    """Find what recordings read at zero command, and what of it grows with the pressure drop."""
+    levels = [level for number, test in enumerate(tests) for level in _levels(number, test, u_max)]
+    leak = _leak(levels, max(float(np.abs(test.q).max()) for test in tests))
+    flows: list[float | np.ndarray] = []
+    zeros: dict[str, float] = {}
+    errors: dict[str, float] = {}
+    for number, test in enumerate(tests):
+        own = [level for level in levels if level.recording == number]
+        zero, se = _zero_beside(leak, test, own, u_max)
+        errors[test.source] = se
+        # Beside a leak the zero is what a line extrapolates to no pressure, about twice as far off.
+        told = abs(zero) > max(2 * ZERO_ERRORS * se, ZERO_SHARE * float(np.abs(test.q).max()))
+        zeros[test.source] = zero if told or not leak else 0.0
+        flows.append(zero if leak == 0 or test.dp is None else zero + leak * test.dp)
+    return RestFlows(flows=tuple(flows), zero=zeros, se=errors, leak_per_Pa=leak)
+
+
+def _zero_beside(leak: float, test: RampTest, levels: Sequence[_Rest], u_max: float) -> tuple[float, float]:
+    """Return what the meter reads at zero command beside a leak (m³/(s Pa)), and its standard error, m³/s.
+
+    Thousands of readings at rest tell it far better than any declared bound; zeros where it does not stand out.
+    """
+    if leak > 0 and levels:
+        zero = float(np.mean([level.flow - leak * level.dp for level in levels]))
+        return zero, max(level.se for level in levels)
+    rest = test.q[readings_at_rest(test, u_max)]
+    if rest.size < FEWEST_AT_REST:
+        return 0.0, 0.0
+    zero, error = float(np.median(rest)), _error_of_median(rest)
+    stands_out = abs(zero) > max(ZERO_ERRORS * error, ZERO_SHARE * float(np.abs(test.q).max()))
+    return (zero, error) if stands_out else (0.0, 0.0)
+
+
+def _levels(number: int, test: RampTest, u_max: float) -> Iterator[_Rest]:
+    """Yield what a recording reads at rest, at each of its pressure drops."""
+    if test.dp is None:
+        return
+    rows = readings_at_rest(test, u_max)
+    rows = rows[test.dp[rows] > 0]
+    order = rows[np.argsort(test.dp[rows], kind="stable")]
+    jumps = np.flatnonzero(test.dp[order][1:] > TWO_PRESSURES * test.dp[order][:-1]) + 1
+    for part in np.split(order, jumps):
+        if part.size < FEWEST_AT_REST:
+            continue
+        q = test.q[np.sort(part)]
+        blocks = np.array([block.mean() for block in np.array_split(q, BLOCKS)])
+        white = robust_sigma(q) ** 2 * BLOCKS / q.size
+        colour = float(np.var(blocks, ddof=1) / white) if white > 0 else 1.0
+        yield _Rest(number, float(np.median(test.dp[part])), float(np.median(q)), _error_of_median(q), colour)
+
+
+def _leak(levels: Sequence[_Rest], largest: float) -> float:
+    """Return by how much the readings at rest grow with the pressure drop, m³/(s Pa); 0 if that does not stand out.
+
+    Weighted least squares of a zero error that is common to all, and a leak proportional to the pressure drop.
+    """
+    if len(levels) < 2:
+        return 0.0
+    dp, flow, se = (np.array([getattr(level, name) for level in levels]) for name in ("dp", "flow", "se"))
+    if dp.max() <= TWO_PRESSURES * dp.min():
+        return 0.0
+    # One meter, so one colour; readings without noise are taken to be as fine as no meter is.
+    se = np.maximum(se * math.sqrt(max(1.0, float(np.median([level.colour for level in levels])))), 1e-6 * largest)
+    weight = se**-2.0
+    away, rise = dp - np.average(dp, weights=weight), flow - np.average(flow, weights=weight)
+    squares = float(np.sum(weight * away**2))
+    leak = float(np.sum(weight * away * rise)) / squares
+    explained = leak**2 * squares >= EXPLAINED * float(np.sum(weight * rise**2))
+    stands_out = leak * math.sqrt(squares) > LEAK_ERRORS and leak * np.ptp(dp) > ZERO_SHARE * largest
+    return leak if explained and stands_out else 0.0
+
+
+def readings_at_rest(test: RampTest, u_max: float) -> np.ndarray:
+    """Return which readings are taken where the command rests, in order; fewer than `FEWEST_AT_REST` if nowhere.
+
+    Of the hold before the first ramp only the later half counts, and none of it if it still drifts: hoses and meter may
+    be filling. Where the command hardly rests, what the meter reads far below the first flow serves as well.
+    """
+    flowing = np.abs(test.q) > FIRST_FLOW * np.abs(test.q).max()
+    opens = float(np.quantile(np.abs(test.u[flowing]), 0.01)) if flowing.any() else 0.0
+    rest = np.empty(0, dtype=int)
+    for share in AT_REST:
+        at_rest = np.abs(test.u) <= share * u_max
+        if share > AT_REST[0] and share * u_max > FAR_BELOW * opens:
+            break  # the valve may be open there
+        rest = _without_filling(test, at_rest)
+        if rest.size >= FEWEST_AT_REST:
+            break
+    return rest
+
+
+def _without_filling(test: RampTest, at_rest: np.ndarray) -> np.ndarray:
+    before = int(np.argmin(at_rest)) if not at_rest.all() else 0
+    third, fourth = test.q[before // 2 : 3 * before // 4], test.q[3 * before // 4 : before]
+    drifts = third.size >= 5 and abs(np.median(third) - np.median(fourth)) > 5 * _error_of_median(fourth)
+    return np.flatnonzero(at_rest & (np.arange(at_rest.size) >= (before if drifts else before // 2)))
+
+
+def _error_of_median(values: np.ndarray) -> float:
+    return robust_sigma(values) / math.sqrt(values.size)

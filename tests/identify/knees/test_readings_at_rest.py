@@ -1,0 +1,96 @@
+"""What is read at zero command: the same at every pressure it is the meter's zero error, growing with it a leak."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dzdesign.identify.identification import identify
+from dzdesign.identify.options import IdentifyOptions
+from tests.support.bench_recordings import L_MIN, Valve, record
+
+PRESSURES = (1.0, 3.0, 5.0)
+CLOSING = 5.2
+OPTIONS = IdentifyOptions(meter_lag=0.0, repeatability=0.0)
+
+
+def recordings(per_MPa, *, zero=0.0, stops=True, noise=0.05, pressures=PRESSURES, memory=0.0):
+    """Ramps of a valve with a leak that stops where it opens, or goes on beside the main flow."""
+    tests = []
+    for dp in pressures:
+        quiet = record(Valve(closing=CLOSING, noise=0.0), dp)
+        scatter = record(Valve(noise=noise, memory=memory, gain=0.0), dp).q
+        leak = per_MPa * dp * L_MIN
+        main = np.maximum(quiet.q, leak) if stops else quiet.q + leak
+        tests.append(replace(quiet, q=main + zero * L_MIN + scatter))
+    return tests
+
+
+def warned(valve, code):
+    return [warning for warning in valve.warnings if warning.code == code]
+
+
+class TestLeak:
+    @pytest.mark.parametrize("zero", [0.0, -0.4, 0.3])
+    @pytest.mark.parametrize("stops", [True, False])
+    @pytest.mark.parametrize("noise", [0.05, 0.75])
+    def test_it_is_reported_for_each_pressure_and_in_the_bounds_whether_it_stops_or_not(self, zero, stops, noise):
+        valve = identify(recordings(0.2, zero=zero, stops=stops, noise=noise), OPTIONS)
+        for test, dp in zip(valve.positive.tests, PRESSURES, strict=True):
+            assert test.leak_L_min == pytest.approx(0.2 * dp, rel=0.02 if noise < 0.5 else 0.3)
+            assert test.u_guard_lower_V < CLOSING
+        assert max(valve.positive.curve.u_offset_V) < CLOSING
+        (warning,) = warned(valve, "leak")
+        assert "0.2" in warning.text and warning.source == "p_5_1.csv"
+        assert bool(warned(valve, "meter-zero")) == (zero != 0.0) or noise > 0.5
+
+    def test_taken_for_a_zero_error_it_would_open_the_valve(self):
+        """The recordings of one pressure drop can't tell: what the bounds are worth without the leak in them."""
+        (test,) = identify(recordings(0.2, pressures=(5.0,)), OPTIONS).positive.tests
+        assert test.leak_L_min == 0.0
+        assert test.u_guard_lower_V > CLOSING + 0.09
+
+    def test_two_pressures_in_one_recording_tell_it(self):
+        low, high = recordings(0.2, pressures=(1.0, 5.0))
+        later = high.time + low.time[-1] + 0.02
+        one = replace(
+            low,
+            time=np.concatenate([low.time, later]),
+            **{name: np.concatenate([getattr(low, name), getattr(high, name)]) for name in ("u", "q", "dp")},
+        )
+        tests = identify([one], OPTIONS).positive.tests
+        assert [test.leak_L_min for test in tests] == pytest.approx([0.2, 1.0], rel=0.02)
+        assert all(test.u_guard_lower_V < CLOSING for test in tests)
+
+    def test_one_that_stops_feigns_no_trend(self):
+        side = identify(recordings(0.2), OPTIONS).positive
+        assert side.trend == "flat"
+
+    def test_it_sags_with_the_pressure(self):
+        tests = []
+        for test in recordings(0.2, stops=False):
+            sagging = test.dp * (1 - 0.2 * (test.q / test.q.max()))
+            tests.append(replace(test, dp=sagging, q=test.q * np.sqrt(sagging / test.dp)))
+        side = identify(tests, OPTIONS).positive
+        for test in side.tests:
+            assert test.u_knee_falling_V == pytest.approx(CLOSING, abs=0.015)
+
+
+class TestZero:
+    @pytest.mark.parametrize("zero", [0.5, -0.5])
+    def test_the_same_at_every_pressure_it_stays_the_meters(self, zero):
+        valve = identify(recordings(0.0, zero=zero), OPTIONS)
+        assert all(test.leak_L_min == 0 for test in valve.positive.tests)
+        assert len(warned(valve, "meter-zero")) == len(PRESSURES) and not warned(valve, "leak")
+        assert valve.positive.tests[0].u_guard_lower_V > CLOSING - 0.02
+
+    @pytest.mark.parametrize("zeros", [(0.1, -0.2, 0.1), (0.5, 0.3, 0.1)])
+    def test_what_does_not_grow_with_the_pressure_is_no_leak(self, zeros):
+        tests = [recordings(0.0, zero=zero, pressures=(dp,))[0] for zero, dp in zip(zeros, PRESSURES, strict=True)]
+        assert not warned(identify(tests, OPTIONS), "leak")
+
+    @pytest.mark.parametrize("seed", range(3))
+    def test_slow_noise_is_no_leak(self, seed):
+        pressures = [dp + 0.01 * seed for dp in PRESSURES]
+        valve = identify(recordings(0.0, noise=0.3, memory=0.98, pressures=pressures), OPTIONS)
+        assert not warned(valve, "leak")
