@@ -5,7 +5,7 @@ import re
 from collections.abc import Callable
 
 from dzdesign.core.errors import InputError, quoted
-from dzdesign.core.units import parse_quantity
+from dzdesign.core.units import EXAMPLES, parse_quantity
 
 
 def quantity(kind: str) -> Callable[[str, str], float]:
@@ -92,17 +92,18 @@ def quantity_range(kind: str) -> Callable[[str, str], tuple[float, float]]:
     """
 
     def read(text: str, option: str) -> tuple[float, float]:
-        ends = text.split("..") if isinstance(text, str) else [text]
-        high = parse_quantity(ends[-1], kind, option)
-        if len(ends) == 1:
-            return high, high
-        unit = ends[1].strip().lstrip("+-0123456789.,eE").strip()
-        low = ends[0].strip()
-        if len(ends) > 2 or not low:
-            raise InputError(f"{option} is {quoted(text)}, expected two ends and a unit such as '1..5 {unit}'")
-        low_value = parse_quantity(low if low[-1].isalpha() else f"{low} {unit}", kind, option)
-        if not low_value <= high:
+        first, dots, last = text.partition("..") if isinstance(text, str) else (text, "", "")
+        if not dots:
+            only = parse_quantity(first, kind, option)
+            return only, only
+        unit = re.sub(r"^[\s\d.,+-]*", "", last)
+        if not unit or not first.strip():
+            example = EXAMPLES[kind].split(",")[0]
+            raise InputError(f"{option} is {quoted(text)}, expected two numbers and a unit such as '1..5 {example}'")
+        lower = first if re.search(r"[^\W\d]", first) else f"{first} {unit}"
+        low, high = parse_quantity(lower, kind, option), parse_quantity(last, kind, option)
+        if low > high:
             raise InputError(f"{option} is {quoted(text)}, expected the lower end first")
-        return low_value, high
+        return low, high
 
     return read

@@ -199,7 +199,7 @@ def _stated(arguments: PlanArguments, valve: "ExpectedValve", bench: "Bench", pi
         Premise(
             name="repeatability",
             value=f"{100 * valve.scatter / bench.u_max:.3g} %",
-            origin=origin("repeatability"),
+            origin=origin("repeatability", in_pilot=pilot is not None and pilot.scatter_is != "assumed"),
         ),
         Premise(name="noise", value=f"{bench.noise / L_MIN:.3g} L/min", origin=origin("noise")),
         Premise(

@@ -11,6 +11,7 @@ from dzdesign.identify.knees.linear_region import ABOVE_LEVEL, NOISE_LEVEL, USEF
 from dzdesign.identify.knees.meter_lag import MeterLag
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.ramp_result import TestResult
+from dzdesign.identify.valve.repeatability import Origin
 
 #: A line through fewer readings is none.
 FEWEST_READINGS = 12
@@ -160,6 +161,8 @@ class Pilot:
     """What a quick series of the valve tells."""
 
     valve: ExpectedValve
+    #: Where its scatter is from: of too few repeats it is an assumption.
+    scatter_is: Origin
     u_max: float
     #: m³/s, what its colour adds to the variance of a mean, and m³/s.
     noise: float
@@ -199,6 +202,7 @@ def read_pilot(model: ValveModel) -> Pilot:
             straight=np.array([test.straight_falling or test.straight_rising for test in tests], dtype=float),
             scatter=scatter,
         ),
+        scatter_is=found.origin,
         u_max=model.u_max_V,
         noise=L_MIN * float(np.median([test.noise_L_min for test in tests])),
         noise_inflation=float(np.median([test.noise_variance_inflation for test in tests])),

@@ -14,7 +14,8 @@ from dzdesign.identify.planning.series import Series, lay_out_series, most_round
 
 #: Times of a ramp that a bench is set to, s.
 RAMP_TIMES = (2.0, 5.0, 10.0, 20.0, 30.0, 50.0, 75.0, 100.0, 150.0, 200.0, 300.0, 500.0, 1000.0)
-MOST_PRESSURES, MOST_ROUNDS = 8, 12
+#: Numbers of pressure drops, where there are several, and the most rounds of them.
+PRESSURES, MOST_ROUNDS = (2, 3, 4, 5, 6, 7, 8, 10, 12, 15), 12
 #: Neighbouring pressure drops differ by more than this share: nearer ones are pooled to one test, or nearly.
 LEAST_STEP = 0.05
 #: Draws by which series are compared, and by which one is predicted: the mean is then good to 3 and to 1 %.
@@ -158,7 +159,7 @@ class _Search:
         low, high = self.request.dp_range
         if low == high:
             return [1]
-        placed = [place_pressures(self.valve, self.bench, low, high, count) for count in range(2, MOST_PRESSURES + 1)]
+        placed = [place_pressures(self.valve, self.bench, low, high, count) for count in PRESSURES]
         return [dp.size for dp in placed if np.all(np.diff(dp) >= LEAST_STEP * dp[1:])]
 
     def _frames(self, budget: float, *, repeated: bool) -> Iterator[tuple[int, float, int]]:

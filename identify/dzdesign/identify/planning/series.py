@@ -1,5 +1,6 @@
 """`Series`: pressure drops, ramps and their order, as a bench is to run them."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,8 +8,8 @@ import numpy as np
 from dzdesign.identify.constants import MPA
 from dzdesign.identify.planning.premises import Bench, ExpectedValve
 
-#: Significant digits of a pressure drop between the ends of the range.
-DIGITS = 2
+#: Significant digits of a pressure drop between the ends of the range, and at them: a pilot series measured those.
+DIGITS, END_DIGITS = 2, 3
 #: Share of the threshold's whole change that is none: then the pressure drops are spread evenly.
 EVEN = 1e-3
 
@@ -70,7 +71,7 @@ def place_pressures(valve: ExpectedValve, bench: Bench, low: float, high: float,
     is on equal steps of the pressure drop. Those between the ends are round numbers.
     """
     if count == 1:
-        return np.array([high])
+        return _rounded([high], END_DIGITS)
     dp = np.linspace(low, high, 1001)
     place = (dp - low) / (high - low)
     threshold = valve.threshold_at(dp)
@@ -78,5 +79,9 @@ def place_pressures(valve: ExpectedValve, bench: Bench, low: float, high: float,
     if way[-1] > EVEN * bench.u_max:
         place = (place + way / way[-1]) / 2
     inner = np.interp(np.linspace(0, 1, count)[1:-1], place, dp)
-    rounded = [float(f"{value / MPA:.{DIGITS}g}") * MPA for value in inner]
-    return np.array([low, *rounded, high])
+    first, last = _rounded([low, high], END_DIGITS)
+    return np.array([first, *_rounded(inner, DIGITS), last])
+
+
+def _rounded(dp: Iterable[float], digits: int) -> np.ndarray:
+    return np.array([float(f"{value / MPA:.{digits}g}") * MPA for value in dp])

@@ -29,6 +29,7 @@ class PlannedBench:
     hold: float = 2.0
 
     def threshold(self, dp_MPa):
+        """Return the closing threshold, V."""
         return self.closing - self.fall_per_MPa * (np.asarray(dp_MPa) - 1)
 
     def record(self, order_MPa, ramp_s, pause, rng):
