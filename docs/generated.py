@@ -160,7 +160,10 @@ def warnings() -> str:
 
 def key_lines(artefact: type) -> list[str]:
     """Return a field of reStructuredText for each key of an artefact, which its annotation describes."""
-    hints = get_type_hints(artefact, include_extras=True)
+    try:
+        hints = get_type_hints(artefact, include_extras=True)
+    except NameError:  # arguments of a stage, some of whose types only a type checker imports: no artefact
+        return []
     lines = []
     for field in fields(artefact):
         described = [each.description for each in getattr(hints[field.name], "__metadata__", ()) if each.description]

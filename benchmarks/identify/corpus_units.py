@@ -162,7 +162,7 @@ def with_units_below(rows: Rows, *names: str) -> str:
     return "\n".join([head, "\t".join(["ms", "V", *["psi"] * len(names), "l/min"]), *lines]) + "\n"
 
 
-def command(rows: Rows, label: str, values: np.ndarray, digits: int = 4, clock: bool = True) -> str:
+def command_text(rows: Rows, label: str, values: np.ndarray, digits: int = 4, clock: bool = True) -> str:
     """Return a recording whose command stands under another label, in its own unit."""
     time = {"time_s": (rows["t"], 3)} if clock else {}
     return table({**time, label: (values, digits), "dP_bar": (10 * rows["dP"], 3), "Q_Lmin": (rows["Q"], 3)})
@@ -244,7 +244,7 @@ def units() -> Iterator[Case]:
     ):
         digits = 6 if label in ("duty", "I_coil [A]") else 4
         rows = {f"unit_{number}_{dp:g}.csv": bench(ramp(), edge=dp, seed=40 + number) for dp in (1.0, 2.5)}
-        files = {name: command(each, label, scale(each["u"]), digits) for name, each in rows.items()}
+        files = {name: command_text(each, label, scale(each["u"]), digits) for name, each in rows.items()}
         named = ("--columns", f"u={label}:{declared}") if declared else ("--columns", f"u={label}")
         if "[A]" in label:
             named = ("--columns", f"u={label}:0..0.8 A = 0..100 %")
@@ -258,11 +258,11 @@ def units() -> Iterator[Case]:
         ]
     ):
         each = bench(BOTH_WAYS, seed=60 + number, positive=False)
-        files = {f"bipolar_{number}.csv": command(each, label, scale(each["u"]), 6)}
+        files = {f"bipolar_{number}.csv": command_text(each, label, scale(each["u"]), 6)}
         named = ("--columns", f"u={label}:{declared}") if declared else ("--columns", f"u={label}")
         yield Case(name=f"bipolar_{number}", kind=kind, files=files, options=named, sides=both)
     each = bench(ramp(), seed=70)
-    text = {"no_unit.csv": command(each, "duty", 0.09 * each["u"], 6)}
+    text = {"no_unit.csv": command_text(each, "duty", 0.09 * each["u"], 6)}
     yield Case(name="no_unit", kind=kind, files=text, options=("--columns", "u=duty"), asks="u=duty:0..1 = 0..100 %")
 
 
@@ -270,7 +270,7 @@ def without_a_clock() -> Iterator[Case]:
     kind = "no column of time"
     for number, rate in enumerate((50.0, 10.0, 1000.0)):
         each = bench(ramp(20.0), seed=80 + number, rate_Hz=rate)
-        text = {f"no_time_{rate:g}.csv": command(each, "u_V", each["u"], clock=False)}
+        text = {f"no_time_{rate:g}.csv": command_text(each, "u_V", each["u"], clock=False)}
         yield Case(name=f"no_time_{rate:g}", kind=kind, files=text, options=("--sample-rate", f"{rate:g} Hz"))
     each = bench(ramp(), seed=83)
     hot = {"T_degC": (np.full(each["t"].size, 44.0), 1), "u_V": (each["u"], 4), "dP_MPa": (each["dP"], 5)}
@@ -281,7 +281,49 @@ def without_a_clock() -> Iterator[Case]:
     yield Case(name="both_clocks", kind=kind, files=text, options=("--sample-rate", "50 Hz"), asks="leave one of them")
 
 
-KINDS: tuple[Callable[[], Iterator[Case]], ...] = (four_ports, units, without_a_clock)
+#: What must not be said of a staircase: its steps are no holes, its transients no outliers.
+NOT_OF_STAIRS = ("gap", "outliers", "stick-slip", "noise", "bend")
+
+
+def staircases() -> Iterator[Case]:
+    kind = "staircases"
+    for number, (step, dwell, rise_s, floor) in enumerate(
+        [
+            (0.05, 1.0, 0.1, 0.6), (0.05, 1.0, 0.3, 0.0), (0.1, 1.0, 0.3, 0.0), (0.1, 2.0, 0.1, 0.6),
+            (0.1, 5.0, 0.3, 0.6), (0.2, 1.0, 0.3, 0.0), (0.2, 2.0, 0.3, 0.6), (0.2, 5.0, 0.1, 0.6),
+            (0.25, 2.0, 0.3, 0.0),
+            (0.25, 10.0, 0.3, 0.0), (0.5, 2.0, 0.3, 0.0), (0.5, 5.0, 0.1, 0.0), (0.5, 10.0, 0.3, 0.0),
+        ]
+    ):  # fmt: skip
+        logger = (plain, german, with_units_below)[number % 3]
+        rows = bench(staircase(step, dwell), seed=90 + number, rate_Hz=20.0, rise_s=rise_s, floor=floor)
+        yield Case(
+            name=f"stairs_{number}", kind=kind, files={f"stairs_{number}.csv": logger(rows, "dP")},
+            not_warned=NOT_OF_STAIRS, floor=(floor, 1.2 * floor),
+        )  # fmt: skip
+    command = staircase(0.2, 2.0)
+    rows = {f"two_{dp:g}.csv": bench(command, edge=dp, seed=110, rise_s=0.1) for dp in (1.0, 2.5)}
+    files = {name: plain(each, "dP") for name, each in rows.items()}
+    yield Case(name="stairs_two", kind=kind, files=files, pressures=(1.0, 2.5), not_warned=NOT_OF_STAIRS)
+    files = {"again.csv": german(bench((*command, *command), seed=111, rise_s=0.2, rate_Hz=20.0), "dP")}
+    yield Case(name="stairs_again", kind=kind, files=files, not_warned=NOT_OF_STAIRS)
+    both = (*command, *((seconds, -at, -to) for seconds, at, to in command))
+    files = {"both.csv": plain(bench(both, seed=112, rise_s=0.1, rate_Hz=20.0, positive=False), "dP")}
+    yield Case(name="stairs_both", kind=kind, files=files, sides=("positive", "negative"), not_warned=NOT_OF_STAIRS)
+    each = bench(staircase(0.25, 3.0), seed=113, rise_s=0.3, rate_Hz=100.0)
+    files = {"duty.csv": command_text(each, "duty", 0.09 * each["u"], 5)}
+    yield Case(name="stairs_duty", kind=kind, files=files, options=("--columns", "u=duty:0..0.9 = 0..100 %"))
+    # No staircase: a ramp whose command was recorded in coarse steps, and one with holds.
+    each = bench(ramp(100.0), seed=114, command_noise=0.0)
+    files = {"coarse.csv": command_text(each, "u_V", np.round(each["u"] / 0.05) * 0.05)}
+    yield Case(name="coarse_ramp", kind=kind, files=files)
+    held = [(4.0, level, level) if part else (4.0, level - 1.0, level) for level in range(1, 11) for part in (0, 1)]
+    down = [(seconds, to, at) for seconds, at, to in reversed(held)]
+    files = {"holds.csv": plain(bench([(3.0, 0, 0), *held, *down, (3.0, 0, 0)], seed=115, rise_s=0.05), "dP")}
+    yield Case(name="ramp_with_holds", kind=kind, files=files)
+
+
+KINDS: tuple[Callable[[], Iterator[Case]], ...] = (four_ports, units, without_a_clock, staircases)
 
 
 def cases() -> list[Case]:

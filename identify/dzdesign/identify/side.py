@@ -21,7 +21,7 @@ from dzdesign.identify.fitting.guarding import (
     order_knees,
     systematic_change,
 )
-from dzdesign.identify.knees.between_ramps import BetweenRamps
+from dzdesign.identify.knees.between_ramps import FEW_DEGREES, BetweenRamps
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
 from dzdesign.identify.knees.prepared_tests import describe_tests
 from dzdesign.identify.options import IdentifyOptions
@@ -100,6 +100,7 @@ def _side_model(
     thresholds, rising = _all_thresholds(group, free, guarded, trend, options)
     guard, threshold = next(iter(thresholds.items()))
     dp = [item.dp for item in described]
+    _refuse_unlike_repeats(group.between(guarded.column), threshold)
     found = fit_guard_curves(thresholds, dp, reference, trend.direction, options.u_max)
     guards: dict[str, GuardCurve] = {name: found[name][0] for name in GUARDS if name in found}
     slope = float(np.nanmean(knees.slope[reference]))
@@ -127,6 +128,16 @@ def _side_model(
         active_constraints=knees.active
         + tuple(f"offset at test {row + 1}" for row, holds in enumerate(found[guard][1]) if holds),
     )
+
+
+def _refuse_unlike_repeats(between: BetweenRamps, threshold: Threshold) -> None:
+    """Refuse repeats that differ so much, and are so few, that the next closing may lie anywhere."""
+    if between.origin == "repeats" and between.degrees < FEW_DEGREES and threshold.bound.min() <= 0:
+        raise InputError(
+            f"ramps at one pressure drop differ: their thresholds scatter by {1e3 * between.sd:.0f} mV (one standard "
+            f"deviation, degrees of freedom: {between.degrees:.0f}), so that no lower bound above zero follows; record "
+            "two more ramps there, or leave out the one that is unlike the rest"
+        )
 
 
 def _repeatability(found: BetweenRamps) -> Repeatability:

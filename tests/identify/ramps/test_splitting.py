@@ -136,9 +136,9 @@ class TestSplitting:
         valve = identify([recording, other])
         low, high = as_document(valve)["sides"]["positive"]["tests"]
         assert low["source"] == "all.csv (ramps 1, 3)"
-        assert low["ramps"] == ("all.csv (ramp 1)", "all.csv (ramp 3)")
-        assert high["source"] == "all.csv (ramp 2), b.csv"
-        assert high["ramps"] == ("all.csv (ramp 2)", "b.csv")
+        assert low["ramps"] == ("all.csv (ramp 1, 0.0 to 121.0 s)", "all.csv (ramp 3, 244.0 to 368.9 s)")
+        assert high["source"] == "all.csv (ramp 2, 121.0 to 243.9 s), b.csv"
+        assert high["ramps"] == ("all.csv (ramp 2, 121.0 to 243.9 s)", "b.csv")
         assert [file.source for file in valve.made_from] == ["all.csv", "b.csv"]
         text = to_json_bytes(valve).decode()
         assert to_json_bytes(read_artefact(text.encode(), ValveModel, "valve.json")).decode() == text

@@ -4,6 +4,9 @@ import corpus_units
 import numpy as np
 import pytest
 
+from dzdesign.identify.knees import characteristic
+from dzdesign.identify.ramps import splitting
+from dzdesign.identify.ramps.staircases import find_staircase
 from dzdesign.identify.reading import column_labels, ramp_files
 from dzdesign.identify.reading.metering_edge import MeteringEdge, metering_edge
 
@@ -26,6 +29,28 @@ def test_working_ports_in_silence_are_seen(name, tmp_path, monkeypatch):
     for module in (column_labels, ramp_files):
         monkeypatch.setattr(module, "metering_edge", in_silence)
     assert corpus_units.fault_of(CASES[name], tmp_path)
+
+
+@pytest.mark.parametrize("name", ["stairs_2", "stairs_8", "stairs_10", "stairs_12"])
+def test_a_staircase_taken_for_a_ramp_is_seen(name, tmp_path, monkeypatch):
+    monkeypatch.setattr(splitting, "find_staircase", lambda *_: None)
+    assert corpus_units.fault_of(CASES[name], tmp_path)
+
+
+def test_a_floor_that_levels_hide_is_seen(tmp_path, monkeypatch):
+    monkeypatch.setattr(characteristic, "floor_of_levels", lambda *_: 0.0)
+    assert "a floor of 0 L/min" in corpus_units.fault_of(CASES["stairs_7"], tmp_path)
+
+
+def test_a_ramp_in_coarse_steps_is_no_staircase():
+    """Its flow goes on through each step: taken for levels, the last quarter of each would lie off its command."""
+    rows = corpus_units.bench(corpus_units.ramp(100.0), seed=114, command_noise=0.0)
+    u = np.round(rows["u"] / 0.05) * 0.05
+    assert find_staircase(u, rows["Q"]) is None
+    steps = corpus_units.bench(corpus_units.staircase(0.25, 3.0), seed=1, rise_s=0.2)
+    found = find_staircase(steps["u"], steps["Q"])
+    assert found is not None and 0.5 < found.settled.mean() < 0.95
+    np.testing.assert_allclose(found.u[found.settled] / 0.25, np.round(found.u[found.settled] / 0.25), atol=0.02)
 
 
 @pytest.mark.parametrize(

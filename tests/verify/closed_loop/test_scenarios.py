@@ -63,9 +63,13 @@ def test_a_step_without_compensator_gives_no_flow_where_half_command_is_dead(res
     assert 1 < figures["compensated_rise_ms"] < figures["compensated_settling_ms"] < 50
 
 
-def test_a_load_step_may_open_the_valve_for_a_moment_and_never_for_good(results):
-    """The pressure's fall of the threshold outruns the sampled sensor by a sample or two."""
-    result = results["load steps at zero command"]
+def test_a_load_step_may_open_the_valve_for_a_moment_and_never_for_good(firmware, example_compensator, plant):
+    """The pressure's fall of the threshold outruns the sampled sensor by a sample or two.
+
+    The valve closes 20 mV lower than the example's, as at one ramp of many: that much the bound leaves it.
+    """
+    low = replace(plant, preload_N=plant.preload_N - 0.02 * plant.force_per_volt)
+    result = by_name(scene_of(firmware, example_compensator, low))["load steps at zero command"]
     assert result.q_zero_L_min == 0 and 0 < result.q_peak_at_zero_L_min < 0.3
     assert 0 < result.figures["volume_mL"] < 0.02
 

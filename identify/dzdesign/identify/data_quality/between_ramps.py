@@ -3,15 +3,13 @@
 from collections.abc import Iterator
 
 from dzdesign.identify.data_quality.catalogue import warn
-from dzdesign.identify.knees.between_ramps import ASSUMED_REPEATABILITY
+from dzdesign.identify.knees.between_ramps import ASSUMED_REPEATABILITY, FEW_DEGREES
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.repeatability import Repeatability
 
 #: Standard errors from which a drift is said, and share of u_max from which it matters.
 DRIFT_SIGNIFICANCE, SMALLEST_DRIFT = 3.0, 1e-3
-#: With fewer degrees of freedom the scatter is known so badly that repeats pay twice.
-FEW_DEGREES = 4
 
 
 def about_ramps(found: Repeatability, count: int, options: IdentifyOptions) -> Iterator[Warning_]:

@@ -26,6 +26,8 @@ from dzdesign.identify.valve.repeatability import NoDrift, Origin
 ASSUMED_REPEATABILITY = 2.5e-3
 #: Fewest degrees of freedom of a small scatter that is believed: the one difference of two ramps may be so by chance.
 FEWEST_DEGREES = 2
+#: With fewer degrees of freedom the scatter is known so badly that repeats pay twice.
+FEW_DEGREES = 4
 #: A ramp tells its own knee with at least so many samples, over this share of the straight part.
 RAMP_SAMPLES, RAMP_SPAN = 5, 0.5
 #: A term of the model is told apart where its standard error is at most so many times the scatter of one ramp.

@@ -9,6 +9,7 @@ import numpy as np
 from dzdesign.identify.knees.branch_shape import BranchShape, Tail
 from dzdesign.identify.knees.dead_zone import look_into_dead_zone
 from dzdesign.identify.knees.gated_line import GATE, GatedLine, PreparedBranch, fit_line
+from dzdesign.identify.knees.level_floor import floor_of_levels
 from dzdesign.identify.knees.line_fitting import inflation_by_blocks
 from dzdesign.identify.knees.linear_region import StraightParts, find_straight_parts
 from dzdesign.identify.knees.noise import measure_roughness, robust_sigma, variance_inflation
@@ -97,7 +98,9 @@ def find_meter_floor(u: np.ndarray, q: np.ndarray, u_max: float) -> float | None
     straight = int(np.sum((u >= start) & (u <= half)))
     density = straight / (0.38 * q_max)  # readings per unit of flow where the valve is known to open smoothly
     shut = q[u < 0.5 * start]
-    if shut.size < 5 or straight < 100 or u_profile.size < 200:  # a staircase skips flows, whatever the meter
+    if shut.size >= 5 and u_profile.size < 200:  # a staircase skips flows, whatever the meter
+        return floor_of_levels(u, q, shut, (start, half))
+    if shut.size < 5 or straight < 100:
         return 0.0
     noise = robust_sigma(shut)
     lowest = max(3 * noise, 1e-3 * q_max)

@@ -26,6 +26,7 @@ from dzdesign.identify.ramps.command import (
     sweep_direction,
     without_command_spikes,
 )
+from dzdesign.identify.ramps.staircases import find_staircase
 from dzdesign.identify.ramps.sweep_pressure import SweepLevel, joined, off_level, stretches, sweep_level, without_flow
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.left_out import LeftOut
@@ -91,7 +92,10 @@ def split_ramps(test: RampTest, lag: float) -> list[Ramp]:
         Where the command jumps back and forth within a ramp.
     """
     test = without_command_spikes(test)
-    u = lagged_command(test.time, test.u, lag)
+    stairs = find_staircase(test.u, test.q, test.source)
+    if stairs is not None:  # what has settled has no lag
+        test = replace(test, u=stairs.u).part(stairs.settled)
+    u = lagged_command(test.time, test.u, lag) if stairs is None else test.u
     sweeps = _sweeps(test, u)
     idle = _idle(sweeps)
     groups = _groups([sweep for sweep, is_idle in zip(sweeps, idle, strict=True) if not is_idle])
@@ -200,7 +204,7 @@ def _off_level(group: Sequence[_Sweep], test: RampTest) -> np.ndarray:
             level = replace(level, dp=sure[0].dp, spread=sure[0].spread, sure=True)
         part = sweep.test if sweep.test.dp is None else replace(sweep.test, dp=despiked(sweep.test.dp))
         lowest = min(float(despiked(one.test.u).min()) for one in group)
-        at_bottom = part.u <= lowest + SMALLEST_MOVE * np.ptp(test.u)
+        at_bottom = part.u <= lowest + SHUT * np.ptp(test.u)
         found.append(off_level(part, at_bottom, level))
     return np.concatenate(found)
 
@@ -240,29 +244,32 @@ def _rate(time: np.ndarray, u: np.ndarray) -> float:
 
 
 def _cut(u: np.ndarray, dp: np.ndarray | None, turn: int, direction: np.ndarray) -> int:
-    """Return where two sweeps are parted: at the turning point, or at the bottom where the pressure steps.
+    """Return where two sweeps are parted: where the pressure steps in a hold, or else at the turn, below in the middle.
 
     A step that the noise may have made, or that leaves the pressure the same, parts nothing: the sweeps would lose what
     lies between it and the turn, and with it an edge that opens there.
     """
-    if direction[turn] < 0:
-        return turn
-    shut = u <= u[turn - 1 : turn + 1].min() + SHUT * np.ptp(u)
-    before, after = np.flatnonzero(~shut[:turn]), np.flatnonzero(~shut[turn:])
+    at_top = direction[turn] < 0
+    if at_top:
+        held = u >= u[turn - 1 : turn + 1].max() - SMALLEST_MOVE * np.ptp(u)
+    else:
+        held = u <= u[turn - 1 : turn + 1].min() + SHUT * np.ptp(u)
+    before, after = np.flatnonzero(~held[:turn]), np.flatnonzero(~held[turn:])
     start = int(before[-1]) + 1 if before.size else 0
     stop = turn + int(after[0]) if after.size else u.size
-    at_rest = _middle_of_hold(u, turn, start, stop)
+    at_rest = turn if at_top else _middle_of_hold(u, turn, start, stop)
     if dp is None or stop - start < 4:
         return at_rest
     # Two levels with the least squares about them; n m^2 of both sides is largest there.
     mean = dp[start:stop].mean()
-    held = dp[start:stop] - mean
-    left, n = np.cumsum(held)[:-1], np.arange(1, held.size)
-    gain = left**2 / n + left**2 / (held.size - n)
+    off = dp[start:stop] - mean
+    left, n = np.cumsum(off)[:-1], np.arange(1, off.size)
+    gain = left**2 / n + left**2 / (off.size - n)
     cut = int(np.argmax(gain))
-    step = abs(left[cut]) * (1 / n[cut] + 1 / (held.size - n[cut]))
-    about_levels = max(float(np.sum(held**2) - gain[cut]), 0.0) / (held.size - 2)
-    real = step > PRESSURE_STEP * abs(mean) and gain[cut] > STEP_SIGNIFICANCE**2 * about_levels
+    step = abs(left[cut]) * (1 / n[cut] + 1 / (off.size - n[cut]))
+    about_levels = max(float(np.sum(off**2) - gain[cut]), 0.0) / (off.size - 2)
+    share = TWO_PRESSURES if at_top else PRESSURE_STEP  # under flow the pressure drop may sink in a hold
+    real = step > share * abs(mean) and gain[cut] > STEP_SIGNIFICANCE**2 * about_levels
     return start + 1 + cut if real else at_rest
 
 

@@ -6,6 +6,7 @@ the bottom whose pressure drop is off that level is left out, and so is a part o
 a flow at another pressure drop stays, for it is brought to the nominal one sample by sample.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -27,10 +28,16 @@ GOES_WITH = 0.25
 ONE_LEVEL = 0.15
 #: Fewest samples of the first flow, and of the shut valve, that show a level.
 FIRST_SAMPLES, SHUT_SAMPLES = 5, 10
-#: A hold's pressure drop is off the level by more than this share of it, and so many spreads of the shut valve's.
-OFF_LEVEL, OFF_SPREADS = 0.05, 5.0
+#: Share of the command at the first flow from which the shut valve is near its edge.
+NEAR_EDGE = 0.5
+#: The pressure drop near zero is off the level by more than this share of it, and so many spreads of the shut valve's.
+OFF_LEVEL, OFF_SPREADS = 0.02, 5.0
 #: Within a sweep the pressure is another where it is off by this factor with no flow, and gone below this share of it.
 ANOTHER, GONE = 2.0, 0.1
+#: A sweep with no flow has no pressure below this share of the largest level.
+NO_PRESSURE = 0.02
+#: Samples whose median is no spike.
+RUN = 5
 #: Samples between two stretches that are left out which go with them.
 BETWEEN = 5
 #: Usual steps of the clock beyond which rows are missing, as those of the other side.
@@ -51,6 +58,8 @@ class SweepLevel:
     #: Largest flow at which the valve counts as shut, m³/s, and spread of the pressure drop there, Pa.
     shut_below: float
     spread: float
+    #: Whether the pressure drop near zero is another, all in all: it had not come up yet, or had gone.
+    moves_at_zero: bool = False
 
 
 def sweep_level(test: RampTest, nominal: float | None, shut_share: float) -> SweepLevel:
@@ -66,7 +75,7 @@ def sweep_level(test: RampTest, nominal: float | None, shut_share: float) -> Swe
         Share of the largest command below which the pressure drop is read.
     """
     top = float(test.u.max())
-    full = float(np.median(test.q[test.u >= 0.9 * top]))
+    full = _largest_flow(test.q[test.u >= 0.9 * top])
     noise = 1.4826 * float(np.median(np.abs(np.diff(test.q)))) / 2**0.5 if test.q.size > 1 else 0.0
     flows = full > max(FLOW_SIGNIFICANCE * noise, 0.01 * L_MIN)
     shut_below = max(SHUT_FLOW * full, FLOW_SIGNIFICANCE * noise)
@@ -74,20 +83,37 @@ def sweep_level(test: RampTest, nominal: float | None, shut_share: float) -> Swe
     if test.dp is None or nominal is None or not flows:
         return unknown
     low, high = (share * full for share in FIRST_FLOW)
-    first = test.dp[(test.q > max(low, shut_below)) & (test.q < high)]
-    if first.size < FIRST_SAMPLES:
+    first = (test.q > max(low, shut_below)) & (test.q < high)
+    if np.count_nonzero(first) < FIRST_SAMPLES:
         return unknown
-    at_first = float(np.median(first))
-    halves = [float(np.median(half)) for half in np.array_split(first, 2)]
+    at_first, edge = float(np.median(test.dp[first])), float(np.median(test.u[first]))
+    halves = [float(np.median(half)) for half in np.array_split(test.dp[first], 2)]
     if at_first <= 0 or abs(halves[0] - halves[1]) > ONE_LEVEL * at_first:
         return unknown
     goes_with = (test.q <= shut_below) & (np.abs(test.dp - at_first) <= GOES_WITH * at_first)
     if np.count_nonzero(goes_with) < SHUT_SAMPLES:
         return unknown
-    near_zero = goes_with & (test.u >= 0) & (test.u <= shut_share * top)
-    dp = float(np.median(test.dp[near_zero if np.count_nonzero(near_zero) >= FIRST_SAMPLES else goes_with]))
-    spread = 1.4826 * float(np.median(np.abs(test.dp[goes_with] - dp)))
-    return SweepLevel(dp=dp, sure=True, flows=flows, shut_below=shut_below, spread=spread)
+    near_zero = test.dp[goes_with & (test.u >= 0) & (test.u <= shut_share * top)]
+    # Near zero the pressure may not have come up yet, or have gone already: below the edge it has been there longest.
+    near_edge = test.dp[goes_with & (test.u >= NEAR_EDGE * edge) & (test.u <= edge)]
+    if near_edge.size < FIRST_SAMPLES:
+        near_edge = test.dp[goes_with]
+    dp = float(np.median(near_edge))
+    spread = 1.4826 * float(np.median(np.abs(near_edge - dp)))
+    moves = False
+    if near_zero.size >= FIRST_SAMPLES:
+        at_zero = float(np.median(near_zero))
+        error = 3 * spread / math.sqrt(min(near_zero.size, near_edge.size))
+        moves = abs(at_zero - dp) > max(OFF_LEVEL * dp, error)
+        dp = dp if moves else at_zero
+    return SweepLevel(dp=dp, sure=True, flows=flows, shut_below=shut_below, spread=spread, moves_at_zero=moves)
+
+
+def _largest_flow(q: np.ndarray) -> float:
+    """Return the largest flow that is no spike; a pump may have run for a part of the time only."""
+    if q.size < RUN:
+        return float(np.median(q))
+    return float(np.median(q[: q.size // RUN * RUN].reshape(-1, RUN), axis=1).max())
 
 
 def off_level(test: RampTest, at_bottom: np.ndarray, level: SweepLevel) -> np.ndarray:
@@ -108,6 +134,8 @@ def off_level(test: RampTest, at_bottom: np.ndarray, level: SweepLevel) -> np.nd
     resting = shut & at_bottom & (away > OFF_LEVEL * level.dp)
     moving = shut & ((test.dp * ANOTHER < level.dp) | (test.dp > ANOTHER * level.dp))
     off: np.ndarray = (resting | moving | (test.dp < GONE * level.dp)) & (away > OFF_SPREADS * level.spread)
+    if level.moves_at_zero:  # of noisy readings each may be the level's
+        off |= shut & at_bottom
     # A few samples between two such stretches are where a moving pressure crosses the level.
     for start, end in pairwise(np.flatnonzero(off).tolist()):
         if 1 < end - start <= BETWEEN + 1:
@@ -153,7 +181,7 @@ def without_flow(levels: Sequence[SweepLevel], reach: Sequence[float]) -> list[b
     """
     best = max((level.dp for level in levels if level.flows and level.dp), default=0.0)
     idle = [
-        not level.flows and best > 0 and ((level.dp or best) < GONE * best or far < 0.5 * max(reach))
+        not level.flows and best > 0 and ((level.dp or best) < NO_PRESSURE * best or far < 0.5 * max(reach))
         for level, far in zip(levels, reach, strict=True)
     ]
     return [False] * len(idle) if all(idle) else idle

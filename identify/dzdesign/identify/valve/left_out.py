@@ -35,7 +35,7 @@ class LeftOut:
     ]
     dp_MPa: Annotated[
         tuple[AnyPressure, AnyPressure] | None,
-        Meta(description="Lowest and highest pressure drop in it; null where that is unknown."),
+        quantity("MPa", "Lowest and highest pressure drop in it; null where that is unknown."),
     ]
 
     def __str__(self) -> str:
