@@ -126,8 +126,18 @@ def _premises(
     if pilot is not None and arguments.meter_lag is None and pilot.meter_lag is not None:
         lag, tolerance = pilot.meter_lag, None
     scatter = read["repeatability"] * u_max
-    if pilot is None:
+    if pilot is not None and arguments.dp_range is None:
+        dp_range = (float(pilot.valve.dp[0]), float(pilot.valve.dp[-1]))
+    else:
         dp_range = read["dp_range"]
+    request = Request(
+        dp_range=dp_range,
+        budget=read["budget"],
+        ramp_times=read["ramp_times"],
+        wanted=read["loss"],
+        seed=read["seed"],
+    )
+    if pilot is None:
         valve = straight_valve(
             dp_range,
             threshold=read["dead_zone"] * u_max,
@@ -138,8 +148,6 @@ def _premises(
         )
     else:
         valve = pilot.valve if arguments.repeatability is None else replace(pilot.valve, scatter=scatter)
-        known = (float(valve.dp[0]), float(valve.dp[-1]))
-        dp_range = known if arguments.dp_range is None else read["dp_range"]
     options = IdentifyOptions(
         u_max=u_max,
         meter_floor=of("meter_floor"),
@@ -160,13 +168,6 @@ def _premises(
         pause=read["pause"],
         confidence=options.confidence,
         flat_below=options.flat_below,
-    )
-    request = Request(
-        dp_range=dp_range,
-        budget=read["budget"],
-        ramp_times=read["ramp_times"],
-        wanted=read["loss"],
-        seed=read["seed"],
     )
     return valve, bench, request
 
