@@ -38,8 +38,8 @@ ANOTHER, GONE = 2.0, 0.1
 NO_PRESSURE = 0.02
 #: Samples whose median is no spike.
 RUN = 5
-#: Samples between two stretches that are left out which go with them.
-BETWEEN = 5
+#: Samples of the shut valve between two stretches that are left out which go with them.
+BETWEEN = 20
 #: Usual steps of the clock beyond which rows are missing, as those of the other side.
 LOST_ROWS = 20
 
@@ -99,7 +99,7 @@ def sweep_level(test: RampTest, nominal: float | None, shut_share: float) -> Swe
     if near_edge.size < FIRST_SAMPLES:
         near_edge = test.dp[goes_with]
     dp = float(np.median(near_edge))
-    spread = 1.4826 * float(np.median(np.abs(near_edge - dp)))
+    spread = _spread(near_edge)
     moves = False
     if near_zero.size >= FIRST_SAMPLES:
         at_zero = float(np.median(near_zero))
@@ -107,6 +107,14 @@ def sweep_level(test: RampTest, nominal: float | None, shut_share: float) -> Swe
         moves = abs(at_zero - dp) > max(OFF_LEVEL * dp, error)
         dp = dp if moves else at_zero
     return SweepLevel(dp=dp, sure=True, flows=flows, shut_below=shut_below, spread=spread, moves_at_zero=moves)
+
+
+def _spread(dp: np.ndarray) -> float:
+    """Return the spread of a pressure drop that stands still, at least a step of a coarse converter."""
+    steps = np.abs(np.diff(dp))
+    steps = steps[steps > 0]
+    step = float(np.median(steps)) if steps.size else 0.0
+    return max(1.4826 * float(np.median(np.abs(dp - np.median(dp)))), step)
 
 
 def _largest_flow(q: np.ndarray) -> float:
@@ -139,7 +147,7 @@ def off_level(test: RampTest, at_bottom: np.ndarray, level: SweepLevel) -> np.nd
     # A few samples between two such stretches are where a moving pressure crosses the level.
     for start, end in pairwise(np.flatnonzero(off).tolist()):
         if 1 < end - start <= BETWEEN + 1:
-            off[start:end] = True
+            off[start:end] |= shut[start:end]
     return off
 
 
