@@ -129,7 +129,7 @@ def split_ramps(test: RampTest, lag: float) -> list[Ramp]:
 def _why_no_ramp(sweeps: Sequence[_Sweep]) -> list[Reason | None]:
     """Tell of each sweep why it is none of a ramp test; a jump goes with a ramp."""
     slow = [sweep for sweep in sweeps if sweep.is_branch]
-    found = iter(why_no_ramp([sweep.level for sweep in slow], [float(np.ptp(sweep.test.u)) for sweep in slow]))
+    found = iter(why_no_ramp([sweep.level for sweep in slow], [float(despiked(sweep.test.u).max()) for sweep in slow]))
     return [next(found) if sweep.is_branch else None for sweep in sweeps]
 
 
