@@ -19,6 +19,7 @@ from bound_coverage import print_coverage, print_over_compensation, print_residu
 from corpus import print_corpus  # noqa: E402
 from measured import print_measured  # noqa: E402
 from meters import print_meters  # noqa: E402
+from planned_series import print_planned_series  # noqa: E402
 from ramp_series import print_ramp_series  # noqa: E402
 from random_valves import print_random_valves  # noqa: E402
 from reading import print_reading  # noqa: E402
@@ -33,6 +34,7 @@ PARTS = {
     "residual": (print_residual, 303),
     "between-ramps": (print_between_ramps, 808),
     "ramp-series": (print_ramp_series, 818),
+    "planned": (print_planned_series, 828),
     "stops": (print_stops, 909),
     "meters": (print_meters, 1010),
     "corpus": (print_corpus, 909),
