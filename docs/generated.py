@@ -13,7 +13,11 @@ from dzdesign.identify.data_quality.catalogue import catalogue
 
 #: What a caller of the rooms needs.
 API = (
-    ("dzdesign.api", ("identify", "design", "generate", "verify", "init", "simulate", "assess", "report", "batch")),
+    (
+        "dzdesign.api",
+        ("identify", "design", "generate", "verify", "plan", "init", "simulate", "assess", "report", "batch"),
+    ),
+    ("dzdesign.identify.planning.results", ("SeriesPlan", "SeriesRow")),
     ("dzdesign.initial_options.proposal", ("Proposal",)),
     ("dzdesign.assess.assessment", ("Assessment",)),
     ("dzdesign.report.page", ("Report",)),

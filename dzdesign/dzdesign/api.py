@@ -3,7 +3,7 @@
 Each takes paths or the result of the stage before it, options in the words of the command line ("1 MPa", "0.1 s"), and
 returns a frozen result, which `print` sums up and a notebook shows as a table. With ``output`` it also writes the file
 or folder that the command of the same stage writes, byte for byte. Nothing is printed. What is heavy is imported when a
-stage is called. `init`, `simulate`, `assess`, `report` and `batch` are the commands of those names.
+stage is called. `plan`, `init`, `simulate`, `assess`, `report` and `batch` are the commands of those names.
 
 >>> from dzdesign import api
 >>> valve = api.identify("ramps/*.csv", meter_lag="0.1 s")         # doctest: +SKIP
@@ -23,6 +23,7 @@ from dzdesign.stages import design as design_stage
 from dzdesign.stages import generate as generate_stage
 from dzdesign.stages import identify as identify_stage
 from dzdesign.stages import init as init_stage
+from dzdesign.stages import plan as plan_stage
 from dzdesign.stages import report as report_stage
 from dzdesign.stages import simulate as simulate_stage
 from dzdesign.stages import verify as verify_stage
@@ -30,12 +31,13 @@ from dzdesign.terminal.notebook import heading_of, html_of, text_of
 
 __all__ = [
     "DzdesignError", "InputError", "RequirementError",
-    "assess", "batch", "design", "generate", "identify", "init", "report", "simulate", "verify",
+    "assess", "batch", "design", "generate", "identify", "init", "plan", "report", "simulate", "verify",
 ]  # fmt: skip
 
 display_by(heading=heading_of, text=text_of, html=html_of)
 
 init = with_keywords(init_stage.InitArguments, init_stage.init)
+plan = with_keywords(plan_stage.PlanArguments, plan_stage.plan)
 identify = with_keywords(identify_stage.IdentifyArguments, identify_stage.identify)
 design = with_keywords(design_stage.DesignArguments, design_stage.design)
 generate = with_keywords(generate_stage.GenerateArguments, generate_stage.generate)

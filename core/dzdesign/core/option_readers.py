@@ -5,7 +5,7 @@ import re
 from collections.abc import Callable
 
 from dzdesign.core.errors import InputError, quoted
-from dzdesign.core.units import parse_quantity
+from dzdesign.core.units import EXAMPLES, parse_quantity
 
 
 def quantity(kind: str) -> Callable[[str, str], float]:
@@ -80,5 +80,32 @@ def percent_range(of: str) -> Callable[[str, str], tuple[float, float]]:
         if ends is None:
             raise InputError(f"{option} is {quoted(text)}, expected two per cents of {of}")
         return float(ends[1]) / 100, float(ends[2]) / 100
+
+    return read
+
+
+def quantity_range(kind: str) -> Callable[[str, str], tuple[float, float]]:
+    """Return what reads two numbers with one unit, such as ``1..5 MPa``, or one for both, in SI.
+
+    Examples
+    --------
+    >>> quantity_range("time")("20..200 s", "--ramp-times"), quantity_range("time")("1 min", "--ramp-times")
+    ((20.0, 200.0), (60.0, 60.0))
+    """
+
+    def read(text: str, option: str) -> tuple[float, float]:
+        first, dots, last = text.partition("..") if isinstance(text, str) else (text, "", "")
+        if not dots:
+            only = parse_quantity(first, kind, option)
+            return only, only
+        unit = re.sub(r"^[\s\d.,+-]*", "", last)
+        if not unit or not first.strip():
+            example = EXAMPLES[kind].split(",")[0]
+            raise InputError(f"{option} is {quoted(text)}, expected two numbers and a unit such as '1..5 {example}'")
+        lower = first if re.search(r"[^\W\d]", first) else f"{first} {unit}"
+        low, high = parse_quantity(lower, kind, option), parse_quantity(last, kind, option)
+        if low > high:
+            raise InputError(f"{option} is {quoted(text)}, expected the lower end first")
+        return low, high
 
     return read

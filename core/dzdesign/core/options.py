@@ -31,9 +31,9 @@ Texts = str | Iterable[str]
 Table = str | Mapping[str, str] | None
 
 #: Headings of the help, in their order; an option without one stands above them.
-RECORDINGS, METER, FIT, LAW = "recordings", "flow meter", "fit", "law"
+EXPECTED, RECORDINGS, METER, FIT, LAW = "expected valve", "recordings", "flow meter", "fit", "law"
 CONNECTIONS, DRIVE, CHECKS = "connections of the firmware", "drive functions", "further checks"
-GROUPS = (RECORDINGS, METER, FIT, LAW, CONNECTIONS, DRIVE, CHECKS)
+GROUPS = (EXPECTED, RECORDINGS, METER, FIT, LAW, CONNECTIONS, DRIVE, CHECKS)
 
 
 @dataclass(frozen=True, slots=True)

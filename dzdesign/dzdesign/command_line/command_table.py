@@ -17,6 +17,7 @@ class Command(NamedTuple):
 PIPELINE, EVIDENCE, SETUP = "from ramps to firmware", "evidence", "getting started and diagnostics"
 
 COMMANDS = {
+    "plan": Command(PIPELINE, "plan a test series: pressures, ramp times and repeats, with the predicted error"),
     "init": Command(PIPELINE, "look at recordings and write a commented dzdesign.toml"),
     "identify": Command(PIPELINE, "ramp tests in, valve.json out: k, thresholds, beta(dP)"),
     "design": Command(PIPELINE, "valve.json in, compensator.json out: the law with exact coefficients, certified"),

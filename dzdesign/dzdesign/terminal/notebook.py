@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from dzdesign.core.errors import one_line
 from dzdesign.terminal.page import FILE_WIDTH, put_line
+from dzdesign.terminal.plan_tables import print_plan
 from dzdesign.terminal.tables import print_compensator, print_firmware, print_valve
 from dzdesign.terminal.verification_tables import print_verification
 
@@ -45,6 +46,10 @@ PAGES: Mapping[str, tuple[Callable[[Any], str], Callable[[Any, "Console"], None]
     "Firmware": (
         lambda made: f"Firmware for {made.manifest.target}, law {made.manifest.law}, {len(made.files)} files",
         _print_firmware,
+    ),
+    "SeriesPlan": (
+        lambda plan: f"Test series of {plan.chosen.ramps} ramps, {plan.chosen.duration_min:g} min",
+        print_plan,
     ),
     "Verification": (lambda verification: f"Verification: {verification.verdict}", print_verification),
 }

@@ -1,0 +1,212 @@
+"""`plan`: what bench and valve are expected to be like -> a series of ramp tests, with the predicted error."""
+
+import os
+from dataclasses import KW_ONLY, dataclass, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from dzdesign.core.artefact_files import read_bytes
+from dzdesign.core.errors import InputError
+from dzdesign.core.option_readers import number, percent, quantity, quantity_range, whole_number, with_tolerance
+from dzdesign.core.options import EXPECTED, FIT, METER, RECORDINGS, AnyPath, Option, Text, flag_of, read_options
+from dzdesign.terminal.progress import stage_progress
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from dzdesign.identify.planning.premises import Bench, ExpectedValve, Pilot
+    from dzdesign.identify.planning.results import Premise, SeriesPlan
+    from dzdesign.identify.planning.search import Request
+    from dzdesign.identify.valve.model import ValveModel
+
+#: Options that a pilot series answers.
+OF_PILOT = ("dead_zone", "threshold_change", "max_flow", "u_max")
+
+
+@dataclass(frozen=True)
+class PlanArguments:
+    """Arguments of `plan`."""
+
+    pilot: Annotated["ValveModel | AnyPath | None", Option("VALVE.json")] = None
+    """valve.json of a quick series of this valve: noise, thresholds, flow gain and repeatability are then taken from
+    it."""
+    _: KW_ONLY
+    budget: Annotated[str, Option("T", example="30 min", read=quantity("time"))] = "30 min"
+    """Time for the whole series, pauses included."""
+    loss: Annotated[Text, Option("U", example="150 mV", read=quantity("voltage"))] = None
+    """Mean distance of the certified offset below the threshold that is enough, such as "150 mV": the shortest series
+    that reaches it is planned (default: the smallest that the time allows)."""
+    seed: Annotated[
+        int | str, Option("N", read=whole_number("a whole number of zero or more, such as 1", digits=18))
+    ] = "1"
+    """Random seed of the order of the ramps."""
+    dp_range: Annotated[Text, Option("P..P", EXPECTED, "1..5 MPa", "1..5 MPa", quantity_range("pressure"))] = None
+    """Lowest and highest pressure drop to be certified; one value plans a series at that pressure drop."""
+    dead_zone: Annotated[Text, Option("S", EXPECTED, "50 %", "50 %", percent("50 %"))] = None
+    """Closing threshold at the lowest pressure drop, in percent of full command."""
+    threshold_change: Annotated[Text, Option("S", EXPECTED, "2 %", "2 %", percent("2 %"))] = None
+    """Fall of the threshold from the lowest to the highest pressure drop, in percent of full command."""
+    max_flow: Annotated[Text, Option("Q", EXPECTED, "15 L/min", "15 L/min", quantity("flow"))] = None
+    """Flow at full command and the lowest pressure drop."""
+    repeatability: Annotated[Text, Option("S", EXPECTED, "0.25 %", "0.1 %", percent("0.1 %"))] = None
+    """Standard deviation of the threshold from ramp to ramp, in percent of full command."""
+    u_max: Annotated[Text, Option("U", EXPECTED, "10 V", "10 V", quantity("voltage"))] = None
+    """Full command."""
+    sample_rate: Annotated[str, Option("F", RECORDINGS, example="100 Hz", read=quantity("frequency"))] = "100 Hz"
+    """Sampling rate of the recordings."""
+    ramp_times: Annotated[str, Option("T..T", RECORDINGS, example="20..200 s", read=quantity_range("time"))] = (
+        "20..200 s"
+    )
+    """Shortest and longest time of a ramp from zero to full command; one value fixes it."""
+    pause: Annotated[str, Option("T", RECORDINGS, example="20 s", read=quantity("time"))] = "20 s"
+    """Time between two ramps, to set the pressure drop and settle at zero command."""
+    noise: Annotated[Text, Option("Q", METER, "0.15 L/min", "0.15 L/min", quantity("flow"))] = None
+    """Standard deviation of one reading of the flow."""
+    meter_floor: Annotated[Text, Option("Q", METER, "0 L/min", "0.6 L/min", quantity("flow"))] = None
+    """Flow below which the meter reads zero."""
+    meter_lag: Annotated[Text, Option("T", METER, "0.1 s", "0.1 s", with_tolerance("time"))] = None
+    """Lag of the flow meter that identify will be given, with its tolerance: "0.1 s +- 0.02 s" (without one 20 %, and
+    at least 0.05 s)."""
+    meter_zero: Annotated[Text, Option("Q", METER, "0 L/min", "0.1 L/min", quantity("flow"))] = None
+    """Bound of the flow meter's zero error."""
+    confidence: Annotated[float | str, Option("C", FIT, read=number("a number such as 0.99", (0.5, 1.0)))] = "0.99"
+    """Joint confidence level of all lower bounds."""
+
+
+def plan(arguments: PlanArguments) -> "SeriesPlan":
+    """Plan a series of ramp tests: pressure drops, ramp times, repeats and order, with the predicted error.
+
+    Raises
+    ------
+    InputError
+        If the file or an option can't be read, or no series with enough repeats fits in the time.
+    """
+    from dzdesign.identify.planning.results import series_plan
+    from dzdesign.identify.planning.search import plan_series
+
+    read = read_options(arguments, [each.name for each in fields(PlanArguments) if each.name != "pilot"])
+    pilot = _read_pilot(arguments)
+    valve, bench, request = _premises(arguments, read, pilot)
+    with stage_progress("comparing series"):
+        found = plan_series(valve, bench, request)
+    return series_plan(found, valve, bench, request, _stated(arguments, valve, bench, pilot))
+
+
+def _read_pilot(arguments: PlanArguments) -> "Pilot | None":
+    """Return what the pilot series tells; refuse options that it answers."""
+    from dzdesign.core.artefact_reading import read_artefact
+    from dzdesign.identify.planning.premises import read_pilot
+    from dzdesign.identify.valve.model import ValveModel
+
+    if arguments.pilot is None:
+        return None
+    answered = [flag_of(name) for name in OF_PILOT if getattr(arguments, name) is not None]
+    if answered:
+        raise InputError(f"{answered[0]} is answered by the pilot series; leave out the option, or VALVE.json")
+    if isinstance(arguments.pilot, ValveModel):
+        return read_pilot(arguments.pilot)
+    content = read_bytes(Path(arguments.pilot), "valve file")
+    return read_pilot(read_artefact(content, ValveModel, os.fspath(arguments.pilot)))
+
+
+def _premises(
+    arguments: PlanArguments, read: dict[str, Any], pilot: "Pilot | None"
+) -> "tuple[ExpectedValve, Bench, Request]":
+    """Return the expected valve, the bench and the request: what is given, else the pilot's, else the defaults."""
+    from dzdesign.identify.knees.meter_lag import find_lag
+    from dzdesign.identify.options import IdentifyOptions
+    from dzdesign.identify.planning.premises import Bench, straight_valve
+    from dzdesign.identify.planning.search import Request
+
+    def of(name: str) -> Any:
+        told = getattr(pilot, name) if pilot and getattr(arguments, name) is None else None
+        return read[name] if told is None else told
+
+    u_max, (lag, tolerance) = of("u_max"), read["meter_lag"]
+    if pilot is not None and arguments.meter_lag is None and pilot.meter_lag is not None:
+        lag, tolerance = pilot.meter_lag, None
+    scatter = read["repeatability"] * u_max
+    if pilot is None:
+        dp_range = read["dp_range"]
+        valve = straight_valve(
+            dp_range,
+            threshold=read["dead_zone"] * u_max,
+            change=read["threshold_change"] * u_max,
+            max_flow=read["max_flow"],
+            u_max=u_max,
+            scatter=scatter,
+        )
+    else:
+        valve = pilot.valve if arguments.repeatability is None else replace(pilot.valve, scatter=scatter)
+        known = (float(valve.dp[0]), float(valve.dp[-1]))
+        dp_range = known if arguments.dp_range is None else read["dp_range"]
+    options = IdentifyOptions(
+        u_max=u_max,
+        meter_floor=of("meter_floor"),
+        meter_lag=lag,
+        meter_lag_tolerance=tolerance,
+        meter_zero=of("meter_zero"),
+        confidence=read["confidence"],
+        repeatability=valve.scatter / u_max,
+    )
+    bench = Bench(
+        u_max=u_max,
+        noise=of("noise"),
+        noise_inflation=1.0 if pilot is None else pilot.noise_inflation,
+        sample_rate=read["sample_rate"],
+        meter_floor=options.meter_floor or 0.0,
+        meter_zero=options.meter_zero,
+        lag=find_lag([], options),
+        pause=read["pause"],
+        confidence=options.confidence,
+        flat_below=options.flat_below,
+    )
+    request = Request(
+        dp_range=dp_range,
+        budget=read["budget"],
+        ramp_times=read["ramp_times"],
+        wanted=read["loss"],
+        seed=read["seed"],
+    )
+    return valve, bench, request
+
+
+def _stated(arguments: PlanArguments, valve: "ExpectedValve", bench: "Bench", pilot: "Pilot | None") -> "list[Premise]":
+    """Return the premises as text, and where each is from."""
+    from dzdesign.identify.constants import L_MIN
+    from dzdesign.identify.planning.results import Premise
+
+    def origin(name: str, *, in_pilot: bool = True) -> str:
+        if getattr(arguments, name) is not None:
+            return "given"
+        return "pilot series" if pilot is not None and in_pilot else "assumed"
+
+    def span(values: "np.ndarray") -> str:
+        return " to ".join(dict.fromkeys(f"{value:.3g}" for value in (values[0], values[-1])))
+
+    whole = {origin(name) for name in ("dead_zone", "threshold_change")}
+    return [
+        Premise(
+            name="threshold",
+            value=f"{span(100 * valve.threshold / bench.u_max)} % of {bench.u_max:g} V",
+            origin=whole.pop() if len(whole) == 1 else "partly assumed",
+        ),
+        Premise(
+            name="largest flow",
+            value=f"{span(valve.q_max / L_MIN)} L/min",
+            origin=origin("max_flow"),
+        ),
+        Premise(
+            name="repeatability",
+            value=f"{100 * valve.scatter / bench.u_max:.3g} %",
+            origin=origin("repeatability", in_pilot=pilot is not None and pilot.scatter_is != "assumed"),
+        ),
+        Premise(name="noise", value=f"{bench.noise / L_MIN:.3g} L/min", origin=origin("noise")),
+        Premise(
+            name="meter lag",
+            value=f"{bench.lag.seconds:.3g} s, at most {bench.lag.shorter:.3g} s shorter",
+            origin=origin("meter_lag", in_pilot=pilot is not None and pilot.meter_lag is not None),
+        ),
+        Premise(name="meter floor", value=f"{bench.meter_floor / L_MIN:.3g} L/min", origin=origin("meter_floor")),
+        Premise(name="meter zero", value=f"{bench.meter_zero / L_MIN:.3g} L/min", origin=origin("meter_zero")),
+    ]
