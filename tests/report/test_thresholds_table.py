@@ -9,7 +9,7 @@ from tests.identify.knees.test_readings_at_rest import recordings
 def columns(per_MPa):
     side = identify(recordings(per_MPa), IdentifyOptions(meter_lag=0.0)).positive
     table = thresholds_table(side, "closing", "Thresholds")
-    return {label: [row[at] for row in table.rows] for at, label in enumerate(table.columns)}, side
+    return {label: [row[at].text for row in table.rows] for at, label in enumerate(table.columns)}, side
 
 
 def test_the_noise_level_stands_beside_each_pressure_drop():
