@@ -1,4 +1,4 @@
-"""9. A corpus of recordings as benches make them: none refused without need, none misread, no side dropped.
+"""11. A corpus of recordings as benches make them: none refused without need, none misread, no side dropped.
 
 Each case is one or more recordings from `corpus_plant`, as text, and the truth beside them: the commands at which each
 side opens and closes at each pressure drop. A case is misread where a side, a pressure drop or a branch is missing, or
@@ -282,7 +282,7 @@ KINDS: tuple[Callable[[], Iterator[Case]], ...] = (
 
 
 def print_corpus(*, quick: bool, seed: int) -> list:
-    """Print and return the rows of part 9."""
+    """Print and return the rows of part 11."""
     from scoreboard import Row, print_rows, say
 
     every = cases()[:: 4 if quick else 1]
@@ -299,7 +299,7 @@ def print_corpus(*, quick: bool, seed: int) -> list:
     ]
     total = sum(counts.values(), Counter())
     rows.append(Row(what="all", value=float(total.total() - total[""]), limit=0.0, note=_note(total)))
-    print_rows(f"9. Recordings as benches make them: refused or misread (seed {seed})", rows)
+    print_rows(f"11. Recordings as benches make them: refused or misread (seed {seed})", rows)
     return rows
 
 

@@ -4,6 +4,7 @@ import json
 import re
 from dataclasses import asdict
 
+import numpy as np
 import pytest
 
 from dzdesign.command_line.cli import main
@@ -26,7 +27,9 @@ def demo(tmp_path_factory):
 def test_demo_leaves_every_artefact_with_its_origin(demo):
     valve, compensator = (json.loads((demo / name).read_text()) for name in ("valve.json", "compensator.json"))
     evidence = json.loads((demo / "evidence" / "verification.json").read_text())
-    assert valve["schema"] == "dzdesign.valve/1" and len(valve["made_from"]) == 6
+    assert valve["schema"] == "dzdesign.valve/1" and len(valve["made_from"]) == 18
+    # The example shows how to record: nothing is left open that a bench can do about.
+    assert not {warning["code"] for warning in valve["warnings"]} & {"no-repeats", "few-repeats", "order", "drift"}
     assert compensator["made_from"][0]["source"] == "valve.json"
     assert evidence["holds"] is True
     assert [(each["inputs"], each["wrong"]) for each in evidence["inputs"]] == [(33550336, 0)]
@@ -83,8 +86,34 @@ def test_simulate_same_seed_same_bytes(tmp_path, example_folder):
     from dzdesign.identify.reading.ramp_files import read_ramp_file
 
     arguments = ["--dp", "1 MPa", "--ramp-time", "100 s", "--plant", str(example_folder / "plant.toml")]
+    arguments += ["--repeats", "3", "--repeatability", "0.05 %"]
     assert main(["simulate", "-o", str(tmp_path / "again"), *arguments]) == 0
-    again = read_ramp_file(tmp_path / "again" / "ramp_dP1.csv.gz")
-    bundled = read_ramp_file(example_folder / "ramps" / "ramp_dP1.csv.gz")
-    # Another compiler may round the last bit of the plant differently; the file has four decimals.
-    assert abs(again.q - bundled.q).max() < 2e-4 / 60000
+    for number in (1, 2, 3):
+        again = read_ramp_file(tmp_path / "again" / f"ramp_dP1_{number}.csv.gz")
+        bundled = read_ramp_file(example_folder / "ramps" / f"ramp_dP1_{number}.csv.gz")
+        # Another compiler may round the last bit of the plant differently; the file has four decimals.
+        assert abs(again.q - bundled.q).max() < 2e-4 / 60000
+
+
+def test_the_series_is_in_random_order_and_its_time_stamps_tell_it(example_folder):
+    from dzdesign.identify.reading.ramp_files import read_ramp_file
+
+    ramps = [read_ramp_file(path) for path in sorted((example_folder / "ramps").glob("*.csv.gz"))]
+    assert len(ramps) == 18
+    ramps.sort(key=lambda ramp: ramp.started)
+    pressures = [round(2e-6 * float(ramp.dp[:50].mean())) / 2 for ramp in ramps]
+    assert sorted(pressures) == sorted([0.5, 1, 2, 3, 4, 5] * 3)
+    assert abs(np.corrcoef(pressures, np.arange(18))[0, 1]) < 0.5
+    ends = [ramp.started + ramp.time[-1] for ramp in ramps]
+    assert all(after.started - end == pytest.approx(60, abs=1) for end, after in zip(ends, ramps[1:], strict=False))
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    "argv", ["--repeats 0", "--repeats 101", "--repeats two", "--repeatability 0.1", "--repeatability 11%"]
+)
+def test_a_series_that_can_not_be_is_refused(tmp_path, monkeypatch, argv, capsys, wording):
+    monkeypatch.chdir(tmp_path)
+    assert main(["simulate", "--dp", "1 MPa", *argv.split()]) == 2
+    wording(f"simulate: {argv}", capsys.readouterr().err)
+    assert not (tmp_path / "ramps").exists()

@@ -10,9 +10,10 @@ from scipy.stats import chi2
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
+from dzdesign.identify.fitting.bounds import lower_bounds
 from dzdesign.identify.identification import identify
 from dzdesign.identify.knees import between_ramps
-from dzdesign.identify.knees.between_ramps import BetweenRamps
+from dzdesign.identify.knees.between_ramps import BetweenRamps, RampKnees, compare_ramps
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.splitting import Ramp
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes
@@ -113,6 +114,38 @@ class TestScatter:
         assert (bounds(taken.tests) < following).all()
         monkeypatch.setattr(BetweenRamps, "variance_of_next", lambda self, noise_se, state: noise_se**2)
         assert (bounds(taken.tests) > following).any()
+
+
+class TestCoverage:
+    """The bound of the next closing at every test, straight from knees: at 99 % 20 of 2000 families are expected."""
+
+    @staticmethod
+    def failures(repeats, scatter, declared=None):
+        rng = np.random.default_rng([repeats, round(1e4 * scatter)])
+        test, noise_se = np.tile(np.arange(4), repeats), 1e-3
+        failed = 0
+        for knees in 5 + math.hypot(scatter, noise_se) * rng.standard_normal((2000, test.size)):
+            number, unknown = np.repeat(np.arange(repeats), 4), np.full(test.size, np.nan)
+            known = RampKnees(test, number, knees, np.full(test.size, noise_se**2), unknown)
+            between = compare_ramps(known, [repeats] * 4, declared=declared, u_max=10.0)
+            mean = np.bincount(test, weights=knees) / repeats
+            bound = lower_bounds(mean, np.full(4, noise_se / math.sqrt(repeats)), between, 0.99, np.zeros(4))
+            failed += bool(np.any(5 + scatter * rng.standard_normal(4) < bound))
+        return failed
+
+    CASES = pytest.mark.parametrize(("repeats", "declared"), [(1, 0.01), (2, None), (3, None)])
+
+    @CASES
+    def test_it_fails_no_more_often_than_stated(self, repeats, declared):
+        assert self.failures(repeats, 0.01, declared) <= 34
+
+    @CASES
+    def test_the_mean_in_place_of_the_next_is_seen(self, repeats, declared, monkeypatch):
+        def of_mean(self, noise_se, state):
+            return np.diag(self.covariance_of_mean(noise_se))
+
+        monkeypatch.setattr(BetweenRamps, "variance_of_next", of_mean)
+        assert self.failures(repeats, 0.01, declared) > 34
 
 
 class TestWithoutRepeats:

@@ -89,8 +89,10 @@ class TestZero:
         tests = [recordings(0.0, zero=zero, pressures=(dp,))[0] for zero, dp in zip(zeros, PRESSURES, strict=True)]
         assert not warned(identify(tests, OPTIONS), "leak")
 
-    @pytest.mark.parametrize("seed", range(3))
-    def test_slow_noise_is_no_leak(self, seed):
-        pressures = [dp + 0.01 * seed for dp in PRESSURES]
-        valve = identify(recordings(0.0, noise=0.3, memory=0.98, pressures=pressures), OPTIONS)
-        assert not warned(valve, "leak")
+    def test_slow_noise_is_no_leak(self):
+        feigned = 0
+        for seed in range(8):
+            pressures = [dp + 0.01 * seed for dp in PRESSURES]
+            valve = identify(recordings(0.0, noise=0.75, memory=0.98, pressures=pressures), OPTIONS)
+            feigned += valve.positive.tests[0].leak_L_min > 0
+        assert feigned == 0

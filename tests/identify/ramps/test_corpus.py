@@ -48,12 +48,12 @@ class TestWhatIsLeftOut:
     @pytest.mark.parametrize(
         ("name", "reason", "start", "end"),
         [
-            ("pump_1.5s", "pressure", 0.0, 1.5 + 0.9),
-            ("rest_pump_off_between", "pressure", 49.0, 69.0 + 1.2),
+            ("pump_1.5s", "pressure", 0.0, 1.5 + 1.2),
+            ("rest_pump_off_between", "pressure", 49.0, 69.0 + 1.6),
             ("dip_first_hold", "pressure", 1.5, 2.0),
             ("pump_off_at_2V", "pressure", 76.0 + 0.35, 87.0),
-            ("jog_before", "no-flow", 0.0, 7.5),
-            ("exercise_before_the_pump", "no-flow", 0.0, 15.0),
+            ("jog_before", "partial", 0.0, 7.5),
+            ("exercise_before_the_pump", "no-pressure", 0.0, 15.0),
         ],
     )
     def test_a_rest_and_a_moving_pressure(self, name, reason, start, end, tmp_path):
@@ -71,10 +71,10 @@ class TestWhatIsLeftOut:
         tests = found_of("rest_levels_between", tmp_path).positive.tests
         assert [[part.to_s for part in test.left_out] for test in tests] == [
             [],
-            [pytest.approx(56, abs=1.5)],
-            [pytest.approx(133, abs=1.5)],
+            [pytest.approx(59, abs=1.5)],
+            [pytest.approx(136, abs=1.5)],
         ]
-        assert tests[1].left_out[0].dp_MPa == (pytest.approx(1.05, abs=0.02), pytest.approx(1.9, abs=0.02))
+        assert tests[1].left_out[0].dp_MPa == (pytest.approx(1.02, abs=0.02), pytest.approx(1.96, abs=0.02))
 
     def test_the_hold_of_a_ramp_is_kept(self, tmp_path):
         (path,) = write(CASES["noise_1mV"], SEED, tmp_path)
@@ -85,7 +85,7 @@ class TestWhatIsLeftOut:
 
 def test_a_ramp_is_named_with_its_times(tmp_path):
     tests = found_of("repeats_series", tmp_path).positive.tests
-    assert [test.ramps for test in tests][1] == ("repeats_series_1.csv (ramp 2, 46.9 to 93.0 s)",)
+    assert [test.ramps for test in tests][1] == ("repeats_series_1.csv (ramp 2, 47.3 to 93.0 s)",)
 
 
 def test_a_ramp_whose_valve_stays_shut_under_pressure_is_refused_by_name(tmp_path):
@@ -111,8 +111,8 @@ class TestSeededFaults:
     def test_holds_taken_for_sweeps(self, monkeypatch, tmp_path):
         monkeypatch.setattr(command, "_holds", lambda u, turn: False)
         (test,) = found_of("noise_20mV", tmp_path).positive.tests
-        assert [part.reason for part in test.left_out] == ["no-flow"]
-        monkeypatch.setattr(splitting, "without_flow", lambda levels, reach: [False] * len(levels))
+        assert [part.reason for part in test.left_out] == ["partial"]
+        monkeypatch.setattr(splitting, "why_no_ramp", lambda levels, reach: [None] * len(levels))
         assert all(self.faults(["drift_up"], tmp_path))
 
     def test_pressures_not_looked_at(self, monkeypatch, tmp_path):
@@ -120,7 +120,7 @@ class TestSeededFaults:
         assert all(self.faults(["pump_long_hold", "rest_pump_off_after", "pump_on_at_7V"], tmp_path))
 
     def test_exercises_taken_for_ramps(self, monkeypatch, tmp_path):
-        monkeypatch.setattr(splitting, "without_flow", lambda levels, reach: [False] * len(levels))
+        monkeypatch.setattr(splitting, "why_no_ramp", lambda levels, reach: [None] * len(levels))
         assert all(self.faults(["exercise_before_the_pump"], tmp_path))
 
     def test_a_truth_that_is_another(self, tmp_path):

@@ -19,6 +19,8 @@ from dzdesign.identify.ramps.command import despiked
 STEP_SIGMAS, SMALLEST_STEP = 6.0, 2.5e-3
 #: Fewest samples of a dwell and dwells of a staircase, and share of the samples that lie in dwells.
 DWELL_SAMPLES, FEWEST_DWELLS, IN_DWELLS = 8, 8, 0.8
+#: A level at which the valve is open passes this share of the largest flow.
+FLOWING = 0.05
 #: Within a dwell the command moves by less than this share of a step.
 LEVEL = 0.1
 #: A reading that stands out of its neighbours by this share of the flow's range is a spike.
@@ -51,19 +53,17 @@ def find_staircase(u: np.ndarray, q: np.ndarray, source: str = "") -> Staircase 
     starts, ends = dwells
     levels = np.array([np.median(u[start:end]) for start, end in zip(starts, ends, strict=True)])
     steps = np.diff(levels, prepend=levels[0])
-    length = int(np.median(ends - starts))
     smooth = despiked(q)
     spikes = np.abs(q - smooth) > SPIKE * float(np.ptp(smooth))
-    response = _mean_response(np.where(spikes, smooth, q), starts, ends, length)
+    response = _mean_response(np.where(spikes, smooth, q), starts, ends, levels, steps)
     if response is None:
         return None
     first, rest = response
     # One level of the command whenever it comes again, whatever the noise.
     grid = BIN_WIDTH / 10 * float(np.ptp(levels))
     levels = np.round((levels - rest * steps) / grid) * grid
-    logger.info(
-        "'%s': a staircase of %d dwells; the flow settles in %d of their %d samples", source, starts.size, first, length
-    )
+    length = np.median(ends - starts)
+    logger.info("'%s': a staircase, whose flow settles in %d of the %d samples of a dwell", source, first, length)
     settled, command = np.zeros(u.size, dtype=bool), np.full(u.size, np.nan)
     for start, end, level in zip(starts, ends, levels.tolist(), strict=True):
         begin = start + min(first, 3 * (end - start) // 4) if start else start
@@ -88,26 +88,30 @@ def _dwells(u: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     before, after = np.array(halves).T
     step = float(np.median(np.abs(np.diff((before + after) / 2))))
     # A ramp with a hole or two, or with holds, has stretches that are no level.
-    flat = np.abs(after - before) <= LEVEL * step
+    flat = np.abs(after - before) <= LEVEL * step + STEP_SIGMAS * noise / np.sqrt(ends - starts)
     if step < SMALLEST_STEP * span or not np.sum((ends - starts)[flat]) >= IN_DWELLS * u.size:
         return None
     return starts[flat], ends[flat]
 
 
-def _mean_response(q: np.ndarray, starts: np.ndarray, ends: np.ndarray, length: int) -> tuple[int, float] | None:
+def _mean_response(
+    q: np.ndarray, starts: np.ndarray, ends: np.ndarray, levels: np.ndarray, steps: np.ndarray
+) -> tuple[int, float] | None:
     """Return after how many samples the flow has settled, and the share of its step that is left at a dwell's end.
 
     None where no flow follows the steps, or where it goes on through the dwells.
     """
+    length = int(np.median(ends - starts))
     last = np.array([np.mean(q[end - (end - start) // 4 : end]) for start, end in zip(starts, ends, strict=True)])
-    way = np.diff(last)
-    whole = np.flatnonzero((ends - starts)[1:] >= length) + 1
-    noise = _scatter(q[starts[0] : ends[0]])
-    whole = whole[np.abs(way[whole - 1]) > max(3 * noise / np.sqrt(length), 0.1 * np.abs(way).max())]
-    if whole.size < 3:
+    size = np.abs(last)
+    flowing = (np.minimum(size[1:], size[:-1]) > FLOWING * size.max()) & ((ends - starts)[1:] >= length)
+    whole = np.flatnonzero(flowing) + 1
+    # The direction of the flow's step is that of the command's: of the readings, their noise would pass for a step.
+    sign = np.sign(steps[whole]) * np.where(levels[whole] > 0, *_directions(last, levels, steps, whole))
+    before = last[whole - 1]
+    total = float(sign @ (last[whole] - before))
+    if whole.size < FEWEST_DWELLS // 2 or total <= 0:
         return None
-    sign, before = np.sign(way[whole - 1]), last[whole - 1]
-    total = float(np.sum(np.abs(way[whole - 1])))
     rows = q[starts[whole][:, None] + np.arange(length)]
     response = (sign @ (rows - before[:, None])) / total
     residual = rows - last[whole][:, None]
@@ -118,6 +122,13 @@ def _mean_response(q: np.ndarray, starts: np.ndarray, ends: np.ndarray, length: 
         return first, 0.0
     rest = _rest_of_the_way(response)
     return None if rest is None else (3 * length // 4, rest)
+
+
+def _directions(last: np.ndarray, levels: np.ndarray, steps: np.ndarray, whole: np.ndarray) -> tuple[float, float]:
+    """Return whether the flow rises (1) or falls (-1) with the command, where that is positive and where negative."""
+    rises = steps[whole] * (last[whole] - last[whole - 1])
+    positive, negative = (float(np.sign(rises[side].sum())) for side in (levels[whole] > 0, levels[whole] <= 0))
+    return positive, negative
 
 
 def _rest_of_the_way(response: np.ndarray) -> float | None:

@@ -1,0 +1,76 @@
+"""`identify --from` and `--to`, and what `-v` and valve.json say of what was left out."""
+
+import json
+from pathlib import Path
+
+import pytest
+from corpus import cases, write
+
+from dzdesign import api
+from dzdesign.command_line.cli import main
+
+CASES = {case.name: case for case in cases()}
+
+
+@pytest.fixture
+def recording(tmp_path, monkeypatch):
+    """Two ramps with the pump off from 49 to 69 s."""
+    monkeypatch.chdir(tmp_path)
+    (path,) = write(CASES["rest_pump_off_between"], 909, tmp_path)
+    return path.name
+
+
+def left_out():
+    (test,) = json.loads(Path("valve.json").read_text())["sides"]["positive"]["tests"]
+    return test["ramps"], [
+        (part["reason"], round(part["from_s"], 1), round(part["to_s"], 1)) for part in test["left_out"]
+    ]
+
+
+def test_a_part_is_read_and_the_rest_said(recording, capsys):
+    assert main(["identify", recording, "--from", "60 s", "-v"]) == 0
+    ramps, parts = left_out()
+    assert ramps == [recording] and parts[0] == ("option", 0.0, 60.0)
+    assert [part[0] for part in parts] == ["option", "pressure"]
+    assert f"'{recording}', 0.0 to 60.0 s left out" in capsys.readouterr().err
+
+
+def test_without_them_the_rest_is_found(recording, capsys):
+    assert main(["identify", recording]) == 0
+    ramps, parts = left_out()
+    assert len(ramps) == 2 and parts == [("pressure", 49.0, pytest.approx(70.5, abs=0.5))]
+    assert "left out" not in capsys.readouterr().err
+
+
+def test_tables_name_recordings_or_patterns(recording):
+    Path("options.toml").write_text('to = "48 s"\n[from]\n"rest_*.csv" = "1000 ms"\n')
+    assert main(["identify", recording, "--config", "options.toml"]) == 0
+    assert left_out()[1] == [("option", 0.0, 1.0), ("option", 48.0, 124.0)]
+
+
+def test_the_command_line_goes_before_the_file(recording):
+    Path("options.toml").write_text('from = "1 s"\n')
+    assert main(["identify", recording, "--config", "options.toml", "--from", "2 s"]) == 0
+    assert left_out()[1][0] == ("option", 0.0, 2.0)
+
+
+def test_python_writes_it_with_an_underscore(recording):
+    assert api.identify(recording, from_="60 s").positive.tests[0].left_out[0].reason == "option"
+
+
+@pytest.mark.parametrize(
+    ("options", "file", "says"),
+    [
+        (["--from", "600 s"], "", ["runs from 0.0 to 124.0 s", "--from 600 s", "0 rows"]),
+        (["--from", "60"], "", ["--from is '60' without a unit"]),
+        ([], 'from = "60"', ["'options.toml': from is '60' without a unit", 'from = "60 s"']),
+        ([], '[to]\n"rest.csv" = "60 s"', ["[to] names 'rest.csv'"]),
+        (["--from", "60 s", "--to", "50 s"], "", ["--from 60 s and --to 50 s", "0 rows"]),
+        (["--from", "40 MPa"], "", ["--from"]),
+    ],
+)
+def test_what_leaves_nothing_is_refused(options, file, says, recording, capsys):
+    Path("options.toml").write_text(file)
+    assert main(["identify", recording, *options, "--config", "options.toml"]) == 2
+    error = capsys.readouterr().err
+    assert all(words in error for words in says) and not Path("valve.json").exists()
