@@ -199,7 +199,7 @@ def _stated(arguments: PlanArguments, valve: "ExpectedValve", bench: "Bench", pi
         ),
         Premise(
             name="repeatability",
-            value=f"{100 * valve.scatter / bench.u_max:.3g} %",
+            value=f"{100 * valve.scatter / bench.u_max:.3g}{_error_of_scatter(arguments, bench, pilot)} %",
             origin=origin("repeatability", in_pilot=pilot is not None and pilot.scatter_is != "assumed"),
         ),
         Premise(name="noise", value=f"{bench.noise / L_MIN:.3g} L/min", origin=origin("noise")),
@@ -211,3 +211,10 @@ def _stated(arguments: PlanArguments, valve: "ExpectedValve", bench: "Bench", pi
         Premise(name="meter floor", value=f"{bench.meter_floor / L_MIN:.3g} L/min", origin=origin("meter_floor")),
         Premise(name="meter zero", value=f"{bench.meter_zero / L_MIN:.3g} L/min", origin=origin("meter_zero")),
     ]
+
+
+def _error_of_scatter(arguments: PlanArguments, bench: "Bench", pilot: "Pilot | None") -> str:
+    """Return the standard error of a scatter that the pilot's repeats measured, in percent of full command."""
+    if pilot is None or arguments.repeatability is not None or pilot.scatter_is != "repeats":
+        return ""
+    return f" ± {100 * pilot.scatter_se / bench.u_max:.1g}"

@@ -162,8 +162,9 @@ class Pilot:
     """What a quick series of the valve tells."""
 
     valve: ExpectedValve
-    #: Where its scatter is from: of too few repeats it is an assumption.
+    #: Where its scatter is from (of too few repeats it is assumed), and its standard error, V; NaN if not measured.
     scatter_is: Origin
+    scatter_se: float
     u_max: float
     #: m³/s, what its colour adds to the variance of a mean, and m³/s.
     noise: float
@@ -204,6 +205,7 @@ def read_pilot(model: ValveModel) -> Pilot:
             scatter=scatter,
         ),
         scatter_is=found.origin,
+        scatter_se=found.sd_V / math.sqrt(2 * (found.degrees_of_freedom or math.nan)),
         u_max=model.u_max_V,
         noise=L_MIN * float(np.median([test.noise_L_min for test in tests])),
         noise_inflation=float(np.median([test.noise_variance_inflation for test in tests])),
