@@ -23,10 +23,12 @@ def with_tolerance(kind: str) -> Callable[[str, str], tuple[float, float | None]
     """
 
     def read(text: str, option: str) -> tuple[float, float | None]:
-        value, *tolerance = re.split(r"\+/?-|±", text) if isinstance(text, str) else [text]
+        if not isinstance(text, str):  # from a notebook
+            return parse_quantity(text, kind, option), None
+        value, *tolerance = re.split(r"\+/?-|±", text)
         if len(tolerance) > 1:
             raise InputError(f"{option} is {quoted(text)}, expected one tolerance, such as '0.1 s +- 0.02 s'")
-        found = [parse_quantity(each, kind, option) for each in (value, *tolerance)]
+        found = [parse_quantity(each.strip(), kind, option) for each in (value, *tolerance)]
         return found[0], (found[1] if tolerance else None)
 
     return read

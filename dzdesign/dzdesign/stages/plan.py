@@ -126,8 +126,18 @@ def _premises(
     if pilot is not None and arguments.meter_lag is None and pilot.meter_lag is not None:
         lag, tolerance = pilot.meter_lag, None
     scatter = read["repeatability"] * u_max
-    if pilot is None:
+    if pilot is not None and arguments.dp_range is None:
+        dp_range = (float(pilot.valve.dp[0]), float(pilot.valve.dp[-1]))
+    else:
         dp_range = read["dp_range"]
+    request = Request(
+        dp_range=dp_range,
+        budget=read["budget"],
+        ramp_times=read["ramp_times"],
+        wanted=read["loss"],
+        seed=read["seed"],
+    )
+    if pilot is None:
         valve = straight_valve(
             dp_range,
             threshold=read["dead_zone"] * u_max,
@@ -138,8 +148,6 @@ def _premises(
         )
     else:
         valve = pilot.valve if arguments.repeatability is None else replace(pilot.valve, scatter=scatter)
-        known = (float(valve.dp[0]), float(valve.dp[-1]))
-        dp_range = known if arguments.dp_range is None else read["dp_range"]
     options = IdentifyOptions(
         u_max=u_max,
         meter_floor=of("meter_floor"),
@@ -160,13 +168,6 @@ def _premises(
         pause=read["pause"],
         confidence=options.confidence,
         flat_below=options.flat_below,
-    )
-    request = Request(
-        dp_range=dp_range,
-        budget=read["budget"],
-        ramp_times=read["ramp_times"],
-        wanted=read["loss"],
-        seed=read["seed"],
     )
     return valve, bench, request
 
@@ -198,7 +199,7 @@ def _stated(arguments: PlanArguments, valve: "ExpectedValve", bench: "Bench", pi
         ),
         Premise(
             name="repeatability",
-            value=f"{100 * valve.scatter / bench.u_max:.3g} %",
+            value=f"{100 * valve.scatter / bench.u_max:.3g}{_error_of_scatter(arguments, bench, pilot)} %",
             origin=origin("repeatability", in_pilot=pilot is not None and pilot.scatter_is != "assumed"),
         ),
         Premise(name="noise", value=f"{bench.noise / L_MIN:.3g} L/min", origin=origin("noise")),
@@ -210,3 +211,10 @@ def _stated(arguments: PlanArguments, valve: "ExpectedValve", bench: "Bench", pi
         Premise(name="meter floor", value=f"{bench.meter_floor / L_MIN:.3g} L/min", origin=origin("meter_floor")),
         Premise(name="meter zero", value=f"{bench.meter_zero / L_MIN:.3g} L/min", origin=origin("meter_zero")),
     ]
+
+
+def _error_of_scatter(arguments: PlanArguments, bench: "Bench", pilot: "Pilot | None") -> str:
+    """Return the standard error of a scatter that the pilot's repeats measured, in percent of full command."""
+    if pilot is None or arguments.repeatability is not None or pilot.scatter_is != "repeats":
+        return ""
+    return f" ± {100 * pilot.scatter_se / bench.u_max:.1g}"

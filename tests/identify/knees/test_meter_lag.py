@@ -11,6 +11,7 @@ from dzdesign.core.option_readers import with_tolerance
 from dzdesign.identify.identification import identify
 from dzdesign.identify.knees.meter_lag import LONGEST_UNKNOWN, softness_of_filter
 from dzdesign.identify.options import IdentifyOptions
+from dzdesign.stages.identify import IdentifyArguments, identify_options
 from tests.support.bench_recordings import Valve, record
 
 OPENING, CLOSING = 5.4, 5.2
@@ -79,6 +80,13 @@ class TestTolerance:
     @pytest.mark.parametrize("text", ["0.1 s +- 0.02 s", "0.1 s ± 20 ms", "100ms +/- 0.02s"])
     def test_it_is_read_beside_the_lag(self, text):
         assert with_tolerance("time")(text, "--meter-lag") == pytest.approx((0.1, 0.02))
+
+    def test_the_options_carry_it(self):
+        given = identify_options(IdentifyArguments(["a.csv"], meter_lag="0.1 s ± 0.02 s", noise_level="0.3 L/min"))
+        assert (given.meter_lag, given.meter_lag_tolerance) == pytest.approx((0.1, 0.02))
+        assert given.noise_level == pytest.approx(0.3 / 6e4)
+        plain = identify_options(IdentifyArguments(["a.csv"], meter_lag="0.1 s"))
+        assert (plain.meter_lag, plain.meter_lag_tolerance) == (0.1, None)
 
     @pytest.mark.parametrize("text", ["0.1 s +- 0.02", "0.1 s +-", "± 0.02 s", "0.1 s ± 1 ms ± 1 ms", "0.1 s ± 1 V"])
     def test_half_a_tolerance_is_refused(self, text):

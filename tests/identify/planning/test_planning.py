@@ -116,6 +116,7 @@ def test_pressures_stand_where_the_threshold_runs():
     assert place_pressures(VALVE, BENCH, 1 * MPA, 5 * MPA, 5) / MPA == pytest.approx([1, 2, 3, 4, 5])
 
 
+@pytest.mark.slow
 def test_more_time_certifies_more_and_a_wanted_loss_is_reached_in_less():
     short, long = (plan_series(VALVE, BENCH, request(minutes)) for minutes in (10, 40))
     assert long.chosen.prediction.loss < 0.8 * short.chosen.prediction.loss
@@ -128,6 +129,7 @@ def test_more_time_certifies_more_and_a_wanted_loss_is_reached_in_less():
     assert plan_series(VALVE, BENCH, request(10, wanted=0.01)).reached is False
 
 
+@pytest.mark.slow
 def test_a_lag_that_is_not_known_well_asks_for_slow_ramps():
     sure = replace(BENCH, lag=replace(LAG, shorter=0.0))
     unsure = replace(BENCH, lag=replace(LAG, shorter=0.1))

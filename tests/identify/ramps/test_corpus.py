@@ -52,8 +52,8 @@ class TestWhatIsLeftOut:
             ("rest_pump_off_between", "pressure", 49.0, 69.0 + 1.6),
             ("dip_first_hold", "pressure", 1.5, 2.0),
             ("pump_off_at_2V", "pressure", 76.0 + 0.35, 87.0),
-            ("jog_before", "no-flow", 0.0, 7.5),
-            ("exercise_before_the_pump", "no-flow", 0.0, 15.0),
+            ("jog_before", "partial", 0.0, 7.5),
+            ("exercise_before_the_pump", "no-pressure", 0.0, 15.0),
         ],
     )
     def test_a_rest_and_a_moving_pressure(self, name, reason, start, end, tmp_path):
@@ -102,6 +102,11 @@ def test_a_ramp_whose_valve_stays_shut_under_pressure_is_refused_by_name(tmp_pat
     assert fault.startswith("refused") and "(ramp 2, 4" in fault and "to 94.0 s)" in fault
 
 
+@pytest.mark.parametrize("name", ["teeth_noisy", "pump_on_at_7V", "pump_off_at_8V", "bipolar_noisy"])
+def test_a_declared_lag_needs_no_second_branch(name, tmp_path):
+    assert found_of(name, tmp_path, options={"meter_lag": 0.01}).meter.lag_is == "declared"
+
+
 class TestSeededFaults:
     """Without what puts it right each kind of case is refused or misread again, so the corpus sees it."""
 
@@ -111,8 +116,8 @@ class TestSeededFaults:
     def test_holds_taken_for_sweeps(self, monkeypatch, tmp_path):
         monkeypatch.setattr(command, "_holds", lambda u, turn: False)
         (test,) = found_of("noise_20mV", tmp_path).positive.tests
-        assert [part.reason for part in test.left_out] == ["no-flow"]
-        monkeypatch.setattr(splitting, "without_flow", lambda levels, reach: [False] * len(levels))
+        assert [part.reason for part in test.left_out] == ["partial"]
+        monkeypatch.setattr(splitting, "why_no_ramp", lambda levels, reach: [None] * len(levels))
         assert all(self.faults(["drift_up"], tmp_path))
 
     def test_pressures_not_looked_at(self, monkeypatch, tmp_path):
@@ -120,7 +125,7 @@ class TestSeededFaults:
         assert all(self.faults(["pump_long_hold", "rest_pump_off_after", "pump_on_at_7V"], tmp_path))
 
     def test_exercises_taken_for_ramps(self, monkeypatch, tmp_path):
-        monkeypatch.setattr(splitting, "without_flow", lambda levels, reach: [False] * len(levels))
+        monkeypatch.setattr(splitting, "why_no_ramp", lambda levels, reach: [None] * len(levels))
         assert all(self.faults(["exercise_before_the_pump"], tmp_path))
 
     def test_a_truth_that_is_another(self, tmp_path):

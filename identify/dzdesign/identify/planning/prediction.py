@@ -74,9 +74,10 @@ def predict(series: Series, valve: ExpectedValve, bench: Bench, *, draws: int, s
     of_staircase = float(np.mean(on_grid - np.interp(grid, series.dp, of_known)))
     of_lag, of_zero = float(lag.mean()), float(zero.mean())
     noise, share = float(np.mean(ramp_se**2)), 1 / series.rounds
-    # Noise moves what was found, scatter that and the next closing too.
-    scattered = valve.scatter**2 * (1 + share)
-    of_bound, of_scatter = loss - of_staircase - of_lag - of_zero, scattered / (scattered + noise * share)
+    # Scatter moves what was found and the next closing. So does noise where repeats measure the two as one, which the
+    # bounds take for scatter; beside a declared scatter it moves only what was found.
+    scattered, noisy = valve.scatter**2 * (1 + share), noise * (share if series.rounds == 1 else 1 + share)
+    of_bound, of_scatter = loss - of_staircase - of_lag - of_zero, scattered / (scattered + noisy)
     return Prediction(
         knee_se=ramp_se,
         loss=loss,

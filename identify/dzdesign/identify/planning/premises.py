@@ -34,12 +34,9 @@ class ExpectedValve:
     def __post_init__(self) -> None:
         if not np.all(np.diff(self.dp) > 0):
             raise InputError("the pressure drops of the expected valve must rise")
-        if not (np.all(self.threshold > 0) and np.all(self.slope > 0)):
-            raise InputError(
-                f"the threshold falls to {1e3 * self.threshold.min():.3g} mV with a slope of "
-                f"{self.slope.min() / L_MIN:.3g} L/min/V, expected both above zero; correct the dead zone, its change "
-                "or the largest flow"
-            )
+        for name, values, unit in (("threshold", self.threshold, "V"), ("slope", self.slope / L_MIN, "L/min/V")):
+            if not np.all(values > 0):
+                raise InputError(f"the {name} of the expected valve is {values.min():.3g} {unit}, expected above zero")
 
     def threshold_at(self, dp: np.ndarray) -> np.ndarray:
         """Return the threshold, V; outside the known pressure drops that of the nearest."""
@@ -79,7 +76,9 @@ class Bench:
         shown = (("noise of the flow", self.noise / L_MIN, "L/min"), ("sampling rate", self.sample_rate, "Hz"))
         for name, value, unit in shown:
             if not (value > 0 and math.isfinite(value)):
-                raise InputError(f"the {name} is {value:g} {unit}, expected above zero")
+                raise InputError(
+                    f"the {name} is {value:g} {unit}, expected above zero; give --noise and --sample-rate of the bench"
+                )
         if not 0 <= self.pause < math.inf:
             raise InputError(f"the pause between two ramps is {self.pause:g} s, expected zero or more")
 
@@ -145,6 +144,8 @@ def straight_valve(
             f"the threshold runs from {100 * thresholds[0] / u_max:.3g} to {100 * thresholds[-1] / u_max:.3g} % of "
             "full command, expected above 0 and below 100 %; correct --dead-zone or --threshold-change"
         )
+    if not 0 < max_flow < math.inf:
+        raise InputError(f"the largest flow is {max_flow / L_MIN:g} L/min, expected above zero; correct --max-flow")
     slope = max_flow / (u_max - thresholds[0]) * np.sqrt(nodes / nodes[0])
     return ExpectedValve(
         dp=nodes,
@@ -161,8 +162,9 @@ class Pilot:
     """What a quick series of the valve tells."""
 
     valve: ExpectedValve
-    #: Where its scatter is from: of too few repeats it is an assumption.
+    #: Where its scatter is from (of too few repeats it is assumed), and its standard error, V; NaN if not measured.
     scatter_is: Origin
+    scatter_se: float
     u_max: float
     #: m³/s, what its colour adds to the variance of a mean, and m³/s.
     noise: float
@@ -203,6 +205,7 @@ def read_pilot(model: ValveModel) -> Pilot:
             scatter=scatter,
         ),
         scatter_is=found.origin,
+        scatter_se=found.sd_V / math.sqrt(2 * (found.degrees_of_freedom or math.nan)),
         u_max=model.u_max_V,
         noise=L_MIN * float(np.median([test.noise_L_min for test in tests])),
         noise_inflation=float(np.median([test.noise_variance_inflation for test in tests])),

@@ -140,18 +140,20 @@ class _Search:
 
     def too_short(self) -> InputError:
         """Return the error for a time in which no series fits."""
-        low, high = self.request.ramp_times
-        if not self._resolved(high):
+        resolved = [time for time in self._ramp_times() if self._resolved(time)]
+        if not resolved:
             return InputError(
-                f"at {self.bench.sample_rate:g} Hz a ramp of {high:g} s has too few readings for a line, expected "
-                f"{FEWEST_READINGS} or more on its straight part; sample faster, or allow longer ramps by --ramp-times"
+                f"at {self.bench.sample_rate:g} Hz a ramp of {self.request.ramp_times[1]:g} s has too few readings for "
+                f"a line, expected {FEWEST_READINGS} or more on its straight part; sample faster, or allow longer "
+                "ramps by --ramp-times"
             )
+        low = resolved[0]
         one = 2 * low + self.bench.pause
         fewest = min(_fewest_ramps(tests) for tests in self._tests())
         return InputError(
             f"in {self.request.budget / 60:.3g} min no series with enough repeats can be recorded: {fewest} ramps of "
             f"{low:g} s up and down, with pauses of {self.bench.pause:g} s, take {fewest * one / 60:.3g} min; give a "
-            "longer --budget, or shorter --ramp-times"
+            f"longer --budget, or {'shorter --ramp-times' if low == self.request.ramp_times[0] else 'sample faster'}"
         )
 
     def _tests(self) -> list[int]:
@@ -162,12 +164,14 @@ class _Search:
         placed = [place_pressures(self.valve, self.bench, low, high, count) for count in PRESSURES]
         return [dp.size for dp in placed if np.all(np.diff(dp) >= LEAST_STEP * dp[1:])]
 
+    def _ramp_times(self) -> list[float]:
+        shortest, longest = self.request.ramp_times
+        return sorted({shortest, longest, *(time for time in RAMP_TIMES if shortest < time < longest)})
+
     def _frames(self, budget: float, *, repeated: bool) -> Iterator[tuple[int, float, int]]:
         """Yield pressure drops, ramp time (s) and most rounds of the series that fit in a time."""
-        shortest, longest = self.request.ramp_times
-        times = sorted({shortest, longest, *(time for time in RAMP_TIMES if shortest < time < longest)})
         for tests in self._tests():
-            for ramp_time in times:
+            for ramp_time in self._ramp_times():
                 rounds = min(most_rounds(tests, budget, ramp_time, self.bench.pause), MOST_ROUNDS)
                 ramps = tests * rounds + (tests > 1)
                 if rounds < 1 or (repeated and ramps < _fewest_ramps(tests)):

@@ -9,7 +9,6 @@ ramps are one test is said by their pressure drops: see `pooling`.
 """
 
 import bisect
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -27,7 +26,15 @@ from dzdesign.identify.ramps.command import (
     without_command_spikes,
 )
 from dzdesign.identify.ramps.staircases import find_staircase
-from dzdesign.identify.ramps.sweep_pressure import SweepLevel, joined, off_level, stretches, sweep_level, without_flow
+from dzdesign.identify.ramps.sweep_pressure import (
+    Reason,
+    SweepLevel,
+    joined,
+    off_level,
+    stretches,
+    sweep_level,
+    why_no_ramp,
+)
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.left_out import LeftOut
 
@@ -97,32 +104,33 @@ def split_ramps(test: RampTest, lag: float) -> list[Ramp]:
         test = replace(test, u=stairs.u).part(stairs.settled)
     u = lagged_command(test.time, test.u, lag) if stairs is None else test.u
     sweeps = _sweeps(test, u)
-    idle = _idle(sweeps)
-    groups = _groups([sweep for sweep, is_idle in zip(sweeps, idle, strict=True) if not is_idle])
+    reasons = _why_no_ramp(sweeps)
+    groups = _groups([sweep for sweep, reason in zip(sweeps, reasons, strict=True) if reason is None])
     kept = test.time >= test.time[0] + lag  # before that, the command that the flow belongs to was not recorded
     found, left_out = [], list(test.left_out)
-    for sweep in itertools.compress(sweeps, idle):
-        left_out += stretches(test, np.arange(sweep.rows.start, sweep.rows.stop), "no-flow")
+    for sweep, reason in zip(sweeps, reasons, strict=True):
+        if reason is not None:
+            left_out += stretches(test, np.arange(sweep.rows.start, sweep.rows.stop), reason)
     for group in groups:
-        rows = np.arange(group[0].rows.start, group[-1].rows.stop)
-        off = rows[_off_level(group, test)]
-        whole = np.setdiff1d(rows, off, assume_unique=True)
+        rows = slice(group[0].rows.start, group[-1].rows.stop)
+        off, part = _off_level(group, test), test.part(rows)
         in_ramp = kept.copy()
-        in_ramp[off] = False
+        in_ramp[rows] &= ~off
         branches = [_branch(test, u, in_ramp, sweep.rows, sweep.direction) for sweep in group if sweep.is_branch]
         branches = [branch for branch in branches if branch.u.size >= SWEEP_SAMPLES]
-        left_out += stretches(test, off if branches else rows, "pressure" if branches else "no-ramp")
-        found.append((test.part(whole if whole.size else rows), tuple(branches)))
+        not_taken = rows.start + np.flatnonzero(off if branches else np.ones_like(off))
+        left_out += stretches(test, not_taken, "pressure" if branches else "no-ramp")
+        found.append((part.part(~off) if off.any() and not off.all() else part, tuple(branches)))
     if any(branches for _, branches in found):
         found = [(part, branches) for part, branches in found if branches]
     return _numbered(found, joined(left_out, test))
 
 
-def _idle(sweeps: Sequence[_Sweep]) -> list[bool]:
-    """Tell of each sweep whether it is none of a ramp test; a jump goes with a ramp."""
+def _why_no_ramp(sweeps: Sequence[_Sweep]) -> list[Reason | None]:
+    """Tell of each sweep why it is none of a ramp test; a jump goes with a ramp."""
     slow = [sweep for sweep in sweeps if sweep.is_branch]
-    idle = iter(without_flow([sweep.level for sweep in slow], [float(np.ptp(sweep.test.u)) for sweep in slow]))
-    return [sweep.is_branch and next(idle) for sweep in sweeps]
+    found = iter(why_no_ramp([sweep.level for sweep in slow], [float(despiked(sweep.test.u).max()) for sweep in slow]))
+    return [next(found) if sweep.is_branch else None for sweep in sweeps]
 
 
 def _numbered(found: list[tuple[RampTest, tuple[Branch, ...]]], left_out: list[LeftOut]) -> list[Ramp]:

@@ -36,6 +36,8 @@ OFF_LEVEL, OFF_SPREADS = 0.02, 5.0
 ANOTHER, GONE = 2.0, 0.1
 #: A sweep with no flow has no pressure below this share of the largest level.
 NO_PRESSURE = 0.02
+#: Share of the largest command that a sweep of a ramp test comes to: less is an exercise of the valve.
+WHOLE = 0.5
 #: Samples whose median is no spike.
 RUN = 5
 #: Samples of the shut valve between two stretches that are left out which go with them.
@@ -43,7 +45,7 @@ BETWEEN = 20
 #: Usual steps of the clock beyond which rows are missing, as those of the other side.
 LOST_ROWS = 20
 
-Reason = Literal["option", "pressure", "no-flow", "no-ramp"]
+Reason = Literal["option", "pressure", "no-pressure", "partial", "no-ramp"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -182,14 +184,16 @@ def left_out(test: RampTest, rows: np.ndarray, reason: Reason) -> LeftOut:
     )
 
 
-def without_flow(levels: Sequence[SweepLevel], reach: Sequence[float]) -> list[bool]:
-    """Tell of each sweep whether it is none of a ramp test: no flow, with no pressure or far from full command.
+def why_no_ramp(levels: Sequence[SweepLevel], reach: Sequence[float]) -> list[Reason | None]:
+    """Tell of each sweep why it is none of a ramp test, None of those that are.
 
-    `reach` is how far the command of each runs, V. Where all are, none is: the valve is shut, and that is to be said.
+    `reach` is the largest command of each, V. Where no whole sweep opens the valve all are of a test: it is shut.
     """
-    best = max((level.dp for level in levels if level.flows and level.dp), default=0.0)
-    idle = [
-        not level.flows and best > 0 and ((level.dp or best) < NO_PRESSURE * best or far < 0.5 * max(reach))
-        for level, far in zip(levels, reach, strict=True)
-    ]
-    return [False] * len(idle) if all(idle) else idle
+    opening = [level for level in levels if level.flows]
+    best = max((level.dp or 0.0 for level in opening), default=0.0)
+    found: list[Reason | None] = []
+    for level, far in zip(levels, reach, strict=True):
+        no_pressure = not level.flows and level.dp is not None and level.dp < NO_PRESSURE * best
+        found.append("no-pressure" if no_pressure else "partial" if far < WHOLE * max(reach) else None)
+    whole = [level for level, reason in zip(levels, found, strict=True) if reason is None]
+    return found if any(level.flows for level in whole) else [None] * len(found)

@@ -11,7 +11,8 @@ from dzdesign.core.artefact_types import quantity
 REASONS = {
     "option": "--from and --to leave it out",
     "pressure": "the pressure drop is not the ramp's",
-    "no-flow": "the command moves, but the valve never opens: no pressure, or far from full command",
+    "no-pressure": "the command moves without pressure",
+    "partial": "the command stays below half of its largest",
     "no-ramp": "a fragment without a ramp",
 }
 Time = Annotated[float, quantity("s", ge=-1e12, le=1e12)]
@@ -26,11 +27,11 @@ class LeftOut:
     from_s: Annotated[Time, Meta(description="Its first sample, on the recording's own clock.")]
     to_s: Annotated[Time, Meta(description="Its last sample.")]
     reason: Annotated[
-        Literal["option", "pressure", "no-flow", "no-ramp"],
+        Literal["option", "pressure", "no-pressure", "partial", "no-ramp"],
         Meta(
             description="'option': by --from or --to. 'pressure': a rest, or a part of a ramp, whose pressure drop is "
-            "not the ramp's, as before the pump is started. 'no-flow': a sweep that never opens the valve, with no "
-            "pressure or far from full command. 'no-ramp': a fragment without a ramp."
+            "not the ramp's, as before the pump is started. 'no-pressure': a sweep without pressure or flow. "
+            "'partial': a sweep that stays below half of the largest command. 'no-ramp': a fragment without a ramp."
         ),
     ]
     dp_MPa: Annotated[
