@@ -17,6 +17,7 @@ from accuracy import print_accuracy  # noqa: E402
 from between_ramps import print_between_ramps  # noqa: E402
 from bound_coverage import print_coverage, print_over_compensation, print_residual  # noqa: E402
 from corpus import print_corpus  # noqa: E402
+from corpus_units import print_corpus_of_units  # noqa: E402
 from measured import print_measured  # noqa: E402
 from meters import print_meters  # noqa: E402
 from planned_series import print_planned_series  # noqa: E402
@@ -38,6 +39,7 @@ PARTS = {
     "stops": (print_stops, 909),
     "meters": (print_meters, 1010),
     "corpus": (print_corpus, 909),
+    "corpus-units": (print_corpus_of_units, 0),
     "random": (print_random_valves, 404),
     "measured": (print_measured, 0),
     "timing": (print_timing, 0),

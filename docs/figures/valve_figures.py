@@ -46,7 +46,8 @@ def thresholds(example: Example) -> "Figure":
         axes, item.shapes, (opening, closing), names, (BLUE, ORANGE), strict=True
     ):
         read = shape.prepared.branch
-        panel.plot(read.u, read.q / L_MIN, ".", ms=2, color=GREY, alpha=0.35, label="samples")
+        one = read.ramps[0]
+        panel.plot(read.u[one], read.q[one] / L_MIN, ".", ms=2, color=GREY, alpha=0.35, label="samples of one ramp")
         u = np.array([knee, 6.3])
         panel.plot(u, (u - knee) * shape.slope / L_MIN, color=colour, lw=1.8, label="straight part, extended")
         panel.axhline(level, color=BLACK, ls=":", lw=1.2, label=f"what counts as flow, {level:.2f} L/min")

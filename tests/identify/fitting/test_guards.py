@@ -56,10 +56,6 @@ def falling_only(test):
     return dataclasses.replace(test, time=test.time[half:], u=test.u[half:], q=test.q[half:], dp=test.dp[half:])
 
 
-#: Of what is allowed for the lag the mean of both branches takes only what they do not share.
-EXACT = dataclasses.replace(REPEATABLE, meter_lag=0.0, meter_lag_tolerance=0.0)
-
-
 def fitted(tests):
     """Return the positive side as it was fitted, before it is rounded for valve.json."""
     return identify_side(tests, EXACT).model

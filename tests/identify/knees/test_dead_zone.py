@@ -78,8 +78,8 @@ class TestNotch:
     @pytest.mark.parametrize("seed", range(6))
     @pytest.mark.parametrize(
         "bench",
-        [{}, {"noise": 0.05}, {"noise": 0.3, "memory": 0.95}, {"floor": 0.6, "noise": 0.1}],
-        ids=["loud", "quiet", "slow", "floor"],
+        [{}, {"noise": 0.05}, {"noise": 0.3, "memory": 0.95}, {"floor": 0.6, "noise": 0.1}, {"floor": 0.0}],
+        ids=["loud", "quiet", "slow", "floor", "shows nothing below zero"],
     )
     def test_a_sharp_edge_pays_nothing(self, seed, bench):
         valve = identified(seed, **bench)

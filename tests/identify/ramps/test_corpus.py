@@ -102,6 +102,11 @@ def test_a_ramp_whose_valve_stays_shut_under_pressure_is_refused_by_name(tmp_pat
     assert fault.startswith("refused") and "(ramp 2, 4" in fault and "to 94.0 s)" in fault
 
 
+@pytest.mark.parametrize("name", ["teeth_noisy", "pump_on_at_7V", "pump_off_at_8V", "bipolar_noisy"])
+def test_a_declared_lag_needs_no_second_branch(name, tmp_path):
+    assert found_of(name, tmp_path, options={"meter_lag": 0.01}).meter.lag_is == "declared"
+
+
 class TestSeededFaults:
     """Without what puts it right each kind of case is refused or misread again, so the corpus sees it."""
 

@@ -96,7 +96,7 @@ def _about_the_lag(group: DescribedTests, options: IdentifyOptions) -> Iterator[
 def _about_lag_and_order(side: SideModel, group: DescribedTests) -> Iterator[Warning_]:
     """Say of a declared lag that it puts the closing knee above the opening one by more than its tolerance may."""
     lag = group.lag
-    if lag.origin != "declared" or lag.seconds == 0:
+    if lag.origin != "declared" or lag.seconds == 0 or None in group.tests[0].shapes:
         return
     for test, opening, closing in zip(side.tests, *(group.rates(column) for column in (0, 1)), strict=True):
         opens, closes = test.u_knee_rising_V, test.u_knee_falling_V

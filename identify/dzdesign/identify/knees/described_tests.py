@@ -1,5 +1,6 @@
 """`DescribedTests`: ramp tests made comparable and described, as fits, warnings and plots take them."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -72,5 +73,6 @@ class DescribedTests:
         return found
 
     def rates(self, column: int) -> np.ndarray:
-        """Return the pace of the command on that branch of each test, V/s (T,); NaN where it is not known."""
-        return np.array([item.branch(column).prepared.branch.rate for item in self.tests])
+        """Return the pace of the command on that branch of each test, V/s (T,); NaN where it is unknown."""
+        shapes = [item.shapes[column] for item in self.tests]
+        return np.array([shape.prepared.branch.rate if shape else math.nan for shape in shapes])

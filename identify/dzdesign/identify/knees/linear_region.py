@@ -22,6 +22,9 @@ from dzdesign.identify.ramps.branches import Branch
 USEFUL_FLOW = 0.005
 #: Standard deviations of a shut reading above which a single reading is flow.
 NOISE_LEVEL = 3.0
+#: Share of the readings while the valve is shut that are the lowest one, from which on the noise is cut off there;
+#: shares of the readings below the middle of a normal law, and below one standard deviation more.
+CUT_OFF, ONE_SIGMA = 0.25, (0.5, 0.841)
 #: The window may reach down to this multiple of the first flow that counts: nearer to a floor readings are cut off.
 ABOVE_LEVEL = 1.5
 #: Upper ends to which the window is widened while the characteristic goes on straight, over the largest flow. Not 1:
@@ -99,7 +102,13 @@ def _shared_noise(lines: Sequence[GatedLine]) -> tuple[float, float]:
 def _quiet_noise(branch: Branch, y: np.ndarray, knee: float) -> float:
     """Return the robust standard deviation of a reading while the valve is shut (u below half the knee), m³/s."""
     shut = y[branch.u < 0.5 * knee]
-    return robust_sigma(shut) if shut.size >= 5 else 0.0
+    if shut.size < 5:
+        return 0.0
+    if np.mean(shut == shut.min()) < CUT_OFF:
+        return robust_sigma(shut)
+    # A meter that shows nothing below zero cuts off the lower half of its noise.
+    middle, upper = np.quantile(shut, ONE_SIGMA)
+    return float(upper - middle)
 
 
 def _widest_straight(

@@ -112,15 +112,15 @@ def split_ramps(test: RampTest, lag: float) -> list[Ramp]:
         if reason is not None:
             left_out += stretches(test, np.arange(sweep.rows.start, sweep.rows.stop), reason)
     for group in groups:
-        rows = np.arange(group[0].rows.start, group[-1].rows.stop)
-        off = rows[_off_level(group, test)]
-        whole = np.setdiff1d(rows, off, assume_unique=True)
+        rows = slice(group[0].rows.start, group[-1].rows.stop)
+        off, part = _off_level(group, test), test.part(rows)
         in_ramp = kept.copy()
-        in_ramp[off] = False
+        in_ramp[rows] &= ~off
         branches = [_branch(test, u, in_ramp, sweep.rows, sweep.direction) for sweep in group if sweep.is_branch]
         branches = [branch for branch in branches if branch.u.size >= SWEEP_SAMPLES]
-        left_out += stretches(test, off if branches else rows, "pressure" if branches else "no-ramp")
-        found.append((test.part(whole if whole.size else rows), tuple(branches)))
+        not_taken = rows.start + np.flatnonzero(off if branches else np.ones_like(off))
+        left_out += stretches(test, not_taken, "pressure" if branches else "no-ramp")
+        found.append((part.part(~off) if off.any() and not off.all() else part, tuple(branches)))
     if any(branches for _, branches in found):
         found = [(part, branches) for part, branches in found if branches]
     return _numbered(found, joined(left_out, test))
@@ -129,7 +129,7 @@ def split_ramps(test: RampTest, lag: float) -> list[Ramp]:
 def _why_no_ramp(sweeps: Sequence[_Sweep]) -> list[Reason | None]:
     """Tell of each sweep why it is none of a ramp test; a jump goes with a ramp."""
     slow = [sweep for sweep in sweeps if sweep.is_branch]
-    found = iter(why_no_ramp([sweep.level for sweep in slow], [float(np.ptp(sweep.test.u)) for sweep in slow]))
+    found = iter(why_no_ramp([sweep.level for sweep in slow], [float(despiked(sweep.test.u).max()) for sweep in slow]))
     return [next(found) if sweep.is_branch else None for sweep in sweeps]
 
 

@@ -36,7 +36,7 @@ OFF_LEVEL, OFF_SPREADS = 0.02, 5.0
 ANOTHER, GONE = 2.0, 0.1
 #: A sweep with no flow has no pressure below this share of the largest level.
 NO_PRESSURE = 0.02
-#: Share of the farthest sweep that a sweep of a ramp test runs: less is an exercise of the valve.
+#: Share of the largest command that a sweep of a ramp test comes to: less is an exercise of the valve.
 WHOLE = 0.5
 #: Samples whose median is no spike.
 RUN = 5
@@ -187,7 +187,7 @@ def left_out(test: RampTest, rows: np.ndarray, reason: Reason) -> LeftOut:
 def why_no_ramp(levels: Sequence[SweepLevel], reach: Sequence[float]) -> list[Reason | None]:
     """Tell of each sweep why it is none of a ramp test, None of those that are.
 
-    `reach` is how far the command of each runs, V. Where no whole sweep opens the valve all are of one: it is shut.
+    `reach` is the largest command of each, V. Where no whole sweep opens the valve all are of a test: it is shut.
     """
     opening = [level for level in levels if level.flows]
     best = max((level.dp or 0.0 for level in opening), default=0.0)

@@ -12,7 +12,7 @@ REASONS = {
     "option": "--from and --to leave it out",
     "pressure": "the pressure drop is not the ramp's",
     "no-pressure": "the command moves without pressure",
-    "partial": "the command runs less than half as far as in the ramps",
+    "partial": "the command stays below half of its largest",
     "no-ramp": "a fragment without a ramp",
 }
 Time = Annotated[float, quantity("s", ge=-1e12, le=1e12)]
@@ -31,7 +31,7 @@ class LeftOut:
         Meta(
             description="'option': by --from or --to. 'pressure': a rest, or a part of a ramp, whose pressure drop is "
             "not the ramp's, as before the pump is started. 'no-pressure': a sweep without pressure or flow. "
-            "'partial': a sweep less than half as far as the farthest. 'no-ramp': a fragment without a ramp."
+            "'partial': a sweep that stays below half of the largest command. 'no-ramp': a fragment without a ramp."
         ),
     ]
     dp_MPa: Annotated[
