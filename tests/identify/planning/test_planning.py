@@ -165,13 +165,17 @@ def test_a_few_valves_come_out_as_predicted_and_worse_ones_do_not():
 def test_a_pilot_tells_noise_slopes_thresholds_and_scatter():
     truth, rng = PlannedBench(), np.random.default_rng(3)
     tests = truth.record([1, 3, 5] * 4, 20.0, 20.0, rng)
-    pilot = read_pilot(identify(tests, IdentifyOptions(meter_lag=0.1)))
+    found = identify(tests, IdentifyOptions(meter_lag=0.1))
+    pilot = read_pilot(found)
     assert pilot.noise / L_MIN == pytest.approx(0.15, rel=0.02)
     assert pilot.valve.dp / MPA == pytest.approx([1, 3, 5], rel=1e-3)
     assert pilot.valve.slope / L_MIN == pytest.approx(3 * np.sqrt([1, 3, 5]), rel=0.01)
     assert pilot.valve.threshold == pytest.approx(truth.threshold([1, 3, 5]), abs=3 * truth.scatter / 2)
-    # Eight degrees of freedom tell a standard deviation to a quarter of itself.
-    assert 0.5 * truth.scatter < pilot.valve.scatter < 1.6 * truth.scatter
+    # Eight degrees of freedom tell a standard deviation to a quarter of itself; the noise of one ramp is in it.
+    measured = found.positive.certificate.repeatability
+    noise = np.mean(BENCH.knee_errors(VALVE, MPA * np.array([1.0, 3.0, 5.0]), 20.0) ** 2)
+    assert pilot.valve.scatter == pytest.approx(np.sqrt(measured.sd_V**2 - noise), rel=0.01)
+    assert abs(pilot.valve.scatter - truth.scatter) < 3 * pilot.scatter_se == pytest.approx(3 * measured.sd_V / 4)
     assert pilot.meter_lag == 0.1 and pilot.u_max == 10.0
     bench = replace(BENCH, noise=pilot.noise, noise_inflation=pilot.noise_inflation)
     exact = BENCH.knee_errors(VALVE, VALVE.dp, 50.0)
