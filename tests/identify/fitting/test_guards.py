@@ -297,3 +297,11 @@ def test_verify_holds_the_core_against_the_bounds_of_its_own_guard(tmp_path, mon
     out = capsys.readouterr().out
     assert "DOES NOT HOLD  the certificate follows from the valve" in out
     assert "DOES NOT HOLD  no over-compensation on the tested interval" in out
+
+
+def test_a_beta_beyond_its_table_is_refused_and_another_dp0_helps():
+    opens = {0.3: 3.0, 0.6: 2.8, 1.0: 1.2, 5.0: 1.0}
+    tests = ramps(opens.__getitem__, pressures=tuple(opens))
+    with pytest.raises(InputError, match="--dp0"):
+        identify_side(tests, EXACT)
+    assert max(identify_side(tests, dataclasses.replace(EXACT, dp0=0.3 * MPA)).model.beta.beta) <= 1

@@ -13,6 +13,7 @@ from dzdesign.identify.fitting.constrained_fits import KneeFit, fit_knees, fit_o
 from dzdesign.identify.knees.described_tests import DescribedTests
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.guard_curve import Guard, GuardCurve, OpeningCurve
+from dzdesign.identify.valve.quantity_types import LARGEST_BETA
 from dzdesign.identify.valve.staircase import Direction, staircase
 
 #: Standard errors by which the tail's zero must lie below the knee, in one test or in all together, to be taken for a
@@ -191,6 +192,11 @@ def _fit_guard_curve(
 ) -> tuple[GuardCurve, np.ndarray]:
     steps, ceiling = staircase(threshold.bound, direction)
     offset = fit_offset(threshold.value, threshold.se, ceiling, reference, u_max=u_max, trend=direction)
+    if offset.beta.max() > LARGEST_BETA:
+        raise InputError(
+            f"beta(dP) reaches {offset.beta.max():.2f}, expected at most {LARGEST_BETA}: the threshold at dP0 is less "
+            "than half of that at another pressure drop; give the pressure drop with the largest threshold by --dp0"
+        )
     nodes = tuple(value / MPA for value in dp if value is not None)
     curve = GuardCurve(
         u_min0_V=offset.u_min0,

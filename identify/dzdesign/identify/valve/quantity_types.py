@@ -12,5 +12,7 @@ VoltageError = Annotated[float, quantity("V", ge=0, le=1e4)]
 PressureDrop = Annotated[float, quantity("MPa", ge=1e-6, le=1e3)]
 Flow = Annotated[float, quantity("L/min", ge=0, le=1e6)]
 FlowGain = Annotated[float, quantity("L/min/V", ge=0, le=1e6)]
-Ratio = Annotated[float, quantity("1", ge=0, le=2)]
+#: Largest beta(dP): a table of it has room for that, and dP0 can be chosen so that none is larger.
+LARGEST_BETA = 2
+Ratio = Annotated[float, quantity("1", ge=0, le=LARGEST_BETA)]
 Probability = Annotated[float, quantity("1", ge=0, le=1)]
