@@ -112,7 +112,6 @@ class RampKnees:
     """Knees of the single ramps that tell one, (R,), of one branch."""
 
     #: Test of each, and which ramp of it, from 0.
-
     test: np.ndarray
     number: np.ndarray
     #: V, and the variance that the noise gives it, V².
@@ -149,8 +148,10 @@ def compare_ramps(known: RampKnees, counts: Sequence[int], *, declared: float | 
     origin = _origin(squares, noise, degrees, declared, u_max)
     measured = origin == "repeats"
     sd = math.sqrt(squares / degrees) if measured else ASSUMED_REPEATABILITY * u_max if declared is None else declared
-    covariance = np.eye(count if no_drift else count + 1)
-    covariance[np.ix_(*[told if no_drift else covariance[0] >= 0] * 2)] = np.linalg.inv(design.T @ design)
+    rows = told if no_drift else np.ones(count + 1, dtype=bool)
+    # A test without a ramp that tells its knee counts as one ramp.
+    covariance = np.eye(rows.size)
+    covariance[np.ix_(rows, rows)] = np.linalg.inv(design.T @ design)
     drift = None
     if not no_drift:
         # Where a bend of the drift would show, it is in the scatter already.
