@@ -20,7 +20,8 @@ def artefacts(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp(f"valve_{request.param}")
     ramps = sorted(str(path) for path in (SHARED / f"valve_{request.param}").glob("*.csv.gz"))
     assert len(ramps) == 6
-    assert main(["identify", *ramps, "-o", str(folder / "valve.json")]) == 0
+    # One ramp at each pressure drop: with the scatter that is assumed then, valve E's trend of 20 mV would be none.
+    assert main(["identify", *ramps, "--repeatability", "0 %", "-o", str(folder / "valve.json")]) == 0
     return folder
 
 

@@ -6,7 +6,7 @@ from dzdesign.design.signal_descriptions import signals_in_words
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.chain import KINDS, Chain
 from dzdesign.report.page import Section
-from dzdesign.report.sections.cells import Cell, Table, table_of, whole
+from dzdesign.report.sections.cells import Cell, Table, counted, table_of, whole
 
 
 def warnings_section(valve: ValveModel | None, compensator: Compensator | None) -> Section:
@@ -30,7 +30,7 @@ def warnings_section(valve: ValveModel | None, compensator: Compensator | None) 
 
 def provenance_section(chain: Chain) -> Section:
     """Return the section with every hash."""
-    return Section(tables=(_provenance_table(chain), _hashes_table(chain)))
+    return Section(tables=(_provenance_table(chain), _recordings_table(chain), _hashes_table(chain)))
 
 
 def _provenance_table(chain: Chain) -> Table:
@@ -41,11 +41,11 @@ def _provenance_table(chain: Chain) -> Table:
         if artefact:
             place, tool = chain.places[role], artefact.tool
             sources = ", ".join(each.source for each in artefact.made_from) or "–"
+            if role == "valve":
+                sources = counted(len(artefact.made_from), "recording")
             rows.append((kind.label, place.name, _hash(place.sha256), f"{tool.name} {tool.version}", sources))
         elif kind.command:
             rows.append((kind.label, Cell(text="missing or not used", kind="open"), "", "", ""))
-    for source in chain.valve.made_from if chain.valve else ():
-        rows.append(("recording", source.source, _hash(source.sha256), "–", "–"))
     return table_of(
         "Each artefact with the SHA-256 of its bytes, and what it was made from",
         rows,
@@ -54,6 +54,18 @@ def _provenance_table(chain: Chain) -> Table:
         ("SHA-256", lambda row: row[2]),
         ("made by", lambda row: row[3]),
         ("made from", lambda row: row[4]),
+    )
+
+
+def _recordings_table(chain: Chain) -> Table | None:
+    """Return the recordings that the valve was identified from; there may be many, so each takes one line."""
+    if chain.valve is None:
+        return None
+    return table_of(
+        "Recordings that the valve was identified from",
+        chain.valve.made_from,
+        ("file", lambda row: row.source),
+        ("SHA-256", lambda row: Cell(text=row.sha256, kind="code")),
     )
 
 

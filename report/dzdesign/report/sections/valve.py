@@ -1,5 +1,7 @@
 """Sections on the identified valve: data and fit, thresholds, beta over the pressure drop."""
 
+from collections.abc import Sequence
+
 from dzdesign.core.units import chance
 from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.model import ValveModel
@@ -72,6 +74,11 @@ def _trend(name: str, side: SideModel) -> str:
     )
 
 
+def _first_of(ramps: Sequence[str]) -> str:
+    """Return the first ramp of a test, and how many more there are; valve.json names them all."""
+    return f"{ramps[0]} and {len(ramps) - 1} more" if len(ramps) > 1 else ramps[0]
+
+
 def thresholds_table(side: SideModel, guard: str, title: str) -> Table:
     """Return the thresholds of each ramp test, with the lower bounds of the guarded one."""
     leaks = (("leak (L/min)", lambda row: number(row[0].leak_L_min, 2)),)
@@ -90,6 +97,5 @@ def thresholds_table(side: SideModel, guard: str, title: str) -> Table:
         ("noise (L/min)", lambda row: number(row[0].noise_L_min, 3)),
         ("noise level (L/min)", lambda row: number(row[0].noise_level_L_min, 2)),
         *(leaks if any(test.leak_L_min for test in side.tests) else ()),
-        ("outliers", lambda row: number(row[0].outliers, 0)),
-        ("ramp test", lambda row: row[0].source),
+        ("ramp test", lambda row: _first_of(row[0].ramps)),
     )
