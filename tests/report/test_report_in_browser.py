@@ -80,7 +80,7 @@ SPLIT = """() => {
 }"""
 #: CSS pixels between the margins of the page that the style sheet prints on: 210 mm less 2 x 14 mm.
 PAPER = 688
-#: Its height there, and the share by which pages may be more than what is on them fills: a figure moves to the next one.
+#: Its height, and by how much more pages there may be than what is on them fills: a figure moves to the next one.
 PAPER_HEIGHT, UNFILLED = 994, 1.15
 
 
@@ -219,7 +219,7 @@ def test_it_prints_on_light_paper_without_what_only_a_screen_needs(browser, page
         page.emulate_media(media="print")
         filled = page.evaluate("document.documentElement.scrollHeight") / PAPER_HEIGHT
     count = paper.count(b"/Type /Page\n")
-    assert paper.startswith(b"%PDF") and 6 <= count <= UNFILLED * filled, f"{count} pages of which {filled:.1f} are full"
+    assert paper.startswith(b"%PDF") and 6 <= count <= UNFILLED * filled, f"{count} pages, {filled:.1f} full"
 
 
 @pytest.mark.parametrize("name", ["demo", "failing", "valve alone"])
