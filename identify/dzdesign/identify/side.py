@@ -22,6 +22,7 @@ from dzdesign.identify.fitting.guarding import (
     systematic_change,
 )
 from dzdesign.identify.knees.between_ramps import FEW_DEGREES, BetweenRamps
+from dzdesign.identify.knees.curve_thinning import recorded_curve
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
 from dzdesign.identify.knees.prepared_tests import describe_tests
 from dzdesign.identify.options import IdentifyOptions
@@ -109,7 +110,7 @@ def _side_model(
     dp0 = described[reference].dp
     several = len(described) > 1
     return SideModel(
-        tests=tuple(_test_result(group, knees, row, threshold) for row in range(len(described))),
+        tests=tuple(_test_result(group, knees, row, threshold, options.u_max) for row in range(len(described))),
         reference=Reference(dp_MPa=None if dp0 is None else dp0 / MPA, u_min_V=guards[guard].u_min0_V),
         k_x_max_over_u_max=k_x_max / options.u_max,
         k_V_mm=k_x_max / (options.x_max * 1e3) if options.x_max else None,
@@ -172,10 +173,13 @@ def _all_thresholds(
     return thresholds, knees.get("opening")
 
 
-def _test_result(group: DescribedTests, knees: KneeFit, row: int, guarded: Threshold) -> TestResult:
+def _test_result(
+    group: DescribedTests, knees: KneeFit, row: int, guarded: Threshold, u_max: float
+) -> TestResult:
     """Return one row of valve.json's tests."""
     item = group.tests[row]
     rising, falling = item.shapes
+    noise_level = max(shape.dead_zone.noise_level for shape in item.branches)
     return TestResult(
         source=item.test.source,
         dp_MPa=None if item.dp is None else item.dp / MPA,
@@ -190,11 +194,12 @@ def _test_result(group: DescribedTests, knees: KneeFit, row: int, guarded: Thres
         q_max_L_min=item.q_max / L_MIN,
         saturates=all(shape.saturates for shape in item.branches),
         leak_L_min=group.leak[row] / L_MIN,
-        noise_level_L_min=max(shape.dead_zone.noise_level for shape in item.branches) / L_MIN,
+        noise_level_L_min=noise_level / L_MIN,
         noise_L_min=max(shape.sigma for shape in item.branches) / L_MIN,
         noise_variance_inflation=max(shape.variance_inflation for shape in item.branches),
         spool_ripple_V=max(shape.ripple for shape in item.branches),
         outliers=sum(shape.outliers for shape in item.branches),
+        recorded=recorded_curve(item, group.leak[row], noise_level, u_max),
         ramps=item.ramps,
         left_out=item.left_out,
     )
