@@ -5,7 +5,8 @@ from typing import Any
 
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import THIS_TOOL
-from dzdesign.verify.evidence import ClosedLoopResult, Evidence
+from dzdesign.verify.evidence import Evidence
+from dzdesign.verify.loop_results import ClosedLoopResult
 from dzdesign.verify.requirements import ALWAYS
 
 LOOP = ClosedLoopResult(plant=None, plant_source="none", plant_sha256=None, plants=(), pressures=())

@@ -151,6 +151,10 @@ class Compensator(ShownInNotebooks, Artefact):
             "of two; 0: none."
         ),
     ] = 0
+    reading_flow_L_min: Annotated[
+        float,
+        quantity("L/min", "Reading flow: the flow at which dead zones are read, beside the onset.", gt=0, le=1e6),
+    ]
     sides: Annotated[Sides, Meta(description="The law of each sign of command.")]
     drive_functions: Annotated[DriveFunctions, Meta(description="Ramps, dither and the like.")] = field(
         default_factory=DriveFunctions

@@ -31,6 +31,9 @@ class DesignChoices:
     """First share of the command, over which the drive runs from the closing threshold to the opening one."""
     below_dp0: Annotated[Text, Option("B", LAW, "hold", choices=BELOW_DP0)] = None
     """Below dP0: hold beta = 1 as the paper does, or extend it to the tests there."""
+    reading_flow: Annotated[Text, Option("Q", LAW, example="0.6 L/min")] = None
+    """Flow at which dead zones are read beside the onset (default: the meter's floor, or the noise level of a meter
+    without one)."""
     output_max: Annotated[Text, Option("C", LAW, "100 %", example="95 %")] = None
     """Largest drive, in percent of full drive."""
     accept: Annotated[Text, Option("CODE", LAW, choices="dzdesign.design.options:ACCEPTABLE")] = None

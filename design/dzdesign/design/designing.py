@@ -18,6 +18,7 @@ from dzdesign.design.quantise import Units, finest_units
 from dzdesign.design.signals import Signals
 from dzdesign.identify.valve.guard_curve import GUARDS
 from dzdesign.identify.valve.model import ValveModel
+from dzdesign.identify.valve.reading_flow import default_reading_flow
 from dzdesign.identify.valve.side_model import SideModel
 
 #: Share of the sensor's span by which the difference may read negative before it counts as a failed sensor.
@@ -78,6 +79,7 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
         beta_step_codes=STEP_CODES,
         reverse_codes=int(REVERSE_SHARE * (signals.pressure_a.full_code - signals.pressure_a.zero_code)),
         transition_codes=transition_codes,
+        reading_flow_L_min=options.reading_flow_L_min or default_reading_flow(valve),
         drive_functions=options.drive_functions(),
         costs=(),
         valve=valve,

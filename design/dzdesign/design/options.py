@@ -17,6 +17,8 @@ LARGEST_WINDOW = Fraction(1, 10)
 #: Frequencies that a proportional valve's dither has, Hz.
 DITHER_HZ = (100.0, 300.0)
 LONGEST_RAMP_S = 600.0
+#: Beyond any flow that a valve of a control passes.
+MOST_L_MIN = 1e6
 #: Warnings of `identify` for which a valve is refused unless they are accepted.
 ACCEPTABLE = ("branch-order",)
 
@@ -46,6 +48,9 @@ class DesignOptions:
         Frequency of the dither, a square wave, and its peak (half its height) over full drive; 0: none.
     output_max : Fraction
         Largest drive over full drive.
+    reading_flow_L_min : float or None
+        Flow at which dead zones are read beside the onset; None takes the meter's floor, or the noise level of a meter
+        without one.
     full_command_V : Fraction or None
         Full command that the signal states, V.
     accept : tuple of str
@@ -65,6 +70,7 @@ class DesignOptions:
     dither_Hz: float = 0.0
     dither_peak: Fraction = Fraction(0)
     output_max: Fraction = Fraction(1)
+    reading_flow_L_min: float | None = None
     full_command_V: Fraction | None = None
     accept: tuple[str, ...] = ()
     request: DesignRequest | None = None
@@ -93,6 +99,10 @@ class DesignOptions:
                 raise InputError(f"the {what} is {float(share):.3%}, expected 0 to {float(limit):.0%}")
         if not 0 < self.output_max <= 1:
             raise InputError(f"the largest output is {float(self.output_max):.3%}, expected more than 0, up to 100 %")
+        if self.reading_flow_L_min is not None and not 0 < self.reading_flow_L_min <= MOST_L_MIN:
+            raise InputError(
+                f"the reading flow is {self.reading_flow_L_min:g} L/min, expected more than zero, such as '0.6 L/min'"
+            )
         if bool(self.dither_Hz) != bool(self.dither_peak):
             raise InputError("a dither needs both, a frequency and a peak, such as '150 Hz 1 %'")
         if self.dither_Hz and not DITHER_HZ[0] <= self.dither_Hz <= DITHER_HZ[1]:

@@ -1,10 +1,12 @@
 """A recorded branch as few points: straight lines through its averaged flow, halved where they depart from it."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 
 from dzdesign.identify.constants import L_MIN, MPA
+from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.knees.described_tests import DescribedTest
 from dzdesign.identify.knees.noise import robust_sigma
 from dzdesign.identify.knees.profile import smooth_profile
@@ -20,22 +22,23 @@ COMMAND_DIGITS, FLOW_DIGITS = 4, 4
 
 def recorded_curve(item: DescribedTest, leak: float, noise_level: float, u_max: float) -> RecordedCurve:
     """Return the characteristic that the ramps of a test show; leak and noise level in m³/s."""
-    profiles = [shape and smooth_profile(shape.prepared.branch.u, shape.prepared.branch.q + leak, u_max)
-                for shape in item.shapes]  # fmt: skip
-    largest = max(float(profile[1].max()) for profile in profiles if profile)
+    profiles = [_profile(shape, leak, u_max) if shape else None for shape in item.shapes]
+    tolerance = TOLERANCE * max(float(profile[1].max()) for profile in profiles if profile)
     rising, falling = (
-        _thinned(*profile, onset=shape.onset, leak=leak, level=noise_level, tolerance=TOLERANCE * largest)
-        if profile and shape
-        else None
-        for profile, shape in zip(profiles, item.shapes, strict=True)
+        profile and _thinned(*profile, leak=leak, level=noise_level, tolerance=tolerance) for profile in profiles
     )
     curve = RecordedCurve(rising=rising, falling=falling, dp_at_flow_MPa=None)
     branches = [shape.prepared.branch for shape in item.branches]
     return RecordedCurve(rising=rising, falling=falling, dp_at_flow_MPa=_sag(branches, leak, curve.q_max_L_min))
 
 
+def _profile(shape: BranchShape, leak: float, u_max: float) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return command and flow in bins of the command, as recorded, and where the branch begins to flow."""
+    return *smooth_profile(shape.prepared.branch.u, shape.prepared.branch.q + leak, u_max), shape.onset
+
+
 def _thinned(
-    u: np.ndarray, q: np.ndarray, *, onset: float, leak: float, level: float, tolerance: float
+    u: np.ndarray, q: np.ndarray, onset: float, *, leak: float, level: float, tolerance: float
 ) -> RecordedBranch:
     """Return the points of a branch whose flow q (m³/s) was averaged in bins of the command."""
     at, q_at = _points(u, q, tolerance)
@@ -71,7 +74,7 @@ def _points(u: np.ndarray, q: np.ndarray, tolerance: float) -> tuple[np.ndarray,
         flows = _least_squares(u, q, at)
         misses = np.abs(_averaged(q - np.interp(u, u[at], flows)))
         wide = np.diff(at) > 1
-        worst = np.array([misses[left : right + 1].max() for left, right in zip(at[:-1], at[1:], strict=True)])
+        worst = np.array([misses[left : right + 1].max() for left, right in pairwise(at)])
         halved = np.flatnonzero(wide & (worst > allowed))
         room = MOST_POINTS - at.size
         if not halved.size or room <= 0:

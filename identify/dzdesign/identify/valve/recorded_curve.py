@@ -55,9 +55,10 @@ class RecordedBranch:
         if not all(left < right for left, right in pairwise(self.u_V)):
             raise RuleError("the commands of the recorded flow must rise")
 
-    def flow_at(self, u_V: np.ndarray | float) -> np.ndarray:
+    def flow_at(self, u_V: np.ndarray) -> np.ndarray:
         """Return the flow at commands, L/min; beyond the recorded ones that of the nearest."""
-        return np.interp(u_V, self.u_V, self.q_L_min)
+        flows: np.ndarray = np.interp(u_V, self.u_V, self.q_L_min)
+        return flows
 
     def command_at(self, flow_L_min: float) -> float | None:
         """Return the lowest command at which the branch passes a flow, V; None where it never does."""

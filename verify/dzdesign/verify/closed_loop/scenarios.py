@@ -8,7 +8,8 @@ import numpy as np
 
 from dzdesign.verify.closed_loop.loop import ClosedLoop, LoopRun
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
-from dzdesign.verify.evidence import ScenarioResult, Side
+from dzdesign.verify.closed_loop.stand_in import StandIn
+from dzdesign.verify.loop_results import ScenarioResult, Side
 
 #: Two periods a record: as often as the core samples, 1.25 kHz.
 PERIODS = 2
@@ -35,7 +36,7 @@ class Scene:
 
     #: With the compensator, and the plant of this pressure drop.
     loop: ClosedLoop
-    plant: Plant
+    plant: Plant | StandIn
     side: Side
     #: At no flow.
     dp_MPa: float
@@ -80,6 +81,7 @@ class Scene:
             dp_MPa=self.dp_MPa,
             q_zero_L_min=float(run.q_largest_L_min[-1]),
             q_peak_at_zero_L_min=float(run.q_largest_L_min[shut].max(initial=0.0)),
+            unseen_below_L_min=self.loop.unseen_below_L_min(self.dp_MPa),
             must_shut=must_shut,
             figures={key: float(value) for key, value in figures.items()},
         )
@@ -209,9 +211,7 @@ def _noise_at_zero(scene: Scene) -> ScenarioResult:
 def _oils(scene: Scene) -> Iterator[ScenarioResult]:
     """The same ramp with oil far from the temperature of the bench."""
     for name, (viscosity, density) in OILS.items():
-        plant = replace(
-            scene.plant, B_e_N_s_m=scene.plant.B_e_N_s_m * viscosity, rho_kg_m3=scene.plant.rho_kg_m3 * density
-        )
+        plant = scene.plant.with_oil(viscosity, density)
         warm = replace(scene, loop=scene.loop.with_plant(plant), plant=plant)
         run = warm.run(warm.opened_and_closed())
         yield warm.result(name, run, figures={"largest_flow_L_min": run.q_mean_L_min.max()})

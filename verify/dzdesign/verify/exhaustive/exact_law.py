@@ -14,7 +14,7 @@ from dzdesign.core.errors import RequirementError
 from dzdesign.derivation.law import law
 from dzdesign.derivation.scaling import evaluate_line
 from dzdesign.design.compensator import Compensator
-from dzdesign.verify.evidence import Side
+from dzdesign.verify.loop_results import Side
 
 #: What sensor B's weight is stated over, where the two sensors count unlike (DESIGN: codes of A over 2^12).
 WEIGHT_UNIT = 4096
