@@ -154,7 +154,7 @@ def _refuse_two_signs(valve: ValveModel, guard: str) -> None:
             "the command has both signs, but the valve's negative side was not tested; record its ramps, or give a "
             "command of one sign"
         )
-    guards = {name: valve.sides[name].guards for name in ("positive", "negative")}
+    guards = {name: valve.sides[name].certified for name in ("positive", "negative")}
     lacking = [name for name, found in guards.items() if guard not in found]
     if not lacking:
         return
@@ -183,8 +183,7 @@ def _opening_curve(side: SideModel, options: DesignOptions) -> OffsetCurve:
     return OffsetCurve(
         dp_MPa=tuple(Fraction(repr(value)) for value in opening.dp_MPa),
         offset_V=tuple(offset),
-        steps_V=(),
-        lowest_V=min(offset),
+        certified=None,
         hold_below_MPa=hold_below(side, options.below_dp0),
     )
 

@@ -26,12 +26,11 @@ from dzdesign.design.lot import LotMargin, prove_lot
 from dzdesign.design.lot_valves import LotValve
 from dzdesign.design.quantise import finest_units
 from dzdesign.design.signals import SIDE_NAMES, Signals
+from dzdesign.identify.valve.certified_bound import NEAR_MPa
 from dzdesign.identify.valve.side_model import SideModel
 
 #: Of u_max: a ceiling that is nowhere this near to the least one can't be the least by a rounding error (1e-12).
 CLEAR = 1e-6
-#: Pressure drops closer than this are one, MPa: where a double may fall on either side of a tested pressure drop.
-NEAR_MPa = 1e-9
 #: What all compensators of a batch must have in common.
 SHARED = ("law", "below_dp0", "signals", "u_max_V", "beta_denominator", "transition_codes", "drive_functions")
 
@@ -204,11 +203,7 @@ def _limit(curve: OffsetCurve, dp_MPa: np.ndarray) -> np.ndarray:
     if curve.hold_below_MPa is not None:
         hold = float(curve.hold_below_MPa)
         value = np.where(dp_MPa <= hold + NEAR_MPa, np.minimum(value, np.interp(hold, nodes, offset)), value)
-    steps = curve.steps_V or (curve.lowest_V,)
-    for left, right, step in zip(nodes, nodes[1:] if curve.steps_V else nodes, steps, strict=False):
-        between = (dp_MPa >= left - NEAR_MPa) & (dp_MPa <= right + NEAR_MPa)
-        value = np.where(between, np.minimum(value, float(step)), value)
-    return value
+    return value if curve.certified is None else np.minimum(value, curve.certified.in_doubles(dp_MPa))
 
 
 def _carriers(batch: Mapping[str, Compensator], sides: Sequence[_Side]) -> list[str]:
