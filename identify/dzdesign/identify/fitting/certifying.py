@@ -11,7 +11,13 @@ from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, FINEST_ERROR, l
 from dzdesign.identify.fitting.constrained_fits import fit_offset
 from dzdesign.identify.fitting.guarding import GuardedThreshold, OrderedKnees
 from dzdesign.identify.fitting.offsets import OffsetUnderBound, fit_offset_under
-from dzdesign.identify.fitting.premises import FEWEST_FOR_CURVATURE, REFUSED, bound_line, find_curvature
+from dzdesign.identify.fitting.premises import (
+    FEWEST_FOR_CURVATURE,
+    REFUSED,
+    bound_line,
+    confidence_at_tests,
+    find_curvature,
+)
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.certified_bound import CertifiedBound, Premise
 from dzdesign.identify.valve.guard_curve import CertifiedCurve, Guard, OpeningCurve, PremiseCheck
@@ -69,9 +75,10 @@ def bounds_under_premises(guarded: GuardedThreshold, tested: Tested) -> dict[Pre
         )  # fmt: skip
         found.insert(0, smooth)
     if dp.size > 1:
-        statistical = lower_bounds(free.value, free.se, between, options.confidence, np.zeros(dp.size))
+        confidence = confidence_at_tests(options.confidence)
+        statistical = lower_bounds(free.value, free.se, between, confidence, np.zeros(dp.size))
         budget = np.maximum(statistical - free.bound, 0.0)
-        fit = bound_line(dp, free.value, free.se, budget, between, confidence=options.confidence, u_max=options.u_max)
+        fit = bound_line(dp, free.value, free.se, budget, between, confidence=confidence, u_max=options.u_max)
         line = BoundUnderPremise(
             premise="line", value=fit.value, se=free.se, lower=fit.bound, curvature=np.zeros(dp.size - 1),
             p_value=fit.p_value,

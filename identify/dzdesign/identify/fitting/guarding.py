@@ -15,6 +15,7 @@ from dzdesign.identify.fitting.bounds import (
     lower_bounds,
 )
 from dzdesign.identify.fitting.constrained_fits import KneeFit, fit_knees
+from dzdesign.identify.fitting.premises import confidence_at_tests
 from dzdesign.identify.knees.between_ramps import BetweenRamps
 from dzdesign.identify.knees.described_tests import DescribedTests
 from dzdesign.identify.options import IdentifyOptions
@@ -239,9 +240,9 @@ def guard_thresholds(group: DescribedTests, free: KneeFit, options: IdentifyOpti
 
 
 def _unordered(group: DescribedTests, free: KneeFit, column: int, options: IdentifyOptions) -> Threshold:
-    """Return a branch's threshold without a premise about how it runs."""
+    """Return a branch's threshold for a premise that is no direction."""
     alone = OrderedKnees(column=column, fit=free, departure=np.zeros(len(group.tests)))
-    return bound_threshold(group, alone, options)
+    return bound_threshold(group, alone, replace(options, confidence=confidence_at_tests(options.confidence)))
 
 
 def _trend_of(

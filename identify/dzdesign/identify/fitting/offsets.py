@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 #: Parts of the interval between two tests that the offset is straight in, and in each of them the parts at whose ends
 #: the bound is a constraint.
-PARTS, POINTS = 4, 6
+PARTS, POINTS = 8, 4
 #: valve.json has seven decimals: rounding both offset and bound may bring them nearer by this, V.
 ROUNDING_V = 1.5e-7
 #: By how much a curve may run the wrong way for the solver's tolerance, over u_max.

@@ -16,6 +16,9 @@ from dzdesign.identify.knees.between_ramps import BetweenRamps
 
 #: Probability, if a premise were true, of data as unlike it as these, below which it is refused.
 REFUSED = 0.01
+#: Share of the error probability that the bounds at the tests leave to the premise: for a curvature that is estimated,
+#: and for degrees of freedom that are effective ones.
+SHARE_OF_PREMISE = 0.25
 #: A curvature that is estimated: so many times the largest second divided difference at the tests. A kink half way
 #: between two tests shows as half of its change of slope at each, and over the distance of two tests instead of one.
 INNER_FACTOR = 4.0
@@ -59,11 +62,12 @@ class Line:
 def find_curvature(
     dp_MPa: np.ndarray, threshold: np.ndarray, covariance: np.ndarray, degrees: float, declared: float | None
 ) -> Curvature:
-    """Find which curvature M the premise `smooth` is to allow, in the class |2 f[a, x, b]| <= M between tests.
+    """Find which curvature M the premise `smooth` is to allow, in the class 2 f[a, x, b] <= M between tests.
 
-    Estimated, M is four times the largest second divided difference at the tests; in the first and the last interval
-    at least 32 times that of the one test that tells of it (64 with three tests). Its error needs no allowance: what M
-    lacks by it is small beside the distance of the bounds from the thresholds, which the same errors set.
+    Only a threshold that bends upwards lies below its chords. Estimated, M is four times the largest second divided
+    difference at the tests; in the first and the last interval at least 32 times that of the one test that tells of it
+    (64 with three tests). Its error needs no allowance: what M lacks by it is small beside the distance of the bounds
+    from the thresholds, which the same errors set (benchmarks/identify/premises.py).
 
     Parameters
     ----------
@@ -83,14 +87,20 @@ def find_curvature(
     if declared is not None:
         allowed = np.full(dp_MPa.size - 1, declared)
         if found.size:
-            beyond = float(np.max((np.abs(found) - declared) / np.maximum(se, np.finfo(float).tiny)))
-            p_value = min(1.0, float(2 * found.size * stdtr(degrees, -beyond)))
+            beyond = float(np.max((found - declared) / np.maximum(se, np.finfo(float).tiny)))
+            p_value = min(1.0, float(found.size * stdtr(degrees, -beyond)))
     else:
         end = END_FACTOR_OF_THREE if dp_MPa.size == FEWEST_FOR_CURVATURE else END_FACTOR
-        allowed = np.full(dp_MPa.size - 1, INNER_FACTOR * float(np.abs(found).max()))
-        allowed[0] = max(allowed[0], end * abs(float(found[0])))
-        allowed[-1] = max(allowed[-1], end * abs(float(found[-1])))
+        upwards = np.maximum(found, 0.0)
+        allowed = np.full(dp_MPa.size - 1, INNER_FACTOR * float(upwards.max()))
+        allowed[0] = max(allowed[0], end * float(upwards[0]))
+        allowed[-1] = max(allowed[-1], end * float(upwards[-1]))
     return Curvature(at_tests=found, se=se, allowed=allowed, declared=declared is not None, p_value=p_value)
+
+
+def confidence_at_tests(confidence: float) -> float:
+    """Return the confidence of the bounds at the tests with which the whole curve has the given one."""
+    return 1 - (1 - SHARE_OF_PREMISE) * (1 - confidence)
 
 
 def second_differences(dp_MPa: np.ndarray) -> np.ndarray:

@@ -65,7 +65,7 @@ class CertifiedBound:
     ) -> "CertifiedBound":
         """Return the bound that follows from simultaneous bounds at the tests.
 
-        `monotone`: between two tests the lower bound of both sides, by the trend. Otherwise, with |2 f[a, x, b]| <= M
+        `monotone`: between two tests the lower bound of both sides, by the trend. Otherwise, with 2 f[a, x, b] <= M
         for every x between neighbouring tests a and b, f(x) >= chord - M/2 (x - a) (b - x); `line` has M = 0.
         """
         nodes, bounds = ([Fraction(repr(float(value))) for value in values] for values in (dp_MPa, lower_V))
