@@ -33,8 +33,12 @@ def recorded_curve(item: DescribedTest, leak: float, noise_level: float, u_max: 
 
 
 def _profile(shape: BranchShape, leak: float, u_max: float) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return command and flow in bins of the command, as recorded, and where the branch begins to flow."""
-    return *smooth_profile(shape.prepared.branch.u, shape.prepared.branch.q + leak, u_max), shape.onset
+    """Return command and flow in bins of the command, as recorded, and where flow begins: no later than the knee.
+
+    Of a noisy meter the first flow that stands out comes after the knee, and the valve is no sharper for that.
+    """
+    flow = shape.prepared.branch.q + leak
+    return *smooth_profile(shape.prepared.branch.u, flow, u_max), min(shape.onset, shape.knee)
 
 
 def _thinned(

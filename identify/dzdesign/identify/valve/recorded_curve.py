@@ -28,7 +28,12 @@ class RecordedBranch:
 
     u_V: Annotated[
         tuple[Voltage, ...],
-        Meta(description="Commands of the points, rising.", min_length=2, max_length=MOST_POINTS + 4),
+        Meta(
+            description="Commands of the points, rising.",
+            min_length=2,
+            max_length=MOST_POINTS + 4,
+            extra_json_schema={"unit": "V"},
+        ),
     ]
     q_L_min: Annotated[
         tuple[Flow, ...],
