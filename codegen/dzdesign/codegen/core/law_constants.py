@@ -139,6 +139,7 @@ class LawConstants:
                     f"u_min0/{c.transition_codes} = {self._volts(form.transition * self.unit):.6g} V",
                     (u_min0_key, "transition_codes", "u_max_V", *SCALED),
                     rounding=f"exact from {u_min0_text}",
+                    literal="uint32" if self.narrow else "int32",
                 )
             )
         return found
