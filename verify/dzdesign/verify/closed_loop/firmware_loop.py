@@ -63,7 +63,16 @@ def scenes_of(folder: Path, compensator: Compensator, plant: Plant | None) -> tu
             reference = dp_MPa if side.reference.dp_MPa is None else side.reference.dp_MPa
             loop = first.with_plant(one)
             scenes.append(
-                Scene(loop=loop, plant=one, side=name, dp_MPa=dp_MPa, reference_MPa=reference, tested_MPa=tested)
+                Scene(
+                    loop=loop,
+                    plant=one,
+                    side=name,
+                    dp_MPa=dp_MPa,
+                    reference_MPa=reference,
+                    tested_MPa=tested,
+                    command_error=compensator.command_error,
+                    has_zero_band=compensator.zero_band_codes > 0,
+                )
             )
     return tuple(scenes)
 

@@ -116,6 +116,16 @@ class ClosedLoop:
         self._has_core = firmware is not None
         self._plant = numbers_of(plant, self._signals.compare_max)
 
+    def command_of_codes(self, codes: np.ndarray) -> np.ndarray:
+        """Return the commands, shares of full, that the converter reads as so many codes from zero, (N,) whole numbers.
+
+        They may lie below zero: then the command is one of the other sign, or none that the signal has.
+        """
+        zero, full = int(self._scalings[0][0]), int(self._scalings[1][0])
+        span, way = abs(full - zero), 1 if full > zero else -1
+        middle: np.ndarray = (codes + 0.5 * way) / (span + 1)  # of the code: it is rounded down, whichever way it runs
+        return middle
+
     def with_plant(self, plant: Plant) -> "ClosedLoop":
         """Return the same loop with another plant; nothing is compiled again."""
         other = copy.copy(self)

@@ -93,7 +93,7 @@ def shut_after_scenarios(scenarios: Sequence[ScenarioResult], zero_flow: Check, 
     text += f"{worst.q_zero_L_min:.4g} L/min ({worst.name}, at {worst.dp_MPa:.2f} MPa)"
     if hidden := [each for each in scenarios if not each.must_shut]:
         leak = max(hidden, key=lambda each: each.q_zero_L_min)
-        text += f"; not required, as no core can know: {leak.name}, {leak.q_zero_L_min:.2g} L/min"
+        text += f"; not required, as no core can know of it or it has no zero band: {leak.name}, {leak.q_zero_L_min:.2g} L/min"
     if not plant_given:
         text += "; load steps and frozen sensors were not tried, which needs a plant (--plant)"
     if zero_flow.holds is None:
