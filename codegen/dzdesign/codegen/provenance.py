@@ -19,8 +19,8 @@ def _valve_keys(compensator: Compensator) -> dict[str, tuple[str, ...]]:
     for sign in compensator.signals.signs:
         name = "positive" if sign > 0 else "negative"
         side = f"sides.{name}"
-        curve = f"{side}.guards.{compensator.side(sign).certificate.guard}"
-        offset, bounds = f"{curve}.u_min0_V", (f"{curve}.beta", f"{curve}.certified_steps_V")
+        curve = f"{side}.certified.{compensator.side(sign).certificate.guard}"
+        offset, bounds = f"{curve}.u_min0_V", (f"{curve}.offset_V", f"{curve}.u_lower_V", f"{curve}.curvature_V_MPa2")
         # With a transition the law's offset is that of the opening threshold.
         opening = (f"{side}.opening_curve",) if compensator.transition_codes else ()
         found |= {

@@ -21,6 +21,7 @@ SI_UNIT = {
     "ratio": "",
     "current": "A",
     "resistance": "ohm",
+    "curvature": "V/Pa**2",
 }
 EXAMPLES = {
     "time": "s, ms, min",
@@ -32,6 +33,7 @@ EXAMPLES = {
     "ratio": "%",
     "current": "mA, A",
     "resistance": "ohm, kohm",
+    "curvature": "mV/MPa^2, mV/bar^2",
 }
 #: Spellings of data-acquisition programs that pint does not read.
 SPELLINGS = {

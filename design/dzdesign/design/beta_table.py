@@ -10,6 +10,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.signals import Signals
+from dzdesign.identify.valve.certified_bound import CertifiedBound
 
 #: Pressure codes between neighbouring nodes: a power of two, so that the firmware finds a node by a shift.
 STEP_CODES = 64
@@ -33,14 +34,12 @@ class OffsetCeiling:
 class OffsetCurve:
     """An offset over the pressure drop and the bounds that hold it, exactly from the decimal numbers of valve.json."""
 
-    #: Tested pressure drops, rising.
+    #: Nodes, from the first tested pressure drop to the last, rising.
     dp_MPa: tuple[Fraction, ...]
     #: Offset at each; straight between them.
     offset_V: tuple[Fraction, ...]
-    #: Lower bounds of the guarded threshold between neighbouring tests (one fewer); empty from one test.
-    steps_V: tuple[Fraction, ...]
-    #: The lowest bound of all tests.
-    lowest_V: Fraction
+    #: Lower bound of the guarded threshold on that interval; None of an offset that nothing has to bound.
+    certified: CertifiedBound | None
     #: Up to this dP0 the offset is at most the one there, as Eq. (7) holds beta = 1; None follows the tests.
     hold_below_MPa: Fraction | None
 
@@ -67,14 +66,7 @@ class OffsetCurve:
 
     def bound(self, dp_MPa: Fraction) -> Fraction | None:
         """Return the lower bound of the guarded threshold at dP in V, or None outside the tested interval."""
-        nodes = self.dp_MPa
-        if not nodes[0] <= dp_MPa <= nodes[-1]:
-            return None
-        if not self.steps_V:
-            return self.lowest_V
-        right = bisect_left(nodes, dp_MPa)
-        touching = self.steps_V[max(right - 1, 0) : right + (nodes[right] == dp_MPa)]
-        return min(touching)
+        return None if self.certified is None else self.certified.at(dp_MPa)
 
 
 @lru_cache(maxsize=8)
@@ -88,7 +80,7 @@ def offset_ceiling(
 ) -> OffsetCeiling:
     """Return the limit of the offset at every pressure code, the converter's error and the rounding counted.
 
-    The dither's peak is kept free beside the rounding. A curve that lies above the staircase of its bounds somewhere
+    The dither's peak is kept free beside the rounding. A curve that lies above its bound somewhere
     is refused: valve.json contradicts itself.
     """
     first, last = (signals.dp_code(end) for end in (curve.dp_MPa[0], curve.dp_MPa[-1]))

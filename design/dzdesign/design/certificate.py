@@ -9,9 +9,10 @@ from fractions import Fraction
 
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.beta_table import STEP_CODES, OffsetCeiling, OffsetCurve, offset_ceiling
-from dzdesign.design.compensator import Certificate, Compensator
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.side_law import Certificate
 from dzdesign.design.signals import SIDE_NAMES, Signals
-from dzdesign.identify.valve.guard_curve import Guard, GuardCurve
+from dzdesign.identify.valve.guard_curve import CertifiedCurve, Guard
 from dzdesign.identify.valve.side_model import SideModel
 
 #: Of a loss in V: tenths of a microvolt.
@@ -90,18 +91,16 @@ def _words(value: object) -> str:
 
 def guarded_curve(side: SideModel, guard: str, below_dp0: str) -> OffsetCurve:
     """Return the certified offset of the threshold that is to be guarded, or say what to do if there is none."""
-    if not side.beta.dp_MPa:
+    if not side.curve.dp_MPa:
         raise InputError(
             "the valve was identified without a pressure drop, so no offset can be certified at any pressure; "
             'record the ramp test again with a column of dP (or pA and pB), or declare it: identify --dp "1 MPa"'
         )
     curve = _curve_of(side, guard)
-    u_min0 = Fraction(repr(curve.u_min0_V))
     return OffsetCurve(
-        dp_MPa=tuple(Fraction(repr(value)) for value in curve.beta_dp_MPa),
-        offset_V=tuple(Fraction(repr(value)) * u_min0 for value in curve.beta),
-        steps_V=tuple(Fraction(repr(step)) for step in curve.certified_steps_V),
-        lowest_V=min(Fraction(repr(bound)) for bound in curve.u_lower_V),
+        dp_MPa=tuple(Fraction(repr(value)) for value in curve.offset_dp_MPa),
+        offset_V=tuple(Fraction(repr(value)) for value in curve.offset_V),
+        certified=curve.bound(side.trend or "flat"),
         hold_below_MPa=hold_below(side, below_dp0),
     )
 
@@ -111,12 +110,12 @@ def hold_below(side: SideModel, below_dp0: str) -> Fraction | None:
     return Fraction(repr(side.reference.dp_MPa)) if below_dp0 == "hold" else None
 
 
-def _curve_of(side: SideModel, guard: str) -> GuardCurve:
+def _curve_of(side: SideModel, guard: str) -> CertifiedCurve:
     """Return the curve that certifies a threshold; refuse one that valve.json does not have, and say why."""
-    if guard in side.guards:
-        return side.guards[guard]
+    if guard in side.certified:
+        return side.certified[guard]
     raise InputError(
-        f"the ramp tests bound the {' and the '.join(side.guards)} threshold, but the {guard} one is to be guarded; "
+        f"the ramp tests bound the {' and the '.join(side.certified)} threshold, but the {guard} one is to be guarded; "
         + _remedy(side, guard)
     )
 

@@ -9,9 +9,13 @@ import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError, and_more
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.signals import Signals
+from dzdesign.identify.valve.certified_bound import BoundPiece, CertifiedBound
 
 #: Over-compensated valves that a sentence names.
 NAMED = 5
+#: Drives that are this near to the nearest one by doubles, V, are compared exactly.
+CLOSE_V = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,20 +50,52 @@ def lot_margins(compensator: Compensator) -> tuple[LotMargin, ...]:
             side = valve.side(sign)
             if side is None:
                 raise InputError(f"'{valve.name}' of the lot has no bounds of the negative side; run `batch` again")
-            for left, right, bound in side.steps():
+            for piece in side.bound().pieces:
+                left, right = piece.from_MPa, piece.to_MPa
                 first = max(ceil(signals.dp_code(left)) - high, 0)
                 last = min(floor(signals.dp_code(right)) - low, numerators.size - 1)
                 if first > last and left == right:  # one test, between two codes: both of them count
                     first, last = last, min(first, numerators.size - 1)
                 if first > last:
                     continue
-                code = first + int(numerators[first : last + 1].argmax())
-                margin = bound - int(numerators[code]) * unit_V - kept * compensator.u_max_V
+                drive_V = numerators[first : last + 1] * float(unit_V)
+                nearest = first + _nearest(piece, signals, first, drive_V, (low, high))
+                over, code = max(
+                    (int(numerators[code]) * unit_V - _least(piece, signals, int(code), (low, high)), -int(code))
+                    for code in nearest
+                )
+                code = -code
+                margin = -over - kept * compensator.u_max_V
                 if valve.name not in margins or margin < margins[valve.name].margin_V:
                     margins[valve.name] = LotMargin(
                         name=valve.name, sign=sign, dp_MPa=signals.dp_MPa(code), margin_V=margin
                     )
     return tuple(margins.values())
+
+
+def _least(piece: BoundPiece, signals: Signals, code: int, error: tuple[int, int]) -> Fraction:
+    """Return the least bound over the pressure drops that a code may stand for, as far as the piece reaches, V."""
+    low, high = (signals.dp_MPa(code + each) for each in error)
+    return piece.least(max(min(low, piece.to_MPa), piece.from_MPa), min(max(high, piece.from_MPa), piece.to_MPa))
+
+
+def _nearest(
+    piece: BoundPiece, signals: Signals, first: int, drive_V: np.ndarray, error: tuple[int, int]
+) -> np.ndarray:
+    """Return which drives, from the code `first` on, may come nearest to a piece: by doubles, to `CLOSE_V`."""
+    codes = first + np.arange(drive_V.size)
+    zero, step = float(signals.dp_MPa(0)), float(signals.dp_MPa(1) - signals.dp_MPa(0))
+    low, high = (np.clip(zero + step * (codes + each), float(piece.from_MPa), float(piece.to_MPa)) for each in error)
+    places = [low, high]
+    if piece.curvature > 0:
+        slope = (piece.high_V - piece.low_V) / (piece.to_MPa - piece.from_MPa)
+        places.append(np.clip(float((piece.from_MPa + piece.to_MPa) / 2 - slope / piece.curvature), low, high))
+    bound = CertifiedBound(pieces=(piece,))
+    left_V = np.min([bound.in_doubles(place) for place in places], axis=0) - drive_V
+    near: np.ndarray = np.flatnonzero(left_V <= left_V.min() + CLOSE_V)
+    if piece.curvature == 0 and piece.low_V == piece.high_V:  # a step: the largest drive comes nearest, the first of it
+        return np.array([int(drive_V.argmax())])
+    return near
 
 
 def _numerators(nodes: Sequence[int], step: int, last: int) -> np.ndarray:

@@ -74,11 +74,10 @@ def without_narrow(
 
 def _coarser_V(side: LotSide, dp_MPa: float) -> float:
     """Return how far a bound between two tests lies under the straight line through theirs, V."""
-    for low, high, bound in side.steps():
-        if low < dp_MPa < high:
-            straight = np.interp(dp_MPa, side.dp_MPa, side.u_lower_V)
-            return max(float(straight) - float(bound), 0.0) if side.trend in SLOPING else 0.0
-    return 0.0
+    if side.trend not in SLOPING or not side.dp_MPa[0] < dp_MPa < side.dp_MPa[-1]:
+        return 0.0
+    straight = np.interp(dp_MPa, side.dp_MPa, side.u_lower_V)
+    return max(float(straight) - float(side.bound().in_doubles(np.array([dp_MPa]))[0]), 0.0)
 
 
 def _pressures_of_lot(tested: Sequence[Sequence[float]]) -> list[tuple[float, float]]:

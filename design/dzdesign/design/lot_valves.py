@@ -4,16 +4,16 @@ The certificate of a compensator's file is for the valve in it. A lot setting is
 `verify` needs to see that none is over-compensated: name, hash of valve.json, and the guarded threshold's bounds.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from fractions import Fraction
-from itertools import accumulate, pairwise
+from itertools import pairwise
 from typing import Annotated
 
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, Sha256, quantity
-from dzdesign.identify.valve.quantity_types import PressureDrop, Voltage
+from dzdesign.identify.valve.certified_bound import CertifiedBound, Premise
+from dzdesign.identify.valve.quantity_types import PressureDrop, SecondDifference, Voltage
 from dzdesign.identify.valve.side_model import SideModel
 from dzdesign.identify.valve.staircase import Direction
 
@@ -27,6 +27,11 @@ class LotSide:
         Meta(description="How the threshold runs with the pressure drop; null where fewer than two were tested."),
     ]
     confidence: Annotated[float, quantity("1", "Confidence with which all bounds hold together.", ge=0.5, le=1)]
+    premise: Annotated[Premise, Meta(description="What the bound rests on between the tests.")]
+    curvature_V_MPa2: Annotated[
+        tuple[SecondDifference, ...],
+        quantity("V/MPa2", "M between neighbouring tests, one fewer than tests; 0 for line, empty for monotone."),
+    ]
     dp_MPa: Annotated[tuple[PressureDrop, ...], quantity("MPa", "Tested pressure drops, rising.")]
     u_lower_V: Annotated[tuple[Voltage, ...], quantity("V", "Lower bound of the threshold at each.")]
 
@@ -35,34 +40,27 @@ class LotSide:
             raise RuleError(f"{len(self.dp_MPa)} pressure drops have {len(self.u_lower_V)} bounds, expected one each")
         if any(left >= right for left, right in pairwise(self.dp_MPa)):
             raise RuleError("the pressure drops of a valve do not rise from test to test")
+        bends = 0 if self.premise == "monotone" else len(self.dp_MPa) - 1
+        if len(self.curvature_V_MPa2) != bends:
+            raise RuleError(f"{len(self.curvature_V_MPa2)} values of M for the premise {self.premise}, expected {bends}")
 
     @classmethod
     def of(cls, side: SideModel, guard: str) -> "LotSide":
         """Return the bounds of an identified side."""
+        curve = side.certified[guard]
         return cls(
             trend=side.trend,
             confidence=side.certificate.confidence,
-            dp_MPa=side.guards[guard].beta_dp_MPa,
-            u_lower_V=side.guards[guard].u_lower_V,
+            premise=curve.premise,
+            curvature_V_MPa2=curve.curvature_V_MPa2,
+            dp_MPa=curve.dp_MPa,
+            u_lower_V=curve.u_lower_V,
         )
 
-    def steps(self) -> Iterator[tuple[Fraction, Fraction, Fraction]]:
-        """Yield from where to where (MPa) which bound holds (V): straight from the tests, the threshold being monotone.
-
-        A threshold that falls with dP is, below a test, at least that test's bound.
-        """
-        pressures = [Fraction(repr(dp)) for dp in self.dp_MPa]
-        bounds = [Fraction(repr(bound)) for bound in self.u_lower_V]
-        if self.trend == "decreasing":
-            best = list(accumulate(reversed(bounds[1:]), max))[::-1]
-        elif self.trend == "increasing":
-            best = list(accumulate(bounds[:-1], max))
-        else:
-            best = [min(bounds)] * (len(bounds) - 1)
-        if not best:
-            yield pressures[0], pressures[0], bounds[0]
-        for (low, high), bound in zip(pairwise(pressures), best, strict=True):
-            yield low, high, bound
+    def bound(self) -> CertifiedBound:
+        """Return the bound on the whole tested interval, exact."""
+        trend = self.trend or "flat"
+        return CertifiedBound.of(self.premise, self.dp_MPa, self.u_lower_V, self.curvature_V_MPa2, trend)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

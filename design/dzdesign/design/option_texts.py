@@ -14,6 +14,7 @@ from dzdesign.design.signal_text import command_signal, full_command_V, parse_si
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import TargetInputs
 from dzdesign.identify.constants import L_MIN
+from dzdesign.design.zero_band import command_error_of
 from dzdesign.identify.valve.guard_curve import Guard
 from dzdesign.identify.valve.model import DECIMALS
 
@@ -54,8 +55,8 @@ def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
         ),
         guard=cast(Guard, text["guard"]),
         below_dp0=cast(BelowDp0, text["below_dp0"]),
-        transition=_share(text["transition"], "--transition"),
-        window=_share(text["zero_window"], "--zero-window"),
+        transition=_transition(text["transition"]),
+        command_error=command_error_of(text["command_error"], converter, command),
         ramp_up_s=_seconds(text["ramp_up"], "--ramp-up"),
         ramp_down_s=_seconds(text["ramp_down"], "--ramp-down"),
         dither_Hz=dither_Hz,
@@ -66,6 +67,13 @@ def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
         accept=tuple(text["accept"].replace(",", " ").split()),
         request=DesignRequest(target=target, options=text),
     )
+
+
+def _transition(text: str) -> Fraction | None:
+    """Read ``auto`` (None), ``off`` (0) or a share."""
+    if text == "auto":
+        return None
+    return Fraction(0) if text == "off" else _share(text, "--transition")
 
 
 def _share(text: str, option: str) -> Fraction:

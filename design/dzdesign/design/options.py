@@ -8,12 +8,14 @@ from dzdesign.core.errors import InputError, nearest
 from dzdesign.design.design_choices import BELOW_DP0, BelowDp0, DesignRequest
 from dzdesign.design.drive_functions import RAMP_UNIT, DriveFunctions
 from dzdesign.design.signals import Signals
+from dzdesign.design.target_inputs import Converter
+from dzdesign.design.zero_band import LEAST_TRANSITION, LEAST_TRANSITION_NOISE, CommandError, command_error_of
 from dzdesign.identify.valve.guard_curve import GUARDS, Guard
 
-#: Largest transition, dither and window, of full command or drive.
+#: The transition where nothing is said; largest transition and dither, of full command or drive.
+TRANSITION = Fraction(1, 100)
 LARGEST_TRANSITION = Fraction(1, 10)
 LARGEST_DITHER = Fraction(1, 10)
-LARGEST_WINDOW = Fraction(1, 10)
 #: Frequencies that a proportional valve's dither has, Hz.
 DITHER_HZ = (100.0, 300.0)
 LONGEST_RAMP_S = 600.0
@@ -38,10 +40,11 @@ class DesignOptions:
         falling branch was recorded is refused unless "opening" is asked for.
     below_dp0 : {"hold", "extend"}
         For dP <= dP0 hold beta = 1 (the paper, Eq. 7), or follow the tests there, beta above 1.
-    transition : Fraction
-        Share of full command over which the drive runs from the closing to the opening threshold; 0: none.
-    window : Fraction
-        Of a command of both signs: share of full command that it must pass zero by before the other side is driven.
+    transition : Fraction or None
+        Share of full command over which, behind the zero band, the drive runs from the closing to the opening
+        threshold; 0: none, and no zero band either; None: `TRANSITION`, or as many codes as the noise wants.
+    command_error : CommandError or None
+        Error of the command's code at zero, which the zero band is for; None: that of the F28335's converter.
     ramp_up_s, ramp_down_s : tuple of float
         Time of the command from zero to full, and back, s: positive, then negative command. 0: no limit.
     dither_Hz, dither_peak : float, Fraction
@@ -63,8 +66,8 @@ class DesignOptions:
     signals: Signals = field(default_factory=Signals)
     guard: Guard = "closing"
     below_dp0: BelowDp0 = "hold"
-    transition: Fraction = Fraction(0)
-    window: Fraction = Fraction(1, 100)
+    transition: Fraction | None = None
+    command_error: CommandError | None = None
     ramp_up_s: tuple[float, float] = (0.0, 0.0)
     ramp_down_s: tuple[float, float] = (0.0, 0.0)
     dither_Hz: float = 0.0
@@ -91,9 +94,8 @@ class DesignOptions:
                     f"{' or '.join(ACCEPTABLE)}: no other one stops a design"
                 )
         for what, share, limit in (
-            ("transition", self.transition, LARGEST_TRANSITION),
+            ("transition", self.transition or Fraction(0), LARGEST_TRANSITION),
             ("dither", self.dither_peak, LARGEST_DITHER),
-            ("zero window", self.window, LARGEST_WINDOW),
         ):
             if not 0 <= share <= limit:
                 raise InputError(f"the {what} is {float(share):.3%}, expected 0 to {float(limit):.0%}")
@@ -117,25 +119,45 @@ class DesignOptions:
                 )
 
     def transition_codes(self) -> int:
-        """Return the codes of the transition: the largest power of two within its share of the shorter command."""
-        if not self.transition:
+        """Return the codes of the transition: the largest power of two within its share of the shorter command.
+
+        A narrower one than the command's noise allows is refused; where nothing is said the least that it allows.
+        """
+        if self.transition == 0:
             return 0
         span = min(self.signals.command.span(sign) for sign in self.signals.signs)
-        codes = int(self.transition * span)
-        if codes < 1:
+        least = self.error.least_transition
+        codes = int((TRANSITION if self.transition is None else self.transition) * span)
+        if self.transition is None:
+            codes = max(codes, 1 << (least - 1).bit_length())
+        codes = 1 << (codes.bit_length() - 1) if codes else 0
+        if codes < least:
+            needed = Fraction(1 << (least - 1).bit_length(), span)
             raise InputError(
-                f"a transition of {float(self.transition):.3%} is less than one code of the command, 1/{span}; "
-                "give more"
+                f"a transition of {float(self.transition or 0):.3%} is {codes} codes of the command, a power of two, "
+                f"expected {LEAST_TRANSITION} or more and {LEAST_TRANSITION_NOISE} times the noise's peak of "
+                f"{self.error.noise_codes}; give --transition {float(needed) + 5e-6:.3%} or more, or off"
             )
-        return 1 << (codes.bit_length() - 1)
+        if (taken := codes + self.error.zero_band_codes) > span // 10:
+            raise InputError(
+                f"a zero band of {self.error.zero_band_codes} codes and a transition of {codes} take {taken} of the "
+                f"command's {span} codes, expected a tenth at most; give a --command-signal over more of the "
+                "converter, a smaller --command-error, or --transition off"
+            )
+        return codes
 
-    def drive_functions(self) -> DriveFunctions:
+    @property
+    def error(self) -> CommandError:
+        """The command's error: what was declared, or that of the F28335's converter."""
+        return self.command_error or command_error_of("", Converter(), self.signals.command)
+
+    def drive_functions(self, transition_codes: int) -> DriveFunctions:
         """Return what the drive does around the law, in the firmware's integers."""
         signals, command = self.signals, self.signals.command
         spans = tuple(command.span(sign) if sign in signals.signs else 0 for sign in (1, -1))
         both = len(signals.signs) == 2
         return DriveFunctions(
-            window_codes=round(self.window * min(spans)) if both else 0,
+            leave_zero_codes=self.error.leave_zero_codes if both or transition_codes else 0,
             ramp_up=self._ramp(self.ramp_up_s, spans),
             ramp_down=self._ramp(self.ramp_down_s, spans),
             dither_counts=self._dither_counts(),

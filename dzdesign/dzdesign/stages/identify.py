@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from dzdesign.identify.options import IdentifyOptions
     from dzdesign.identify.valve.model import ValveModel
 
+#: Of the threshold between the tests.
+PREMISES = "dzdesign.identify.valve.certified_bound:PREMISES"
+
 
 @dataclass(frozen=True, kw_only=True)
 class IdentifyChoices(RampArguments):
@@ -46,6 +49,13 @@ class IdentifyChoices(RampArguments):
     repeatability: Annotated[Text, Option("S", FIT, example="0.1 %", read=percent("0.1 %"))] = None
     """Standard deviation of the threshold from ramp to ramp, in percent of full command, such as "0.1 %" (default:
     measured where ramps are repeated, otherwise 0.25 %)."""
+    curve: Annotated[Text, Option("PREMISE", FIT, choices=PREMISES)] = None
+    """Premise about the threshold between the tests (default: smooth, where three or more pressure drops support it,
+    otherwise monotone). line: straight over the pressure drop. smooth: curvature at most M. monotone: it runs one
+    way."""
+    curvature: Annotated[Text, Option("M", FIT, example="20 mV/MPa^2", read=quantity("curvature"))] = None
+    """M of the premise smooth, such as "20 mV/MPa^2": bound of the threshold's second divided difference, kinks
+    included (default: estimated from the tests)."""
     record: Annotated[Mapping[str, object] | None, Option("ENTRY", RECORDINGS, by_entry=True)] = None
     """Entry of the test record, such as "serial = 4711": kept in valve.json and printed in the report, nothing is
     computed from it. Repeatable. In the options file a table [record]."""

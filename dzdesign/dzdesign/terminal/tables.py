@@ -76,17 +76,43 @@ def _side_lines(side: "SideModel") -> tuple[str, ...]:
         f"{certificate.level_L_min:.2f} L/min (noise level: the meter's floor, what averages resolve, or 0.5 % of the "
         "largest flow) counts as none",
         f"from ramp to ramp: {certificate.repeatability.in_words()}",
-        f"u_min0 = {side.reference.u_min_V:.4f} V{at}: the largest certified offset, under the bounds of both "
-        "neighbouring tests; more tests raise it",
+        f"identified: u_min0 = {side.reference.u_min_V:.4f} ± {side.reference.u_min_se_V:.4f} V{at}, the knee on "
+        f"{certificate.guard}{_betas(side)}",
+        f"certified: an offset of {side.curve.u_min0_V:.4f} V{at}, the largest under the bounds; more tests raise it",
         f"premise: {side.premise}",
-        f"drive range of the valve k x_max/u_max = {side.k_x_max_over_u_max:.4f}: command from the knee to full "
-        "stroke, as a share of full command; the law's counts from its offset, which lies lower"
-        + (f"; k = {side.k_V_mm:.4f} V/mm" if side.k_V_mm is not None else ""),
+        *_premise_lines(side),
+        f"drive range of the valve k x_max/u_max = {side.k_x_max_over_u_max:.4f} ± {side.k_x_max_over_u_max_se:.4f}: "
+        "command from the knee to full stroke, as a share of full command; the law's counts from its offset, which "
+        "lies lower"
+        + (f"; k = {side.k_V_mm:.4f} ± {side.k_V_mm_se or 0.0:.4f} V/mm" if side.k_V_mm is not None else ""),
         "trend with dP: can't be said from one ramp test"
         if side.trend_change_V is None or side.trend_change_se_V is None
         else f"trend with dP: {side.trend} ({1e3 * side.trend_change_V:+.1f} ± {1e3 * side.trend_change_se_V:.1f} mV "
         f"over the tested range, {chance(side.trend_p or 0.0)})",
     )
+
+
+def _betas(side: "SideModel") -> str:
+    """Say beta at the highest pressure drop, of each branch."""
+    found = [
+        f"{each.beta[-1]:.4f} ± {each.beta_se[-1]:.4f} on {name}"
+        for name, each in side.identified.items()
+        if len(each.beta) > 1
+    ]
+    return f"; beta({side.tests[-1].dp_MPa:.3g} MPa) = {', '.join(found)}" if found else ""
+
+
+def _premise_lines(side: "SideModel") -> tuple[str, ...]:
+    """Say of each premise that these tests allow how it fits them, and what it would leave."""
+    if len(side.curve.premises) < 2:
+        return ()
+    words = []
+    for check in side.curve.premises:
+        p_value, left = check.lack_of_fit_p, check.dead_zone_over_u_max
+        tested = "untested" if p_value is None else f"lack of fit {chance(p_value)}"
+        leaves = "no offset" if left is None else f"{100 * left:.1f} %"
+        words.append(f"{check.premise} {leaves} ({tested})")
+    return (f"largest dead zone on opening, without a transition, by --curve: {', '.join(words)}",)
 
 
 def print_compensator(compensator: "Compensator", console: "Console | None" = None) -> None:

@@ -1,8 +1,10 @@
 """Choices of the engineer for an identification."""
 
+import math
 from dataclasses import dataclass
 
-from dzdesign.core.errors import InputError
+from dzdesign.core.errors import InputError, quoted
+from dzdesign.identify.valve.certified_bound import PREMISES, Premise
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,6 +41,11 @@ class IdentifyOptions:
     repeatability : float or None
         Standard deviation of the threshold from ramp to ramp, as a share of u_max; None measures it where ramps are
         repeated, and takes 0.25 % elsewhere.
+    curve : {"line", "smooth", "monotone"} or None
+        Premise about the threshold between the tests; None takes `smooth` where its curvature can be told from the
+        tests and certifies more than `monotone`.
+    curvature : float or None
+        M of `smooth`: the largest second divided difference of the threshold, V/Pa²; None estimates it from the tests.
     """
 
     u_max: float = 10.0
@@ -53,6 +60,8 @@ class IdentifyOptions:
     knee_window: tuple[float, float] = (0.12, 0.5)
     flat_below: float = 1e-3
     repeatability: float | None = None
+    curve: Premise | None = None
+    curvature: float | None = None
 
     def __post_init__(self) -> None:
         if not self.u_max > 0:
@@ -66,6 +75,12 @@ class IdentifyOptions:
                 f"the repeatability is {100 * self.repeatability:.3g} % of full command, expected 0 to below 10 %: one "
                 "standard deviation of the threshold from ramp to ramp"
             )
+        if self.curve not in (*PREMISES, None):
+            raise InputError(f"the curve is {quoted(self.curve)}, expected one of {', '.join(PREMISES)}")
+        if self.curvature is not None and not 0 <= self.curvature < math.inf:
+            raise InputError(f"the curvature is {self.curvature} V/Pa², expected zero or more")
+        if self.curvature is not None and self.curve not in ("smooth", None):
+            raise InputError(f"a curvature is declared beside the curve '{self.curve}', expected it beside 'smooth'")
         if not 0 <= self.flat_below < 1:
             raise InputError(f"the change that counts as flat is {self.flat_below}, expected a share of u_max")
         for name in ("meter_floor", "meter_lag", "meter_lag_tolerance", "noise_level", "meter_zero"):

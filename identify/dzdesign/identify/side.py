@@ -2,25 +2,16 @@
 
 import math
 from collections.abc import Sequence
-from contextlib import suppress
 
 import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.constants import L_MIN, MPA
 from dzdesign.identify.data_quality.side_warnings import find_warnings
-from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, Trend, find_trend
+from dzdesign.identify.fitting.certifying import Certified, Tested, certify_thresholds, opening_curve
 from dzdesign.identify.fitting.constrained_fits import KneeFit, fit_knees
-from dzdesign.identify.fitting.guarding import (
-    OrderedKnees,
-    Threshold,
-    bound_threshold,
-    fit_guard_curves,
-    mean_threshold,
-    opening_curve,
-    order_knees,
-    systematic_change,
-)
+from dzdesign.identify.fitting.guarding import Guarding, Threshold, guard_thresholds
+from dzdesign.identify.fitting.identifying import identify_curve
 from dzdesign.identify.knees.between_ramps import FEW_DEGREES, BetweenRamps
 from dzdesign.identify.knees.curve_thinning import recorded_curve
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
@@ -28,7 +19,7 @@ from dzdesign.identify.knees.prepared_tests import describe_tests
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.results import SideIdentification
-from dzdesign.identify.valve.guard_curve import GUARDS, Guard, GuardCurve
+from dzdesign.identify.valve.guard_curve import GUARDS, CertifiedCurve, Guard
 from dzdesign.identify.valve.ramp_result import BRANCHES, TestResult
 from dzdesign.identify.valve.repeatability import Repeatability
 from dzdesign.identify.valve.side_model import BoundsBasis, Reference, SideModel
@@ -48,32 +39,39 @@ def identify_side(tests: Sequence[RampTest], options: IdentifyOptions) -> SideId
         Where no threshold can be given, with the reason.
     """
     group = describe_tests(tests, options)
-    trend, free, guarded = _fit_with_trend(group, options)
-    model = _side_model(group, trend, free, guarded, options)
+    free = fit_knees([item.shapes for item in group.tests], floor=group.floor, u_max=options.u_max, trend="flat")
+    reference = _reference(group.tests, options.dp0)
+    guarding = guard_thresholds(group, free, options)
+    certified = _certify(group, guarding, reference, options)
+    curve = next(iter(certified.values())).curve
+    knees = guarding.knees if curve.premise == "monotone" else free
+    model = _side_model(group, guarding, certified, knees, reference, options)
+    departure = np.maximum(guarding.departure, guarding.guarded_departure)
+    refused = next(iter(certified.values())).refused
     return SideIdentification(
         model=model,
         described=group,
-        knees=guarded.fit,
-        warnings=find_warnings(model, group, guarded.departure, options),
+        knees=knees,
+        warnings=find_warnings(model, group, departure, refused, options),
     )
 
 
-def _fit_with_trend(group: DescribedTests, options: IdentifyOptions) -> tuple[Trend, KneeFit, OrderedKnees]:
-    """Fit the knees freely, see which way the guarded ones run, and fit them again under that direction."""
-    free = fit_knees([item.shapes for item in group.tests], floor=group.floor, u_max=options.u_max, trend="flat")
-    dp = np.array([item.dp or math.nan for item in group.tests])
-    column = 1 if group.tests[0].shapes[1] else 0  # falling wherever there is one: zero command comes after closing
-    between, knee_se = group.between(column), free.knee_se[:, column]
-    degrees = float(between.degrees_of_freedom(knee_se, DEGREES_OF_FREEDOM).min())
-    trend = find_trend(
-        dp,
-        free.knee[:, column],
-        between.covariance_of_mean(knee_se),
-        degrees,
-        options.u_max,
-        systematic_change(group, column, options),
+def _certify(
+    group: DescribedTests, guarding: Guarding, reference: int, options: IdentifyOptions
+) -> dict[Guard, Certified]:
+    """Certify the offset of every guard, the default one first."""
+    dp = np.array([math.nan if item.dp is None else item.dp / MPA for item in group.tests])
+    opens = guarding.free.knee[:, 0]
+    tested = Tested(
+        dp_MPa=dp,
+        reference=reference,
+        direction=guarding.trend.direction,
+        opens_V=np.where(np.isnan(opens), guarding.free.knee[:, 1], opens),
+        options=options,
     )
-    return trend, free, order_knees(group, free, trend.direction, column, options)
+    between, threshold = group.between(guarding.column), next(iter(guarding.thresholds.values())).free
+    _refuse_unlike_repeats(between, threshold)
+    return certify_thresholds(guarding.thresholds, tested)
 
 
 def _reference(described: tuple[DescribedTest, ...], dp0: float | None) -> int:
@@ -93,27 +91,32 @@ def _reference(described: tuple[DescribedTest, ...], dp0: float | None) -> int:
 
 
 def _side_model(
-    group: DescribedTests, trend: Trend, free: KneeFit, guarded: OrderedKnees, options: IdentifyOptions
+    group: DescribedTests,
+    guarding: Guarding,
+    certified: dict[Guard, Certified],
+    knees: KneeFit,
+    reference: int,
+    options: IdentifyOptions,
 ) -> SideModel:
-    """Assemble one side: guarded thresholds, the curves that may be certified of them, and k x_max."""
-    described, knees = group.tests, guarded.fit
-    reference = _reference(described, options.dp0)
-    thresholds, rising = _all_thresholds(group, free, guarded, trend, options)
-    guard, threshold = next(iter(thresholds.items()))
-    dp = [item.dp for item in described]
-    _refuse_unlike_repeats(group.between(guarded.column), threshold)
-    found = fit_guard_curves(thresholds, dp, reference, trend.direction, options.u_max)
-    guards: dict[str, GuardCurve] = {name: found[name][0] for name in GUARDS if name in found}
-    slope = float(np.nanmean(knees.slope[reference]))
-    y_max = float(np.mean([shape.y_max for shape in described[reference].branches]))
-    k_x_max = y_max / slope  # Eq. (11) at full stroke: Q_max = slope (k x_max)
+    """Assemble one side: what was identified, the curves that may be certified, and k x_max."""
+    described, trend = group.tests, guarding.trend
+    guard = next(iter(certified))
+    curves = {name: certified[name].curve for name in GUARDS if name in certified}
+    joint = identify_curve(group, knees, curves[guard].premise, reference, options)
     dp0 = described[reference].dp
     several = len(described) > 1
+    k_mm = 1 / (options.x_max * 1e3) if options.x_max else None
     return SideModel(
-        tests=tuple(_test_result(group, knees, row, threshold, options.u_max) for row in range(len(described))),
-        reference=Reference(dp_MPa=None if dp0 is None else dp0 / MPA, u_min_V=guards[guard].u_min0_V),
-        k_x_max_over_u_max=k_x_max / options.u_max,
-        k_V_mm=k_x_max / (options.x_max * 1e3) if options.x_max else None,
+        tests=tuple(_test_result(group, knees, row, curves[guard], options.u_max) for row in range(len(described))),
+        reference=Reference(
+            dp_MPa=None if dp0 is None else dp0 / MPA,
+            u_min_V=joint.curves[guard].u_V[reference],
+            u_min_se_V=joint.curves[guard].u_se_V[reference],
+        ),
+        k_x_max_over_u_max=joint.k_x_max / options.u_max,
+        k_x_max_over_u_max_se=joint.k_x_max_se / options.u_max,
+        k_V_mm=joint.k_x_max * k_mm if k_mm else None,
+        k_V_mm_se=joint.k_x_max_se * k_mm if k_mm else None,
         trend=trend.direction if several else None,
         trend_change_V=trend.change if several else None,
         trend_change_se_V=trend.change_se if several else None,
@@ -122,12 +125,14 @@ def _side_model(
             confidence=options.confidence,
             guard=guard,
             level_L_min=max(shape.dead_zone.noise_level for item in described for shape in item.branches) / L_MIN,
-            repeatability=_repeatability(group.between(guarded.column)),
+            repeatability=_repeatability(group.between(guarding.column)),
         ),
-        guards=guards,
-        opening_curve=opening_curve(rising, trend.direction, guards, options.u_max) if rising else None,
-        active_constraints=knees.active
-        + tuple(f"offset at test {row + 1}" for row, holds in enumerate(found[guard][1]) if holds),
+        identified=joint.curves,
+        certified=curves,
+        opening_curve=opening_curve(guarding.opening, trend.direction, curves, options.u_max)
+        if guarding.opening
+        else None,
+        active_constraints=knees.active + certified[guard].active,
     )
 
 
@@ -152,30 +157,7 @@ def _repeatability(found: BetweenRamps) -> Repeatability:
     )
 
 
-def _all_thresholds(
-    group: DescribedTests, free: KneeFit, guarded: OrderedKnees, trend: Trend, options: IdentifyOptions
-) -> tuple[dict[Guard, Threshold], OrderedKnees | None]:
-    """Return the threshold of every guard that the branches allow, the default one first, and the rising knees.
-
-    The trend is the one found on the guarded branch: one edge opens and closes. A branch that runs otherwise departs
-    from it, and its bounds are lowered by the departure.
-    """
-    guard: Guard = "closing" if guarded.column else "opening"
-    other: Guard = "opening" if guarded.column else "closing"
-    knees, thresholds = {guard: guarded}, {guard: bound_threshold(group, guarded, options)}
-    # Where the solver finds no order of the other branch's knees, that guard is not on offer, and `design` says so.
-    with suppress(InputError):
-        if group.tests[0].shapes[1 - guarded.column]:
-            knees[other] = order_knees(group, free, trend.direction, 1 - guarded.column, options, alone=True)
-    if other in knees:
-        thresholds[other] = bound_threshold(group, knees[other], options)
-        thresholds["mean"] = mean_threshold(group, thresholds["opening"], thresholds["closing"])
-    return thresholds, knees.get("opening")
-
-
-def _test_result(
-    group: DescribedTests, knees: KneeFit, row: int, guarded: Threshold, u_max: float
-) -> TestResult:
+def _test_result(group: DescribedTests, knees: KneeFit, row: int, guarded: CertifiedCurve, u_max: float) -> TestResult:
     """Return one row of valve.json's tests."""
     item = group.tests[row]
     rising, falling = item.shapes
@@ -188,8 +170,8 @@ def _test_result(
         straight_rising=rising.line.window if rising else None,
         straight_falling=falling.line.window if falling else None,
         not_observable=_not_observable(group, row),
-        u_guard_V=float(guarded.value[row]),
-        u_guard_lower_V=float(guarded.bound[row]),
+        u_guard_V=guarded.u_threshold_V[row],
+        u_guard_lower_V=guarded.u_lower_V[row],
         slope_L_min_V=float(np.nanmean(knees.slope[row])) / L_MIN,
         q_max_L_min=item.q_max / L_MIN,
         saturates=all(shape.saturates for shape in item.branches),

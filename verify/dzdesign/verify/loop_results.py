@@ -122,6 +122,11 @@ class ScenarioResult:
     ]
     figures: Annotated[Mapping[str, float], about("What else was measured; the unit is the end of the name.")]
 
+    @property
+    def is_load_step(self) -> bool:
+        """Whether the pressure drop jumps in it."""
+        return "pressure_drop_then_MPa" in self.figures
+
     def in_words(self, flow_L_min: float) -> str:
         """Return a flow with two decimals; what the recordings can't show is no 0.00."""
         return flow_in_words(flow_L_min, self.unseen_below_L_min)

@@ -33,7 +33,7 @@ def untried_requirements(evidence: Evidence) -> tuple[Requirement, ...]:
     untried += [each for each in ALWAYS if each.id not in tried]
     if evidence.closed_loop.plant is None:
         untried.append(OWN_PLANT)
-    if all(each.must_shut for each in evidence.scenarios):  # frozen sensors are no core's to know
+    if not any(each.is_load_step for each in evidence.scenarios):
         untried.append(LOAD_STEPS)
     if evidence.monte_carlo is None:
         untried.append(SERIES)

@@ -16,6 +16,7 @@ from dzdesign.identify.knees.characteristic import TAIL
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
 from dzdesign.identify.knees.meter_lag import softness_of_filter
 from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.valve.guard_curve import PremiseCheck
 from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.side_model import SideModel
 
@@ -30,12 +31,16 @@ LEAK_SHARE = 1e-3
 
 
 def find_warnings(
-    side: SideModel, group: DescribedTests, departure: np.ndarray, options: IdentifyOptions
+    side: SideModel,
+    group: DescribedTests,
+    departure: np.ndarray,
+    refused: PremiseCheck | None,
+    options: IdentifyOptions,
 ) -> tuple[Warning_, ...]:
     """Return the warnings about one side.
 
-    `departure` (T,) says by how much each test's knees depart from one direction with the pressure drop, V; zero
-    within their error.
+    `departure` (T,) says by how much each test's threshold departs from one direction with the pressure drop, V; zero
+    within its error, and of no matter under another premise. `refused` is the premise that the tests contradict.
     """
     return (
         *about_the_meter(side, group, options),
@@ -43,8 +48,9 @@ def find_warnings(
         *(
             warn("not-monotone", test.source, gap_mV=1e3 * float(gap))
             for test, gap in zip(side.tests, departure, strict=True)
-            if gap > 0
+            if gap > 0 and side.curve.premise == "monotone"
         ),
+        *([_about_premise(side, refused)] if refused else []),
         *(
             warn("stick-slip", test.source, ripple_mV=1e3 * test.spool_ripple_V, stop_mV=1.732e3 * test.spool_ripple_V)
             for test in side.tests
@@ -57,6 +63,10 @@ def find_warnings(
         *about_errors(side, group.tests, options.u_max, options.knee_window),
         *_about_the_edge(side, group, options.u_max),
     )
+
+
+def _about_premise(side: SideModel, refused: PremiseCheck) -> Warning_:
+    return warn("premise-refused", premise=refused.premise, p=refused.lack_of_fit_p, taken=side.curve.premise)
 
 
 def _about_hysteresis(side: SideModel, u_max: float) -> Iterator[Warning_]:

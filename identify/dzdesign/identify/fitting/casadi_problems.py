@@ -89,13 +89,21 @@ def solver_with_numbers(
     next knee from the one before where the lines have their zeros, and by how much each of the two unknowns adds to it:
     the solver's constraints bound that distance.
     """
-    most = max(censored.shape[1] for _, censored in branches)
-    # Room for a power of two, filled up by bins with no samples, so that few layouts differ in it.
-    room = max(ROOM, 1 << (most - 1).bit_length()) if most else 0
-    rows = [np.pad(censored, ((0, 0), (0, room - censored.shape[1]))) for _, censored in branches]
-    known = [np.array([numbers for numbers, _ in branches]), *np.array(rows).transpose(1, 2, 0), steps]
+    rows = censored_rows([censored for _, censored in branches])
+    known = [np.array([numbers for numbers, _ in branches]), *rows, steps]
     # CasADi stores matrices by column.
-    return _knee_solver(len(branches), room, chain), np.concatenate([part.ravel("F") for part in known])
+    return _knee_solver(len(branches), rows[0].shape[0], chain), np.concatenate([part.ravel("F") for part in known])
+
+
+def censored_rows(censored: Sequence[np.ndarray]) -> tuple[np.ndarray, ...]:
+    """Return numbers, depths and places of the bins with samples below the floor, each (room, B).
+
+    The room is a power of two, filled up by bins with no samples, so that few layouts differ in it.
+    """
+    most = max(each.shape[1] for each in censored)
+    room = max(ROOM, 1 << (most - 1).bit_length()) if most else 0
+    rows = [np.pad(each, ((0, 0), (0, room - each.shape[1]))) for each in censored]
+    return tuple(np.array(rows).transpose(1, 2, 0))
 
 
 @lru_cache(maxsize=KEPT)

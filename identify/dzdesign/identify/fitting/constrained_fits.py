@@ -60,7 +60,7 @@ def fit_knees(
     """
     placed = [(row, column, shape) for row, pair in enumerate(shapes) for column, shape in enumerate(pair) if shape]
     branches = [shape for _, _, shape in placed]
-    scales = [_expected_errors(shape) for shape in branches]
+    scales = [expected_errors(shape) for shape in branches]
     numbers = [branch_numbers(shape, scale, floor, u_max) for shape, scale in zip(branches, scales, strict=True)]
     chain = tuple(index for index, (_, column, _) in enumerate(placed) if column == ordered and trend != "flat")
     order = _order_knees(branches, scales, chain if len(chain) > 1 else (), increasing=trend == "increasing")
@@ -69,7 +69,7 @@ def fit_knees(
         solution = solver(x0=order.start, p=known, lbg=0.0, ubg=np.inf)
         outcome = solver.stats()
         best, slack = np.asarray(solution["x"]).ravel(), np.asarray(solution["g"]).ravel() * order.unit
-        hessian = _hessian_of_cost(solver, best, known)
+        hessian = hessian_of_cost(solver, best, known)
     _log("knees", outcome)
     if not outcome["success"]:
         raise InputError(
@@ -100,7 +100,7 @@ def _log(name: str, outcome: Mapping[str, Any]) -> None:
     logger.debug("%s: %s after %d iterations, %.3f s", name, status, outcome.get("iter_count", 0), seconds)
 
 
-def _hessian_of_cost(solver: "ca.Function", at: np.ndarray, known: np.ndarray) -> np.ndarray:
+def hessian_of_cost(solver: "ca.Function", at: np.ndarray, known: np.ndarray) -> np.ndarray:
     """Return the second derivatives of a solver's objective, which it has for its own steps: the upper triangle."""
     import casadi as ca
 
@@ -109,7 +109,7 @@ def _hessian_of_cost(solver: "ca.Function", at: np.ndarray, known: np.ndarray) -
     return upper + np.triu(upper, 1).T
 
 
-def _expected_errors(shape: BranchShape) -> tuple[float, float]:
+def expected_errors(shape: BranchShape) -> tuple[float, float]:
     """Return rough standard errors of slope (relative) and knee (V): in their units the fit is well scaled."""
     n = max(float(shape.bins.n.sum()), 1.0)
     knee = shape.sigma / (shape.slope * np.sqrt(n))

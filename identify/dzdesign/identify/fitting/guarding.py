@@ -1,20 +1,26 @@
-"""From the thresholds of both branches to what each guard certifies: bounds, staircase, the law's offset."""
+"""The thresholds that a certificate may guard, of both branches and their mean, with their bounds at the tests."""
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.constants import MPA
-from dzdesign.identify.fitting.bounds import FINEST_ERROR, excess_departure, lower_bounds
-from dzdesign.identify.fitting.constrained_fits import KneeFit, fit_knees, fit_offset
+from dzdesign.identify.fitting.bounds import (
+    DEGREES_OF_FREEDOM,
+    Trend,
+    excess_departure,
+    find_trend,
+    lower_bounds,
+)
+from dzdesign.identify.fitting.constrained_fits import KneeFit, fit_knees
+from dzdesign.identify.fitting.premises import confidence_at_tests
+from dzdesign.identify.knees.between_ramps import BetweenRamps
 from dzdesign.identify.knees.described_tests import DescribedTests
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.valve.guard_curve import Guard, GuardCurve, OpeningCurve
-from dzdesign.identify.valve.quantity_types import LARGEST_BETA
-from dzdesign.identify.valve.staircase import Direction, staircase
+from dzdesign.identify.valve.guard_curve import Guard
+from dzdesign.identify.valve.staircase import Direction
 
 #: Standard errors by which the tail's zero must lie below the knee, in one test or in all together, to be taken for a
 #: soft edge. At 3 one sharp valve in a hundred was, and beta(5 MPa) scattered by 7e-4 instead of 2.6e-4; which soft
@@ -159,69 +165,143 @@ def mean_threshold(group: DescribedTests, opening: Threshold, closing: Threshold
     )
 
 
-def fit_guard_curves(
-    thresholds: Mapping[Guard, Threshold],
-    dp: Sequence[float | None],
-    reference: int,
-    direction: Direction,
-    u_max: float,
-) -> dict[Guard, tuple[GuardCurve, np.ndarray]]:
-    """Fit the law's offset under the staircase of the bounds of the first threshold, which must succeed, and of others.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GuardedThreshold:
+    """The threshold of one guard, without a premise and with knees brought in the order of their trend."""
 
-    One of the others whose bounds leave no positive offset is left out: `design` then refuses that guard and says which
-    there are. A curve comes with which of its bounds hold with equality, (T,) bool. The tests come in the order of
-    rising pressure drop (Pa); `reference` is the index of that at dP0.
+    free: Threshold
+    ordered: Threshold
+    between: BetweenRamps
+    #: By how much systematic errors may make it differ from test to test, V.
+    allowance: float
 
-    Raises
-    ------
-    InputError
-        If the first threshold's bounds leave no positive offset.
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Guarding:
+    """All that one side's tests say of what may be guarded."""
+
+    #: Branch that is guarded by default: 0 rising, 1 falling.
+    column: int
+    #: How its guarded threshold runs with the pressure drop.
+    trend: Trend
+    #: Without a direction, and with the knees of that branch in the order of their own trend.
+    free: KneeFit
+    knees: KneeFit
+    #: How far the knees, and the guarded thresholds, depart from one direction at each test, V.
+    departure: np.ndarray
+    guarded_departure: np.ndarray
+    #: Of every guard that the branches allow, the default one first.
+    thresholds: dict[Guard, GuardedThreshold]
+    #: Knees of the rising branch that run the way of the trend.
+    opening: OrderedKnees | None
+
+
+def guard_thresholds(group: DescribedTests, free: KneeFit, options: IdentifyOptions) -> Guarding:
+    """Return the thresholds that may be guarded, and which way the guarded one runs.
+
+    The trend is the guarded threshold's: a soft edge whose leak grows with the pressure drop may run against the knees.
+    One edge opens and closes, so it is that of the default guard for all. A branch that runs otherwise departs from it,
+    and its bounds are lowered by the departure.
     """
-    curves: dict[Guard, tuple[GuardCurve, np.ndarray]] = {}
-    for name, threshold in thresholds.items():
-        try:
-            curves[name] = _fit_guard_curve(threshold, dp, reference, direction, u_max)
-        except InputError:
-            if not curves:
-                raise
-    return curves
-
-
-def _fit_guard_curve(
-    threshold: Threshold, dp: Sequence[float | None], reference: int, direction: Direction, u_max: float
-) -> tuple[GuardCurve, np.ndarray]:
-    steps, ceiling = staircase(threshold.bound, direction)
-    offset = fit_offset(threshold.value, threshold.se, ceiling, reference, u_max=u_max, trend=direction)
-    if offset.beta.max() > LARGEST_BETA:
-        raise InputError(
-            f"beta(dP) reaches {offset.beta.max():.2f}, expected at most {LARGEST_BETA}: the threshold at dP0 is less "
-            "than half of that at another pressure drop; give the pressure drop with the largest threshold by --dp0"
+    column = 1 if group.tests[0].shapes[1] else 0  # falling wherever there is one: zero command comes after closing
+    guard: Guard = "closing" if column else "opening"
+    other: Guard = "opening" if column else "closing"
+    single = {guard: _unordered(group, free, column, options)}
+    trend = _trend_of(group, column, single[guard].value, single[guard].se, options)
+    of_knees = _trend_of(group, column, free.knee[:, column], free.knee_se[:, column], options).direction
+    knees = {guard: order_knees(group, free, of_knees, column, options)}
+    # Where the solver finds no order of the other branch's knees, that guard is not on offer, and `design` says so.
+    with suppress(InputError):
+        if group.tests[0].shapes[1 - column]:
+            knees[other] = order_knees(group, free, of_knees, 1 - column, options, alone=True)
+            single[other] = _unordered(group, free, 1 - column, options)
+    thresholds: dict[Guard, GuardedThreshold] = {}
+    for name, ordered in knees.items():
+        thresholds[name] = GuardedThreshold(
+            free=single[name],
+            ordered=bound_threshold(group, ordered, options),
+            between=group.between(ordered.column),
+            allowance=systematic_change(group, ordered.column, options),
         )
-    nodes = tuple(value / MPA for value in dp if value is not None)
-    curve = GuardCurve(
-        u_min0_V=offset.u_min0,
-        beta_dp_MPa=nodes,
-        beta=tuple(float(value) for value in offset.beta) if nodes else (),
-        certified_steps_V=tuple(float(step) for step in steps),
-        u_lower_V=tuple(float(value) for value in threshold.bound),
-        u_threshold_V=tuple(float(value) for value in threshold.value),
+    departure = guarded_departure(thresholds[guard], trend.direction)
+    thresholds = {name: _lowered(each, trend.direction) for name, each in thresholds.items()}
+    if other in thresholds:
+        thresholds["mean"] = _mean_of(group, thresholds)
+    return Guarding(
+        column=column,
+        trend=trend,
+        free=free,
+        knees=knees[guard].fit,
+        departure=knees[guard].departure,
+        guarded_departure=departure,
+        thresholds=thresholds,
+        opening=_opening(group, free, knees, of_knees, trend.direction, options),
     )
-    return curve, offset.active
 
 
-def opening_curve(
-    rising: OrderedKnees, direction: Direction, guards: Mapping[str, GuardCurve], u_max: float
-) -> OpeningCurve | None:
-    """Return where useful flow begins on opening, from the knees of the rising branch; None where dP is unknown.
+def _unordered(group: DescribedTests, free: KneeFit, column: int, options: IdentifyOptions) -> Threshold:
+    """Return a branch's threshold for a premise that is no direction."""
+    alone = OrderedKnees(column=column, fit=free, departure=np.zeros(len(group.tests)))
+    return bound_threshold(group, alone, replace(options, confidence=confidence_at_tests(options.confidence)))
 
-    It must not lie below the curves of the guards.
-    """
-    dp = next(iter(guards.values())).beta_dp_MPa
-    if not dp:
-        return None
-    knee, se = rising.knee, rising.knee_se
-    if direction == "flat":
-        knee = np.full_like(knee, np.average(knee, weights=np.maximum(se, FINEST_ERROR * u_max) ** -2))
-    # The larger of two curves that run one way runs that way too.
-    highest = np.max([knee, *(np.array(curve.u_offset_V) for curve in guards.values())], axis=0)
-    return OpeningCurve(dp_MPa=dp, u_V=tuple(map(float, highest)), u_se_V=tuple(map(float, se)))
+
+def _trend_of(
+    group: DescribedTests, column: int, value: np.ndarray, se: np.ndarray, options: IdentifyOptions
+) -> Trend:
+    """Test which way the thresholds (V) of a branch run with the pressure drop."""
+    between = group.between(column)
+    return find_trend(
+        np.array([item.dp or math.nan for item in group.tests]),
+        value,
+        between.covariance_of_mean(se),
+        float(between.degrees_of_freedom(se, DEGREES_OF_FREEDOM).min()),
+        options.u_max,
+        systematic_change(group, column, options),
+    )
+
+
+def _opening(
+    group: DescribedTests,
+    free: KneeFit,
+    knees: dict[Guard, OrderedKnees],
+    of_knees: Direction,
+    direction: Direction,
+    options: IdentifyOptions,
+) -> OrderedKnees | None:
+    """Return the rising knees that run the way of the guarded threshold's trend."""
+    if "opening" not in knees or of_knees == direction:
+        return knees.get("opening")
+    with suppress(InputError):
+        return order_knees(group, free, direction, 0, options, alone=True)
+    return None
+
+
+def guarded_departure(guarded: GuardedThreshold, direction: Direction) -> np.ndarray:
+    """Return how far a guarded threshold departs from the direction of the trend at each test, V, beyond its error."""
+    from scipy.optimize import isotonic_regression
+
+    value, se = guarded.ordered.value, guarded.ordered.se
+    if direction == "flat" or value.size < 2:
+        return np.zeros(value.size)
+    error = np.sqrt(np.diag(guarded.between.covariance_of_mean(se)))
+    weights = error**-2.0 if np.all(error > 0) else None
+    nearest = isotonic_regression(value, weights=weights, increasing=direction == "increasing").x
+    return excess_departure(np.abs(value - nearest), error, guarded.allowance)
+
+
+def _lowered(guarded: GuardedThreshold, direction: Direction) -> GuardedThreshold:
+    """Lower the bounds under one direction by what the guarded threshold departs from it."""
+    departure = guarded_departure(guarded, direction).max()
+    ordered = replace(guarded.ordered, bound=guarded.ordered.bound - departure)
+    return replace(guarded, ordered=ordered)
+
+
+def _mean_of(group: DescribedTests, thresholds: dict[Guard, GuardedThreshold]) -> GuardedThreshold:
+    """Return the mean of both branches' thresholds; from ramp to ramp it scatters no more than the worse of the two."""
+    opening, closing = thresholds["opening"], thresholds["closing"]
+    return GuardedThreshold(
+        free=mean_threshold(group, opening.free, closing.free),
+        ordered=mean_threshold(group, opening.ordered, closing.ordered),
+        between=max(opening.between, closing.between, key=lambda each: each.sd),
+        allowance=max(opening.allowance, closing.allowance),
+    )

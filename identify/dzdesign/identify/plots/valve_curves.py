@@ -1,6 +1,6 @@
 """Curves over the pressure drop that both `identify --plots` and the report show: thresholds and beta, drawn once.
 
-What holds between two tests is the staircase: a chord between two bounds is certified by nothing.
+What is certified between two tests follows from the premise: a staircase, a line, or a chord less its sag.
 """
 
 from typing import TYPE_CHECKING
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dzdesign.identify.plots.frame import HUES
-from dzdesign.identify.valve.guard_curve import GuardCurve
+from dzdesign.identify.valve.guard_curve import CertifiedCurve
 from dzdesign.identify.valve.side_model import SideModel
 
 if TYPE_CHECKING:
@@ -17,9 +17,14 @@ if TYPE_CHECKING:
 #: Of a branch: key in valve.json, name, marker, dash, hue.
 BRANCHES = (("rising", "opening", "^", "-", "blue"), ("falling", "closing", "v", "--", "vermilion"))
 
+#: What is certified between the tests, by the premise.
+BOUND_NAMES = {"line": "certified line", "smooth": "certified bound", "monotone": "certified staircase"}
+#: Pressure drops at which a bound is drawn.
+BOUND_POINTS = 201
 
-def draw_thresholds(axes: "Axes", side: SideModel, curve: GuardCurve) -> None:
-    """Draw knees and onsets with their errors, and of one guard the bounds, the staircase and the largest offset."""
+
+def draw_thresholds(axes: "Axes", side: SideModel, curve: CertifiedCurve) -> None:
+    """Draw knees and onsets with their errors, and of one guard the bounds on the interval and the largest offset."""
     dp = tested_pressures(side)
     for branch, word, marker, _, hue in BRANCHES:
         for what, face, size in (("knee", HUES[hue], 5.5), ("onset", "none", 8.5)):
@@ -32,10 +37,9 @@ def draw_thresholds(axes: "Axes", side: SideModel, curve: GuardCurve) -> None:
                               zorder=4)  # fmt: skip
     axes.plot(dp, curve.u_lower_V, "_", ms=13, mew=2, color=HUES["ink"], label="lower bound, at the test", zorder=5)
     if len(dp) > 1:
-        axes.stairs(curve.certified_steps_V, dp, baseline=None, color=HUES["green"], lw=2,
-                    label="certified staircase")  # fmt: skip
-    axes.plot(dp, curve.u_offset_V, "D-.", ms=4, lw=1.3, color=HUES["purple"], label="largest certified offset",
-              zorder=6)  # fmt: skip
+        draw_bound(axes, side, curve, 1.0, BOUND_NAMES[curve.premise])
+    axes.plot(curve.offset_dp_MPa or dp, curve.offset_V, "D-.", ms=3, lw=1.3, color=HUES["purple"],
+              label="largest certified offset", zorder=6)  # fmt: skip
     axes.set_ylabel("command u (V)")
     if side.tests[0].dp_MPa is None:
         axes.set(xlabel="pressure drop dP (not recorded)", xticks=[])
@@ -43,17 +47,29 @@ def draw_thresholds(axes: "Axes", side: SideModel, curve: GuardCurve) -> None:
         axes.set_xlabel("pressure drop dP (MPa)")
 
 
-def draw_beta(axes: "Axes", curve: GuardCurve) -> None:
-    """Draw beta with its nodes, and over u_min0 what bounds it: the threshold, its lower bound and the staircase."""
-    dp = np.array(curve.beta_dp_MPa)
-    steps, lower, threshold = (
-        np.array(values) / curve.u_min0_V for values in (curve.certified_steps_V, curve.u_lower_V, curve.u_threshold_V)
-    )
-    axes.fill_between(dp, lower, threshold, color=HUES["sky"], alpha=0.25, lw=0,
-                      label="from bound to threshold, over u_min0")  # fmt: skip
-    axes.plot(dp, threshold, ":", color=HUES["blue"], lw=1.4, label="threshold / u_min0")
-    axes.stairs(steps, dp, baseline=None, color=HUES["green"], lw=2, label="certified staircase / u_min0")
-    axes.plot(dp, curve.beta, "D-.", color=HUES["purple"], ms=4.5, lw=1.4, label="β(dP) of the valve")
+def draw_bound(axes: "Axes", side: SideModel, curve: CertifiedCurve, unit_V: float, label: str) -> None:
+    """Draw what is certified of a threshold on the whole interval, over `unit_V`."""
+    bound = curve.bound(side.trend or "flat")
+    dp = [float(end) for end in (bound.pieces[0].from_MPa, *(piece.to_MPa for piece in bound.pieces))]
+    if curve.premise == "monotone":
+        steps = [float(piece.low_V) / unit_V for piece in bound.pieces]
+        axes.stairs(steps, dp, baseline=None, color=HUES["green"], lw=2, label=label)
+        return
+    fine = np.unique(np.concatenate([dp, np.linspace(dp[0], dp[-1], BOUND_POINTS)]))
+    axes.plot(fine, bound.in_doubles(fine) / unit_V, "-", color=HUES["green"], lw=2, label=label)
+
+
+def draw_beta(axes: "Axes", side: SideModel, curve: CertifiedCurve) -> None:
+    """Draw beta of both branches with its error; over the identified u_min0 the certified offset and its bound."""
+    u_min0 = side.reference.u_min_V
+    for (_, word, marker, dash, hue), name in zip(BRANCHES, ("opening", "closing"), strict=True):
+        if name in side.identified:
+            found = side.identified[name]
+            axes.errorbar(found.dp_MPa, found.beta, yerr=[2 * se for se in found.beta_se], fmt=marker + dash, ms=5,
+                          color=HUES[hue], capsize=3, lw=1.2, label=f"β(dP) {word} ± 2 s.e.")  # fmt: skip
+    draw_bound(axes, side, curve, u_min0, f"{BOUND_NAMES[curve.premise]} / u_min0")
+    axes.plot(curve.offset_dp_MPa, np.array(curve.offset_V) / u_min0, "D-.", color=HUES["purple"], ms=3, lw=1.4,
+              label="largest certified offset / u_min0")  # fmt: skip
     axes.set(xlabel="pressure drop dP (MPa)", ylabel="β (no unit)")
 
 

@@ -189,8 +189,8 @@ def _thresholds_figure(side: SideModel) -> "Figure":
         5.4,
         f"Thresholds of {len(tests)} pressure drop{'s' if len(tests) > 1 else ''}: {_sources(side)}",
         f"{side.certificate.guard} threshold guarded ({_percent(side)} for all tests together){trend}",
-        f"u_min0 = {side.reference.u_min_V:.4f} V"
-        + (f" at dP0 = {side.reference.dp_MPa:.3f} MPa" if side.beta.beta else ""),
+        f"identified u_min0 = {side.reference.u_min_V:.4f} ± {side.reference.u_min_se_V:.4f} V, certified offset "
+        f"{curve.u_min0_V:.4f} V" + (f" at dP0 = {side.reference.dp_MPa:.3f} MPa" if side.beta.beta else ""),
     )
     axes, dp = figure.subplots(), tested_pressures(side)
     draw_thresholds(axes, side, curve)
@@ -201,16 +201,16 @@ def _thresholds_figure(side: SideModel) -> "Figure":
 
 
 def _beta_figure(side: SideModel) -> "Figure":
-    """Draw beta with its nodes under what the bounds allow, and dP0."""
+    """Draw the identified beta, what the bounds allow, and dP0."""
     dp, beta, u_min0 = tested_pressures(side), side.beta.beta, side.reference.u_min_V
     figure = new_figure(
         5.0,
         f"β over {dp[0]:.3f} to {dp[-1]:.3f} MPa: {_sources(side)}",
         f"β = {beta[0]:.4f} to {beta[-1]:.4f}, 1 at dP0 = {side.reference.dp_MPa:.3f} MPa "
-        f"(u_min0 = {u_min0:.4f} V); bounds: {_percent(side)} for all tests together",
+        f"(identified u_min0 = {u_min0:.4f} V); bounds: {_percent(side)} for all tests together",
     )
     axes = figure.subplots()
-    draw_beta(axes, side.curve)
+    draw_beta(axes, side, side.curve)
     axes.plot(dp, np.array(side.curve.u_lower_V) / u_min0, "_", ms=14, mew=2, color=HUES["ink"],
               label="lower bound / u_min0, at the test", zorder=5)  # fmt: skip
     axes.plot(side.reference.dp_MPa or 0.0, 1, "o", ms=13, mfc="none", mec=HUES["ink"], label="dP0, where β = 1")

@@ -9,64 +9,197 @@ import numpy as np
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
-from dzdesign.identify.valve.quantity_types import PressureDrop, Ratio, Voltage, VoltageError
-from dzdesign.identify.valve.staircase import Direction, staircase
+from dzdesign.identify.valve.certified_bound import BoundPiece, CertifiedBound, Premise
+from dzdesign.identify.valve.quantity_types import (
+    PressureDrop,
+    Probability,
+    Ratio,
+    SecondDifference,
+    Voltage,
+    VoltageError,
+)
+from dzdesign.identify.valve.staircase import Direction
 
 Guard = Literal["closing", "mean", "opening"]
 #: Thresholds that a certificate may protect, from the safest on.
 GUARDS: tuple[Guard, ...] = get_args(Guard)
 #: Numbers of the file are right to seven decimals; a comparison of two allows ten times that.
 ROUNDING_V = 1e-6
+#: Where a single test stands whose pressure drop is unknown, MPa: nothing depends on it.
+ANYWHERE = (1.0,)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GuardCurve:
-    """The law's offset beta(dP) u_min0 under the certified bound of one threshold; one entry a test, dP rising.
+class PremiseCheck:
+    """One premise about the threshold between the tests: how it fits them, and what it would leave."""
 
-    Its bounds hold together with the side's confidence. Those of two curves are not meant to hold together: a
-    certificate protects one threshold.
+    premise: Annotated[
+        Premise,
+        Meta(
+            description="line: the threshold is straight over the pressure drop. smooth: its second divided "
+            "difference, kinks included, is at most M. monotone: it runs one way between neighbouring tests."
+        ),
+    ]
+    lack_of_fit_p: Annotated[
+        Probability | None,
+        Meta(
+            description="Probability of tests as unlike the premise as these if it were true, against noise and "
+            "scatter; below 0.01 it is refused. null: the tests can't contradict it."
+        ),
+    ]
+    dead_zone_over_u_max: Annotated[
+        Ratio | None,
+        quantity(
+            "1",
+            "Largest dead zone on opening that a law without transition would leave at a tested pressure drop; null "
+            "where no positive offset follows.",
+        ),
+    ]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CertifiedCurve:
+    """The law's offset under the certified bound of one threshold; bounds hold together with the side's confidence.
+
+    Those of two curves are not meant to hold together: a certificate protects one threshold.
     """
 
-    u_min0_V: Annotated[Voltage, Meta(description="The largest offset at dP0 that the certificate allows.")]
-    beta_dp_MPa: Annotated[
-        tuple[PressureDrop, ...],
-        quantity("MPa", "Nodes of beta, at the tests; empty where the pressure drop is unknown."),
+    premise: Annotated[Premise, Meta(description="What the bound rests on between the tests.")]
+    premises: Annotated[
+        tuple[PremiseCheck, ...], Meta(description="The premises that these tests allow, and what each would leave.")
     ]
-    beta: Annotated[tuple[Ratio, ...], quantity("1", "beta at the nodes, straight between them.")]
-    certified_steps_V: Annotated[
+    curvature_V_MPa2: Annotated[
+        tuple[SecondDifference, ...],
+        quantity("V/MPa2", "M between neighbouring tests, one fewer than tests; 0 for line, empty for monotone."),
+    ]
+    curvature_is: Annotated[
+        Literal["declared", "estimated"] | None,
+        Meta(description="Where the M of a smooth curve is from; null for another premise."),
+    ]
+    dp_MPa: Annotated[
+        tuple[PressureDrop, ...], quantity("MPa", "Tested pressure drops; empty where the pressure drop is unknown.")
+    ]
+    u_threshold_V: Annotated[
+        tuple[Voltage, ...], quantity("V", "The threshold at each test, as the fit under the premise has it.")
+    ]
+    u_lower_V: Annotated[
         tuple[Voltage, ...],
-        quantity("V", "Staircase: lower bound of the threshold between neighbouring tests, one fewer than tests."),
+        quantity(
+            "V",
+            "Lower bounds of the threshold at the tests. Between two of them the bound is their chord less "
+            "M/2 (dP - a) (b - dP), or, for monotone, the lower of both.",
+        ),
     ]
-    u_lower_V: Annotated[tuple[Voltage, ...], quantity("V", "Lower bounds of the threshold at the tests.")]
-    u_threshold_V: Annotated[tuple[Voltage, ...], quantity("V", "The threshold itself, as the monotone fit has it.")]
+    u_min0_V: Annotated[Voltage, Meta(description="The largest offset at dP0 that the certificate allows.")]
+    offset_dp_MPa: Annotated[
+        tuple[PressureDrop, ...], quantity("MPa", "Nodes of the offset; empty where the pressure drop is unknown.")
+    ]
+    offset_V: Annotated[
+        tuple[Voltage, ...],
+        quantity("V", "The largest offset that runs the way of the trend under the bound, straight between its nodes."),
+    ]
 
     def __post_init__(self) -> None:
-        if len(self.beta) != len(self.beta_dp_MPa) or not _rises(self.beta_dp_MPa):
-            raise RuleError("the nodes of beta must be as many as their pressure drops, which must rise")
-        count = len(self.u_lower_V)
-        if len(self.u_threshold_V) != count:
+        for name, nodes, values in (
+            ("the offset", self.offset_dp_MPa, self.offset_V),
+            ("the bound", self.dp_MPa, self.u_lower_V),
+        ):
+            if not _rises(nodes) or len(nodes) not in (len(values), 0) or not values or (not nodes and len(values) > 1):
+                raise RuleError(f"the nodes of {name} must be as many as their pressure drops, which must rise")
+        if len(self.u_threshold_V) != len(self.u_lower_V):
             raise RuleError(
-                f"{count} lower bounds stand beside {len(self.u_threshold_V)} thresholds, expected one each"
+                f"{len(self.u_lower_V)} lower bounds stand beside {len(self.u_threshold_V)} thresholds, expected one "
+                "each"
             )
-        if not count or (self.beta_dp_MPa and count != len(self.beta_dp_MPa)):
-            raise RuleError(f"{count} tests stand beside {len(self.beta_dp_MPa)} nodes of beta, expected one each")
-        if len(self.certified_steps_V) != count - 1:
-            raise RuleError(f"{len(self.certified_steps_V)} steps bound {count} tests, expected one fewer")
+        if bool(self.dp_MPa) != bool(self.offset_dp_MPa) or (
+            self.dp_MPa and (self.dp_MPa[0], self.dp_MPa[-1]) != (self.offset_dp_MPa[0], self.offset_dp_MPa[-1])
+        ):
+            raise RuleError("the nodes of the offset must reach from the first tested pressure drop to the last")
+        bends = 0 if self.premise == "monotone" else len(self.u_lower_V) - 1
+        if len(self.curvature_V_MPa2) != bends:
+            raise RuleError(
+                f"the premise is '{self.premise}' and {len(self.curvature_V_MPa2)} values of M stand beside "
+                f"{len(self.u_lower_V)} tests, expected {bends}"
+            )
+        if self.premise == "line" and any(self.curvature_V_MPa2):
+            raise RuleError("a straight threshold has M = 0")
+        if (self.premise == "smooth") != (self.curvature_is is not None):
+            raise RuleError("where M is from must be said of a smooth curve, and of no other")
         if any(low > high + ROUNDING_V for low, high in zip(self.u_lower_V, self.u_threshold_V, strict=True)):
             raise RuleError("a lower bound lies above the threshold that it bounds")
-        if not self.u_min0_V > 0:
+        if not self.u_min0_V > 0 or min(self.offset_V) <= 0:
             raise RuleError(f"u_min0 is {self.u_min0_V:g} V, expected a positive threshold")
 
     @property
     def u_offset_V(self) -> tuple[float, ...]:
-        """Offset beta u_min0 at the tests, V."""
-        return tuple(share * self.u_min0_V for share in self.beta) or (self.u_min0_V,)
+        """Offset at the tests, V."""
+        if not self.dp_MPa:
+            return self.offset_V
+        return tuple(map(float, np.interp(self.dp_MPa, self.offset_dp_MPa, self.offset_V)))
 
-    def check_staircase(self, trend: Direction) -> None:
-        """Refuse steps that do not follow from the tests' bounds under a trend."""
-        steps, _ = staircase(np.array(self.u_lower_V), trend)
-        if any(abs(step - known) > ROUNDING_V for step, known in zip(steps, self.certified_steps_V, strict=True)):
-            raise RuleError("the certified steps do not follow from the tests' lower bounds")
+    @property
+    def beta(self) -> tuple[float, ...]:
+        """Offset at the tests over that at dP0; empty where the pressure drop is unknown."""
+        return tuple(value / self.u_min0_V for value in self.u_offset_V) if self.dp_MPa else ()
+
+    @property
+    def premise_in_words(self) -> str:
+        """What the bound rests on between the tests, and how that was tested."""
+        check = next((each for each in self.premises if each.premise == self.premise), None)
+        p_value = None if check is None else check.lack_of_fit_p
+        tested = "which these tests can't contradict" if p_value is None else f"lack of fit p = {p_value:.2g}"
+        if self.premise == "line":
+            return f"Premise line: the threshold is straight over the pressure drop ({tested})"
+        if self.premise == "smooth":
+            bends = [1e3 * value for value in self.curvature_V_MPa2]
+            inner, ends = min(bends), (bends[0], bends[-1])
+            at_ends = f", {ends[0]:.3g} and {ends[1]:.3g} in the first and last interval" if max(ends) > inner else ""
+            return (
+                f"Premise smooth: between two tests the threshold sags at most M h²/8 below the chord of its bounds, "
+                f"M = {inner:.3g} mV/MPa² ({self.curvature_is}{at_ends}; {tested})"
+            )
+        return (
+            "Premise monotone: between two tests the bound is the lower one's, on the premise that the threshold runs "
+            "one way there, which no test checks: a threshold that is lowest between two tests would lie below it"
+        )
+
+    def bound(self, trend: Direction) -> CertifiedBound:
+        """Return the bound on the whole tested interval, exact."""
+        return CertifiedBound.of(self.premise, self.dp_MPa or ANYWHERE, self.u_lower_V, self.curvature_V_MPa2, trend)
+
+    def check_offset(self, trend: Direction, dp0_MPa: float | None) -> None:
+        """Refuse an offset that lies above the bound anywhere, or does not run the way of the trend."""
+        bound, offset = self.bound(trend), np.array(self.offset_V)
+        nodes = np.array(self.offset_dp_MPa or ANYWHERE)
+        if largest_excess(bound, nodes, offset) > ROUNDING_V:
+            raise RuleError("the offset does not follow from the tests' lower bounds: it lies above them")
+        steps = np.diff(offset)
+        wrong_way = {"decreasing": steps, "increasing": -steps, "flat": np.abs(steps)}[trend]
+        if np.any(wrong_way > ROUNDING_V):
+            raise RuleError(f"the offset does not run one way, expected a {trend} one like the trend")
+        at_dp0 = offset[0] if dp0_MPa is None or not self.dp_MPa else float(np.interp(dp0_MPa, nodes, offset))
+        if abs(at_dp0 - self.u_min0_V) > ROUNDING_V:
+            raise RuleError(f"u_min0 is {self.u_min0_V:g} V, but the offset at dP0 is {at_dp0:g} V")
+
+
+def largest_excess(bound: CertifiedBound, nodes: np.ndarray, offset: np.ndarray) -> float:
+    """Return by how much an offset, straight between its nodes (MPa, V), exceeds a bound at most, V."""
+    return max(_excess(piece, nodes, offset) for piece in bound.pieces)
+
+
+def _excess(piece: BoundPiece, nodes: np.ndarray, offset: np.ndarray) -> float:
+    """Return by how much it exceeds the bound between two tests at most, V."""
+    ends = [float(piece.from_MPa), float(piece.to_MPa)]
+    at = np.array([ends[0], *nodes[(nodes > ends[0]) & (nodes < ends[1])], ends[1]])
+    value, bend = np.interp(at, nodes, offset), float(piece.curvature)
+    places = [at]
+    if bend > 0:  # the bound is convex: where its slope is the offset's, it comes nearest
+        chord = float(piece.high_V - piece.low_V) / (ends[1] - ends[0])
+        nearest = (ends[0] + ends[1]) / 2 + (np.diff(value) / np.diff(at) - chord) / bend
+        places.append(np.clip(nearest, at[:-1], at[1:]))
+    points = np.concatenate(places)
+    bound = CertifiedBound(pieces=(piece,)).in_doubles(points)
+    return float(np.max(np.interp(points, nodes, offset) - bound))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,7 +228,7 @@ class OpeningCurve:
                 f"{len(self.dp_MPa)} pressure drops, expected as many, at least one, and rising pressure drops"
             )
 
-    def check_order(self, trend: Direction, guards: Sequence[GuardCurve]) -> None:
+    def check_order(self, trend: Direction, guards: Sequence[CertifiedCurve]) -> None:
         """Refuse a curve that does not run the way of the trend, or lies below the offset of a guard's curve."""
         steps = np.diff(self.u_V)
         wrong_way = {"decreasing": steps, "increasing": -steps, "flat": np.abs(steps)}[trend]

@@ -15,4 +15,6 @@ FlowGain = Annotated[float, quantity("L/min/V", ge=0, le=1e6)]
 #: Largest beta(dP): a table of it has room for that, and dP0 can be chosen so that none is larger.
 LARGEST_BETA = 2
 Ratio = Annotated[float, quantity("1", ge=0, le=LARGEST_BETA)]
+RatioError = Annotated[float, quantity("1", ge=0, le=1e6)]
 Probability = Annotated[float, quantity("1", ge=0, le=1)]
+SecondDifference = Annotated[float, quantity("V/MPa2", ge=0, le=1e9)]

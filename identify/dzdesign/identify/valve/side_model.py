@@ -7,8 +7,17 @@ from typing import Annotated, get_args
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
-from dzdesign.identify.valve.guard_curve import GUARDS, ROUNDING_V, Guard, GuardCurve, OpeningCurve
-from dzdesign.identify.valve.quantity_types import Flow, PressureDrop, Probability, Ratio, Voltage, VoltageError
+from dzdesign.identify.valve.guard_curve import GUARDS, ROUNDING_V, CertifiedCurve, Guard, OpeningCurve
+from dzdesign.identify.valve.identified_curve import BETA_ROUNDING, IDENTIFIED, IdentifiedCurve
+from dzdesign.identify.valve.quantity_types import (
+    Flow,
+    PressureDrop,
+    Probability,
+    Ratio,
+    RatioError,
+    Voltage,
+    VoltageError,
+)
 from dzdesign.identify.valve.ramp_result import TestResult
 from dzdesign.identify.valve.repeatability import Repeatability
 from dzdesign.identify.valve.staircase import Direction
@@ -22,16 +31,18 @@ class Reference:
 
     dp_MPa: Annotated[PressureDrop | None, Meta(description="dP0; null where the ramp test has no pressure.")]
     u_min_V: Annotated[
-        Voltage, Meta(description="u_min0: the law's offset at dP0, the largest that the certificate allows.")
+        Voltage, Meta(description="u_min0: the identified threshold at dP0, of the branch that is guarded by default.")
     ]
+    u_min_se_V: Annotated[VoltageError, Meta(description="Its standard error.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BetaNodes:
-    """beta(dP) of the default guard, straight between the nodes; without nodes where dP is unknown."""
+    """beta(dP) of Eq. (5), identified on the branch that is guarded by default; without nodes where dP is unknown."""
 
     dp_MPa: Annotated[tuple[PressureDrop, ...], quantity("MPa", "Pressure drops of the nodes, those of the tests.")]
     beta: Annotated[tuple[Ratio, ...], quantity("1", "beta there: u_min(dP) / u_min0.")]
+    beta_se: Annotated[tuple[RatioError, ...], quantity("1", "Standard error of each; 0 at dP0.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,17 +83,23 @@ class SideModel:
             le=1e3,
         ),
     ]
+    k_x_max_over_u_max_se: Annotated[float, quantity("1", "Its standard error.", ge=0, le=1e3)]
     k_V_mm: Annotated[float, quantity("V/mm", "k of Eq. (11), where --x-max was given.", ge=0, le=1e9)] | None
+    k_V_mm_se: Annotated[float, quantity("V/mm", "Its standard error.", ge=0, le=1e9)] | None
     trend: Annotated[
         Direction | None,
-        Meta(description="How the threshold runs with the pressure drop; null where fewer than two were tested."),
+        Meta(
+            description="How the guarded threshold runs with the pressure drop; null where fewer than two were tested."
+        ),
     ]
-    trend_change_V: Annotated[Voltage | None, Meta(description="Change of the threshold over the tested range.")]
+    trend_change_V: Annotated[
+        Voltage | None, Meta(description="Change of the guarded threshold over the tested range, by a straight line.")
+    ]
     trend_change_se_V: Annotated[VoltageError | None, Meta(description="Its standard error.")]
     trend_p: Annotated[
         Probability | None, Meta(description="Probability of so large a change if the threshold were flat.")
     ]
-    beta: Annotated[BetaNodes, Meta(description="beta(dP) of the default guard.")] = field(init=False)
+    beta: Annotated[BetaNodes, Meta(description="beta(dP), identified; no bound.")] = field(init=False)
     valid_dp_MPa: Annotated[
         tuple[PressureDrop, PressureDrop] | None, quantity("MPa", "Tested interval; nothing is certified outside it.")
     ] = field(init=False)
@@ -90,11 +107,19 @@ class SideModel:
     active_constraints: Annotated[
         tuple[str, ...], Meta(description="Constraints of the fits that hold with equality, in words.")
     ]
-    guards: Annotated[
-        Mapping[str, GuardCurve],
+    identified: Annotated[
+        Mapping[str, IdentifiedCurve],
         Meta(
-            description="One curve for each threshold that the recordings allow: closing, opening and the mean of "
-            "both, its error taken as large as their covariance could make it.",
+            description="What the data say of the threshold (its knee) of each recorded branch, with its error: no "
+            "bound, nothing is safe by it.",
+            extra_json_schema={"propertyNames": {"enum": list(IDENTIFIED)}},
+        ),
+    ]
+    certified: Annotated[
+        Mapping[str, CertifiedCurve],
+        Meta(
+            description="What is safe to rely on. One curve for each threshold that the recordings allow: closing, "
+            "opening and the mean of both, its error taken as large as their covariance could make it.",
             extra_json_schema={"propertyNames": {"enum": list(GUARDS)}},
         ),
     ]
@@ -106,53 +131,69 @@ class SideModel:
     def __post_init__(self) -> None:
         if self.trend is None and len(self.tests) != 1:
             raise RuleError(f"trend is missing beside {len(self.tests)} tests, expected one of {', '.join(DIRECTIONS)}")
-        if self.certificate.guard not in self.guards or not set(self.guards) <= set(GUARDS):
+        if self.certificate.guard not in self.certified or not set(self.certified) <= set(GUARDS):
             raise RuleError(
-                f"the guard is '{self.certificate.guard}' and there are curves of {', '.join(self.guards) or 'none'}, "
-                f"expected the guard among them, and no others than {', '.join(GUARDS)}"
+                f"the guard is '{self.certificate.guard}' and there are curves of {', '.join(self.certified) or 'none'}"
+                f", expected the guard among them, and no others than {', '.join(GUARDS)}"
             )
-        dp = self.curve.beta_dp_MPa
+        dp = self.curve.dp_MPa
         if dp and (self.reference.dp_MPa is None or any(test.dp_MPa is None for test in self.tests)):
-            raise RuleError("a pressure drop is missing beside the nodes of beta; expected one per test and dP0")
-        for guard in self.guards.values():
-            self._check_nodes(guard.beta_dp_MPa, len(guard.u_lower_V))
-            guard.check_staircase(self.trend or "flat")
+            raise RuleError("a pressure drop is missing beside the tested ones of a curve; expected one per test and dP0")
+        for guard in self.certified.values():
+            self._check_nodes(guard.dp_MPa, len(guard.u_lower_V))
+            guard.check_offset(self.trend or "flat", self.reference.dp_MPa)
         self._check_guarded()
+        self._check_identified()
         if self.opening_curve is not None:
             self._check_nodes(self.opening_curve.dp_MPa, len(self.opening_curve.u_V))
-            self.opening_curve.check_order(self.trend or "flat", tuple(self.guards.values()))
-        object.__setattr__(self, "beta", BetaNodes(dp_MPa=dp, beta=self.curve.beta))
+            self.opening_curve.check_order(self.trend or "flat", tuple(self.certified.values()))
+        of_guarded = self.identified[self.certificate.guard]
+        beta = BetaNodes(dp_MPa=of_guarded.dp_MPa, beta=of_guarded.beta, beta_se=of_guarded.beta_se)
+        object.__setattr__(self, "beta", beta)
         object.__setattr__(self, "valid_dp_MPa", (dp[0], dp[-1]) if dp else None)
 
     def _check_nodes(self, nodes: tuple[float, ...], count: int) -> None:
         """Check that a curve has one node a test, at its pressure drop; where that is unknown, none."""
-        if count != len(self.tests) or len(nodes) != len(self.curve.beta_dp_MPa):
+        if count != len(self.tests) or len(nodes) != len(self.curve.dp_MPa):
             raise RuleError(f"a curve has {count} thresholds for {len(self.tests)} tests, expected one each")
         for test, node in zip(self.tests if nodes else (), nodes, strict=True):
             if test.dp_MPa is None or abs(test.dp_MPa - node) > ROUNDING_V:
-                raise RuleError("the nodes of beta must stand at the tests' pressure drops")
+                raise RuleError("the nodes of a curve must stand at the tests' pressure drops")
 
     def _check_guarded(self) -> None:
-        """Check that reference and tests repeat the guard's curve."""
+        """Check that the tests repeat the guard's curve."""
         guard, curve = self.certificate.guard, self.curve
-        if abs(self.reference.u_min_V - curve.u_min0_V) > ROUNDING_V:
-            raise RuleError(f"the reference's u_min_V is {self.reference.u_min_V:g} V, not that of the {guard} curve")
         for test, threshold, bound in zip(self.tests, curve.u_threshold_V, curve.u_lower_V, strict=True):
             if abs(test.u_guard_V - threshold) > ROUNDING_V or abs(test.u_guard_lower_V - bound) > ROUNDING_V:
                 raise RuleError(f"the tests' guarded thresholds and bounds are not those of the {guard} curve")
+
+    def _check_identified(self) -> None:
+        """Check that there is a curve for the guarded branch, one node a test, and that the reference repeats it."""
+        guard = self.certificate.guard
+        if guard not in self.identified or not set(self.identified) <= set(IDENTIFIED):
+            raise RuleError(
+                f"there are identified thresholds on {', '.join(self.identified) or 'no branch'}, expected the guarded "
+                f"one's, {guard}, and no others than {', '.join(IDENTIFIED)}"
+            )
+        for each in self.identified.values():
+            self._check_nodes(each.dp_MPa, len(each.u_V))
+        known = self.identified[guard]
+        places = [0.0] if self.reference.dp_MPa is None else [abs(dp - self.reference.dp_MPa) for dp in known.dp_MPa]
+        row = places.index(min(places)) if places else 0
+        pairs = ((self.reference.u_min_V, known.u_V[row]), (self.reference.u_min_se_V, known.u_se_V[row]))
+        if any(abs(stated - found) > ROUNDING_V for stated, found in pairs):
+            raise RuleError(f"the reference's u_min_V is {self.reference.u_min_V:g} V, not the identified threshold")
+        if known.beta and abs(known.beta[row] - 1) > BETA_ROUNDING:
+            raise RuleError(f"beta at dP0 is {known.beta[row]:g}, expected 1")
 
     @property
     def premise(self) -> str:
         """What the bounds between the tests rest on, in words."""
         if len(self.tests) < 2:
             return "one pressure drop was tested: the bound holds there, and nothing is certified at another"
-        return (
-            f"{len(self.tests)} pressure drops were tested. Between two of them the bound is the lower one's, on the "
-            "premise that the threshold runs one way there, which no test checks: a threshold that is lowest between "
-            "two tests would lie below it"
-        )
+        return f"{len(self.tests)} pressure drops were tested. {self.curve.premise_in_words}"
 
     @property
-    def curve(self) -> GuardCurve:
+    def curve(self) -> CertifiedCurve:
         """The curve of the guard that is protected by default."""
-        return self.guards[self.certificate.guard]
+        return self.certified[self.certificate.guard]

@@ -22,7 +22,7 @@ def law_figure(compensator: Compensator, name: str, both: bool) -> ReportFigure:
         volts = [u_max * float(count) / exact.compare_max for _, count in corners]
         axes.plot(percent, volts, dash, color=LIGHT[hue], lw=1.8, label=f"at {dp_MPa:.2f} MPa")
         rows += [[round(dp_MPa, 4), round(x, 4), round(y, 6)] for x, y in zip(percent, volts, strict=True)]
-    bound = min(compensator.valve.sides[name].guards[certificate.guard].u_lower_V)
+    bound = min(compensator.valve.sides[name].certified[certificate.guard].u_lower_V)
     axes.axhline(bound, color=LIGHT["green"], lw=1.2, ls="-.", label="least lower bound of the threshold")
     axes.set(xlabel="command u_i (% of full)", ylabel="output u_O (V)", xlim=(0, 100), ylim=(0, None))
     axes.legend(loc="lower right")

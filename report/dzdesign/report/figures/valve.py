@@ -61,8 +61,10 @@ def lines_figure(side: SideModel, name: str, both: bool) -> ReportFigure:
 
 def thresholds_figure(side: SideModel, guard: str, name: str, both: bool) -> ReportFigure:
     """Draw the thresholds over the pressure drop, and what is certified of the guarded one."""
-    curve = side.guards[guard]
+    curve = side.certified[guard]
     several = len(side.tests) > 1
+    pieces = curve.bound(side.trend or "flat").pieces if several else ()
+    least_to_next = [round(float(piece.least(piece.from_MPa, piece.to_MPa)), 7) for piece in pieces]
     figure, axes = titled_axes(3.8, name, both, legend_rows=2)
     draw_thresholds(axes, side, curve)
     legend_below(figure, 4)
@@ -72,7 +74,8 @@ def thresholds_figure(side: SideModel, guard: str, name: str, both: bool) -> Rep
         f"Thresholds over the pressure drop{side_words(name, both)}. The {guard} threshold is guarded: the "
         "drive at zero command stays below "
         + (
-            "the staircase, which is what the bounds of all tests together certify between the tests too."
+            f"the {BOUND_NAMES[curve.premise]}, which is what the bounds of all tests together certify between the "
+            f"tests too. {curve.premise_in_words}."
             if several
             else "its lower bound. One pressure drop was tested, and nothing is certified at another."
         ),
@@ -87,7 +90,7 @@ def thresholds_figure(side: SideModel, guard: str, name: str, both: bool) -> Rep
                     test.dp_MPa, test.u_knee_rising_V, test.u_knee_falling_V, test.u_onset_rising_V,
                     test.u_onset_falling_V, curve.u_threshold_V[i], curve.u_lower_V[i],
                     round(curve.u_offset_V[i], 7),
-                    curve.certified_steps_V[i] if i < len(curve.certified_steps_V) else None,
+                    least_to_next[i] if i < len(least_to_next) else None,
                 ]
                 for i, test in enumerate(side.tests)
             ],
@@ -102,7 +105,7 @@ def beta_figure(
 
     None of a valve tested at one pressure drop.
     """
-    curve = side.guards[guard]
+    curve = side.certified[guard]
     if len(curve.beta) < 2:
         return None
     dp, u_min0 = np.array(curve.beta_dp_MPa), curve.u_min0_V

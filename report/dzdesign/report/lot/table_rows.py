@@ -67,7 +67,7 @@ def _figures(designed: "Compensator | None", sign: int, lot_law: "Compensator | 
         branch: round(100 * max(values), 5)
         for branch, values in _remaining(own, side, sign).items()
     }
-    curve = side.guards[own.side(sign).certificate.guard]
+    curve = side.certified[own.side(sign).certificate.guard]
     code = round(own.signals.dp_code(Fraction(repr(side.reference.dp_MPa))))
     return SideFigures(
         dp0_MPa=side.reference.dp_MPa,
@@ -78,7 +78,7 @@ def _figures(designed: "Compensator | None", sign: int, lot_law: "Compensator | 
         offset_V=round(float(own.beta(code, sign) * own.side(sign).u_min0_over_u_max * own.u_max_V), 7),
         trend=side.trend,
         highest_dp_MPa=side.beta.dp_MPa[-1],
-        beta_at_highest_dp=curve.beta[-1],
+        beta_at_highest_dp=side.beta.beta[-1],
         k_x_max_over_u_max=side.k_x_max_over_u_max,
         dead_zone_opening_percent=left.get("opening"),
         dead_zone_closing_percent=left.get("closing"),

@@ -100,7 +100,7 @@ def rounding_table(compensator: Compensator) -> Table:
         node = offset / compensator.beta_denominator
         of = f" ({name})" if len(laws_of(compensator)) > 1 else ""
         if not compensator.transition_codes:  # which counts from the opening threshold, the valve's curve does not
-            wanted = Fraction(repr(compensator.valve.sides[name].guards[certificate.guard].u_min0_V))
+            wanted = Fraction(repr(compensator.valve.sides[name].certified[certificate.guard].u_min0_V))
             volts = (f"{float(offset):.6f} V", f"{float(wanted):.6f} V")
             rows.append(("u_min0" + of, *volts, 1e3 * float(offset - wanted)))
         rows += [

@@ -84,7 +84,7 @@ def thresholds_table(side: SideModel, guard: str, title: str) -> Table:
     leaks = (("leak (L/min)", lambda row: number(row[0].leak_L_min, 2)),)
     return table_of(
         title,
-        zip(side.tests, side.guards[guard].u_lower_V, strict=True),
+        zip(side.tests, side.certified[guard].u_lower_V, strict=True),
         ("dP (MPa)", lambda row: number(row[0].dp_MPa, 3)),
         ("knee opening (V)", lambda row: number(row[0].u_knee_rising_V, 3)),
         ("knee closing (V)", lambda row: number(row[0].u_knee_falling_V, 3)),

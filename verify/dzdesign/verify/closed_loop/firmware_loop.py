@@ -67,7 +67,16 @@ def scenes_of(folder: Path, compensator: Compensator, plant: Plant | None) -> tu
             # A recording at one pressure drop says nothing of another.
             tested = (min(pressures), max(pressures)) if plant or len(pressures) > 1 else None
             scenes.append(
-                Scene(loop=loop, plant=one, side=name, dp_MPa=dp_MPa, reference_MPa=reference, tested_MPa=tested)
+                Scene(
+                    loop=loop,
+                    plant=one,
+                    side=name,
+                    dp_MPa=dp_MPa,
+                    reference_MPa=reference,
+                    tested_MPa=tested,
+                    command_error=compensator.command_error,
+                    has_zero_band=compensator.zero_band_codes > 0,
+                )
             )
     return tuple(scenes)
 

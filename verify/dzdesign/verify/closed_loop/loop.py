@@ -133,6 +133,16 @@ class ClosedLoop:
         """Return the flow below which a stand-in's is not known at a pressure drop; None of a plant of equations."""
         return None if self._stand_in is None else self._stand_in.unseen_below_L_min(dp_MPa)
 
+    def command_of_codes(self, codes: np.ndarray) -> np.ndarray:
+        """Return the commands, shares of full, that the converter reads as so many codes from zero, (N,) whole numbers.
+
+        They may lie below zero: then the command is one of the other sign, or none that the signal has.
+        """
+        zero, full = int(self._scalings[0][0]), int(self._scalings[1][0])
+        span, way = abs(full - zero), 1 if full > zero else -1
+        middle: np.ndarray = (codes + 0.5 * way) / (span + 1)  # of the code: it is rounded down, whichever way it runs
+        return middle
+
     def with_plant(self, plant: Plant | StandIn) -> "ClosedLoop":
         """Return the same loop with another plant; nothing is compiled again."""
         other = copy.copy(self)

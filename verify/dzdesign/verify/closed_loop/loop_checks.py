@@ -122,8 +122,11 @@ def shut_after_scenarios(scenarios: Sequence[ScenarioResult], zero_flow: Check, 
     text += f"{_flow(worst, worst.q_zero_L_min)} ({worst.name}, at {worst.dp_MPa:.2f} MPa)"
     if hidden := [each for each in scenarios if not each.must_shut]:
         leak = max(hidden, key=lambda each: each.q_zero_L_min)
-        text += f"; not required, as no core can know: {leak.name}, {_flow(leak, leak.q_zero_L_min)}"
-    elif not plant_given:
+        text += (
+            f"; not required, as no core can know of it or it has no zero band: {leak.name}, "
+            f"{_flow(leak, leak.q_zero_L_min)}"
+        )
+    if not plant_given and not any(each.is_load_step for each in scenarios):
         text += "; load steps and frozen sensors were not tried: that needs ramps at two pressure drops, or --plant"
     if zero_flow.holds is None:
         return ZERO_FLOW_AFTER_SCENARIOS.check(holds=None, text=f"{text}; see the ramps")

@@ -1,8 +1,9 @@
 """What the zero-command drive leaves to a threshold's lower bound, at every difference of pressure codes.
 
-The bound is argued from the ramp tests anew: by monotonicity a threshold that falls with dP is at least the bound of
+The bound is argued from the ramp tests anew. By monotonicity a threshold that falls with dP is at least the bound of
 any test at a higher dP, one that rises at least that of any test at a lower dP, and of a flat one only the lowest bound
-is known. A code stands for all pressures that may have made it; a dither's peak counts as drive.
+is known. One of limited curvature sags below the chord of two tests by a parabola at most (`SaggingBound`). A code
+stands for all pressures that may have made it; a dither's peak counts as drive.
 """
 
 from collections.abc import Iterable, Sequence
@@ -17,8 +18,11 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.lot_valves import LotSide
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
+from dzdesign.verify.exhaustive.sagging_bound import SaggingBound
 from dzdesign.verify.exhaustive.test_vectors import Differences
 
+#: Margins that differ by less than this in doubles, V, are compared exactly.
+CLOSE_V = 1e-9
 #: Whole numbers below this, and their differences, fit 64 bits with a sign.
 LARGEST = 2**62
 
@@ -43,7 +47,7 @@ def guarded_bounds(compensator: Compensator, sign: int) -> LotSide:
     """Return the lower bounds of the threshold that a compensator was certified for."""
     side = compensator.valve.sides["positive" if sign > 0 else "negative"]
     guard = compensator.side(sign).certificate.guard
-    if guard not in side.guards:
+    if guard not in side.certified:
         raise InputError(
             f"the certificate guards the {guard} threshold, of which its valve has no bounds; make the compensator "
             "again with `dzdesign design`"
@@ -129,11 +133,34 @@ def zero_command_margins(
 
     `at_zero` are the compare values that the core gives at zero command, one a difference of pressure codes.
     """
-    stairs = [Staircase(each) for each in bounds]
-    drops = pressure_drops(exact, found, {dp for each in stairs for dp in each.dp_MPa})
+    drops = pressure_drops(exact, found, {Fraction(repr(dp)) for each in bounds for dp in each.dp_MPa})
     unit_V = exact.compensator.u_max_V / exact.compare_max
     at_peak = at_zero + exact.compensator.drive_functions.dither_counts
-    return [_margin(staircase, drops, at_peak, unit_V) for staircase in stairs]
+    return [
+        _margin(Staircase(each), drops, at_peak, unit_V)
+        if each.premise == "monotone" or len(each.dp_MPa) == 1
+        else _margin_of_sagging(SaggingBound(each), drops, at_peak, unit_V)
+        for each in bounds
+    ]
+
+
+def _margin_of_sagging(
+    bound: SaggingBound, drops: PressureDrops, at_peak: np.ndarray, unit_V: Fraction
+) -> ZeroCommandMargin | None:
+    """Return what drives, counts of `unit_V`, leave to a bound that sags: by doubles, and exactly where they decide."""
+    least, most = (values.astype(float) / drops.scale for values in (drops.least, drops.most))
+    left_V = np.where(drops.made, bound.least_in_doubles(least, most), np.inf) - float(unit_V) * at_peak
+    if not np.isfinite(left_V).any():
+        return None
+    near = np.flatnonzero((left_V <= left_V.min() + CLOSE_V) | (np.abs(left_V) <= CLOSE_V))
+    exact = []
+    for row in near:
+        ends = Fraction(int(drops.least[row]), drops.scale), Fraction(int(drops.most[row]), drops.scale)
+        exact.append((bound.least(*ends) - unit_V * int(at_peak[row]), int(row)))
+    margin, row = min(exact)
+    exceeded = int(np.sum(left_V < -CLOSE_V)) + sum(value < 0 for value, at in exact if abs(left_V[at]) <= CLOSE_V)
+    middle = Fraction(int(drops.least[row]) + int(drops.most[row]), 2 * drops.scale)
+    return ZeroCommandMargin(margin_V=margin, dp_MPa=round(float(middle), 4), exceeded=exceeded)
 
 
 def _margin(

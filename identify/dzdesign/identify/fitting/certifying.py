@@ -1,0 +1,223 @@
+"""From guarded thresholds to certified curves: the premise that is taken, its bound, and the law's offset under it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from dzdesign.core.errors import InputError
+from dzdesign.identify.constants import MPA
+from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, FINEST_ERROR, lower_bounds
+from dzdesign.identify.fitting.constrained_fits import fit_offset
+from dzdesign.identify.fitting.guarding import GuardedThreshold, OrderedKnees
+from dzdesign.identify.fitting.offsets import OffsetUnderBound, fit_offset_under
+from dzdesign.identify.fitting.premises import (
+    FEWEST_FOR_CURVATURE,
+    REFUSED,
+    bound_line,
+    confidence_at_tests,
+    find_curvature,
+)
+from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.valve.certified_bound import CertifiedBound, Premise
+from dzdesign.identify.valve.guard_curve import CertifiedCurve, Guard, OpeningCurve, PremiseCheck
+from dzdesign.identify.valve.quantity_types import LARGEST_BETA
+from dzdesign.identify.valve.staircase import Direction, staircase
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tested:
+    """What all guards of a side have in common."""
+
+    #: Pressure drops of the tests, MPa, rising; empty where it is unknown.
+    dp_MPa: np.ndarray
+    #: Index of the test at dP0.
+    reference: int
+    direction: Direction
+    #: Knees on opening, or on closing where no other branch was recorded, V (T,).
+    opens_V: np.ndarray
+    options: IdentifyOptions
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoundUnderPremise:
+    """Simultaneous bounds at the tests under one premise, V (T,), and what holds between them."""
+
+    premise: Premise
+    value: np.ndarray
+    se: np.ndarray
+    lower: np.ndarray
+    #: M between neighbouring tests, V/MPa²; empty for `monotone`.
+    curvature: np.ndarray
+    p_value: float | None
+
+    @property
+    def refused(self) -> bool:
+        """Whether the tests contradict the premise."""
+        return self.p_value is not None and self.p_value < REFUSED
+
+
+def bounds_under_premises(guarded: GuardedThreshold, tested: Tested) -> dict[Premise, BoundUnderPremise]:
+    """Return the bounds under every premise that these tests allow to be taken, the strongest first."""
+    free, between, dp, options = guarded.free, guarded.between, tested.dp_MPa, tested.options
+    ordered = guarded.ordered
+    monotone = BoundUnderPremise(
+        premise="monotone", value=ordered.value, se=ordered.se, lower=ordered.bound, curvature=np.zeros(0), p_value=None
+    )
+    found = [monotone]
+    declared = None if options.curvature is None else options.curvature * MPA**2
+    if dp.size > 1 and (dp.size >= FEWEST_FOR_CURVATURE or options.curvature is not None):
+        covariance = between.covariance_of_mean(free.se) + (FINEST_ERROR * options.u_max) ** 2 * np.eye(dp.size)
+        degrees = float(between.degrees_of_freedom(free.se, DEGREES_OF_FREEDOM).min())
+        bends = find_curvature(dp, free.value, covariance, degrees, declared)
+        smooth = BoundUnderPremise(
+            premise="smooth", value=free.value, se=free.se, lower=free.bound, curvature=bends.allowed,
+            p_value=bends.p_value,
+        )  # fmt: skip
+        found.insert(0, smooth)
+    if dp.size > 1:
+        confidence = confidence_at_tests(options.confidence)
+        statistical = lower_bounds(free.value, free.se, between, confidence, np.zeros(dp.size))
+        budget = np.maximum(statistical - free.bound, 0.0)
+        fit = bound_line(dp, free.value, free.se, budget, between, confidence=confidence, u_max=options.u_max)
+        line = BoundUnderPremise(
+            premise="line", value=fit.value, se=free.se, lower=fit.bound, curvature=np.zeros(dp.size - 1),
+            p_value=fit.p_value,
+        )  # fmt: skip
+        found.insert(0, line)
+    return {each.premise: each for each in found}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Certified:
+    """A certified curve, which constraints of its offset hold with equality, and a premise that was refused."""
+
+    curve: CertifiedCurve
+    active: tuple[str, ...]
+    refused: PremiseCheck | None
+
+
+def certify_thresholds(thresholds: Mapping[Guard, GuardedThreshold], tested: Tested) -> dict[Guard, Certified]:
+    """Fit the law's offset under the bound of the first threshold, which must succeed, and of others.
+
+    One of the others whose bounds leave no positive offset is left out: `design` then refuses that guard and says which
+    there are.
+
+    Raises
+    ------
+    InputError
+        If the first threshold's bounds leave no positive offset.
+    """
+    curves: dict[Guard, Certified] = {}
+    for name, threshold in thresholds.items():
+        try:
+            curves[name] = _certify(threshold, tested)
+        except InputError:
+            if not curves:
+                raise
+    return curves
+
+
+def _certify(guarded: GuardedThreshold, tested: Tested) -> Certified:
+    """Take the premise that is asked for, or the strongest of the default ones, unless the tests refuse it."""
+    bounds = bounds_under_premises(guarded, tested)
+    offsets: dict[Premise, OffsetUnderBound] = {}
+    failures: dict[Premise, InputError] = {}
+    for premise, bound in bounds.items():
+        try:
+            offsets[premise] = _fit_offset(bound, tested)
+        except InputError as error:
+            failures[premise] = error
+    checks = {premise: _check(bound, offsets.get(premise), tested) for premise, bound in bounds.items()}
+    taken, refused = _take(bounds, offsets, tested.options.curve)
+    if taken not in offsets:
+        raise failures[taken]
+    bound, offset = bounds[taken], offsets[taken]
+    declared = "declared" if tested.options.curvature is not None else "estimated"
+    with_dp = tested.dp_MPa.size > 0 and not np.isnan(tested.dp_MPa).any()
+    curve = CertifiedCurve(
+        premise=taken,
+        premises=tuple(checks.values()),
+        curvature_V_MPa2=tuple(map(float, bound.curvature)),
+        curvature_is=declared if taken == "smooth" else None,
+        dp_MPa=tuple(map(float, tested.dp_MPa)) if with_dp else (),
+        u_threshold_V=tuple(map(float, np.maximum(bound.value, bound.lower))),
+        u_lower_V=tuple(map(float, bound.lower)),
+        u_min0_V=offset.u_min0,
+        offset_dp_MPa=tuple(map(float, offset.dp_MPa)) if with_dp else (),
+        offset_V=tuple(map(float, offset.offset)),
+    )
+    return Certified(curve=curve, active=offset.active, refused=checks[refused] if refused else None)
+
+
+def _take(
+    bounds: Mapping[Premise, BoundUnderPremise], offsets: Mapping[Premise, OffsetUnderBound], asked: Premise | None
+) -> tuple[Premise, Premise | None]:
+    """Return the premise to take, and the one that was asked for but that the tests refuse.
+
+    By default `smooth`, where its curvature can be told or is declared and it certifies more, on average, than
+    `monotone`: a curvature that the tests know too badly supports nothing.
+    """
+    refused = asked if asked in bounds and asked is not None and bounds[asked].refused else None
+    if asked is not None and asked not in bounds:
+        raise InputError(
+            f"--curve {asked} with {next(iter(bounds.values())).lower.size} pressure drop(s): a curvature is estimated "
+            f"from {FEWEST_FOR_CURVATURE} or more; declare it by --curvature, or record more tests"
+        )
+    if asked is not None and refused is None:
+        return asked, None
+    smooth = bounds.get("smooth")
+    if refused == "smooth" or smooth is None or smooth.refused or "smooth" not in offsets:
+        return "monotone", refused
+    better = "monotone" not in offsets or offsets["smooth"].mean > offsets["monotone"].mean
+    return ("smooth" if better else "monotone"), refused
+
+
+def _fit_offset(bound: BoundUnderPremise, tested: Tested) -> OffsetUnderBound:
+    """Fit the law's offset under a bound."""
+    u_max, dp = tested.options.u_max, tested.dp_MPa
+    if bound.premise == "monotone":
+        _, ceiling = staircase(bound.lower, tested.direction)
+        fit = fit_offset(bound.value, bound.se, ceiling, tested.reference, u_max=u_max, trend=tested.direction)
+        active = tuple(f"offset at test {row + 1}" for row, holds in enumerate(fit.active) if holds)
+        found = OffsetUnderBound(dp_MPa=dp, offset=fit.u_min0 * fit.beta, u_min0=fit.u_min0, active=active)
+    else:
+        found = fit_offset_under(
+            CertifiedBound.of(bound.premise, dp.tolist(), bound.lower.tolist(), bound.curvature.tolist(),
+                              tested.direction),
+            dp, bound.value, tested.reference, trend=tested.direction, u_max=u_max,
+        )  # fmt: skip
+    beta = found.offset / found.u_min0
+    if beta.max() > LARGEST_BETA:
+        raise InputError(
+            f"beta(dP) reaches {beta.max():.2f}, expected at most {LARGEST_BETA}: the threshold at dP0 is less "
+            "than half of that at another pressure drop; give the pressure drop with the largest threshold by --dp0"
+        )
+    return found
+
+
+def _check(bound: BoundUnderPremise, offset: OffsetUnderBound | None, tested: Tested) -> PremiseCheck:
+    """Return a premise's test, and the largest dead zone on opening that a law without transition would leave."""
+    left = None
+    if offset is not None:
+        at_tests = np.interp(tested.dp_MPa, offset.dp_MPa, offset.offset) if offset.dp_MPa.size > 1 else offset.offset
+        above = (tested.opens_V - at_tests) / np.maximum(tested.options.u_max - at_tests, np.finfo(float).tiny)
+        left = float(np.clip(above.max(), 0.0, 1.0))
+    return PremiseCheck(premise=bound.premise, lack_of_fit_p=bound.p_value, dead_zone_over_u_max=left)
+
+
+def opening_curve(
+    rising: OrderedKnees, direction: Direction, guards: Mapping[str, CertifiedCurve], u_max: float
+) -> OpeningCurve | None:
+    """Return where useful flow begins on opening, from the knees of the rising branch; None where dP is unknown.
+
+    It must not lie below the curves of the guards.
+    """
+    dp = next(iter(guards.values())).dp_MPa
+    if not dp:
+        return None
+    knee, se = rising.knee, rising.knee_se
+    if direction == "flat":
+        knee = np.full_like(knee, np.average(knee, weights=np.maximum(se, FINEST_ERROR * u_max) ** -2))
+    # The larger of two curves that run one way runs that way too.
+    highest = np.max([knee, *(np.array(curve.u_offset_V) for curve in guards.values())], axis=0)
+    return OpeningCurve(dp_MPa=dp, u_V=tuple(map(float, highest)), u_se_V=tuple(map(float, se)))

@@ -1,0 +1,46 @@
+"""`IdentifiedCurve`: what the data say of one branch's threshold over the pressure drop, for valve.json."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Annotated
+
+from dzdesign.core.artefact_types import RuleError, quantity
+from dzdesign.identify.valve.quantity_types import PressureDrop, Ratio, RatioError, Voltage, VoltageError
+
+#: The branches, by what the valve does on them.
+IDENTIFIED = ("closing", "opening")
+#: Numbers of the file have seven decimals: a ratio of two thresholds of 1 mV or more is that of the file to this.
+BETA_ROUNDING = 1e-3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class IdentifiedCurve:
+    """Thresholds of one branch (their knees) by the joint fit, and Eq. (5)'s ratio of them; one entry a test."""
+
+    dp_MPa: Annotated[
+        tuple[PressureDrop, ...], quantity("MPa", "Tested pressure drops; empty where the pressure drop is unknown.")
+    ]
+    u_V: Annotated[tuple[Voltage, ...], quantity("V", "u_min: the threshold, a knee, as the fit under the premise has it.")]
+    u_se_V: Annotated[
+        tuple[VoltageError, ...],
+        quantity("V", "Its standard error: noise, scatter from ramp to ramp, and how wide a straight part was taken."),
+    ]
+    beta: Annotated[
+        tuple[Ratio, ...], quantity("1", "Eq. (5): the threshold over that at dP0; empty where dP is unknown.")
+    ]
+    beta_se: Annotated[tuple[RatioError, ...], quantity("1", "Its standard error; 0 at dP0.")]
+
+    def __post_init__(self) -> None:
+        count = len(self.u_V)
+        if not count or len(self.u_se_V) != count or len(self.dp_MPa) not in (0, count):
+            raise RuleError(
+                f"{count} identified thresholds stand beside {len(self.u_se_V)} errors and {len(self.dp_MPa)} pressure "
+                "drops, expected one each"
+            )
+        if not len(self.beta) == len(self.beta_se) == len(self.dp_MPa):
+            raise RuleError(
+                f"beta has {len(self.beta)} nodes and {len(self.beta_se)} errors at {len(self.dp_MPa)} pressure drops, "
+                "expected one each"
+            )
+        if any(left >= right for left, right in pairwise(self.dp_MPa)):
+            raise RuleError("the nodes of beta must rise with the pressure drop")
