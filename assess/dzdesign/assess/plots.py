@@ -42,8 +42,9 @@ def _figure(pair: CurvePair, item: PressureAssessment, options: AssessOptions) -
         for _, direction, marker, *_ in BRANCHES:
             at = readings[f"dead_zone_{direction}"].value
             if at is not None:
-                axes.plot(at, item.level_L_min, marker, ms=7, color=COLOURS[name], mec=HUES["ink"], mew=0.8,
+                axes.plot(at, item.reading_flow_L_min, marker, ms=7, color=COLOURS[name], mec=HUES["ink"], mew=0.8,
                           label=f"{name}, dead zone {direction}", zorder=5)  # fmt: skip
-    axes.axhline(item.level_L_min, color=HUES["ink"], lw=0.9, ls=":", label=f"level {item.level_L_min:.3g} L/min")
+    flow = item.reading_flow_L_min
+    axes.axhline(flow, color=HUES["ink"], lw=0.9, ls=":", label=f"reading flow {flow:.3g} L/min")
     axes.set(xlabel="command (% of full)", ylabel="flow at the nominal pressure drop (L/min)", xlim=(0, 100))
     return finish(figure, 3)

@@ -10,6 +10,7 @@ from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.knees.gated_line import GATE, fit_line
 from dzdesign.identify.knees.noise import median
 from dzdesign.identify.knees.profile import crossing
+from dzdesign.identify.valve.reading_flow import ideal_line
 
 #: Shares of the largest flow at which the branches' distance is taken, and the fewest of them.
 WIDTH_LEVELS, FEWEST_LEVELS = np.arange(5, 91, 5) / 100, 3
@@ -26,16 +27,19 @@ FEWEST_CELLS = 10
 
 
 def read_quantities(
-    curves: PressureCurves, *, u_max: float, level: float, rated: float, window: tuple[float, float]
+    curves: PressureCurves, *, u_max: float, reading_flow: float, rated: float, window: tuple[float, float]
 ) -> dict[str, Reading]:
     """Read every quantity of one set at one pressure drop, in its unit; symmetry, which needs both sides, is missing.
 
-    The flow `level` ends the dead zone, linearity is a share of the flow `rated` (m³/s); `window` is over u_max (V).
+    Dead zones are read at `reading_flow`, linearity is a share of the flow `rated` (m³/s); `window` is over u_max (V).
     """
     rising, falling = curves.rising, curves.falling
     si = {
-        "dead_zone_opening": _dead_zone(rising, "rising", level, u_max),
-        "dead_zone_closing": _dead_zone(falling, "falling", level, u_max),
+        "dead_zone_opening": _dead_zone(rising, "rising", reading_flow, u_max),
+        "dead_zone_closing": _dead_zone(falling, "falling", reading_flow, u_max),
+        "ideal_line": observed(ideal_line(reading_flow, curves.q_max)),
+        "onset_opening": _onset(rising, "rising", u_max),
+        "onset_closing": _onset(falling, "falling", u_max),
         "knee_opening": _knee(rising, "rising", u_max),
         "knee_closing": _knee(falling, "falling", u_max),
         "hysteresis": _hysteresis(rising, falling, u_max),
@@ -58,16 +62,30 @@ def _dead_zone(curve: FlowCurve | None, direction: str, level: float, u_max: flo
     floor, noise = curve.read.floor, _noise_of_course(curve)
     if level < floor:
         bound = _passing(curve, floor, noise, u_max)
-        reason = f"the meter shows nothing below {floor / L_MIN:.3g} L/min, and the level is {level / L_MIN:.3g} L/min"
-        return hidden(reason, at_most=_bound_of(bound))
+        return hidden(
+            f"the meter shows nothing below {floor / L_MIN:.3g} L/min, and the reading flow is "
+            f"{level / L_MIN:.3g} L/min",
+            at_most=_bound_of(bound),
+        )
     if level < STANDS_OUT * noise:
         bound = _passing(curve, STANDS_OUT * noise, noise, u_max)
         return hidden(
-            f"the level of {level / L_MIN:.3g} L/min does not stand out of the noise, of which "
+            f"the reading flow of {level / L_MIN:.3g} L/min does not stand out of the noise, of which "
             f"{noise / L_MIN:.2g} L/min are left in the averaged flow",
             at_most=_bound_of(bound),
         )
     return _passing(curve, level, noise, u_max)
+
+
+def _onset(curve: FlowCurve | None, direction: str, u_max: float) -> Reading:
+    """Return where a branch begins to flow, as far as the meter shows it: below its floor no onset is seen."""
+    if curve is None:
+        return _no_branch(direction)
+    floor, noise = curve.read.floor, _noise_of_course(curve)
+    seen = _passing(curve, max(floor, STANDS_OUT * noise), noise, u_max)
+    if not floor:
+        return seen
+    return hidden(f"the meter shows nothing below {floor / L_MIN:.3g} L/min", at_most=_bound_of(seen))
 
 
 def _bound_of(reading: Reading) -> float | None:

@@ -36,7 +36,7 @@ def _table_of(item: "PressureAssessment") -> Table:
     from dzdesign.assess.quantities import QUANTITIES
 
     where = "pressure drop unknown" if item.dp_MPa is None else f"{item.dp_MPa:.2f} MPa"
-    flows = f"level {item.level_L_min:.3g} L/min, rated flow {item.rated_flow_L_min:.3g} L/min"
+    flows = f"reading flow {item.reading_flow_L_min:.3g} L/min, rated flow {item.rated_flow_L_min:.3g} L/min"
     rows = Table(f"{where}, {item.side} commands; {flows}", "quantity", "unit", "before", "after", "change", "± s.e.")
     for key, found in item.quantities.items():
         quantity, change, both = QUANTITIES[key], found.change, (found.before, found.after)
