@@ -56,6 +56,8 @@ class RampTest:
     started: float | None = None
     #: What the engineer has left out of the file.
     left_out: tuple[LeftOut, ...] = ()
+    #: Ramps that this cuts, each with the branches of it that are lost: ``ramp 2, 12.3 to 62.1 s (falling)``.
+    cut: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for array in (self.time, self.u, self.q, self.dp):
