@@ -79,7 +79,7 @@ class TestSimulated:
         tests = [valve_at(dp) for dp in PRESSURES]
         tests[1] = replace(tests[1], simulated=True)
         (warning,) = warned(identify(tests), "simulated")
-        wording.of_test(warning.text)
+        wording.of_test(str(warning.text))
 
     def test_the_firmware_and_the_report_say_so_and_those_of_a_measured_valve_do_not(self):
         for simulated in (True, False):
@@ -231,7 +231,7 @@ class TestKneeErrors:
         half = test.u.size // 2
         up = replace(test, **{name: getattr(test, name)[:half] for name in ("time", "u", "q", "dp")})
         (warning,) = warned(identify([up]), "noise")
-        wording.of_test(warning.text)
+        wording.of_test(str(warning.text))
 
     def test_a_sharp_straight_valve_hears_nothing(self):
         valve = identify(self.curved(1.0))
@@ -240,14 +240,14 @@ class TestKneeErrors:
     @pytest.mark.parametrize("window", [(0.12, 0.5), (0.6, 0.8)])
     def test_the_window_of_the_line_is_named(self, window, wording):
         (warning, *_) = warned(identify(self.curved(0.5), IdentifyOptions(knee_window=window)), "bend")
-        wording.of_test(warning.text)
+        wording.of_test(str(warning.text))
 
     def test_a_window_that_was_widened_is_named_beside_the_one_that_was_asked_for(self, wording):
         valve = identify(self.curved(0.5))
         row = valve.positive.tests[0]
         row = replace(row, straight_rising=(0.12, 0.9), u_knee_rising_se_V=1.0)
         warning = knee_errors._bent(row, 0.1, (0.12, 0.5))
-        wording.of_test(warning.text)
+        wording.of_test(str(warning.text))
 
 
 class TestStuckPressure:

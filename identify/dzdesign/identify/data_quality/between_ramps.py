@@ -2,17 +2,16 @@
 
 from collections.abc import Iterator
 
-from dzdesign.identify.data_quality.catalogue import warn
+from dzdesign.identify.data_quality.catalogue import Finding, warn
 from dzdesign.identify.knees.between_ramps import ASSUMED_REPEATABILITY, FEW_DEGREES
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.repeatability import Repeatability
 
 #: Standard errors from which a drift is said, and share of u_max from which it matters.
 DRIFT_SIGNIFICANCE, SMALLEST_DRIFT = 3.0, 1e-3
 
 
-def about_ramps(found: Repeatability, count: int, options: IdentifyOptions) -> Iterator[Warning_]:
+def about_ramps(found: Repeatability, count: int, options: IdentifyOptions) -> Iterator[Finding]:
     """Yield the warnings about what differs from ramp to ramp, of the guarded branch of `count` tests."""
     sd_mV, degrees = 1e3 * found.sd_V, found.degrees_of_freedom
     if found.origin == "assumed":

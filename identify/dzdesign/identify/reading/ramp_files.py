@@ -15,6 +15,7 @@ import numpy as np
 
 from dzdesign.core.artefact_files import open_bytes, sha256_of_file
 from dzdesign.core.errors import InputError
+from dzdesign.core.recorded_units import Quantity, Unit
 from dzdesign.identify.reading.binary.array_table import read_binary_table
 from dzdesign.identify.reading.binary.registry import LONGEST_MARK, format_of
 from dzdesign.identify.reading.clock import ASSUMED_MS, clock_doubt, may_count_ms, never_back, seconds_of_day_times
@@ -26,6 +27,7 @@ from dzdesign.identify.reading.scaling import scaling_of
 from dzdesign.identify.reading.table import QUOTED_CHARACTERS, Table
 from dzdesign.identify.reading.text.table_reader import read_text_table
 from dzdesign.identify.reading.thinning import thin
+from dzdesign.identify.reading.units_of_columns import units_of_columns
 
 #: Fewest complete rows in which two branches with a threshold could stand.
 MIN_ROWS = 20
@@ -99,6 +101,7 @@ def read_ramp_file(
         simulated=recording.simulated,
         no_values=recording.no_values,
         started=recording.started,
+        units=recording.units,
     )
 
 
@@ -117,6 +120,7 @@ class _Recording:
     started: float | None
     dp_from: tuple[str, str]
     side_without_dp: str
+    units: Mapping[Quantity, tuple[Unit, ...]]
 
 
 def _refuse_too_few_rows(path: Path, recording: _Recording) -> None:
@@ -186,6 +190,7 @@ def _read_recording(
         started=table.started(found["time"].label) if is_clock else None,
         dp_from=edge.in_words(labels),
         side_without_dp=side_without_dp(edge, labels, table.path, data["u"], u_max),
+        units=units_of_columns(table.path, found, u_max),
     )
 
 

@@ -1,9 +1,11 @@
 """`RampTest`: one recorded ramp test, as all rooms of identify take it."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from dzdesign.core.recorded_units import Quantity, Unit
 from dzdesign.identify.valve.left_out import LeftOut
 
 
@@ -54,6 +56,8 @@ class RampTest:
     started: float | None = None
     #: What the engineer has left out of the file.
     left_out: tuple[LeftOut, ...] = ()
+    #: Units of the file's columns, each once; `u`, `dp` and `q` are in SI.
+    units: Mapping[Quantity, tuple[Unit, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for array in (self.time, self.u, self.q, self.dp):
