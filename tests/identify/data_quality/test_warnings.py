@@ -424,6 +424,15 @@ class TestOrder:
             cases = [ast.unparse(each) for each in call.args[2:3]]
             assert bool(cases) == isinstance(text, dict), call.args[0].value
 
+    def test_the_unit_of_a_quantity_stands_in_its_place(self):
+        """Or it would be said in V whatever the recordings are in; of two with one unit the first is ``#unit``."""
+        for code, entry in catalogue().items():
+            for text in entry.text.values() if isinstance(entry.text, dict) else [entry.text]:
+                assert not re.search(r"\}\s*(m?V|MPa|L/min)\b", text), code
+                for _, name, spec, _ in string.Formatter().parse(text):
+                    ending = re.search(r"_(V|mV|MPa|L_min|V_s)$", name or "")
+                    assert not ending or " " in (spec or ""), (code, name)
+
     def test_a_place_that_nobody_fills_is_an_error(self):
         with pytest.raises(KeyError, match="zero_L_min"):
             warn("meter-zero", "ramp.csv", leak="")
