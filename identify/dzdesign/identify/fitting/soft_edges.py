@@ -22,8 +22,12 @@ from dzdesign.identify.knees.meter_lag import MeterLag
 SHARES, WIDTHS = np.array([0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]), np.geomspace(3e-3, 0.2, 11)
 #: Times that the grid is refined about the most credible shape, and points of the finer grid in each direction.
 REFINED, FINER = 3, 5
-#: Readings are averaged over this share of u_max, from so far below the knee to so far above, and over more from there.
-FINE, BELOW, ABOVE, COARSE = 2e-3, 0.25, 0.2, 1e-2
+#: A first part whose largest flow is less than this share of the level is as good as none.
+HARMLESS = 0.5
+#: Readings are averaged over this share of u_max from so far below the knee to so far above, and over more beyond.
+FINE, BELOW, ABOVE, COARSE = 2e-3, 0.06, 0.08, 1e-2
+#: How far below the knee they are averaged at all, over u_max.
+LOWEST = 0.25
 #: Rounds in which base, slope and knee of each test are fitted for a shape; fewest averages for that.
 ROUNDS, FEWEST = 3, 8
 #: The knee moves by at most this share of u_max in a round.
@@ -92,9 +96,12 @@ def find_softness(
         return Softness(np.zeros(knees.size), np.zeros(knees.size))
     width = np.concatenate([[0.0], WIDTHS * u_max])
     grids = [_fit(known, SHARES, width, seconds, level, u_max) for seconds in _lags(lag, shapes)]
+    best = _best(grids)
     for _ in range(REFINED):
-        grids.append(_finer(known, min(grids, key=lambda grid: float(grid.squares.min())), level, u_max))
-    best = min(grids, key=lambda grid: float(grid.squares.min()))
+        if best.width[np.argmin(best.squares.min(axis=0))] == 0:
+            break
+        grids.append(_finer(known, best, level, u_max))
+        best = _best(grids)
     least = float(best.squares.min())
     # Where no shape fits as well as the noise allows, all of them are judged by what the best one leaves.
     left = max(least / max(sum(item.u.size - 3 for item in known), 1), 1.0)
@@ -111,6 +118,11 @@ def find_softness(
         every[told] = below
         found.append(every)
     return Softness(*found)
+
+
+def _best(grids: Sequence[_Shapes]) -> _Shapes:
+    """Return the grid that has the most credible shape of all."""
+    return min(grids, key=lambda grid: float(grid.squares.min()))
 
 
 def _lags(lag: MeterLag, shapes: Sequence[BranchShape]) -> list[float]:
@@ -145,15 +157,14 @@ def _average(shape: BranchShape, floor: float, u_max: float) -> _Averages | None
     read, line = shape.prepared, shape.line
     u, y = read.branch.u, read.y
     top = float(u[line.kept].max())
-    low = line.knee - BELOW * u_max
     noise = max(shape.noise, QUIETEST * shape.sigma)
     furthest = max(GATE * max(noise, shape.sigma), NEAR_FLOOR * floor) + COARSE * u_max * shape.slope
     near = np.abs(y - np.interp(u, *read.profile)) <= furthest
-    rows = (u >= low) & (u <= top) & near
-    middle = min(line.knee + ABOVE * u_max, top)
+    ends = [line.knee + share * u_max for share in (-LOWEST, -BELOW, ABOVE)] + [top + COARSE * u_max]
     edges = np.concatenate(
-        [np.arange(low, middle, FINE * u_max), np.arange(middle, top + COARSE * u_max, COARSE * u_max)]
+        [np.arange(*ends[at : at + 2], width * u_max) for at, width in enumerate((COARSE, FINE, COARSE))]
     )
+    rows = (u >= edges[0]) & (u <= top) & near
     if rows.sum() < FEWEST or edges.size < FEWEST:
         return None
     index = np.searchsorted(edges, u[rows], side="right")
@@ -190,22 +201,20 @@ def _fit(
     u_max: float,
 ) -> _Shapes:
     """Fit base, slope and knee of each test to every shape of a grid."""
-    shares, widths = (axis.ravel() for axis in np.meshgrid(share, width, indexing="ij"))
-    squares, at_level = np.zeros(shares.size), []
-    for test in tests:
-        left, knee, slope = _fit_test(test, shares, widths, seconds, LARGEST_STEP * u_max)
-        squares += left
-        of_first = level / np.maximum(shares * slope, np.finfo(float).tiny)
-        first = knee - (1 - shares) * widths + of_first
-        at_level.append(np.where(of_first < widths, first, knee + level / slope))
-    grid = (share.size, width.size)
-    return _Shapes(
-        share=share,
-        width=width,
-        seconds=seconds,
-        squares=squares.reshape(grid),
-        at_level=np.array(at_level).reshape(len(tests), *grid),
-    )
+    shares, widths = np.meshgrid(share, width, indexing="ij")
+    squares = np.full(shares.shape, np.inf)
+    at_level = np.zeros((len(tests), *shares.shape))
+    largest = max(test.slope for test in tests) * shares * (1 - shares) * widths
+    asked = largest > HARMLESS * level
+    asked[0, 0] |= width[0] == 0  # a sharp edge, whatever its first part's share
+    squares[asked] = 0.0
+    for test, at in zip(tests, at_level, strict=True):
+        left, knee, slope = _fit_test(test, shares[asked], widths[asked], seconds, LARGEST_STEP * u_max)
+        squares[asked] += left
+        of_first = level / (shares[asked] * slope)
+        first = knee - (1 - shares[asked]) * widths[asked] + of_first
+        at[asked] = np.where(of_first < widths[asked], first, knee + level / slope)
+    return _Shapes(share=share, width=width, seconds=seconds, squares=squares, at_level=at_level)
 
 
 def _fit_test(
