@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import isotonic_regression
+from scipy.signal import lfilter
 from scoreboard import Row, print_rows, say
 
 from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, find_trend, lower_bounds
@@ -36,6 +37,36 @@ ORDERS: dict[str, Order] = {
     "three rounds": lambda rng: np.tile(TESTS, 3),
 }
 
+#: Draws by how much ramps of given tests, in the order of taking, stand off their threshold, V.
+Scatter = Callable[[np.ndarray, np.random.Generator], np.ndarray]
+
+
+def normal(sd: float | np.ndarray) -> Scatter:
+    """Return the premise, a normal scatter, of that standard deviation at all tests or at each, V (T,)."""
+    sds = np.broadcast_to(sd, DP_MPa.shape)
+    return lambda test, rng: sds[test] * rng.standard_normal(test.size)
+
+
+def sticking(test: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Return a scatter of 4 mV, and one ramp in twenty whose spool sticks and closes 80 mV lower."""
+    return 4e-3 * rng.standard_normal(test.size) - 80e-3 * (rng.random(test.size) < 0.05)
+
+
+def long_tailed(test: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Return a scatter of Student's distribution with 3 degrees of freedom, 10 mV times it."""
+    return 10e-3 * rng.standard_t(3, test.size)
+
+
+def wandering(correlation: float, sd: float = 25e-3) -> Scatter:
+    """Return an autoregressive scatter: each ramp is like the one before it, with that correlation."""
+
+    def draw(test: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        steps = rng.standard_normal(test.size)
+        steps[1:] *= np.sqrt(1 - correlation**2)
+        return sd * lfilter([1.0], [1.0, -correlation], steps)
+
+    return draw
+
 
 @dataclass(frozen=True, kw_only=True)
 class Family:
@@ -44,6 +75,8 @@ class Family:
     opened: bool
     trend: bool
     margin: np.ndarray
+    #: Codes of what its ramps say against the premises.
+    said: tuple[str, ...]
 
 
 def print_between_ramps(*, quick: bool, seed: int) -> list[Row]:
@@ -109,15 +142,19 @@ def _rows(
 def simulate(
     truth: np.ndarray,
     test: np.ndarray,
-    scatter: float,
+    scatter: float | Scatter,
     drift: float,
     declared: float | None,
     clock: bool,
     rng: np.random.Generator,
 ) -> Family:
-    """Simulate one family; `truth` (T,) in the state of the first ramp, V, and `test` (R,) in the order of taking."""
+    """Simulate one family; `truth` (T,) in the state of the first ramp, V, and `test` (R,) in the order of taking.
+
+    The scatter is a standard deviation, V, or what draws it for ramps of given tests in the order of taking.
+    """
+    draw = normal(scatter) if isinstance(scatter, float) else scatter
     state = np.linspace(0, 1, test.size)
-    knee = truth[test] + drift * state + scatter * rng.standard_normal(test.size)
+    knee = truth[test] + drift * state + draw(test, rng)
     knee += NOISE_SE[test] * rng.standard_normal(test.size)
     counts = np.bincount(test)
     known = RampKnees(
@@ -138,5 +175,8 @@ def simulate(
     bound = lower_bounds(mean, noise_se, between, CONFIDENCE, np.zeros(mean.size))
     _, offset = staircase(bound, trend)
     lowest = truth + min(drift, 0.0)
-    closing = lowest + scatter * rng.standard_normal(truth.size)
-    return Family(opened=bool(np.any(closing < offset)), trend=trend != "flat", margin=bound - lowest)
+    # Each next closing is one of its own, long after the series.
+    closing = lowest + [float(draw(np.array([one]), rng)[0]) for one in TESTS]
+    codes = (("unequal-scatter", between.checks.largest), ("outlying-ramp", between.checks.outlying))
+    said = tuple(code for code, found in (*codes, ("serial-scatter", between.checks.serial)) if found is not None)
+    return Family(opened=bool(np.any(closing < offset)), trend=trend != "flat", margin=bound - lowest, said=said)

@@ -1,12 +1,11 @@
 """Recordings of four ports, of commands in any unit, without a clock, and staircases, as loggers write them.
 
 Each case is a valve's recordings as text, the command line that reads them, and the truth beside them: where each side
-opens and closes at the pressure drop of its metering edge. NumPy only, no code shared with the product, which is asked
-through its command line. ``corpus_units.py FOLDER`` writes all files.
+opens and closes at the pressure drop of its metering edge. No code shared with the product, which is asked through its
+command line. ``corpus_units.py FOLDER`` writes all files.
 """
 
 import contextlib
-import datetime
 import io
 import json
 import sys
@@ -17,13 +16,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from bench_loggers import Rows, command_text, german, plain, table, with_units_below
+from bench_plant import Segment, commanded, lagged, ramp, staircase, with_play
 
 TOLERANCE_V, TOLERANCE_SE, LARGEST_SE_V, SAME_DP = 0.015, 3.0, 0.03, 0.02
 #: Volts at which the valve's sides open and close, whatever the unit of the command.
 OPENS, CLOSES = {"positive": 4.66, "negative": 3.26}, {"positive": 4.54, "negative": 3.14}
 GAIN, PLAY = 3.5, 0.12
-Rows = dict[str, np.ndarray]
-Segment = tuple[float, float, float]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,18 +49,7 @@ class Case:
 # The bench.
 
 
-def ramp(up_s: float = 40.0, top: float = 10.0) -> tuple[Segment, ...]:
-    """Hold, up, hold, down, hold; each (seconds, from V, to V)."""
-    return (3.0, 0.0, 0.0), (up_s, 0.0, top), (1.0, top, top), (up_s, top, 0.0), (3.0, 0.0, 0.0)
-
-
 BOTH_WAYS = (*ramp(), *ramp(top=-10.0))
-
-
-def staircase(step: float, dwell: float, top: float = 10.0) -> tuple[Segment, ...]:
-    """Levels held from zero to the top and back."""
-    up = np.arange(0, top + step / 2, step)
-    return tuple((dwell, float(level), float(level)) for level in (*up, *up[::-1]))
 
 
 def bench(
@@ -85,14 +73,10 @@ def bench(
     the time constant of the spool and the flow, `floor` the meter's.
     """
     rng = np.random.default_rng([seed, 77])
-    ends = np.cumsum([0.0, *(seconds for seconds, _, _ in command)])
-    time = np.arange(0.0, ends[-1], 1 / rate_Hz)
-    which = np.searchsorted(ends, time, side="right") - 1
-    seconds, start, stop = np.array(command).T
-    u = start[which] + (stop - start)[which] * (time - ends[which]) / seconds[which]
-    spool = _with_play(u)
+    time, u = commanded(command, rate_Hz)
+    spool = with_play(u, PLAY)
     if rise_s:
-        spool = _lagged(spool, rise_s * rate_Hz)
+        spool = lagged(spool, rise_s * rate_Hz)
     right = np.maximum(spool - (OPENS["positive"] - PLAY / 2), 0)
     left = np.maximum(-spool - (OPENS["negative"] - PLAY / 2), 0)
     opened = np.minimum(right + left, 4.6)
@@ -110,62 +94,6 @@ def bench(
     noisy = {f"p{port}": value + 0.003 * rng.standard_normal(u.size) for port, value in ports.items()}
     noisy["dP"] = drop + 0.004 * rng.standard_normal(u.size)
     return {"t": time, "u": u + command_noise * rng.standard_normal(u.size), "Q": read, **noisy}
-
-
-def _with_play(u: np.ndarray) -> np.ndarray:
-    at, found = 0.0, []
-    for value in u.tolist():
-        at = min(max(at, value - PLAY / 2), value + PLAY / 2)
-        found.append(at)
-    return np.array(found)
-
-
-def _lagged(values: np.ndarray, samples: float) -> np.ndarray:
-    pole, at, late = float(np.exp(-1 / samples)), float(values[0]), []
-    for value in values.tolist():
-        at = pole * at + (1 - pole) * value
-        late.append(at)
-    return np.array(late)
-
-
-# The loggers.
-
-
-def table(columns: dict[str, tuple[np.ndarray, int]], separator: str = ",", comma: bool = False) -> str:
-    """Return a table: label -> column and its decimals."""
-    cells = [[f"{value:.{digits}f}" for value in column.tolist()] for column, digits in columns.values()]
-    rows = "\n".join(separator.join(row) for row in zip(*cells, strict=True))
-    return separator.join(columns) + "\n" + (rows.replace(".", ",") if comma else rows) + "\n"
-
-
-def plain(rows: Rows, *names: str) -> str:
-    """Return time, command, some pressures in MPa and the flow, the unit in each label."""
-    pressures = {f"{name}_MPa": (rows[name], 5) for name in names}
-    return table({"time_s": (rows["t"], 3), "u_V": (rows["u"], 4), **pressures, "Q_Lmin": (rows["Q"], 3)})
-
-
-def german(rows: Rows, *names: str) -> str:
-    """Return the same in bar, with decimal commas and stamps."""
-    begin = datetime.datetime(2026, 3, 4, 9, 30)
-    pressures = {f"{name} [bar]": (10 * rows[name], 3) for name in names}
-    text = table({"u [V]": (rows["u"], 4), **pressures, "Q [l/min]": (rows["Q"], 3)}, ";", comma=True)
-    head, *lines = text.splitlines()
-    stamps = (f"{begin + datetime.timedelta(seconds=at):%d.%m.%Y %H:%M:%S,%f}" for at in rows["t"].tolist())
-    return "\n".join([f"t;{head}", *(f"{at};{line}" for at, line in zip(stamps, lines, strict=True))]) + "\n"
-
-
-def with_units_below(rows: Rows, *names: str) -> str:
-    """Return the same with a row of units below the labels, pressures in psi."""
-    columns = {"t": (1e3 * rows["t"], 1), "u": (rows["u"], 4)}
-    columns |= {name: (rows[name] * 145.0377, 3) for name in names} | {"Q": (rows["Q"], 3)}
-    head, *lines = table(columns, "\t").splitlines()
-    return "\n".join([head, "\t".join(["ms", "V", *["psi"] * len(names), "l/min"]), *lines]) + "\n"
-
-
-def command_text(rows: Rows, label: str, values: np.ndarray, digits: int = 4, clock: bool = True) -> str:
-    """Return a recording whose command stands under another label, in its own unit."""
-    time = {"time_s": (rows["t"], 3)} if clock else {}
-    return table({**time, label: (values, digits), "dP_bar": (10 * rows["dP"], 3), "Q_Lmin": (rows["Q"], 3)})
 
 
 # The cases.

@@ -1,20 +1,22 @@
 """9. Spools with play, and spools that stick and slip: the flow left at zero command after a stop.
 
 Each valve is recorded on a simulated bench, identified with the defaults, and stopped once at every tested pressure
-drop from a random command, the drive at the law's offset. The spool is a play or a breakaway in NumPy: no code of the
-plant, of the law or of the fit.
+drop from a random command, the drive at the law's offset. The spool is one of `bench_plant`, which knows nothing of the
+law or of the fit.
 """
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
+from bench_plant import that_sticks, with_play
+from recorded_ramps import recorded
 from scoreboard import Row, print_rows, say
 
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_test import RampTest
 
-L_MIN, MPA = 1e-3 / 60, 1e6
 PRESSURES_MPa = (1.0, 2.0, 3.0, 4.0, 5.0)
 RATE_Hz, RAMP_S, NOISE_L_min, TOP_V = 50, 100, 0.05, 3.9
 #: Of 200 valves.
@@ -25,40 +27,13 @@ SCATTER_V = 5e-3
 Spool = Callable[[np.ndarray], np.ndarray]
 
 
-def spool_with_play(width: float) -> Spool:
-    """Return a spool that follows the command inside a play of so many volts."""
-
-    def follow(u: np.ndarray) -> np.ndarray:
-        spool, at = np.empty_like(u), float(u[0])
-        for index, command in enumerate(u.tolist()):
-            at = min(max(at, command - width / 2), command + width / 2)
-            spool[index] = at
-        return spool
-
-    return follow
-
-
-def spool_that_sticks(breakaway: float, rng: np.random.Generator) -> Spool:
-    """Return a spool that waits until the command is a breakaway (within 20 %) ahead, and then jumps to it."""
-
-    def follow(u: np.ndarray) -> np.ndarray:
-        spool, at, next_one = np.empty_like(u), float(u[0]), breakaway
-        for index, command in enumerate(u.tolist()):
-            if abs(command - at) > next_one:
-                at, next_one = command, breakaway * (1 + 0.2 * rng.uniform(-1, 1))
-            spool[index] = at
-        return spool
-
-    return follow
-
-
 def print_stops(*, quick: bool, seed: int) -> list[Row]:
     """Print and return the rows of part 9."""
     count = 20 if quick else 200
     rows = []
     cases = {
-        "play of 4 to 6 %": (lambda rng: spool_with_play(rng.uniform(0.4, 0.6)), "hysteresis"),
-        "breakaway of 0.15 V": (lambda rng: spool_that_sticks(0.15, rng), "stick-slip"),
+        "play of 4 to 6 %": (lambda rng: partial(with_play, play=rng.uniform(0.4, 0.6)), "hysteresis"),
+        "breakaway of 0.15 V": (lambda rng: partial(that_sticks, breakaway=0.15, rng=rng), "stick-slip"),
     }
     for name, (make, code) in cases.items():
         for repeats in (1, 3):
@@ -103,13 +78,5 @@ def _gain(dp_MPa: float) -> float:
 def _ramp(dp_MPa: float, spool: Spool, source: str, started: float, rng: np.random.Generator) -> RampTest:
     up = np.linspace(0, 10, RAMP_S * RATE_Hz)
     u = np.concatenate([up, up[::-1]])
-    q = np.clip(_gain(dp_MPa) * (spool(u) - _edge(dp_MPa, rng)), 0, _gain(dp_MPa) * TOP_V)
-    return RampTest(
-        source=source,
-        sha256=f"{int(rng.integers(1 << 40)):064x}",
-        time=np.arange(u.size) / RATE_Hz,
-        u=u,
-        q=(q + NOISE_L_min * rng.standard_normal(u.size)) * L_MIN,
-        dp=dp_MPa * MPA * (1 + 1e-3 * rng.standard_normal(u.size)),
-        started=started,
-    )
+    flow = np.clip(_gain(dp_MPa) * (spool(u) - _edge(dp_MPa, rng)), 0, _gain(dp_MPa) * TOP_V)
+    return recorded(source, u, flow, dp_MPa, rate_Hz=RATE_Hz, noise=NOISE_L_min, rng=rng, started=started)

@@ -26,7 +26,6 @@ from dzdesign.core.options import (
     Paths,
     Table,
     Text,
-    Texts,
     paths_of,
     read_options,
 )
@@ -202,38 +201,6 @@ def refuse_copies(tests: list["RampTest"]) -> None:
                 "(a repeated ramp test is welcome, a copy is no repetition)"
             )
         known[test.sha256] = test.source
-
-
-def in_order(tests: list["RampTest"], order: Texts | None) -> list["RampTest"]:
-    """Return recordings with the times at which they began, one after the other, where --order states them.
-
-    Raises
-    ------
-    InputError
-        If a name in it is no recording's, or a recording is missing in it.
-    """
-    if order is None:
-        return tests
-    names = [name.strip() for text in ([order] if isinstance(order, str) else order) for name in text.split(",")]
-    known = {test.source: test for test in tests}
-    unknown = next((name for name in names if name not in known), None)
-    missing = next((name for name in known if name not in names), None)
-    if unknown is not None or missing is not None or len(names) != len(known):
-        wrong = (
-            f"names '{unknown}', which is no recording here{nearest(unknown, known)}"
-            if unknown is not None
-            else f"lacks '{missing}'"
-            if missing is not None
-            else "names a recording twice"
-        )
-        raise InputError(f"--order {wrong}; expected each recording once, by its file name, in the order of taking")
-    import numpy as np
-
-    started = 0.0
-    for name in names:
-        known[name] = replace(known[name], started=started - float(known[name].time[0]))
-        started += float(np.ptp(known[name].time))
-    return list(known.values())
 
 
 def check_places(kind: "type[Artefact]", output: AnyPath | None, plots: AnyPath | None) -> None:

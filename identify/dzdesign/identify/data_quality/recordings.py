@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from dzdesign.identify.data_quality.catalogue import most_serious_first, warn
+from dzdesign.identify.data_quality.recording_order import about_order
 from dzdesign.identify.reading.clock import ASSUMED_MS
 from dzdesign.identify.reading.metering_edge import EDGES
 from dzdesign.identify.reading.ramp_test import RampTest
@@ -14,7 +15,8 @@ NAMED_FILES = 3
 
 def about_recordings(tests: Sequence[RampTest]) -> tuple[Warning_, ...]:
     """Return what is to be said of the recordings themselves, the most serious first."""
-    return most_serious_first([*_about_simulation(tests), *(item for test in tests for item in _about_one(test))])
+    of_each = (item for test in tests for item in _about_one(test))
+    return most_serious_first([*_about_simulation(tests), *about_order(tests), *of_each])
 
 
 def _about_one(test: RampTest) -> Iterator[Warning_]:

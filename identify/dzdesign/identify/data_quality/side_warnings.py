@@ -15,6 +15,7 @@ from dzdesign.identify.data_quality.sweeps import about_sweeps
 from dzdesign.identify.knees.characteristic import TAIL
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
 from dzdesign.identify.knees.meter_lag import softness_of_filter
+from dzdesign.identify.knees.scatter_checks import ScatterChecks
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.side_model import SideModel
@@ -39,7 +40,7 @@ def find_warnings(
     """
     return (
         *about_the_meter(side, group, options),
-        *about_ramps(side.certificate.repeatability, len(side.tests), options),
+        *about_ramps(side.certificate.repeatability, _checks(side, group), group.tests, options),
         *(
             warn("not-monotone", test.source, gap_mV=1e3 * float(gap))
             for test, gap in zip(side.tests, departure, strict=True)
@@ -57,6 +58,10 @@ def find_warnings(
         *about_errors(side, group.tests, options.u_max, options.knee_window),
         *_about_the_edge(side, group, options.u_max),
     )
+
+
+def _checks(side: SideModel, group: DescribedTests) -> ScatterChecks:
+    return group.between(1 if side.certificate.guard == "closing" else 0).checks
 
 
 def _about_hysteresis(side: SideModel, u_max: float) -> Iterator[Warning_]:

@@ -28,6 +28,7 @@ from dzdesign.identify.ramps.command import despiked
 from dzdesign.identify.ramps.pooling import PooledTest, name_of_ramp, pool_ramps
 from dzdesign.identify.ramps.splitting import Ramp, nominal_dp, split_ramps
 from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.reading.series_order import with_clock_of_series
 
 logger = logging.getLogger(__name__)
 
@@ -45,8 +46,7 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
     """
     rest = find_rest_flows(tests, options.u_max)
     tests = [replace(test, q=test.q - flow) for test, flow in zip(tests, rest.flows, strict=True)]
-    if len(tests) == 1 and tests[0].started is None:
-        tests = [replace(tests[0], started=0.0)]  # its own clock is common to all of its ramps
+    tests = with_clock_of_series(tests)
     ramps = split_recordings(tests, options, options.meter_lag or 0.0)
     lag = find_lag(ramps, options)
     pooled = pool_ramps(ramps if lag.origin != "identified" else split_recordings(tests, options, lag.seconds))

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dzdesign.identify.reading.time_stamps import Start
 from dzdesign.identify.valve.left_out import LeftOut
 
 
@@ -50,7 +51,8 @@ class RampTest:
     clock_doubt: str = ""
     simulated: bool = False
     no_values: str = ""
-    #: Time of `time` = 0 on a clock common to all recordings, s; None if it is not known.
+    #: Date and time of `time` = 0 that the recording itself states, and time on the clock of the series that counts, s.
+    stamp: Start | None = None
     started: float | None = None
     #: What the engineer has left out of the file.
     left_out: tuple[LeftOut, ...] = ()
