@@ -125,7 +125,7 @@ def _side_model(
         certificate=BoundsBasis(
             confidence=options.confidence,
             guard=guard,
-            level_L_min=max(shape.dead_zone.noise_level for item in described for shape in item.branches) / L_MIN,
+            level_L_min=group.noise_level / L_MIN,
             repeatability=_repeatability(group.between(guarded.column)),
         ),
         guards=guards,

@@ -11,9 +11,10 @@ from dzdesign.core.worded import worded
 from dzdesign.identify.constants import FULL_SWEEP, L_MIN
 from dzdesign.identify.knees.between_ramps import BetweenRamps, compare_ramps, knees_of_ramps
 from dzdesign.identify.knees.branch_shape import BranchShape
-from dzdesign.identify.knees.characteristic import describe_branches, find_meter_floor
+from dzdesign.identify.knees.characteristic import describe_branches
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
 from dzdesign.identify.knees.gated_line import prepare_branch
+from dzdesign.identify.knees.meter_floor import find_meter_floor
 from dzdesign.identify.knees.meter_lag import MeterLag, find_lag
 from dzdesign.identify.knees.profile import largest_flow
 from dzdesign.identify.knees.readings_at_rest import find_rest_flows
@@ -128,10 +129,9 @@ def _refuse_what_shows_no_dead_zone(pooled: list[PooledTest], options: IdentifyO
 
 
 def found_floor(pooled: list[PooledTest], options: IdentifyOptions) -> float:
-    """Return the largest meter floor that any branch shows (one meter, so one floor), m³/s; 0 if none can tell."""
-    branches = (branch for item in pooled for branch in item.branches if branch is not None)
-    floors = (find_meter_floor(branch.u, branch.q, options.u_max) for branch in branches)
-    return max((floor for floor in floors if floor is not None), default=0.0)
+    """Return the meter's floor as the branches show it, m³/s; 0 if none can tell."""
+    branches = [branch for item in pooled for branch in item.branches if branch is not None]
+    return find_meter_floor(branches, options.u_max)
 
 
 def _described(pooled: list[PooledTest], floor: float, lag: MeterLag, options: IdentifyOptions) -> list[DescribedTest]:
