@@ -19,6 +19,8 @@ Codes = tuple[int, int, int]
 SEED, SAMPLES = 11, 3000
 #: A ramp that is not put anywhere; share of the samples before which it is.
 STAYS, PUT_SHARE = -(2**31), 0.04
+#: A command that no converter gives.
+INVALID = 65535
 FIELDS = ("compare_a", "compare_b", "status", "law", "side", "ticks", "at_rest", "ramped")
 
 
@@ -98,7 +100,8 @@ def window_samples(compensator: Compensator) -> list[tuple[Codes, int]]:
 def every_state(compensator: Compensator) -> list[tuple[Codes, int, int]]:
     """Return every valid command from every state of rest and side: codes, the ramp's place and `state_word`.
 
-    The ramp is put where the command is, so that it does not hold it back.
+    The ramp is put where the command is, so that it does not hold it back. After a command that is not valid the drive
+    must be at rest, so one is tried from each state too, and a command between the ends of the zero band behind it.
     """
     signals, command = compensator.signals, compensator.signals.command
     sides = (1,) if len(signals.signs) == 1 else (-1, 0, 1)
@@ -109,12 +112,15 @@ def every_state(compensator: Compensator) -> list[tuple[Codes, int, int]]:
     rng = np.random.default_rng(SEED)
     made = []
     for side, rest in product(sides, rests):
-        for code in range(command.valid_codes[0], command.valid_codes[1] + 1):
+        codes = [(code, state_word(side, rest)) for code in range(command.valid_codes[0], command.valid_codes[1] + 1)]
+        between = command.zero_code + command.direction(1) * (compensator.zero_band_codes + 1)
+        for code, word in (*codes, (INVALID, state_word(side, rest)), (between, STAYS)):
             pressures = (rng.integers(*sensor.valid_codes) for sensor in (signals.pressure_a, signals.pressure_b))
             p_a, p_b = map(int, pressures)
             away = command.direction(1) * (code - command.zero_code)
             reached = away if len(sides) == 3 else max(away, 0)
-            made.append(((code, p_a, p_b), reached * STEP_UNIT if ramps else STAYS, state_word(side, rest)))
+            placed = ramps and code != INVALID
+            made.append(((code, p_a, p_b), reached * STEP_UNIT if placed else STAYS, word))
     return made
 
 
