@@ -351,7 +351,10 @@ def test_the_dead_zones_of_the_closed_loop_are_found_in_its_records(example_comp
 
     loop = ClosedLoop(Plant(), firmware_folder, example_compensator)
     for dp_MPa in (1.0, 5.0):
-        compared = compare_at_pressure(loop, dp_MPa, 1.0, RampSequence(ramp=50.0))
+        recorded_flow = example_compensator.valve.positive.tests[-1].recorded
+        compared = compare_at_pressure(
+            loop, dp_MPa, 1.0, RampSequence(ramp=50.0), reading_flow_L_min=0.6, recorded=recorded_flow
+        )
 
         def recorded(run, digit):
             q = run.q_L_min * L_MIN
