@@ -16,10 +16,12 @@ from mutants import print_mutants  # noqa: E402
 from plant import print_plant  # noqa: E402
 from proof_of_c import print_proof  # noqa: E402
 from scoreboard import run_parts  # noqa: E402
+from stand_in_flow import print_stand_in  # noqa: E402
 
 PARTS = {
     "inputs": (print_inputs, 101),
     "plant": (print_plant, 303),
+    "stand-in": (print_stand_in, 0),
     "mutants": (print_mutants, 202),
     "proof": (print_proof, 0),
 }

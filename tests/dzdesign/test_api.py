@@ -17,7 +17,7 @@ from nbclient import NotebookClient
 from dzdesign import api
 from dzdesign.command_line.cli import main
 from dzdesign.command_line.parser import arguments_of_command
-from dzdesign.design.compensator import Sides
+from dzdesign.design.side_law import Sides
 from dzdesign.identify.valve.model import ValveModel
 from tests.support.paths import ROOT
 from tests.support.synthetic import needs_compiler

@@ -35,7 +35,7 @@ from dzdesign.report.reproduction import Outcome, PaperNumber, Reproduction
 from dzdesign.report.summary import headline, worst_of
 from dzdesign.report.valve_report import REPORT_NAME, report_of_folder
 from dzdesign.verify.closed_loop.plant import Plant
-from dzdesign.verify.evidence import PressureResult
+from dzdesign.verify.loop_results import PressureResult
 from tests.support.html_pages import HOSTILE, Page
 from tests.support.synthetic import Truth, needs_compiler, synthetic_ramp
 

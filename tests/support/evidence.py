@@ -5,10 +5,11 @@ from typing import Any
 
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import THIS_TOOL
-from dzdesign.verify.evidence import ClosedLoopResult, Evidence
+from dzdesign.verify.evidence import Evidence
+from dzdesign.verify.loop_results import ClosedLoopResult
 from dzdesign.verify.requirements import ALWAYS
 
-LOOP = ClosedLoopResult(plant=None, plant_source="none", plant_sha256=None, plants=(), pressures=())
+LOOP = ClosedLoopResult(plant=None, plant_source="none", plant_sha256=None, dynamics=None, pressures=())
 EVIDENCE = Evidence(
     tool=THIS_TOOL, made_from=(), target="f28335", changed_board_files=(), user_files=(), board_not_compiled="",
     checks=tuple(each.check(holds=True, text="yes") for each in ALWAYS), inputs=(), closed_loop=LOOP, scenarios=(),

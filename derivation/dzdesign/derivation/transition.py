@@ -1,12 +1,14 @@
-"""The transition: over the first codes of command the drive runs from the closing threshold to the opening one.
+"""The zero band and the transition: from the closing threshold, held about zero command, to the opening one.
 
-Hysteresis parts the two: a single offset at the opening threshold leaks at zero command, one at the closing threshold
-leaves a dead zone on opening. With a transition the law is that of the opening threshold, u_O(beta_o), and below the
-transition's end u_t it is lowered in proportion to what is missing to it::
+Hysteresis parts the two thresholds: a single offset at the opening threshold leaks at zero command, one at the closing
+threshold leaves a dead zone on opening. So commands up to u_z, the zero band, count as zero; and from u_z to u_t, the
+transition, the drive runs straight from the certified closing offset to the law of the opening threshold::
 
-    u_O = u_O(beta_o) - (beta_o - beta) u_min0 (1 - u_i/u_t)        for u_i < u_t
+    share = (u_i - u_z)/(u_t - u_z), held between 0 and 1
+    u_O = u_O(beta_o; u) - (beta_o - beta) u_min0 (1 - share),  u = share u_t for u_i < u_t, u_i beyond
 
-so that zero command gives beta u_min0, the certified closing offset, and u_i = u_t the opening law, without a step.
+u_O(beta_o; u) being the law of the opening threshold. In the zero band that is beta u_min0, the certified offset, at
+u_t the opening law, and beyond it the law as if there were no band: full command stays full command.
 """
 
 from functools import cache
@@ -16,12 +18,42 @@ import sympy
 
 from dzdesign.derivation.lowering import lower
 from dzdesign.derivation.scaling import COMPARE_VALUE, mu
-from dzdesign.derivation.symbols import beta, n_full, u_max, u_min0, u_O
+from dzdesign.derivation.symbols import beta, n_full, u_i, u_max, u_min0, u_O
 
 beta_o = sympy.Symbol("beta_o", positive=True)  # beta of the opening threshold
-share = sympy.Symbol("share", nonnegative=True)  # u_i/u_t
-#: What the transition takes from the opening law below its end, V.
+share = sympy.Symbol("share", nonnegative=True)  # of the transition that the command has passed, 0 to 1
+u_z, u_t = sympy.symbols("u_z u_t", positive=True)  # ends of the zero band and of the transition
+#: What the transition takes from the opening law, V.
 LOWERED_BY = (beta_o - beta) * u_min0 * (1 - share)
+#: Share of the transition that a command within it has passed.
+SHARE = (u_i - u_z) / (u_t - u_z)
+#: The command that the opening law is given within the transition.
+LAW_COMMAND = share * u_t
+
+
+def evaluate_share(command: Any, *, zero_band: Any, end: Any) -> Any:
+    """Return the share of the transition that a command has passed, 0 to 1, for numbers of one unit.
+
+    `zero_band` is where the transition begins, `end` where it ends.
+
+    Examples
+    --------
+    >>> evaluate_share(21, zero_band=19, end=51)
+    Fraction(1, 16)
+    """
+    return min(max(_lowered_share()(command, zero_band, end), 0), 1)
+
+
+def evaluate_law_command(command: Any, *, zero_band: Any, end: Any) -> Any:
+    """Return the command that the opening law is given: 0 in the zero band, the command itself beyond the transition.
+
+    Examples
+    --------
+    >>> evaluate_law_command(21, zero_band=19, end=51)
+    Fraction(51, 16)
+    """
+    passed = evaluate_share(command, zero_band=zero_band, end=end)
+    return command if passed == 1 else _lowered_command()(passed, end)
 
 
 def evaluate_transition(
@@ -29,8 +61,8 @@ def evaluate_transition(
 ) -> Any:
     """Return by how many counts the transition lowers the opening law, for numbers of any kind.
 
-    The betas are the offsets of the two thresholds over the law's u_min0; `share_of_transition` is u_i/u_t, from 0 to
-    1: beyond the transition there is nothing to lower. Full drive is `n_full` counts.
+    The betas are the offsets of the two thresholds over the law's u_min0; `share_of_transition` is what
+    `evaluate_share` gives. Full drive is `n_full` counts.
 
     Examples
     --------
@@ -44,3 +76,13 @@ def evaluate_transition(
 def _lowered() -> Any:
     counts = COMPARE_VALUE.subs(u_O, LOWERED_BY).subs(u_min0, mu * u_max)
     return lower(sympy.cancel(counts), (beta_o, beta, mu, share, n_full))
+
+
+@cache
+def _lowered_share() -> Any:
+    return lower(SHARE, (u_i, u_z, u_t))
+
+
+@cache
+def _lowered_command() -> Any:
+    return lower(LAW_COMMAND, (share, u_t))

@@ -13,104 +13,17 @@ from dzdesign.core.errors import InputError
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.derivation.law import law
 from dzdesign.derivation.scaling import drive, evaluate_line
-from dzdesign.derivation.transition import evaluate_transition
+from dzdesign.derivation.transition import evaluate_law_command, evaluate_share, evaluate_transition
 from dzdesign.design.design_choices import BelowDp0
 from dzdesign.design.drive_functions import RAMPED_CODES, DriveFunctions
 from dzdesign.design.lot_valves import LotValve
+from dzdesign.design.side_law import SideLaw, Sides
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import TargetInputs
-from dzdesign.identify.valve.guard_curve import Guard
+from dzdesign.design.zero_band import CommandError
 from dzdesign.identify.valve.model import ValveModel
 
-Node = Annotated[int, Meta(ge=1, le=2**31)]
 Codes = Annotated[int, Meta(ge=0, le=65535)]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Certificate:
-    """What is proved about the offset of one side, on the integers, at every pressure code of the interval."""
-
-    confidence: Annotated[
-        float, quantity("1", "Confidence with which the threshold's lower bounds hold together.", ge=0.5, le=1)
-    ]
-    guard: Annotated[Guard, Meta(description="The threshold that they bound.")]
-    level_L_min: Annotated[
-        float,
-        quantity("L/min", "Flow that counted as flow when the thresholds were identified.", ge=0, le=1e6),
-    ]
-    dp_MPa: Annotated[tuple[Fraction, Fraction], quantity("MPa", "Interval of the pressure drop on which it holds.")]
-    smallest_margin_V: Annotated[
-        Fraction, quantity("V", "Smallest distance from the offset to the lower bound, over all those codes.")
-    ]
-    mean_loss_V: Annotated[
-        float,
-        quantity(
-            "V",
-            "By how much the table's offset stays under the certified curve on average: the price of few nodes, "
-            "rounding, the converter's error and the dither.",
-            ge=-1e6,
-            le=1e6,
-        ),
-    ]
-    largest_loss_V: Annotated[float, quantity("V", "The same at most.", ge=-1e6, le=1e6)]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SideLaw:
-    """The law of one sign of command."""
-
-    drive_range_over_u_max: Annotated[
-        Fraction,
-        quantity(
-            "1",
-            "k x_max / u_max of the law: command from its offset u_min0 to full flow, over full command. In valve.json "
-            "k x_max counts from the knee, which lies higher.",
-        ),
-    ]
-    u_min0_over_u_max: Annotated[Fraction, quantity("1", "The law's offset at dP0 over full command.")]
-    beta: Annotated[
-        tuple[Node, ...],
-        Meta(
-            description="Nodes of beta at zero command, certified, over `beta_denominator`: at pressure codes 0, "
-            "`beta_step_codes`, twice that, ...; straight between them."
-        ),
-    ]
-    transition_beta: Annotated[
-        tuple[Node, ...] | None,
-        Meta(
-            description="With a transition: nodes of the opening threshold's beta, that the law follows beyond it; "
-            "none below the certified."
-        ),
-    ] = None
-    certificate: Annotated[Certificate, Meta(description="What is proved.")]
-
-    def __post_init__(self) -> None:
-        if not 0 < self.u_min0_over_u_max < 1:
-            raise RuleError(f"u_min0 is {float(self.u_min0_over_u_max):.3f} of u_max, expected between 0 and 1")
-        if not 0 < self.drive_range_over_u_max <= 10**3:
-            raise RuleError("k x_max/u_max must be positive")
-        if self.transition_beta is not None:
-            if len(self.transition_beta) != len(self.beta):
-                raise RuleError("the transition's beta must have as many nodes as the certified one")
-            if any(upper < lower for upper, lower in zip(self.transition_beta, self.beta, strict=True)):
-                raise RuleError(
-                    "the transition's beta lies below the certified one, expected the opening threshold above"
-                )
-
-    @property
-    def law_beta(self) -> tuple[int, ...]:
-        """Nodes of the beta that the law follows beyond the transition; without one the certified beta itself."""
-        return self.beta if self.transition_beta is None else self.transition_beta
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Sides:
-    """The law of each sign of command."""
-
-    positive: Annotated[SideLaw, Meta(description="Of positive commands.")]
-    negative: Annotated[
-        SideLaw | None, Meta(description="Of negative commands, of a valve with two solenoids; null: none.")
-    ] = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -147,10 +60,19 @@ class Compensator(ShownInNotebooks, Artefact):
     transition_codes: Annotated[
         Codes,
         Meta(
-            description="Codes of command over which the drive runs from the closing to the opening threshold, a power "
-            "of two; 0: none."
+            description="Codes of command, behind the zero band, over which the drive runs from the closing to the "
+            "opening threshold, a power of two; 0: none."
         ),
     ] = 0
+    reading_flow_L_min: Annotated[
+        float,
+        quantity("L/min", "Reading flow: the flow at which dead zones are read, beside the onset.", gt=0, le=1e6),
+    ]
+    zero_band_codes: Annotated[
+        Codes,
+        Meta(description="Codes of command up to which the law takes it as zero; 0, and only 0, without a transition."),
+    ] = 0
+    command_error: Annotated[CommandError, Meta(description="Error of the command's code at zero, as declared.")]
     sides: Annotated[Sides, Meta(description="The law of each sign of command.")]
     drive_functions: Annotated[DriveFunctions, Meta(description="Ramps, dither and the like.")] = field(
         default_factory=DriveFunctions
@@ -213,9 +135,14 @@ class Compensator(ShownInNotebooks, Artefact):
             raise RuleError("every beta must lie between 0 and 2, exclusive")
         if bool(self.transition_codes) != (side.transition_beta is not None):
             raise RuleError("a transition needs the opening threshold's beta, and its codes of command")
-        if self.transition_codes > self.signals.command.span(sign) // 10:
+        if bool(self.transition_codes) != bool(self.zero_band_codes):
+            raise RuleError("a zero band and a transition belong together, expected both or neither")
+        if self.transition_codes and self.drive_functions.leave_zero_codes <= self.zero_band_codes:
+            raise RuleError("the drive must leave its rest beyond the zero band, so that noise at its end does not show")
+        if (taken := self.transition_end) > self.signals.command.span(sign) // 10:
             raise RuleError(
-                f"the transition takes {self.transition_codes} codes, expected at most a tenth of the command"
+                f"zero band and transition take {taken} codes, expected at most a tenth of the command, "
+                f"{self.signals.command.span(sign)} codes"
             )
 
     @property
@@ -239,6 +166,11 @@ class Compensator(ShownInNotebooks, Artefact):
         if side is None:
             raise InputError("this compensator has no law for negative commands")
         return side
+
+    @property
+    def transition_end(self) -> int:
+        """Codes of command at which zero band and transition are over."""
+        return self.zero_band_codes + self.transition_codes
 
     def nodes(self, sign: int = 1) -> int:
         """Return how many nodes beta needs for every difference of pressure codes."""
@@ -274,16 +206,17 @@ class Compensator(ShownInNotebooks, Artefact):
             n_adc=signals.command.span(sign),
             n_full=signals.compare_max,
         )
-        counts: Fraction = line.slope * from_zero + line.start
-        if from_zero < self.transition_codes:
-            counts -= evaluate_transition(
-                beta_opening=beta,
-                beta_closing=self.beta(dp_code, sign),
-                u_min0_over_u_max=side.u_min0_over_u_max,
-                share_of_transition=Fraction(from_zero, self.transition_codes),
-                n_full=signals.compare_max,
-            )
-        return counts
+        ends = {"zero_band": self.zero_band_codes, "end": self.transition_end}
+        if from_zero >= self.transition_end:
+            return Fraction(line.slope * from_zero + line.start)
+        lowered = evaluate_transition(
+            beta_opening=beta,
+            beta_closing=self.beta(dp_code, sign),
+            u_min0_over_u_max=side.u_min0_over_u_max,
+            share_of_transition=evaluate_share(from_zero, **ends),
+            n_full=signals.compare_max,
+        )
+        return Fraction(line.slope * evaluate_law_command(from_zero, **ends) + line.start - lowered)
 
     def drive(self, command_code: int, dp_code: int, sign: int = 1) -> Fraction:
         """Return u_O/u_max of the law at a code pair, exactly and before it is limited to 0...1."""

@@ -1,5 +1,6 @@
 """What a design costs, in a person's words: dead zone that remains, flow at the transition, drive at full command."""
 
+from dataclasses import dataclass
 from fractions import Fraction
 
 from dzdesign.core.errors import InputError
@@ -54,30 +55,30 @@ def _cost_of_test(compensator: Compensator, test: TestResult, sign: int) -> str:
     """Say what remains at one tested pressure drop."""
     signals, u_max = compensator.signals, float(compensator.u_max_V)
     code = round(signals.dp_code(Fraction(repr(test.dp_MPa))))
-    offset, at_end, full, transition = _corners(compensator, code, sign)
+    corners = _corners(compensator, code, sign)
     left = remaining_dead_zone(compensator, test, sign)
-    parts = [f"{test.dp_MPa:.2f} MPa: offset {offset * u_max:.3f} V"]
+    parts = [f"{test.dp_MPa:.2f} MPa: offset {corners.offset * u_max:.3f} V"]
     for name, knee in (("opening", test.u_knee_rising_V), ("closing", test.u_knee_falling_V)):
-        if knee is not None and knee >= offset * u_max:
+        if knee is not None and knee >= corners.offset * u_max:
             parts.append(f"dead zone that remains on {name} {left[name]:.2%} of command (knee)")
         elif knee is not None:
-            above = offset * u_max - knee
+            above = corners.offset * u_max - knee
             parts.append(f"flow at zero command on {name}: the offset lies {above:.3f} V above the knee")
-    if transition and test.u_knee_falling_V is not None:
-        flow = test.slope_L_min_V * max(at_end * u_max - test.u_knee_falling_V, 0.0)
+    if corners.end and test.u_knee_falling_V is not None:
+        flow = test.slope_L_min_V * max(corners.at_end * u_max - test.u_knee_falling_V, 0.0)
         parts.append(f"flow on closing at the transition's end {flow:.2f} L/min")
     limit = compensator.drive_functions.compare_limit / signals.compare_max
-    if limit <= offset or limit <= (test.u_knee_rising_V or 0.0) / u_max:
+    if limit <= corners.offset or limit <= (test.u_knee_rising_V or 0.0) / u_max:
         raise InputError(
             f"the largest output is {limit:.1%} of full drive, but the valve opens at "
-            f"{max(offset, (test.u_knee_rising_V or 0.0) / u_max):.1%} at {test.dp_MPa:.2f} MPa, so nothing would ever "
+            f"{max(corners.offset, (test.u_knee_rising_V or 0.0) / u_max):.1%} at {test.dp_MPa:.2f} MPa, so nothing would ever "
             "flow; give a larger --output-max"
         )
-    if limit < full:
-        reached = transition + (1 - transition) * (limit - at_end) / (full - at_end)
+    if limit < corners.full:
+        reached = corners.command_at(limit)
         parts.append(f"the largest drive, {limit:.2%}, is reached at {reached:.1%} of command")
     else:
-        parts.append(f"drive at full command {full:.2%}")
+        parts.append(f"drive at full command {corners.full:.2%}")
     return ", ".join(parts)
 
 
@@ -88,26 +89,45 @@ def remaining_dead_zone(compensator: Compensator, test: TestResult, sign: int = 
     share is 0 where flow passes at zero command.
     """
     code = round(compensator.signals.dp_code(Fraction(repr(test.dp_MPa))))
-    offset, at_end, full, transition = _corners(compensator, code, sign)
+    corners = _corners(compensator, code, sign)
     knees = {"opening": test.u_knee_rising_V, "closing": test.u_knee_falling_V}
     shares = {name: knee / float(compensator.u_max_V) for name, knee in knees.items() if knee is not None}
-    return {name: max(_residual(knee, offset, at_end, full, transition), 0.0) for name, knee in shares.items()}
+    found = {name: max(corners.command_at(knee), 0.0) for name, knee in shares.items()}
+    if "opening" in found:  # from rest the drive leaves the zero band at its outer end
+        found["opening"] = max(found["opening"], corners.leaves)
+    return found
 
 
-def _corners(compensator: Compensator, dp_code: int, sign: int) -> tuple[float, float, float, float]:
-    """Return the drive at zero command, at the transition's end and at full command, and the transition's share."""
-    command = compensator.signals.command
-    span, transition = command.span(sign), compensator.transition_codes
-    at = (command.zero_code + command.direction(sign) * from_zero for from_zero in (0, transition, span))
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Corners:
+    """The law at one pressure drop, two straight parts behind the zero band, all over full command and full drive."""
+
+    #: Drive in the zero band, at the transition's end and at full command.
+    offset: float
+    at_end: float
+    full: float
+    #: Command at the ends of zero band and transition, 0 without one; and beyond which the drive leaves its rest.
+    zero_band: float
+    end: float
+    leaves: float
+
+    def command_at(self, drive: float) -> float:
+        """Return the command at which the drive reaches a threshold."""
+        if drive <= self.at_end and self.end:
+            passed = (drive - self.offset) / (self.at_end - self.offset) if self.at_end > self.offset else 0.0
+            return self.zero_band + (self.end - self.zero_band) * passed
+        return self.end + (1 - self.end) * (drive - self.at_end) / (self.full - self.at_end)
+
+
+def _corners(compensator: Compensator, dp_code: int, sign: int) -> _Corners:
+    """Return the law's corners at a difference of pressure codes."""
+    command, end = compensator.signals.command, compensator.transition_end
+    span = command.span(sign)
+    at = (command.zero_code + command.direction(sign) * from_zero for from_zero in (0, end, span))
     offset, at_end, full = (float(compensator.drive(code, dp_code, sign)) for code in at)
-    return offset, at_end, full, transition / span
-
-
-def _residual(knee: float, offset: float, at_end: float, full: float, transition: float) -> float:
-    """Return the command at which the drive reaches a threshold: two straight parts, their corner at the transition."""
-    if knee <= at_end and transition:
-        return transition * (knee - offset) / (at_end - offset) if at_end > offset else 0.0
-    return transition + (1 - transition) * (knee - at_end) / (full - at_end)
+    leaves = compensator.drive_functions.leave_zero_codes / span if compensator.zero_band_codes else 0.0
+    zero_band = compensator.zero_band_codes / span
+    return _Corners(offset=offset, at_end=at_end, full=full, zero_band=zero_band, end=end / span, leaves=leaves)
 
 
 def _cost_of_side(compensator: Compensator, side: SideModel, sign: int) -> list[str]:
@@ -142,20 +162,47 @@ def _cost_of_options(compensator: Compensator) -> list[str]:
             f"dither of {frequency:.4g} Hz (half a wave is a whole number of PWM periods) and ±{peak:.2%} of full "
             "drive: the offset stands lower by that much, so that zero command stays shut at the wave's top"
         )
-    if compensator.transition_codes:
-        lines.append(f"the transition is a power of two in codes of command: {compensator.transition_codes}")
+    lines += _cost_of_zero_band(compensator)
     if functions.has_ramp:
         lines.append(
             f"ramps: {_ramp_text(compensator)}; they hold for zero command too: the valve closes no faster than they "
             "let it"
         )
-    if functions.window_codes:
-        share = functions.window_codes / signals.command.span(1)
+    if compensator.negative is not None:
+        share = functions.leave_zero_codes / signals.command.span(1)
         lines.append(
             f"coming from the other sign a command must pass zero by {share:.2%} before its solenoid is driven: that "
             "much dead zone remains then, if the lines above say less"
         )
     return lines
+
+
+def _cost_of_zero_band(compensator: Compensator) -> list[str]:
+    """Say which commands count as zero, or what a wrong zero does where none but zero itself does."""
+    span, error = compensator.signals.command.span(1), compensator.command_error
+    declared = f"{error.offset_codes} + {error.noise_codes} codes of declared error"
+    if not compensator.transition_codes:
+        return [
+            f"no transition, so no zero band: a zero command that reads {error.zero_band_codes} codes too high "
+            f"({declared}) lifts the drive by {_lift_V(compensator):.3f} V, which the certificate does not count"
+        ]
+    leave = compensator.drive_functions.leave_zero_codes
+    return [
+        f"commands up to {compensator.zero_band_codes} codes ({compensator.zero_band_codes / span:.2%}) count as zero, "
+        f"{declared}; from rest the drive leaves at more than {leave} codes ({leave / span:.2%})",
+        f"the transition behind them is a power of two in codes of command: {compensator.transition_codes} "
+        f"({compensator.transition_codes / span:.2%})",
+    ]
+
+
+def _lift_V(compensator: Compensator) -> float:
+    """Return by how much the declared error of a zero command lifts the drive at dP0, V."""
+    command = compensator.signals.command
+    reference = compensator.valve.positive.reference.dp_MPa or 0.0
+    dp_code = round(compensator.signals.dp_code(Fraction(repr(reference))))
+    at = (0, min(compensator.command_error.zero_band_codes, command.span(1)))
+    low, high = (compensator.drive(command.zero_code + command.direction(1) * each, dp_code) for each in at)
+    return float((high - low) * compensator.u_max_V)
 
 
 def _of_which_dither(compensator: Compensator) -> str:

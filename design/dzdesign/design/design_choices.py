@@ -27,10 +27,17 @@ class DesignChoices:
     """Law; `dzdesign derive` states what each one does."""
     guard: Annotated[Text, Option("G", LAW, "closing", choices="dzdesign.design.options:GUARDS")] = None
     """Threshold to protect: closing, mean or opening."""
-    transition: Annotated[Text, Option("C", LAW, "0 %", example="1 %")] = None
-    """First share of the command, over which the drive runs from the closing threshold to the opening one."""
+    transition: Annotated[Text, Option("C", LAW, "auto", example="1 %")] = None
+    """Share of the command behind the zero band over which the drive runs from the closing threshold to the opening
+    one; auto: 1 %, or 16 codes where those are more; off: the closing threshold's offset alone, and no zero band."""
+    command_error: Annotated[Text, Option("E", CONNECTIONS, example="15 + 4 codes")] = None
+    """Error of the code at zero command: offset and peak noise, such as "15 + 4 codes" or "0.4 % + 0.1 %". So many
+    codes count as zero, the zero band (default: the target's converter)."""
     below_dp0: Annotated[Text, Option("B", LAW, "hold", choices=BELOW_DP0)] = None
     """Below dP0: hold beta = 1 as the paper does, or extend it to the tests there."""
+    reading_flow: Annotated[Text, Option("Q", LAW, example="0.6 L/min")] = None
+    """Flow at which dead zones are read beside the onset (default: the meter's floor, or the noise level of a meter
+    without one)."""
     output_max: Annotated[Text, Option("C", LAW, "100 %", example="95 %")] = None
     """Largest drive, in percent of full drive."""
     accept: Annotated[Text, Option("CODE", LAW, choices="dzdesign.design.options:ACCEPTABLE")] = None
@@ -50,8 +57,6 @@ class DesignChoices:
     """Sensor behind the metering edge (default: the whole range of the converter)."""
     negative_dp: Annotated[Text, Option("D", CONNECTIONS, "same", choices=NEGATIVE_DP)] = None
     """Pressure drop of negative commands: same, or swapped, which is B less A."""
-    zero_window: Annotated[Text, Option("C", DRIVE, "1 %", example="1 %")] = None
-    """Command of both signs: share by which it must pass zero before the other solenoid is driven."""
     ramp_up: Annotated[Text, Option("T", DRIVE, "0 s", example="0.5 s")] = None
     """Time from zero to full command, such as "0.5 s", or "0.5 s / 0.8 s" for positive and negative commands."""
     ramp_down: Annotated[Text, Option("T", DRIVE, "0 s", example="0.5 s")] = None

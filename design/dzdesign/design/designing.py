@@ -11,13 +11,15 @@ from dzdesign.derivation.laws import LAW_NAMES
 from dzdesign.derivation.presentation.formulas import to_text
 from dzdesign.design.beta_table import STEP_CODES, OffsetCeiling, OffsetCurve, choose_beta_table, offset_ceiling
 from dzdesign.design.certificate import certify, guarded_curve, hold_below
-from dzdesign.design.compensator import Compensator, SideLaw, Sides
+from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import costs_of
 from dzdesign.design.options import DesignOptions
-from dzdesign.design.quantise import Units, finest_units
-from dzdesign.design.signals import Signals
+from dzdesign.design.quantise import Units, finest_units, fits
+from dzdesign.design.side_law import SideLaw, Sides
+from dzdesign.design.signals import SIDE_NAMES, Signals
 from dzdesign.identify.valve.guard_curve import GUARDS
 from dzdesign.identify.valve.model import ValveModel
+from dzdesign.identify.valve.reading_flow import default_reading_flow
 from dzdesign.identify.valve.side_model import SideModel
 
 #: Share of the sensor's span by which the difference may read negative before it counts as a failed sensor.
@@ -54,14 +56,14 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
             f"the command signal's upper end stands for {float(options.full_command_V or 0):g} V, but the valve was "
             f"identified with a full command of {valve.u_max_V:g} V; write the signal's range up to that"
         )
-    transition_codes = options.transition_codes()
+    transition_codes = _transition_codes(valve, options)
     units = finest_units(signals, transition_codes)
     if len(signals.signs) == 2:
         _refuse_two_signs(valve, options.guard)
     laws = {}
     for sign in signals.signs:
         side = valve.positive if sign > 0 else valve.sides["negative"]
-        laws[sign] = _side_law(side, options, u_max, sign, units)
+        laws[sign] = _side_law(side, options, u_max, sign, units, transition_codes)
     digest = sha256_of(to_json_bytes(valve) if valve_bytes is None else valve_bytes)
     request = options.request
     compensator = Compensator(
@@ -78,7 +80,10 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
         beta_step_codes=STEP_CODES,
         reverse_codes=int(REVERSE_SHARE * (signals.pressure_a.full_code - signals.pressure_a.zero_code)),
         transition_codes=transition_codes,
-        drive_functions=options.drive_functions(),
+        reading_flow_L_min=options.reading_flow_L_min or default_reading_flow(valve),
+        zero_band_codes=options.error.zero_band_codes if transition_codes else 0,
+        command_error=options.error,
+        drive_functions=options.drive_functions(transition_codes),
         costs=(),
         valve=valve,
     )
@@ -87,13 +92,26 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
     return replace(compensator, costs=costs_of(compensator))
 
 
-def _side_law(side: SideModel, options: DesignOptions, u_max: Fraction, sign: int, units: Units) -> SideLaw:
+def _transition_codes(valve: ValveModel, options: DesignOptions) -> int:
+    """Return the codes of the transition; where nothing is said, none for a valve whose opening was not recorded."""
+    sides = [valve.sides[SIDE_NAMES[sign]] for sign in options.signals.signs if SIDE_NAMES[sign] in valve.sides]
+    if options.transition is None and any(side.opening_curve is None for side in sides):
+        return 0
+    codes = options.transition_codes()
+    while options.transition is None and codes > options.error.least_transition and not fits(options.signals, codes):
+        codes //= 2
+    return codes
+
+
+def _side_law(
+    side: SideModel, options: DesignOptions, u_max: Fraction, sign: int, units: Units, transition_codes: int
+) -> SideLaw:
     """Choose the coefficients and tables of one side, and prove its certificate."""
     signals = options.signals
     if "branch-order" not in options.accept:
         _refuse_crossed_branches(side)
     certified = guarded_curve(side, options.guard, options.below_dp0)
-    opening = _opening_curve(side, options) if options.transition else None
+    opening = _opening_curve(side, options) if transition_codes else None
     reference = Fraction(repr(side.reference.dp_MPa))
     top = (opening or certified).at(reference)
     # Half a count less, because the compare value of the offset may be rounded up.
@@ -101,7 +119,7 @@ def _side_law(side: SideModel, options: DesignOptions, u_max: Fraction, sign: in
     if u_min0 <= 0:
         raise InputError(f"u_min0 is {float(top):.4f} V, less than one count of the PWM: no dead zone")
     above_one = side.trend == "increasing" or options.below_dp0 == "extend"
-    dither = options.drive_functions().dither_counts
+    dither = options.drive_functions(transition_codes).dither_counts
     ceiling = offset_ceiling(certified, signals, u_max, sign=sign, dither_counts=dither)
     if min(ceiling.limit) <= 0:
         raise InputError("the dither's peak leaves no offset under the certified one; make it smaller")
@@ -174,7 +192,7 @@ def _opening_curve(side: SideModel, options: DesignOptions) -> OffsetCurve:
     if opening is None:
         raise InputError(
             "a transition ends at the opening threshold, of which valve.json has no curve; record the rising branch "
-            "with a column of dP, make valve.json again, or leave out --transition"
+            "with a column of dP, make valve.json again, or give --transition off"
         )
     error = max(opening.u_se_V)
     offset = [Fraction(repr(value)) + OPENING_ERRORS * Fraction(repr(error)) for value in opening.u_V]
@@ -215,7 +233,8 @@ def over(value: Fraction, rounding: str, unit: int) -> Fraction:
 def prove_monotone(compensator: Compensator, sign: int) -> None:
     """Prove that more command gives more drive, at every pressure: the gain is affine in beta, so its ends decide.
 
-    Inside the transition the drive rises faster still: what the transition takes away falls with the command.
+    Inside the transition the drive rises faster still: the law is given a command that runs ahead there, and what the
+    transition takes away falls. In the zero band it stands still.
     """
     chosen, side = law(compensator.law), compensator.side(sign)
     numerators = side.law_beta

@@ -19,14 +19,15 @@ Step = Annotated[int, Meta(ge=0, le=2**30)]
 class DriveFunctions:
     """What the drive does around the law, as the integers that the firmware uses."""
 
-    window_codes: Annotated[
+    leave_zero_codes: Annotated[
         int,
         Meta(
-            description="Of a command of both signs: codes by which it must pass zero before the other solenoid is "
+            description="Codes of command beyond which the drive leaves its rest at zero command, where the law has a "
+            "zero band; and, of a command of both signs, by which it must pass zero before the other solenoid is "
             "driven. Until then the one that was driven stays at its offset: noise about zero does not throw the spool "
-            "from side to side.",
+            "from side to side. 0: none.",
             ge=0,
-            le=4095,
+            le=32767,
         ),
     ] = 0
     ramp_up: Annotated[
@@ -51,7 +52,7 @@ class DriveFunctions:
 
     def __post_init__(self) -> None:
         for name, value, limit in (
-            ("window_codes", self.window_codes, 4095),
+            ("leave_zero_codes", self.leave_zero_codes, 32767),
             ("dither_counts", self.dither_counts, 65535),
             ("compare_limit", self.compare_limit, 65535),
             *(("ramp_up", value, 2**30) for value in self.ramp_up),

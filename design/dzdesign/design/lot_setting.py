@@ -19,12 +19,14 @@ import numpy as np
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.beta_table import OffsetCeiling, OffsetCurve, choose_beta_table, offset_ceiling, pressures_MPa
 from dzdesign.design.certificate import certify, guarded_curve, prove_certificates
-from dzdesign.design.compensator import Certificate, Compensator, SideLaw, Sides
+from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import costs_of
-from dzdesign.design.designing import over, prove_monotone, travel
+from dzdesign.design.designing import design, over, prove_monotone, travel
 from dzdesign.design.lot import LotMargin, prove_lot
 from dzdesign.design.lot_valves import LotValve
+from dzdesign.design.option_texts import options_of
 from dzdesign.design.quantise import finest_units
+from dzdesign.design.side_law import Certificate, SideLaw, Sides
 from dzdesign.design.signals import SIDE_NAMES, Signals
 from dzdesign.identify.valve.certified_bound import NEAR_MPa
 from dzdesign.identify.valve.side_model import SideModel
@@ -32,7 +34,7 @@ from dzdesign.identify.valve.side_model import SideModel
 #: Of u_max: a ceiling that is nowhere this near to the least one can't be the least by a rounding error (1e-12).
 CLEAR = 1e-6
 #: What all compensators of a batch must have in common.
-SHARED = ("law", "below_dp0", "signals", "u_max_V", "beta_denominator", "transition_codes", "drive_functions")
+SHARED = ("law", "below_dp0", "signals", "u_max_V", "beta_denominator", "transition_codes", "command_error", "drive_functions")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,10 +75,11 @@ class _Side:
 def lot_setting(batch: Mapping[str, Compensator]) -> LotSetting:
     """Return the largest setting, under one direction of the threshold, that is certified for every valve.
 
-    The batch gives each valve's own compensator by its name. Refused are valves designed with other options, without a
-    common pressure drop, or with a transition, whose end is no bound.
+    The batch gives each valve's own compensator by its name. Refused are valves designed with other options, or without
+    a common pressure drop. The setting has no transition: it would end at one valve's opening threshold, which is
+    another's flow, so a transition that was asked for is refused, and the default's is left out.
     """
-    first = _shared_design(batch)
+    first = _without_transition(_shared_design(batch))
     sides = [_side(batch, first, sign) for sign in first.signals.signs]
     best: tuple[float, str, dict[int, SideLaw]] | None = None
     for carrier in _carriers(batch, sides):
@@ -91,7 +94,7 @@ def lot_setting(batch: Mapping[str, Compensator]) -> LotSetting:
         raise InputError("no law of one direction lies under the least guarded offset of all valves")
     _, carrier, laws = best
     compensator = replace(
-        batch[carrier],
+        _without_transition(batch[carrier]),
         sides=Sides(positive=laws[1], negative=laws.get(-1)),
         costs=(),
         lot=_lot(batch, first, sides),
@@ -140,9 +143,22 @@ def _shared_design(batch: Mapping[str, Compensator]) -> Compensator:
             unlike.append("guard")
         if unlike:
             raise InputError(f"{other} and {name} are designed with another {unlike[0]}, so no setting serves both")
-    if first.transition_codes:
-        raise InputError("with --transition the law follows each valve's opening threshold, so no setting serves all")
+    asked = (first.options or {}).get("transition", "auto")
+    if first.transition_codes and asked != "auto":
+        raise InputError(
+            f"with --transition '{asked}' the law follows each valve's opening threshold, so no setting serves all"
+        )
     return first
+
+
+def _without_transition(own: Compensator) -> Compensator:
+    """Return a valve's compensator as it is with ``--transition off``, and with the other options that it has."""
+    if not own.transition_codes:
+        return own
+    if own.target is None or own.options is None:
+        raise InputError("a valve's compensator does not say what it was designed with; make it again")
+    off = options_of({**own.options, "transition": "off"}, own.target)
+    return replace(design(own.valve, off), made_from=own.made_from)
 
 
 def _common_interval(sides: Iterable[Mapping[str, OffsetCurve]]) -> tuple[float, float]:

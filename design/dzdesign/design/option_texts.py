@@ -13,7 +13,10 @@ from dzdesign.design.options import DesignOptions
 from dzdesign.design.signal_text import command_signal, full_command_V, parse_signal, pressure_signal
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import TargetInputs
+from dzdesign.identify.constants import L_MIN
+from dzdesign.design.zero_band import command_error_of
 from dzdesign.identify.valve.guard_curve import Guard
+from dzdesign.identify.valve.model import DECIMALS
 
 
 def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
@@ -52,22 +55,34 @@ def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
         ),
         guard=cast(Guard, text["guard"]),
         below_dp0=cast(BelowDp0, text["below_dp0"]),
-        transition=_share(text["transition"], "--transition"),
-        window=_share(text["zero_window"], "--zero-window"),
+        transition=_transition(text["transition"]),
+        command_error=command_error_of(text["command_error"], converter, command),
         ramp_up_s=_seconds(text["ramp_up"], "--ramp-up"),
         ramp_down_s=_seconds(text["ramp_down"], "--ramp-down"),
         dither_Hz=dither_Hz,
         dither_peak=dither_peak,
         output_max=_share(text["output_max"], "--output-max"),
+        reading_flow_L_min=_flow_L_min(text["reading_flow"], "--reading-flow") if text["reading_flow"] else None,
         full_command_V=full_command_V(signal),
         accept=tuple(text["accept"].replace(",", " ").split()),
         request=DesignRequest(target=target, options=text),
     )
 
 
+def _transition(text: str) -> Fraction | None:
+    """Read ``auto`` (None), ``off`` (0) or a share."""
+    if text == "auto":
+        return None
+    return Fraction(0) if text == "off" else _share(text, "--transition")
+
+
 def _share(text: str, option: str) -> Fraction:
     value = parse_quantity(text, "ratio", option)
     return Fraction(round(value * 10**9), 10**9)
+
+
+def _flow_L_min(text: str, option: str) -> float:
+    return round(parse_quantity(text, "flow", option) / L_MIN, DECIMALS)
 
 
 def _seconds(text: str, option: str) -> tuple[float, float]:

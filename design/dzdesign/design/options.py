@@ -8,15 +8,19 @@ from dzdesign.core.errors import InputError, nearest
 from dzdesign.design.design_choices import BELOW_DP0, BelowDp0, DesignRequest
 from dzdesign.design.drive_functions import RAMP_UNIT, DriveFunctions
 from dzdesign.design.signals import Signals
+from dzdesign.design.target_inputs import Converter
+from dzdesign.design.zero_band import LEAST_TRANSITION, LEAST_TRANSITION_NOISE, CommandError, command_error_of
 from dzdesign.identify.valve.guard_curve import GUARDS, Guard
 
-#: Largest transition, dither and window, of full command or drive.
+#: The transition where nothing is said; largest transition and dither, of full command or drive.
+TRANSITION = Fraction(1, 100)
 LARGEST_TRANSITION = Fraction(1, 10)
 LARGEST_DITHER = Fraction(1, 10)
-LARGEST_WINDOW = Fraction(1, 10)
 #: Frequencies that a proportional valve's dither has, Hz.
 DITHER_HZ = (100.0, 300.0)
 LONGEST_RAMP_S = 600.0
+#: Beyond any flow that a valve of a control passes.
+MOST_L_MIN = 1e6
 #: Warnings of `identify` for which a valve is refused unless they are accepted.
 ACCEPTABLE = ("branch-order",)
 
@@ -36,16 +40,20 @@ class DesignOptions:
         falling branch was recorded is refused unless "opening" is asked for.
     below_dp0 : {"hold", "extend"}
         For dP <= dP0 hold beta = 1 (the paper, Eq. 7), or follow the tests there, beta above 1.
-    transition : Fraction
-        Share of full command over which the drive runs from the closing to the opening threshold; 0: none.
-    window : Fraction
-        Of a command of both signs: share of full command that it must pass zero by before the other side is driven.
+    transition : Fraction or None
+        Share of full command over which, behind the zero band, the drive runs from the closing to the opening
+        threshold; 0: none, and no zero band either; None: `TRANSITION`, or as many codes as the noise wants.
+    command_error : CommandError or None
+        Error of the command's code at zero, which the zero band is for; None: that of the F28335's converter.
     ramp_up_s, ramp_down_s : tuple of float
         Time of the command from zero to full, and back, s: positive, then negative command. 0: no limit.
     dither_Hz, dither_peak : float, Fraction
         Frequency of the dither, a square wave, and its peak (half its height) over full drive; 0: none.
     output_max : Fraction
         Largest drive over full drive.
+    reading_flow_L_min : float or None
+        Flow at which dead zones are read beside the onset; None takes the meter's floor, or the noise level of a meter
+        without one.
     full_command_V : Fraction or None
         Full command that the signal states, V.
     accept : tuple of str
@@ -58,13 +66,14 @@ class DesignOptions:
     signals: Signals = field(default_factory=Signals)
     guard: Guard = "closing"
     below_dp0: BelowDp0 = "hold"
-    transition: Fraction = Fraction(0)
-    window: Fraction = Fraction(1, 100)
+    transition: Fraction | None = None
+    command_error: CommandError | None = None
     ramp_up_s: tuple[float, float] = (0.0, 0.0)
     ramp_down_s: tuple[float, float] = (0.0, 0.0)
     dither_Hz: float = 0.0
     dither_peak: Fraction = Fraction(0)
     output_max: Fraction = Fraction(1)
+    reading_flow_L_min: float | None = None
     full_command_V: Fraction | None = None
     accept: tuple[str, ...] = ()
     request: DesignRequest | None = None
@@ -85,14 +94,17 @@ class DesignOptions:
                     f"{' or '.join(ACCEPTABLE)}: no other one stops a design"
                 )
         for what, share, limit in (
-            ("transition", self.transition, LARGEST_TRANSITION),
+            ("transition", self.transition or Fraction(0), LARGEST_TRANSITION),
             ("dither", self.dither_peak, LARGEST_DITHER),
-            ("zero window", self.window, LARGEST_WINDOW),
         ):
             if not 0 <= share <= limit:
                 raise InputError(f"the {what} is {float(share):.3%}, expected 0 to {float(limit):.0%}")
         if not 0 < self.output_max <= 1:
             raise InputError(f"the largest output is {float(self.output_max):.3%}, expected more than 0, up to 100 %")
+        if self.reading_flow_L_min is not None and not 0 < self.reading_flow_L_min <= MOST_L_MIN:
+            raise InputError(
+                f"the reading flow is {self.reading_flow_L_min:g} L/min, expected more than zero, such as '0.6 L/min'"
+            )
         if bool(self.dither_Hz) != bool(self.dither_peak):
             raise InputError("a dither needs both, a frequency and a peak, such as '150 Hz 1 %'")
         if self.dither_Hz and not DITHER_HZ[0] <= self.dither_Hz <= DITHER_HZ[1]:
@@ -107,25 +119,45 @@ class DesignOptions:
                 )
 
     def transition_codes(self) -> int:
-        """Return the codes of the transition: the largest power of two within its share of the shorter command."""
-        if not self.transition:
+        """Return the codes of the transition: the largest power of two within its share of the shorter command.
+
+        A narrower one than the command's noise allows is refused; where nothing is said the least that it allows.
+        """
+        if self.transition == 0:
             return 0
         span = min(self.signals.command.span(sign) for sign in self.signals.signs)
-        codes = int(self.transition * span)
-        if codes < 1:
+        least = self.error.least_transition
+        codes = int((TRANSITION if self.transition is None else self.transition) * span)
+        if self.transition is None:
+            codes = max(codes, 1 << (least - 1).bit_length())
+        codes = 1 << (codes.bit_length() - 1) if codes else 0
+        if codes < least:
+            needed = Fraction(1 << (least - 1).bit_length(), span)
             raise InputError(
-                f"a transition of {float(self.transition):.3%} is less than one code of the command, 1/{span}; "
-                "give more"
+                f"a transition of {float(self.transition or 0):.3%} is {codes} codes of the command, a power of two, "
+                f"expected {LEAST_TRANSITION} or more and {LEAST_TRANSITION_NOISE} times the noise's peak of "
+                f"{self.error.noise_codes}; give --transition {float(needed) + 5e-6:.3%} or more, or off"
             )
-        return 1 << (codes.bit_length() - 1)
+        if (taken := codes + self.error.zero_band_codes) > span // 10:
+            raise InputError(
+                f"a zero band of {self.error.zero_band_codes} codes and a transition of {codes} take {taken} of the "
+                f"command's {span} codes, expected a tenth at most; give a --command-signal over more of the "
+                "converter, a smaller --command-error, or --transition off"
+            )
+        return codes
 
-    def drive_functions(self) -> DriveFunctions:
+    @property
+    def error(self) -> CommandError:
+        """The command's error: what was declared, or that of the F28335's converter."""
+        return self.command_error or command_error_of("", Converter(), self.signals.command)
+
+    def drive_functions(self, transition_codes: int) -> DriveFunctions:
         """Return what the drive does around the law, in the firmware's integers."""
         signals, command = self.signals, self.signals.command
         spans = tuple(command.span(sign) if sign in signals.signs else 0 for sign in (1, -1))
         both = len(signals.signs) == 2
         return DriveFunctions(
-            window_codes=round(self.window * min(spans)) if both else 0,
+            leave_zero_codes=self.error.leave_zero_codes if both or transition_codes else 0,
             ramp_up=self._ramp(self.ramp_up_s, spans),
             ramp_down=self._ramp(self.ramp_down_s, spans),
             dither_counts=self._dither_counts(),

@@ -46,8 +46,13 @@ def finest_units(signals: Signals, transition_codes: int) -> Units:
         )
     raise InputError(
         f"{what} needs more than 64-bit arithmetic; choose an attenuator whose full command has more factors in common "
-        "with the counts" + (", or leave out the transition" if transition_codes else "")
+        "with the counts" + (", or give --transition off" if transition_codes else "")
     )
+
+
+def fits(signals: Signals, transition_codes: int) -> bool:
+    """Tell whether the law with such a transition fits the firmware's arithmetic."""
+    return _finest_that_fit(signals, transition_codes) is not None
 
 
 def _finest_that_fit(signals: Signals, transition_codes: int) -> Units | None:

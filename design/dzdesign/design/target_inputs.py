@@ -10,6 +10,7 @@ from msgspec import Meta
 from dzdesign.core.artefact_types import RuleError, quantity
 
 Count = Annotated[int, Meta(ge=1, le=65535)]
+Error = Annotated[int, Meta(ge=0, le=4095)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,6 +21,10 @@ class Converter:
         default_factory=lambda: Fraction(3)
     )
     levels: Annotated[int, Meta(description="Number of codes.", ge=2, le=65536)] = 4096
+    # Without a declaration: the F28335's, by its data sheet (SPRS439) the worst of the targets'.
+    offset_codes: Annotated[Error, Meta(description="Largest offset error, codes.")] = 15
+    gain_codes: Annotated[Error, Meta(description="Largest gain error at the top of the range, codes.")] = 30
+    noise_codes: Annotated[Error, Meta(description="Peak of the noise on a reading, codes.")] = 4
 
     def __post_init__(self) -> None:
         if self.full_V <= 0:

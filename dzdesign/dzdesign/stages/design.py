@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 #: Where the names of the targets stand.
 TARGETS = "dzdesign.codegen.project:TARGET_NAMES"
 #: Options that only a command of both signs has a use for.
-OF_BOTH_SIGNS = ("negative_dp", "zero_window")
+OF_BOTH_SIGNS = ("negative_dp",)
 
 
 @dataclass(frozen=True)

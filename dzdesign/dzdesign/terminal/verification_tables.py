@@ -11,7 +11,8 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from dzdesign.identify.valve.model import ValveModel
-    from dzdesign.verify.evidence import MonteCarlo, MutationScore, PressureResult, Scatter, ScenarioResult, Spread
+    from dzdesign.verify.evidence import MutationScore
+    from dzdesign.verify.loop_results import MonteCarlo, PressureResult, Scatter, ScenarioResult, Spread
     from dzdesign.verify.verification import Verification
 
 
@@ -47,13 +48,31 @@ def _put_closed_loop(console: "Console", verification: "Verification") -> None:
         "without: closing": lambda loop: _percent(loop.dead_zone_closing),
         "with: opening": lambda loop: _percent(loop.residual_opening),
         "with: closing": lambda loop: _percent(loop.residual_closing),
-        "Q at zero, no beta": lambda loop: f"{loop.q_zero_without_beta_L_min:.2f}",
-        "Q at zero, beta": lambda loop: f"{loop.q_zero_L_min:.2f}",
+        "Q at zero, no beta": lambda loop: loop.in_words(loop.q_zero_without_beta_L_min),
+        "Q at zero, beta": lambda loop: loop.in_words(loop.q_zero_L_min),
         "Q max without": lambda loop: f"{loop.q_max_direct_L_min:.1f}",
         "Q max with (L/min)": lambda loop: f"{loop.q_max_L_min:.1f}",
     }
     title = f"Closed loop (plant: {plant}); dead zones in per cent of full command, onset of flow"
     put_rows(console, title, [loop.result for loop in verification.loops], columns)
+    _put_readings(console, verification, {"dP (MPa)": columns["dP (MPa)"]})
+
+
+def _put_readings(
+    console: "Console", verification: "Verification", where: "Mapping[str, Callable[[PressureResult], str]]"
+) -> None:
+    """Print the dead zones read at the reading flow, as a bench reads them, beside an ideal line's."""
+    results = [loop.result for loop in verification.loops]
+    columns: dict[str, Callable[[PressureResult], str]] = {
+        **where,
+        "without: opening": lambda loop: _percent(loop.reading_opening_without),
+        "without: closing": lambda loop: _percent(loop.reading_closing_without),
+        "with: opening": lambda loop: _percent(loop.reading_opening),
+        "with: closing": lambda loop: _percent(loop.reading_closing),
+        "ideal line": lambda loop: _percent(loop.ideal_line),
+    }
+    title = f"Dead zones read at {results[0].reading_flow_L_min:.2f} L/min; an ideal line rises straight from zero"
+    put_rows(console, title, results, columns)
 
 
 def print_scenarios(scenarios: "Sequence[ScenarioResult]", console: "Console") -> None:
@@ -67,8 +86,8 @@ def print_scenarios(scenarios: "Sequence[ScenarioResult]", console: "Console") -
     columns: dict[str, Callable[[ScenarioResult], str]] = {
         "scenario": lambda each: each.name + ("" if each.must_shut else " (no core can know)"),
         "dP (MPa)": lambda each: f"{each.dp_MPa:.2f}",
-        "Q at zero, at the end (L/min)": lambda each: f"{each.q_zero_L_min:.2f}",
-        "on the way, at most (L/min)": lambda each: f"{each.q_peak_at_zero_L_min:.2f}",
+        "Q at zero, at the end (L/min)": lambda each: each.in_words(each.q_zero_L_min),
+        "on the way, at most (L/min)": lambda each: each.in_words(each.q_peak_at_zero_L_min),
     }
     if shown:
         put_rows(console, "Scenarios with the compensator, worst of all pressure drops", shown, columns)
@@ -134,11 +153,12 @@ def print_demo(valve: "ValveModel", verification: "Verification", folder: str) -
         "dead zone without": lambda loop: _percent(loop.dead_zone_opening),
         "with: opening": lambda loop: _percent(loop.residual_opening),
         "with: closing": lambda loop: _percent(loop.residual_closing),
-        "Q at zero without beta": lambda loop: f"{loop.q_zero_without_beta_L_min:.2f}",
-        "with beta (L/min)": lambda loop: f"{loop.q_zero_L_min:.2f}",
+        "Q at zero without beta": lambda loop: loop.in_words(loop.q_zero_without_beta_L_min),
+        "with beta (L/min)": lambda loop: loop.in_words(loop.q_zero_L_min),
     }
     console, title = new_console(), "Simulated example valve, 0-10 V ramps in closed loop with the generated C"
     put_rows(console, title, [loop.result for loop in verification.loops], columns)
+    _put_readings(console, verification, {"dP (MPa)": columns["dP (MPa)"]})
     checked, wrong = (sum(getattr(each, name) for each in verification.evidence.inputs) for name in ("inputs", "wrong"))
     put_line(console, f"Inputs checked: {checked}, wrong: {wrong}")
     put_line(console, verification.verdict)

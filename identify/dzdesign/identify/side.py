@@ -13,6 +13,7 @@ from dzdesign.identify.fitting.constrained_fits import KneeFit, fit_knees
 from dzdesign.identify.fitting.guarding import Guarding, Threshold, guard_thresholds
 from dzdesign.identify.fitting.identifying import identify_curve
 from dzdesign.identify.knees.between_ramps import FEW_DEGREES, BetweenRamps
+from dzdesign.identify.knees.curve_thinning import recorded_curve
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
 from dzdesign.identify.knees.prepared_tests import describe_tests
 from dzdesign.identify.options import IdentifyOptions
@@ -106,7 +107,7 @@ def _side_model(
     several = len(described) > 1
     k_mm = 1 / (options.x_max * 1e3) if options.x_max else None
     return SideModel(
-        tests=tuple(_test_result(group, knees, row, curves[guard]) for row in range(len(described))),
+        tests=tuple(_test_result(group, knees, row, curves[guard], options.u_max) for row in range(len(described))),
         reference=Reference(
             dp_MPa=None if dp0 is None else dp0 / MPA,
             u_min_V=joint.curves[guard].u_V[reference],
@@ -156,10 +157,11 @@ def _repeatability(found: BetweenRamps) -> Repeatability:
     )
 
 
-def _test_result(group: DescribedTests, knees: KneeFit, row: int, guarded: CertifiedCurve) -> TestResult:
+def _test_result(group: DescribedTests, knees: KneeFit, row: int, guarded: CertifiedCurve, u_max: float) -> TestResult:
     """Return one row of valve.json's tests."""
     item = group.tests[row]
     rising, falling = item.shapes
+    noise_level = max(shape.dead_zone.noise_level for shape in item.branches)
     return TestResult(
         source=item.test.source,
         dp_MPa=None if item.dp is None else item.dp / MPA,
@@ -174,11 +176,12 @@ def _test_result(group: DescribedTests, knees: KneeFit, row: int, guarded: Certi
         q_max_L_min=item.q_max / L_MIN,
         saturates=all(shape.saturates for shape in item.branches),
         leak_L_min=group.leak[row] / L_MIN,
-        noise_level_L_min=max(shape.dead_zone.noise_level for shape in item.branches) / L_MIN,
+        noise_level_L_min=noise_level / L_MIN,
         noise_L_min=max(shape.sigma for shape in item.branches) / L_MIN,
         noise_variance_inflation=max(shape.variance_inflation for shape in item.branches),
         spool_ripple_V=max(shape.ripple for shape in item.branches),
         outliers=sum(shape.outliers for shape in item.branches),
+        recorded=recorded_curve(item, group.leak[row], noise_level, u_max),
         ramps=item.ramps,
         left_out=item.left_out,
     )

@@ -1,6 +1,7 @@
 """The sides of a compensator by their names."""
 
-from dzdesign.design.compensator import Compensator, SideLaw
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.side_law import SideLaw
 
 SIGNS = {"positive": 1, "negative": -1}
 

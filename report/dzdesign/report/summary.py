@@ -13,7 +13,8 @@ from dzdesign.report.compensator_sides import laws_of
 from dzdesign.report.page import Figure, Headline, misfit
 from dzdesign.report.sections.cells import counted, whole
 from dzdesign.verify.contradictions import contradictions
-from dzdesign.verify.evidence import Evidence, InputCheck, PressureResult
+from dzdesign.verify.evidence import Evidence, InputCheck
+from dzdesign.verify.loop_results import PressureResult
 from dzdesign.verify.requirements import Check
 from dzdesign.verify.untried import not_tried
 
@@ -101,8 +102,18 @@ def _dead_zone(loops: Sequence[PressureResult], branch: str) -> Figure:
     return Figure(
         label=f"Dead zone on {branch}",
         value=f"{before:.1f} % → {after:.1f} %",
-        note=f"of command, without → with; {worst_of(loops)}"
-        + (f". With: {least:.1f} to {after:.1f} %" if len(loops) > 1 else ""),
+        note=f"of command at the onset of flow, without → with; {worst_of(loops)}"
+        + (f". With: {least:.1f} to {after:.1f} %" if len(loops) > 1 else "")
+        + _read(loops, branch),
+    )
+
+
+def _read(loops: Sequence[PressureResult], branch: str) -> str:
+    """Say what is read at the reading flow, where it is most, and what an ideal line would read there."""
+    worst = max(loops, key=lambda each: float(getattr(each, f"reading_{branch}")))
+    return (
+        f". Read at {worst.reading_flow_L_min:.2f} L/min: {100 * getattr(worst, f'reading_{branch}'):.1f} %, of which "
+        f"{100 * worst.ideal_line:.1f} % an ideal line's"
     )
 
 
@@ -117,12 +128,16 @@ def worst_of(loops: Sequence[PressureResult]) -> str:
 
 
 def _at_zero(loops: Sequence[PressureResult]) -> Figure:
-    flow = max(each.q_zero_L_min for each in loops)
-    bare = max(each.q_zero_without_beta_L_min for each in loops)
+    worst = max(loops, key=lambda each: (each.q_zero_L_min, each.unseen_below_L_min or 0.0))
+    bare = max(loops, key=lambda each: each.q_zero_without_beta_L_min)
+    flow, unseen = worst.q_zero_L_min, worst.unseen_below_L_min
+    hidden = "" if unseen is None else "; less than that the recordings don't show"
+    value = worst.in_words(flow) if unseen is not None else f"{flow:.3g}"
     return Figure(
         label="Flow at zero command",
-        value="none" if flow <= 1e-9 else f"{flow:.3g} L/min",
-        note=f"in the simulated loop, after closing, {worst_of(loops)}; without β it would be {bare:.2f} L/min",
+        value="none" if flow <= 1e-9 and unseen is None else f"{value} L/min",
+        note=f"in the simulated loop, after closing, {worst_of(loops)}{hidden}; without β it would be "
+        f"{bare.in_words(bare.q_zero_without_beta_L_min)} L/min",
         kind="text" if flow <= 1e-9 else "bad",
     )
 

@@ -12,9 +12,10 @@ import pytest
 from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
-from dzdesign.design.compensator import Compensator, Sides
+from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
+from dzdesign.design.side_law import Sides
 from dzdesign.design.signal_text import command_signal, parse_signal
 from dzdesign.design.target_inputs import Converter
 from dzdesign.identify.valve.model import ValveModel

@@ -11,21 +11,10 @@ from msgspec import Meta
 
 from dzdesign.core.artefact_types import Artefact, Sha256, quantity
 from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED
-from dzdesign.verify.closed_loop.plant import Plant
+from dzdesign.verify.loop_results import ClosedLoopResult, Count, MonteCarlo, ScenarioResult, Side, about
 from dzdesign.verify.requirements import ALWAYS, Check
 
-
-def about(description: str) -> Meta:
-    """Return what an annotation says of a field."""
-    return Meta(description=description)
-
-
 Sign = Literal[1, -1]
-Side = Annotated[Literal["positive", "negative"], about("Side of the valve.")]
-PressureDrop = Annotated[float, quantity("MPa", "Pressure drop at no flow.", ge=0, le=1000)]
-Count = Annotated[int, Meta(ge=0, le=2**60)]
-Share = Annotated[float, Meta(ge=-1, le=1, extra_json_schema={"unit": "1"})]
-Flow = Annotated[float, Meta(ge=-1e6, le=1e6, extra_json_schema={"unit": "L/min"})]
 Names = tuple[str, ...]
 #: Voltages are bounded so that no arithmetic on them overflows.
 MOST_V = 1e4
@@ -110,103 +99,6 @@ class InputCheck(InputCounts):
     def holds(self) -> bool:
         """True if nothing was found."""
         return self.faults + self.over_compensated == 0 and not (self.lot and self.lot.over_compensated)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PressureResult:
-    """One tested pressure drop; dead zones as shares of full command, read at 0.1 % of the largest flow."""
-
-    side: Side
-    dp_MPa: PressureDrop
-    dead_zone_opening: Annotated[Share, about("Dead zone on opening without compensator.")]
-    dead_zone_closing: Annotated[Share, about("The same on closing.")]
-    residual_opening: Annotated[Share, about("Dead zone on opening that the compensator leaves.")]
-    residual_closing: Annotated[Share, about("The same on closing.")]
-    q_zero_L_min: Annotated[Flow, about("Flow at zero command after closing, with compensator.")]
-    q_zero_without_beta_L_min: Annotated[Flow, about("The same with beta held at 1: what over-compensation would do.")]
-    q_max_direct_L_min: Annotated[Flow, about("Largest flow without compensator.")]
-    q_max_L_min: Annotated[Flow, about("Largest flow with it.")]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class IdentifiedPlant:
-    """A plant made from the identified thresholds of one side at one pressure drop."""
-
-    side: Side
-    dp_MPa: PressureDrop
-    parameters: Annotated[Plant, about("Its parameters.")]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ClosedLoopResult:
-    """Ramps in closed loop with the generated C."""
-
-    plant: Annotated[Plant | None, about("The plant that was given; null where plants were made from the thresholds.")]
-    plant_source: Annotated[str, about("Where the plant came from.")]
-    plant_sha256: Annotated[
-        Sha256 | None, about("Hash of the plant's file; null of one made from the identified thresholds.")
-    ]
-    plants: Annotated[
-        tuple[IdentifiedPlant, ...],
-        about("Plants made from the identified thresholds, one entry a side and pressure drop."),
-    ]
-    pressures: Annotated[
-        tuple[PressureResult, ...], about("One entry a side and tested pressure drop; none if it did not run.")
-    ]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ScenarioResult:
-    """One scenario beside the ramps, at one pressure drop."""
-
-    name: Annotated[str, about("What happens.")]
-    side: Side
-    dp_MPa: PressureDrop
-    q_zero_L_min: Annotated[Flow, about("Flow at zero command at the end.")]
-    q_peak_at_zero_L_min: Annotated[
-        Flow, about("Largest flow while the command was zero and the valve had closed before.")
-    ]
-    must_shut: Annotated[
-        bool, about("Whether flow at the end is a failure: not where no compensator could know better.")
-    ]
-    figures: Annotated[Mapping[str, float], about("What else was measured; the unit is the end of the name.")]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Spread:
-    """Quantiles of one quantity over a series of plants, and the plant at its bad end."""
-
-    p01: Annotated[float, about("1 % quantile.")]
-    p05: Annotated[float, about("5 % quantile.")]
-    p50: Annotated[float, about("Median.")]
-    p95: Annotated[float, about("95 % quantile.")]
-    p99: Annotated[float, about("99 % quantile.")]
-    worst: Annotated[float, about("Value of the plant at the bad end.")]
-    worst_plant: Annotated[Mapping[str, float], about("Those of its parameters that were drawn.")]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Scatter:
-    """What a series of plants does on one side at one pressure drop."""
-
-    side: Side
-    dp_MPa: PressureDrop
-    plants: Annotated[int, Meta(description="How many plants.", ge=1, le=10**6)]
-    leaking: Annotated[Count, about("How many pass flow at zero command after closing.")]
-    residual_opening: Annotated[Spread, about("Dead zone on opening, share of full command.")]
-    residual_closing: Annotated[Spread, about("Dead zone on closing, share of full command.")]
-    q_zero_L_min: Annotated[Spread, about("Flow at zero command, L/min.")]
-    q_max_L_min: Annotated[Spread, about("Largest flow, L/min.")]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MonteCarlo:
-    """A series of plants about the one that was given."""
-
-    plants: Annotated[int, Meta(description="How many.", ge=1, le=10**6)]
-    seed: Annotated[int, Meta(description="Of the draw.", ge=0, le=2**60)]
-    spreads: Annotated[Mapping[str, str], about("Parameter to its spread, in words.")]
-    pressures: Annotated[tuple[Scatter, ...], about("One entry a side and pressure drop.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

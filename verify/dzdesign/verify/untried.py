@@ -3,7 +3,16 @@
 from dataclasses import replace
 
 from dzdesign.verify.evidence import Evidence
-from dzdesign.verify.requirements import ALWAYS, BOARD_FILES, C2000WARE, NEED_A_PLANT, OPTIONAL, SERIES, Requirement
+from dzdesign.verify.requirements import (
+    ALWAYS,
+    BOARD_FILES,
+    C2000WARE,
+    LOAD_STEPS,
+    OPTIONAL,
+    OWN_PLANT,
+    SERIES,
+    Requirement,
+)
 
 #: Of a file of the user's: nothing that was generated is there to compare it with.
 REVIEW = "review it, and try it on the machine"
@@ -23,7 +32,9 @@ def untried_requirements(evidence: Evidence) -> tuple[Requirement, ...]:
         untried.append(replace(BOARD_FILES, how=evidence.board_not_compiled))
     untried += [each for each in ALWAYS if each.id not in tried]
     if evidence.closed_loop.plant is None:
-        untried += NEED_A_PLANT
+        untried.append(OWN_PLANT)
+    if not any(each.is_load_step for each in evidence.scenarios):
+        untried.append(LOAD_STEPS)
     if evidence.monte_carlo is None:
         untried.append(SERIES)
     optional = OPTIONAL + ((C2000WARE,) if evidence.target == "f28335" else ())

@@ -74,9 +74,10 @@ def verify(
 ) -> Verification:
     """Verify a firmware folder, made by `dzdesign codegen`.
 
-    Without a `plant` for the closed loop one is made from the identified thresholds; `plant_source` and `plant_sha256`
-    are name and hash of its file, for the evidence, and `tolerances` those of a series of plants about it. `sequence`
-    is the command over time, by default 0-10 V in 100 s and back. In `include` lie headers of the user's board files.
+    Without a `plant` the recorded characteristic stands in for the valve in the closed loop; `plant_source` and
+    `plant_sha256` are name and hash of its file, for the evidence, and `tolerances` those of a series of plants about
+    it. `sequence` is the command over time, by default 0-10 V in 100 s and back. In `include` lie headers of the user's
+    board files.
     `say` is told each stage before it begins; `watch` is handed the pieces of a long one and their number, and gives
     them back one by one, as they are done.
 

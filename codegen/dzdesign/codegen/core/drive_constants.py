@@ -6,6 +6,7 @@ from dzdesign.design.drive_functions import RAMP_UNIT
 
 HERE = "codegen/dzdesign/codegen/core/drive_constants.py"
 OPTIONS, SIGNALS = "design/dzdesign/design/options.py", "design/dzdesign/design/signals.py"
+ZERO_BAND = "design/dzdesign/design/zero_band.py"
 INT32_MAX = 2**31 - 1
 #: Bits of the status word, and what each says.
 STATUS_BITS = {
@@ -56,15 +57,17 @@ def drive_constants(compensator: Compensator) -> list[Define]:
     """Return what the drive functions need; nothing where all are off."""
     functions, bipolar = compensator.drive_functions, compensator.negative is not None
     found = []
-    if bipolar or functions.has_ramp:
+    if bipolar or functions.has_ramp or compensator.zero_band_codes:
         found.append(
             Define(symbol="COMMAND_ZERO", value=compensator.signals.command.zero_code, literal="int32",
                      equation="Eq. (29), code of zero command", engineering="0 V",
                      rounding="the converter's code, rounded down", data=("signals.command.zero_code",),
                      generator=SIGNALS)
         )  # fmt: skip
-    if bipolar:
-        found.append(_window(compensator))
+    if compensator.zero_band_codes:
+        found.append(_zero_band(compensator))
+    if bipolar or compensator.zero_band_codes:
+        found.append(_leave_zero(compensator))
     if functions.has_ramp:
         found += _ramps(compensator)
     if functions.dither_counts:
@@ -72,17 +75,35 @@ def drive_constants(compensator: Compensator) -> list[Define]:
     return found
 
 
-def _window(compensator: Compensator) -> Define:
-    codes, span = compensator.drive_functions.window_codes, compensator.signals.command.span(1)
+def _share(compensator: Compensator, codes: int) -> str:
+    share = codes / compensator.signals.command.span(1)
+    return f"{share:.2%} of command, {share * float(compensator.u_max_V):.4g} V"
+
+
+def _zero_band(compensator: Compensator) -> Define:
     return Define(
-        symbol="WINDOW_CODES",
+        symbol="ZERO_BAND",
+        value=compensator.zero_band_codes,
+        literal="int32",
+        equation="codes of command up to which the drive comes to rest, the law's zero band",
+        engineering=_share(compensator, compensator.zero_band_codes),
+        data=("zero_band_codes", "signals.command", "u_max_V"),
+        generator=ZERO_BAND,
+    )
+
+
+def _leave_zero(compensator: Compensator) -> Define:
+    codes = compensator.drive_functions.leave_zero_codes
+    what = ["leaves its rest"] * bool(compensator.zero_band_codes)
+    what += ["drives the other solenoid"] * (compensator.negative is not None)
+    return Define(
+        symbol="LEAVE_ZERO",
         value=codes,
         literal="int32",
-        equation="codes by which the command must pass zero before the other solenoid is driven",
-        engineering=f"{codes / span:.2%} of command, {codes / span * float(compensator.u_max_V):.4g} V",
-        rounding="rounded to nearest",
-        data=("drive_functions.window_codes", "signals.command", "u_max_V"),
-        generator=OPTIONS,
+        equation=f"codes by which the command must pass zero before the drive {' or '.join(what)}",
+        engineering=f"{_share(compensator, codes)}; a zero command with twice its noise stays within",
+        data=("drive_functions.leave_zero_codes", "signals.command", "u_max_V"),
+        generator=ZERO_BAND,
     )
 
 

@@ -139,6 +139,7 @@ def _law_words(compensator: Compensator) -> Values:
         "law_text": str(chosen.output).replace("**", "^"),
         "law_equation": equation_of(chosen),
         "transition_codes": compensator.transition_codes,
+        "zero_band_codes": compensator.zero_band_codes,
     }
 
 
@@ -147,6 +148,8 @@ def _drive_words(compensator: Compensator) -> Values:
     functions, signals = compensator.drive_functions, compensator.signals
     return {
         "bipolar": compensator.negative is not None,
+        "zero_band": compensator.zero_band_codes > 0,
+        "away": "command" if compensator.negative is None else "away",
         "ramp": functions.has_ramp,
         "dither": functions.dither_counts > 0,
         "rises": signals.command.direction(1) > 0,
@@ -162,7 +165,8 @@ def _signal_expressions(compensator: Compensator, sign: int) -> Values:
         "command_difference": "u - COMMAND_ZERO" if command.direction(sign) > 0 else "COMMAND_ZERO - u",
         "clip_low": towards[0] < 0,
         "clip_high": towards[1] > command.span(sign),
-        "unclipped": "towards" if towards[0] < 0 else "from_zero",
+        "unclipped": "towards" if towards[0] < 0 or compensator.transition_codes else "from_zero",
+        "clipped": "past" if compensator.transition_codes else "command",
         "pressure_turn": "b - a" if sign < 0 and signals.swapped else "a - b",
         "a_weight": 2**WEIGHT_SHIFT,
     }
@@ -180,7 +184,7 @@ def _arithmetic_expressions(of_law: LawConstants, suffix: str) -> Values:
         "straight_high": high,
         "straight_low": low,
         "straight_product": f"short_product{suffix}((uint16_t)command, COMMAND_HIGH_WORD)"
-        if high < 1 << 16
+        if high < 1 << 16 and not of_law.compensator.transition_codes
         else "COMMAND_HIGH_WORD * command",
         # Half of an odd divisor times a power of two: alone in the low word it is its top bit, and else nothing.
         "half_carries": form.half % 2**32,

@@ -1,11 +1,12 @@
 """The law of one side of a `Compensator` lowered to integers that the firmware can multiply, shift and compare, proved.
 
 With beta = B / (D S), k x_max/u_max and u_min0/u_max over 2^16 and x = c / C, c being the codes of command from zero
-on, the law (18) in counts, lowered inside the transition of E codes, is
+on, the law (18) in counts, lowered inside the transition of E codes behind a zero band of Z, is
 
-    compare = B_law (p c + o) + l c - (B_law - B) e max(E - c, 0),
+    compare = B_law (p X + o) + l X - (B_law - B) e (E - r),    r = min(max(c - Z, 0), E),
 
-p, o, l and e rational. Times the common denominator every term is an integer; cancelling powers of two leaves
+p, o, l and e rational. X is the command that the law is given, in codes over E: (Z + E) r within the transition and E c
+beyond it, together E max(c - Z, 0) + Z r; without a transition it is c. Times the common denominator every term is an integer; cancelling powers of two leaves
 ``total / (divisor 2^shift)`` with an integer `total` of 64 bits, so one shift and one division by a small constant give
 the exactly rounded law. The division is a multiplication by a reciprocal that is proved exact for every dividend that
 can occur; where the target has 32-bit arithmetic only, it is an estimate and a proved number of corrections.
@@ -44,8 +45,7 @@ class Estimate:
 class IntegerForm:
     """Constants of the core; see the module's text for the algebra.
 
-    ``total = B_law * (slope * c + offset) + (linear * c << linear_shift) + half
-    - (B_law - B) * transition * max(E - c, 0)``
+    ``total = B_law * (slope * X + offset) + (linear * X << linear_shift) + half - (B_law - B) * transition * (E - r)``
     with B_law and B the tables interpolated without rounding;
     ``compare = min(total >> shift, largest) / divisor``, so that no compare value exceeds the limit; the division is
     ``(quotient * reciprocal) >> reciprocal_shift`` or the `estimate`.
@@ -84,7 +84,7 @@ def integer_form(compensator: Compensator, sign: int = 1) -> IntegerForm:
     terms = _terms(compensator, sign)
     divisor, shift, common = _denominator(terms)
     slope, offset, linear, transition = (int(value * common) for value in terms)
-    span = c.signals.command.span(sign)
+    span = c.signals.command.span(sign) * (c.transition_codes or 1)
     scale_beta = _share((slope, offset, transition), (abs(slope) * span, abs(offset), transition * c.transition_codes))
     linear, linear_shift = _odd_part(linear)
     asked = _largest_quotient(compensator, sign, divisor)
@@ -139,6 +139,7 @@ def _terms(compensator: Compensator, sign: int) -> _Terms:
 
     without, whole = line(beta=0), line(beta=1)
     beta_unit = c.beta_denominator * c.beta_step_codes
+    per_code = c.transition_codes or 1
     per_transition_code = Fraction(0)
     if c.transition_codes:  # what one unit of the gap lowers at zero command, over the transition's codes
         lowered = evaluate_transition(
@@ -150,9 +151,9 @@ def _terms(compensator: Compensator, sign: int) -> _Terms:
         )
         per_transition_code = lowered / beta_unit / c.transition_codes
     return _Terms(
-        per_command=(whole.slope - without.slope) / beta_unit,
+        per_command=(whole.slope - without.slope) / beta_unit / per_code,
         constant=(whole.start - without.start) / beta_unit,
-        plain=without.slope,
+        plain=without.slope / per_code,
         per_transition_code=per_transition_code,
     )
 
@@ -189,8 +190,8 @@ def _largest_quotient(compensator: Compensator, sign: int, divisor: int) -> int:
     # Every node that a code reaches, and the fallback's smallest beta: along dP the law is straight between them.
     codes = [index * c.beta_step_codes for index in range(c.nodes(sign) - 1)]
     codes += [c.signals.largest_difference(sign), -c.reverse_codes - 1]
-    # Along the command it is straight but for the transition's end.
-    corners = {0, min(c.transition_codes, command.span(sign)), command.span(sign)}
+    # Along the command it is straight but for the ends of zero band and transition.
+    corners = {0, c.transition_end, command.span(sign)}
     commands = [command.zero_code + command.direction(sign) * corner for corner in corners]
     values = [c.drive(code, dp_code, sign) for dp_code in codes for code in commands]
     if min(values) < 0:
@@ -245,7 +246,7 @@ def _estimate(divisor: int, largest: int) -> Estimate:
 
 def _prove_widths(form: IntegerForm, compensator: Compensator, sign: int) -> None:
     """Prove that every intermediate value fits the type that the template gives it."""
-    span = compensator.signals.command.span(sign)
+    span = compensator.signals.command.span(sign) * (compensator.transition_codes or 1)
     step = compensator.beta_step_codes
     beta = max(form.table) * step
     gap = beta if form.zero_table else 0

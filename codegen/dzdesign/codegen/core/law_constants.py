@@ -87,7 +87,8 @@ class LawConstants:
     def _per_volt(self, count: int) -> float:
         """Return u_O/u_i of a coefficient of the command in the sum."""
         form, signals = self.form, self.compensator.signals
-        return count * signals.command.span(self.sign) / (form.divisor << form.shift) / signals.compare_max
+        codes = signals.command.span(self.sign) * (self.compensator.transition_codes or 1)
+        return count * codes / (form.divisor << form.shift) / signals.compare_max
 
     def _volts(self, count: int) -> float:
         """Return u_O in V of a term of the sum."""
@@ -102,6 +103,7 @@ class LawConstants:
         kappa, u_min0 = side.drive_range_over_u_max, side.u_min0_over_u_max
         kappa_key, u_min0_key = f"{self.key}.drive_range_over_u_max", f"{self.key}.u_min0_over_u_max"
         u_min0_text = f"u_min0/u_max = {u_min0}, {U_MIN0_ROUNDING}"
+        transition = ("transition_codes",) if c.transition_codes else ()
         found = []
         size = ", its size" if self.narrow and form.slope < 0 else ""
         if form.slope:
@@ -112,7 +114,7 @@ class LawConstants:
                     -form.slope if self.narrow and form.slope < 0 else form.slope,
                     f"{equation}, coefficient of beta * u_i in u_O{size}",
                     f"{factor} = {self._per_volt(form.slope * self.unit):.6f}",
-                    (kappa_key, *SCALED),
+                    (kappa_key, *transition, *SCALED),
                     rounding=f"exact from k x_max/u_max = {kappa}, {KAPPA_ROUNDING}",
                     literal="uint32" if self.narrow else "int32",
                 )
@@ -137,6 +139,7 @@ class LawConstants:
                     f"u_min0/{c.transition_codes} = {self._volts(form.transition * self.unit):.6g} V",
                     (u_min0_key, "transition_codes", "u_max_V", *SCALED),
                     rounding=f"exact from {u_min0_text}",
+                    literal="uint32" if self.narrow else "int32",
                 )
             )
         return found
@@ -155,7 +158,8 @@ class LawConstants:
         high, low = divmod(total, 1 << 32)
         if low == 0:
             return [self._constant("COMMAND_HIGH_WORD", high, f"{equation}, over 2^32", engineering, data,
-                                   literal="plain" if high < 1 << 16 and self.narrow else "uint32")]  # fmt: skip
+                                   literal="plain" if high < 1 << 16 and self.narrow and not c.transition_codes
+                                   else "uint32")]  # fmt: skip
         if not self.narrow:
             return [
                 self._constant("COMMAND_TERM", form.linear, f"{equation}, over 2^{form.linear_shift}", engineering,

@@ -127,13 +127,26 @@ class SignalConstants:
                      generator=HERE),
         ]  # fmt: skip
         if transition:
-            share = transition / c.signals.command.span(self.sign)
-            found.append(
-                Define(symbol="TRANSITION_CODES", value=transition,
-                     equation="codes of command that the transition takes, u_transition",
-                         engineering=f"{share:.2%} of command, {share * float(c.u_max_V):.4g} V",
-                         data=("transition_codes",),
-                         rounding="the power of two below what was asked for",
-                         generator="design/dzdesign/design/options.py")
-            )  # fmt: skip
+            found += self._zero_band()
         return found
+
+    def _zero_band(self) -> list[Define]:
+        c, where = self.compensator, "design/dzdesign/design/options.py"
+        span, error = c.signals.command.span(self.sign), c.command_error
+
+        def share(codes: int) -> str:
+            return f"{codes / span:.2%} of command, {codes / span * float(c.u_max_V):.4g} V"
+
+        return [
+            Define(symbol="ZERO_BAND", value=c.zero_band_codes, equation="codes of command that count as zero, u_z",
+                   engineering=f"{share(c.zero_band_codes)}; error of a zero command, {error.offset_codes} + "
+                   f"{error.noise_codes} codes", data=("zero_band_codes", "command_error"),
+                   generator="design/dzdesign/design/zero_band.py"),
+            Define(symbol="TRANSITION_CODES", value=c.transition_codes,
+                   equation="codes of command that the transition takes, u_t - u_z",
+                   engineering=share(c.transition_codes), data=("transition_codes",),
+                   rounding="a power of two", generator=where),
+            Define(symbol="TRANSITION_SHIFT", value=c.transition_codes.bit_length() - 1,
+                   equation="from codes to the unit of the law's command", engineering=f"1/{c.transition_codes} code",
+                   data=("transition_codes",), generator=HERE),
+        ]  # fmt: skip

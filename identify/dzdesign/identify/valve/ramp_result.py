@@ -9,6 +9,7 @@ from msgspec import Meta
 from dzdesign.core.artefact_types import RuleError, quantity
 from dzdesign.identify.valve.left_out import LeftOut
 from dzdesign.identify.valve.quantity_types import Flow, FlowGain, PressureDrop, Ratio, Voltage, VoltageError
+from dzdesign.identify.valve.recorded_curve import RecordedCurve
 
 #: Standard errors by which closing must lie above opening to be no noise; and V, for a simulation has next to none.
 ORDER_SIGNIFICANCE, ORDER_LEAST_V = 5.0, 1e-3
@@ -111,6 +112,7 @@ class TestResult:
         Meta(description="Standard deviation of the spool about its mean course, as a command: stick and slip."),
     ]
     outliers: Annotated[int, Meta(description="Samples of the straight part that were left out.", ge=0, le=10**12)]
+    recorded: Annotated[RecordedCurve, Meta(description="Flow over command as recorded, thinned to few points.")]
     ramps: Annotated[tuple[str, ...], Meta(description="The ramps that were pooled.", min_length=1)]
     left_out: Annotated[
         tuple[LeftOut, ...], Meta(description="What of the recordings was left out: in these ramps, and before them.")

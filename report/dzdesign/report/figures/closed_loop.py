@@ -19,7 +19,7 @@ from dzdesign.report.figures.figure import (
     titled_axes,
     to_report_figure,
 )
-from dzdesign.verify.evidence import PressureResult
+from dzdesign.verify.loop_results import PressureResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -14,16 +14,14 @@ from dzdesign.report.figures.zero_command import zero_figure
 from dzdesign.report.page import Section
 from dzdesign.report.sections.cells import Cell, Table, from_to, in_number_font, number, table_of, verdict, whole
 from dzdesign.verify.closed_loop.evidence_curves import closed_loop_name, input_map_name, read_curves, zero_command_name
-from dzdesign.verify.evidence import (
-    ClosedLoopResult,
-    Evidence,
-    InputCheck,
-    MonteCarlo,
-    PressureResult,
-    ScenarioResult,
-    Spread,
-)
+from dzdesign.verify.evidence import Evidence, InputCheck
+from dzdesign.verify.loop_results import ClosedLoopResult, MonteCarlo, PressureResult, ScenarioResult, Spread
 from dzdesign.verify.untried import untried_requirements
+
+#: Parameters of a plant that count where its edge does not.
+COIL_AND_SPOOL = (
+    "K_a", "K_fi_V_A", "R_c_ohm", "r_p_ohm", "L_c_H", "K_i_N_A", "m_e_kg", "B_e_N_s_m", "K_et_N_m",
+)  # fmt: skip
 
 
 def _curves(chain: Chain, name: str) -> Curves | None:
@@ -91,6 +89,7 @@ def loop_section(chain: Chain) -> Section:
         figures=figures,
         tables=(
             loops_table(loop.pressures),
+            readings_table(loop.pressures),
             scenarios_table(evidence.scenarios),
             series_table(evidence.monte_carlo),
             plant_table(loop),
@@ -107,21 +106,22 @@ def _plant_line(loop: ClosedLoopResult) -> str:
         return f"{line}, SHA-256 {loop.plant_sha256}."
     if loop.plant:
         return f"{line}."
-    return f"{line}, one for each pressure drop: this checks the design and the C, not the identification."
+    return (
+        f"{line}: between two tests its thresholds run straight over the pressure drop, and below the noise level, "
+        "where the recordings show no flow, nothing is known of it. What it does in time is the default plant's."
+    )
 
 
 def plant_table(loop: ClosedLoopResult) -> Table | None:
-    """Return the parameters of the closed loop's plant; from where to where, of one for each pressure drop."""
-    plants = [asdict(loop.plant)] if loop.plant else [asdict(each.parameters) for each in loop.plants]
-    if not plants:
+    """Return the parameters of the closed loop's plant; of one that moves the recorded flow those of coil and spool."""
+    plant = loop.plant or loop.dynamics
+    if plant is None:
         return None
-    cells = [
-        (Cell(text=name, kind="symbol"), in_number_font(from_to([plant[name] for plant in plants], ".6g")))
-        for name in plants[0]
-    ]
+    names = asdict(plant) if loop.plant else COIL_AND_SPOOL
+    cells = [(Cell(text=name, kind="symbol"), in_number_font(f"{getattr(plant, name):.6g}")) for name in names]
     half = -(-len(cells) // 2)  # in two columns, or they would take a page of paper
     right = [*cells[half:], (Cell(text=""), Cell(text=""))]
-    of = "" if len(plants) == 1 else f", from the least to the largest of {len(plants)} pressure drops"
+    of = "" if loop.plant else ": its coil and spool; the flow is the recorded one"
     return Table(
         caption=f"The plant's parameters; the unit is in the name{of}",
         columns=("parameter", "value", "parameter", "value"),
@@ -129,10 +129,26 @@ def plant_table(loop: ClosedLoopResult) -> Table | None:
     )
 
 
+def readings_table(pressures: Sequence[PressureResult]) -> Table:
+    """Return the dead zones read at the reading flow, beside what an ideal line would read there."""
+    flows = from_to([each.reading_flow_L_min for each in pressures], ".2f")
+    return table_of(
+        f"Dead zones read at {flows} L/min, in per cent of command; an ideal line rises straight from zero command",
+        pressures,
+        ("side", lambda one: one.side),
+        ("dP (MPa)", lambda one: number(one.dp_MPa, 2)),
+        ("opening without (%)", lambda one: number(100 * one.reading_opening_without, 1)),
+        ("opening with (%)", lambda one: number(100 * one.reading_opening, 1)),
+        ("closing without (%)", lambda one: number(100 * one.reading_closing_without, 1)),
+        ("closing with (%)", lambda one: number(100 * one.reading_closing, 1)),
+        ("ideal line (%)", lambda one: number(100 * one.ideal_line, 1)),
+    )
+
+
 def loops_table(pressures: Sequence[PressureResult]) -> Table:
     """Return dead zones and flows of the closed loop."""
     return table_of(
-        "Dead zones in per cent of command, flows in L/min",
+        "Dead zones at the onset of flow in per cent of command, flows in L/min",
         pressures,
         ("side", lambda one: one.side),
         ("dP (MPa)", lambda one: number(one.dp_MPa, 2)),
@@ -140,8 +156,8 @@ def loops_table(pressures: Sequence[PressureResult]) -> Table:
         ("opening with (%)", lambda one: number(100 * one.residual_opening, 1)),
         ("closing without (%)", lambda one: number(100 * one.dead_zone_closing, 1)),
         ("closing with (%)", lambda one: number(100 * one.residual_closing, 1)),
-        ("at zero without β (L/min)", lambda one: number(one.q_zero_without_beta_L_min, 2)),
-        ("at zero (L/min)", lambda one: number(one.q_zero_L_min, 2)),
+        ("at zero without β (L/min)", lambda one: in_number_font(one.in_words(one.q_zero_without_beta_L_min))),
+        ("at zero (L/min)", lambda one: in_number_font(one.in_words(one.q_zero_L_min))),
         ("largest without (L/min)", lambda one: number(one.q_max_direct_L_min, 2)),
         ("largest with (L/min)", lambda one: number(one.q_max_L_min, 2)),
     )
@@ -159,8 +175,8 @@ def scenarios_table(scenarios: Sequence[ScenarioResult]) -> Table | None:
         [worst[name] for name in dict.fromkeys(each.name for each in scenarios)],
         ("scenario", lambda one: one.name),
         ("dP (MPa)", lambda one: number(one.dp_MPa, 2)),
-        ("at zero, at the end (L/min)", lambda one: number(one.q_zero_L_min, 2)),
-        ("on the way, at most (L/min)", lambda one: number(one.q_peak_at_zero_L_min, 2)),
+        ("at zero, at the end (L/min)", lambda one: in_number_font(one.in_words(one.q_zero_L_min))),
+        ("on the way, at most (L/min)", lambda one: in_number_font(one.in_words(one.q_peak_at_zero_L_min))),
         ("required", lambda one: "must be shut at the end" if one.must_shut else "no core can know: not required"),
     )
 

@@ -121,7 +121,8 @@ def _pieces(law: ExactLaw, ending: str, tried: range) -> str:
     """Return pieces.h: the functions of a side, and the codes where the pieces of each input end; of B those tried."""
     a, b = _sound(law.a.valid_codes), _sound(law.b.valid_codes)
     commands = law.sound_commands
-    corners = {law.zero, law.full, law.zero + law.transition_codes, max(law.zero - law.transition_codes, 0)}
+    away = (0, law.zero_band, law.transition_end)
+    corners = {law.full, *(max(law.zero + sign * codes, 0) for sign in (1, -1) for codes in away)}
     ends = sorted({0, CODES, *_ends_of(commands), *corners, *(code + 1 for code in corners)})
     furthest = max(abs(code - law.zero) for code in (commands.start, commands.stop - 1))
     lines = [f"#define {function.upper()} dz_{function}{ending}" for function in ("comp", "beta", "status")]

@@ -4,11 +4,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dzdesign.identify.valve.reading_flow import dead_zone_at, ideal_line
+from dzdesign.identify.valve.recorded_curve import RecordedCurve
 from dzdesign.verify.closed_loop.loop import ClosedLoop, LoopRun, RampSequence
-from dzdesign.verify.evidence import PressureResult, Side
+from dzdesign.verify.loop_results import PressureResult, Side
 
-#: Flow counts as flow from this share of the largest flow on: no meter stands between.
+#: The onset: flow counts as flow from this share of the largest flow on, as no meter stands between.
 FLOW_SHARE = 1e-3
+#: Bins of command over which a plant's flow is compared with the recorded one, over full command.
+BIN = 0.01
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,9 +25,18 @@ class LoopComparison:
 
 
 def compare_at_pressure(
-    loop: ClosedLoop, dp_MPa: float, dp0_MPa: float, sequence: RampSequence, side: Side = "positive"
+    loop: ClosedLoop,
+    dp_MPa: float,
+    dp0_MPa: float,
+    sequence: RampSequence,
+    side: Side = "positive",
+    *,
+    reading_flow_L_min: float,
+    recorded: RecordedCurve,
 ) -> LoopComparison:
     """Run the ramp without and with the compensator at one pressure drop, and read dead zones and flows.
+
+    Dead zones are read at the onset and at the reading flow; the flow is compared with what was recorded there.
 
     Where the firmware has ramps of its own, the command goes no faster than they: then they hold nothing back, and
     what is read over the command is of the valve and the law, not of the ramps' lag.
@@ -34,7 +47,8 @@ def compare_at_pressure(
     # Only the flow at zero command is asked of this one, so it may open and close the valve quickly.
     quick = RampSequence(rest=sequence.rest, ramp=5.0, top=0.5).no_faster_than(loop.slowest_ramp_s).command()
     without_beta = loop.run(quick, dp_MPa, "without beta", dp_frozen_MPa=dp0_MPa)
-    level = FLOW_SHARE * direct.q_L_min.max()
+    level, reading = FLOW_SHARE * float(direct.q_L_min.max()), reading_flow_L_min
+    largest = float(with_core.q_mean_L_min.max())
     result = PressureResult(
         side=side,
         dp_MPa=dp_MPa,
@@ -42,19 +56,34 @@ def compare_at_pressure(
         dead_zone_closing=dead_zone(direct, level, rising=False),
         residual_opening=dead_zone(with_core, level, rising=True),
         residual_closing=dead_zone(with_core, level, rising=False),
+        reading_flow_L_min=reading,
+        reading_opening_without=dead_zone(direct, reading, rising=True),
+        reading_closing_without=dead_zone(direct, reading, rising=False),
+        reading_opening=dead_zone(with_core, reading, rising=True),
+        reading_closing=dead_zone(with_core, reading, rising=False),
+        ideal_line=ideal_line(reading, largest),
+        unseen_below_L_min=loop.unseen_below_L_min(dp_MPa),
         q_zero_L_min=float(with_core.q_largest_L_min[-1]),
         q_zero_without_beta_L_min=float(without_beta.q_largest_L_min[-1]),
+        flow_miss=largest_miss(direct, loop.u_max_V, recorded),
         q_max_direct_L_min=float(direct.q_L_min.max()),
-        q_max_L_min=float(with_core.q_mean_L_min.max()),
+        q_max_L_min=largest,
     )
     return LoopComparison(result=result, direct=direct, compensated=with_core)
 
 
 def dead_zone(run: LoopRun, level: float, *, rising: bool) -> float:
     """Return the command share at which flow first reaches `level` going up, or last holds it going down."""
+    return dead_zone_at(level, run.command, run.q_mean_L_min, rising=rising)
+
+
+def largest_miss(run: LoopRun, u_max_V: float, recorded: RecordedCurve) -> float:
+    """Return by how much the mean flow per bin of command departs from the recorded one, over the largest of these."""
+    bins = np.minimum((run.command / BIN).astype(int), round(1 / BIN) - 1)
     top = int(np.argmax(run.command))
-    flows = np.flatnonzero(run.q_mean_L_min > level)
-    part = flows[flows <= top] if rising else flows[flows > top]
-    if part.size == 0:
-        return 1.0
-    return float(run.command[part[0] if rising else part[-1]])
+    misses = [0.0]
+    for branch, part in ((recorded.opening, slice(0, top + 1)), (recorded.closing, slice(top + 1, None))):
+        miss = run.q_mean_L_min[part] - branch.flow_at(u_max_V * run.command[part])
+        count = np.bincount(bins[part])
+        misses.append(float(np.abs(np.bincount(bins[part], weights=miss)[count > 0] / count[count > 0]).max()))
+    return max(misses) / recorded.q_max_L_min

@@ -7,19 +7,23 @@ from pathlib import Path
 from typing import Any
 
 from dzdesign.design.compensator import Compensator
+from dzdesign.identify.valve.recorded_curve import RecordedCurve
 from dzdesign.verify.closed_loop.dead_zone import LoopComparison, compare_at_pressure
 from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.loop_checks import loop_checks
-from dzdesign.verify.closed_loop.plant import Plant, plants_from_tests
+from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.closed_loop.scenarios import Scene, run_scenarios
+from dzdesign.verify.closed_loop.stand_in import stand_in_of
 from dzdesign.verify.closed_loop.tolerances import Tolerances, monte_carlo, scatter
-from dzdesign.verify.evidence import ClosedLoopResult, IdentifiedPlant, MonteCarlo, ScenarioResult, Side
+from dzdesign.verify.loop_results import ClosedLoopResult, MonteCarlo, ScenarioResult, Side
 from dzdesign.verify.requirements import Check
 
 #: Shows how far a stage is: pieces and their number in, the pieces out.
 Watch = Callable[[Iterable[Any], int], Iterable[Any]]
 #: Runs side by side.
 WORKERS = 2
+#: How the evidence calls the plant where none was given.
+STAND_IN = "the recorded flow over command, moved by the default plant's coil and spool"
 SIGNS: dict[Side, int] = {"positive": 1, "negative": -1}
 
 
@@ -28,18 +32,18 @@ class FirmwareLoop:
     """What the closed loop showed; nothing of it where there was no core to close it with."""
 
     checks: tuple[Check, ...] = ()
-    plants: tuple[IdentifiedPlant, ...] = ()
+    dynamics: Plant | None = None
     loops: tuple[LoopComparison, ...] = ()
     scenarios: tuple[ScenarioResult, ...] = ()
     monte_carlo: MonteCarlo | None = None
 
     def result(self, plant: Plant | None, source: str, sha256: str | None) -> ClosedLoopResult:
-        """Return what the evidence has of the ramps and of the plant, given from a file or made from the thresholds."""
+        """Return what the evidence has of the ramps and of the plant, given from a file or made of the recordings."""
         return ClosedLoopResult(
             plant=plant,
-            plant_source=source or "made from the identified thresholds",
+            plant_source=source or STAND_IN,
             plant_sha256=sha256,
-            plants=() if plant else self.plants,
+            dynamics=None if plant else self.dynamics,
             pressures=tuple(loop.result for loop in self.loops),
         )
 
@@ -47,7 +51,7 @@ class FirmwareLoop:
 def scenes_of(folder: Path, compensator: Compensator, plant: Plant | None) -> tuple[Scene, ...]:
     """Return the compensated loop of each side at every tested pressure drop.
 
-    Without a plant there is one for each pressure drop, made from the identified thresholds.
+    Without a plant the recorded characteristic stands in for the valve.
     """
     valve = compensator.valve
     scenes: list[Scene] = []
@@ -55,17 +59,32 @@ def scenes_of(folder: Path, compensator: Compensator, plant: Plant | None) -> tu
         if sign not in compensator.signals.signs:
             continue
         side = valve.sides[name]
-        # One that stands in for the valve at one pressure drop says nothing of another.
-        plants = dict.fromkeys(side.beta.dp_MPa, plant) if plant else plants_from_tests(side, valve.u_max_V)
-        tested = (min(plants), max(plants)) if plant else None
-        first = ClosedLoop(next(iter(plants.values())), folder, compensator, sign)
-        for dp_MPa, one in plants.items():
+        one = plant or stand_in_of(side, valve.u_max_V)
+        pressures = side.beta.dp_MPa or tuple(test.dp_MPa for test in side.tests if test.dp_MPa is not None)
+        loop = ClosedLoop(one, folder, compensator, sign)
+        for dp_MPa in pressures:
             reference = dp_MPa if side.reference.dp_MPa is None else side.reference.dp_MPa
-            loop = first.with_plant(one)
+            # A recording at one pressure drop says nothing of another.
+            tested = (min(pressures), max(pressures)) if plant or len(pressures) > 1 else None
             scenes.append(
-                Scene(loop=loop, plant=one, side=name, dp_MPa=dp_MPa, reference_MPa=reference, tested_MPa=tested)
+                Scene(
+                    loop=loop,
+                    plant=one,
+                    side=name,
+                    dp_MPa=dp_MPa,
+                    reference_MPa=reference,
+                    tested_MPa=tested,
+                    command_error=compensator.command_error,
+                    has_zero_band=compensator.zero_band_codes > 0,
+                )
             )
     return tuple(scenes)
+
+
+def recorded_at(compensator: Compensator, scene: Scene) -> RecordedCurve:
+    """Return what was recorded at a scene's pressure drop."""
+    tests = compensator.valve.sides[scene.side].tests
+    return min(tests, key=lambda test: abs((test.dp_MPa or 0.0) - scene.dp_MPa)).recorded
 
 
 def close_the_loop(
@@ -81,7 +100,10 @@ def close_the_loop(
     say("running the closed loop")
     with ThreadPoolExecutor(WORKERS) as pool:
         ramps = pool.map(
-            lambda scene: compare_at_pressure(scene.loop, scene.dp_MPa, scene.reference_MPa, sequence, scene.side),
+            lambda scene: compare_at_pressure(
+                scene.loop, scene.dp_MPa, scene.reference_MPa, sequence, scene.side,
+                reading_flow_L_min=compensator.reading_flow_L_min, recorded=recorded_at(compensator, scene),
+            ),
             scenes,
         )
         loops = tuple(watch(ramps, len(scenes)))
@@ -95,7 +117,7 @@ def close_the_loop(
         series = monte_carlo(tolerances, [scatter(s.loop, plant, tolerances, s.dp_MPa, s.side) for s in pieces])
     return FirmwareLoop(
         checks=loop_checks([loop.result for loop in loops], scenarios, compensator, plant_given=plant is not None),
-        plants=tuple(IdentifiedPlant(side=scene.side, dp_MPa=scene.dp_MPa, parameters=scene.plant) for scene in scenes),
+        dynamics=scenes[0].plant.parameters if scenes else None,
         loops=loops,
         scenarios=scenarios,
         monte_carlo=series,

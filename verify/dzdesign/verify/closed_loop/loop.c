@@ -98,11 +98,11 @@ static inline void run(const struct task *task, struct plant *plant, double *rec
 }
 
 /* choices: n, every, amplifier, negative, swapped, largest code, largest compare value. series, channels: see `task`.
- * p, coarse, fine: the plant, see motion.py.
+ * p, coarse, fine: the plant, see motion.py; curve: its recorded characteristic, see stand_in.py, or null.
  * record[n][6]: compare value, dP in MPa, Q in L/min at its end; over the record mean and largest Q; position in m. */
 EXPORT void dz_loop(const int32_t *choices, const double *command, const double *supply_MPa, const double *seen_MPa,
                     double back_MPa, const int32_t *zeros, const int32_t *fulls, const double *spans, const double *p,
-                    const double *coarse, const double *fine, double *record)
+                    const double *coarse, const double *fine, const double *curve, double *record)
 {
     struct plant plant;
     struct task task = {choices[0], choices[1], choices[2], choices[3], choices[4], command, supply_MPa, seen_MPa,
@@ -111,7 +111,7 @@ EXPORT void dz_loop(const int32_t *choices, const double *command, const double 
     for (int index = 0; index < 3; index++) {
         task.channels[index] = channel_of(zeros[index], fulls[index], spans[index], choices[5]);
     }
-    plant_at_rest(&plant, p, coarse, fine, choices[6], supply_MPa[0]);
+    plant_at_rest(&plant, p, coarse, fine, curve, choices[6], supply_MPa[0]);
     if (p[PLANT_LINEAR] > 0.5) {
         run(&task, &plant, record, 1);
     } else {

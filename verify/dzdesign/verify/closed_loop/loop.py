@@ -14,6 +14,7 @@ from dzdesign.design.drive_functions import RAMP_UNIT
 from dzdesign.design.signals import Signals
 from dzdesign.verify.closed_loop.motion import motion_header, numbers_of
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
+from dzdesign.verify.closed_loop.stand_in import StandIn
 from dzdesign.verify.toolchain.host_compiler import load_library
 
 #: Periods of the PWM between two records: 100 a second, as in the paper's tests.
@@ -86,11 +87,15 @@ class ClosedLoop:
     """
 
     def __init__(
-        self, plant: Plant, firmware: Path | None = None, compensator: Compensator | None = None, sign: int = 1
+        self,
+        plant: Plant | StandIn,
+        firmware: Path | None = None,
+        compensator: Compensator | None = None,
+        sign: int = 1,
     ) -> None:
         driver = files("dzdesign.verify.closed_loop")
         sources = {"plant_motion.h": motion_header()}
-        for name in ("loop.c", "plant_period.h", "plant_stops.h"):
+        for name in ("loop.c", "plant_period.h", "plant_curve.h", "plant_stops.h"):
             sources[name] = driver.joinpath(name).read_text(encoding="utf-8")
         if firmware is None:
             sources["dz_drive.h"] = driver.joinpath("no_drive.h").read_text(encoding="utf-8")
@@ -114,12 +119,34 @@ class ClosedLoop:
         #: Of the drive's own ramps on this side, from zero to full command or back, s; 0: none.
         self.slowest_ramp_s = _slowest_ramp_s(compensator, sign) if compensator else 0.0
         self._has_core = firmware is not None
-        self._plant = numbers_of(plant, self._signals.compare_max)
+        self._take(plant)
 
-    def with_plant(self, plant: Plant) -> "ClosedLoop":
+    def _take(self, plant: Plant | StandIn) -> None:
+        self._plant = numbers_of(plant.parameters, self._signals.compare_max)
+        #: Of a stand-in its recorded characteristic.
+        self._curve = plant.table if isinstance(plant, StandIn) else None
+        #: Full command, V.
+        self.u_max_V = plant.parameters.u_max_V
+        self._stand_in = plant if isinstance(plant, StandIn) else None
+
+    def unseen_below_L_min(self, dp_MPa: float) -> float | None:
+        """Return the flow below which a stand-in's is not known at a pressure drop; None of a plant of equations."""
+        return None if self._stand_in is None else self._stand_in.unseen_below_L_min(dp_MPa)
+
+    def command_of_codes(self, codes: np.ndarray) -> np.ndarray:
+        """Return the commands, shares of full, that the converter reads as so many codes from zero, (N,) whole numbers.
+
+        They may lie below zero: then the command is one of the other sign, or none that the signal has.
+        """
+        zero, full = int(self._scalings[0][0]), int(self._scalings[1][0])
+        span, way = abs(full - zero), 1 if full > zero else -1
+        middle: np.ndarray = (codes + 0.5 * way) / (span + 1)  # of the code: it is rounded down, whichever way it runs
+        return middle
+
+    def with_plant(self, plant: Plant | StandIn) -> "ClosedLoop":
         """Return the same loop with another plant; nothing is compiled again."""
         other = copy.copy(self)
-        other._plant = numbers_of(plant, self._signals.compare_max)
+        other._take(plant)
         return other
 
     def run(
@@ -158,8 +185,11 @@ class ClosedLoop:
             signals.code_max, signals.compare_max,
         )  # fmt: skip
         series = (np.array(choices, dtype=np.int32), command, supply, seen)
-        given = (*self._scalings, plant.flat, plant.coarse, plant.fine, record)
-        pointers = [[array.ctypes.data_as(ctypes.c_void_p) for array in arrays] for arrays in (series, given)]
+        given = (*self._scalings, plant.flat, plant.coarse, plant.fine, self._curve, record)
+        pointers = [
+            [None if array is None else array.ctypes.data_as(ctypes.c_void_p) for array in arrays]
+            for arrays in (series, given)
+        ]
         self._library.dz_loop(*pointers[0], ctypes.c_double(back_MPa), *pointers[1])
         recorded = dict(zip(RECORDED, record.T, strict=True))
         time = np.arange(command.size) * periods_per_record * PWM_PERIOD_S

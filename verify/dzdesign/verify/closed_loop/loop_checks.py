@@ -4,12 +4,15 @@ from collections.abc import Sequence
 
 from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.model import ValveModel
+from dzdesign.verify.closed_loop.dead_zone import BIN
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN
-from dzdesign.verify.evidence import PressureResult, ScenarioResult
+from dzdesign.verify.loop_results import PressureResult, ScenarioResult
 from dzdesign.verify.requirements import PLANT_IS_THE_VALVE, PLANT_OPENS, ZERO_FLOW, ZERO_FLOW_AFTER_SCENARIOS, Check
 
 #: Share of full command by which the opening of a plant may differ from the identified valve's: rounding, a quick ramp.
 SAME_THRESHOLD = 0.03
+#: Share of a test's largest flow by which a stand-in's mean flow in a bin of command may differ from the recorded one.
+SAME_FLOW = 0.03
 
 
 def loop_checks(
@@ -19,7 +22,7 @@ def loop_checks(
     zero_flow = no_flow_at_zero(ramps, compensator, plant_given=plant_given)
     return (
         plant_opens(ramps),
-        plant_is_the_valve(ramps, compensator.valve),
+        plant_is_the_valve(ramps, compensator.valve) if plant_given else stand_in_is_the_recording(ramps),
         zero_flow,
         shut_after_scenarios(scenarios, zero_flow, plant_given=plant_given),
     )
@@ -46,18 +49,35 @@ def plant_is_the_valve(ramps: Sequence[PressureResult], valve: ValveModel) -> Ch
     worst = max(ramps, key=lambda ramp: abs(float.__sub__(*opens_V(ramp))))
     plant_V, valve_V = opens_V(worst)
     holds = abs(plant_V - valve_V) <= SAME_THRESHOLD * valve.u_max_V
-    text = f"at {plant_V:.2f} V, the ramp tests at {valve_V:.2f} V (at {worst.dp_MPa:.2f} MPa, the worst)"
+    text = f"at {plant_V:.2f} V, the ramp tests at {valve_V:.2f} V (at {worst.dp_MPa:.2f} MPa, the worst); "
+    text += _miss(max(ramps, key=lambda ramp: ramp.flow_miss))
     if not holds:
         text += "; the closed loop is of another valve: correct preload, spring or force in --plant"
     return PLANT_IS_THE_VALVE.check(holds=holds, text=text)
 
 
+def stand_in_is_the_recording(ramps: Sequence[PressureResult]) -> Check:
+    """Tell whether the flow of a stand-in is that of valve.json at the tests, over the command and on both branches."""
+    worst = max(ramps, key=lambda ramp: ramp.flow_miss)
+    holds = worst.flow_miss <= SAME_FLOW
+    return PLANT_IS_THE_VALVE.check(holds=holds, text=f"{_miss(worst)}; expected {SAME_FLOW:.0%} at most")
+
+
+def _miss(worst: PressureResult) -> str:
+    """Say how near the plant's flow is to the recorded one."""
+    return (
+        f"its mean flow per {BIN:.0%} of command departs from the recorded one by {worst.flow_miss:.1%} of the largest "
+        f"flow (at {worst.dp_MPa:.2f} MPa, the worst)"
+    )
+
+
 def no_flow_at_zero(ramps: Sequence[PressureResult], compensator: Compensator, *, plant_given: bool) -> Check:
     """Tell whether the valve is shut at zero command, after closing.
 
-    A plant that is made from the thresholds, and not given, closes where they say.
+    A stand-in closes where the recorded flow, continued below the noise level, comes to none.
     """
-    worst = max(ramps, key=lambda ramp: ramp.q_zero_L_min)
+    worst = max(ramps, key=lambda ramp: (ramp.q_zero_L_min, ramp.unseen_below_L_min or 0.0))
+    leakiest = max(ramps, key=lambda ramp: ramp.q_zero_without_beta_L_min)
     guards = {sign: compensator.side(sign).certificate.guard for sign in compensator.signals.signs}
     sides = compensator.valve.sides
     identified = {1: sides.get("positive"), -1: sides.get("negative")}
@@ -66,8 +86,8 @@ def no_flow_at_zero(ramps: Sequence[PressureResult], compensator: Compensator, *
         return ZERO_FLOW.check(
             holds=None,
             text=f"the {chosen[0]} threshold was chosen to be guarded, above the one at which the valve closes: "
-            f"{worst.q_zero_L_min:.4g} L/min after closing (at {worst.dp_MPa:.2f} MPa) is the price of that choice. "
-            "Design with --guard closing to have none",
+            f"{_flow(worst, worst.q_zero_L_min)} after closing (at {worst.dp_MPa:.2f} MPa) is the price of that "
+            "choice. Design with --guard closing to have none",
         )
     if not plant_given and "opening" in guards.values():
         return ZERO_FLOW.check(
@@ -77,9 +97,18 @@ def no_flow_at_zero(ramps: Sequence[PressureResult], compensator: Compensator, *
         )
     return ZERO_FLOW.check(
         holds=worst.q_zero_L_min <= NO_FLOW_L_MIN,
-        text=f"at most {worst.q_zero_L_min:.4g} L/min after closing (at {worst.dp_MPa:.2f} MPa), "
-        f"{max(ramp.q_zero_without_beta_L_min for ramp in ramps):.3g} L/min without beta",
+        text=f"{_flow(worst, worst.q_zero_L_min)} after closing (at {worst.dp_MPa:.2f} MPa), "
+        f"{_flow(leakiest, leakiest.q_zero_without_beta_L_min)} without beta",
     )
+
+
+def _flow(where: PressureResult | ScenarioResult, flow_L_min: float) -> str:
+    """Return a flow; where the recordings can't show it, below what, and what their first flows, continued, say."""
+    unseen = where.unseen_below_L_min
+    if unseen is None or flow_L_min >= unseen:
+        return f"at most {flow_L_min:.4g} L/min"
+    more = f": {flow_L_min:.2g} L/min if the first flow seen goes on below" if flow_L_min > NO_FLOW_L_MIN else ""
+    return f"below {unseen:.2f} L/min (less than the recordings show{more})"
 
 
 def shut_after_scenarios(scenarios: Sequence[ScenarioResult], zero_flow: Check, *, plant_given: bool) -> Check:
@@ -88,14 +117,17 @@ def shut_after_scenarios(scenarios: Sequence[ScenarioResult], zero_flow: Check, 
     Where the flow at zero command could not be checked, this can't be; a plant that is given sees all scenarios.
     """
     required = [each for each in scenarios if each.must_shut]
-    worst = max(required, key=lambda each: each.q_zero_L_min)
-    text = f"{len(required)} runs of {len({each.name for each in required})} scenarios: at most "
-    text += f"{worst.q_zero_L_min:.4g} L/min ({worst.name}, at {worst.dp_MPa:.2f} MPa)"
+    worst = max(required, key=lambda each: (each.q_zero_L_min, each.unseen_below_L_min or 0.0))
+    text = f"{len(required)} runs of {len({each.name for each in required})} scenarios: "
+    text += f"{_flow(worst, worst.q_zero_L_min)} ({worst.name}, at {worst.dp_MPa:.2f} MPa)"
     if hidden := [each for each in scenarios if not each.must_shut]:
         leak = max(hidden, key=lambda each: each.q_zero_L_min)
-        text += f"; not required, as no core can know: {leak.name}, {leak.q_zero_L_min:.2g} L/min"
-    if not plant_given:
-        text += "; load steps and frozen sensors were not tried, which needs a plant (--plant)"
+        text += (
+            f"; not required, as no core can know of it or it has no zero band: {leak.name}, "
+            f"{_flow(leak, leak.q_zero_L_min)}"
+        )
+    if not plant_given and not any(each.is_load_step for each in scenarios):
+        text += "; load steps and frozen sensors were not tried: that needs ramps at two pressure drops, or --plant"
     if zero_flow.holds is None:
         return ZERO_FLOW_AFTER_SCENARIOS.check(holds=None, text=f"{text}; see the ramps")
     return ZERO_FLOW_AFTER_SCENARIOS.check(holds=worst.q_zero_L_min <= NO_FLOW_L_MIN, text=text)

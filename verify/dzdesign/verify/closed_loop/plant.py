@@ -16,7 +16,6 @@ from msgspec import Meta
 from dzdesign.core.artefact_files import read_bytes
 from dzdesign.core.artefact_types import quantity
 from dzdesign.core.errors import InputError, nearest, quoted
-from dzdesign.identify.valve.side_model import SideModel
 
 if TYPE_CHECKING:
     import casadi
@@ -84,6 +83,15 @@ class Plant:
                 raise InputError(f"the plant's {what} at {rate:.3g} rad/s, {limit}; correct {keys}")
 
     @property
+    def parameters(self) -> "Plant":
+        """The plant that moves the spool: itself."""
+        return self
+
+    def with_oil(self, viscosity: float, density: float) -> "Plant":
+        """Return it with oil of so many times the viscosity, with which its damping goes, and density."""
+        return replace(self, B_e_N_s_m=self.B_e_N_s_m * viscosity, rho_kg_m3=self.rho_kg_m3 * density)
+
+    @property
     def fastest_rad_s(self) -> float:
         """Rate of the spool's fastest free motion: against spring and flow force, or against its damping."""
         stiffest = self.K_et_N_m + self.flow_force_N_mm_MPa * 1e3 * LARGEST_DP_MPA
@@ -128,37 +136,6 @@ def read_parameters(path: Path, what: str, others: Sequence[str] = ()) -> dict[s
         if key not in known:
             raise InputError(f"'{path}': there is no plant parameter {quoted(key)}{nearest(key[:LONGEST_KEY], known)}")
     return values
-
-
-def plants_from_tests(side: SideModel, u_max_V: float) -> dict[float, Plant]:
-    """Return, per tested pressure drop in MPa, the default plant with the identified thresholds, slope and stroke.
-
-    The dynamics stay those of the default plant; what was identified at rest is taken over, at a constant pressure
-    drop: it opens at the rising knee and closes at the guarded threshold (the onset, where the edge is soft). It stands
-    in for the valve where no better plant is given; the closed loop then checks the design and the C, not the
-    identification.
-    """
-    plants = {}
-    for test in side.tests:
-        if test.dp_MPa is None:
-            raise InputError(f"{test.source} has no pressure drop, so no plant can be made from it; give --plant")
-        base = Plant(u_max_V=u_max_V, pressure_force_N_MPa=0, flow_force_N_mm_MPa=0, droop_MPa_L_min2=0, overlap_mm=0.3)
-        opens = test.u_knee_rising_V if test.u_knee_rising_V is not None else test.u_guard_V
-        closes = test.u_guard_V if side.certificate.guard == "closing" else opens
-        middle, hysteresis = (opens + closes) / 2, max(opens - closes, 0.0)
-        # A threshold below the spring force of the overlap is met with less overlap.
-        overlap = min(base.overlap_mm, 0.5 * middle * base.force_per_volt / base.K_et_N_m * 1e3)
-        travel_mm_V = base.force_per_volt / base.K_et_N_m * 1e3
-        speed = math.sqrt(2 * test.dp_MPa * MPA / base.rho_kg_m3)
-        plants[test.dp_MPa] = replace(
-            base,
-            overlap_mm=overlap,
-            preload_N=middle * base.force_per_volt - base.K_et_N_m * overlap * 1e-3,
-            hysteresis_V=hysteresis,
-            stroke_mm=overlap + side.k_x_max_over_u_max * u_max_V * travel_mm_V,
-            C_d_W_mm=test.slope_L_min_V * L_MIN / (travel_mm_V * 1e-3) / speed * 1e3,
-        )
-    return plants
 
 
 def derivatives(plant: Plant) -> tuple["casadi.SX", "casadi.SX", "casadi.SX"]:

@@ -2,7 +2,7 @@
 #ifndef PLANT_PERIOD_H
 #define PLANT_PERIOD_H
 
-#include "plant_stops.h"
+#include "plant_curve.h"
 
 /* Where the edge is passed, each phase is moved in so many pieces. */
 #define PIECES 8
@@ -31,7 +31,7 @@ static inline double ripple_m(const struct plant *plant)
 }
 
 /* A period that may be taken whole, in one piece: 0. Otherwise nothing moves, and it needs so many pieces a phase. */
-static inline int32_t whole_period(struct plant *plant, int linear, double *charge)
+static inline int32_t whole_period(struct plant *plant, int linear, double *charge, double *at_middle)
 {
     const double *p = plant->p;
     double i, x, v, middle, end, near;
@@ -62,6 +62,7 @@ static inline int32_t whole_period(struct plant *plant, int linear, double *char
     plant->i = i;
     plant->x = x;
     plant->v = v;
+    *at_middle = middle;
     if (!linear) {
         act(plant);
         plant->acts = end - plant->push; /* which the next period need not wait for */
@@ -112,13 +113,18 @@ static inline void plant_supply(struct plant *plant, double supply_MPa)
         plant->flow_a_metre = plant->flow / (p[PLANT_STROKE_M] - p[PLANT_OVERLAP_M]);
         plant->x = x;
         act(plant);
+        if (plant->curve) {
+            curve_supply(plant);
+        }
     }
 }
 
+/* curve: a recorded characteristic, or none. */
 static void plant_at_rest(struct plant *plant, const double *p, const double *coarse, const double *fine,
-                          int32_t counts, double supply_MPa)
+                          const double *curve, int32_t counts, double supply_MPa)
 {
-    const struct plant rest = {.p = p, .coarse = coarse, .fine = fine, .counts = counts, .supply_MPa = -1.0};
+    const struct plant rest = {
+        .p = p, .coarse = coarse, .fine = fine, .curve = curve, .counts = counts, .supply_MPa = -1.0};
 
     *plant = rest;
     plant->all = response_after(plant, 2 * counts);
@@ -133,7 +139,9 @@ static inline void plant_period(struct plant *plant, int32_t compare, int linear
     const double *p = plant->p;
     const double low = plant->mean - p[PLANT_HALF_PLAY_V];
     const double high = plant->mean + p[PLANT_HALF_PLAY_V];
+    const double before = plant->x;
     double charge = 0.0;
+    double middle = before;
 
     if (compare != plant->compare) {
         respond(plant, compare);
@@ -154,13 +162,17 @@ static inline void plant_period(struct plant *plant, int32_t compare, int linear
         }
     } else {
         const int32_t steps = (int32_t)p[PLANT_STEPS];
-        const int32_t pieces = (!linear && (steps > 1)) ? PIECES : whole_period(plant, linear, &charge);
+        const int32_t pieces = (!linear && (steps > 1)) ? PIECES : whole_period(plant, linear, &charge, &middle);
 
         if (pieces > 0) {
             charge = period_in_pieces(plant, compare, pieces * steps);
+            middle = 0.5 * (before + plant->x);
         }
     }
-    if (linear) {
+    if (linear && plant->curve) {
+        /* The PWM's ripple stands out of it, as it does of a meter's reading. */
+        curve_flow(plant, 0.25 * before + 0.5 * middle + 0.25 * plant->x);
+    } else if (linear) {
         const double opening = plant->x - p[PLANT_OVERLAP_M];
 
         plant->flow = plant->flow_a_metre * ((opening > 0.0) ? opening : 0.0);

@@ -45,6 +45,12 @@ struct plant
     int32_t compare;     /* of the last period, and for it: */
     double off;          /* the current that full voltage makes in the time for which it is off */
     double response[5];  /* what the voltage adds: current, position, speed, charge, position in the middle */
+    const double *curve; /* the recorded characteristic, see plant_curve.h; none: the edge is that of Eq. (24) */
+    const double *below; /* its tests on both sides of the pressure drop, */
+    const double *above;
+    double share_above; /* how far towards the upper one, */
+    double q_max;       /* the largest flow there, L/min, */
+    double share;       /* and the share of it that flows */
 };
 
 /* What depends on the position. */

@@ -6,9 +6,11 @@ from types import MappingProxyType
 
 import numpy as np
 
+from dzdesign.design.zero_band import CommandError
 from dzdesign.verify.closed_loop.loop import ClosedLoop, LoopRun
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
-from dzdesign.verify.evidence import ScenarioResult, Side
+from dzdesign.verify.closed_loop.stand_in import StandIn
+from dzdesign.verify.loop_results import ScenarioResult, Side
 
 #: Two periods a record: as often as the core samples, 1.25 kHz.
 PERIODS = 2
@@ -35,7 +37,7 @@ class Scene:
 
     #: With the compensator, and the plant of this pressure drop.
     loop: ClosedLoop
-    plant: Plant
+    plant: Plant | StandIn
     side: Side
     #: At no flow.
     dp_MPa: float
@@ -43,6 +45,9 @@ class Scene:
     reference_MPa: float
     #: Of the tests; None where the plant holds at `dp_MPa` only.
     tested_MPa: Ends | None
+    #: Of a zero command's code; and whether the law has a zero band against it.
+    command_error: CommandError
+    has_zero_band: bool
 
     @property
     def settle_s(self) -> float:
@@ -80,6 +85,7 @@ class Scene:
             dp_MPa=self.dp_MPa,
             q_zero_L_min=float(run.q_largest_L_min[-1]),
             q_peak_at_zero_L_min=float(run.q_largest_L_min[shut].max(initial=0.0)),
+            unseen_below_L_min=self.loop.unseen_below_L_min(self.dp_MPa),
             must_shut=must_shut,
             figures={key: float(value) for key, value in figures.items()},
         )
@@ -94,6 +100,7 @@ def run_scenarios(scene: Scene) -> Iterator[ScenarioResult]:
         yield _frozen_sensors(scene, scene.tested_MPa)
     yield from _failing_sensors(scene)
     yield _noise_at_zero(scene)
+    yield _converter_off_at_zero(scene)
     yield from _oils(scene)
 
 
@@ -206,12 +213,33 @@ def _noise_at_zero(scene: Scene) -> ScenarioResult:
     )
 
 
+def _converter_off_at_zero(scene: Scene) -> ScenarioResult:
+    """A zero command that the converter reads with its declared error: too high for long, and noisy on top.
+
+    Judged while it lasts, once the spool has had the time to follow. Without a zero band flow is to be expected.
+    """
+    error, before = scene.command_error, scene.opened_and_closed()
+    count = scene.held(0, 2).size
+    noise = np.random.default_rng(SEED).integers(-error.noise_codes, error.noise_codes, count, endpoint=True)
+    wrong = scene.loop.command_of_codes(error.offset_codes + noise)
+    run = scene.run(np.concatenate([before, wrong]))
+    flow = run.q_largest_L_min[before.size + round(scene.settle_s / STEP_S) :]
+    return ScenarioResult(
+        name=f"zero command read {error.offset_codes} codes too high, with ±{error.noise_codes} codes of noise",
+        side=scene.side,
+        dp_MPa=scene.dp_MPa,
+        q_zero_L_min=float(flow.max()),
+        q_peak_at_zero_L_min=float(flow.max()),
+        unseen_below_L_min=scene.loop.unseen_below_L_min(scene.dp_MPa),
+        must_shut=scene.has_zero_band,
+        figures={"mean_flow_L_min": float(run.q_mean_L_min[before.size :].mean())},
+    )
+
+
 def _oils(scene: Scene) -> Iterator[ScenarioResult]:
     """The same ramp with oil far from the temperature of the bench."""
     for name, (viscosity, density) in OILS.items():
-        plant = replace(
-            scene.plant, B_e_N_s_m=scene.plant.B_e_N_s_m * viscosity, rho_kg_m3=scene.plant.rho_kg_m3 * density
-        )
+        plant = scene.plant.with_oil(viscosity, density)
         warm = replace(scene, loop=scene.loop.with_plant(plant), plant=plant)
         run = warm.run(warm.opened_and_closed())
         yield warm.result(name, run, figures={"largest_flow_L_min": run.q_mean_L_min.max()})

@@ -13,7 +13,7 @@ from dzdesign.core.errors import InputError, quoted
 from dzdesign.verify.closed_loop.dead_zone import FLOW_SHARE, dead_zone
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN, ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.plant import Plant, read_parameters
-from dzdesign.verify.evidence import MonteCarlo, Scatter, Side, Spread
+from dzdesign.verify.loop_results import MonteCarlo, Scatter, Side, Spread
 
 #: Keys of a file of tolerances beside the parameters.
 COUNTS = ("plants", "seed")

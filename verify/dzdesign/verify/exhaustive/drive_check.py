@@ -3,6 +3,7 @@
 import copy
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ Codes = tuple[int, int, int]
 SEED, SAMPLES = 11, 3000
 #: A ramp that is not put anywhere; share of the samples before which it is.
 STAYS, PUT_SHARE = -(2**31), 0.04
-FIELDS = ("compare_a", "compare_b", "status", "law", "side", "ticks", "ramped")
+FIELDS = ("compare_a", "compare_b", "status", "law", "side", "ticks", "at_rest", "ramped")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,7 +35,7 @@ def drive_samples(compensator: Compensator, seed: int, count: int) -> list[Codes
     """Return codes of random samples, corners, steps from end to end, and noise about zero, one after the other."""
     rng = np.random.default_rng(seed)
     signals = compensator.signals
-    zero, window = signals.command.zero_code, max(compensator.drive_functions.window_codes, 4)
+    zero, window = signals.command.zero_code, max(compensator.drive_functions.leave_zero_codes, 4)
     low, high = signals.command.valid_codes
     corners = [0, low, high, signals.code_max, signals.code_max + 1, 65535, zero, signals.command.full_code]
     corners += [max(zero + sign * (window + step), 0) for sign in (1, -1) for step in (-1, 0, 1)]
@@ -88,10 +89,38 @@ def window_samples(compensator: Compensator) -> list[tuple[Codes, int]]:
     for sign in signs:
         far = -sign * command.span(-sign) if len(signs) == 2 else 0
         for step in (-1, 0, 1):
-            for away in (far, sign * max(functions.window_codes + step, 0)):
+            for away in (far, sign * max(functions.leave_zero_codes + step, 0)):
                 code = command.zero_code + command.direction(1) * away
                 made.append(((code, p_a, p_b), away * STEP_UNIT if ramps else STAYS))
     return made
+
+
+def every_state(compensator: Compensator) -> list[tuple[Codes, int, int]]:
+    """Return every valid command from every state of rest and side: codes, the ramp's place and `state_word`.
+
+    The ramp is put where the command is, so that it does not hold it back.
+    """
+    signals, command = compensator.signals, compensator.signals.command
+    sides = (1,) if len(signals.signs) == 1 else (-1, 0, 1)
+    rests = (0, 1) if compensator.zero_band_codes else (0,)
+    if not compensator.zero_band_codes and len(sides) == 1:
+        return []
+    ramps = any(compensator.drive_functions.ramp_up + compensator.drive_functions.ramp_down)
+    rng = np.random.default_rng(SEED)
+    made = []
+    for side, rest in product(sides, rests):
+        for code in range(command.valid_codes[0], command.valid_codes[1] + 1):
+            pressures = (rng.integers(*sensor.valid_codes) for sensor in (signals.pressure_a, signals.pressure_b))
+            p_a, p_b = map(int, pressures)
+            away = command.direction(1) * (code - command.zero_code)
+            reached = away if len(sides) == 3 else max(away, 0)
+            made.append(((code, p_a, p_b), reached * STEP_UNIT if ramps else STAYS, state_word(side, rest)))
+    return made
+
+
+def state_word(side: int, rest: int) -> int:
+    """Return a driven side, -1 to 1, and whether the drive is at rest, in one number."""
+    return 2 * (side + 1) + rest
 
 
 class PreparedDrive:
@@ -100,23 +129,30 @@ class PreparedDrive:
     def __init__(self, compensator: Compensator, seed: int = SEED, count: int = SAMPLES) -> None:
         signals = compensator.signals
         first, put = zip(*window_samples(compensator), strict=True)
-        self.samples = [*first, *drive_samples(compensator, seed, count)]
+        states_put = every_state(compensator)
+        drawn = drive_samples(compensator, seed, count)
+        self.samples = [*first, *drawn, *(codes for codes, _, _ in states_put)]
+        #: How many of the samples are taken from a state that was put: every command, from each.
+        self.put = len(states_put)
         self.ticks_per_sample = signals.tick_Hz // signals.sample_Hz
         model = DriveModel(compensator)
         states = [model.state]
-        places = [*put, *ramp_places(compensator, seed, count)]
+        places = [*put, *ramp_places(compensator, seed, count), *(place for _, place, _ in states_put)]
+        words = [STAYS] * (len(first) + count) + [word for _, _, word in states_put]
         for index, codes in enumerate((None, *self.samples)):  # some PWM periods go by before the first sample
             if codes:
                 if places[index - 1] != STAYS:
                     model.position = Fraction(places[index - 1], STEP_UNIT)
+                if words[index - 1] != STAYS:
+                    model.side, model.at_rest = words[index - 1] // 2 - 1, bool(words[index - 1] % 2)
                 model.sample(*codes)
             for _ in range(self.ticks_per_sample):
                 model.tick()
                 states.append(model.state)
         head = np.array([len(self.samples), self.ticks_per_sample], dtype="<i4")
         codes = np.array(self.samples, dtype="<u2").tobytes()
-        words = np.array(places, dtype="<i4").tobytes() + np.array(states, dtype="<i4").tobytes()
-        self.content = head.tobytes() + codes + bytes(-len(codes) % 4) + words
+        numbers = b"".join(np.array(each, dtype="<i4").tobytes() for each in (places, words, states))
+        self.content = head.tobytes() + codes + bytes(-len(codes) % 4) + numbers
 
 
 class CompiledDrive:
@@ -166,6 +202,8 @@ def drive_follows(folder: Path, compensator: Compensator) -> Check:
     except RequirementError as error:
         return DRIVE.check(holds=False, text=str(error))
     text = f"outputs and state after each of {found.ticks} PWM periods, {len(prepared.samples)} samples of corners, "
-    text += f"steps, noise and random codes (seed {SEED}): {found.faults} wrong"
+    text += f"steps, noise and random codes (seed {SEED})"
+    text += f", {prepared.put} of them every valid command from every state of rest and side" if prepared.put else ""
+    text += f": {found.faults} wrong"
     text += f" ({found.first_wrong})" if found.faults else ""
     return DRIVE.check(holds=found.faults == 0, text=text)

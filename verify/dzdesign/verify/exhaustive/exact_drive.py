@@ -1,7 +1,8 @@
 """What the firmware's drive must do, in rational numbers from the compensator: no code of the generated C.
 
 Written from what the drive functions are asked for, not from the template: the command is a position in codes that the
-ramps hold back, the side changes where that position passes the window, the dither is a square wave about the law.
+ramps hold back, it counts as zero until it leaves the zero band, the side changes where it does so on the other side,
+the dither is a square wave about the law.
 """
 
 from dataclasses import dataclass, field
@@ -27,12 +28,15 @@ class DriveModel:
     side: int = 0
     #: The place in the dither's wave.
     tick_of_wave: int = 0
+    #: Whether the command counts as zero.
+    at_rest: bool = False
     #: Command after the ramps, in codes from zero; positive commands above zero.
     position: Fraction = field(default_factory=Fraction)
 
     def __post_init__(self) -> None:
         self.both = len(self.compensator.signals.signs) == 2
-        self.side = 0 if self.both else 1
+        self.has_rest = self.compensator.zero_band_codes > 0
+        self.side, self.at_rest = 0 if self.both else 1, self.has_rest
 
     def sample(self, command: int, p_a: int, p_b: int) -> None:
         """Take new codes."""
@@ -41,16 +45,31 @@ class DriveModel:
         if not low <= command <= high:
             self.status = self._status(command, p_a, p_b, 1)
             self.law, self.side, self.position = 0, 0 if self.both else 1, Fraction(0)
+            self.at_rest = self.has_rest
             return
         away = signals.command.direction(1) * (command - signals.command.zero_code)
         if any(functions.ramp_up + functions.ramp_down):
             self._ramp(away)
             away = int(self.position)  # towards zero: never more command than the ramp has reached
-        if self.both and abs(away) > functions.window_codes:
+        if self.both and abs(away) > functions.leave_zero_codes:
             self.side = 1 if away > 0 else -1
+        if self.has_rest:
+            away = self._past_rest(away)
         code = signals.command.zero_code + signals.command.direction(1) * away
         self.status = self._status(command, p_a, p_b, self.side or 1)
         self.law = self._law(code, p_a, p_b) if self.side else 0
+
+    def _past_rest(self, away: int) -> int:
+        """Return the command that counts: it leaves its rest beyond the band's outer end, and comes back at its inner.
+
+        Driven to the other side, or not yet to any, a command is nearer to rest than any code of the band.
+        """
+        towards = away * (self.side or 1)
+        if towards > self.compensator.drive_functions.leave_zero_codes:
+            self.at_rest = False
+        if towards <= self.compensator.zero_band_codes:
+            self.at_rest = True
+        return 0 if self.at_rest else away
 
     def _ramp(self, asked: int) -> None:
         """Move towards what is asked, within the step of the side and the direction, and stop at zero on the way."""
@@ -106,4 +125,4 @@ class DriveModel:
     def state(self) -> tuple[int, ...]:
         """Everything that `struct dz_drive` holds, in its order."""
         ramped = self.position * STEP_UNIT
-        return (*self.outputs, self.law, self.side, self.tick_of_wave, int(ramped))
+        return (*self.outputs, self.law, self.side, self.tick_of_wave, int(self.at_rest), int(ramped))

@@ -1,7 +1,7 @@
 """The exactly rounded law at every code pair, computed without the firmware's arithmetic.
 
 Starts from the rationals in compensator.json and the law of `dzdesign.derivation`; along a row of constant pressure the
-law is straight in the command code up to the transition's end and beyond. No multiplication, shift or reciprocal is
+law is straight in the command code over the zero band, over the transition and beyond. No multiplication, shift or reciprocal is
 shared with the generated C.
 """
 
@@ -14,7 +14,7 @@ from dzdesign.core.errors import RequirementError
 from dzdesign.derivation.law import law
 from dzdesign.derivation.scaling import evaluate_line
 from dzdesign.design.compensator import Compensator
-from dzdesign.verify.evidence import Side
+from dzdesign.verify.loop_results import Side
 
 #: What sensor B's weight is stated over, where the two sensors count unlike (DESIGN: codes of A over 2^12).
 WEIGHT_UNIT = 4096
@@ -51,7 +51,7 @@ class ExactLaw:
         self.a, self.b = signals.pressure_a, signals.pressure_b
         self.reverse = compensator.reverse_codes
         self.turn = -1 if sign < 0 and signals.swapped else 1
-        self.transition_codes = compensator.transition_codes
+        self.zero_band, self.transition_end = compensator.zero_band_codes, compensator.transition_end
         self._law = law(compensator.law)
         self._kappa, self._u_min0 = side.drive_range_over_u_max, side.u_min0_over_u_max
         self._zero_nodes, self._law_nodes = side.beta, side.law_beta
@@ -94,7 +94,11 @@ class ExactLaw:
         return BetaNumerators(law, zero, self._denominator * self._step)
 
     def corners(self, betas: Betas) -> list[tuple[int, Fraction]]:
-        """Return the law in counts at the ends of its straight parts: zero command, transition's end, full command."""
+        """Return the law in counts at the ends of its straight parts, by the codes from zero command on.
+
+        They are zero command, the zero band's end, the transition's end and full command; up to the zero band's end,
+        `zero_band`, it is the certified beta that counts, and from the transition's end on the law's.
+        """
         line = evaluate_line(
             self._law,
             beta=betas.law,
@@ -103,9 +107,11 @@ class ExactLaw:
             n_adc=self.span,
             n_full=self.compare_max,
         )
-        corners = [(0, betas.zero * self._u_min0 * self.compare_max)]
-        if self.transition_codes:
-            corners.append((self.transition_codes, line.slope * self.transition_codes + line.start))
+        at_zero = betas.zero * self._u_min0 * self.compare_max
+        corners = [(0, at_zero)]
+        if self.transition_end:
+            corners.append((self.zero_band, at_zero))
+            corners.append((self.transition_end, line.slope * self.transition_end + line.start))
         return [*corners, (self.span, line.slope * self.span + line.start)]
 
     def compare_value(self, command_code: int, corners: list[tuple[int, Fraction]]) -> int:

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from dzdesign.design.compensator import Compensator
-from dzdesign.verify.evidence import Side
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import Differences, differences
 from dzdesign.verify.exhaustive.zero_command import Staircase, guarded_bounds, pressure_drops
+from dzdesign.verify.loop_results import Side
 from dzdesign.verify.toolchain.compiled_core import SOURCES
 from dzdesign.verify.toolchain.host_compiler import load_library
 

@@ -14,7 +14,7 @@ from dzdesign.verify.exhaustive.exact_law import ExactLaw
 
 #: Codes beyond the converter's range: the largest that 16 bits hold.
 OUTSIDE = 65535
-PARTS, TURNS = 6, 4
+PARTS, TURNS = 8, 6
 #: Remainders and their sums fit 64 bits with a sign below this.
 LARGEST_DENOMINATOR = 2**62
 #: Of a sample: rows and places (commands), and which of the codes of 16 bits; 257 divides 65535.
@@ -140,8 +140,8 @@ class PreparedInputs:
         scale = lcm(2, *(each for _, none, more in lines for each in (none.denominator, more.denominator * self._unit)))
         law, zero = both.astype(object)
         corners = []
-        for place, (away, none, more) in enumerate(lines):
-            beta = law if place else zero  # zero command has the certified beta
+        for away, none, more in lines:
+            beta = law if away > self.exact.zero_band else zero  # zero command has the certified beta
             corners.append((away, beta * int(more * scale / self._unit) + int(none * scale) + scale // 2))
         return scale, corners
 

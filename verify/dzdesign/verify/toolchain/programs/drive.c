@@ -6,12 +6,12 @@
 
 #include "dz_drive.h"
 
-#define FIELDS 7
+#define FIELDS 8
 
 static long wrong_field(const struct dz_drive *drive, const int32_t *expected)
 {
     const int32_t found[FIELDS] = {drive->compare_a, drive->compare_b, drive->status, drive->law,
-                                   drive->side,      drive->ticks,     drive->ramped};
+                                   drive->side,      drive->ticks,     drive->at_rest, drive->ramped};
 
     for (long field = 0; field < FIELDS; field++) {
         if (found[field] != expected[field]) {
@@ -48,17 +48,18 @@ static int run(FILE *file)
     struct comparison found = {0, 0, 0, 0};
     int whole = 1;
     uint16_t *codes;
-    int32_t *places;
+    int32_t *places, *words; /* where the ramp is put before each sample, and side and rest */
     struct dz_drive drive;
 
     if (fread(head, sizeof head, 1, file) != 1 || head[0] < 1) {
         return 2;
     }
     codes = malloc((size_t)head[0] * 6u + 2u);
-    places = malloc((size_t)head[0] * sizeof *places);
+    places = malloc(2u * (size_t)head[0] * sizeof *places);
+    words = places + head[0];
     /* The codes fill whole words. */
     if (codes == NULL || places == NULL || fread(codes, ((size_t)head[0] * 6u + 3u) & ~(size_t)3u, 1, file) != 1 ||
-        fread(places, (size_t)head[0] * sizeof *places, 1, file) != 1) {
+        fread(places, 2u * (size_t)head[0] * sizeof *places, 1, file) != 1) {
         free(codes);
         free(places);
         return 2;
@@ -71,6 +72,10 @@ static int run(FILE *file)
         if (sample >= 0) {
             if (places[sample] != INT32_MIN) {
                 drive.ramped = places[sample]; /* a slow ramp is put where samples would take minutes to bring it */
+            }
+            if (words[sample] != INT32_MIN) {
+                drive.side = (int16_t)(words[sample] / 2 - 1);
+                drive.at_rest = (uint16_t)(words[sample] % 2);
             }
             dz_drive_sample(&drive, codes[3 * sample], codes[3 * sample + 1], codes[3 * sample + 2]);
         }

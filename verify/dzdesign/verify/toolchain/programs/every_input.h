@@ -11,8 +11,8 @@
 #define DZ_TABLE
 #endif
 
-#define DZ_MAX_PARTS 6
-#define DZ_MAX_TURNS 4
+#define DZ_MAX_PARTS 8
+#define DZ_MAX_TURNS 6
 /* Sampled commands of a row. */
 #define DZ_MAX_PLACES 256
 

@@ -1,0 +1,99 @@
+"""The law of one sign of command, and what is proved about its offset: what `Compensator` is made of."""
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Annotated
+
+from msgspec import Meta
+
+from dzdesign.core.artefact_types import RuleError, quantity
+from dzdesign.identify.valve.guard_curve import Guard
+
+Node = Annotated[int, Meta(ge=1, le=2**31)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Certificate:
+    """What is proved about the offset of one side, on the integers, at every pressure code of the interval."""
+
+    confidence: Annotated[
+        float, quantity("1", "Confidence with which the threshold's lower bounds hold together.", ge=0.5, le=1)
+    ]
+    guard: Annotated[Guard, Meta(description="The threshold that they bound.")]
+    level_L_min: Annotated[
+        float,
+        quantity("L/min", "Flow that counted as flow when the thresholds were identified.", ge=0, le=1e6),
+    ]
+    dp_MPa: Annotated[tuple[Fraction, Fraction], quantity("MPa", "Interval of the pressure drop on which it holds.")]
+    smallest_margin_V: Annotated[
+        Fraction, quantity("V", "Smallest distance from the offset to the lower bound, over all those codes.")
+    ]
+    mean_loss_V: Annotated[
+        float,
+        quantity(
+            "V",
+            "By how much the table's offset stays under the certified curve on average: the price of few nodes, "
+            "rounding, the converter's error and the dither.",
+            ge=-1e6,
+            le=1e6,
+        ),
+    ]
+    largest_loss_V: Annotated[float, quantity("V", "The same at most.", ge=-1e6, le=1e6)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SideLaw:
+    """The law of one sign of command."""
+
+    drive_range_over_u_max: Annotated[
+        Fraction,
+        quantity(
+            "1",
+            "k x_max / u_max of the law: command from its offset u_min0 to full flow, over full command. In valve.json "
+            "k x_max counts from the knee, which lies higher.",
+        ),
+    ]
+    u_min0_over_u_max: Annotated[Fraction, quantity("1", "The law's offset at dP0 over full command.")]
+    beta: Annotated[
+        tuple[Node, ...],
+        Meta(
+            description="Nodes of beta at zero command, certified, over `beta_denominator`: at pressure codes 0, "
+            "`beta_step_codes`, twice that, ...; straight between them."
+        ),
+    ]
+    transition_beta: Annotated[
+        tuple[Node, ...] | None,
+        Meta(
+            description="With a transition: nodes of the opening threshold's beta, that the law follows beyond it; "
+            "none below the certified."
+        ),
+    ] = None
+    certificate: Annotated[Certificate, Meta(description="What is proved.")]
+
+    def __post_init__(self) -> None:
+        if not 0 < self.u_min0_over_u_max < 1:
+            raise RuleError(f"u_min0 is {float(self.u_min0_over_u_max):.3f} of u_max, expected between 0 and 1")
+        if not 0 < self.drive_range_over_u_max <= 10**3:
+            raise RuleError("k x_max/u_max must be positive")
+        if self.transition_beta is not None:
+            if len(self.transition_beta) != len(self.beta):
+                raise RuleError("the transition's beta must have as many nodes as the certified one")
+            if any(upper < lower for upper, lower in zip(self.transition_beta, self.beta, strict=True)):
+                raise RuleError(
+                    "the transition's beta lies below the certified one, expected the opening threshold above"
+                )
+
+    @property
+    def law_beta(self) -> tuple[int, ...]:
+        """Nodes of the beta that the law follows beyond the transition; without one the certified beta itself."""
+        return self.beta if self.transition_beta is None else self.transition_beta
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sides:
+    """The law of each sign of command."""
+
+    positive: Annotated[SideLaw, Meta(description="Of positive commands.")]
+    negative: Annotated[
+        SideLaw | None, Meta(description="Of negative commands, of a valve with two solenoids; null: none.")
+    ] = None

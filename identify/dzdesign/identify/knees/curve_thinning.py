@@ -1,0 +1,139 @@
+"""A recorded branch as few points: straight lines through its averaged flow, halved where they depart from it."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+
+from dzdesign.identify.constants import L_MIN, MPA
+from dzdesign.identify.knees.branch_shape import BranchShape
+from dzdesign.identify.knees.described_tests import DescribedTest
+from dzdesign.identify.knees.noise import robust_sigma
+from dzdesign.identify.knees.profile import smooth_profile
+from dzdesign.identify.ramps.branches import Branch
+from dzdesign.identify.valve.recorded_curve import MOST_POINTS, SAG_STEPS, RecordedBranch, RecordedCurve
+
+#: A line between two points is halved where the flow, averaged over so many bins (0.5 % of full command), departs from
+#: it by more than this share of the test's largest flow, and by more than its own noise explains, standard errors.
+AVERAGED, TOLERANCE, NOISE_ERRORS = 5, 2.5e-3, 4.0
+#: Decimals of a point, V and L/min: far below what a recording tells.
+COMMAND_DIGITS, FLOW_DIGITS = 4, 4
+
+
+def recorded_curve(item: DescribedTest, leak: float, noise_level: float, u_max: float) -> RecordedCurve:
+    """Return the characteristic that the ramps of a test show; leak and noise level in m³/s."""
+    profiles = [_profile(shape, leak, u_max) if shape else None for shape in item.shapes]
+    tolerance = TOLERANCE * max(float(profile[1].max()) for profile in profiles if profile)
+    rising, falling = (
+        profile and _thinned(*profile, leak=leak, level=noise_level, tolerance=tolerance) for profile in profiles
+    )
+    curve = RecordedCurve(rising=rising, falling=falling, dp_at_flow_MPa=None)
+    branches = [shape.prepared.branch for shape in item.branches]
+    return RecordedCurve(rising=rising, falling=falling, dp_at_flow_MPa=_sag(branches, leak, curve.q_max_L_min))
+
+
+def _profile(shape: BranchShape, leak: float, u_max: float) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return command and flow in bins of the command, as recorded, and where flow begins: no later than the knee.
+
+    Of a noisy meter the first flow that stands out comes after the knee, and the valve is no sharper for that.
+    """
+    flow = shape.prepared.branch.q + leak
+    return *smooth_profile(shape.prepared.branch.u, flow, u_max), min(shape.onset, shape.knee)
+
+
+def _thinned(
+    u: np.ndarray, q: np.ndarray, onset: float, *, leak: float, level: float, tolerance: float
+) -> RecordedBranch:
+    """Return the points of a branch whose flow q (m³/s) was averaged in bins of the command."""
+    at, q_at = _points(u, q, tolerance)
+    u_seen = _first_seen(u[at], q_at, level)
+    lowest, seen = float(u[0]), u[at] > u_seen
+    points = [(u_seen, level), *zip(u[at][seen].tolist(), np.maximum(q_at[seen], 0.0).tolist(), strict=True)]
+    if u_seen > lowest:
+        base = min(leak, level)
+        # What lies below the level comes to the leak at the onset, which no recorded flow contradicts.
+        zero = min(max(onset, lowest), u_seen)
+        points = [(lowest, base), (zero, base), *points]
+    else:
+        points = list(zip(u[at].tolist(), np.maximum(q_at, 0.0).tolist(), strict=True))
+    # Of two points at one command, as of an onset at the first flow seen, the later one stands for both.
+    kept = {round(command, COMMAND_DIGITS): round(flow / L_MIN, FLOW_DIGITS) for command, flow in points}
+    commands, flows = np.array(list(kept)), np.array(list(kept.values()))
+    misses = _averaged(np.where(u >= u_seen, q / L_MIN - np.interp(u, commands, flows), 0.0))
+    return RecordedBranch(
+        u_V=tuple(commands.tolist()),
+        q_L_min=tuple(flows.tolist()),
+        u_seen_V=round(u_seen, COMMAND_DIGITS),
+        error_L_min=round(float(np.abs(misses).max()), FLOW_DIGITS),
+    )
+
+
+def _points(u: np.ndarray, q: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return at which bins the points stand, and the flow there: least squares, halved until the lines fit."""
+    # Of neighbouring bins on a straight line the second difference is noise alone, of six times its variance.
+    noise = robust_sigma(np.diff(q, 2)) / math.sqrt(6) if q.size > 2 else 0.0
+    allowed = max(tolerance, NOISE_ERRORS * noise / math.sqrt(AVERAGED))
+    at = np.unique(np.linspace(0, u.size - 1, min(9, u.size)).round().astype(int))
+    while True:
+        flows = _least_squares(u, q, at)
+        misses = np.abs(_averaged(q - np.interp(u, u[at], flows)))
+        wide = np.diff(at) > 1
+        worst = np.array([misses[left : right + 1].max() for left, right in pairwise(at)])
+        halved = np.flatnonzero(wide & (worst > allowed))
+        room = MOST_POINTS - at.size
+        if not halved.size or room <= 0:
+            return at, flows
+        halved = halved[np.argsort(-worst[halved], kind="stable")[:room]]
+        at = np.sort(np.concatenate([at, (at[halved] + at[halved + 1]) // 2]))
+
+
+def _least_squares(u: np.ndarray, q: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Return the flows at the points whose straight lines come nearest to the flow of all bins."""
+    segment = np.clip(np.searchsorted(at, np.arange(u.size), side="right") - 1, 0, at.size - 2)
+    left, right = u[at[segment]], u[at[segment + 1]]
+    share = (u - left) / (right - left)
+    size = at.size
+    normal = np.zeros((size, size))
+    for row, column, weight in (
+        (segment, segment, (1 - share) ** 2),
+        (segment, segment + 1, (1 - share) * share),
+        (segment + 1, segment, (1 - share) * share),
+        (segment + 1, segment + 1, share**2),
+    ):
+        np.add.at(normal, (row, column), weight)
+    wanted = np.zeros(size)
+    np.add.at(wanted, segment, (1 - share) * q)
+    np.add.at(wanted, segment + 1, share * q)
+    return np.linalg.solve(normal, wanted)
+
+
+def _averaged(values: np.ndarray) -> np.ndarray:
+    """Return means over `AVERAGED` neighbouring bins, at the middle one; of fewer bins the mean of all."""
+    if values.size < AVERAGED:
+        return np.full(values.size, values.mean())
+    inner = np.convolve(values, np.full(AVERAGED, 1 / AVERAGED), mode="valid")
+    return np.pad(inner, AVERAGED // 2, mode="edge")
+
+
+def _first_seen(u: np.ndarray, q: np.ndarray, level: float) -> float:
+    """Return the command beyond which the flow stays at the level or above; the first where it always does."""
+    below = np.flatnonzero(q < level)
+    if not below.size:
+        return float(u[0])
+    last = int(below[-1])
+    if last + 1 == u.size:
+        return float(u[-1])
+    return float(np.interp(level, q[last : last + 2], u[last : last + 2]))
+
+
+def _sag(branches: list[Branch], leak: float, q_max_L_min: float) -> tuple[float, ...] | None:
+    """Return the pressure drop at equal steps of the flow, MPa: medians about them, straight between those."""
+    if any(branch.dp is None for branch in branches):
+        return None
+    dp = np.concatenate([branch.dp for branch in branches if branch.dp is not None])
+    steps = np.concatenate([branch.q + leak for branch in branches]) / (q_max_L_min * L_MIN) * SAG_STEPS
+    found = {
+        step: float(np.median(dp[near])) for step in range(SAG_STEPS + 1) if (near := np.abs(steps - step) < 0.25).any()
+    }
+    nodes = np.interp(np.arange(SAG_STEPS + 1), list(found), list(found.values()))
+    return tuple(round(float(node) / MPA, FLOW_DIGITS) for node in nodes)
