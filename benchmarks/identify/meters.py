@@ -87,10 +87,10 @@ def _valve(case: Case, rng: np.random.Generator) -> tuple[bool, bool, float, flo
     tests = [_ramp(case, dp, edge + slope * (dp - 1), rng) for dp in PRESSURES_MPa]
     model = identify(tests, IdentifyOptions(meter_lag=case.declared, repeatability=0.0))
     side = model.positive
-    curve, up = side.guards[case.guard], {"closing": 0.0, "mean": 0.5, "opening": 1.0}[case.guard]
+    curve, up = side.certified[case.guard], {"closing": 0.0, "mean": 0.5, "opening": 1.0}[case.guard]
     worst, losses = 0.0, []
     for dp in np.linspace(PRESSURES_MPa[0], PRESSURES_MPa[-1], 9).tolist():
-        offset = float(np.interp(dp, curve.beta_dp_MPa, curve.u_offset_V))
+        offset = float(np.interp(dp, curve.dp_MPa, curve.u_offset_V))
         threshold = edge + slope * (dp - 1) + up * HYSTERESIS_V
         worst = max(worst, float(_flow(case, dp, np.array(offset - threshold))))
         losses.append(threshold - offset)

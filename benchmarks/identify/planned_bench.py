@@ -58,6 +58,6 @@ class PlannedBench:
     def distance(self, valve):
         """Return the mean distance of the certified offset below the threshold over the tested pressure drops, V."""
         curve = valve.positive.curve
-        nodes = np.array(curve.beta_dp_MPa)
+        nodes = np.array(curve.dp_MPa)
         dp = np.linspace(nodes[0], nodes[-1], 201)
         return float(np.mean(self.threshold(dp) - np.interp(dp, nodes, curve.u_offset_V)))

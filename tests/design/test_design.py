@@ -103,9 +103,9 @@ def test_document_round_trip(example_compensator):
 
 def with_curve(side, **changes):
     """Return a side whose closing curve is changed."""
-    curve = dataclasses.replace(side.guards["closing"], **changes)
+    curve = dataclasses.replace(side.certified["closing"], **changes)
     reference = dataclasses.replace(side.reference, u_min_V=curve.u_min0_V)
-    return dataclasses.replace(side, guards={**side.guards, "closing": curve}, reference=reference)
+    return dataclasses.replace(side, certified={**side.certified, "closing": curve}, reference=reference)
 
 
 def test_a_valve_file_that_contradicts_itself_is_refused(example_valve, wording):

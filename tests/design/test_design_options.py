@@ -102,7 +102,7 @@ def test_a_side_that_is_left_out_is_named(run):
 
 def test_a_guard_that_one_side_lacks_is_refused_with_those_that_serve_both(run, tmp_path):
     document = json.loads(BOTH_SIDES.read_text())
-    del document["sides"]["negative"]["guards"]["mean"]
+    del document["sides"]["negative"]["certified"]["mean"]
     valve = tmp_path / "valve.json"
     valve.write_text(json.dumps(document))
     status, said, _ = run(valve, BOTH_SIGNS, "--guard", "mean")

@@ -107,7 +107,7 @@ def _side_model(
     described, trend = group.tests, guarding.trend
     guard = next(iter(certified))
     curves = {name: certified[name].curve for name in GUARDS if name in certified}
-    joint = identify_curve(group, knees, curves[guard].premise, reference, options)
+    joint = identify_curve(group, guarding.free, curves[guard].premise, reference, options)
     dp0 = described[reference].dp
     several = len(described) > 1
     k_mm = 1 / (options.x_max * 1e3) if options.x_max else None

@@ -29,7 +29,7 @@ def two_sided(example_valve):
             u_lower_V=tuple(bound - 0.2 for bound in curve.u_lower_V),
             u_threshold_V=tuple(threshold - 0.2 for threshold in curve.u_threshold_V),
         )
-        for name, curve in side.guards.items()
+        for name, curve in side.certified.items()
     }
     opening = dataclasses.replace(side.opening_curve, u_V=tuple(u - 0.2 for u in side.opening_curve.u_V))
     tests = tuple(

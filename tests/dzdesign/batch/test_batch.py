@@ -207,8 +207,8 @@ def offsets_above_their_bounds(common, made: Path, names) -> list[str]:
     found = []
     for name in names:
         side = json.loads((made / "valves" / name / "valve.json").read_text())["sides"]["positive"]
-        curve = side["guards"]["closing"]
-        nodes = [Fraction(repr(value)) for value in curve["beta_dp_MPa"]]
+        curve = side["certified"]["closing"]
+        nodes = [Fraction(repr(value)) for value in curve["dp_MPa"]]
         for code in range(common.signals.code_max + 1):
             dp = common.signals.dp_MPa(code)
             bounds = [

@@ -46,9 +46,14 @@ def find_warnings(
         *about_the_meter(side, group, options),
         *about_ramps(side.certificate.repeatability, _checks(side, group), group.tests, options),
         *(
-            warn("not-monotone", test.source, gap_mV=1e3 * float(gap))
+            warn(
+                "not-monotone",
+                test.source,
+                "premise" if side.curve.premise == "monotone" else "other-premise",
+                gap_mV=1e3 * float(gap),
+            )
             for test, gap in zip(side.tests, departure, strict=True)
-            if gap > 0 and side.curve.premise == "monotone"
+            if gap > 0
         ),
         *([_about_premise(side, refused)] if refused else []),
         *(
