@@ -30,6 +30,8 @@ def _about_one(test: RampTest) -> Iterator[Finding]:
         yield warn("side-refused", test.source, side=test.side_without_dp, reason=reason)
     if test.no_values:
         yield warn("missing-samples", test.source, numbers=test.no_values)
+    if test.cut:
+        yield warn("cut-ramp", test.source, ramps="; ".join(test.cut))
     if test.run > 1:
         yield warn("thinned", test.source, rows=test.rows_read, run=test.run, samples=test.time.size)
 

@@ -198,9 +198,14 @@ def _in_order_of_pressure(pooled: list[PooledTest]) -> list[PooledTest]:
 def _refuse_mixed_branches(described: list[DescribedTest]) -> None:
     """Refuse tests of which some have a branch that others lack: they can't be compared."""
     for column, name in ((0, "rising"), (1, "falling")):
-        lacking = [item.test.source for item in described if item.shapes[column] is None]
+        lacking = [item for item in described if item.shapes[column] is None]
         if lacking and len(lacking) < len(described):
-            raise InputError(
-                f"'{lacking[0]}' has no {name} branch while other ramp tests have one; "
+            by_option = next((part for part in lacking[0].left_out if part.reason == "option"), None)
+            remedy = (
                 "record every pressure drop up and down, or leave that file out"
+                if by_option is None
+                else f"--from and --to leave out {by_option.from_s:.1f} to {by_option.to_s:.1f} s of it, and with that "
+                "a branch: choose seconds before and after a whole ramp, or leave that file out"
             )
+            source = lacking[0].test.source
+            raise InputError(f"'{source}' has no {name} branch while other ramp tests have one; {remedy}")

@@ -60,6 +60,8 @@ class RampTest:
     left_out: tuple[LeftOut, ...] = ()
     #: Units of the file's columns, each once; `u`, `dp` and `q` are in SI.
     units: Mapping[Quantity, tuple[Unit, ...]] = field(default_factory=dict)
+    #: Ramps that this cuts, each with the branches of it that are lost: ``ramp 2, 12.3 to 62.1 s (falling)``.
+    cut: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for array in (self.time, self.u, self.q, self.dp):
