@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from dzdesign.core.errors import InputError, one_line
 from dzdesign.core.options import Paths, Table, paths_of
 from dzdesign.core.recorded_units import AS_COMPUTED
+from dzdesign.core.strict_templates import strict_templates
 from dzdesign.stages.recordings import distinct_names, expand, read_recordings, refuse_copies
 from dzdesign.terminal.progress import say, stage_progress, with_bar
 
@@ -238,13 +239,8 @@ def _summary(
 
 
 def _rendered(**content: object) -> str:
-    import jinja2
-
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("dzdesign.initial_options", "templates"),
-        undefined=jinja2.StrictUndefined,
-        keep_trailing_newline=True,
-        trim_blocks=True,
+    environment = strict_templates(
+        "dzdesign.initial_options",
         lstrip_blocks=True,
         finalize=lambda value: one_line(str(value)),  # labels come from the recordings
     )
