@@ -115,7 +115,7 @@ def identify(arguments: IdentifyArguments) -> "ValveModel":
         sample_rate=arguments.sample_rate, skip_rows=arguments.skip_rows,
     )  # fmt: skip
     refuse_copies(tests)
-    tests = in_order(parts_of(tests, arguments.from_, arguments.to), paths, arguments.order)
+    tests = in_order(parts_of(tests, arguments.from_, arguments.to, options.u_max), paths, arguments.order)
     with stage_progress(f"fitting {len(tests)} recording{'s' if len(tests) > 1 else ''}"):
         found = identify_sides(tests, options, record)
     write_results(found.model, arguments.output, arguments.plots, lambda: plot_files(found))

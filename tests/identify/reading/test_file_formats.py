@@ -174,7 +174,7 @@ UTC, LOCAL = "2026-03-01 08:00:00.5Z", "2026-03-01 08:00:00.5"
         (zoned("UTC"), UTC),
         (zoned("Asia/Tokyo"), UTC),
         (zoned("America/New_York", "write_ipc"), UTC),
-        (frame("write_parquet", timed((DATES - BEGUN))), ""),
+        (frame("write_parquet", timed(DATES - BEGUN)), ""),
         (of_hdf5({"units": "seconds since 2026-03-01 08:00:00.5"}), UTC),
         (of_hdf5({"units": "s since 2026-03-01T10:00:00.5+02:00"}), UTC),
         (of_hdf5({"units": "seconds since 2026-03-01"}), "2026-03-01 00:00:00Z"),

@@ -13,7 +13,7 @@ from dzdesign.identify.knees.line_fitting import inflation_by_blocks
 from dzdesign.identify.knees.linear_region import StraightParts, find_straight_parts
 from dzdesign.identify.knees.noise import measure_roughness, robust_sigma, variance_inflation
 from dzdesign.identify.knees.profile import crossing, hole_within
-from dzdesign.identify.knees.spool_ripple import spool_ripple
+from dzdesign.identify.knees.spool_ripple import spool_ripples
 from dzdesign.identify.ramps.branches import bin_branch
 
 #: Standard deviations of a shut reading above which the mean of a bin is flow.
@@ -42,10 +42,16 @@ def describe_branches(
     `noise_level` and errors are those of `find_straight_parts`.
     """
     parts = find_straight_parts(reads, u_max=u_max, window=window, noise_level=noise_level)
-    return [_describe(parts, index, read, longest_lag, u_max) for index, read in enumerate(reads)]
+    ripples = spool_ripples(reads, parts.lines, u_max)
+    return [
+        _describe(parts, index, read, ripple, longest_lag, u_max)
+        for index, (read, ripple) in enumerate(zip(reads, ripples, strict=True))
+    ]
 
 
-def _describe(parts: StraightParts, index: int, read: PreparedBranch, longest_lag: float, u_max: float) -> BranchShape:
+def _describe(
+    parts: StraightParts, index: int, read: PreparedBranch, ripple: float, longest_lag: float, u_max: float
+) -> BranchShape:
     line, level, noise = parts.lines[index], parts.levels[index], parts.noises[index]
     branch, kept = read.branch, line.kept
     dead_zone = look_into_dead_zone(
@@ -80,7 +86,7 @@ def _describe(parts: StraightParts, index: int, read: PreparedBranch, longest_la
         tail=tail,
         onset=onset,
         onset_se=onset_se,
-        ripple=spool_ripple(read, line, u_max),
+        ripple=ripple,
         saturates=read.y_max < 0.93 * line.slope * (branch.u.max() - line.knee),
     )
 

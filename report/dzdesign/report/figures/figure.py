@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.identify.plots.frame import HUES
 
 if TYPE_CHECKING:
@@ -161,9 +162,9 @@ def side_words(name: str, both: bool) -> str:
     return f", {name} commands" if both else ""
 
 
-def span(values: "Sequence[float] | np.ndarray", unit: str, digits: int) -> str:
+def span(values: "Sequence[float] | np.ndarray", form: str, units: RecordedUnits) -> str:
     """Return from where to where values run, with their unit."""
-    return f"{min(values):.{digits}f} to {max(values):.{digits}f} {unit}"
+    return f"{units.number(min(values), form)} to {units.text(max(values), form)}"
 
 
 def legend_below(figure: "Figure", columns: int) -> None:
