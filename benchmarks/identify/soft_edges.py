@@ -2,15 +2,16 @@
 
 Each valve is drawn at random (notch or rounded edge, noise, rate, repeats, lag, floor), recorded on a simulated bench,
 identified, and closed (or opened) once more at every tested pressure drop: the true flow there at the law's offset is
-compared with the stated level. The spool is a play in NumPy, the meter a filter in SciPy: no code of the plant, of the
-law or of the fit. Sharp edges of the same draws tell what the guard against soft ones costs.
+compared with the stated level. Spool and meter are those of `bench_plant`, which knows nothing of the law or of the
+fit. Sharp edges of the same draws tell what the guard against soft ones costs.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.signal import lfilter
+from bench_plant import commanded, lagged, ramp, with_play
+from recorded_ramps import L_MIN, recorded
 from scoreboard import Row, print_rows, say
 
 from dzdesign.identify.identification import identify
@@ -18,7 +19,6 @@ from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.guard_curve import Guard
 
-L_MIN, MPA = 1e-3 / 60, 1e6
 PRESSURES_MPa = (1.0, 2.0, 3.0, 4.0, 5.0)
 RATE_Hz, HOLD_S, PLAY_V, GAIN = 50, 2, 0.15, 3.2
 #: Of 200 valves.
@@ -162,22 +162,19 @@ def _edge(dp_MPa: float) -> float:
 
 
 def _ramp(valve: Drawn, dp_MPa: float, source: str, started: float, rng: np.random.Generator) -> RampTest:
-    up, rest = np.linspace(0, 10, round(valve.ramp_s * RATE_Hz)), np.zeros(HOLD_S * RATE_Hz)
-    u = np.concatenate([rest, up, up[::-1], rest])
-    # Up the spool trails by its play, from the top on it takes the same play up.
-    spool = np.concatenate([rest, up - PLAY_V, np.minimum(up[-1] - PLAY_V, up[::-1]), rest])
-    q = valve.flow(dp_MPa, spool - _edge(dp_MPa) - valve.scatter * rng.standard_normal())
+    _, u = commanded(ramp(valve.ramp_s, before=HOLD_S, at_top=0.0, after=HOLD_S), RATE_Hz)
+    closes = _edge(dp_MPa) + valve.scatter * rng.standard_normal()
+    q = valve.flow(dp_MPa, with_play(u, PLAY_V) - PLAY_V / 2 - closes)
     if valve.lag:
-        share = 1 - np.exp(-1 / (valve.lag * RATE_Hz))
-        q = lfilter([share], [1, share - 1], q)
-    q = q + valve.noise * rng.standard_normal(u.size)
-    q[np.abs(q) < valve.floor] = 0.0
-    return RampTest(
-        source=source,
-        sha256=f"{int(rng.integers(1 << 40)):064x}",
-        time=np.arange(u.size) / RATE_Hz,
-        u=u + 2e-3 * rng.standard_normal(u.size),
-        q=q * L_MIN,
-        dp=dp_MPa * MPA * (1 + 2e-3 * rng.standard_normal(u.size)),
+        q = lagged(q, valve.lag * RATE_Hz)
+    test = recorded(
+        source,
+        u + 2e-3 * rng.standard_normal(u.size),
+        q,
+        dp_MPa,
+        rate_Hz=RATE_Hz,
+        noise=valve.noise,
+        rng=rng,
         started=started,
     )
+    return replace(test, q=np.where(np.abs(test.q) < valve.floor * L_MIN, 0.0, test.q))

@@ -81,6 +81,7 @@ class TestSimulated:
         (warning,) = warned(identify(tests), "simulated")
         wording.of_test(str(warning.text))
 
+    @pytest.mark.slow
     def test_the_firmware_and_the_report_say_so_and_those_of_a_measured_valve_do_not(self):
         for simulated in (True, False):
             valve = identify([replace(valve_at(dp), simulated=simulated) for dp in PRESSURES])
@@ -137,6 +138,7 @@ class TestBranchOrder:
         compensator = design(crossed, DesignOptions(accept=("branch-order",)))
         assert any(line.startswith("accepted, branch-order: at 1.00, 2.00, 4.00 MPa") for line in compensator.costs)
 
+    @pytest.mark.slow
     def test_the_report_says_so_beside_the_verdict_and_beside_the_warning(self, crossed):
         """The warning was written before anybody accepted it."""
         options = options_of({"accept": "branch-order"}, target_named("f28335").inputs())

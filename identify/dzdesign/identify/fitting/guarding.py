@@ -110,7 +110,8 @@ def order_knees(
 
 
 def bound_threshold(group: DescribedTests, knees: OrderedKnees, options: IdentifyOptions) -> Threshold:
-    """Bound the knee, or the tail's zero where that lies below the knee by more than its error: a soft edge."""
+    """Bound the knee, or below it what a soft edge still passes: the tail's zero, if that lies below by more than its
+    error, and where the flow falls to the noise level."""
     shapes = [item.branch(knees.column) for item in group.tests]
     knee, knee_se = knees.knee, knees.knee_se
     zero = np.array([shape.tail.zero for shape in shapes])

@@ -43,6 +43,10 @@ PALETTE = {name: (light, DARK[name]) for name, light in LIGHT.items()}
 #: For a series over the pressure drop: hues in turn.
 CYCLE = ("blue", "vermilion", "green", "purple", "orange", "ink")
 WIDTH = 7.4
+#: Left margin, and the width of numbers on the axis for which it has room: of ``5.150``.
+LEFT, TICKS_IN_MARGIN = 0.6, 0.345
+#: Of the numbers on axes, points.
+TICK_SIZE = 8.5
 #: Of Matplotlib, while a figure is drawn.
 STYLE = {
     "font.family": "DejaVu Sans",
@@ -50,8 +54,8 @@ STYLE = {
     "axes.labelsize": 9,
     "axes.titlesize": 9.5,
     "axes.titlelocation": "left",
-    "xtick.labelsize": 8.5,
-    "ytick.labelsize": 8.5,
+    "xtick.labelsize": TICK_SIZE,
+    "ytick.labelsize": TICK_SIZE,
     "legend.fontsize": 8.5,
     "legend.frameon": False,
     "axes.grid": True,
@@ -141,7 +145,7 @@ def new_figure(height: float, *, legend_rows: int = 0, right: float = 0.2, top: 
     FigureCanvasSVG(figure)
     bottom = 0.5 + (0.1 + 0.2 * legend_rows if legend_rows else 0.0)
     figure.subplots_adjust(
-        left=0.6 / WIDTH, right=1 - right / WIDTH, bottom=bottom / height, top=1 - top / height
+        left=LEFT / WIDTH, right=1 - right / WIDTH, bottom=bottom / height, top=1 - top / height
     )
     return figure
 
@@ -192,9 +196,23 @@ def label_ends(axes: "Axes", labels: Sequence[tuple[float, float, str, str]]) ->
 
 def to_report_figure(figure: "Figure", name: str, caption: str, description: str, csv: str) -> ReportFigure:
     """Return a figure as the page shows it; see `ReportFigure`."""
+    _make_room_for_ticks(figure)
     return ReportFigure(
         name=name, caption=caption, description=description, svg=_svg_of(figure, name, description), csv=csv
     )
+
+
+def _make_room_for_ticks(figure: "Figure") -> None:
+    """Widen the margin of a single panel whose numbers are wider than the usual ones: counts, or many digits."""
+    if len(figure.axes) != 1:
+        return
+    low, high = sorted(figure.axes[0].get_ylim())
+    ticks = [tick for tick in figure.axes[0].get_yticks() if low <= tick <= high]
+    labels = figure.axes[0].yaxis.get_major_formatter().format_ticks(ticks)
+    em = max((sum(0.32 if sign in ".," else 0.64 for sign in label) for label in labels), default=0.0)
+    surplus = TICK_SIZE * em / 72 - TICKS_IN_MARGIN
+    if surplus > 0:
+        figure.subplots_adjust(left=(LEFT + surplus + 0.04) / WIDTH)
 
 
 def _svg_of(figure: "Figure", name: str, description: str) -> str:
