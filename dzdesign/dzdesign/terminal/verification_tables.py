@@ -113,7 +113,7 @@ def _figures(result: "ScenarioResult") -> str:
         name = key.removeprefix(start).removesuffix(end).replace("_", " ")
         # A change of flow may well be small; a flow that the recordings can't show is no small one.
         hidden = unseen is not None and name.endswith("flow") and value < unseen
-        groups[start].append(f"{name} {result.in_words(value) if hidden else f'{value:.3g}'}{UNITS[end]}")
+        groups[start].append(f"{name} {result.in_words(value, AS_COMPUTED) if hidden else f'{value:.3g}'}{UNITS[end]}")
     return "; ".join(VALVES[start] + ", ".join(each) for start, each in groups.items() if each)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.compensator import Compensator
-from dzdesign.identify.plots.valve_curves import BRANCHES, draw_beta, draw_thresholds
+from dzdesign.identify.plots.valve_curves import BOUND_NAMES, BRANCHES, draw_beta, draw_thresholds
 from dzdesign.identify.valve.side_model import SideModel
 from dzdesign.report.compensator_sides import laws_of
 from dzdesign.report.figures.figure import (
@@ -114,13 +114,20 @@ def beta_figure(
     None of a valve tested at one pressure drop.
     """
     curve = side.certified[guard]
-    if len(curve.beta) < 2:
+    if len(curve.dp_MPa) < 2:
         return None
-    dp, u_min0 = np.array(curve.beta_dp_MPa), curve.u_min0_V
+    dp, u_min0 = np.array(curve.dp_MPa), side.reference.u_min_V
     figure, axes = titled_axes(3.6, name, both, legend_rows=2)
-    draw_beta(axes, curve, units)
-    pairs = zip(dp.tolist(), curve.beta, strict=True)
-    rows = [["valve", at, value, round(value * u_min0, 7)] for at, value in pairs]
+    draw_beta(axes, side, curve, units)
+    rows: list[list[str | float | None]] = [
+        [f"identified, {branch}", at, value, se, volts]
+        for branch, found in side.identified.items()
+        for at, value, se, volts in zip(found.dp_MPa, found.beta, found.beta_se, found.u_V, strict=True)
+    ]
+    rows += [
+        ["certified", at, round(volts / u_min0, 7), None, volts]
+        for at, volts in zip(curve.offset_dp_MPa, curve.offset_V, strict=True)
+    ]
     if compensator:
         where, nodes, of_the_C = _beta_table(compensator, name)
         table = nodes * of_the_C / u_min0  # with a transition the C counts from the opening threshold
@@ -128,19 +135,21 @@ def beta_figure(
         shown = units.convert(where[near], "MPa")
         axes.plot(shown, table[near], ".-", color=LIGHT["ink"], ms=4, lw=1, label="the C's offset / u_min0")
         rows += [
-            ["C", round(float(x), 6), round(float(y), 7), round(float(y * of_the_C), 7)]
+            ["C", round(float(x), 6), round(float(y), 7), None, round(float(y * of_the_C), 7)]
             for x, y in zip(where, nodes, strict=True)
         ]
     legend_below(figure, 3)
-    low, high = min(curve.beta), max(curve.beta)
+    low, high = min(side.beta.beta), max(side.beta.beta)
+    shares = [volts / u_min0 for volts in curve.offset_V]
     return to_report_figure(
         figure,
         f"beta-{name}",
-        f"β over the pressure drop{side_words(name, both)}: the share of u_min0 that the law puts out at zero command."
-        + _about_the_table(compensator),
-        f"Beta lies between {low:.4f} and {high:.4f} over {span(dp, '.2f MPa', units)}, the certified staircase "
-        f"at {min(curve.certified_steps_V) / u_min0:.4f} to {max(curve.certified_steps_V) / u_min0:.4f}.",
-        csv_text(("of", "dp_MPa", "beta", "offset_V"), rows),
+        f"β over the pressure drop{side_words(name, both)}: the identified thresholds over that at dP0, u_min0 = "
+        f"{units.text(u_min0, '.4f V')} (Eq. 5), with their error; and over the same u_min0 what is certified of the "
+        f"{guard} threshold, under which the law puts out its offset at zero command." + _about_the_table(compensator),
+        f"Identified beta lies between {low:.4f} and {high:.4f} over {span(dp, '.2f MPa', units)}, the largest "
+        f"certified offset at {min(shares):.4f} to {max(shares):.4f} of u_min0.",
+        csv_text(("of", "dp_MPa", "beta", "beta_se", "u_V"), rows),
     )
 
 
@@ -149,7 +158,7 @@ def _about_the_table(compensator: Compensator | None) -> str:
         return ""
     holds = compensator.below_dp0 == "hold"
     held = " Up to dP0 the C holds what it has there, as the paper does." if holds else ""
-    return f"{held} The table in the C is rounded down, so that it stays below the staircase."
+    return f"{held} The table in the C is rounded down, so that it stays below the bound."
 
 
 def _beta_table(compensator: Compensator, name: str) -> tuple[np.ndarray, np.ndarray, float]:
