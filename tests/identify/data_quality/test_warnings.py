@@ -414,7 +414,7 @@ class TestOrder:
             if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "warn"
         ]
         used = {call.args[0].value for call in calls}
-        assert used == set(catalogue()) and len(used) == 44
+        assert used == set(catalogue()) and len(used) == 45
         for call in calls:
             filled = {word.arg for word in call.keywords}
             text = catalogue()[call.args[0].value].text

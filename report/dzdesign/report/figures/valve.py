@@ -3,7 +3,7 @@
 import numpy as np
 
 from dzdesign.design.compensator import Compensator
-from dzdesign.identify.plots.valve_curves import BRANCHES, draw_beta, draw_thresholds
+from dzdesign.identify.plots.valve_curves import BOUND_NAMES, BRANCHES, draw_beta, draw_thresholds
 from dzdesign.identify.valve.side_model import SideModel
 from dzdesign.report.compensator_sides import laws_of
 from dzdesign.report.figures.figure import (
@@ -106,32 +106,41 @@ def beta_figure(
     None of a valve tested at one pressure drop.
     """
     curve = side.certified[guard]
-    if len(curve.beta) < 2:
+    if len(curve.dp_MPa) < 2:
         return None
-    dp, u_min0 = np.array(curve.beta_dp_MPa), curve.u_min0_V
+    dp, u_min0 = np.array(curve.dp_MPa), side.reference.u_min_V
     figure, axes = titled_axes(3.6, name, both, legend_rows=2)
-    draw_beta(axes, curve)
-    pairs = zip(dp.tolist(), curve.beta, strict=True)
-    rows = [["valve", at, value, round(value * u_min0, 7)] for at, value in pairs]
+    draw_beta(axes, side, curve)
+    rows: list[list[str | float | None]] = [
+        [f"identified, {branch}", at, value, se, volts]
+        for branch, found in side.identified.items()
+        for at, value, se, volts in zip(found.dp_MPa, found.beta, found.beta_se, found.u_V, strict=True)
+    ]
+    rows += [
+        ["certified", at, round(volts / u_min0, 7), None, volts]
+        for at, volts in zip(curve.offset_dp_MPa, curve.offset_V, strict=True)
+    ]
     if compensator:
         where, nodes, of_the_C = _beta_table(compensator, name)
         table = nodes * of_the_C / u_min0  # with a transition the C counts from the opening threshold
         near = (where >= dp[0] - 0.1 * np.ptp(dp)) & (where <= dp[-1] + 0.1 * np.ptp(dp))
         axes.plot(where[near], table[near], ".-", color=LIGHT["ink"], ms=4, lw=1, label="the C's offset / u_min0")
         rows += [
-            ["C", round(float(x), 6), round(float(y), 7), round(float(y * of_the_C), 7)]
+            ["C", round(float(x), 6), round(float(y), 7), None, round(float(y * of_the_C), 7)]
             for x, y in zip(where, nodes, strict=True)
         ]
     legend_below(figure, 3)
-    low, high = min(curve.beta), max(curve.beta)
+    beta = side.beta
+    low, high = min(beta.beta), max(beta.beta)
     return to_report_figure(
         figure,
         f"beta-{name}",
-        f"β over the pressure drop{side_words(name, both)}: the share of u_min0 that the law puts out at zero command."
-        + _about_the_table(compensator),
-        f"Beta lies between {low:.4f} and {high:.4f} over {dp[0]:.2f} to {dp[-1]:.2f} MPa, the certified staircase "
-        f"at {span(np.array(curve.certified_steps_V) / u_min0, '', 4).strip()}.",
-        csv_text(("of", "dp_MPa", "beta", "offset_V"), rows),
+        f"β over the pressure drop{side_words(name, both)}: the identified thresholds over that at dP0, u_min0 = "
+        f"{u_min0:.4f} V (Eq. 5), with their error; and over the same u_min0 what is certified of the {guard} "
+        "threshold, under which the law puts out its offset at zero command." + _about_the_table(compensator),
+        f"Identified beta lies between {low:.4f} and {high:.4f} over {dp[0]:.2f} to {dp[-1]:.2f} MPa, the largest "
+        f"certified offset at {span(np.array(curve.offset_V) / u_min0, '', 4).strip()} of u_min0.",
+        csv_text(("of", "dp_MPa", "beta", "beta_se", "u_V"), rows),
     )
 
 
@@ -140,7 +149,7 @@ def _about_the_table(compensator: Compensator | None) -> str:
         return ""
     holds = compensator.below_dp0 == "hold"
     held = " Up to dP0 the C holds what it has there, as the paper does." if holds else ""
-    return f"{held} The table in the C is rounded down, so that it stays below the staircase."
+    return f"{held} The table in the C is rounded down, so that it stays below the bound."
 
 
 def _beta_table(compensator: Compensator, name: str) -> tuple[np.ndarray, np.ndarray, float]:
