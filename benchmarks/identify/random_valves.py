@@ -69,7 +69,7 @@ def print_random_valves(*, quick: bool, seed: int) -> list[Row]:
             )
             (hidden if bound > HIDDEN * U_MAX_V else gross).append(text)
         dp = np.linspace(*side.valid_dp_MPa, 100)
-        if np.any(side.reference.u_min_V * np.interp(dp, side.beta.dp_MPa, side.beta.beta) > bench.closing_V(dp)):
+        if np.any(np.interp(dp, side.curve.offset_dp_MPa, side.curve.offset_V) > bench.closing_V(dp)):
             wrong_side.append(number)
     rows = [
         Row(what="gross failures", value=len(gross), limit=0, note="; ".join(gross[:6])),

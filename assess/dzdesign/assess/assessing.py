@@ -43,9 +43,9 @@ def assess(before: Sequence[RampTest], after: Sequence[RampTest], options: Asses
 
 def assess_curves(comparison: Comparison) -> Assessment:
     """Read every quantity of both sets, and check the limits."""
-    options = comparison.options
+    options, units = comparison.options, comparison.units
     flows = [_reading_flow(pair, options) for pair in comparison.pairs]
-    readings = [_read(pair, flow, options) for pair, flow in zip(comparison.pairs, flows, strict=True)]
+    readings = [_read(pair, flow, comparison) for pair, flow in zip(comparison.pairs, flows, strict=True)]
     _add_symmetry(comparison.pairs, readings)
     pressures = tuple(map(_pressure, comparison.pairs, flows, readings))
     return Assessment(
@@ -65,9 +65,10 @@ def assess_curves(comparison: Comparison) -> Assessment:
             result
             for item, found in zip(pressures, readings, strict=True)
             if "after" in found
-            for result in check_limits(options.limits, item.place, found.get("before"), found["after"])
+            for result in check_limits(options.limits, item.place(units), found.get("before"), found["after"], units)
         ),
         notes=find_notes(comparison, pressures),
+        recorded_units=units,
     )
 
 
@@ -90,18 +91,16 @@ def _reading_flow(pair: CurvePair, options: AssessOptions) -> float:
     return pair.first.counts if options.reading_share is None else options.reading_share * pair.first.y_max
 
 
-def _read(pair: CurvePair, reading_flow: float, options: AssessOptions) -> Readings:
+def _read(pair: CurvePair, reading_flow: float, comparison: Comparison) -> Readings:
     """Read all quantities at one pressure drop, of both sets at one reading flow and over one rated flow."""
+    options = comparison.options
     return {
         name: read_quantities(
-            curves,
-            u_max=options.of_set(name).u_max,
-            reading_flow=reading_flow,
-            rated=pair.first.y_max,
-            window=options.window,
+            curves, u_max=options.of_set(name).u_max, reading_flow=reading_flow, rated=pair.first.y_max,
+            window=options.window, units=comparison.of_set(name, pair.side),
         )
         for name, curves in pair.sets.items()
-    }
+    }  # fmt: skip
 
 
 def _add_symmetry(pairs: Sequence[CurvePair], readings: Sequence[Readings]) -> None:

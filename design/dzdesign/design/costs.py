@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from dzdesign.core.errors import InputError
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.drive_functions import RAMP_UNIT
 from dzdesign.design.signal_descriptions import unseen_failures
@@ -23,7 +24,9 @@ def costs_of(compensator: Compensator) -> tuple[str, ...]:
         lines += [label + _cost_of_test(compensator, test, sign) for test in side.tests]
         lines += [label + line for line in _cost_of_side(compensator, side, sign)]
     low, high = (float(end) for end in compensator.positive.certificate.dp_MPa)
-    beyond = f"outside {low:.2f} to {high:.2f} MPa" if high > low else f"at any pressure drop but {low:.2f} MPa"
+    units = valve.recorded_units
+    first, last = units.number(low, ".2f MPa"), units.text(high, ".2f MPa")
+    beyond = f"outside {first} to {last}" if high > low else f"at any pressure drop but {last}"
     lines.append(
         f"{beyond} the nearest tested beta is held and nothing is certified; "
         f"a pressure difference below -{compensator.reverse_codes} codes is taken as a failed sensor: smallest beta"
@@ -59,23 +62,25 @@ def _cost_of_test(compensator: Compensator, test: TestResult, sign: int) -> str:
     code = round(signals.dp_code(Fraction(repr(test.dp_MPa))))
     corners = _corners(compensator, code, sign)
     left = remaining_dead_zone(compensator, test, sign)
-    parts = [f"{test.dp_MPa:.2f} MPa: offset {corners.offset * u_max:.3f} V"]
+    units = compensator.valve.recorded_units.of_side(SIDE_NAMES[sign])
+    at = units.text(test.dp_MPa or 0.0, ".2f MPa")
+    parts = [f"{at}: offset {units.text(corners.offset * u_max, '.3f V')}"]
     for name, knee in (("opening", test.u_knee_rising_V), ("closing", test.u_knee_falling_V)):
         if knee is not None and knee >= corners.offset * u_max:
             parts.append(f"dead zone that remains on {name} {left[name]:.2%} of command (knee)")
         elif knee is not None:
-            above = corners.offset * u_max - knee
-            parts.append(f"flow at zero command on {name}: the offset lies {above:.3f} V above the knee")
+            above = units.text(corners.offset * u_max - knee, ".3f dV")
+            parts.append(f"flow at zero command on {name}: the offset lies {above} above the knee")
     if corners.end and test.u_knee_falling_V is not None:
         flow = test.slope_L_min_V * max(corners.at_end * u_max - test.u_knee_falling_V, 0.0)
-        parts.append(f"flow on closing at the transition's end {flow:.2f} L/min")
-    parts.append(_reading(compensator, test, sign))
+        parts.append(f"flow on closing at the transition's end {units.text(flow, '.2f L/min')}")
+    parts.append(_reading(compensator, test, sign, units))
     limit = compensator.drive_functions.compare_limit / signals.compare_max
     if limit <= corners.offset or limit <= (test.u_knee_rising_V or 0.0) / u_max:
         raise InputError(
             f"the largest output is {limit:.1%} of full drive, but the valve opens at "
-            f"{max(corners.offset, (test.u_knee_rising_V or 0.0) / u_max):.1%} at {test.dp_MPa:.2f} MPa, so nothing would ever "
-            "flow; give a larger --output-max"
+            f"{max(corners.offset, (test.u_knee_rising_V or 0.0) / u_max):.1%} at {at}, so nothing would ever flow; "
+            "give a larger --output-max"
         )
     if limit < corners.full:
         reached = corners.command_at(limit)
@@ -102,8 +107,8 @@ def read_dead_zone(compensator: Compensator, test: TestResult, sign: int = 1) ->
     """
     flow, recorded = compensator.reading_flow_L_min, test.recorded
     thresholds = {
-        "opening": recorded.rising and recorded.rising.command_at(flow),
-        "closing": recorded.falling and recorded.falling.command_at(flow),
+        "opening": recorded.rising.command_at(flow) if recorded.rising else None,
+        "closing": recorded.falling.command_at(flow) if recorded.falling else None,
     }
     return _commands_at(compensator, test, sign, thresholds)
 
@@ -120,13 +125,13 @@ def _commands_at(
     return found
 
 
-def _reading(compensator: Compensator, test: TestResult, sign: int) -> str:
+def _reading(compensator: Compensator, test: TestResult, sign: int, units: RecordedUnits) -> str:
     """Say what is read at the reading flow, beside what an ideal line to the largest flow would read."""
     flow = compensator.reading_flow_L_min
     read = [f"{share:.2%} on {name}" for name, share in read_dead_zone(compensator, test, sign).items()]
     ideal = ideal_line(flow, test.recorded.q_max_L_min)
     words = " and ".join(read) or "nothing: the valve never passes it"
-    return f"read at {flow:.2f} L/min {words} (ideal line {ideal:.2%})"
+    return f"read at {units.text(flow, '.2f L/min')} {words} (ideal line {ideal:.2%})"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -163,16 +168,17 @@ def _corners(compensator: Compensator, dp_code: int, sign: int) -> _Corners:
 
 def _cost_of_side(compensator: Compensator, side: SideModel, sign: int) -> list[str]:
     lines = []
-    crossed = [f"{test.dp_MPa:.2f}" for test in side.tests if test.closes_above_opening]
+    units = compensator.valve.recorded_units
+    crossed = [units.number(test.dp_MPa or 0.0, ".2f MPa") for test in side.tests if test.closes_above_opening]
     if crossed:
         lines.append(
-            f"accepted, branch-order: at {', '.join(crossed)} MPa the valve seems to close above where it opens, so "
-            "flow at zero command is possible"
+            f"accepted, branch-order: at {', '.join(crossed)} {units.label('MPa')} the valve seems to close above "
+            "where it opens, so flow at zero command is possible"
         )
     certificate = compensator.side(sign).certificate
     lines.append(
-        f"the table's offset stays {1e3 * certificate.mean_loss_V:.2f} mV under the certified curve on average, "
-        f"{1e3 * certificate.largest_loss_V:.2f} mV at most{_of_which_dither(compensator)}"
+        f"the table's offset stays {units.text(1e3 * certificate.mean_loss_V, '.2f mV')} under the certified curve on "
+        f"average, {units.text(1e3 * certificate.largest_loss_V, '.2f mV')} at most{_of_which_dither(compensator)}"
     )
     guard = certificate.guard
     if guard != "closing":
@@ -241,7 +247,7 @@ def _of_which_dither(compensator: Compensator) -> str:
     if not counts:
         return ""
     peak = counts / compensator.signals.compare_max * float(compensator.u_max_V)
-    return f", of which {1e3 * peak:.2f} mV are the dither's peak"
+    return f", of which {compensator.valve.recorded_units.text(1e3 * peak, '.2f mV')} are the dither's peak"
 
 
 def _ramp_text(compensator: Compensator) -> str:

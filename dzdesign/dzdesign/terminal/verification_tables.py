@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING
 
+from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.core.verdicts import NOT_CHECKED, verdict_words
 from dzdesign.terminal.page import new_console, put_line, put_rows, volts
 
@@ -48,8 +49,8 @@ def _put_closed_loop(console: "Console", verification: "Verification") -> None:
         "without: closing": lambda loop: _percent(loop.dead_zone_closing),
         "with: opening": lambda loop: _percent(loop.residual_opening),
         "with: closing": lambda loop: _percent(loop.residual_closing),
-        "Q at zero, no beta": lambda loop: loop.in_words(loop.q_zero_without_beta_L_min),
-        "Q at zero, beta": lambda loop: loop.in_words(loop.q_zero_L_min),
+        "Q at zero, no beta": lambda loop: loop.in_words(loop.q_zero_without_beta_L_min, AS_COMPUTED),
+        "Q at zero, beta": lambda loop: loop.in_words(loop.q_zero_L_min, AS_COMPUTED),
         "Q max without": lambda loop: f"{loop.q_max_direct_L_min:.1f}",
         "Q max with (L/min)": lambda loop: f"{loop.q_max_L_min:.1f}",
     }
@@ -88,8 +89,8 @@ def print_scenarios(scenarios: "Sequence[ScenarioResult]", console: "Console") -
     columns: dict[str, Callable[[ScenarioResult], str]] = {
         "scenario": lambda each: each.name + ("" if each.must_shut else " (no core can know)"),
         "dP (MPa)": lambda each: f"{each.dp_MPa:.2f}",
-        "Q at zero, at the end (L/min)": lambda each: each.in_words(each.q_zero_L_min),
-        "on the way, at most (L/min)": lambda each: each.in_words(each.q_peak_at_zero_L_min),
+        "Q at zero, at the end (L/min)": lambda each: each.in_words(each.q_zero_L_min, AS_COMPUTED),
+        "on the way, at most (L/min)": lambda each: each.in_words(each.q_peak_at_zero_L_min, AS_COMPUTED),
     }
     if shown:
         put_rows(console, "Scenarios with the compensator, worst of all pressure drops", shown, columns)
@@ -112,7 +113,7 @@ def _figures(result: "ScenarioResult") -> str:
         name = key.removeprefix(start).removesuffix(end).replace("_", " ")
         # A change of flow may well be small; a flow that the recordings can't show is no small one.
         hidden = unseen is not None and name.endswith("flow") and value < unseen
-        groups[start].append(f"{name} {result.in_words(value) if hidden else f'{value:.3g}'}{UNITS[end]}")
+        groups[start].append(f"{name} {result.in_words(value, AS_COMPUTED) if hidden else f'{value:.3g}'}{UNITS[end]}")
     return "; ".join(VALVES[start] + ", ".join(each) for start, each in groups.items() if each)
 
 
@@ -158,8 +159,8 @@ def print_demo(valve: "ValveModel", verification: "Verification", folder: str) -
         "dead zone without": lambda loop: _percent(loop.dead_zone_opening),
         "with: opening": lambda loop: _percent(loop.residual_opening),
         "with: closing": lambda loop: _percent(loop.residual_closing),
-        "Q at zero without beta": lambda loop: loop.in_words(loop.q_zero_without_beta_L_min),
-        "with beta (L/min)": lambda loop: loop.in_words(loop.q_zero_L_min),
+        "Q at zero without beta": lambda loop: loop.in_words(loop.q_zero_without_beta_L_min, AS_COMPUTED),
+        "with beta (L/min)": lambda loop: loop.in_words(loop.q_zero_L_min, AS_COMPUTED),
     }
     console, title = new_console(), "Simulated example valve, 0-10 V ramps in closed loop with the generated C"
     put_rows(console, title, [loop.result for loop in verification.loops], columns)

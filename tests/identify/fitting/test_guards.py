@@ -22,7 +22,6 @@ from dzdesign.identify.reading.ramp_files import ramp_file_bytes
 from dzdesign.identify.side import identify_side
 from dzdesign.identify.valve.guard_curve import GUARDS
 from dzdesign.identify.valve.model import ValveModel
-from dzdesign.identify.valve.staircase import staircase
 from tests.support.repeatable_valves import REPEATABLE, identify
 from tests.support.synthetic import L_MIN, MPA, Truth, needs_compiler, synthetic_ramp
 
@@ -68,28 +67,22 @@ def fitted(tests):
 
 def offset_at(curve, dp):
     """Return the law's offset, V, without the paper's rule below dP0, which only lowers it."""
-    return curve.u_min0_V * np.interp(dp, curve.beta_dp_MPa, curve.beta)
+    return np.interp(dp, curve.offset_dp_MPa, curve.offset_V)
 
 
 def check_laws(side):
     """Hold one side with both branches against what must be so whatever its numbers are."""
-    assert tuple(side.guards) == GUARDS
-    closing, mean, opening = (np.array(side.guards[name].u_lower_V) for name in GUARDS)
+    assert tuple(side.certified) == GUARDS
+    closing, mean, opening = (np.array(side.certified[name].u_lower_V) for name in GUARDS)
     assert np.all(closing <= mean) and np.all(mean <= opening)
     # The errors of both branches add up in full: the mean of two bounds.
     np.testing.assert_allclose(mean, (closing + opening) / 2, rtol=0, atol=1e-12)
     dp = np.linspace(side.valid_dp_MPa[0], side.valid_dp_MPa[1], 400)
     edge = np.interp(dp, side.opening_curve.dp_MPa, side.opening_curve.u_V)
-    for curve in side.guards.values():
+    for curve in side.certified.values():
         assert np.all(np.array(curve.u_lower_V) < curve.u_threshold_V)
-        steps, _ = staircase(np.array(curve.u_lower_V), side.trend)
-        np.testing.assert_allclose(steps, curve.certified_steps_V, rtol=0, atol=1e-12)
-        right = np.clip(np.searchsorted(curve.beta_dp_MPa, dp), 1, len(steps))
         offset = offset_at(curve, dp)
-        assert np.all(offset <= steps[right - 1] + 1e-9)
-        # A node stands under both of its steps.
-        nodes = np.array(curve.u_offset_V)
-        assert np.all(nodes[1:] <= steps + 1e-9) and np.all(nodes[:-1] <= steps + 1e-9)
+        assert np.all(offset <= curve.bound(side.trend).in_doubles(dp) + 1e-9)
         assert np.all(edge >= offset - 1e-9)
     runs = np.diff(side.opening_curve.u_V) * {"decreasing": -1, "increasing": 1, "flat": 0}[side.trend]
     assert np.all(runs >= 0) and (side.trend != "flat" or not np.any(np.diff(side.opening_curve.u_V)))
@@ -101,7 +94,7 @@ def test_the_laws_of_the_guards_in_every_trend(opens):
     check_laws(side)
     dp = np.array(side.beta.dp_MPa)
     for name, below in BELOW_OPENING.items():
-        found = np.array(side.guards[name].u_threshold_V)
+        found = np.array(side.certified[name].u_threshold_V)
         np.testing.assert_allclose(found, opens(dp) - below, rtol=0, atol=0.01)
     np.testing.assert_allclose(side.opening_curve.u_V, opens(dp), rtol=0, atol=0.01)
 
@@ -116,30 +109,31 @@ def test_the_laws_of_the_guards_whatever_the_valve(seed, run, hysteresis):
 
 def test_the_guard_that_the_side_has_is_one_of_the_guards():
     side = identify(ramps(OPENS["decreasing"])).positive
-    own = side.guards[side.certificate.guard]
+    own = side.certified[side.certificate.guard]
     assert side.certificate.guard == "closing"
     assert own.u_lower_V == tuple(test.u_guard_lower_V for test in side.tests)
     assert own.u_threshold_V == tuple(test.u_guard_V for test in side.tests)
-    assert side.reference.u_min_V == own.u_min0_V
-    assert (side.beta.dp_MPa, side.beta.beta) == (own.beta_dp_MPa, own.beta)
+    found = side.identified[side.certificate.guard]
+    assert (side.beta.dp_MPa, side.beta.beta, side.beta.beta_se) == (own.dp_MPa, found.beta, found.beta_se)
+    assert side.reference.u_min_V == found.u_V[found.beta.index(1.0)]
 
 
 def test_the_rising_branch_is_guarded_as_if_there_were_no_other():
     """The falling branch tells of the noise, and nothing else."""
     both, alone = (identify(ramps(OPENS["convex"], falling=falling)).positive for falling in (True, False))
     assert both.certificate.guard == "closing" and alone.certificate.guard == "opening"
-    assert both.guards["opening"].u_threshold_V == pytest.approx(alone.guards["opening"].u_threshold_V, abs=2e-3)
-    assert both.guards["opening"].u_min0_V == pytest.approx(alone.reference.u_min_V, abs=5e-3)
+    assert both.certified["opening"].u_threshold_V == pytest.approx(alone.certified["opening"].u_threshold_V, abs=2e-3)
+    assert both.certified["opening"].u_min0_V == pytest.approx(alone.curve.u_min0_V, abs=5e-3)
 
 
 def test_what_was_not_recorded_is_not_guarded():
     rising = identify(ramps(OPENS["decreasing"], falling=False)).positive
-    assert list(rising.guards) == ["opening"]
-    assert np.all(np.array(rising.opening_curve.u_V) >= rising.guards["opening"].u_offset_V)
+    assert list(rising.certified) == ["opening"]
+    assert np.all(np.array(rising.opening_curve.u_V) >= rising.certified["opening"].u_offset_V)
     falling = identify([falling_only(test) for test in ramps(OPENS["decreasing"])]).positive
-    assert list(falling.guards) == ["closing"] and falling.opening_curve is None
+    assert list(falling.certified) == ["closing"] and falling.opening_curve is None
     one = identify([dataclasses.replace(ramps(OPENS["flat"], pressures=(1.0,))[0], dp=None)]).positive
-    assert set(one.guards) == set(GUARDS) and one.opening_curve is None and one.guards["mean"].beta == ()
+    assert set(one.certified) == set(GUARDS) and one.opening_curve is None and one.certified["mean"].beta == ()
 
 
 def test_a_rising_branch_that_contradicts_the_trend_pays_for_it():
@@ -155,10 +149,10 @@ def test_a_rising_branch_that_contradicts_the_trend_pays_for_it():
     odd, even = identify(tests).positive, identify(honest).positive
     assert odd.trend == even.trend == "decreasing"
     truth = np.array([5.5 - 0.01 * dp - way for dp, way in away.items()])
-    assert np.all(np.array(odd.guards["opening"].u_lower_V) < truth)
-    lowered = np.array(even.guards["opening"].u_lower_V) - odd.guards["opening"].u_lower_V
+    assert np.all(np.array(odd.certified["opening"].u_lower_V) < truth)
+    lowered = np.array(even.certified["opening"].u_lower_V) - odd.certified["opening"].u_lower_V
     assert np.all(lowered > 0.015)
-    assert odd.guards["closing"].u_lower_V == pytest.approx(even.guards["closing"].u_lower_V, abs=5e-3)
+    assert odd.certified["closing"].u_lower_V == pytest.approx(even.certified["closing"].u_lower_V, abs=5e-3)
 
 
 #: Bounds at 90 % that hold together fail in at most a tenth of the valves: in 13 of 60 or more with p < 1 %.
@@ -175,7 +169,7 @@ def gaps(request):
         side = identify(tests, IdentifyOptions(confidence=CONFIDENCE, meter_lag=0.0)).positive
         dp = np.array(side.beta.dp_MPa)
         grid = np.linspace(dp[0], dp[-1], 100)
-        for name, curve in side.guards.items():
+        for name, curve in side.certified.items():
             found[name][0].append(opens(dp) - BELOW_OPENING[name] - curve.u_lower_V)
             found[name][1].append(opens(grid) - BELOW_OPENING[name] - offset_at(curve, grid))
     return {name: tuple(map(np.array, both)) for name, both in found.items()}
@@ -214,11 +208,11 @@ class TestFile:
 
     def test_it_is_read_as_it_was_written(self, document):
         assert json.loads(to_json_bytes(self.read(document))) == document
-        assert list(document["sides"]["positive"]["guards"]) == list(GUARDS)
+        assert list(document["sides"]["positive"]["certified"]) == list(GUARDS)
 
     def test_a_guard_of_another_name_is_refused(self, document, wording):
         newer = json.loads(json.dumps(document))
-        newer["sides"]["positive"]["guards"]["future"] = newer["sides"]["positive"]["guards"]["mean"]
+        newer["sides"]["positive"]["certified"]["future"] = newer["sides"]["positive"]["certified"]["mean"]
         with wording.refusal(InputError):
             self.read(newer)
 

@@ -31,7 +31,7 @@ def recordings(lag, *, seconds=25.0, noise=0.03, opening=OPENING, pressures=(1.0
 def bounds(tests, **choices):
     """The offsets of the three guards at the first test, with what the bounds allow for scatter set to none."""
     valve = identify(tests, IdentifyOptions(repeatability=0.0, **choices))
-    return {name: guard.u_min0_V for name, guard in valve.positive.guards.items()}
+    return {name: guard.u_min0_V for name, guard in valve.positive.certified.items()}
 
 
 def codes(tests, **choices):
@@ -71,7 +71,7 @@ class TestTolerance:
         slow, fast = recordings(0.1, seconds=100.0)[:1], recordings(0.1, seconds=20.0)[1:]
         options = IdentifyOptions(repeatability=0.0, meter_lag=0.1)
         some, none = (
-            identify([*slow, *fast], each).positive.guards["closing"].u_lower_V
+            identify([*slow, *fast], each).positive.certified["closing"].u_lower_V
             for each in (options, replace(options, meter_lag_tolerance=0.0))
         )
         paid = [without - with_it for with_it, without in zip(some, none, strict=True)]

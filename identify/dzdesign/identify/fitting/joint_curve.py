@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
 #: Samples at this share of the largest command and above give the largest flow.
 TOP = 0.98
+#: Standard errors from the optimum at which a fit has converged.
+NEARLY = 1e-3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,12 +129,14 @@ def fit_joint_curve(
         outcome = solver.stats()
         best = np.asarray(solution["x"]).ravel()
         hessian = hessian_of_cost(solver, best, known)
-    if not outcome["success"]:
+        gradient = np.asarray(solver.get_function("nlp_grad_f")(best, known)[1]).ravel()
+    covariance = np.linalg.pinv(hessian, hermitian=True)
+    # In standard errors, how far the next step would go: a start at the optimum leaves the solver nothing to improve.
+    if not gradient @ covariance @ gradient < NEARLY**2:
         raise InputError(
             f"the joint fit of the curve did not converge ({outcome['return_status']}); "
             "look at the ramp tests, and leave out the one that is unlike the others"
         )
-    covariance = np.linalg.inv(hessian)
     unknown, inside = best[len(placed) : -1], covariance[len(placed) : -1, len(placed) : -1]
     u, of_u = np.full((len(shapes), 2), np.nan), np.full((2, len(shapes), len(shapes)), np.nan)
     for column, (start, parts) in layout.reported.items():
@@ -140,7 +144,10 @@ def fit_joint_curve(
         of_u[column] = parts @ inside @ parts.T
     k_x_max = top / (at @ slope)
     return JointCurve(
-        u=u, covariance=of_u, k_x_max=float(k_x_max * (1 + best[-1])), k_x_max_se=float(k_x_max * np.sqrt(covariance[-1, -1]))
+        u=u,
+        covariance=of_u,
+        k_x_max=float(k_x_max * (1 + best[-1])),
+        k_x_max_se=float(k_x_max * np.sqrt(covariance[-1, -1])),
     )
 
 

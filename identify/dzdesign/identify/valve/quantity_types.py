@@ -15,6 +15,8 @@ FlowGain = Annotated[float, quantity("L/min/V", ge=0, le=1e6)]
 #: Largest beta(dP): a table of it has room for that, and dP0 can be chosen so that none is larger.
 LARGEST_BETA = 2
 Ratio = Annotated[float, quantity("1", ge=0, le=LARGEST_BETA)]
+#: Of thresholds as the data have them, which no table has to hold.
+IdentifiedRatio = Annotated[float, quantity("1", ge=-1e6, le=1e6)]
 RatioError = Annotated[float, quantity("1", ge=0, le=1e6)]
 Probability = Annotated[float, quantity("1", ge=0, le=1)]
 SecondDifference = Annotated[float, quantity("V/MPa2", ge=0, le=1e9)]

@@ -11,9 +11,9 @@ from dzdesign.identify.valve.guard_curve import GUARDS, ROUNDING_V, CertifiedCur
 from dzdesign.identify.valve.identified_curve import BETA_ROUNDING, IDENTIFIED, IdentifiedCurve
 from dzdesign.identify.valve.quantity_types import (
     Flow,
+    IdentifiedRatio,
     PressureDrop,
     Probability,
-    Ratio,
     RatioError,
     Voltage,
     VoltageError,
@@ -41,7 +41,7 @@ class BetaNodes:
     """beta(dP) of Eq. (5), identified on the branch that is guarded by default; without nodes where dP is unknown."""
 
     dp_MPa: Annotated[tuple[PressureDrop, ...], quantity("MPa", "Pressure drops of the nodes, those of the tests.")]
-    beta: Annotated[tuple[Ratio, ...], quantity("1", "beta there: u_min(dP) / u_min0.")]
+    beta: Annotated[tuple[IdentifiedRatio, ...], quantity("1", "beta there: u_min(dP) / u_min0.")]
     beta_se: Annotated[tuple[RatioError, ...], quantity("1", "Standard error of each; 0 at dP0.")]
 
 
@@ -138,7 +138,7 @@ class SideModel:
             )
         dp = self.curve.dp_MPa
         if dp and (self.reference.dp_MPa is None or any(test.dp_MPa is None for test in self.tests)):
-            raise RuleError("a pressure drop is missing beside the tested ones of a curve; expected one per test and dP0")
+            raise RuleError("a pressure drop is missing beside those of a curve; expected one per test and dP0")
         for guard in self.certified.values():
             self._check_nodes(guard.dp_MPa, len(guard.u_lower_V))
             guard.check_offset(self.trend or "flat", self.reference.dp_MPa)
