@@ -4,7 +4,6 @@ from typing import TYPE_CHECKING
 
 from dzdesign.core.verdicts import DOES_NOT_HOLD, verdict_words
 from dzdesign.terminal.page import Table, new_console, put_line, put_table
-from dzdesign.terminal.tables import meter_line
 
 if TYPE_CHECKING:
     from dzdesign.assess.assessment import Assessment, PressureAssessment
@@ -16,7 +15,9 @@ DECIMALS = {"%": 2, "L/min": 3, "L/min/V": 4}
 
 def print_assessment(assessment: "Assessment") -> None:
     """Print each pressure drop, the reasons of what is not observable, formulas, notes and limits."""
-    page = new_console()
+    from dzdesign.identify.valve.model import lag_in_words
+
+    page, meter = new_console(), assessment.meter
     for item in _shown_pressures(assessment):
         put_table(page, _table_of(item))
     lines = [
@@ -24,7 +25,7 @@ def print_assessment(assessment: "Assessment") -> None:
         *_remarks(assessment),
         f"{assessment.terms[0].upper()}{assessment.terms[1:]}:",
         *(f"  {text}" for text in _formulas(assessment)),
-        meter_line(assessment.meter),
+        f"meter floor: {meter.floor_L_min:.2f} L/min; {lag_in_words(meter.lag_s, meter.lag_is)}",
         *(f"note [{each.code}] {f'{each.source}: ' if each.source else ''}{each.text}" for each in assessment.notes),
         *_limits(assessment),
     ]

@@ -1,24 +1,28 @@
 """Results as tables on stdout, by rich; plain where stdout is no terminal."""
 
 import json
+import os
+import re
 from typing import TYPE_CHECKING
 
 from dzdesign.core.units import chance, span_MPa
 from dzdesign.terminal.page import new_console, put_line, put_rows, volts
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from fractions import Fraction
 
     from rich.console import Console
 
-    from dzdesign.assess.assessment import MeterTaken
     from dzdesign.codegen.project import Firmware
     from dzdesign.derivation.account.mutation import AccountMutants, StatementMutants
     from dzdesign.design.compensator import Compensator
-    from dzdesign.identify.valve.model import Meter, ValveModel
+    from dzdesign.identify.valve.model import ValveModel
     from dzdesign.identify.valve.ramp_result import TestResult
     from dzdesign.identify.valve.side_model import SideModel
+
+#: Files of a test that its row names, and characters by which their names may differ.
+NAMED_FILES, LONGEST_DIFFERENCE = 6, 12
 
 
 def _rational(value: "Fraction") -> str:
@@ -37,22 +41,16 @@ def print_valve(valve: "ValveModel", console: "Console | None" = None) -> None:
             put_line(console, line)
     if "positive" not in valve.sides:
         console.print("positive commands: not tested")
-    put_line(console, meter_line(valve.meter))
+    put_line(console, f"meter floor: {valve.meter.floor_L_min:.2f} L/min; {valve.meter.lag_in_words()}")
     for warning in valve.warnings:
         source = f"{warning.source}: " if warning.source else ""
         put_line(console, f"warning [{warning.code}] {source}{warning.text}")
 
 
-def meter_line(meter: "Meter | MeterTaken") -> str:
-    """Return what is known of the flow meter of recordings."""
-    how = {"declared": "declared", "identified": "from ramps of two rates", "unknown": "none declared"}
-    return f"meter floor: {meter.floor_L_min:.2f} L/min; lag taken as {meter.lag_s:.3g} s ({how[meter.lag_is]})"
-
-
 def _put_thresholds(console: "Console", side: "SideModel", title: str) -> None:
     betas = dict(zip((test.source for test in side.tests), side.beta.beta, strict=False))  # none without a known dP
     columns: dict[str, Callable[[TestResult], str]] = {
-        "ramp test": lambda test: test.source,
+        "ramp test": lambda test: short_source(test.source, test.ramps),
         "dP (MPa)": lambda test: "?" if test.dp_MPa is None else f"{test.dp_MPa:.3f}",
         "knee opening": lambda test: volts(test.u_knee_rising_V),
         "knee closing": lambda test: volts(test.u_knee_falling_V),
@@ -63,6 +61,27 @@ def _put_thresholds(console: "Console", side: "SideModel", title: str) -> None:
         "Q max (L/min)": lambda test: f"{test.q_max_L_min:.2f}",
     }
     put_rows(console, title, side.tests, columns)
+
+
+def short_source(source: str, ramps: "Sequence[str]") -> str:
+    """Return the files of a test for a narrow column: what their names share stands once; several ramps of one as is.
+
+    Examples
+    --------
+    >>> short_source("", ["ramp_dP1_1.csv", "ramp_dP1_2.csv", "ramp_dP1_10.csv"])
+    'ramp_dP1_{1,2,10}.csv'
+    """
+    names = list(dict.fromkeys(ramps))
+    if len(names) < 2 or any(name.endswith(" s)") for name in names):
+        return source
+    start = re.sub(r"\d+$", "", os.path.commonprefix(names))  # noqa: RUF071 (of characters)
+    rests = [name[len(start) :] for name in names]
+    end = re.sub(r"^\d+", "", os.path.commonprefix([rest[::-1] for rest in rests])[::-1])  # noqa: RUF071
+    middles = [rest[: len(rest) - len(end)] for rest in rests]
+    if not start or not all(middles) or max(map(len, middles)) > LONGEST_DIFFERENCE:
+        return source
+    shown = middles[:NAMED_FILES] + ["..."] * (len(middles) > NAMED_FILES)
+    return f"{start}{{{','.join(shown)}}}{end}"
 
 
 def _side_lines(side: "SideModel") -> tuple[str, ...]:

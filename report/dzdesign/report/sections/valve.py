@@ -11,7 +11,8 @@ from dzdesign.report.figures.valve import beta_figure, lines_figure, thresholds_
 from dzdesign.report.page import Section
 from dzdesign.report.sections.cells import Table, counted, number, table_of
 
-LAG = {"declared": "declared", "identified": "from ramps of two rates", "unknown": "none declared"}
+#: Warnings about the order of the recordings, which bear on the bounds.
+ORDER = ("order", "time-stamps")
 
 
 def valve_sections(valve: ValveModel | None, compensator: Compensator | None) -> dict[str, Section]:
@@ -28,15 +29,13 @@ def valve_sections(valve: ValveModel | None, compensator: Compensator | None) ->
         thresholds.append(thresholds_figure(side, guard, name, both))
         tables.append(thresholds_table(side, guard, f"Thresholds, {name} commands"))
         betas.append(beta_figure(side, guard, name, both, compensator if law else None))
-    meter = valve.meter
     return {
         "data": Section(
             figures=fits,
             lines=(
                 f"{counted(sum(len(side.tests) for side in valve.sides.values()), 'ramp test')}; full command "
                 f"{valve.u_max_V:g} V.",
-                f"Flow meter: floor {meter.floor_L_min:.2f} L/min; lag taken as {meter.lag_s:.3g} s "
-                f"({LAG[meter.lag_is]}).",
+                f"Flow meter: floor {valve.meter.floor_L_min:.2f} L/min; {valve.meter.lag_in_words()}.",
                 *(_trend(name, side) for name, side in valve.sides.items()),
                 *(
                     f"{name.capitalize()} commands, from ramp to ramp: {side.certificate.repeatability.in_words()}."
@@ -50,7 +49,7 @@ def valve_sections(valve: ValveModel | None, compensator: Compensator | None) ->
             tables=tables,
             lines=(
                 *(f"Premise, {name} commands: {side.premise}." for name, side in valve.sides.items()),
-                *(f"{warning.text}." for warning in valve.warnings if warning.code == "order"),
+                *(f"{warning.text}." for warning in valve.warnings if warning.code in ORDER),
             ),
         ),
         "beta": Section(
