@@ -10,6 +10,10 @@ from collections.abc import Callable
 import numpy as np
 
 Rows = dict[str, np.ndarray]
+#: How many of a unit of flow are one litre a minute, by what a gallon, an hour and a second are.
+PER_L_MIN = {"Lmin": 1.0, "gpm": 1 / 3.785411784, "mL/s": 1000 / 60, "m3/h": 0.06}
+#: Logger -> unit of its pressures.
+PRESSURE_OF = {"plain": "MPa", "german": "bar", "with_units_below": "psi"}
 BEGIN = datetime.datetime(2026, 3, 4, 9, 30)
 
 
@@ -61,10 +65,13 @@ def with_units_below(rows: Rows, *pressures: str) -> str:
     return "\n".join([head, "\t".join(["ms", "V", *["psi"] * len(pressures), "l/min"]), *lines]) + "\n"
 
 
-def command_text(rows: Rows, label: str, values: np.ndarray, digits: int = 4, clock: bool = True) -> str:
-    """Return a recording whose command stands under another label, in its own unit."""
+def command_text(
+    rows: Rows, label: str, values: np.ndarray, digits: int = 4, clock: bool = True, flow: str = "Lmin"
+) -> str:
+    """Return a recording whose command stands under another label, in its own unit; its flow in one of `PER_L_MIN`."""
     time = {"time_s": (rows["t"], 3)} if clock else {}
-    return table({**time, label: (values, digits), "dP_bar": (10 * rows["dP"], 3), "Q_Lmin": (rows["Q"], 3)})
+    flows = rows["Q"] * PER_L_MIN[flow]
+    return table({**time, label: (values, digits), "dP_bar": (10 * rows["dP"], 3), f"Q_{flow}": (flows, 4)})
 
 
 def _with_stamps(time: np.ndarray, label: str, pattern: str, text: str, separator: str) -> str:

@@ -68,6 +68,19 @@ def wandering(correlation: float, sd: float = 25e-3) -> Scatter:
     return draw
 
 
+#: Scatter that the premises exclude, the warning that may see it, and whether the bounds hold at 1 % all the same.
+UNLIKE: dict[str, tuple[Scatter, str, bool]] = {
+    "sd from 5 to 20 mV": (normal(np.linspace(5e-3, 20e-3, DP_MPa.size)), "unequal-scatter", True),
+    "sd from 20 to 5 mV": (normal(np.linspace(20e-3, 5e-3, DP_MPa.size)), "unequal-scatter", True),
+    "sd 5 mV, at the last test 50 mV": (normal(np.append(np.full(5, 5e-3), 50e-3)), "unequal-scatter", False),
+    "Student's scatter": (long_tailed, "outlying-ramp", False),
+    "one closing of twenty sticks": (sticking, "outlying-ramp", False),
+    "correlation 0.5": (wandering(0.5), "serial-scatter", True),
+    "correlation 0.8": (wandering(0.8), "serial-scatter", False),
+    "correlation 0.95": (wandering(0.95), "serial-scatter", False),
+}
+
+
 @dataclass(frozen=True, kw_only=True)
 class Family:
     """What became of one valve: a next closing below the offset, a trend, and bound less threshold at the tests, V."""
@@ -91,6 +104,7 @@ def print_between_ramps(*, quick: bool, seed: int) -> list[Row]:
             test = np.repeat(TESTS, repeats)
             how = "one ramp, declared" if repeats == 1 else f"{repeats} repeats"
             rows += _rows(f"sd {scatter:g} mV, {how}", test, None, 1e-3 * scatter, 0.0, declared, count, limit, rng)
+    rows += _against_the_premises(count, limit, seed)
     for name, order in ORDERS.items():
         for drift in (-0.02, 0.02):
             rng = np.random.default_rng([seed, len(name), round(1e3 * (drift + 1))])
@@ -98,6 +112,26 @@ def print_between_ramps(*, quick: bool, seed: int) -> list[Row]:
             declared = 12.5e-3 if name == "closing repeat" else None
             rows += _rows(what, None, order, 12.5e-3, 4.6 * drift, declared, count, limit, rng)
     print_rows(f"8. Next closings below the offset and false trends, of {count} families (seed {seed})", rows)
+    return rows
+
+
+def _against_the_premises(count: int, limit: float, seed: int) -> list[Row]:
+    """Return the rows of scatter that is not normal, equal and independent: with a limit where the 1 % is promised."""
+    rows = []
+    for name, (scatter, code, promised) in UNLIKE.items():
+        say(f"between ramps: {name}, {count} families")
+        rng, order = np.random.default_rng([seed, len(name)]), ORDERS["three repeats in random order"]
+        falling, flat = (
+            [simulate(truth, order(rng), scatter, 0.0, None, True, rng) for _ in range(count)]
+            for truth in (FALLING, FLAT)
+        )
+        said = sum(code in family.said for family in falling) / count
+        margin = -1e3 * float(np.median([family.margin for family in falling]))
+        note = f"of {count}; {code} said of {said:.0%}; bound {margin:.0f} mV under the threshold (median)"
+        opened = [float(sum(family.opened for family in families)) for families in (falling, flat)]
+        rows.append(Row(what=f"{name}: opened", value=opened[0], limit=limit if promised else None, note=note))
+        what = f"{name}: flat valve opened"
+        rows.append(Row(what=what, value=opened[1], limit=limit if promised else None))
     return rows
 
 

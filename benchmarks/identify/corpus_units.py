@@ -8,6 +8,7 @@ command line. ``corpus_units.py FOLDER`` writes all files.
 import contextlib
 import io
 import json
+import re
 import sys
 import tempfile
 from collections import Counter
@@ -16,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from bench_loggers import Rows, command_text, german, plain, table, with_units_below
+from bench_loggers import PER_L_MIN, PRESSURE_OF, Rows, command_text, german, plain, table, with_units_below
 from bench_plant import Segment, commanded, lagged, ramp, staircase, with_play
 
 TOLERANCE_V, TOLERANCE_SE, LARGEST_SE_V, SAME_DP = 0.015, 3.0, 0.03, 0.02
@@ -44,6 +45,9 @@ class Case:
     floor: tuple[float, float] | None = None
     #: Standard error beyond which a knee is no result, V.
     largest_se: float = LARGEST_SE_V
+    #: Units of command, pressure and flow that must be printed, and what the command reads at a voltage.
+    shows: tuple[str, str, str] = ("V", "MPa", "L/min")
+    reads: Callable[[float], float] = float
 
 
 # The bench.
@@ -118,7 +122,8 @@ def four_ports() -> Iterator[Case]:
             f"ports_{number}_{dp:g}.csv": logger(bench(ramp(), edge=dp, seed=number, load_MPa=2 * dp), *names)
             for dp in (1.0, 2.5)
         }
-        yield Case(name=f"ports_{number}", kind=kind, files=texts, dp_from=dp_from, pressures=(1.0, 2.5))
+        shows = ("V", PRESSURE_OF[logger.__name__], "L/min")
+        yield Case(name=f"ports_{number}", kind=kind, files=texts, dp_from=dp_from, pressures=(1.0, 2.5), shows=shows)
     for number, (logger, names, dp_from) in enumerate(
         [
             (plain, ("pP", "pA", "pB"), "pP_MPa - pB_MPa"),
@@ -127,7 +132,8 @@ def four_ports() -> Iterator[Case]:
         ]
     ):
         texts = {f"both_{number}.csv": logger(bench(BOTH_WAYS, seed=20 + number, positive=number == 1), *names)}
-        yield Case(name=f"both_{number}", kind=kind, files=texts, sides=both, dp_from=dp_from)
+        shows = ("V", PRESSURE_OF[logger.__name__], "L/min")
+        yield Case(name=f"both_{number}", kind=kind, files=texts, sides=both, dp_from=dp_from, shows=shows)
     texts = {"negative.csv": plain(bench(ramp(top=-10.0), seed=30), "pP", "pB")}
     yield Case(name="negative", kind=kind, files=texts, sides=("negative",), dp_from="pP_MPa - pB_MPa")
     every = {
@@ -156,42 +162,58 @@ def four_ports() -> Iterator[Case]:
 
 def units() -> Iterator[Case]:
     kind, both = "units of the command", ("positive", "negative")
-    for number, (label, scale, declared) in enumerate(
+    for number, (label, unit, scale, declared, reads) in enumerate(
         [
-            ("duty", lambda u: 0.09 * u, "0..0.9 = 0..100 %"),
-            ("PWM (counts)", lambda u: 400 * u, "0..4000 = 0..100 %"),
-            ("AO raw", lambda u: 2764.8 * u, "0..27648 = 0..10 V"),
-            ("I_cmd_mA", lambda u: 4 + 1.6 * u, "4..20 mA = 0..10 V"),
-            ("I_coil [A]", lambda u: 0.08 * u, "0..800 mA = 0..100 %"),
-            ("set (%)", lambda u: 10 * u, ""),
-            ("set", lambda u: 10 * u, "%"),
-            ("set %", lambda u: 100 - 10 * u, "100..0 % = 0..10 V"),
-            ("AI3 (V)", lambda u: 0.15 * (4 + 1.6 * u), "4..20 mA on 150 ohm = 0..10 V"),
-            ("AI3 (mV)", lambda u: 150 * (4 + 1.6 * u), "4..20 mA on 150 ohm = 0..100 %"),
+            ("duty", "duty", lambda u: 0.09 * u, "0..0.9 = 0..100 %", None),
+            ("PWM (counts)", "counts", lambda u: 400 * u, "0..4000 = 0..100 %", None),
+            ("AO raw", "AO raw", lambda u: 2764.8 * u, "0..27648 = 0..10 V", None),
+            ("I_cmd_mA", "mA", lambda u: 4 + 1.6 * u, "4..20 mA = 0..10 V", None),
+            ("I_coil [A]", "A", lambda u: 0.08 * u, "0..0.8 A = 0..100 %", None),
+            ("set (%)", "%", lambda u: 10 * u, "", None),
+            ("set", "%", lambda u: 10 * u, "%", None),
+            ("set %", "%", lambda u: 100 - 10 * u, "100..0 % = 0..10 V", None),
+            # Behind its wiring a signal reads as at the wire, and volts that stand for others as what they stand for.
+            ("AI3 (V)", "mA", lambda u: 0.15 * (4 + 1.6 * u), "4..20 mA on 150 ohm = 0..10 V", lambda u: 4 + 1.6 * u),
+            ("AI3 (mV)", "mA", lambda u: 150 * (4 + 1.6 * u), "4..20 mA on 150 ohm = 0..100 %", lambda u: 4 + 1.6 * u),
+            ("AI4 (V)", "V", lambda u: 0.4 * u, "0..4 V = 0..10 V", float),
+            ("AI4 (mV)", "%", lambda u: 400 * u, "0..4000 mV = 0..100 %", lambda u: 10 * u),
         ]
     ):
-        digits = 6 if label in ("duty", "I_coil [A]") else 4
+        digits, flow = (6 if label in ("duty", "I_coil [A]") else 4), list(PER_L_MIN)[number % 4]
         rows = {f"unit_{number}_{dp:g}.csv": bench(ramp(), edge=dp, seed=40 + number) for dp in (1.0, 2.5)}
-        files = {name: command_text(each, label, scale(each["u"]), digits) for name, each in rows.items()}
-        named = ("--columns", f"u={label}:{declared}") if declared else ("--columns", f"u={label}")
-        if "[A]" in label:
-            named = ("--columns", f"u={label}:0..0.8 A = 0..100 %")
-        yield Case(name=f"unit_{number}", kind=kind, files=files, options=named, pressures=(1.0, 2.5))
-    for number, (label, scale, declared) in enumerate(
+        files = {name: command_text(each, label, scale(each["u"]), digits, flow=flow) for name, each in rows.items()}
+        yield Case(
+            name=f"unit_{number}", kind=kind, files=files, options=_named(label, declared), pressures=(1.0, 2.5),
+            shows=(unit, "bar", flow.replace("Lmin", "L/min")), reads=reads or scale,
+        )  # fmt: skip
+    for number, (label, unit, scale, declared, reads) in enumerate(
         [
-            ("I_cmd_mA", lambda u: 12 + 0.8 * u, "4..20 mA = -10..10 V"),
-            ("AI3 (V)", lambda u: 0.15 * (12 + 0.8 * u), "4..20 mA on 150 ohm = -10..10 V"),
-            ("duty", lambda u: 0.5 + 0.04 * u, "0,1..0,9 = -100..100 %"),
-            ("set (%)", lambda u: 10 * u, ""),
+            ("I_cmd_mA", "mA", lambda u: 12 + 0.8 * u, "4..20 mA = -10..10 V", None),
+            (
+                "AI3 (V)", "mA", lambda u: 0.15 * (12 + 0.8 * u), "4..20 mA on 150 ohm = -10..10 V",
+                lambda u: 12 + 0.8 * u,
+            ),
+            ("duty", "duty", lambda u: 0.5 + 0.04 * u, "0,1..0,9 = -100..100 %", None),
+            ("set (%)", "%", lambda u: 10 * u, "", None),
         ]
-    ):
+    ):  # fmt: skip
         each = bench(BOTH_WAYS, seed=60 + number, positive=False)
         files = {f"bipolar_{number}.csv": command_text(each, label, scale(each["u"]), 6)}
-        named = ("--columns", f"u={label}:{declared}") if declared else ("--columns", f"u={label}")
-        yield Case(name=f"bipolar_{number}", kind=kind, files=files, options=named, sides=both)
+        yield Case(
+            name=f"bipolar_{number}", kind=kind, files=files, options=_named(label, declared), sides=both,
+            shows=(unit, "bar", "L/min"), reads=reads or scale,
+        )  # fmt: skip
     each = bench(ramp(), seed=70)
     text = {"no_unit.csv": command_text(each, "duty", 0.09 * each["u"], 6)}
     yield Case(name="no_unit", kind=kind, files=text, options=("--columns", "u=duty"), asks="u=duty:0..1 = 0..100 %")
+    # A file that is not in the units of the others: what all have is shown as it is, the rest in V, MPa and L/min.
+    rows = [bench(ramp(), edge=dp, seed=71) for dp in (1.0, 2.5)]
+    files = {"one.csv": plain(rows[0], "dP"), "other.csv": command_text(rows[1], "u_V", rows[1]["u"], flow="gpm")}
+    yield Case(name="mixed", kind=kind, files=files, pressures=(1.0, 2.5))
+
+
+def _named(label: str, declared: str) -> tuple[str, str]:
+    return ("--columns", f"u={label}:{declared}" if declared else f"u={label}")
 
 
 def without_a_clock() -> Iterator[Case]:
@@ -199,7 +221,10 @@ def without_a_clock() -> Iterator[Case]:
     for number, rate in enumerate((50.0, 10.0, 1000.0)):
         each = bench(ramp(20.0), seed=80 + number, rate_Hz=rate)
         text = {f"no_time_{rate:g}.csv": command_text(each, "u_V", each["u"], clock=False)}
-        yield Case(name=f"no_time_{rate:g}", kind=kind, files=text, options=("--sample-rate", f"{rate:g} Hz"))
+        yield Case(
+            name=f"no_time_{rate:g}", kind=kind, files=text, options=("--sample-rate", f"{rate:g} Hz"),
+            shows=("V", "bar", "L/min"),
+        )  # fmt: skip
     each = bench(ramp(), seed=83)
     hot = {"T_degC": (np.full(each["t"].size, 44.0), 1), "u_V": (each["u"], 4), "dP_MPa": (each["dP"], 5)}
     text = {"thermometer_no_time.csv": table({**hot, "Q_Lmin": (each["Q"], 3)})}
@@ -228,23 +253,28 @@ def staircases() -> Iterator[Case]:
         yield Case(
             name=f"stairs_{number}", kind=kind, files={f"stairs_{number}.csv": logger(rows, "dP")},
             not_warned=NOT_OF_STAIRS, floor=(floor, 1.2 * floor),
+            shows=("V", PRESSURE_OF[logger.__name__], "L/min"),
         )  # fmt: skip
     command = staircase(0.2, 2.0)
     rows = {f"two_{dp:g}.csv": bench(command, edge=dp, seed=110, rise_s=0.1) for dp in (1.0, 2.5)}
     files = {name: plain(each, "dP") for name, each in rows.items()}
     yield Case(name="stairs_two", kind=kind, files=files, pressures=(1.0, 2.5), not_warned=NOT_OF_STAIRS)
     files = {"again.csv": german(bench((*command, *command), seed=111, rise_s=0.2, rate_Hz=20.0), "dP")}
-    yield Case(name="stairs_again", kind=kind, files=files, not_warned=NOT_OF_STAIRS)
+    in_bar = ("V", "bar", "L/min")
+    yield Case(name="stairs_again", kind=kind, files=files, not_warned=NOT_OF_STAIRS, shows=in_bar)
     both = (*command, *((seconds, -at, -to) for seconds, at, to in command))
     files = {"both.csv": plain(bench(both, seed=112, rise_s=0.1, rate_Hz=20.0, positive=False), "dP")}
     yield Case(name="stairs_both", kind=kind, files=files, sides=("positive", "negative"), not_warned=NOT_OF_STAIRS)
     each = bench(staircase(0.25, 3.0), seed=113, rise_s=0.3, rate_Hz=100.0)
     files = {"duty.csv": command_text(each, "duty", 0.09 * each["u"], 5)}
-    yield Case(name="stairs_duty", kind=kind, files=files, options=("--columns", "u=duty:0..0.9 = 0..100 %"))
+    yield Case(
+        name="stairs_duty", kind=kind, files=files, options=("--columns", "u=duty:0..0.9 = 0..100 %"),
+        shows=("duty", "bar", "L/min"), reads=lambda u: 0.09 * u,
+    )  # fmt: skip
     # No staircase: a ramp whose command was recorded in coarse steps, and one with holds.
     each = bench(ramp(100.0), seed=114, command_noise=0.0)
     files = {"coarse.csv": command_text(each, "u_V", np.round(each["u"] / 0.05) * 0.05)}
-    yield Case(name="coarse_ramp", kind=kind, files=files)
+    yield Case(name="coarse_ramp", kind=kind, files=files, shows=in_bar)
     held = [(4.0, level, level) if part else (4.0, level - 1.0, level) for level in range(1, 11) for part in (0, 1)]
     down = [(seconds, to, at) for seconds, at, to in reversed(held)]
     files = {"holds.csv": plain(bench([(3.0, 0, 0), *held, *down, (3.0, 0, 0)], seed=115, rise_s=0.05), "dP")}
@@ -280,7 +310,8 @@ def fault_of(case: Case, folder: Path) -> str:
         return "" if right else f"misread: not asked for '{case.asks}': {errors.getvalue() or out.getvalue()}"
     if status:
         return f"refused: {errors.getvalue()}"
-    faults = list(_misread(case, json.loads(output.read_text()), " ".join(out.getvalue().split())))
+    valve = json.loads(output.read_text())
+    faults = [*_misread(case, valve, " ".join(out.getvalue().split())), *_misprinted(case, valve, out.getvalue())]
     return f"misread: {'; '.join(faults)}" if faults else ""
 
 
@@ -308,6 +339,50 @@ def _misread(case: Case, valve: dict, printed: str) -> Iterator[str]:
                 elif se > case.largest_se or abs(knee - truth) > max(TOLERANCE_V, TOLERANCE_SE * se):
                     off = 1e3 * (knee - truth)
                     yield f"{branch} knee at {dp:g} MPa, {name}: off by {off:+.0f} mV (se {1e3 * se:.1f})"
+
+
+#: What no printed number may carry where the recordings carry another unit, by quantity.
+FOREIGN = (r"m?V", r"MPa", r"L/min")
+PER_MPA = {"MPa": 1.0, "bar": 10.0, "psi": 145.0377}
+
+
+def _misprinted(case: Case, valve: dict, printed: str) -> Iterator[str]:
+    """Yield what is printed in another unit than that of the recordings, or with a wrong number in it."""
+    command, pressure, flow = case.shows
+    foreign = [
+        re.compile(rf"\d\s?({unit})(?!\w)")
+        for unit, shown in zip(FOREIGN, case.shows, strict=True)
+        if not re.fullmatch(unit, shown)
+    ]
+    for line in printed.splitlines():
+        # Ranges and options are quoted as they are written, and `two-sides` has an example of one.
+        said = re.sub(r"'[^']*'|\(\S+\.\.[^)]*\)", "", line)
+        for found in filter(None, (each.search(said) for each in foreign)):
+            yield f"'{found[0]}' is printed in '{line[:60]}'"
+    titles = [line for line in printed.splitlines() if line.startswith("Thresholds (")]
+    if titles != [title for title in titles if f"({command})" in title] or len(titles) != len(case.sides):
+        yield f"the thresholds are headed {titles}"
+    if printed.count(f"dP ({pressure})") + printed.count(f"({pressure})") < len(titles):
+        yield f"no pressure drop is in {pressure}"
+    rows = [line.split()[-8:] for line in printed.splitlines() if re.search(r"(\s+(-|-?[\d.]+)){8}$", line)]
+    tests = [(name, test) for name in case.sides for test in valve["sides"].get(name, {}).get("tests", [])]
+    if len(rows) != len(tests):
+        yield f"{len(rows)} rows are printed of {len(tests)} tests"
+        return
+    for row, (name, test) in zip(rows, tests, strict=True):
+        sign = -1 if name == "negative" and case.reads(0.0) else 1
+        slope = abs(case.reads(1.0) - case.reads(0.0))
+        per_L_min = PER_L_MIN[flow.replace("L/min", "Lmin")]
+        expected = {
+            0: (PER_MPA[pressure] * test["dp_MPa"], 0.02 * PER_MPA[pressure]),
+            1: (case.reads(sign * OPENS[name]), slope * max(TOLERANCE_V, 4 * test["u_knee_se_V"])),
+            2: (case.reads(sign * CLOSES[name]), slope * max(TOLERANCE_V, 4 * test["u_knee_se_V"])),
+            3: (slope * test["u_knee_se_V"], 1e-3 * slope),
+            7: (per_L_min * test["q_max_L_min"], 0.01 * per_L_min),
+        }
+        for place, (right, room) in expected.items():
+            if row[place] != "-" and abs(float(row[place]) - right) > room:
+                yield f"column {place + 1} says {row[place]}, expected {right:.6g} in {case.shows}"
 
 
 def print_corpus_of_units(*, quick: bool, seed: int) -> list:

@@ -17,10 +17,15 @@ def recorded(
     noise: float,
     rng: np.random.Generator,
     started: float | None = None,
+    floor: float = 0.0,
 ) -> RampTest:
-    """Return a recording of a flow (L/min) with the meter's noise (L/min) and a pressure drop that is 0.1 % off."""
+    """Return a recording of a flow (L/min) with the meter's noise (L/min) and a pressure drop that is 0.1 % off.
+
+    Below its floor (L/min) the meter reads zero.
+    """
+    read = flow + noise * rng.standard_normal(u.size)
     return RampTest(
-        q=(flow + noise * rng.standard_normal(u.size)) * L_MIN,
+        q=np.where(np.abs(read) < floor, 0.0, read) * L_MIN,
         source=source,
         sha256=f"{int(rng.integers(1 << 40)):064x}",
         time=np.arange(u.size) / rate_Hz,

@@ -95,6 +95,7 @@ def test_whatever_units_design_takes_the_firmware_can_count_in(example_compensat
                 assert evaluate(form, compensator, command, code) == compensator.compare(command, code)
 
 
+@pytest.mark.slow
 def test_reciprocal_is_exact_for_every_quotient_that_can_occur(example_compensator):
     form = integer_form(example_compensator)
     quotients = np.arange(0, 2 * 60000 * form.divisor, dtype=np.uint64)

@@ -25,6 +25,7 @@ from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of, to_json
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import THIS_TOOL, to_json_bytes
 from dzdesign.core.errors import InputError
+from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.design.designing import design
 from dzdesign.identify.identification import identify
 from dzdesign.identify.valve.model import ValveModel
@@ -619,4 +620,4 @@ def test_of_how_many_runs_a_figure_is_the_worst(sides, said):
         residual_closing=0.1, q_zero_L_min=0.0, q_zero_without_beta_L_min=0.0, q_max_direct_L_min=1.0, q_max_L_min=1.0,
     )  # fmt: skip
     runs = [replace(one, side=side, dp_MPa=1.0 + n) for side, count in sides.items() for n in range(count)]
-    assert worst_of(runs) == said
+    assert worst_of(runs, AS_COMPUTED) == said

@@ -104,19 +104,22 @@ def read_recordings(
     """
     from dzdesign.identify.reading.column_labels import parse_columns
     from dzdesign.identify.reading.ramp_files import read_ramp_file
+    from dzdesign.identify.reading.units_of_columns import unit_of_pressure
 
     chosen = parse_columns(columns) if columns else {}
     skipped = None if skip_rows is None else read_skip_rows(skip_rows, "--skip-rows")
     rate = None if sample_rate is None else read_sample_rate(sample_rate, "--sample-rate")
     paths = expand(patterns)
     names = distinct_names(paths)
-    tests = [
-        replace(
-            read_ramp_file(path, u_max, columns=chosen, dp=_declared_dp(name, dp), sample_rate=rate, skip_rows=skipped),
-            source=name,
-        )
-        for path, name in with_bar(list(zip(paths, names, strict=True)), what)
-    ]
+    tests = []
+    for path, name in with_bar(list(zip(paths, names, strict=True)), what):
+        declared = _declared_dp(name, dp)
+        test = read_ramp_file(
+            path, u_max, columns=chosen, dp=declared and parse_quantity(declared[0], "pressure", declared[1]),
+            sample_rate=rate, skip_rows=skipped,
+        )  # fmt: skip
+        units = test.units if declared is None else {**test.units, **unit_of_pressure(declared[0])}
+        tests.append(replace(test, source=name, units=units))
     _refuse_unnamed(tests, dp)
     return tests
 
@@ -166,19 +169,19 @@ def distinct_names(paths: list[Path]) -> list[str]:
     return names
 
 
-def _declared_dp(name: str, declared: Table) -> float | None:
-    """Return the pressure drop that --dp or [dp] declares for a file, in Pa; a name goes before a pattern.
+def _declared_dp(name: str, declared: Table) -> tuple[str, str] | None:
+    """Return the pressure drop that --dp or [dp] declares for a file, and where; a name goes before a pattern.
 
     The name may have folders before it, where they tell two files apart; [dp] may leave them out.
     """
     if declared is None:
         return None
     if isinstance(declared, str):
-        return parse_quantity(declared, "pressure", "--dp")
+        return declared, "--dp"
     last = name.rpartition("/")[2]
     patterns = [known for known in (name, last) if known in declared]
     patterns += [each for each in declared if fnmatch.fnmatchcase(name, each) or fnmatch.fnmatchcase(last, each)]
-    return parse_quantity(declared[patterns[0]], "pressure", f"[dp] '{patterns[0]}'") if patterns else None
+    return (declared[patterns[0]], f"[dp] '{patterns[0]}'") if patterns else None
 
 
 def _refuse_unnamed(tests: list["RampTest"], declared: Table) -> None:

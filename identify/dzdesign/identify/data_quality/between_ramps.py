@@ -2,12 +2,11 @@
 
 from collections.abc import Iterator, Sequence
 
-from dzdesign.identify.data_quality.catalogue import warn
+from dzdesign.identify.data_quality.catalogue import Finding, warn
 from dzdesign.identify.knees.between_ramps import ASSUMED_REPEATABILITY, FEW_DEGREES
 from dzdesign.identify.knees.described_tests import DescribedTest
 from dzdesign.identify.knees.scatter_checks import ScatterChecks
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.repeatability import Repeatability
 
 #: Standard errors from which a drift is said, and share of u_max from which it matters.
@@ -18,7 +17,7 @@ SMALLEST_DISTANCE, SMALLEST_SCATTER = 1e-3, 5e-4
 
 def about_ramps(
     found: Repeatability, checks: ScatterChecks, tests: Sequence[DescribedTest], options: IdentifyOptions
-) -> Iterator[Warning_]:
+) -> Iterator[Finding]:
     """Yield the warnings about what differs from ramp to ramp, on the guarded branch."""
     count = len(tests)
     sd_mV, degrees = 1e3 * found.sd_V, found.degrees_of_freedom
@@ -40,7 +39,7 @@ def about_ramps(
 
 def _about_premises(
     found: Repeatability, checks: ScatterChecks, tests: Sequence[DescribedTest], u_max: float
-) -> Iterator[Warning_]:
+) -> Iterator[Finding]:
     """Yield what the repeats say against a scatter that is normal, alike at all pressure drops, and independent."""
     largest, outlying = checks.largest, checks.outlying
     if largest and found.origin == "repeats":

@@ -6,11 +6,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from dzdesign.identify.data_quality.catalogue import warn
+from dzdesign.identify.data_quality.catalogue import Finding, warn
 from dzdesign.identify.ramps.pooling import SAME_PRESSURE
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.reading.series_order import began, ended, on_one_clock, order_is_stated, runs_back
-from dzdesign.identify.valve.model import Warning_
 
 #: A pause within a series of ramps is shorter than this, s: half a year.
 LONGEST_PAUSE = 183 * 86_400.0
@@ -18,7 +17,7 @@ LONGEST_PAUSE = 183 * 86_400.0
 NUMBERED = 3
 
 
-def about_order(tests: Sequence[RampTest]) -> Iterator[Warning_]:
+def about_order(tests: Sequence[RampTest]) -> Iterator[Finding]:
     """Yield what contradicts the order in which the recordings count, or the dates that it rests on."""
     if order_is_stated(tests):
         found, case = runs_back(sorted(tests, key=lambda test: test.started or 0.0)), "order"

@@ -7,7 +7,7 @@ import numpy as np
 
 from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.data_quality.between_ramps import about_ramps
-from dzdesign.identify.data_quality.catalogue import warn
+from dzdesign.identify.data_quality.catalogue import Finding, warn
 from dzdesign.identify.data_quality.flow_meter import about_the_meter
 from dzdesign.identify.data_quality.knee_errors import about_errors
 from dzdesign.identify.data_quality.pressures import about_flow_gains
@@ -17,7 +17,6 @@ from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTest
 from dzdesign.identify.knees.meter_lag import softness_of_filter
 from dzdesign.identify.knees.scatter_checks import ScatterChecks
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.side_model import SideModel
 
 #: A softer edge than this share of u_max between knee and the tail's zero is said.
@@ -32,7 +31,7 @@ LEAK_SHARE = 1e-3
 
 def find_warnings(
     side: SideModel, group: DescribedTests, departure: np.ndarray, options: IdentifyOptions
-) -> tuple[Warning_, ...]:
+) -> tuple[Finding, ...]:
     """Return the warnings about one side.
 
     `departure` (T,) says by how much each test's knees depart from one direction with the pressure drop, V; zero
@@ -64,14 +63,14 @@ def _checks(side: SideModel, group: DescribedTests) -> ScatterChecks:
     return group.between(1 if side.certificate.guard == "closing" else 0).checks
 
 
-def _about_hysteresis(side: SideModel, u_max: float) -> Iterator[Warning_]:
+def _about_hysteresis(side: SideModel, u_max: float) -> Iterator[Finding]:
     for test in side.tests:
         gap = (test.u_knee_rising_V or 0.0) - (test.u_knee_falling_V or math.inf)
         if gap > WIDE_HYSTERESIS * u_max:
             yield warn("hysteresis", test.source, gap_mV=1e3 * gap, percent=100 * gap / u_max)
 
 
-def _about_pressure(side: SideModel, tests: tuple[DescribedTest, ...]) -> Iterator[Warning_]:
+def _about_pressure(side: SideModel, tests: tuple[DescribedTest, ...]) -> Iterator[Finding]:
     if side.reference.dp_MPa is None:
         yield warn("no-pressure", side.tests[0].source)
     elif len(side.tests) == 1:
@@ -95,7 +94,7 @@ def _sag(item: DescribedTest) -> float:
     return 1 - float(np.median(test.dp[test.u >= 0.97 * test.u.max()])) / item.dp
 
 
-def _about_the_edge(side: SideModel, group: DescribedTests, u_max: float) -> Iterator[Warning_]:
+def _about_the_edge(side: SideModel, group: DescribedTests, u_max: float) -> Iterator[Finding]:
     floor = group.floor / L_MIN
     if floor > 0:
         yield warn("onset-hidden", floor_L_min=floor)

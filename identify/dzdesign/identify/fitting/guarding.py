@@ -10,6 +10,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.identify.constants import MPA
 from dzdesign.identify.fitting.bounds import FINEST_ERROR, excess_departure, lower_bounds
 from dzdesign.identify.fitting.constrained_fits import KneeFit, fit_knees, fit_offset
+from dzdesign.identify.fitting.soft_edges import find_softness
 from dzdesign.identify.knees.described_tests import DescribedTests
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.guard_curve import Guard, GuardCurve, OpeningCurve
@@ -103,7 +104,8 @@ def order_knees(
 
 
 def bound_threshold(group: DescribedTests, knees: OrderedKnees, options: IdentifyOptions) -> Threshold:
-    """Bound the knee, or the tail's zero where that lies below the knee by more than its error: a soft edge."""
+    """Bound the knee, or below it what a soft edge still passes: the tail's zero, if that lies below by more than its
+    error, and where the flow falls to the noise level."""
     shapes = [item.branch(knees.column) for item in group.tests]
     knee, knee_se = knees.knee, knees.knee_se
     zero = np.array([shape.tail.zero for shape in shapes])
@@ -132,10 +134,18 @@ def bound_threshold(group: DescribedTests, knees: OrderedKnees, options: Identif
     zero_bound = lower_bounds(zero, zero_se, between, options.confidence, zero_budget)
     # What averages show below the knee at one pressure drop is one edge's, which all tests have.
     depth = max(shape.dead_zone.depth for shape in shapes)
+    value = np.minimum(np.where(soft, zero, knee), knee - depth)
+    bound = np.minimum(np.where(soft, np.minimum(knee_bound, zero_bound), knee_bound), knee_bound - depth)
+    # Where the edge may pass more than the level below the knee, as credible as the bound is sure. Both errors are of
+    # different readings, so they add by their squares.
+    softness = find_softness(
+        shapes, knee, level=group.noise_level, lag=group.lag, confidence=options.confidence, u_max=options.u_max
+    )
+    margin = np.hypot(knee - knee_bound, softness.at_most - softness.likely)
     return Threshold(
-        np.minimum(np.where(soft, zero, knee), knee - depth),
+        np.minimum(value, knee - softness.likely),
         np.where(soft, zero_se, knee_se),
-        np.minimum(np.where(soft, np.minimum(knee_bound, zero_bound), knee_bound), knee_bound - depth),
+        np.minimum(bound, knee - softness.likely - margin),
         lag_budget,
     )
 

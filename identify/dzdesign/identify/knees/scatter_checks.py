@@ -13,8 +13,8 @@ import numpy as np
 REFUSED = 0.01
 #: Fewest degrees of freedom in which neighbouring ramps can be told to be alike.
 FEWEST_IN_A_ROW = 4
-#: Degrees of freedom below this are rounding.
-NO_DEGREES = 1e-6
+#: Degrees of freedom below the one, and squares over those of the noise below the other, are rounding.
+NO_DEGREES, NOTHING = 1e-6, 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,53 +73,56 @@ def check_scatter(
     when : (R,) array
         When each was recorded, s; NaN where that is not known.
     """
-    if residual.size <= design.shape[1]:
+    if residual.size <= design.shape[1] or residual @ residual <= NOTHING * noise.sum():
         return ScatterChecks(largest=None, outlying=None, serial=None)
+    basis = np.linalg.qr(design)[0]
+    free = 1 - np.sum(basis**2, axis=1)
     return ScatterChecks(
-        largest=_find_largest_scatter(residual, design, test, noise),
-        outlying=_find_outlying_ramp(residual, design, test, number),
-        serial=_serial_correlation(residual, design, when) if np.isfinite(when).all() else None,
+        largest=_find_largest_scatter(residual, free, test, noise),
+        outlying=_find_outlying_ramp(residual, free, test, number),
+        serial=_serial_correlation(residual, basis, when) if np.isfinite(when).all() else None,
     )
 
 
 def _find_largest_scatter(
-    residual: np.ndarray, design: np.ndarray, test: np.ndarray, noise: np.ndarray
+    residual: np.ndarray, free: np.ndarray, test: np.ndarray, noise: np.ndarray
 ) -> LargestScatter | None:
     """Return where the ramps scatter more than elsewhere, or None if they may well scatter alike (Cochran's test).
 
-    The noise of each ramp is known, so that alike means: one variance from ramp to ramp beside it.
+    Each residual has a share `free` (R,) of its ramp's variance. The noise of each ramp is known, so that alike means:
+    one variance from ramp to ramp beside it, and that may be none.
     """
     from scipy.special import betainc
 
-    free = 1 - _leverage(design)
     degrees, squares = (np.bincount(test, weights=each) for each in (free, residual**2))
     groups = np.flatnonzero(degrees > NO_DEGREES)
     if groups.size < 2:
         return None
     total = float(degrees.sum())
-    of_valve = max(float(squares.sum()) / total - float(noise.mean()), 0.0)
     noises = np.bincount(test, weights=noise) / np.maximum(np.bincount(test), 1)
-    expected = np.maximum(of_valve + noises, np.finfo(float).tiny)
-    ratio = squares[groups] / expected[groups]
-    share = ratio / max(float(ratio.sum()), np.finfo(float).tiny)
-    # The share of one of several independent sums of squares has a beta distribution; Bonferroni over them.
-    chance = groups.size * (1 - betainc(degrees[groups] / 2, (total - degrees[groups]) / 2, share))
-    place = int(np.argmin(chance))
-    at = int(groups[place])
-    if chance[place] > REFUSED or ratio[place] <= degrees[at]:  # less than the noise, as of copies, says nothing
+    found = []
+    for of_valve in (0.0, max(float(squares.sum()) / total - float(noise.mean()), 0.0)):
+        ratio = (squares / np.maximum(of_valve + noises, np.finfo(float).tiny))[groups]
+        share = ratio / max(float(ratio.sum()), np.finfo(float).tiny)
+        # The share of one of several independent sums of squares has a beta distribution; Bonferroni over them.
+        chance = groups.size * (1 - betainc(degrees[groups] / 2, (total - degrees[groups]) / 2, share))
+        place = int(np.argmin(chance))
+        # Less than the noise, as of copies, says nothing.
+        found.append((float(chance[place]) if ratio[place] > degrees[groups[place]] else 1.0, int(groups[place])))
+    chance_of_all, at = max(found)
+    if chance_of_all > REFUSED:
         return None
     of_others = math.sqrt((squares.sum() - squares[at]) / (total - degrees[at]))
     return LargestScatter(at, math.sqrt(squares[at] / degrees[at]), float(degrees[at]), float(noises[at]), of_others)
 
 
 def _find_outlying_ramp(
-    residual: np.ndarray, design: np.ndarray, test: np.ndarray, number: np.ndarray
+    residual: np.ndarray, free: np.ndarray, test: np.ndarray, number: np.ndarray
 ) -> OutlyingRamp | None:
     """Return the ramp that lies furthest from where the others put it, if that is no chance (Student, Bonferroni)."""
     from scipy.special import stdtr
 
-    free = 1 - _leverage(design)
-    degrees = residual.size - design.shape[1] - 1
+    degrees = round(float(free.sum())) - 1
     known = free > NO_DEGREES
     if degrees < 1 or not known.any():
         return None
@@ -134,25 +137,24 @@ def _find_outlying_ramp(
     return OutlyingRamp(ramps, float(distance), float(ratio.max()))
 
 
-def _serial_correlation(residual: np.ndarray, design: np.ndarray, when: np.ndarray) -> float | None:
+def _serial_correlation(residual: np.ndarray, basis: np.ndarray, when: np.ndarray) -> float | None:
     """Return the correlation of neighbouring ramps where they are more alike than chance makes them, else None.
 
-    The test of Durbin and Watson, with the beta distribution that has the mean and the variance of their ratio under
-    this design.
+    The test of Durbin and Watson, with the beta distribution that has the mean and the variance of their ratio for a
+    design of that orthonormal basis (R, P).
     """
     from scipy.special import betainc
 
-    degrees = residual.size - np.linalg.matrix_rank(design)
+    degrees = residual.size - basis.shape[1]
     if degrees < FEWEST_IN_A_ROW or not np.ptp(when) > 0 or not residual.any():
         return None
     order = np.argsort(when, kind="stable")
     steps = np.diff(residual[order])
     ratio = float(steps @ steps) / float(residual @ residual)
-    q = np.linalg.qr(design[order])[0]
-    maker = np.eye(residual.size) - q @ q.T
     difference = np.diff(np.eye(residual.size), axis=0)
-    of_steps = maker @ difference.T @ difference
-    first, second = float(np.trace(of_steps)), float(np.trace(of_steps @ of_steps))
+    of_steps = difference.T @ difference
+    of_steps = of_steps - basis[order] @ (basis[order].T @ of_steps)
+    first, second = float(np.trace(of_steps)), float(np.sum(of_steps * of_steps.T))
     mean = first / degrees
     variance = 2 * (second - first * mean) / (degrees * (degrees + 2))
     if not variance > 0:
@@ -160,10 +162,3 @@ def _serial_correlation(residual: np.ndarray, design: np.ndarray, when: np.ndarr
     both = mean * (4 - mean) / variance - 1
     chance = betainc(both * mean / 4, both * (1 - mean / 4), min(ratio / 4, 1.0))
     return float(1 - ratio / mean) if chance < REFUSED else None
-
-
-def _leverage(design: np.ndarray) -> np.ndarray:
-    """Return the share that each row has in its own fitted value (R,)."""
-    q = np.linalg.qr(design)[0]
-    leverage: np.ndarray = np.sum(q**2, axis=1)
-    return leverage

@@ -15,6 +15,7 @@ import numpy as np
 
 from dzdesign.core.artefact_files import open_bytes, sha256_of_file
 from dzdesign.core.errors import InputError
+from dzdesign.core.recorded_units import Quantity, Unit
 from dzdesign.identify.reading.binary.array_table import read_binary_table
 from dzdesign.identify.reading.binary.registry import LONGEST_MARK, format_of
 from dzdesign.identify.reading.clock import ASSUMED_MS, clock_doubt, may_count_ms, never_back, seconds_of_day_times
@@ -27,6 +28,7 @@ from dzdesign.identify.reading.table import QUOTED_CHARACTERS, Table
 from dzdesign.identify.reading.text.table_reader import read_text_table
 from dzdesign.identify.reading.thinning import thin
 from dzdesign.identify.reading.time_stamps import Start
+from dzdesign.identify.reading.units_of_columns import units_of_columns
 
 #: Fewest complete rows in which two branches with a threshold could stand.
 MIN_ROWS = 20
@@ -96,6 +98,7 @@ def read_ramp_file(
         no_values=recording.no_values,
         stamp=recording.stamp,
         started=recording.stamp.seconds if recording.stamp else None,
+        units=recording.units,
     )
 
 
@@ -114,6 +117,7 @@ class _Recording:
     stamp: Start | None
     dp_from: tuple[str, str]
     side_without_dp: str
+    units: Mapping[Quantity, tuple[Unit, ...]]
 
 
 def _doubt_of_clock(path: Path, recording: _Recording, time: np.ndarray, u: np.ndarray) -> str:
@@ -192,6 +196,7 @@ def _read_recording(
         stamp=table.started(found["time"].label) if sample_rate is None else None,
         dp_from=edge.in_words(labels),
         side_without_dp=side_without_dp(edge, labels, table.path, data["u"], u_max),
+        units=units_of_columns(table.path, found, u_max),
     )
 
 

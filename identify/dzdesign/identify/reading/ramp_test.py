@@ -1,9 +1,11 @@
 """`RampTest`: one recorded ramp test, as all rooms of identify take it."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from dzdesign.core.recorded_units import Quantity, Unit
 from dzdesign.identify.reading.time_stamps import Start
 from dzdesign.identify.valve.left_out import LeftOut
 
@@ -58,6 +60,8 @@ class RampTest:
     left_out: tuple[LeftOut, ...] = ()
     #: Ramps that this cuts, each with the branches of it that are lost: ``ramp 2, 12.3 to 62.1 s (falling)``.
     cut: tuple[str, ...] = ()
+    #: Units of the file's columns, each once; `u`, `dp` and `q` are in SI.
+    units: Mapping[Quantity, tuple[Unit, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for array in (self.time, self.u, self.q, self.dp):
