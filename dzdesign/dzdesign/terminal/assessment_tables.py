@@ -40,8 +40,8 @@ def _table_of(item: "PressureAssessment", units: "RecordedUnits") -> Table:
     from dzdesign.assess.quantities import QUANTITIES
 
     where = "pressure drop unknown" if item.dp_MPa is None else units.text(item.dp_MPa, ".2f MPa")
-    level, rated = (units.text(flow, ".3g L/min") for flow in (item.level_L_min, item.rated_flow_L_min))
-    flows = f"level {level}, rated flow {rated}"
+    reading, rated = (units.text(flow, ".3g L/min") for flow in (item.reading_flow_L_min, item.rated_flow_L_min))
+    flows = f"reading flow {reading}, rated flow {rated}"
     rows = Table(f"{where}, {item.side} commands; {flows}", "quantity", "unit", "before", "after", "change", "± s.e.")
     for key, found in item.quantities.items():
         quantity, change, both = QUANTITIES[key], found.change, (found.before, found.after)
