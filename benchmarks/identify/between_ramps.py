@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import isotonic_regression
+from scipy.signal import lfilter
 from scoreboard import Row, print_rows, say
 
 from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, find_trend, lower_bounds
@@ -36,6 +37,49 @@ ORDERS: dict[str, Order] = {
     "three rounds": lambda rng: np.tile(TESTS, 3),
 }
 
+#: Draws by how much ramps of given tests, in the order of taking, stand off their threshold, V.
+Scatter = Callable[[np.ndarray, np.random.Generator], np.ndarray]
+
+
+def normal(sd: float | np.ndarray) -> Scatter:
+    """Return the premise, a normal scatter, of that standard deviation at all tests or at each, V (T,)."""
+    sds = np.broadcast_to(sd, DP_MPa.shape)
+    return lambda test, rng: sds[test] * rng.standard_normal(test.size)
+
+
+def sticking(test: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Return a scatter of 4 mV, and one ramp in twenty whose spool sticks and closes 80 mV lower."""
+    return 4e-3 * rng.standard_normal(test.size) - 80e-3 * (rng.random(test.size) < 0.05)
+
+
+def long_tailed(test: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Return a scatter of Student's distribution with 3 degrees of freedom, 10 mV times it."""
+    return 10e-3 * rng.standard_t(3, test.size)
+
+
+def wandering(correlation: float, sd: float = 25e-3) -> Scatter:
+    """Return an autoregressive scatter: each ramp is like the one before it, with that correlation."""
+
+    def draw(test: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        steps = rng.standard_normal(test.size)
+        steps[1:] *= np.sqrt(1 - correlation**2)
+        return sd * lfilter([1.0], [1.0, -correlation], steps)
+
+    return draw
+
+
+#: Scatter that the premises exclude, the warning that may see it, and whether the bounds hold at 1 % all the same.
+UNLIKE: dict[str, tuple[Scatter, str, bool]] = {
+    "sd from 5 to 20 mV": (normal(np.linspace(5e-3, 20e-3, DP_MPa.size)), "unequal-scatter", True),
+    "sd from 20 to 5 mV": (normal(np.linspace(20e-3, 5e-3, DP_MPa.size)), "unequal-scatter", True),
+    "sd 5 mV, at the last test 50 mV": (normal(np.append(np.full(5, 5e-3), 50e-3)), "unequal-scatter", False),
+    "Student's scatter": (long_tailed, "outlying-ramp", False),
+    "one closing of twenty sticks": (sticking, "outlying-ramp", False),
+    "correlation 0.5": (wandering(0.5), "serial-scatter", True),
+    "correlation 0.8": (wandering(0.8), "serial-scatter", False),
+    "correlation 0.95": (wandering(0.95), "serial-scatter", False),
+}
+
 
 @dataclass(frozen=True, kw_only=True)
 class Family:
@@ -44,6 +88,8 @@ class Family:
     opened: bool
     trend: bool
     margin: np.ndarray
+    #: Codes of what its ramps say against the premises.
+    said: tuple[str, ...]
 
 
 def print_between_ramps(*, quick: bool, seed: int) -> list[Row]:
@@ -58,6 +104,7 @@ def print_between_ramps(*, quick: bool, seed: int) -> list[Row]:
             test = np.repeat(TESTS, repeats)
             how = "one ramp, declared" if repeats == 1 else f"{repeats} repeats"
             rows += _rows(f"sd {scatter:g} mV, {how}", test, None, 1e-3 * scatter, 0.0, declared, count, limit, rng)
+    rows += _against_the_premises(count, limit, seed)
     for name, order in ORDERS.items():
         for drift in (-0.02, 0.02):
             rng = np.random.default_rng([seed, len(name), round(1e3 * (drift + 1))])
@@ -65,6 +112,26 @@ def print_between_ramps(*, quick: bool, seed: int) -> list[Row]:
             declared = 12.5e-3 if name == "closing repeat" else None
             rows += _rows(what, None, order, 12.5e-3, 4.6 * drift, declared, count, limit, rng)
     print_rows(f"8. Next closings below the offset and false trends, of {count} families (seed {seed})", rows)
+    return rows
+
+
+def _against_the_premises(count: int, limit: float, seed: int) -> list[Row]:
+    """Return the rows of scatter that is not normal, equal and independent: with a limit where the 1 % is promised."""
+    rows = []
+    for name, (scatter, code, promised) in UNLIKE.items():
+        say(f"between ramps: {name}, {count} families")
+        rng, order = np.random.default_rng([seed, len(name)]), ORDERS["three repeats in random order"]
+        falling, flat = (
+            [simulate(truth, order(rng), scatter, 0.0, None, True, rng) for _ in range(count)]
+            for truth in (FALLING, FLAT)
+        )
+        said = sum(code in family.said for family in falling) / count
+        margin = -1e3 * float(np.median([family.margin for family in falling]))
+        note = f"of {count}; {code} said of {said:.0%}; bound {margin:.0f} mV under the threshold (median)"
+        opened = [float(sum(family.opened for family in families)) for families in (falling, flat)]
+        rows.append(Row(what=f"{name}: opened", value=opened[0], limit=limit if promised else None, note=note))
+        what = f"{name}: flat valve opened"
+        rows.append(Row(what=what, value=opened[1], limit=limit if promised else None))
     return rows
 
 
@@ -109,15 +176,19 @@ def _rows(
 def simulate(
     truth: np.ndarray,
     test: np.ndarray,
-    scatter: float,
+    scatter: float | Scatter,
     drift: float,
     declared: float | None,
     clock: bool,
     rng: np.random.Generator,
 ) -> Family:
-    """Simulate one family; `truth` (T,) in the state of the first ramp, V, and `test` (R,) in the order of taking."""
+    """Simulate one family; `truth` (T,) in the state of the first ramp, V, and `test` (R,) in the order of taking.
+
+    The scatter is a standard deviation, V, or what draws it for ramps of given tests in the order of taking.
+    """
+    draw = normal(scatter) if isinstance(scatter, float) else scatter
     state = np.linspace(0, 1, test.size)
-    knee = truth[test] + drift * state + scatter * rng.standard_normal(test.size)
+    knee = truth[test] + drift * state + draw(test, rng)
     knee += NOISE_SE[test] * rng.standard_normal(test.size)
     counts = np.bincount(test)
     known = RampKnees(
@@ -138,5 +209,8 @@ def simulate(
     bound = lower_bounds(mean, noise_se, between, CONFIDENCE, np.zeros(mean.size))
     _, offset = staircase(bound, trend)
     lowest = truth + min(drift, 0.0)
-    closing = lowest + scatter * rng.standard_normal(truth.size)
-    return Family(opened=bool(np.any(closing < offset)), trend=trend != "flat", margin=bound - lowest)
+    # Each next closing is one of its own, long after the series.
+    closing = lowest + [float(draw(np.array([one]), rng)[0]) for one in TESTS]
+    codes = (("unequal-scatter", between.checks.largest), ("outlying-ramp", between.checks.outlying))
+    said = tuple(code for code, found in (*codes, ("serial-scatter", between.checks.serial)) if found is not None)
+    return Family(opened=bool(np.any(closing < offset)), trend=trend != "flat", margin=bound - lowest, said=said)

@@ -14,9 +14,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import corpus_plant as plant
+import bench_loggers as loggers
 import numpy as np
-from corpus_plant import Bench, drifting, duration, hold, levels, pump_off, pump_on, ramp, steady, with_dip
+from bench_plant import duration, hold, ramp
+from corpus_plant import Bench, drifting, levels, pump_off, pump_on, steady, with_dip
 
 TOLERANCE_V, TOLERANCE_SE, LARGEST_SE_V = 0.015, 3.0, 0.03
 #: A test is at a pressure drop of the truth within this share of it.
@@ -35,7 +36,7 @@ class Case:
     pressures: tuple[float, ...] = (1.0,)
     sides: tuple[str, ...] = ("positive",)
     branches: tuple[str, ...] = (UP, DOWN)
-    logger: Callable[[np.ndarray], str] = plant.plain
+    logger: Callable[[loggers.Rows], str] = loggers.plain
     edit: Callable[[np.ndarray], np.ndarray] | None = None
     options: dict[str, float] = field(default_factory=dict)
 
@@ -56,7 +57,8 @@ class Case:
         found = {}
         for number, bench in enumerate(self.benches):
             rows = bench.readings(1000 * seed + number)
-            found[f"{self.name}_{number + 1}.csv"] = self.logger(self.edit(rows) if self.edit else rows)
+            columns = zip(("t", "u", "dP", "Q"), self.edit(rows) if self.edit else rows, strict=True)
+            found[f"{self.name}_{number + 1}.csv"] = self.logger(dict(columns))
         return found
 
 
@@ -126,7 +128,7 @@ def _one(kind: str, name: str, command=ONCE, supply=AT_1_MPa, **changes) -> Case
 def command_noise() -> Iterator[Case]:
     for noise in (0.001, 0.02):
         yield _one("command noise", f"noise_{1e3 * noise:.0f}mV", command_noise_V=noise)
-    yield _one("command noise", "noise_12_bit", bits=12, command_noise_V=0.003, logger=plant.semicolons)
+    yield _one("command noise", "noise_12_bit", bits=12, command_noise_V=0.003, logger=loggers.semicolons)
     steps = Bench(command=ramp(), supply=steady(2.0), command_noise_V=0.01)
     benches = (Bench(command=ramp(), supply=steady(1.0), command_noise_V=0.01), steps)
     yield Case(name="noise_two_files", kind="command noise", benches=benches, pressures=(1.0, 2.0))
@@ -134,7 +136,7 @@ def command_noise() -> Iterator[Case]:
 
 def pump_in_the_first_hold() -> Iterator[Case]:
     for at in (0.1, 0.5, 1.0, 1.5, 2.0, 2.6):
-        logger = plant.LOGGERS[round(10 * at) % 4]
+        logger = loggers.LOGGERS[round(10 * at) % 4]
         yield _one("pump started in the first hold", f"pump_{at:g}s", supply=pump_on(at), logger=logger)
     late = ramp(before=30.0)
     yield _one("pump started in the first hold", "pump_long_hold", late, pump_on(20.0, settles_s=1.5))
@@ -163,7 +165,7 @@ def drifting_supply() -> Iterator[Case]:
         name = "up" if share > 0 else "down"
         yield _one("drifting supply", f"drift_{name}", once, drifting(share, duration(once)), pressures=middle)
         supply = drifting(share, duration(thrice))
-        yield _one("drifting supply", f"drift_{name}_three", thrice, supply, pressures=middle, logger=plant.stamped)
+        yield _one("drifting supply", f"drift_{name}_three", thrice, supply, pressures=middle, logger=loggers.stamped)
 
 
 def repeats() -> Iterator[Case]:
@@ -172,7 +174,7 @@ def repeats() -> Iterator[Case]:
     for name, dp in (("rising", (1.0, 1.03, 1.06)), ("mixed", (1.06, 1.0, 1.03)), ("series", (1.0, 2.0, 4.0))):
         supply = levels((0, dp[0]), (third - 1.0, dp[1]), (2 * third - 1.0, dp[2]))
         yield _one(kind, f"repeats_{name}", thrice, supply, pressures=tuple(sorted(dp)))
-    yield _one(kind, "repeats_same", thrice, logger=plant.two_ports)
+    yield _one(kind, "repeats_same", thrice, logger=loggers.two_ports)
 
 
 def dips() -> Iterator[Case]:
@@ -193,8 +195,8 @@ def both_sides() -> Iterator[Case]:
     kind = "both sides"
     for name, noise in (("noisy", 0.004), ("noise_free", 0.0)):
         yield _one(kind, f"bipolar_{name}", BIPOLAR, sides=BOTH, command_noise_V=noise)
-        yield _one(kind, f"from_zero_{name}", FROM_ZERO, sides=BOTH, command_noise_V=noise, logger=plant.semicolons)
-    yield _one(kind, "from_the_top", FROM_THE_TOP, sides=BOTH, logger=plant.stamped)
+        yield _one(kind, f"from_zero_{name}", FROM_ZERO, sides=BOTH, command_noise_V=noise, logger=loggers.semicolons)
+    yield _one(kind, "from_the_top", FROM_THE_TOP, sides=BOTH, logger=loggers.stamped)
     yield _one(kind, "bipolar_signed_dp", BIPOLAR, sides=BOTH, signed_dp=True)
     yield _one(kind, "bipolar_unsigned_flow", BIPOLAR, sides=BOTH, signed_flow=False, sag=0.15)
     benches = tuple(Bench(command=BIPOLAR, supply=steady(dp), sag=0.1) for dp in (1.0, 3.0))
@@ -222,10 +224,10 @@ def rests() -> Iterator[Case]:
     slow = levels((0, 1.0), (end, 2.0), (2 * end + 30.0, 4.0), settles_s=4.0)
     yield _one(kind, "rest_levels_between", (*once, *(hold(30.0), *once) * 2), slow, pressures=(1.0, 2.0, 4.0))
     yield _one(kind, "rest_pump_off_after", (*ramp(), hold(20.0)), pump_off(duration(ramp()) - 1.0))
-    yield _one(kind, "rest_set_by_hand", (hold(25.0), *ramp()), _set_by_hand, logger=plant.semicolons)
+    yield _one(kind, "rest_set_by_hand", (hold(25.0), *ramp()), _set_by_hand, logger=loggers.semicolons)
     jog = (hold(2.0), (2.0, 0.0, 2.5), (2.0, 2.5, 0.0))
     yield _one(kind, "jog_before", (*jog, *ramp()))
-    yield _one(kind, "jog_between", (*once, *jog, *once), logger=plant.two_ports)
+    yield _one(kind, "jog_between", (*once, *jog, *once), logger=loggers.two_ports)
     exercise = (hold(2.0), (5.0, 0.0, 10.0), (5.0, 10.0, 0.0))
     yield _one(kind, "exercise_before_the_pump", (*exercise, hold(6.0), *ramp()), pump_on(15.0))
     blips = levels((0, 1.0), (end, 0.3), (end + 3.0, 1.6), (end + 6.0, 1.0))
@@ -246,13 +248,13 @@ def within_the_sweep() -> Iterator[Case]:
         supply = pump_off(84.0 - 4.0 * at_V)
         yield _one(kind, f"pump_off_at_{at_V:g}V", supply=supply, branches=branches)
     twice = 2 * ramp(20.0)
-    yield _one(kind, "pump_on_in_ramp_1_of_2", twice, pump_on(3.0 + 2.0 * 6.0), logger=plant.stamped)
+    yield _one(kind, "pump_on_in_ramp_1_of_2", twice, pump_on(3.0 + 2.0 * 6.0), logger=loggers.stamped)
     yield _one(kind, "logger_late_and_early", ramp()[1:4], edit=lambda rows: rows[:, 400:-300])
 
 
 def at_the_top() -> Iterator[Case]:
     kind = "hold at the top"
-    yield _one(kind, "top_hold_twice", 2 * ramp(20.0, at_top=20.0), logger=plant.semicolons)
+    yield _one(kind, "top_hold_twice", 2 * ramp(20.0, at_top=20.0), logger=loggers.semicolons)
     yield _one(kind, "top_hold_long", ramp(at_top=60.0), sag=0.1)
     yield _one(kind, "top_hold_pump", 2 * ramp(20.0, at_top=15.0), pump_on(1.5), command_noise_V=0.01)
 

@@ -1,19 +1,17 @@
-"""A valve on a bench and the logger beside it, for the corpus: NumPy only, no code shared with the product.
+"""A valve on a bench with its supply, for the corpus: no code shared with the product.
 
-Commands are (seconds, from V, to V) one after the other; a supply is a function of time (s) that gives the pressure
-drop over the shut valve (MPa). Both sides of the spool have an edge, the spool has play, the supply sags under flow,
-sensors have noise and a converter's steps. A recording is the text that a logger writes, with the truth beside it.
+A supply is a function of time (s) that gives the pressure drop over the shut valve (MPa). Both sides of the spool have
+an edge, the spool has play, the supply sags under flow, sensors have noise and a converter's steps.
 """
 
-import datetime
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from bench_plant import Segment, commanded, lagged, with_play
 
 Supply = Callable[[np.ndarray], np.ndarray]
-Segment = tuple[float, float, float]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,19 +55,16 @@ class Bench:
     def readings(self, seed: int) -> np.ndarray:
         """Return time (s), command (V), pressure drop (MPa) and flow (L/min) as they are logged (4, N)."""
         rng = np.random.default_rng([seed, 20])
-        ends = np.cumsum([0.0, *(segment[0] for segment in self.command)])
-        time = np.arange(0.0, ends[-1], 1 / self.rate_Hz)
-        corners = np.ravel([(a, b) for a, b in zip(ends, np.nextafter(ends[1:], 0), strict=False)])
-        u = np.interp(time, corners, np.ravel([segment[1:] for segment in self.command]))
+        time, u = commanded(self.command, self.rate_Hz)
         nominal = self.supply(time)
-        spool = _with_play(u, self.valve.play_V)
+        spool = with_play(u, self.valve.play_V, _at_rest(float(u[0]), self.valve.play_V / 2))
         drift = self.valve.knee_V_MPa * (nominal - 1)
         open_ = np.clip(spool - self.valve.knee_V - drift, 0, self.valve.stroke_V)
         open_ -= np.clip(-spool - self.valve.negative_knee_V - drift, 0, self.valve.stroke_V)
         dp = nominal / (1 + self.sag * (open_ / 4) ** 2)
         flow = self.valve.gain * open_ * np.sqrt(np.maximum(dp, 0))
         if self.lag_s > 0:
-            flow = _lagged(flow, self.lag_s * self.rate_Hz)
+            flow = lagged(flow, self.lag_s * self.rate_Hz)
         logged = [
             u + self.command_noise_V * rng.standard_normal(u.size),
             (np.where(u < -0.5, -dp, dp) if self.signed_dp else dp) + self.dp_noise * rng.standard_normal(u.size),
@@ -81,40 +76,9 @@ class Bench:
         return np.array([time, *logged])
 
 
-def _with_play(u: np.ndarray, play: float) -> np.ndarray:
-    """Return where a spool stands that is dragged along by a command with play; it begins in the middle of it."""
-    spool, half = [], play / 2
-    at = float(u[0]) - half if u[0] > 1 else float(u[0]) + half if u[0] < -1 else float(u[0])
-    for value in u.tolist():
-        at = min(max(at, value - half), value + half)
-        spool.append(at)
-    return np.array(spool)
-
-
-def _lagged(values: np.ndarray, samples: float) -> np.ndarray:
-    pole, at, late = float(np.exp(-1 / samples)), float(values[0]), []
-    for value in values.tolist():
-        at = pole * at + (1 - pole) * value
-        late.append(at)
-    return np.array(late)
-
-
-# What the command does, (seconds, from V, to V).
-
-
-def hold(seconds: float, level: float = 0.0) -> Segment:
-    return seconds, level, level
-
-
-def ramp(
-    up_s: float = 40.0, top: float = 10.0, *, before: float = 3.0, at_top: float = 1.0, after: float = 3.0
-) -> tuple[Segment, ...]:
-    """Hold, up, hold, down, hold."""
-    return hold(before), (up_s, 0.0, top), hold(at_top, top), (up_s, top, 0.0), hold(after)
-
-
-def duration(command: tuple[Segment, ...]) -> float:
-    return sum(segment[0] for segment in command)
+def _at_rest(u: float, half: float) -> float:
+    """Return where the spool stands under a command that has been on for long: pushed out, or in the middle."""
+    return u - half if u > 1 else u + half if u < -1 else u
 
 
 # What the supply does.
@@ -151,41 +115,3 @@ def levels(*at: tuple[float, float], settles_s: float = 0.4) -> Supply:
 def with_dip(supply: Supply, at_s: float, to: float, seconds: float = 0.5) -> Supply:
     """Return a supply that dips to a share of itself for a while."""
     return lambda time: supply(time) * np.where((time >= at_s) & (time < at_s + seconds), to, 1.0)
-
-
-# What loggers write.
-
-
-def plain(rows: np.ndarray) -> str:
-    return "time_s,u_V,dP_MPa,Q_Lmin\n" + _lines(rows, ",", (4, 4, 5, 4))
-
-
-def semicolons(rows: np.ndarray) -> str:
-    time, u, dp, q = rows
-    text = "t [s];u [V];dP [bar];Q [l/min]\n" + _lines(np.array([time, u, 10 * dp, q]), ";", (4, 3, 3, 3))
-    return text.replace(".", ",")
-
-
-def stamped(rows: np.ndarray) -> str:
-    """Return what a logger with a preamble and date-and-time stamps writes."""
-    begin = datetime.datetime(2026, 3, 4, 9, 30)
-    lines = ["Logger DL-40;SN 00417", "Channels: 3", "", "time\tu (V)\tdP (MPa)\tQ (L/min)"]
-    for time, u, dp, q in rows.T.tolist():
-        lines.append(f"{begin + datetime.timedelta(seconds=time):%Y-%m-%d %H:%M:%S.%f}\t{u:.4f}\t{dp:.5f}\t{q:.3f}")
-    return "\n".join(lines) + "\n"
-
-
-def two_ports(rows: np.ndarray) -> str:
-    time, u, dp, q = rows
-    rows = np.array([1e3 * time, u, 10 * dp + 12.0, np.full(time.size, 12.0), q])
-    return "time [ms],u [V],pA [bar],pB [bar],Q [L/min]\n" + _lines(rows, ",", (1, 4, 3, 3, 3))
-
-
-def _lines(rows: np.ndarray, separator: str, digits: tuple[int, ...]) -> str:
-    def line(row: list[float]) -> str:
-        return separator.join(f"{value:.{count}f}" for value, count in zip(row, digits, strict=True))
-
-    return "\n".join(line(row) for row in rows.T.tolist()) + "\n"
-
-
-LOGGERS: tuple[Callable[[np.ndarray], str], ...] = (plain, semicolons, stamped, two_ports)

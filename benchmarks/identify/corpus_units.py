@@ -1,14 +1,14 @@
 """Recordings of four ports, of commands in any unit, without a clock, and staircases, as loggers write them.
 
 Each case is a valve's recordings as text, the command line that reads them, and the truth beside them: where each side
-opens and closes at the pressure drop of its metering edge. NumPy only, no code shared with the product, which is asked
-through its command line. ``corpus_units.py FOLDER`` writes all files.
+opens and closes at the pressure drop of its metering edge. No code shared with the product, which is asked through its
+command line. ``corpus_units.py FOLDER`` writes all files.
 """
 
 import contextlib
-import datetime
 import io
 import json
+import re
 import sys
 import tempfile
 from collections import Counter
@@ -17,13 +17,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from bench_loggers import PER_L_MIN, PRESSURE_OF, Rows, command_text, german, plain, table, with_units_below
+from bench_plant import Segment, commanded, lagged, ramp, staircase, with_play
 
 TOLERANCE_V, TOLERANCE_SE, LARGEST_SE_V, SAME_DP = 0.015, 3.0, 0.03, 0.02
 #: Volts at which the valve's sides open and close, whatever the unit of the command.
 OPENS, CLOSES = {"positive": 4.66, "negative": 3.26}, {"positive": 4.54, "negative": 3.14}
 GAIN, PLAY = 3.5, 0.12
-Rows = dict[str, np.ndarray]
-Segment = tuple[float, float, float]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,23 +45,15 @@ class Case:
     floor: tuple[float, float] | None = None
     #: Standard error beyond which a knee is no result, V.
     largest_se: float = LARGEST_SE_V
+    #: Units of command, pressure and flow that must be printed, and what the command reads at a voltage.
+    shows: tuple[str, str, str] = ("V", "MPa", "L/min")
+    reads: Callable[[float], float] = float
 
 
 # The bench.
 
 
-def ramp(up_s: float = 40.0, top: float = 10.0) -> tuple[Segment, ...]:
-    """Hold, up, hold, down, hold; each (seconds, from V, to V)."""
-    return (3.0, 0.0, 0.0), (up_s, 0.0, top), (1.0, top, top), (up_s, top, 0.0), (3.0, 0.0, 0.0)
-
-
 BOTH_WAYS = (*ramp(), *ramp(top=-10.0))
-
-
-def staircase(step: float, dwell: float, top: float = 10.0) -> tuple[Segment, ...]:
-    """Levels held from zero to the top and back."""
-    up = np.arange(0, top + step / 2, step)
-    return tuple((dwell, float(level), float(level)) for level in (*up, *up[::-1]))
 
 
 def bench(
@@ -85,14 +77,10 @@ def bench(
     the time constant of the spool and the flow, `floor` the meter's.
     """
     rng = np.random.default_rng([seed, 77])
-    ends = np.cumsum([0.0, *(seconds for seconds, _, _ in command)])
-    time = np.arange(0.0, ends[-1], 1 / rate_Hz)
-    which = np.searchsorted(ends, time, side="right") - 1
-    seconds, start, stop = np.array(command).T
-    u = start[which] + (stop - start)[which] * (time - ends[which]) / seconds[which]
-    spool = _with_play(u)
+    time, u = commanded(command, rate_Hz)
+    spool = with_play(u, PLAY)
     if rise_s:
-        spool = _lagged(spool, rise_s * rate_Hz)
+        spool = lagged(spool, rise_s * rate_Hz)
     right = np.maximum(spool - (OPENS["positive"] - PLAY / 2), 0)
     left = np.maximum(-spool - (OPENS["negative"] - PLAY / 2), 0)
     opened = np.minimum(right + left, 4.6)
@@ -110,62 +98,6 @@ def bench(
     noisy = {f"p{port}": value + 0.003 * rng.standard_normal(u.size) for port, value in ports.items()}
     noisy["dP"] = drop + 0.004 * rng.standard_normal(u.size)
     return {"t": time, "u": u + command_noise * rng.standard_normal(u.size), "Q": read, **noisy}
-
-
-def _with_play(u: np.ndarray) -> np.ndarray:
-    at, found = 0.0, []
-    for value in u.tolist():
-        at = min(max(at, value - PLAY / 2), value + PLAY / 2)
-        found.append(at)
-    return np.array(found)
-
-
-def _lagged(values: np.ndarray, samples: float) -> np.ndarray:
-    pole, at, late = float(np.exp(-1 / samples)), float(values[0]), []
-    for value in values.tolist():
-        at = pole * at + (1 - pole) * value
-        late.append(at)
-    return np.array(late)
-
-
-# The loggers.
-
-
-def table(columns: dict[str, tuple[np.ndarray, int]], separator: str = ",", comma: bool = False) -> str:
-    """Return a table: label -> column and its decimals."""
-    cells = [[f"{value:.{digits}f}" for value in column.tolist()] for column, digits in columns.values()]
-    rows = "\n".join(separator.join(row) for row in zip(*cells, strict=True))
-    return separator.join(columns) + "\n" + (rows.replace(".", ",") if comma else rows) + "\n"
-
-
-def plain(rows: Rows, *names: str) -> str:
-    """Return time, command, some pressures in MPa and the flow, the unit in each label."""
-    pressures = {f"{name}_MPa": (rows[name], 5) for name in names}
-    return table({"time_s": (rows["t"], 3), "u_V": (rows["u"], 4), **pressures, "Q_Lmin": (rows["Q"], 3)})
-
-
-def german(rows: Rows, *names: str) -> str:
-    """Return the same in bar, with decimal commas and stamps."""
-    begin = datetime.datetime(2026, 3, 4, 9, 30)
-    pressures = {f"{name} [bar]": (10 * rows[name], 3) for name in names}
-    text = table({"u [V]": (rows["u"], 4), **pressures, "Q [l/min]": (rows["Q"], 3)}, ";", comma=True)
-    head, *lines = text.splitlines()
-    stamps = (f"{begin + datetime.timedelta(seconds=at):%d.%m.%Y %H:%M:%S,%f}" for at in rows["t"].tolist())
-    return "\n".join([f"t;{head}", *(f"{at};{line}" for at, line in zip(stamps, lines, strict=True))]) + "\n"
-
-
-def with_units_below(rows: Rows, *names: str) -> str:
-    """Return the same with a row of units below the labels, pressures in psi."""
-    columns = {"t": (1e3 * rows["t"], 1), "u": (rows["u"], 4)}
-    columns |= {name: (rows[name] * 145.0377, 3) for name in names} | {"Q": (rows["Q"], 3)}
-    head, *lines = table(columns, "\t").splitlines()
-    return "\n".join([head, "\t".join(["ms", "V", *["psi"] * len(names), "l/min"]), *lines]) + "\n"
-
-
-def command_text(rows: Rows, label: str, values: np.ndarray, digits: int = 4, clock: bool = True) -> str:
-    """Return a recording whose command stands under another label, in its own unit."""
-    time = {"time_s": (rows["t"], 3)} if clock else {}
-    return table({**time, label: (values, digits), "dP_bar": (10 * rows["dP"], 3), "Q_Lmin": (rows["Q"], 3)})
 
 
 # The cases.
@@ -190,7 +122,8 @@ def four_ports() -> Iterator[Case]:
             f"ports_{number}_{dp:g}.csv": logger(bench(ramp(), edge=dp, seed=number, load_MPa=2 * dp), *names)
             for dp in (1.0, 2.5)
         }
-        yield Case(name=f"ports_{number}", kind=kind, files=texts, dp_from=dp_from, pressures=(1.0, 2.5))
+        shows = ("V", PRESSURE_OF[logger.__name__], "L/min")
+        yield Case(name=f"ports_{number}", kind=kind, files=texts, dp_from=dp_from, pressures=(1.0, 2.5), shows=shows)
     for number, (logger, names, dp_from) in enumerate(
         [
             (plain, ("pP", "pA", "pB"), "pP_MPa - pB_MPa"),
@@ -199,7 +132,8 @@ def four_ports() -> Iterator[Case]:
         ]
     ):
         texts = {f"both_{number}.csv": logger(bench(BOTH_WAYS, seed=20 + number, positive=number == 1), *names)}
-        yield Case(name=f"both_{number}", kind=kind, files=texts, sides=both, dp_from=dp_from)
+        shows = ("V", PRESSURE_OF[logger.__name__], "L/min")
+        yield Case(name=f"both_{number}", kind=kind, files=texts, sides=both, dp_from=dp_from, shows=shows)
     texts = {"negative.csv": plain(bench(ramp(top=-10.0), seed=30), "pP", "pB")}
     yield Case(name="negative", kind=kind, files=texts, sides=("negative",), dp_from="pP_MPa - pB_MPa")
     every = {
@@ -228,42 +162,58 @@ def four_ports() -> Iterator[Case]:
 
 def units() -> Iterator[Case]:
     kind, both = "units of the command", ("positive", "negative")
-    for number, (label, scale, declared) in enumerate(
+    for number, (label, unit, scale, declared, reads) in enumerate(
         [
-            ("duty", lambda u: 0.09 * u, "0..0.9 = 0..100 %"),
-            ("PWM (counts)", lambda u: 400 * u, "0..4000 = 0..100 %"),
-            ("AO raw", lambda u: 2764.8 * u, "0..27648 = 0..10 V"),
-            ("I_cmd_mA", lambda u: 4 + 1.6 * u, "4..20 mA = 0..10 V"),
-            ("I_coil [A]", lambda u: 0.08 * u, "0..800 mA = 0..100 %"),
-            ("set (%)", lambda u: 10 * u, ""),
-            ("set", lambda u: 10 * u, "%"),
-            ("set %", lambda u: 100 - 10 * u, "100..0 % = 0..10 V"),
-            ("AI3 (V)", lambda u: 0.15 * (4 + 1.6 * u), "4..20 mA on 150 ohm = 0..10 V"),
-            ("AI3 (mV)", lambda u: 150 * (4 + 1.6 * u), "4..20 mA on 150 ohm = 0..100 %"),
+            ("duty", "duty", lambda u: 0.09 * u, "0..0.9 = 0..100 %", None),
+            ("PWM (counts)", "counts", lambda u: 400 * u, "0..4000 = 0..100 %", None),
+            ("AO raw", "AO raw", lambda u: 2764.8 * u, "0..27648 = 0..10 V", None),
+            ("I_cmd_mA", "mA", lambda u: 4 + 1.6 * u, "4..20 mA = 0..10 V", None),
+            ("I_coil [A]", "A", lambda u: 0.08 * u, "0..0.8 A = 0..100 %", None),
+            ("set (%)", "%", lambda u: 10 * u, "", None),
+            ("set", "%", lambda u: 10 * u, "%", None),
+            ("set %", "%", lambda u: 100 - 10 * u, "100..0 % = 0..10 V", None),
+            # Behind its wiring a signal reads as at the wire, and volts that stand for others as what they stand for.
+            ("AI3 (V)", "mA", lambda u: 0.15 * (4 + 1.6 * u), "4..20 mA on 150 ohm = 0..10 V", lambda u: 4 + 1.6 * u),
+            ("AI3 (mV)", "mA", lambda u: 150 * (4 + 1.6 * u), "4..20 mA on 150 ohm = 0..100 %", lambda u: 4 + 1.6 * u),
+            ("AI4 (V)", "V", lambda u: 0.4 * u, "0..4 V = 0..10 V", float),
+            ("AI4 (mV)", "%", lambda u: 400 * u, "0..4000 mV = 0..100 %", lambda u: 10 * u),
         ]
     ):
-        digits = 6 if label in ("duty", "I_coil [A]") else 4
+        digits, flow = (6 if label in ("duty", "I_coil [A]") else 4), list(PER_L_MIN)[number % 4]
         rows = {f"unit_{number}_{dp:g}.csv": bench(ramp(), edge=dp, seed=40 + number) for dp in (1.0, 2.5)}
-        files = {name: command_text(each, label, scale(each["u"]), digits) for name, each in rows.items()}
-        named = ("--columns", f"u={label}:{declared}") if declared else ("--columns", f"u={label}")
-        if "[A]" in label:
-            named = ("--columns", f"u={label}:0..0.8 A = 0..100 %")
-        yield Case(name=f"unit_{number}", kind=kind, files=files, options=named, pressures=(1.0, 2.5))
-    for number, (label, scale, declared) in enumerate(
+        files = {name: command_text(each, label, scale(each["u"]), digits, flow=flow) for name, each in rows.items()}
+        yield Case(
+            name=f"unit_{number}", kind=kind, files=files, options=_named(label, declared), pressures=(1.0, 2.5),
+            shows=(unit, "bar", flow.replace("Lmin", "L/min")), reads=reads or scale,
+        )  # fmt: skip
+    for number, (label, unit, scale, declared, reads) in enumerate(
         [
-            ("I_cmd_mA", lambda u: 12 + 0.8 * u, "4..20 mA = -10..10 V"),
-            ("AI3 (V)", lambda u: 0.15 * (12 + 0.8 * u), "4..20 mA on 150 ohm = -10..10 V"),
-            ("duty", lambda u: 0.5 + 0.04 * u, "0,1..0,9 = -100..100 %"),
-            ("set (%)", lambda u: 10 * u, ""),
+            ("I_cmd_mA", "mA", lambda u: 12 + 0.8 * u, "4..20 mA = -10..10 V", None),
+            (
+                "AI3 (V)", "mA", lambda u: 0.15 * (12 + 0.8 * u), "4..20 mA on 150 ohm = -10..10 V",
+                lambda u: 12 + 0.8 * u,
+            ),
+            ("duty", "duty", lambda u: 0.5 + 0.04 * u, "0,1..0,9 = -100..100 %", None),
+            ("set (%)", "%", lambda u: 10 * u, "", None),
         ]
-    ):
+    ):  # fmt: skip
         each = bench(BOTH_WAYS, seed=60 + number, positive=False)
         files = {f"bipolar_{number}.csv": command_text(each, label, scale(each["u"]), 6)}
-        named = ("--columns", f"u={label}:{declared}") if declared else ("--columns", f"u={label}")
-        yield Case(name=f"bipolar_{number}", kind=kind, files=files, options=named, sides=both)
+        yield Case(
+            name=f"bipolar_{number}", kind=kind, files=files, options=_named(label, declared), sides=both,
+            shows=(unit, "bar", "L/min"), reads=reads or scale,
+        )  # fmt: skip
     each = bench(ramp(), seed=70)
     text = {"no_unit.csv": command_text(each, "duty", 0.09 * each["u"], 6)}
     yield Case(name="no_unit", kind=kind, files=text, options=("--columns", "u=duty"), asks="u=duty:0..1 = 0..100 %")
+    # A file that is not in the units of the others: what all have is shown as it is, the rest in V, MPa and L/min.
+    rows = [bench(ramp(), edge=dp, seed=71) for dp in (1.0, 2.5)]
+    files = {"one.csv": plain(rows[0], "dP"), "other.csv": command_text(rows[1], "u_V", rows[1]["u"], flow="gpm")}
+    yield Case(name="mixed", kind=kind, files=files, pressures=(1.0, 2.5))
+
+
+def _named(label: str, declared: str) -> tuple[str, str]:
+    return ("--columns", f"u={label}:{declared}" if declared else f"u={label}")
 
 
 def without_a_clock() -> Iterator[Case]:
@@ -271,7 +221,10 @@ def without_a_clock() -> Iterator[Case]:
     for number, rate in enumerate((50.0, 10.0, 1000.0)):
         each = bench(ramp(20.0), seed=80 + number, rate_Hz=rate)
         text = {f"no_time_{rate:g}.csv": command_text(each, "u_V", each["u"], clock=False)}
-        yield Case(name=f"no_time_{rate:g}", kind=kind, files=text, options=("--sample-rate", f"{rate:g} Hz"))
+        yield Case(
+            name=f"no_time_{rate:g}", kind=kind, files=text, options=("--sample-rate", f"{rate:g} Hz"),
+            shows=("V", "bar", "L/min"),
+        )  # fmt: skip
     each = bench(ramp(), seed=83)
     hot = {"T_degC": (np.full(each["t"].size, 44.0), 1), "u_V": (each["u"], 4), "dP_MPa": (each["dP"], 5)}
     text = {"thermometer_no_time.csv": table({**hot, "Q_Lmin": (each["Q"], 3)})}
@@ -300,23 +253,28 @@ def staircases() -> Iterator[Case]:
         yield Case(
             name=f"stairs_{number}", kind=kind, files={f"stairs_{number}.csv": logger(rows, "dP")},
             not_warned=NOT_OF_STAIRS, floor=(floor, 1.2 * floor),
+            shows=("V", PRESSURE_OF[logger.__name__], "L/min"),
         )  # fmt: skip
     command = staircase(0.2, 2.0)
     rows = {f"two_{dp:g}.csv": bench(command, edge=dp, seed=110, rise_s=0.1) for dp in (1.0, 2.5)}
     files = {name: plain(each, "dP") for name, each in rows.items()}
     yield Case(name="stairs_two", kind=kind, files=files, pressures=(1.0, 2.5), not_warned=NOT_OF_STAIRS)
     files = {"again.csv": german(bench((*command, *command), seed=111, rise_s=0.2, rate_Hz=20.0), "dP")}
-    yield Case(name="stairs_again", kind=kind, files=files, not_warned=NOT_OF_STAIRS)
+    in_bar = ("V", "bar", "L/min")
+    yield Case(name="stairs_again", kind=kind, files=files, not_warned=NOT_OF_STAIRS, shows=in_bar)
     both = (*command, *((seconds, -at, -to) for seconds, at, to in command))
     files = {"both.csv": plain(bench(both, seed=112, rise_s=0.1, rate_Hz=20.0, positive=False), "dP")}
     yield Case(name="stairs_both", kind=kind, files=files, sides=("positive", "negative"), not_warned=NOT_OF_STAIRS)
     each = bench(staircase(0.25, 3.0), seed=113, rise_s=0.3, rate_Hz=100.0)
     files = {"duty.csv": command_text(each, "duty", 0.09 * each["u"], 5)}
-    yield Case(name="stairs_duty", kind=kind, files=files, options=("--columns", "u=duty:0..0.9 = 0..100 %"))
+    yield Case(
+        name="stairs_duty", kind=kind, files=files, options=("--columns", "u=duty:0..0.9 = 0..100 %"),
+        shows=("duty", "bar", "L/min"), reads=lambda u: 0.09 * u,
+    )  # fmt: skip
     # No staircase: a ramp whose command was recorded in coarse steps, and one with holds.
     each = bench(ramp(100.0), seed=114, command_noise=0.0)
     files = {"coarse.csv": command_text(each, "u_V", np.round(each["u"] / 0.05) * 0.05)}
-    yield Case(name="coarse_ramp", kind=kind, files=files)
+    yield Case(name="coarse_ramp", kind=kind, files=files, shows=in_bar)
     held = [(4.0, level, level) if part else (4.0, level - 1.0, level) for level in range(1, 11) for part in (0, 1)]
     down = [(seconds, to, at) for seconds, at, to in reversed(held)]
     files = {"holds.csv": plain(bench([(3.0, 0, 0), *held, *down, (3.0, 0, 0)], seed=115, rise_s=0.05), "dP")}
@@ -352,7 +310,8 @@ def fault_of(case: Case, folder: Path) -> str:
         return "" if right else f"misread: not asked for '{case.asks}': {errors.getvalue() or out.getvalue()}"
     if status:
         return f"refused: {errors.getvalue()}"
-    faults = list(_misread(case, json.loads(output.read_text()), " ".join(out.getvalue().split())))
+    valve = json.loads(output.read_text())
+    faults = [*_misread(case, valve, " ".join(out.getvalue().split())), *_misprinted(case, valve, out.getvalue())]
     return f"misread: {'; '.join(faults)}" if faults else ""
 
 
@@ -380,6 +339,50 @@ def _misread(case: Case, valve: dict, printed: str) -> Iterator[str]:
                 elif se > case.largest_se or abs(knee - truth) > max(TOLERANCE_V, TOLERANCE_SE * se):
                     off = 1e3 * (knee - truth)
                     yield f"{branch} knee at {dp:g} MPa, {name}: off by {off:+.0f} mV (se {1e3 * se:.1f})"
+
+
+#: What no printed number may carry where the recordings carry another unit, by quantity.
+FOREIGN = (r"m?V", r"MPa", r"L/min")
+PER_MPA = {"MPa": 1.0, "bar": 10.0, "psi": 145.0377}
+
+
+def _misprinted(case: Case, valve: dict, printed: str) -> Iterator[str]:
+    """Yield what is printed in another unit than that of the recordings, or with a wrong number in it."""
+    command, pressure, flow = case.shows
+    foreign = [
+        re.compile(rf"\d\s?({unit})(?!\w)")
+        for unit, shown in zip(FOREIGN, case.shows, strict=True)
+        if not re.fullmatch(unit, shown)
+    ]
+    for line in printed.splitlines():
+        # Ranges and options are quoted as they are written, and `two-sides` has an example of one.
+        said = re.sub(r"'[^']*'|\(\S+\.\.[^)]*\)", "", line)
+        for found in filter(None, (each.search(said) for each in foreign)):
+            yield f"'{found[0]}' is printed in '{line[:60]}'"
+    titles = [line for line in printed.splitlines() if line.startswith("Thresholds (")]
+    if titles != [title for title in titles if f"({command})" in title] or len(titles) != len(case.sides):
+        yield f"the thresholds are headed {titles}"
+    if printed.count(f"dP ({pressure})") + printed.count(f"({pressure})") < len(titles):
+        yield f"no pressure drop is in {pressure}"
+    rows = [line.split()[-8:] for line in printed.splitlines() if re.search(r"(\s+(-|-?[\d.]+)){8}$", line)]
+    tests = [(name, test) for name in case.sides for test in valve["sides"].get(name, {}).get("tests", [])]
+    if len(rows) != len(tests):
+        yield f"{len(rows)} rows are printed of {len(tests)} tests"
+        return
+    for row, (name, test) in zip(rows, tests, strict=True):
+        sign = -1 if name == "negative" and case.reads(0.0) else 1
+        slope = abs(case.reads(1.0) - case.reads(0.0))
+        per_L_min = PER_L_MIN[flow.replace("L/min", "Lmin")]
+        expected = {
+            0: (PER_MPA[pressure] * test["dp_MPa"], 0.02 * PER_MPA[pressure]),
+            1: (case.reads(sign * OPENS[name]), slope * max(TOLERANCE_V, 4 * test["u_knee_se_V"])),
+            2: (case.reads(sign * CLOSES[name]), slope * max(TOLERANCE_V, 4 * test["u_knee_se_V"])),
+            3: (slope * test["u_knee_se_V"], 1e-3 * slope),
+            7: (per_L_min * test["q_max_L_min"], 0.01 * per_L_min),
+        }
+        for place, (right, room) in expected.items():
+            if row[place] != "-" and abs(float(row[place]) - right) > room:
+                yield f"column {place + 1} says {row[place]}, expected {right:.6g} in {case.shows}"
 
 
 def print_corpus_of_units(*, quick: bool, seed: int) -> list:

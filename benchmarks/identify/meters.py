@@ -9,7 +9,8 @@ for errors but what they allow for.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
+from bench_plant import lagged
+from recorded_ramps import recorded
 from scoreboard import Row, print_rows, say
 
 from dzdesign.identify.identification import identify
@@ -17,7 +18,6 @@ from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.guard_curve import Guard
 
-L_MIN, MPA = 1e-3 / 60, 1e6
 PRESSURES_MPa = (1.0, 3.0, 5.0)
 RATE_Hz, HOLD_S, HYSTERESIS_V = 50, 4, 0.1
 #: Of 200 valves.
@@ -113,14 +113,5 @@ def _ramp(case: Case, dp_MPa: float, edge: float, rng: np.random.Generator) -> R
     main, leak = _flow(case, dp_MPa, u - edge - HYSTERESIS_V * opening), case.leak * dp_MPa
     q = np.maximum(main, leak) if case.stops else main + leak
     if case.lag:
-        share = 1 - np.exp(-1 / (case.lag * RATE_Hz))
-        q = lfilter([share], [1, share - 1], q - q[0]) + q[0]
-    q = q + case.zero + case.noise * rng.standard_normal(u.size)
-    return RampTest(
-        source=f"dP{dp_MPa:g}.csv",
-        sha256=f"{int(rng.integers(1 << 40)):064x}",
-        time=np.arange(u.size) / RATE_Hz,
-        u=u,
-        q=q * L_MIN,
-        dp=dp_MPa * MPA * (1 + 1e-3 * rng.standard_normal(u.size)),
-    )
+        q = lagged(q, case.lag * RATE_Hz)
+    return recorded(f"dP{dp_MPa:g}.csv", u, q + case.zero, dp_MPa, rate_Hz=RATE_Hz, noise=case.noise, rng=rng)

@@ -3,11 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
+from bench_plant import lagged
+from recorded_ramps import L_MIN, MPA
 
 from dzdesign.identify.reading.ramp_test import RampTest
-
-L_MIN, MPA = 1e-3 / 60, 1e6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,12 +37,11 @@ class PlannedBench:
         rest = np.zeros(int(self.hold * self.rate_Hz))
         u = np.concatenate([rest, up, up[::-1], rest])
         opening = np.arange(u.size) < rest.size + up.size
-        pole = np.exp(-1 / (self.lag * self.rate_Hz))
         tests = []
         for number, dp_MPa in enumerate(order_MPa):
             closing = self.threshold(dp_MPa) + self.scatter * rng.standard_normal()
             flow = self.gain * np.sqrt(dp_MPa) * np.clip(u - closing - self.hysteresis * opening, 0, None)
-            read = lfilter([1 - pole], [1, -pole], flow) + self.noise * rng.standard_normal(u.size)
+            read = lagged(flow, self.lag * self.rate_Hz) + self.noise * rng.standard_normal(u.size)
             tests.append(
                 RampTest(
                     source=f"ramp_{number:02d}.csv",

@@ -2,6 +2,7 @@
 
 import numpy as np
 from between_ramps import CONFIDENCE, FALLING, FLAT, ORDERS, U_MAX, DP_MPa, SCATTERS_mV
+from recorded_ramps import recorded
 from scipy.stats import binom
 from scoreboard import Row, print_rows, say
 
@@ -9,7 +10,6 @@ from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_test import RampTest
 
-L_MIN, MPA = 1e-3 / 60, 1e6
 RATE_Hz, RAMP_S, NOISE_L_min, TOP_V, HYSTERESIS_V = 20, 100, 0.1, 3.9, 0.1
 
 
@@ -59,13 +59,8 @@ def _ramp(number: int, test: int, closes: float, dated: bool, rng: np.random.Gen
     u = np.concatenate([up, up[::-1]])
     edge = closes + HYSTERESIS_V * (np.arange(u.size) < up.size)
     gain = 2 * DP_MPa[test] ** 0.5
-    q = np.clip(gain * (u - edge), 0, gain * TOP_V) + NOISE_L_min * rng.standard_normal(u.size)
-    return RampTest(
-        source=f"ramp{number}.csv",
-        sha256=f"{int(rng.integers(1 << 40)):064x}",
-        time=np.arange(u.size) / RATE_Hz,
-        u=u,
-        q=q * L_MIN,
-        dp=DP_MPa[test] * MPA * (1 + 1e-3 * rng.standard_normal(u.size)),
-        started=400.0 * number if dated else None,
+    flow = np.clip(gain * (u - edge), 0, gain * TOP_V)
+    started = 400.0 * number if dated else None
+    return recorded(
+        f"ramp{number}.csv", u, flow, DP_MPa[test], rate_Hz=RATE_Hz, noise=NOISE_L_min, rng=rng, started=started
     )

@@ -25,6 +25,7 @@ from ramp_series import print_ramp_series  # noqa: E402
 from random_valves import print_random_valves  # noqa: E402
 from reading import print_reading  # noqa: E402
 from scoreboard import run_parts  # noqa: E402
+from soft_edges import print_soft_edges  # noqa: E402
 from stops import print_stops  # noqa: E402
 from timing import print_timing  # noqa: E402
 
@@ -40,6 +41,7 @@ PARTS = {
     "meters": (print_meters, 1010),
     "corpus": (print_corpus, 909),
     "corpus-units": (print_corpus_of_units, 0),
+    "soft-edges": (print_soft_edges, 1313),
     "random": (print_random_valves, 404),
     "measured": (print_measured, 0),
     "timing": (print_timing, 0),

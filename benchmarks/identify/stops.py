@@ -1,22 +1,26 @@
 """9. Spools with play, and spools that stick and slip: the flow left at zero command after a stop.
 
 Each valve is recorded on a simulated bench, identified with the defaults, and stopped once at every tested pressure
-drop from a random command, the drive at the law's offset. The spool is a play or a breakaway in NumPy: no code of the
-plant, of the law or of the fit.
+drop from a random command, the drive at the law's offset. The spool is one of `bench_plant`, which knows nothing of the
+law or of the fit. A meter that reads zero below a floor shows no noise in the dead zone, and rare peaks of it above the
+floor are no stick-slip.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
+from bench_plant import that_sticks, with_play
+from recorded_ramps import recorded
 from scoreboard import Row, print_rows, say
 
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_test import RampTest
 
-L_MIN, MPA = 1e-3 / 60, 1e6
 PRESSURES_MPa = (1.0, 2.0, 3.0, 4.0, 5.0)
-RATE_Hz, RAMP_S, NOISE_L_min, TOP_V = 50, 100, 0.05, 3.9
+RATE_Hz, RAMP_S, TOP_V = 50, 100, 3.9
 #: Of 200 valves.
 LIMIT = 2
 #: Scatter from ramp to ramp beside what the spool does, V.
@@ -25,31 +29,18 @@ SCATTER_V = 5e-3
 Spool = Callable[[np.ndarray], np.ndarray]
 
 
-def spool_with_play(width: float) -> Spool:
-    """Return a spool that follows the command inside a play of so many volts."""
+@dataclass(frozen=True, kw_only=True)
+class Bench:
+    """A valve's flow gain at 1 MPa, L/min/V, and its meter, L/min."""
 
-    def follow(u: np.ndarray) -> np.ndarray:
-        spool, at = np.empty_like(u), float(u[0])
-        for index, command in enumerate(u.tolist()):
-            at = min(max(at, command - width / 2), command + width / 2)
-            spool[index] = at
-        return spool
-
-    return follow
+    gain: float = 2.0
+    noise: float = 0.05
+    floor: float = 0.0
 
 
-def spool_that_sticks(breakaway: float, rng: np.random.Generator) -> Spool:
-    """Return a spool that waits until the command is a breakaway (within 20 %) ahead, and then jumps to it."""
-
-    def follow(u: np.ndarray) -> np.ndarray:
-        spool, at, next_one = np.empty_like(u), float(u[0]), breakaway
-        for index, command in enumerate(u.tolist()):
-            if abs(command - at) > next_one:
-                at, next_one = command, breakaway * (1 + 0.2 * rng.uniform(-1, 1))
-            spool[index] = at
-        return spool
-
-    return follow
+BENCH, BEHIND_A_FLOOR = Bench(), Bench(gain=12.0, noise=0.1, floor=0.6)
+#: The floor is three standard deviations of the noise, so a dead zone shows a peak or two.
+RARE_PEAKS = Bench(gain=3.2, noise=0.1, floor=0.3)
 
 
 def print_stops(*, quick: bool, seed: int) -> list[Row]:
@@ -57,35 +48,46 @@ def print_stops(*, quick: bool, seed: int) -> list[Row]:
     count = 20 if quick else 200
     rows = []
     cases = {
-        "play of 4 to 6 %": (lambda rng: spool_with_play(rng.uniform(0.4, 0.6)), "hysteresis"),
-        "breakaway of 0.15 V": (lambda rng: spool_that_sticks(0.15, rng), "stick-slip"),
+        "play of 4 to 6 %": (lambda rng: partial(with_play, play=rng.uniform(0.4, 0.6)), "hysteresis", BENCH),
+        "breakaway of 0.15 V": (lambda rng: partial(that_sticks, breakaway=0.15, rng=rng), "stick-slip", BENCH),
+        "breakaway of 0.15 V behind a floor": (
+            lambda rng: partial(that_sticks, breakaway=0.15, rng=rng),
+            "stick-slip",
+            BEHIND_A_FLOOR,
+        ),
     }
-    for name, (make, code) in cases.items():
+    for name, (make, code, bench) in cases.items():
         for repeats in (1, 3):
             say(f"stops: {name}, {repeats} ramp(s) a pressure drop, {count} valves")
             rng = np.random.default_rng([seed, repeats, len(name)])
-            results = [_valve(make(rng), code, repeats, rng) for _ in range(count)]
+            results = [_valve(make(rng), code, repeats, bench, rng) for _ in range(count)]
             opened, silent = (sum(result[at] for result in results) for at in (0, 1))
             left = 1e3 * float(np.mean([result[2] for result in results]))
             note = f"of {count}; offset {left:.0f} mV under the closing knee"
             what = f"{name}, {repeats} ramp{'s' if repeats > 1 else ''} a pressure drop"
             rows.append(Row(what=f"{what}: flow above the level", value=opened, limit=LIMIT, note=note))
             rows.append(Row(what=f"{what}: without its warning", value=silent, limit=0))
+    say(f"stops: rare peaks of noise above a floor, {count} valves")
+    rng = np.random.default_rng([seed, count])
+    told = sum(not _valve(partial(with_play, play=0.2), "stick-slip", 1, RARE_PEAKS, rng)[1] for _ in range(count))
+    rows.append(Row(what="rare peaks of noise above a floor: told to be stick-slip", value=told, limit=0))
     print_rows(f"9. Flow above the stated level at zero command, after a stop at each test (seed {seed})", rows)
     return rows
 
 
-def _valve(spool: Spool, code: str, repeats: int, rng: np.random.Generator) -> tuple[bool, bool, float]:
+def _valve(
+    spool: Spool, code: str, repeats: int, bench: Bench, rng: np.random.Generator
+) -> tuple[bool, bool, float]:
     """Return whether a valve passed too much at zero command, whether its warning is missing, and the offset's loss."""
     order = rng.permutation(np.repeat(PRESSURES_MPa, repeats))
-    tests = [_ramp(dp, spool, f"ramp{at}.csv", 400.0 * at, rng) for at, dp in enumerate(order.tolist())]
+    tests = [_ramp(dp, spool, f"ramp{at}.csv", 400.0 * at, bench, rng) for at, dp in enumerate(order.tolist())]
     model = identify(tests, IdentifyOptions(meter_lag=0.0))
     side = model.positive
     worst, losses = 0.0, []
     for dp, offset, test in zip(PRESSURES_MPa, side.curve.u_offset_V, side.tests, strict=True):
         top = rng.uniform(offset + 0.3, 10.0)
         stop = spool(np.concatenate([np.linspace(offset, top, 200), np.linspace(top, offset, 400)]))[-1]
-        worst = max(worst, _gain(dp) * (stop - _edge(dp, rng)))
+        worst = max(worst, bench.gain * dp**0.5 * (stop - _edge(dp, rng)))
         losses.append((test.u_knee_falling_V or np.nan) - offset)
     silent = code not in {warning.code for warning in model.warnings}
     return worst > side.certificate.level_L_min, silent, float(np.mean(losses))
@@ -95,20 +97,11 @@ def _edge(dp_MPa: float, rng: np.random.Generator) -> float:
     return 5.2 - 0.06 * (dp_MPa - 1) + SCATTER_V * rng.standard_normal()
 
 
-def _gain(dp_MPa: float) -> float:
-    return 2 * dp_MPa**0.5
-
-
-def _ramp(dp_MPa: float, spool: Spool, source: str, started: float, rng: np.random.Generator) -> RampTest:
+def _ramp(
+    dp_MPa: float, spool: Spool, source: str, started: float, bench: Bench, rng: np.random.Generator
+) -> RampTest:
     up = np.linspace(0, 10, RAMP_S * RATE_Hz)
     u = np.concatenate([up, up[::-1]])
-    q = np.clip(_gain(dp_MPa) * (spool(u) - _edge(dp_MPa, rng)), 0, _gain(dp_MPa) * TOP_V)
-    return RampTest(
-        source=source,
-        sha256=f"{int(rng.integers(1 << 40)):064x}",
-        time=np.arange(u.size) / RATE_Hz,
-        u=u,
-        q=(q + NOISE_L_min * rng.standard_normal(u.size)) * L_MIN,
-        dp=dp_MPa * MPA * (1 + 1e-3 * rng.standard_normal(u.size)),
-        started=started,
-    )
+    flow = bench.gain * dp_MPa**0.5 * np.clip(spool(u) - _edge(dp_MPa, rng), 0, TOP_V)
+    meter = {"noise": bench.noise, "floor": bench.floor}
+    return recorded(source, u, flow, dp_MPa, rate_Hz=RATE_Hz, rng=rng, started=started, **meter)

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from between_ramps import FALLING, FLAT, ORDERS, TESTS, SCATTERS_mV, simulate
+from between_ramps import FALLING, FLAT, ORDERS, TESTS, UNLIKE, SCATTERS_mV, normal, simulate
 from ramp_series import _family as family_through_recordings
 from scipy.stats import binom
 
-from dzdesign.identify.knees import between_ramps
+from dzdesign.identify.knees import between_ramps, scatter_checks
 from dzdesign.identify.knees.between_ramps import BetweenRamps
 
 COUNT = 100
@@ -47,6 +47,29 @@ def test_so_they_do_in_every_state_of_a_valve_that_drifts(name, drift):
     assert opened <= MOST and trend <= MOST
 
 
+def unlike(scatter, truth=FALLING, seed=3):
+    """Return families whose scatter is not what the bounds take it for."""
+    rng = np.random.default_rng([seed, COUNT])
+    order = ORDERS["three repeats in random order"]
+    return [simulate(truth, order(rng), scatter, 0.0, None, True, rng) for _ in range(COUNT)]
+
+
+@pytest.mark.parametrize("name", [name for name, (_, _, promised) in UNLIKE.items() if promised])
+def test_where_it_is_promised_a_scatter_against_the_premises_opens_no_more(name):
+    for truth in (FALLING, FLAT):
+        assert sum(family.opened for family in unlike(UNLIKE[name][0], truth)) <= MOST
+
+
+@pytest.mark.parametrize("name", [name for name, (_, _, promised) in UNLIKE.items() if not promised])
+def test_what_is_not_promised_is_said_of_more_families_than_by_chance(name):
+    scatter, code, _ = UNLIKE[name]
+    said = sum(code in family.said for family in unlike(scatter))
+    if name == "Student's scatter":  # is seen in few series
+        assert said > sum(code in family.said for family in unlike(normal(0.01)))
+    else:
+        assert said > 2 * MOST
+
+
 class TestSeeded:
     """Each fault, put into the product, is seen by the same numbers."""
 
@@ -57,6 +80,12 @@ class TestSeeded:
     def test_scatter_that_the_trend_does_not_know(self, monkeypatch):
         monkeypatch.setattr(BetweenRamps, "covariance_of_mean", lambda self, noise_se: np.diag(noise_se**2))
         assert families(FLAT, 0.0125, "one ramp, declared")[1] > COUNT / 4
+
+    def test_unequal_scatter_that_is_pooled(self, monkeypatch):
+        scatter = normal(np.append(np.full(5, 2e-3), 0.1))
+        tested = sum(family.opened for family in unlike(scatter))
+        monkeypatch.setattr(scatter_checks, "REFUSED", 0.0)
+        assert tested <= MOST < sum(family.opened for family in unlike(scatter))
 
     def test_a_drift_that_is_left_out(self, monkeypatch):
         unknown = lambda known, count: (np.zeros(known.test.size), "order unknown")  # noqa: E731

@@ -32,10 +32,13 @@ def evaluate(form, compensator, command: int, dp_code: int) -> int:
     def between(table):
         return table[node] * (step - share) + table[node + 1] * share
 
-    total = between(form.table) * (form.slope * command + form.offset)
-    total += (form.linear * command << form.linear_shift) + form.half
+    past = max(command - compensator.zero_band_codes, 0)
+    reached = min(past, codes)
+    given = codes * past + compensator.zero_band_codes * reached if codes else command
+    total = between(form.table) * (form.slope * given + form.offset)
+    total += (form.linear * given << form.linear_shift) + form.half
     if codes:
-        total -= (between(form.table) - between(form.zero_table)) * form.transition * max(codes - command, 0)
+        total -= (between(form.table) - between(form.zero_table)) * form.transition * (codes - reached)
     assert total >= 0
     quotient = min(total >> form.shift, form.largest)
     estimate = ((quotient >> form.estimate.shift) * form.estimate.factor) >> 16
@@ -61,8 +64,15 @@ def random_compensators(base, count: int, seed: int):
             certificate=base.positive.certificate,
         )
         law_name = str(rng.choice(["paper", "target"]))
+        band = int(rng.integers(1, 60)) if transition else 0
         yield dataclasses.replace(
-            base, law=law_name, sides=Sides(positive=side), transition_codes=transition, beta_denominator=unit
+            base,
+            law=law_name,
+            sides=Sides(positive=side),
+            transition_codes=transition,
+            zero_band_codes=band,
+            drive_functions=dataclasses.replace(base.drive_functions, leave_zero_codes=band + 1 if band else 0),
+            beta_denominator=unit,
         )
 
 
@@ -90,11 +100,13 @@ def test_whatever_units_design_takes_the_firmware_can_count_in(example_compensat
     base = dataclasses.replace(example_compensator, signals=signals, drive_functions=functions)
     for compensator in random_compensators(base, 6, seed):
         form = integer_form(compensator)
-        for command in (0, 1, 16, 31, 32, span // 3, span - 1, span):
+        band, end = compensator.zero_band_codes, compensator.transition_end
+        for command in (0, 1, band, band + 1, max(end - 1, 0), end, end + 1, span // 3, span - 1, span):
             for code in (-41, -40, 0, 63, 700, 4095):
                 assert evaluate(form, compensator, command, code) == compensator.compare(command, code)
 
 
+@pytest.mark.slow
 def test_reciprocal_is_exact_for_every_quotient_that_can_occur(example_compensator):
     form = integer_form(example_compensator)
     quotients = np.arange(0, 2 * 60000 * form.divisor, dtype=np.uint64)

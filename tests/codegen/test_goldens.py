@@ -173,6 +173,7 @@ def test_host_prints_the_hash_of_the_exact_law(copy, compiler):
 
 
 @needs("cmake", package="cmake")
+@pytest.mark.slow
 def test_host_builds_with_cmake_in_a_folder_with_a_blank(tmp_path):
     folder = shutil.copytree(GOLDENS / "host", tmp_path / "a folder") / "host"
     run("cmake", "-S", ".", "-B", "build", cwd=folder)
@@ -216,6 +217,7 @@ def test_everything_switched_on_in_simavr_prints_the_hashes_of_the_host(tmp_path
 
 
 @needs_arm
+@pytest.mark.slow
 def test_everything_switched_on_in_qemu_prints_the_hash_of_the_model(tmp_path):
     folder = shutil.copytree(FULL / "cortex-m4", tmp_path / "fw") / "cortex_m4"
     run("make", f"CFLAGS={WARNINGS}", "all", cwd=folder)
@@ -225,6 +227,7 @@ def test_everything_switched_on_in_qemu_prints_the_hash_of_the_model(tmp_path):
 
 
 @pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.slow
 def test_everything_switched_on_is_exact_on_all_inputs(sign, tmp_path):
     shutil.copytree(FULL / "f28335", tmp_path / "fw")
     shutil.copy(FULL / INPUT, tmp_path / "fw" / INPUT)

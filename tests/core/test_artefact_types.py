@@ -153,6 +153,7 @@ pumps = st.builds(
 
 
 @given(pumps)
+@pytest.mark.slow
 def test_every_pump_comes_back_as_it_was(one):
     content = to_json_bytes(one)
     assert read(content) == one and to_json_bytes(read(content)) == content

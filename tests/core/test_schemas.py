@@ -158,6 +158,7 @@ def test_evidence_of_a_core_that_does_not_compile_fits(firmware_folder):
     assert problems("evidence", json.loads(to_json_bytes(found.evidence))) == []
 
 
+@pytest.mark.slow
 def test_an_assessment_fits_and_every_fault_in_it_is_seen(assessment):
     assert problems("assessment", assessment) == []
     assert overlooked("assessment", assessment) == []

@@ -68,7 +68,7 @@ def test_law_paper_is_equation_18(example_compensator):
     # Written out here, independently of derivation: (beta kappa - beta + 1) x + beta u_min0.
     c = example_compensator
     for dp_code in (0, 205, 600, 1023, 4095):
-        beta, share = c.beta(dp_code), Fraction(1234, 4095)
+        beta, share = c.law_beta(dp_code), Fraction(1234, 4095)
         side = c.positive
         expected = (beta * side.drive_range_over_u_max - beta + 1) * share + beta * side.u_min0_over_u_max
         assert c.drive(1234, dp_code) == expected
@@ -76,13 +76,13 @@ def test_law_paper_is_equation_18(example_compensator):
 
 def test_law_target_keeps_the_gain(example_valve):
     c = design(example_valve, DesignOptions(law="target"))
-    rises = {c.drive(4095, code) - c.drive(0, code) for code in (0, 300, 1000)}
+    rises = {Fraction(4095, 4000) * (c.drive(4095, code) - c.drive(95, code)) for code in (0, 300, 1000)}
     assert rises == {c.positive.drive_range_over_u_max}
 
 
 def test_halves_round_up():
     signals = Signals(command=CommandSignal(full_code=2), compare_max=1)
-    _, compensator = compensator_of(lambda dp: 5.0, pressures=(1.0,))
+    _, compensator = compensator_of(lambda dp: 5.0, pressures=(1.0,), transition=Fraction(0))
     exact = with_side(
         dataclasses.replace(compensator, signals=signals, drive_functions=DriveFunctions(compare_limit=1)),
         drive_range_over_u_max=Fraction(1, 2),

@@ -60,7 +60,8 @@ def test_valves_of_opposite_trends_have_one_setting_under_both(falling, rising):
 
 def test_of_valves_that_are_alike_it_is_their_own(falling):
     common = lot_setting({"a": falling, "b": falling}).compensator
-    assert common.positive == falling.positive
+    off = designed(falling.valve, DesignOptions(transition=Fraction(0)))
+    assert common.positive == off.positive and not common.transition_codes
 
 
 @pytest.mark.slow

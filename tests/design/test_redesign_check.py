@@ -230,6 +230,7 @@ def common():
     return lot_setting({"low": valve(5.2), "high": valve(5.4)}).compensator
 
 
+@pytest.mark.slow
 def test_a_lot_setting_is_bounded_by_its_valve(common):
     document = json.loads(to_json_bytes(common))
     assert len(document["lot"]) == 2

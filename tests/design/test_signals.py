@@ -115,7 +115,7 @@ def test_the_integers_of_the_drive_functions():
         transition=Fraction(1, 100), ramp_up_s=(0.5, 0.8), dither_Hz=150.0, dither_peak=Fraction(1, 100),
         output_max=Fraction(9, 10),
     )  # fmt: skip
-    functions = options.drive_functions()
+    functions = options.drive_functions(options.transition_codes())
     assert options.transition_codes() == 16  # 1 % of 2047 codes is 20: the power of two below
     # 0.5 s are 625 samples: 2047 codes * 65536 / 625; of negative commands 2048 codes in 1000.
     assert functions.ramp_up == (round(2047 * 65536 / 625), round(2048 * 65536 / 1000)) and functions.ramp_down == (
@@ -123,15 +123,17 @@ def test_the_integers_of_the_drive_functions():
         0,
     )
     assert (functions.dither_counts, functions.dither_ticks) == (600, 8)  # 2500 Hz / 16 = 156 Hz
-    assert (functions.compare_limit, functions.window_codes) == (54000, 20)
-    assert DesignOptions().drive_functions().window_codes == 0  # one sign has no other solenoid
+    # Of the F28335's converter: 15 codes of offset, half of 30 of the gain, 4 of noise; from rest 5 more.
+    assert (options.error.zero_band_codes, functions.leave_zero_codes) == (34, 39)
+    assert (functions.compare_limit, DesignOptions().drive_functions(32).leave_zero_codes) == (54000, 24)
+    assert DesignOptions().drive_functions(0).leave_zero_codes == 0  # one sign has no other solenoid
 
 
 @pytest.mark.parametrize(
     ("options", "words"),
     [
         ({"transition": Fraction(1, 5)}, "the transition is 20.000%, expected 0 to 10%"),
-        ({"transition": Fraction(1, 10**5)}, "less than one code"),
+        ({"transition": Fraction(1, 10**5)}, "is 0 codes of the command"),
         ({"dither_Hz": 150.0}, "a dither needs both"),
         ({"dither_Hz": 50.0, "dither_peak": Fraction(1, 100)}, "expected 100 to 300 Hz"),
         ({"output_max": Fraction(0)}, "the largest output"),

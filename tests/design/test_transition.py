@@ -27,27 +27,58 @@ def with_transition(example_valve):
 
 
 def test_it_runs_from_the_certified_offset_to_the_opening_law_without_a_step(with_transition, example_valve):
-    plain = design(example_valve)
-    codes = with_transition.transition_codes
+    plain = design(example_valve, DesignOptions(transition=Fraction(0)))
+    band, end = with_transition.zero_band_codes, with_transition.transition_end
+    assert (band, end) == (19, 51)
     u_max = float(with_transition.u_max_V)
     for dp_code in range(0, 1100, 50):
-        drives = [with_transition.drive(command, dp_code) for command in range(codes + 3)]
+        drives = [with_transition.drive(command, dp_code) for command in range(end + 3)]
         # Zero command: the same certified curve as without a transition, to within the nodes' rounding.
         assert float(abs(drives[0] - plain.drive(0, dp_code))) * u_max < 1e-3
         rises = [right - left for left, right in pairwise(drives)]
-        assert all(rise > 0 for rise in rises)
-        assert len(set(rises[:codes])) == 1 and len(set(rises[codes:])) == 1  # two straight parts that meet
+        assert not any(rises[:band]) and all(rise > 0 for rise in rises[band:])
+        assert len(set(rises[band:end])) == 1 and len(set(rises[end:])) == 1  # two straight parts that meet
         # Beyond the transition the law goes on as a law of the opening threshold's beta, Eq. (18).
-        side, beta, share = with_transition.positive, with_transition.law_beta(dp_code), Fraction(codes + 2, 4095)
-        law = (beta * side.drive_range_over_u_max - beta + 1) * share + beta * side.u_min0_over_u_max
-        assert drives[codes + 2] == law
+        for command in (end, end + 2, 2000, 4095):
+            side, beta, share = with_transition.positive, with_transition.law_beta(dp_code), Fraction(command, 4095)
+            law = (beta * side.drive_range_over_u_max - beta + 1) * share + beta * side.u_min0_over_u_max
+            assert with_transition.drive(command, dp_code) == law
 
 
 def test_the_transition_ends_at_or_above_the_opening_threshold_at_every_test(with_transition, example_valve):
     signals = with_transition.signals
     for test in example_valve.positive.tests:
         code = round(signals.dp_code(Fraction(repr(test.dp_MPa))))
-        assert float(with_transition.drive(with_transition.transition_codes, code)) * 10 > test.u_knee_rising_V
+        assert float(with_transition.drive(with_transition.transition_end, code)) * 10 > test.u_knee_rising_V
+
+
+def test_a_valve_without_an_opening_branch_has_no_transition_unless_asked(example_valve):
+    side = dataclasses.replace(example_valve.positive, opening_curve=None)
+    plain = design(dataclasses.replace(example_valve, sides={"positive": side}))
+    assert (plain.transition_codes, plain.zero_band_codes) == (0, 0)
+    assert any("no transition, so no zero band" in line for line in plain.costs)
+
+
+@pytest.mark.parametrize(
+    ("signal", "band"),
+    [("0..10 V x 0.3", 19), ("-10..10 V x 0.15 + 1.5 V", 34), ("4..20 mA on 150 ohm", 25)],
+)
+def test_the_gain_error_counts_as_far_as_zero_lies_up_the_converters_range(signal, band):
+    from dzdesign.design.signal_text import command_signal, parse_signal
+    from dzdesign.design.target_inputs import Converter
+    from dzdesign.design.zero_band import command_error_of
+
+    command = command_signal(parse_signal(signal, "--command-signal"), Converter())
+    assert command_error_of("", Converter(), command).zero_band_codes == band
+
+
+def test_a_declared_error_is_rounded_up_to_codes():
+    from dzdesign.design.signals import CommandSignal
+    from dzdesign.design.target_inputs import Converter
+    from dzdesign.design.zero_band import command_error_of
+
+    error = command_error_of("0.4 % + 0.1 %", Converter(), CommandSignal())
+    assert (error.offset_codes, error.noise_codes) == (17, 5)  # 16.4 and 4.1 codes of 4095
 
 
 @pytest.mark.slow
@@ -66,7 +97,7 @@ def test_no_leak_and_one_per_cent_of_dead_zone_on_the_example(with_transition, e
     assert result.holds, [check for check in result.evidence.checks if not check.holds]
     for loop in result.loops:
         assert loop.result.q_zero_L_min <= 1e-9
-        assert loop.result.residual_opening <= 0.01
+        assert loop.result.residual_opening <= 24 / 4095 + 0.008
 
 
 @pytest.mark.slow
@@ -76,13 +107,13 @@ def test_no_leak_and_one_per_cent_of_dead_zone_on_valve_a(tmp_path, capsys):
     files = sorted(map(str, (SHARED / "valve_a").glob("*.csv.gz")))
     valve, firmware, evidence = (str(tmp_path / name) for name in ("valve.json", "firmware", "evidence"))
     assert main(["identify", *files, "--meter-lag", "0.1 s", "-o", valve]) == 0
-    assert main(["codegen", valve, "--transition", "1 %", "-o", firmware]) == 0
+    assert main(["codegen", valve, "-o", firmware]) == 0
     assert main(["verify", firmware, "-o", evidence, "--json"]) == 0
     out = capsys.readouterr().out
     document = json.loads(out[out.index("{\n") :])
     loops = document["closed_loop"]["pressures"]
     assert len(loops) == 6
-    assert all(loop["residual_opening"] <= 0.01 and loop["q_zero_L_min"] <= 1e-9 for loop in loops)
+    assert all(loop["residual_opening"] <= 24 / 4095 + 0.008 and loop["q_zero_L_min"] <= 1e-9 for loop in loops)
 
 
 def test_an_edge_needs_the_opening_branch(example_valve, wording):
@@ -94,15 +125,16 @@ def test_an_edge_needs_the_opening_branch(example_valve, wording):
 
 @pytest.mark.slow
 def test_below_the_reference_beta_is_held_or_extended(example_valve):
-    held, extended = design(example_valve), design(example_valve, DesignOptions(below_dp0="extend"))
+    off = {"transition": Fraction(0)}
+    held, extended = (design(example_valve, DesignOptions(below_dp0=below, **off)) for below in ("hold", "extend"))
     below, above = (round(held.signals.dp_code(Fraction(dp))) for dp in (Fraction(6, 10), Fraction(3)))
     assert held.beta(below) <= 1 < extended.beta(below)
     assert held.compare(0, above) == pytest.approx(extended.compare(0, above), abs=2)
 
 
 def test_a_dither_stands_under_the_certified_bound_at_its_top(example_valve):
-    plain = design(example_valve)
-    dithered = design(example_valve, DesignOptions(dither_Hz=150.0, dither_peak=Fraction(1, 100)))
+    plain = design(example_valve, DesignOptions(transition=Fraction(0)))
+    dithered = design(example_valve, DesignOptions(transition=Fraction(0), dither_Hz=150.0, dither_peak=Fraction(1, 100)))
     peak = dithered.drive_functions.dither_counts
     assert peak == 600
     for dp_code in range(150, 1000, 10):

@@ -13,6 +13,8 @@ from dzdesign.identify.reading.ramp_files import read_ramp_file
 from tests.support.paths import ROOT
 from tests.support.synthetic import L_MIN, needs_compiler
 
+pytestmark = pytest.mark.slow  # a copy of a room, and processes that import it anew
+
 PAGE = ROOT / "docs" / "howto" / "add-file-format.md"
 #: A file that the page shows: its path, and its content.
 FILE = re.compile(r"^`([\w/]+\.py)`.*?\n\n```python\n(.*?)^```$", re.DOTALL | re.MULTILINE)

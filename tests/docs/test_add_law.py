@@ -12,6 +12,8 @@ import pytest
 from tests.support.paths import GOLDENS, ROOT
 from tests.support.synthetic import needs_compiler
 
+pytestmark = pytest.mark.slow  # a copy of a room, and processes that import it anew
+
 PAGE = ROOT / "docs" / "howto" / "add-law.md"
 #: The file that the page shows: its path, and its content.
 FILE = re.compile(r"^`([\w/]+\.py)`.*?\n\n```python\n(.*?)^```$", re.DOTALL | re.MULTILINE)
@@ -71,7 +73,6 @@ def test_the_firmware_says_which_law_it_is(firmware):
     assert "coefficient of beta * u_i in u_O: k x_max/u_max =" in source
 
 
-@pytest.mark.slow
 @needs_compiler
 def test_every_input_follows_it_and_the_report_derives_it(run, firmware, folder):
     run("verify", "firmware", "-o", "evidence")

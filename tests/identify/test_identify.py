@@ -11,7 +11,7 @@ from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, find_trend, lower_bounds
 from dzdesign.identify.knees.between_ramps import BetweenRamps, RampKnees, compare_ramps
-from dzdesign.identify.knees.characteristic import find_meter_floor
+from dzdesign.identify.knees.meter_floor import find_meter_floor
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.branches import bin_branch
 from dzdesign.identify.ramps.command import sweep_direction
@@ -228,7 +228,7 @@ class TestParts:
     def test_meter_floor_is_found_where_there_is_one(self, floor, expected):
         test = synthetic_ramp(1.0, Truth(floor=floor, noise=0.05), rate_Hz=100)
         rising, _ = split_ramps(test, 0.0)[0].branches
-        assert find_meter_floor(rising.u, rising.q, 10.0) / L_MIN == pytest.approx(expected, abs=0.1)
+        assert find_meter_floor([rising], 10.0) / L_MIN == pytest.approx(expected, abs=0.1)
 
     def test_simultaneous_bounds_cover(self):
         # 99 % for all five together: among 2000 replicates 20 failures are expected, 34 is the 99.9 % quantile.

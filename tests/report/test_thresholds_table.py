@@ -1,5 +1,6 @@
 """The report's first table: what counts as no flow at each pressure drop, and a leak where there is one."""
 
+from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.report.sections.valve import thresholds_table
@@ -8,7 +9,7 @@ from tests.identify.knees.test_readings_at_rest import recordings
 
 def columns(per_MPa):
     side = identify(recordings(per_MPa), IdentifyOptions(meter_lag=0.0)).positive
-    table = thresholds_table(side, "closing", "Thresholds")
+    table = thresholds_table(side, "closing", "Thresholds", AS_COMPUTED)
     return {label: [row[at].text for row in table.rows] for at, label in enumerate(table.columns)}, side
 
 

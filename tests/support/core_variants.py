@@ -46,13 +46,18 @@ DRIVE_FUNCTIONS = {
 }
 #: Name to the options of `design`; "signals" are those that differ from the target's own.
 VARIANTS = {
-    "plain": {},
+    "default": {},
+    "no transition": {"transition": Fraction(0)},
     "target law": {"law": "target"},
-    "transition": {"transition": Fraction(1, 100)},
-    "target law, transition": {"law": "target", "transition": Fraction(1, 100)},
+    "target law, no transition": {"law": "target", "transition": Fraction(0)},
     "live zero": {"signals": UNLIKE | {"command": _command("4..20 mA on 149 ohm")}},
+    "live zero, no transition": {
+        "signals": UNLIKE | {"command": _command("4..20 mA on 149 ohm")},
+        "transition": Fraction(0),
+    },
     "inverted": {"signals": {"command": _command("0..10 V x 0.3", inverted=True)}, **DRIVE_FUNCTIONS},
     "bipolar": {"signals": {"command": BOTH}},
+    "bipolar, no transition": {"signals": {"command": BOTH}, "transition": Fraction(0), **DRIVE_FUNCTIONS},
     "bipolar, all options": {"signals": UNLIKE | {"command": BOTH, "swapped": True}, "transition": Fraction(1, 100)}
     | DRIVE_FUNCTIONS,
 }  # fmt: skip

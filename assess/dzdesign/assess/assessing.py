@@ -43,9 +43,9 @@ def assess(before: Sequence[RampTest], after: Sequence[RampTest], options: Asses
 
 def assess_curves(comparison: Comparison) -> Assessment:
     """Read every quantity of both sets, and check the limits."""
-    options = comparison.options
+    options, units = comparison.options, comparison.units
     levels = [_level(pair, options) for pair in comparison.pairs]
-    readings = [_read(pair, level, options) for pair, level in zip(comparison.pairs, levels, strict=True)]
+    readings = [_read(pair, level, comparison) for pair, level in zip(comparison.pairs, levels, strict=True)]
     _add_symmetry(comparison.pairs, readings)
     pressures = tuple(map(_pressure, comparison.pairs, levels, readings))
     return Assessment(
@@ -65,9 +65,10 @@ def assess_curves(comparison: Comparison) -> Assessment:
             result
             for item, found in zip(pressures, readings, strict=True)
             if "after" in found
-            for result in check_limits(options.limits, item.place, found.get("before"), found["after"])
+            for result in check_limits(options.limits, item.place(units), found.get("before"), found["after"], units)
         ),
         notes=find_notes(comparison, pressures),
+        recorded_units=units,
     )
 
 
@@ -90,14 +91,16 @@ def _level(pair: CurvePair, options: AssessOptions) -> float:
     return pair.first.counts if options.level_share is None else options.level_share * pair.first.y_max
 
 
-def _read(pair: CurvePair, level: float, options: AssessOptions) -> Readings:
+def _read(pair: CurvePair, level: float, comparison: Comparison) -> Readings:
     """Read all quantities at one pressure drop, of both sets at one level and over one rated flow."""
+    options = comparison.options
     return {
         name: read_quantities(
-            curves, u_max=options.of_set(name).u_max, level=level, rated=pair.first.y_max, window=options.window
+            curves, u_max=options.of_set(name).u_max, level=level, rated=pair.first.y_max, window=options.window,
+            units=comparison.of_set(name, pair.side),
         )
         for name, curves in pair.sets.items()
-    }
+    }  # fmt: skip
 
 
 def _add_symmetry(pairs: Sequence[CurvePair], readings: Sequence[Readings]) -> None:

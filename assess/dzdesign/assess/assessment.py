@@ -10,6 +10,7 @@ from dzdesign.assess.limits import LimitResult
 from dzdesign.assess.options import Set, Side
 from dzdesign.assess.quantities import Change, Quantity, Reading
 from dzdesign.core.artefact_types import Artefact, RuleError, SourceFile, quantity
+from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 from dzdesign.identify.valve.model import Warning_
 
 TERMS = (
@@ -99,10 +100,9 @@ class PressureAssessment:
         if self.before is None and self.after is None:
             raise RuleError("there is no recording, expected one without or with the compensator at least")
 
-    @property
-    def place(self) -> str:
-        """Side and pressure drop in words."""
-        return f"{self.side} commands" + ("" if self.dp_MPa is None else f", {self.dp_MPa:.2f} MPa")
+    def place(self, units: RecordedUnits) -> str:
+        """Return side and pressure drop in words."""
+        return f"{self.side} commands" + ("" if self.dp_MPa is None else f", {units.text(self.dp_MPa, '.2f MPa')}")
 
     def readings(self, name: Set) -> dict[str, Reading]:
         """Return what was read from the recordings of a set: key of a quantity -> reading."""
@@ -131,6 +131,9 @@ class Assessment(Artefact):
     ]
     limits: Annotated[tuple[LimitResult, ...], Meta(description="Every limit that was asked for.")]
     notes: Annotated[tuple[Warning_, ...], Meta(description="What must be known to read it.")]
+    recorded_units: Annotated[
+        RecordedUnits, Meta(description="Units of the recordings, in which a person sees what stands here.")
+    ] = AS_COMPUTED
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "holds", all(result.holds for result in self.limits))

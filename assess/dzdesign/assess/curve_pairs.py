@@ -6,12 +6,15 @@ from dataclasses import dataclass
 from dzdesign.assess.flow_curves import PressureCurves, read_curves
 from dzdesign.assess.options import BOTH_SIDES, SETS, AssessOptions, Set, Side
 from dzdesign.core.errors import InputError
+from dzdesign.core.recorded_units import RecordedUnits
+from dzdesign.core.worded import Worded, all_of, in_units, worded
 from dzdesign.identify.constants import MPA
 from dzdesign.identify.knees.meter_lag import MeterLag, find_lag
 from dzdesign.identify.knees.prepared_tests import found_floor, split_recordings
 from dzdesign.identify.ramps.pooling import SAME_PRESSURE, pool_ramps
 from dzdesign.identify.ramps.sides import tests_of_side
 from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.reading.units_of_columns import units_of
 from dzdesign.identify.valve.model import SIDES
 
 Pair = tuple[PressureCurves | None, PressureCurves | None]
@@ -47,6 +50,15 @@ class Comparison:
     lag: MeterLag
     pairs: tuple[CurvePair, ...]
 
+    @property
+    def units(self) -> RecordedUnits:
+        """The units of all recordings."""
+        return units_of([test for tests in self.tests.values() for test in tests])
+
+    def of_set(self, name: Set, side: Side) -> RecordedUnits:
+        """Return the units of one set, in which its side's commands were recorded."""
+        return units_of(self.tests[name]).of_side(side)
+
 
 def compare_curves(before: Sequence[RampTest], after: Sequence[RampTest], options: AssessOptions) -> Comparison:
     """Read the curves of both sets, and pair those of one side and pressure drop.
@@ -61,6 +73,13 @@ def compare_curves(before: Sequence[RampTest], after: Sequence[RampTest], option
         if not tests:
             which = "without" if name == "before" else "with"
             raise InputError(f"no recordings {which} the compensator were given; expected at least one file")
+    try:
+        return _compared(sets, options)
+    except InputError as error:
+        raise InputError(in_units(error, units_of([*before, *after]))) from error
+
+
+def _compared(sets: Mapping[Set, Sequence[RampTest]], options: AssessOptions) -> Comparison:
     of_sides = {
         (side, name): tests_of_side(tests, SIDES[side], options.of_set(name).u_max)
         for side in BOTH_SIDES
@@ -136,13 +155,20 @@ def relative_distance(one: float | None, other: float | None) -> float:
     return abs(one - other) / max(one, other)
 
 
-def _no_pressure_in_common(pairs: Sequence[CurvePair]) -> str:
-    def listed(name: Set) -> str:
+def _no_pressure_in_common(pairs: Sequence[CurvePair]) -> Worded:
+    def listed(name: Set) -> Worded:
         found = [(pair.side, pair.sets[name].dp) for pair in pairs if name in pair.sets]
-        return ", ".join(f"{side} {'unknown' if dp is None else f'{dp / MPA:.2f} MPa'}" for side, dp in found) or "none"
+        places = [
+            worded("{side} unknown" if dp is None else "{side} {dp:.2f MPa}", side=side, dp=(dp or 0.0) / MPA)
+            for side, dp in found
+        ]
+        return all_of(places, ", ") if places else worded("none")
 
-    return (
-        f"the recordings without the compensator ({listed('before')}) and with it ({listed('after')}) have no pressure "
-        f"drop in common within {SAME_PRESSURE:.0%}, expected one at least; record both sets at the same pressure "
-        "drops, or declare them by --dp or [dp]"
+    return worded(
+        "the recordings without the compensator ({before}) and with it ({after}) have no pressure drop in common "
+        "within {within:.0%}, expected one at least; record both sets at the same pressure drops, or declare them by "
+        "--dp or [dp]",
+        before=listed("before"),
+        after=listed("after"),
+        within=SAME_PRESSURE,
     )

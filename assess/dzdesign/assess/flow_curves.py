@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.core.worded import worded
 from dzdesign.identify.constants import MPA
 from dzdesign.identify.knees.gated_line import GATE, GatedLine, PreparedBranch, prepare_branch
 from dzdesign.identify.knees.linear_region import USEFUL_FLOW, find_straight_parts
@@ -112,11 +113,17 @@ def read_curves(
     for item in pooled:
         if item.branches == (None, None):
             u, dp = item.test.u, nominal_dp(item.test)
-            at = "an unknown pressure drop" if dp is None else f"{dp / MPA:.3g} MPa"
+            at = worded("an unknown pressure drop") if dp is None else worded("{dp:.3g MPa}", dp=dp / MPA)
             raise InputError(
-                f"'{item.test.source}' has no ramp from near zero up at {at}: the command runs from {u.min():.2f} to "
-                f"{u.max():.2f} V, expected a sweep over half of it at least; record it so, and give the compensator's "
-                "input, not its output"
+                worded(
+                    "'{source}' has no ramp from near zero up at {at}: the command runs from {low:.2f #V} to "
+                    "{high:.2f V}, expected a sweep over half of it at least; record it so, and give the compensator's "
+                    "input, not its output",
+                    source=item.test.source,
+                    at=at,
+                    low=u.min(),
+                    high=u.max(),
+                )
             )
     reads = [
         None if branch is None else prepare_branch(branch, item.test, u_max=options.u_max, floor=floor)

@@ -18,6 +18,7 @@ from dzdesign.assess.quantities import (
     observed,
 )
 from dzdesign.core.errors import InputError, nearest
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.core.units import parse_quantity
 
 #: Quantities for which there is a largest value; a gain and a flow at full command have none.
@@ -88,7 +89,11 @@ def _limit(key: str, text: str, u_max: float) -> float:
 
 
 def check_limits(
-    limits: Mapping[str, float], place: str, before: Mapping[str, Reading] | None, after: Mapping[str, Reading]
+    limits: Mapping[str, float],
+    place: str,
+    before: Mapping[str, Reading] | None,
+    after: Mapping[str, Reading],
+    units: RecordedUnits,
 ) -> list[LimitResult]:
     """Check the recordings with the compensator at one pressure drop against every limit of `parse_limits`.
 
@@ -98,7 +103,7 @@ def check_limits(
     for key, limit in limits.items():
         reading = _loss(before, after) if key == LOSS else after.get(key)
         if reading is not None:
-            results.append(_check(key, place, IN_UNIT[LIMITED[key].unit] * limit, reading))
+            results.append(_check(key, place, IN_UNIT[LIMITED[key].unit] * limit, reading, units))
     return results
 
 
@@ -111,12 +116,12 @@ def _loss(before: Mapping[str, Reading] | None, after: Mapping[str, Reading]) ->
     return observed(100 * (1 - largest / largest_before))
 
 
-def _check(key: str, place: str, limit: float, reading: Reading) -> LimitResult:
+def _check(key: str, place: str, limit: float, reading: Reading, units: RecordedUnits) -> LimitResult:
     """Compare a reading with its limit; what is not observable holds only where a bound of it does."""
     unit = LIMITED[key].unit
 
     def number(value: float) -> str:
-        return f"{value:.3g} {unit}"
+        return f"{value:.3g} %" if unit == "%" else units.text(value, f".3g {unit}")
 
     value, bound = reading.value, reading.at_most
     holds: bool | None

@@ -4,7 +4,8 @@ from collections.abc import Iterator, Sequence
 
 from dzdesign.assess.assessment import PressureAssessment
 from dzdesign.assess.curve_pairs import Comparison, CurvePair
-from dzdesign.assess.options import SETS, AssessOptions, Set
+from dzdesign.assess.options import SETS, Set
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.identify.constants import L_MIN, MPA
 from dzdesign.identify.data_quality.flow_meter import LIKELY_LAG
 from dzdesign.identify.data_quality.recordings import about_recordings
@@ -22,12 +23,13 @@ ALONE: tuple[tuple[Set, str], ...] = (
 
 def find_notes(comparison: Comparison, pressures: Sequence[PressureAssessment]) -> tuple[Warning_, ...]:
     """Return the notes of an assessment; `pressures` is what was read of each pair of the comparison."""
-    options, pairs = comparison.options, comparison.pairs
+    pairs = comparison.pairs
     tests = [test for tests in comparison.tests.values() for test in tests]
-    notes = [*about_recordings(tests), *_about_partners(pairs), *_about_the_meter(comparison)]
+    found = [item.in_units(comparison.units) for item in about_recordings(tests)]
+    notes = [*found, *_about_partners(comparison), *_about_the_meter(comparison)]
     both = list(zip(pairs, pressures, strict=True))
-    notes += [note for pair, item in both for note in _about_zero(pair, item)]
-    notes += [note for pair, item in both for note in _about_the_command(pair, item, options)]
+    notes += [note for pair, item in both for note in _about_zero(pair, item, comparison.units)]
+    notes += [note for pair, item in both for note in _about_the_command(pair, item, comparison)]
     notes += [
         Warning_(
             code="declared-pressure",
@@ -40,15 +42,17 @@ def find_notes(comparison: Comparison, pressures: Sequence[PressureAssessment]) 
     return tuple(notes)
 
 
-def _about_partners(pairs: Sequence[CurvePair]) -> Iterator[Warning_]:
+def _about_partners(comparison: Comparison) -> Iterator[Warning_]:
+    pairs, units = comparison.pairs, comparison.units
     for side in dict.fromkeys(pair.side for pair in pairs):
         for name, words in ALONE:
             alone = [pair.first for pair in pairs if pair.side == side and list(pair.sets) == [name]]
             if alone:
-                listed = ", ".join("unknown" if one.dp is None else f"{one.dp / MPA:.2f}" for one in alone)
+                known = ("unknown" if one.dp is None else units.number(one.dp / MPA, ".2f MPa") for one in alone)
+                listed = ", ".join(known)
                 yield Warning_(
                     code="no-partner",
-                    text=f"{side} commands at {listed} MPa were recorded {words}",
+                    text=f"{side} commands at {listed} {units.label('MPa')} were recorded {words}",
                     source=", ".join(one.source for one in alone),
                 )
 
@@ -67,7 +71,7 @@ def _about_the_meter(comparison: Comparison) -> Iterator[Warning_]:
             source=None,
         )
     if comparison.floor > 0:
-        floor = f"{comparison.floor / L_MIN:.2f} L/min"
+        floor = comparison.units.text(comparison.floor / L_MIN, ".2f L/min")
         yield Warning_(
             code="floor",
             text=f"the flow meter shows nothing below {floor}: what flows less is not observable",
@@ -87,7 +91,7 @@ def _fastest(name: Set, comparison: Comparison) -> float:
     return max(rates, default=0.0) / comparison.options.of_set(name).u_max
 
 
-def _about_zero(pair: CurvePair, item: PressureAssessment) -> Iterator[Warning_]:
+def _about_zero(pair: CurvePair, item: PressureAssessment, units: RecordedUnits) -> Iterator[Warning_]:
     reading = item.readings("before").get("flow_at_zero")
     if pair.before is None or reading is None or reading.value is None:
         return
@@ -95,22 +99,23 @@ def _about_zero(pair: CurvePair, item: PressureAssessment) -> Iterator[Warning_]
         yield Warning_(
             code="meter-zero",
             text=(
-                f"{item.place}: at zero command {reading.value:+.3g} L/min flow without the compensator too: the "
-                "meter's zero error, or a leak. Nothing is subtracted from any flow"
+                f"{item.place(units)}: at zero command {units.text(reading.value, '+.3g L/min')} flow without the "
+                "compensator too: the meter's zero error, or a leak. Nothing is subtracted from any flow"
             ),
             source=pair.before.source,
         )
 
 
-def _about_the_command(pair: CurvePair, item: PressureAssessment, options: AssessOptions) -> Iterator[Warning_]:
+def _about_the_command(pair: CurvePair, item: PressureAssessment, comparison: Comparison) -> Iterator[Warning_]:
+    place = item.place(comparison.units)
     for name, curves in pair.sets.items():
-        u_max = options.of_set(name).u_max
+        u_max, units = comparison.options.of_set(name).u_max, comparison.of_set(name, pair.side)
         if curves.u_top < FULL_COMMAND * u_max:
             yield Warning_(
                 code="short-ramp",
                 text=(
-                    f"{item.place}: the command ends at {curves.u_top:.2f} V of {u_max:g} V, and the largest flow is "
-                    "the one there"
+                    f"{place}: the command ends at {units.text(curves.u_top, '.2f V')} of {units.text(u_max, 'g V')}, "
+                    "and the largest flow is the one there"
                 ),
                 source=curves.source,
             )
@@ -119,7 +124,7 @@ def _about_the_command(pair: CurvePair, item: PressureAssessment, options: Asses
         yield Warning_(
             code="unchanged",
             text=(
-                f"{item.place}: the dead zone is {old.value:.1f} % without the compensator and {new.value:.1f} % with "
+                f"{place}: the dead zone is {old.value:.1f} % without the compensator and {new.value:.1f} % with "
                 "it; are the sets the wrong way round, or is the command AFTER the compensator's output and not its "
                 "input? --after-columns says which column"
             ),

@@ -4,7 +4,6 @@ from typing import TYPE_CHECKING
 
 from dzdesign.assess.assessment import Assessment, PressureAssessment
 from dzdesign.assess.curve_pairs import Comparison, CurvePair
-from dzdesign.assess.options import AssessOptions
 from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.plots.frame import HUES, finish, new_figure, plot_style, pressure_names, saved
 from dzdesign.identify.plots.valve_curves import BRANCHES
@@ -23,27 +22,32 @@ def plot_files(comparison: Comparison, assessment: Assessment) -> dict[str, byte
     names = pressure_names(stems, [item.dp_MPa for item in pressures])
     with plot_style():
         return {
-            f"{name}.svg": saved(_figure(pair, item, comparison.options), "svg")
+            f"{name}.svg": saved(_figure(pair, item, comparison), "svg")
             for name, pair, item in zip(names, comparison.pairs, pressures, strict=True)
         }
 
 
-def _figure(pair: CurvePair, item: PressureAssessment, options: AssessOptions) -> "Figure":
+def _figure(pair: CurvePair, item: PressureAssessment, comparison: Comparison) -> "Figure":
     """Draw the averaged curves of both sets over the whole command, and the level beside its crossings."""
+    options, units = comparison.options, comparison.units
+    level = units.convert(item.level_L_min, "L/min")
     sources = "; ".join(f"{name}: {curves.source}" for name, curves in pair.sets.items())
-    figure = new_figure(5.0, f"Flow over command, {item.place}", sources)
+    figure = new_figure(5.0, f"Flow over command, {item.place(units)}", sources)
     axes = figure.subplots()
     for name, curves in pair.sets.items():
         u_max, readings = options.of_set(name).u_max, item.readings(name)
         for (_, direction, _, line, _), curve in zip(BRANCHES, (curves.rising, curves.falling), strict=True):
             if curve is not None:
                 u, q = curve.read.profile
-                axes.plot(100 * u / u_max, q / L_MIN, line, lw=1.4, color=COLOURS[name], label=f"{name}, {direction}")
+                flow = units.convert(q / L_MIN, "L/min")
+                axes.plot(100 * u / u_max, flow, line, lw=1.4, color=COLOURS[name], label=f"{name}, {direction}")
         for _, direction, marker, *_ in BRANCHES:
             at = readings[f"dead_zone_{direction}"].value
             if at is not None:
-                axes.plot(at, item.level_L_min, marker, ms=7, color=COLOURS[name], mec=HUES["ink"], mew=0.8,
+                axes.plot(at, level, marker, ms=7, color=COLOURS[name], mec=HUES["ink"], mew=0.8,
                           label=f"{name}, dead zone {direction}", zorder=5)  # fmt: skip
-    axes.axhline(item.level_L_min, color=HUES["ink"], lw=0.9, ls=":", label=f"level {item.level_L_min:.3g} L/min")
-    axes.set(xlabel="command (% of full)", ylabel="flow at the nominal pressure drop (L/min)", xlim=(0, 100))
+    shown = units.text(item.level_L_min, ".3g L/min")
+    axes.axhline(level, color=HUES["ink"], lw=0.9, ls=":", label=f"level {shown}")
+    flow_axis = f"flow at the nominal pressure drop ({units.label('L/min')})"
+    axes.set(xlabel="command (% of full)", ylabel=flow_axis, xlim=(0, 100))
     return finish(figure, 3)

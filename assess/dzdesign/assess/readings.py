@@ -6,6 +6,7 @@ import numpy as np
 
 from dzdesign.assess.flow_curves import CELL, ZERO, FlowCurve, PressureCurves
 from dzdesign.assess.quantities import Reading, hidden, in_units, observed
+from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.knees.gated_line import GATE, fit_line
 from dzdesign.identify.knees.noise import median
@@ -26,22 +27,24 @@ FEWEST_CELLS = 10
 
 
 def read_quantities(
-    curves: PressureCurves, *, u_max: float, level: float, rated: float, window: tuple[float, float]
-) -> dict[str, Reading]:
+    curves: PressureCurves, *, u_max: float, level: float, rated: float, window: tuple[float, float],
+    units: RecordedUnits = AS_COMPUTED,
+) -> dict[str, Reading]:  # fmt: skip
     """Read every quantity of one set at one pressure drop, in its unit; symmetry, which needs both sides, is missing.
 
     The flow `level` ends the dead zone, linearity is a share of the flow `rated` (m³/s); `window` is over u_max (V).
+    Reasons are in `units`.
     """
     rising, falling = curves.rising, curves.falling
     si = {
-        "dead_zone_opening": _dead_zone(rising, "rising", level, u_max),
-        "dead_zone_closing": _dead_zone(falling, "falling", level, u_max),
+        "dead_zone_opening": _dead_zone(rising, "rising", level, u_max, units),
+        "dead_zone_closing": _dead_zone(falling, "falling", level, u_max, units),
         "knee_opening": _knee(rising, "rising", u_max),
         "knee_closing": _knee(falling, "falling", u_max),
-        "hysteresis": _hysteresis(rising, falling, u_max),
-        "linearity": _linearity(curves, rated, window, u_max),
+        "hysteresis": _hysteresis(rising, falling, u_max, units),
+        "linearity": _linearity(curves, rated, window, u_max, units),
         "gain": _gain(curves),
-        "flow_at_zero": _flow_at_zero(curves),
+        "flow_at_zero": _flow_at_zero(curves, units),
         "largest_flow": observed(curves.q_max),
     }
     return in_units(si)
@@ -51,23 +54,26 @@ def _no_branch(direction: str) -> Reading:
     return hidden(f"there is no {direction} branch")
 
 
-def _dead_zone(curve: FlowCurve | None, direction: str, level: float, u_max: float) -> Reading:
+def _dead_zone(
+    curve: FlowCurve | None, direction: str, level: float, u_max: float, units: RecordedUnits
+) -> Reading:
     """Return where a branch passes the level."""
     if curve is None:
         return _no_branch(direction)
     floor, noise = curve.read.floor, _noise_of_course(curve)
+    asked, shown = (units.text(flow / L_MIN, ".3g L/min") for flow in (level, floor))
     if level < floor:
-        bound = _passing(curve, floor, noise, u_max)
-        reason = f"the meter shows nothing below {floor / L_MIN:.3g} L/min, and the level is {level / L_MIN:.3g} L/min"
+        bound = _passing(curve, floor, noise, u_max, units)
+        reason = f"the meter shows nothing below {shown}, and the level is {asked}"
         return hidden(reason, at_most=_bound_of(bound))
     if level < STANDS_OUT * noise:
-        bound = _passing(curve, STANDS_OUT * noise, noise, u_max)
+        bound = _passing(curve, STANDS_OUT * noise, noise, u_max, units)
         return hidden(
-            f"the level of {level / L_MIN:.3g} L/min does not stand out of the noise, of which "
-            f"{noise / L_MIN:.2g} L/min are left in the averaged flow",
+            f"the level of {asked} does not stand out of the noise, of which {units.text(noise / L_MIN, '.2g L/min')} "
+            "are left in the averaged flow",
             at_most=_bound_of(bound),
         )
-    return _passing(curve, level, noise, u_max)
+    return _passing(curve, level, noise, u_max, units)
 
 
 def _bound_of(reading: Reading) -> float | None:
@@ -81,17 +87,18 @@ def _noise_of_course(curve: FlowCurve) -> float:
     return OF_MEDIAN * curve.sigma * math.sqrt(min(curve.variance_inflation, n) / max(n, 1.0))
 
 
-def _passing(curve: FlowCurve, level: float, noise: float, u_max: float) -> Reading:
+def _passing(curve: FlowCurve, level: float, noise: float, u_max: float, units: RecordedUnits) -> Reading:
     """Return the command at which the smoothed course best parts into flows below and above the level."""
     u, q = curve.read.profile
     if level > curve.read.y_max:
-        largest = f"{curve.read.y_max / L_MIN:.3g} L/min"
-        return hidden(f"the largest flow of {largest} lies below the level of {level / L_MIN:.3g} L/min")
+        largest, asked = (units.text(flow / L_MIN, ".3g L/min") for flow in (curve.read.y_max, level))
+        return hidden(f"the largest flow of {largest} lies below the level of {asked}")
     at = crossing(u, q, level)
     if at <= u[0]:
         if u[0] > ZERO * u_max:
             return hidden(
-                f"the flow lies above the level from the first recorded command of {u[0]:.3g} V on; record from zero",
+                f"the flow lies above the level from the first recorded command of {units.text(u[0], '.3g V')} on; "
+                "record from zero",
                 at_most=float(u[0]) / u_max,
             )
         return observed(0.0, note="the flow lies above the level at every command, at zero too")
@@ -117,7 +124,9 @@ def _knee(curve: FlowCurve | None, direction: str, u_max: float) -> Reading:
     return observed(line.knee / u_max, se=line.knee_se / u_max)
 
 
-def _hysteresis(rising: FlowCurve | None, falling: FlowCurve | None, u_max: float) -> Reading:
+def _hysteresis(
+    rising: FlowCurve | None, falling: FlowCurve | None, u_max: float, units: RecordedUnits
+) -> Reading:
     """Return the largest distance of the branches at equal flow."""
     if rising is None or falling is None:
         return _no_branch("rising" if rising is None else "falling")
@@ -128,7 +137,8 @@ def _hysteresis(rising: FlowCurve | None, falling: FlowCurve | None, u_max: floa
     if len(levels) < FEWEST_LEVELS:
         return hidden(
             f"only {len(levels)} of the levels from {WIDTH_LEVELS[0]:.0%} to {WIDTH_LEVELS[-1]:.0%} of the largest "
-            f"flow lie above {lowest / L_MIN:.3g} L/min, where the meter starts or the flow at zero command ends"
+            f"flow lie above {units.text(lowest / L_MIN, '.3g L/min')}, where the meter starts or the flow at zero "
+            "command ends"
         )
     found = [(_command_at(rising, level), _command_at(falling, level)) for level in levels]
     widths = [abs(up[0] - down[0]) for up, down in found]
@@ -159,14 +169,16 @@ def _command_at(curve: FlowCurve, level: float) -> tuple[float, float]:
     return on_line, error if math.isfinite(error) else step
 
 
-def _linearity(curves: PressureCurves, rated: float, window: tuple[float, float], u_max: float) -> Reading:
+def _linearity(
+    curves: PressureCurves, rated: float, window: tuple[float, float], u_max: float, units: RecordedUnits
+) -> Reading:
     """Return the largest departure of the mean curve from its best straight line."""
     low, high = (share * u_max for share in window)
     for curve in curves.curves:
         if curve.u[0] > low + CELL * u_max or curve.u[-1] < high - CELL * u_max:
             return hidden(
-                f"the recorded commands, {curve.u[0]:.2f} to {curve.u[-1]:.2f} V, do not cover the window of {low:.3g} "
-                f"to {high:.3g} V"
+                f"the recorded commands, {units.number(curve.u[0], '.2f V')} to {units.text(curve.u[-1], '.2f V')}, do "
+                f"not cover the window of {units.number(low, '.3g V')} to {units.text(high, '.3g V')}"
             )
     # As many points as the branch with fewest cells has there: between levels of a staircase nothing is known.
     count = min(int(np.sum((curve.u >= low) & (curve.u <= high))) for curve in curves.curves)
@@ -215,7 +227,7 @@ def _gain(curves: PressureCurves) -> Reading:
     )
 
 
-def _flow_at_zero(curves: PressureCurves) -> Reading:
+def _flow_at_zero(curves: PressureCurves, units: RecordedUnits) -> Reading:
     """Return the flow that is left at zero command."""
     flow = curves.at_zero
     if flow.size == 0:
@@ -228,6 +240,6 @@ def _flow_at_zero(curves: PressureCurves) -> Reading:
     value = float(kept.mean())
     floor = curves.curves[0].read.floor
     if abs(value) < floor:
-        return hidden(f"the meter shows nothing below {floor / L_MIN:.3g} L/min", at_most=floor)
+        return hidden(f"the meter shows nothing below {units.text(floor / L_MIN, '.3g L/min')}", at_most=floor)
     spread = float(kept.std()) * math.sqrt(min(curves.variance_inflation, kept.size) / kept.size)
     return observed(value, se=spread)

@@ -20,6 +20,7 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.result_display import ShownInNotebooks
+from dzdesign.core.strict_templates import strict_templates
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest, FirmwareOrigin
 from dzdesign.design.target_inputs import Converter
@@ -166,20 +167,9 @@ def target_files(compensator: Compensator, target: Target, banner: Banner) -> di
 
 @cache
 def _environment(package: str) -> "jinja2.Environment":
-    """Return the renderer of a package's templates, then of the shared ones: strict, a name without a value fails.
-
-    Kept, with the templates that it has compiled.
-    """
-    import jinja2
-
+    """Return the renderer of a package's templates, then of the shared ones; kept, with what it has compiled."""
     packages = dict.fromkeys((package, f"{PACKAGE}.core", PACKAGE))
-    return jinja2.Environment(
-        loader=jinja2.ChoiceLoader([jinja2.PackageLoader(name, "templates") for name in packages]),
-        undefined=jinja2.StrictUndefined,
-        keep_trailing_newline=True,
-        trim_blocks=True,
-        autoescape=False,  # C and make, not HTML
-    )
+    return strict_templates(*packages, autoescape=False)  # C and make, not HTML
 
 
 def _render(package: str, template: str, banner: Sequence[str], values: Values) -> str:

@@ -21,7 +21,9 @@ def costs_of(compensator: Compensator) -> tuple[str, ...]:
         lines += [label + _cost_of_test(compensator, test, sign) for test in side.tests]
         lines += [label + line for line in _cost_of_side(compensator, side, sign)]
     low, high = (float(end) for end in compensator.positive.certificate.dp_MPa)
-    beyond = f"outside {low:.2f} to {high:.2f} MPa" if high > low else f"at any pressure drop but {low:.2f} MPa"
+    units = valve.recorded_units
+    first, last = units.number(low, ".2f MPa"), units.text(high, ".2f MPa")
+    beyond = f"outside {first} to {last}" if high > low else f"at any pressure drop but {last}"
     lines.append(
         f"{beyond} the nearest tested beta is held and nothing is certified; "
         f"a pressure difference below -{compensator.reverse_codes} codes is taken as a failed sensor: smallest beta"
@@ -57,22 +59,24 @@ def _cost_of_test(compensator: Compensator, test: TestResult, sign: int) -> str:
     code = round(signals.dp_code(Fraction(repr(test.dp_MPa))))
     corners = _corners(compensator, code, sign)
     left = remaining_dead_zone(compensator, test, sign)
-    parts = [f"{test.dp_MPa:.2f} MPa: offset {corners.offset * u_max:.3f} V"]
+    units = compensator.valve.recorded_units.of_side(SIDE_NAMES[sign])
+    at = units.text(test.dp_MPa or 0.0, ".2f MPa")
+    parts = [f"{at}: offset {units.text(corners.offset * u_max, '.3f V')}"]
     for name, knee in (("opening", test.u_knee_rising_V), ("closing", test.u_knee_falling_V)):
         if knee is not None and knee >= corners.offset * u_max:
             parts.append(f"dead zone that remains on {name} {left[name]:.2%} of command (knee)")
         elif knee is not None:
-            above = corners.offset * u_max - knee
-            parts.append(f"flow at zero command on {name}: the offset lies {above:.3f} V above the knee")
+            above = units.text(corners.offset * u_max - knee, ".3f dV")
+            parts.append(f"flow at zero command on {name}: the offset lies {above} above the knee")
     if corners.end and test.u_knee_falling_V is not None:
         flow = test.slope_L_min_V * max(corners.at_end * u_max - test.u_knee_falling_V, 0.0)
-        parts.append(f"flow on closing at the transition's end {flow:.2f} L/min")
+        parts.append(f"flow on closing at the transition's end {units.text(flow, '.2f L/min')}")
     limit = compensator.drive_functions.compare_limit / signals.compare_max
     if limit <= corners.offset or limit <= (test.u_knee_rising_V or 0.0) / u_max:
         raise InputError(
             f"the largest output is {limit:.1%} of full drive, but the valve opens at "
-            f"{max(corners.offset, (test.u_knee_rising_V or 0.0) / u_max):.1%} at {test.dp_MPa:.2f} MPa, so nothing would ever "
-            "flow; give a larger --output-max"
+            f"{max(corners.offset, (test.u_knee_rising_V or 0.0) / u_max):.1%} at {at}, so nothing would ever flow; "
+            "give a larger --output-max"
         )
     if limit < corners.full:
         reached = corners.command_at(limit)
@@ -132,16 +136,17 @@ def _corners(compensator: Compensator, dp_code: int, sign: int) -> _Corners:
 
 def _cost_of_side(compensator: Compensator, side: SideModel, sign: int) -> list[str]:
     lines = []
-    crossed = [f"{test.dp_MPa:.2f}" for test in side.tests if test.closes_above_opening]
+    units = compensator.valve.recorded_units
+    crossed = [units.number(test.dp_MPa or 0.0, ".2f MPa") for test in side.tests if test.closes_above_opening]
     if crossed:
         lines.append(
-            f"accepted, branch-order: at {', '.join(crossed)} MPa the valve seems to close above where it opens, so "
-            "flow at zero command is possible"
+            f"accepted, branch-order: at {', '.join(crossed)} {units.label('MPa')} the valve seems to close above "
+            "where it opens, so flow at zero command is possible"
         )
     certificate = compensator.side(sign).certificate
     lines.append(
-        f"the table's offset stays {1e3 * certificate.mean_loss_V:.2f} mV under the certified curve on average, "
-        f"{1e3 * certificate.largest_loss_V:.2f} mV at most{_of_which_dither(compensator)}"
+        f"the table's offset stays {units.text(1e3 * certificate.mean_loss_V, '.2f mV')} under the certified curve on "
+        f"average, {units.text(1e3 * certificate.largest_loss_V, '.2f mV')} at most{_of_which_dither(compensator)}"
     )
     guard = certificate.guard
     if guard != "closing":
@@ -210,7 +215,7 @@ def _of_which_dither(compensator: Compensator) -> str:
     if not counts:
         return ""
     peak = counts / compensator.signals.compare_max * float(compensator.u_max_V)
-    return f", of which {1e3 * peak:.2f} mV are the dither's peak"
+    return f", of which {compensator.valve.recorded_units.text(1e3 * peak, '.2f mV')} are the dither's peak"
 
 
 def _ramp_text(compensator: Compensator) -> str:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 BelowDp0 = Literal["hold", "extend"]
 BELOW_DP0: tuple[BelowDp0, ...] = get_args(BelowDp0)
 POLARITIES, NEGATIVE_DP = ("normal", "inverted"), ("same", "swapped")
+HYSTERESIS = ("keep", "play")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,6 +62,8 @@ class DesignChoices:
     """Time from zero to full command, such as "0.5 s", or "0.5 s / 0.8 s" for positive and negative commands."""
     ramp_down: Annotated[Text, Option("T", DRIVE, "0 s", example="0.5 s")] = None
     """Time from full command to zero."""
+    hysteresis: Annotated[Text, Option("H", DRIVE, "keep", choices=HYSTERESIS)] = None
+    """What to do about the valve's hysteresis: keep it, or play, which drives a falling command lower by its width."""
     dither: Annotated[Text, Option("D", DRIVE, "off", example="150 Hz 1 %")] = None
     """Square wave on the output, such as "150 Hz 1 %", plus and minus 1 % of full drive."""
 

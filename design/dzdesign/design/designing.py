@@ -14,6 +14,7 @@ from dzdesign.design.certificate import certify, guarded_curve, hold_below
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import costs_of
 from dzdesign.design.options import DesignOptions
+from dzdesign.design.play import with_play
 from dzdesign.design.quantise import Units, finest_units, fits
 from dzdesign.design.side_law import SideLaw, Sides
 from dzdesign.design.signals import SIDE_NAMES, Signals
@@ -89,13 +90,15 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
     )
     for sign in signals.signs:
         prove_monotone(compensator, sign)
+    if options.play:
+        compensator = with_play(compensator)
     return replace(compensator, costs=costs_of(compensator))
 
 
 def _transition_codes(valve: ValveModel, options: DesignOptions) -> int:
     """Return the codes of the transition; where nothing is said, none for a valve whose opening was not recorded."""
     sides = [valve.sides[SIDE_NAMES[sign]] for sign in options.signals.signs if SIDE_NAMES[sign] in valve.sides]
-    if options.transition is None and any(side.opening_curve is None for side in sides):
+    if options.transition is None and not options.play and any(side.opening_curve is None for side in sides):
         return 0
     codes = options.transition_codes()
     while options.transition is None and codes > options.error.least_transition and not fits(options.signals, codes):

@@ -1,4 +1,4 @@
-"""What the drive does around the law: side by side, ramps, dither, a largest output. All off by default."""
+"""What the drive does around the law: zero band, sides, ramps, dither, play, a largest output."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -13,6 +13,7 @@ RAMP_UNIT = 1 << 16
 RAMPED_CODES = (1 << 31) // RAMP_UNIT - 1
 
 Step = Annotated[int, Meta(ge=0, le=2**30)]
+Counts = Annotated[int, Meta(ge=0, le=65535)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,6 +49,24 @@ class DriveFunctions:
         ),
     ] = 0
     dither_ticks: Annotated[int, Meta(description="PWM periods of half a wave.", ge=1, le=32767)] = 1
+    play_counts: Annotated[
+        tuple[Counts, Counts],
+        Meta(
+            description="Counts by which a falling command is driven lower than a rising one, the valve's hysteresis: of "
+            "positive, then of negative command. 0: no difference is made."
+        ),
+    ] = (0, 0)
+    play_codes: Annotated[
+        int,
+        Meta(
+            description="Codes of travel over which the drive goes from the one to the other, a power of two.",
+            ge=1,
+            le=32,
+        ),
+    ] = 8
+    play_noise_codes: Annotated[
+        int, Meta(description="Codes that a command may stray to either side without turning.", ge=0, le=4095)
+    ] = 0
     compare_limit: Annotated[int, Meta(description="Largest compare value.", ge=0, le=65535)] = 60000
 
     def __post_init__(self) -> None:
@@ -55,6 +74,8 @@ class DriveFunctions:
             ("leave_zero_codes", self.leave_zero_codes, 32767),
             ("dither_counts", self.dither_counts, 65535),
             ("compare_limit", self.compare_limit, 65535),
+            ("play_noise_codes", self.play_noise_codes, 4095),
+            *(("play_counts", value, 65535) for value in self.play_counts),
             *(("ramp_up", value, 2**30) for value in self.ramp_up),
             *(("ramp_down", value, 2**30) for value in self.ramp_down),
         ):
@@ -64,6 +85,14 @@ class DriveFunctions:
             raise RuleError(
                 f"dither_ticks is {self.dither_ticks}, expected 1 to 32767 PWM periods: a wave is twice that"
             )
+
+        if not 1 <= self.play_codes <= 32 or self.play_codes & (self.play_codes - 1):
+            raise RuleError(f"play_codes is {self.play_codes}, expected a power of two from 1 to 32")
+
+    @property
+    def has_play(self) -> bool:
+        """True if a falling command is driven lower than a rising one."""
+        return any(self.play_counts)
 
     @property
     def has_ramp(self) -> bool:

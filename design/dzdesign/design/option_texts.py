@@ -8,7 +8,7 @@ from typing import cast
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.options import flag_of
 from dzdesign.core.units import parse_quantity
-from dzdesign.design.design_choices import DEFAULTS, NEGATIVE_DP, POLARITIES, BelowDp0, DesignRequest
+from dzdesign.design.design_choices import DEFAULTS, HYSTERESIS, NEGATIVE_DP, POLARITIES, BelowDp0, DesignRequest
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.signal_text import command_signal, full_command_V, parse_signal, pressure_signal
 from dzdesign.design.signals import Signals
@@ -22,7 +22,7 @@ from dzdesign.identify.valve.model import DECIMALS
 def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
     """Return the engineer's choices, each from its text; the default stands for one that is missing or empty."""
     text = {name: texts.get(name) or default for name, default in DEFAULTS.items()}
-    for name, known in (("negative_dp", NEGATIVE_DP), ("polarity", POLARITIES)):
+    for name, known in (("negative_dp", NEGATIVE_DP), ("polarity", POLARITIES), ("hysteresis", HYSTERESIS)):
         if text[name] not in known:
             raise InputError(
                 f"{flag_of(name)} is '{text[name]}'{nearest(text[name], known)}, expected {' or '.join(known)}"
@@ -61,6 +61,7 @@ def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
         ramp_down_s=_seconds(text["ramp_down"], "--ramp-down"),
         dither_Hz=dither_Hz,
         dither_peak=dither_peak,
+        play=text["hysteresis"] == "play",
         output_max=_share(text["output_max"], "--output-max"),
         reading_flow_L_min=_flow_L_min(text["reading_flow"], "--reading-flow") if text["reading_flow"] else None,
         full_command_V=full_command_V(signal),

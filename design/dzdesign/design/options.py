@@ -49,6 +49,8 @@ class DesignOptions:
         Time of the command from zero to full, and back, s: positive, then negative command. 0: no limit.
     dither_Hz, dither_peak : float, Fraction
         Frequency of the dither, a square wave, and its peak (half its height) over full drive; 0: none.
+    play : bool
+        Drive a falling command lower than a rising one, by the valve's hysteresis.
     output_max : Fraction
         Largest drive over full drive.
     reading_flow_L_min : float or None
@@ -72,6 +74,7 @@ class DesignOptions:
     ramp_down_s: tuple[float, float] = (0.0, 0.0)
     dither_Hz: float = 0.0
     dither_peak: Fraction = Fraction(0)
+    play: bool = False
     output_max: Fraction = Fraction(1)
     reading_flow_L_min: float | None = None
     full_command_V: Fraction | None = None
@@ -111,6 +114,10 @@ class DesignOptions:
             raise InputError(
                 f"the dither's frequency is {self.dither_Hz:g} Hz, expected {DITHER_HZ[0]:g} to {DITHER_HZ[1]:g} Hz"
             )
+        if self.play and self.transition == 0:
+            raise InputError("--hysteresis play begins in the transition, but --transition is off; leave one of them out")
+        if self.play and self.dither_Hz:
+            raise InputError("--hysteresis play and --dither both take the hysteresis out; give one of them")
         for seconds in self.ramp_up_s + self.ramp_down_s:
             if not 0 <= seconds <= LONGEST_RAMP_S or 0 < seconds < 1 / self.signals.sample_Hz:
                 raise InputError(

@@ -64,16 +64,17 @@ def command_error_of(text: str, converter: Converter, command: CommandSignal) ->
     parts = [part.strip() for part in text.split("+")]
     if len(parts) != 2:
         raise InputError(f"--command-error is '{text}', {EXPECTED}")
-    in_codes = bool(re.search(r"codes?$", parts[1]))
+    if re.search(r"codes?$", parts[1]) and re.fullmatch(r"\d+", parts[0]):
+        parts[0] += " codes"
     try:
-        offset, noise = (_codes(part, in_codes, command) for part in parts)
+        offset, noise = (_codes(part, command) for part in parts)
         return CommandError(offset_codes=offset, noise_codes=noise)
     except (ValueError, RuleError) as error:
         raise InputError(f"--command-error is '{text}', {EXPECTED} ({error})") from error
 
 
-def _codes(part: str, in_codes: bool, command: CommandSignal) -> int:
+def _codes(part: str, command: CommandSignal) -> int:
     """Return codes of command, a fraction of one as a whole."""
-    if in_codes:
+    if re.search(r"codes?$", part):
         return ceil(Fraction(re.sub(r"\s*codes?$", "", part)))
     return ceil(Fraction(repr(parse_quantity(part, "ratio", "--command-error"))) * command.span(1))

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 
 from dzdesign.core.errors import InputError, one_line
 from dzdesign.core.options import Paths, Table, paths_of
+from dzdesign.core.recorded_units import AS_COMPUTED
+from dzdesign.core.strict_templates import strict_templates
 from dzdesign.stages.recordings import distinct_names, expand, read_recordings, refuse_copies
 from dzdesign.terminal.progress import say, stage_progress, with_bar
 
@@ -220,28 +222,25 @@ def _summary(
     looks: "Sequence[ProposedColumns]", u_seen: float | None, valve: "ValveModel | None", notes: Sequence[str]
 ) -> Iterator[str]:
     """Yield what was seen, for a person."""
+    units = valve.recorded_units if valve else AS_COMPUTED
     yield f"recordings: {len(looks)}, columns {', '.join(looks[0].labels[:12])}"
     if u_seen is not None:
-        yield f"largest command: {u_seen:.2f} V"
+        yield f"largest command: {units.text(u_seen, '.2f V')}"
     yield from dict.fromkeys(notes)
     for name, side in valve.sides.items() if valve else ():
         ramps = sum(len(test.ramps) for test in side.tests)
-        pressures = ", ".join(f"{test.dp_MPa:.3g}" for test in side.tests if test.dp_MPa is not None)
-        where = f"{pressures} MPa" if pressures else "an unknown pressure drop"
-        flow = max(test.q_max_L_min for test in side.tests)
-        yield f"{name} commands: {ramps} ramp{'s' if ramps > 1 else ''} at {where}, up to {flow:.3g} L/min"
+        known = [test.dp_MPa for test in side.tests if test.dp_MPa is not None]
+        pressures = ", ".join(units.number(dp_MPa, ".3g MPa") for dp_MPa in known)
+        where = f"{pressures} {units.label('MPa')}" if pressures else "an unknown pressure drop"
+        flow = units.text(max(test.q_max_L_min for test in side.tests), ".3g L/min")
+        yield f"{name} commands: {ramps} ramp{'s' if ramps > 1 else ''} at {where}, up to {flow}"
     for warning in valve.warnings if valve else ():
         yield f"warning [{warning.code}] {f'{warning.source}: ' if warning.source else ''}{warning.text}"
 
 
 def _rendered(**content: object) -> str:
-    import jinja2
-
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("dzdesign.initial_options", "templates"),
-        undefined=jinja2.StrictUndefined,
-        keep_trailing_newline=True,
-        trim_blocks=True,
+    environment = strict_templates(
+        "dzdesign.initial_options",
         lstrip_blocks=True,
         finalize=lambda value: one_line(str(value)),  # labels come from the recordings
     )

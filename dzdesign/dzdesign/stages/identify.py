@@ -6,12 +6,13 @@ from dataclasses import KW_ONLY, dataclass, fields
 from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.core.option_readers import number, percent, quantity
-from dzdesign.core.options import FIT, METER, RECORDINGS, AnyPath, Option, Paths, Table, Text, Texts
+from dzdesign.core.options import FIT, METER, RECORDINGS, AnyPath, Option, Paths, Table, Text
+from dzdesign.stages.recording_order import in_order
 from dzdesign.stages.recording_parts import parts_of
 from dzdesign.stages.recordings import (
     RampArguments,
     check_places,
-    in_order,
+    expand,
     meter_choices,
     read_recordings,
     refuse_copies,
@@ -71,9 +72,10 @@ class IdentifyArguments(IdentifyChoices):
     _: KW_ONLY
     output: Annotated[AnyPath | None, Option("FILE", command_default="valve.json", short="-o")] = None
     """File to write."""
-    order: Annotated[Texts | None, Option("FILE", RECORDINGS)] = None
+    order: Annotated[Paths | None, Option("FILE", RECORDINGS)] = None
     """Recordings in the order in which they were taken, such as "p1.csv, p5.csv, p1_again.csv", to tell a drift of the
-    valve from the pressure drop (default: from date and time in the recordings)."""
+    valve from the pressure drop (default: from date and time in the recordings). Repeatable; in the options file also
+    a list."""
     from_: Annotated[Table, Option("T", RECORDINGS, example="12.3 s")] = None
     """Time of a recording's clock before which its rows are left out, such as "12.3 s" (dates count from the first
     row). In the options file also a table [from] from file name or pattern to time."""
@@ -117,12 +119,13 @@ def identify(arguments: IdentifyArguments) -> "ValveModel":
 
     options, record = identify_options(arguments), record_of(arguments.record)
     check_places(ValveModel, arguments.output, arguments.plots)
+    paths = expand(arguments.ramps)
     tests = read_recordings(
-        arguments.ramps, u_max=options.u_max, columns=arguments.columns, dp=arguments.dp,
+        paths, u_max=options.u_max, columns=arguments.columns, dp=arguments.dp,
         sample_rate=arguments.sample_rate, skip_rows=arguments.skip_rows,
     )  # fmt: skip
     refuse_copies(tests)
-    tests = in_order(parts_of(tests, arguments.from_, arguments.to), arguments.order)
+    tests = in_order(parts_of(tests, arguments.from_, arguments.to, options.u_max), paths, arguments.order)
     with stage_progress(f"fitting {len(tests)} recording{'s' if len(tests) > 1 else ''}"):
         found = identify_sides(tests, options, record)
     write_results(found.model, arguments.output, arguments.plots, lambda: plot_files(found))

@@ -9,6 +9,7 @@ from dzdesign.core.artefact_files import read_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.core.option_readers import number, percent, quantity, quantity_range, whole_number, with_tolerance
 from dzdesign.core.options import EXPECTED, FIT, METER, RECORDINGS, AnyPath, Option, Text, flag_of, read_options
+from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 from dzdesign.terminal.progress import stage_progress
 
 if TYPE_CHECKING:
@@ -89,7 +90,8 @@ def plan(arguments: PlanArguments) -> "SeriesPlan":
     valve, bench, request = _premises(arguments, read, pilot)
     with stage_progress("comparing series"):
         found = plan_series(valve, bench, request)
-    return series_plan(found, valve, bench, request, _stated(arguments, valve, bench, pilot))
+    units = AS_COMPUTED if pilot is None else pilot.recorded_units
+    return series_plan(found, valve, bench, request, _stated(arguments, valve, bench, pilot, units), units)
 
 
 def _read_pilot(arguments: PlanArguments) -> "Pilot | None":
@@ -172,7 +174,9 @@ def _premises(
     return valve, bench, request
 
 
-def _stated(arguments: PlanArguments, valve: "ExpectedValve", bench: "Bench", pilot: "Pilot | None") -> "list[Premise]":
+def _stated(
+    arguments: PlanArguments, valve: "ExpectedValve", bench: "Bench", pilot: "Pilot | None", units: RecordedUnits
+) -> "list[Premise]":
     """Return the premises as text, and where each is from."""
     from dzdesign.identify.constants import L_MIN
     from dzdesign.identify.planning.results import Premise
@@ -182,19 +186,28 @@ def _stated(arguments: PlanArguments, valve: "ExpectedValve", bench: "Bench", pi
             return "given"
         return "pilot series" if pilot is not None and in_pilot else "assumed"
 
-    def span(values: "np.ndarray") -> str:
-        return " to ".join(dict.fromkeys(f"{value:.3g}" for value in (values[0], values[-1])))
+    def span(values: "np.ndarray", unit: str) -> str:
+        ends = (values[0], values[-1])
+        return " to ".join(
+            dict.fromkeys(units.number(end, f".3g {unit}") if unit else f"{end:.3g}" for end in ends)
+        )
+
+    def flow(value: float) -> str:
+        return units.text(value / L_MIN, ".3g L/min")
+
+    # A share of a signal that is not zero at zero command is no share of its reading.
+    full = "full command" if units.command.at_zero else units.text(bench.u_max, "g V")
 
     whole = {origin(name) for name in ("dead_zone", "threshold_change")}
     return [
         Premise(
             name="threshold",
-            value=f"{span(100 * valve.threshold / bench.u_max)} % of {bench.u_max:g} V",
+            value=f"{span(100 * valve.threshold / bench.u_max, '')} % of {full}",
             origin=whole.pop() if len(whole) == 1 else "partly assumed",
         ),
         Premise(
             name="largest flow",
-            value=f"{span(valve.q_max / L_MIN)} L/min",
+            value=f"{span(valve.q_max / L_MIN, 'L/min')} {units.label('L/min')}",
             origin=origin("max_flow"),
         ),
         Premise(
@@ -202,14 +215,14 @@ def _stated(arguments: PlanArguments, valve: "ExpectedValve", bench: "Bench", pi
             value=f"{100 * valve.scatter / bench.u_max:.3g}{_error_of_scatter(arguments, bench, pilot)} %",
             origin=origin("repeatability", in_pilot=pilot is not None and pilot.scatter_is != "assumed"),
         ),
-        Premise(name="noise", value=f"{bench.noise / L_MIN:.3g} L/min", origin=origin("noise")),
+        Premise(name="noise", value=flow(bench.noise), origin=origin("noise")),
         Premise(
             name="meter lag",
             value=f"{bench.lag.seconds:.3g} s, at most {bench.lag.shorter:.3g} s shorter",
             origin=origin("meter_lag", in_pilot=pilot is not None and pilot.meter_lag is not None),
         ),
-        Premise(name="meter floor", value=f"{bench.meter_floor / L_MIN:.3g} L/min", origin=origin("meter_floor")),
-        Premise(name="meter zero", value=f"{bench.meter_zero / L_MIN:.3g} L/min", origin=origin("meter_zero")),
+        Premise(name="meter floor", value=flow(bench.meter_floor), origin=origin("meter_floor")),
+        Premise(name="meter zero", value=flow(bench.meter_zero), origin=origin("meter_zero")),
     ]
 
 

@@ -26,7 +26,6 @@ from dzdesign.core.options import (
     Paths,
     Table,
     Text,
-    Texts,
     paths_of,
     read_options,
 )
@@ -105,19 +104,22 @@ def read_recordings(
     """
     from dzdesign.identify.reading.column_labels import parse_columns
     from dzdesign.identify.reading.ramp_files import read_ramp_file
+    from dzdesign.identify.reading.units_of_columns import unit_of_pressure
 
     chosen = parse_columns(columns) if columns else {}
     skipped = None if skip_rows is None else read_skip_rows(skip_rows, "--skip-rows")
     rate = None if sample_rate is None else read_sample_rate(sample_rate, "--sample-rate")
     paths = expand(patterns)
     names = distinct_names(paths)
-    tests = [
-        replace(
-            read_ramp_file(path, u_max, columns=chosen, dp=_declared_dp(name, dp), sample_rate=rate, skip_rows=skipped),
-            source=name,
-        )
-        for path, name in with_bar(list(zip(paths, names, strict=True)), what)
-    ]
+    tests = []
+    for path, name in with_bar(list(zip(paths, names, strict=True)), what):
+        declared = _declared_dp(name, dp)
+        test = read_ramp_file(
+            path, u_max, columns=chosen, dp=declared and parse_quantity(declared[0], "pressure", declared[1]),
+            sample_rate=rate, skip_rows=skipped,
+        )  # fmt: skip
+        units = test.units if declared is None else {**test.units, **unit_of_pressure(declared[0])}
+        tests.append(replace(test, source=name, units=units))
     _refuse_unnamed(tests, dp)
     return tests
 
@@ -167,19 +169,19 @@ def distinct_names(paths: list[Path]) -> list[str]:
     return names
 
 
-def _declared_dp(name: str, declared: Table) -> float | None:
-    """Return the pressure drop that --dp or [dp] declares for a file, in Pa; a name goes before a pattern.
+def _declared_dp(name: str, declared: Table) -> tuple[str, str] | None:
+    """Return the pressure drop that --dp or [dp] declares for a file, and where; a name goes before a pattern.
 
     The name may have folders before it, where they tell two files apart; [dp] may leave them out.
     """
     if declared is None:
         return None
     if isinstance(declared, str):
-        return parse_quantity(declared, "pressure", "--dp")
+        return declared, "--dp"
     last = name.rpartition("/")[2]
     patterns = [known for known in (name, last) if known in declared]
     patterns += [each for each in declared if fnmatch.fnmatchcase(name, each) or fnmatch.fnmatchcase(last, each)]
-    return parse_quantity(declared[patterns[0]], "pressure", f"[dp] '{patterns[0]}'") if patterns else None
+    return (declared[patterns[0]], f"[dp] '{patterns[0]}'") if patterns else None
 
 
 def _refuse_unnamed(tests: list["RampTest"], declared: Table) -> None:
@@ -202,38 +204,6 @@ def refuse_copies(tests: list["RampTest"]) -> None:
                 "(a repeated ramp test is welcome, a copy is no repetition)"
             )
         known[test.sha256] = test.source
-
-
-def in_order(tests: list["RampTest"], order: Texts | None) -> list["RampTest"]:
-    """Return recordings with the times at which they began, one after the other, where --order states them.
-
-    Raises
-    ------
-    InputError
-        If a name in it is no recording's, or a recording is missing in it.
-    """
-    if order is None:
-        return tests
-    names = [name.strip() for text in ([order] if isinstance(order, str) else order) for name in text.split(",")]
-    known = {test.source: test for test in tests}
-    unknown = next((name for name in names if name not in known), None)
-    missing = next((name for name in known if name not in names), None)
-    if unknown is not None or missing is not None or len(names) != len(known):
-        wrong = (
-            f"names '{unknown}', which is no recording here{nearest(unknown, known)}"
-            if unknown is not None
-            else f"lacks '{missing}'"
-            if missing is not None
-            else "names a recording twice"
-        )
-        raise InputError(f"--order {wrong}; expected each recording once, by its file name, in the order of taking")
-    import numpy as np
-
-    started = 0.0
-    for name in names:
-        known[name] = replace(known[name], started=started - float(known[name].time[0]))
-        started += float(np.ptp(known[name].time))
-    return list(known.values())
 
 
 def check_places(kind: "type[Artefact]", output: AnyPath | None, plots: AnyPath | None) -> None:

@@ -4,11 +4,12 @@ from typing import TYPE_CHECKING
 
 from dzdesign.core.verdicts import DOES_NOT_HOLD, verdict_words
 from dzdesign.terminal.page import Table, new_console, put_line, put_table
-from dzdesign.terminal.tables import meter_line
+from dzdesign.terminal.tables import meter_line, put_units
 
 if TYPE_CHECKING:
     from dzdesign.assess.assessment import Assessment, PressureAssessment
     from dzdesign.assess.quantities import Reading
+    from dzdesign.core.recorded_units import RecordedUnits
 
 #: Decimals in the unit of a quantity.
 DECIMALS = {"%": 2, "L/min": 3, "L/min/V": 4}
@@ -16,27 +17,29 @@ DECIMALS = {"%": 2, "L/min": 3, "L/min/V": 4}
 
 def print_assessment(assessment: "Assessment") -> None:
     """Print each pressure drop, the reasons of what is not observable, formulas, notes and limits."""
-    page = new_console()
+    page, units = new_console(), assessment.recorded_units
     for item in _shown_pressures(assessment):
-        put_table(page, _table_of(item))
+        put_table(page, _table_of(item, units))
     lines = [
         *_not_observable(assessment),
         *_remarks(assessment),
         f"{assessment.terms[0].upper()}{assessment.terms[1:]}:",
         *(f"  {text}" for text in _formulas(assessment)),
-        meter_line(assessment.meter),
+        meter_line(assessment.meter, units),
         *(f"note [{each.code}] {f'{each.source}: ' if each.source else ''}{each.text}" for each in assessment.notes),
         *_limits(assessment),
     ]
     for line in lines:
         put_line(page, line)
+    put_units(page, units, "assessment.json")
 
 
-def _table_of(item: "PressureAssessment") -> Table:
+def _table_of(item: "PressureAssessment", units: "RecordedUnits") -> Table:
     from dzdesign.assess.quantities import QUANTITIES
 
-    where = "pressure drop unknown" if item.dp_MPa is None else f"{item.dp_MPa:.2f} MPa"
-    flows = f"level {item.level_L_min:.3g} L/min, rated flow {item.rated_flow_L_min:.3g} L/min"
+    where = "pressure drop unknown" if item.dp_MPa is None else units.text(item.dp_MPa, ".2f MPa")
+    level, rated = (units.text(flow, ".3g L/min") for flow in (item.level_L_min, item.rated_flow_L_min))
+    flows = f"level {level}, rated flow {rated}"
     rows = Table(f"{where}, {item.side} commands; {flows}", "quantity", "unit", "before", "after", "change", "± s.e.")
     for key, found in item.quantities.items():
         quantity, change, both = QUANTITIES[key], found.change, (found.before, found.after)
@@ -44,26 +47,34 @@ def _table_of(item: "PressureAssessment") -> Table:
             continue  # of a valve with one side: printed below where a limit asks for it
         rows.add_row(
             quantity.name,
-            quantity.unit,
-            *(_shown(reading, quantity.unit) for reading in both),
-            _number(change.value if change else None, quantity.unit, "+"),
-            _number(change.se if change else None, quantity.unit),
+            _unit(quantity.unit, units),
+            *(_shown(reading, quantity.unit, units) for reading in both),
+            _number(change.value if change else None, quantity.unit, units, "+"),
+            _number(change.se if change else None, quantity.unit, units),
         )
     return rows
 
 
-def _number(value: float | None, unit: str, sign: str = "") -> str:
+def _unit(unit: str, units: "RecordedUnits") -> str:
+    return unit if unit == "%" else units.label(unit)
+
+
+def _number(value: float | None, unit: str, units: "RecordedUnits", sign: str = "") -> str:
     if value is None:
         return "-"
-    text = f"{value:{sign}.{DECIMALS[unit]}f}"
-    return text if float(text) else f"{0:{sign}.{DECIMALS[unit]}f}"  # no -0.00
+
+    def text(shown: float) -> str:
+        form = f"{sign}.{DECIMALS[unit]}f"
+        return format(shown, form) if unit == "%" else units.number(shown, f"{form} {unit}")
+
+    return text(value) if float(text(value)) else text(0.0)  # no -0.00
 
 
-def _shown(reading: "Reading | None", unit: str) -> str:
+def _shown(reading: "Reading | None", unit: str, units: "RecordedUnits") -> str:
     """Return a value, or the bound of what is not observable."""
     if reading is None or reading.value is not None:
-        return _number(reading.value if reading else None, unit)
-    return "?" if reading.at_most is None else f"< {_number(reading.at_most, unit)}"
+        return _number(reading.value if reading else None, unit, units)
+    return "?" if reading.at_most is None else f"< {_number(reading.at_most, unit, units)}"
 
 
 def _not_observable(assessment: "Assessment") -> list[str]:
@@ -71,18 +82,19 @@ def _not_observable(assessment: "Assessment") -> list[str]:
     from dzdesign.assess.options import SETS
     from dzdesign.assess.quantities import QUANTITIES
 
+    units = assessment.recorded_units
     reasons: dict[tuple[str, str], dict[str, list[str]]] = {}
     for item in _shown_pressures(assessment):
         for name in SETS:
             for key, reading in item.readings(name).items():
                 if reading.value is None and not (key == "symmetry" and _one_sided(assessment)):
                     places = reasons.setdefault((QUANTITIES[key].name, reading.not_observable or ""), {})
-                    where = "unknown" if item.dp_MPa is None else f"{item.dp_MPa:.2f}"
+                    where = "unknown" if item.dp_MPa is None else units.number(item.dp_MPa, ".2f MPa")
                     side = "" if _one_sided(assessment) else f", {item.side} commands"
                     places.setdefault(name.upper() + side, []).append(where)
     together: dict[tuple[str, str], list[str]] = {}
     for (quantity, reason), places in reasons.items():
-        where = " and ".join(f"{name} at {', '.join(dp)} MPa" for name, dp in places.items())
+        where = " and ".join(f"{name} at {', '.join(dp)} {units.label('MPa')}" for name, dp in places.items())
         together.setdefault((where, reason), []).append(quantity)
     return [
         f"not observable: {'; '.join(quantities)}: {where}, because {reason}"
@@ -96,7 +108,7 @@ def _remarks(assessment: "Assessment") -> list[str]:
     from dzdesign.assess.quantities import QUANTITIES
 
     return [
-        f"{QUANTITIES[key].name}, {name.upper()} at {item.place}: {reading.note}"
+        f"{QUANTITIES[key].name}, {name.upper()} at {item.place(assessment.recorded_units)}: {reading.note}"
         for item in _shown_pressures(assessment)
         for name in SETS
         for key, reading in item.readings(name).items()

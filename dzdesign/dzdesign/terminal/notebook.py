@@ -24,7 +24,8 @@ FRAME = '<pre style="white-space:pre;overflow-x:auto">{code}</pre>'
 def _valve_heading(valve: "ValveModel") -> str:
     count, sides = len(valve.made_from), " and ".join(valve.sides)
     side = f"{sides} side{'s' * (len(valve.sides) > 1)}"
-    return f"Valve of {valve.u_max_V:g} V, {side}, from {count} recording{'s' * (count != 1)}"
+    full = valve.recorded_units.text(valve.u_max_V, "g V")
+    return f"Valve of {full}, {side}, from {count} recording{'s' * (count != 1)}"
 
 
 def _compensator_heading(compensator: "Compensator") -> str:

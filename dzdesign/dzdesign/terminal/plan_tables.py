@@ -9,28 +9,31 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
+    from dzdesign.core.recorded_units import RecordedUnits
     from dzdesign.identify.planning.results import SeriesPlan, SeriesRow
 
 
 def print_plan(plan: "SeriesPlan", console: "Console | None" = None) -> None:
     """Print how to record the series, what it and others are predicted to certify, and on which premises."""
     console = console or new_console()
-    chosen = plan.chosen
-    pressures = ", ".join(f"{value:g}" for value in chosen.pressure_drops_MPa)
+    chosen, units = plan.chosen, plan.recorded_units
+    pressures = ", ".join(units.number(value, ".4g MPa") for value in chosen.pressure_drops_MPa)
     closing = "; the last one repeats the first" if len(chosen.pressure_drops_MPa) > 1 else ""
     put_line(
-        console, f"Test series of {chosen.ramps} ramps, {chosen.duration_min:.3g} min, at {pressures} MPa{closing}"
+        console,
+        f"Test series of {chosen.ramps} ramps, {chosen.duration_min:.3g} min, at {pressures} "
+        f"{units.label('MPa')}{closing}",
     )
     put_line(
         console,
-        f"each ramp: 0 to {plan.u_max_V:g} V in {chosen.ramp_time_s:g} s and back in {chosen.ramp_time_s:g} s, at "
-        f"{plan.sample_rate_Hz:g} Hz; {plan.pause_s:g} s between two ramps to set the pressure drop and settle at 0 V; "
-        "record date and time",
+        f"each ramp: {units.number(0, 'g V')} to {units.text(plan.u_max_V, 'g V')} in {chosen.ramp_time_s:g} s and "
+        f"back in {chosen.ramp_time_s:g} s, at {plan.sample_rate_Hz:g} Hz; {plan.pause_s:g} s between two ramps to set "
+        f"the pressure drop and settle at {units.text(0, 'g V')}; record date and time",
     )
-    order = ", ".join(f"{value:g}" for value in plan.order_MPa)
-    put_line(console, f"order (random, seed {plan.seed}): {order} MPa")
+    order = ", ".join(units.number(value, ".4g MPa") for value in plan.order_MPa)
+    put_line(console, f"order (random, seed {plan.seed}): {order} {units.label('MPa')}")
     rows = (chosen, *plan.alternatives)
-    put_rows(console, "Predicted loss (mV)", rows, _columns(rows))
+    put_rows(console, f"Predicted loss ({units.label('mV')})", rows, _columns(rows, units))
     for line in _legend(plan):
         put_line(console, line)
     premises = "; ".join(f"{each.name} {each.value} ({each.origin})" for each in plan.premises)
@@ -39,7 +42,7 @@ def print_plan(plan: "SeriesPlan", console: "Console | None" = None) -> None:
         put_line(console, f"note: {note}")
 
 
-def _columns(rows: "tuple[SeriesRow, ...]") -> "dict[str, Callable[[SeriesRow], str]]":
+def _columns(rows: "tuple[SeriesRow, ...]", units: "RecordedUnits") -> "dict[str, Callable[[SeriesRow], str]]":
     columns: dict[str, Callable[[SeriesRow], str]] = {
         "series": lambda row: row.name,
         "pressures": lambda row: str(len(row.pressure_drops_MPa)),
@@ -47,15 +50,15 @@ def _columns(rows: "tuple[SeriesRow, ...]") -> "dict[str, Callable[[SeriesRow], 
         "ramp (s)": lambda row: f"{row.ramp_time_s:g}",
         "time (min)": lambda row: f"{row.duration_min:.3g}",
         "s.e. of knee": lambda row: " to ".join(
-            f"{value:.2f}" for value in sorted({min(row.knee_se_mV), max(row.knee_se_mV)})
+            units.number(value, ".2f mV") for value in sorted({min(row.knee_se_mV), max(row.knee_se_mV)})
         ),
-        "loss": lambda row: f"{row.loss_mV:.1f}",
-        "9 of 10": lambda row: f"{row.loss_nine_of_ten_mV:.1f}",
-        "scatter": lambda row: f"{row.of_scatter_mV:.1f}",
-        "noise": lambda row: f"{row.of_noise_mV:.1f}",
-        "lag": lambda row: f"{row.of_lag_mV:.1f}",
-        "zero": lambda row: f"{row.of_meter_zero_mV:.1f}",
-        "steps": lambda row: f"{row.of_staircase_mV:.1f}",
+        "loss": lambda row: units.number(row.loss_mV, ".1f mV"),
+        "9 of 10": lambda row: units.number(row.loss_nine_of_ten_mV, ".1f mV"),
+        "scatter": lambda row: units.number(row.of_scatter_mV, ".1f mV"),
+        "noise": lambda row: units.number(row.of_noise_mV, ".1f mV"),
+        "lag": lambda row: units.number(row.of_lag_mV, ".1f mV"),
+        "zero": lambda row: units.number(row.of_meter_zero_mV, ".1f mV"),
+        "steps": lambda row: units.number(row.of_staircase_mV, ".1f mV"),
     }
     if not any(row.of_meter_zero_mV for row in rows):
         del columns["zero"]

@@ -3,8 +3,8 @@
 import json
 from typing import TYPE_CHECKING
 
-from dzdesign.core.units import chance, span_MPa
-from dzdesign.terminal.page import new_console, put_line, put_rows, volts
+from dzdesign.core.units import chance
+from dzdesign.terminal.page import new_console, put_line, put_rows
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from dzdesign.assess.assessment import MeterTaken
     from dzdesign.codegen.project import Firmware
+    from dzdesign.core.recorded_units import RecordedUnits
     from dzdesign.derivation.account.mutation import AccountMutants, StatementMutants
     from dzdesign.design.compensator import Compensator
     from dzdesign.identify.valve.model import Meter, ValveModel
@@ -31,64 +32,83 @@ def print_valve(valve: "ValveModel", console: "Console | None" = None) -> None:
     if valve.record:
         put_line(console, "record: " + "; ".join(f"{name} {text}" for name, text in valve.record.items()))
     for name, side in valve.sides.items():
-        title = "Thresholds (V)" if len(valve.sides) == 1 else f"Thresholds (V), {name} side"
-        _put_thresholds(console, side, title)
-        for line in _side_lines(side):
+        units = valve.recorded_units.of_side(name)
+        title = f"Thresholds ({units.label('V')})" + ("" if len(valve.sides) == 1 else f", {name} side")
+        _put_thresholds(console, side, title, units)
+        for line in _side_lines(side, units):
             put_line(console, line)
     if "positive" not in valve.sides:
         console.print("positive commands: not tested")
-    put_line(console, meter_line(valve.meter))
+    put_line(console, meter_line(valve.meter, valve.recorded_units))
+    put_units(console, valve.recorded_units, "valve.json")
     for warning in valve.warnings:
         source = f"{warning.source}: " if warning.source else ""
         put_line(console, f"warning [{warning.code}] {source}{warning.text}")
 
 
-def meter_line(meter: "Meter | MeterTaken") -> str:
+def put_units(console: "Console", units: "RecordedUnits", file: str) -> None:
+    """Print what is shown in which unit; nothing where that is V, MPa and L/min, as in the file."""
+    if units.in_words():
+        falls = "; above and below, of commands, count from zero command outwards" if units.command.at_zero else ""
+        put_line(console, f"units: {units.in_words()}{falls}; {file} holds V, MPa and L/min")
+
+
+def meter_line(meter: "Meter | MeterTaken", units: "RecordedUnits") -> str:
     """Return what is known of the flow meter of recordings."""
     how = {"declared": "declared", "identified": "from ramps of two rates", "unknown": "none declared"}
-    return f"meter floor: {meter.floor_L_min:.2f} L/min; lag taken as {meter.lag_s:.3g} s ({how[meter.lag_is]})"
+    floor = units.text(meter.floor_L_min, ".2f L/min")
+    return f"meter floor: {floor}; lag taken as {meter.lag_s:.3g} s ({how[meter.lag_is]})"
 
 
-def _put_thresholds(console: "Console", side: "SideModel", title: str) -> None:
+def _put_thresholds(console: "Console", side: "SideModel", title: str, units: "RecordedUnits") -> None:
+    def command(value: float | None) -> str:
+        return "-" if value is None else units.number(value, ".3f V")
+
     betas = dict(zip((test.source for test in side.tests), side.beta.beta, strict=False))  # none without a known dP
     columns: dict[str, Callable[[TestResult], str]] = {
         "ramp test": lambda test: test.source,
-        "dP (MPa)": lambda test: "?" if test.dp_MPa is None else f"{test.dp_MPa:.3f}",
-        "knee opening": lambda test: volts(test.u_knee_rising_V),
-        "knee closing": lambda test: volts(test.u_knee_falling_V),
-        "s.e. of knee": lambda test: f"{test.u_knee_se_V:.4f}",
-        "onset closing": lambda test: volts(test.u_onset_falling_V),
-        "bound": lambda test: volts(test.u_guard_lower_V),
+        f"dP ({units.label('MPa')})": lambda test: "?" if test.dp_MPa is None else units.number(test.dp_MPa, ".3f MPa"),
+        "knee opening": lambda test: command(test.u_knee_rising_V),
+        "knee closing": lambda test: command(test.u_knee_falling_V),
+        "s.e. of knee": lambda test: units.number(test.u_knee_se_V, ".4f dV"),
+        "onset closing": lambda test: command(test.u_onset_falling_V),
+        "bound": lambda test: command(test.u_guard_lower_V),
         "beta": lambda test: f"{betas[test.source]:.4f}" if betas else "-",
-        "Q max (L/min)": lambda test: f"{test.q_max_L_min:.2f}",
+        f"Q max ({units.label('L/min')})": lambda test: units.number(test.q_max_L_min, ".2f L/min"),
     }
     put_rows(console, title, side.tests, columns)
 
 
-def _side_lines(side: "SideModel") -> tuple[str, ...]:
-    at = "" if side.reference.dp_MPa is None else f" at dP0 = {side.reference.dp_MPa:.3f} MPa"
+def _side_lines(side: "SideModel", units: "RecordedUnits") -> tuple[str, ...]:
+    dp0 = side.reference.dp_MPa
+    at = "" if dp0 is None else f" at dP0 = {units.text(dp0, '.3f MPa')}"
     certificate = side.certificate
     made_of = dict.fromkeys(test.dp_from or "not recorded" for test in side.tests)
     return (
         f"pressure drop: {', '.join(made_of)}",
         f"bound: {100 * certificate.confidence:.6g}% lower bound, for all tests together, of the {certificate.guard} "
         "threshold (the knee, or the tail's zero where the edge is soft); flow below "
-        f"{certificate.level_L_min:.2f} L/min (noise level: the meter's floor, what averages resolve, or 0.5 % of the "
-        "largest flow) counts as none",
-        f"from ramp to ramp: {certificate.repeatability.in_words()}",
-        f"identified: u_min0 = {side.reference.u_min_V:.4f} ± {side.reference.u_min_se_V:.4f} V{at}, the knee on "
-        f"{certificate.guard}{_betas(side)}",
-        f"certified: an offset of {side.curve.u_min0_V:.4f} V{at}, the largest under the bounds; more tests raise it",
+        f"{units.text(certificate.level_L_min, '.2f L/min')} (noise level: the meter's floor, what averages resolve, "
+        "or 0.5 % of the largest flow) counts as none",
+        f"from ramp to ramp: {certificate.repeatability.in_words(units)}",
+        f"identified: u_min0 = {units.number(side.reference.u_min_V, '.4f V')} ± "
+        f"{units.text(side.reference.u_min_se_V, '.4f dV')}{at}, the knee on {certificate.guard}{_betas(side)}",
+        f"certified: an offset of {units.text(side.curve.u_min0_V, '.4f V')}{at}, the largest under the bounds; more "
+        "tests raise it",
         f"premise: {side.premise}",
         *_premise_lines(side),
         f"drive range of the valve k x_max/u_max = {side.k_x_max_over_u_max:.4f} ± {side.k_x_max_over_u_max_se:.4f}: "
         "command from the knee to full stroke, as a share of full command; the law's counts from its offset, which "
         "lies lower"
-        + (f"; k = {side.k_V_mm:.4f} ± {side.k_V_mm_se or 0.0:.4f} V/mm" if side.k_V_mm is not None else ""),
+        + (
+            f"; k = {units.number(side.k_V_mm, '.4f V/mm')} ± {units.text(side.k_V_mm_se or 0.0, '.4f V/mm')}"
+            if side.k_V_mm is not None
+            else ""
+        ),
         "trend with dP: can't be said from one ramp test"
         if side.trend_change_V is None or side.trend_change_se_V is None
-        else f"trend with dP: {side.trend} ({1e3 * side.trend_change_V:+.1f} ± {1e3 * side.trend_change_se_V:.1f} mV "
-        f"over the tested range, {chance(side.trend_p or 0.0)})",
+        else f"trend with dP: {side.trend} ({units.number(1e3 * side.trend_change_V, '+.1f mV')} ± "
+        f"{units.text(1e3 * side.trend_change_se_V, '.1f mV')} over the tested range, {chance(side.trend_p or 0.0)})",
     )
 
 
@@ -121,7 +141,7 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
     from dzdesign.design.costs import hidden_failures
     from dzdesign.design.signal_descriptions import signals_in_words
 
-    chosen = law(compensator.law)
+    chosen, units = law(compensator.law), compensator.valve.recorded_units
     lines = [
         f"law {chosen.name} {chosen.equation}: u_O = {chosen.output}",
         *signals_in_words(compensator.signals, float(compensator.u_max_V)),
@@ -137,9 +157,9 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
             f"both as shares of full command; beta(dP): straight between {len(side.beta)} nodes, each a "
             f"whole number of 1/{compensator.beta_denominator}",
             f"{label}certificate: the offset stays below the {100 * certificate.confidence:.6g}% lower bound of the "
-            f"{certificate.guard} threshold {span_MPa(low, high, 3)}, at every pressure code; flow below "
-            f"{certificate.level_L_min:.2f} L/min (meter's floor, its noise, or 0.5 % of the largest flow) counts as "
-            "none",
+            f"{certificate.guard} threshold {units.span(low, high, '.3f MPa')}, at every pressure code; flow below "
+            f"{units.text(certificate.level_L_min, '.2f L/min')} (meter's floor, its noise, or 0.5 % of the largest "
+            "flow) counts as none",
         ]
     if compensator.transition_codes:
         share = compensator.transition_codes / compensator.signals.command.span(1)

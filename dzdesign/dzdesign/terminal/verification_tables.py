@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING
 
+from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.core.verdicts import NOT_CHECKED, verdict_words
 from dzdesign.terminal.page import new_console, put_line, put_rows, volts
 
@@ -48,12 +49,14 @@ def _put_closed_loop(console: "Console", verification: "Verification") -> None:
         "without: closing": lambda loop: _percent(loop.dead_zone_closing),
         "with: opening": lambda loop: _percent(loop.residual_opening),
         "with: closing": lambda loop: _percent(loop.residual_closing),
-        "Q at zero, no beta": lambda loop: loop.in_words(loop.q_zero_without_beta_L_min),
-        "Q at zero, beta": lambda loop: loop.in_words(loop.q_zero_L_min),
+        "Q at zero, no beta": lambda loop: loop.in_words(loop.q_zero_without_beta_L_min, AS_COMPUTED),
+        "Q at zero, beta": lambda loop: loop.in_words(loop.q_zero_L_min, AS_COMPUTED),
         "Q max without": lambda loop: f"{loop.q_max_direct_L_min:.1f}",
         "Q max with (L/min)": lambda loop: f"{loop.q_max_L_min:.1f}",
     }
-    title = f"Closed loop (plant: {plant}); dead zones in per cent of full command, onset of flow"
+    hidden = verification.loops[0].result.unseen_below_L_min is not None
+    onset = "onset of flow" + (" (the first flow seen, continued to none)" if hidden else "")
+    title = f"Closed loop (plant: {plant}); dead zones in per cent of full command, at the {onset}"
     put_rows(console, title, [loop.result for loop in verification.loops], columns)
     _put_readings(console, verification, {"dP (MPa)": columns["dP (MPa)"]})
 
@@ -86,14 +89,14 @@ def print_scenarios(scenarios: "Sequence[ScenarioResult]", console: "Console") -
     columns: dict[str, Callable[[ScenarioResult], str]] = {
         "scenario": lambda each: each.name + ("" if each.must_shut else " (no core can know)"),
         "dP (MPa)": lambda each: f"{each.dp_MPa:.2f}",
-        "Q at zero, at the end (L/min)": lambda each: each.in_words(each.q_zero_L_min),
-        "on the way, at most (L/min)": lambda each: each.in_words(each.q_peak_at_zero_L_min),
+        "Q at zero, at the end (L/min)": lambda each: each.in_words(each.q_zero_L_min, AS_COMPUTED),
+        "on the way, at most (L/min)": lambda each: each.in_words(each.q_peak_at_zero_L_min, AS_COMPUTED),
     }
     if shown:
         put_rows(console, "Scenarios with the compensator, worst of all pressure drops", shown, columns)
     for each in shown:  # words of many lines in a narrow column are no table
         if each.figures:
-            put_line(console, f"{each.name}: {_figures(each.figures)}")
+            put_line(console, f"{each.name}: {_figures(each)}")
 
 
 #: How a figure's name begins -> of which valve it is; and how it ends -> its unit.
@@ -101,13 +104,16 @@ VALVES = {"compensated_": "with the compensator ", "direct_": "without it ", "":
 UNITS = {"_L_min": " L/min", "_MPa": " MPa", "_ms": " ms", "_mL": " mL", "_percent": " %", "": ""}
 
 
-def _figures(figures: "Mapping[str, float]") -> str:
+def _figures(result: "ScenarioResult") -> str:
     """Return figures as words, those of one valve together: rise_ms is a rise in ms."""
+    figures, unseen = result.figures, result.unseen_below_L_min
     groups: dict[str, list[str]] = {start: [] for start in VALVES}
     for key, value in figures.items():
         start, end = next(filter(key.startswith, VALVES)), next(filter(key.endswith, UNITS))
         name = key.removeprefix(start).removesuffix(end).replace("_", " ")
-        groups[start].append(f"{name} {value:.3g}{UNITS[end]}")
+        # A change of flow may well be small; a flow that the recordings can't show is no small one.
+        hidden = unseen is not None and name.endswith("flow") and value < unseen
+        groups[start].append(f"{name} {result.in_words(value, AS_COMPUTED) if hidden else f'{value:.3g}'}{UNITS[end]}")
     return "; ".join(VALVES[start] + ", ".join(each) for start, each in groups.items() if each)
 
 
@@ -153,8 +159,8 @@ def print_demo(valve: "ValveModel", verification: "Verification", folder: str) -
         "dead zone without": lambda loop: _percent(loop.dead_zone_opening),
         "with: opening": lambda loop: _percent(loop.residual_opening),
         "with: closing": lambda loop: _percent(loop.residual_closing),
-        "Q at zero without beta": lambda loop: loop.in_words(loop.q_zero_without_beta_L_min),
-        "with beta (L/min)": lambda loop: loop.in_words(loop.q_zero_L_min),
+        "Q at zero without beta": lambda loop: loop.in_words(loop.q_zero_without_beta_L_min, AS_COMPUTED),
+        "with beta (L/min)": lambda loop: loop.in_words(loop.q_zero_L_min, AS_COMPUTED),
     }
     console, title = new_console(), "Simulated example valve, 0-10 V ramps in closed loop with the generated C"
     put_rows(console, title, [loop.result for loop in verification.loops], columns)

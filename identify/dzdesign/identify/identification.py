@@ -6,6 +6,8 @@ from dataclasses import replace
 from dzdesign.core.artefact_reading import rounded
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile
 from dzdesign.core.errors import InputError
+from dzdesign.core.recorded_units import RecordedUnits
+from dzdesign.core.worded import in_units
 from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.data_quality.catalogue import most_serious_first, warn
 from dzdesign.identify.data_quality.clipped_meter import without_clipping
@@ -14,6 +16,7 @@ from dzdesign.identify.data_quality.recordings import about_recordings
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.sides import tests_of_side
 from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.reading.units_of_columns import units_of
 from dzdesign.identify.results import Identification, SideIdentification
 from dzdesign.identify.side import identify_side
 from dzdesign.identify.valve.model import DECIMALS, SIDES, Meter, ValveModel, Warning_
@@ -57,27 +60,8 @@ def identify_sides(
     options = options or IdentifyOptions()
     if not tests:
         raise InputError("no ramp tests were given; expected at least one file")
-    sides: dict[str, SideIdentification] = {}
-    warnings: list[Warning_] = []
-    for name, sign in SIDES.items():
-        of_side = tests_of_side(tests, sign, options.u_max)
-        if not of_side:
-            continue
-        mixed = about_mixed_pressures(of_side)
-        pressures = (*mixed, *about_single_pressures(of_side, mixed))
-        of_side, side_options, clipped = without_clipping(of_side, options)
-        try:
-            sides[name] = identify_side(of_side, side_options)
-        except InputError as error:
-            # Ramps of several pressures taken for one test may be refused for any reason: the cause is this.
-            reason = f"{error}; it may be that {mixed[0].text}" if mixed else str(error)
-            if not sides:
-                raise InputError(reason) from error
-            warnings.append(warn("side-refused", side=name, reason=reason))
-            continue
-        prefix = f"{name} side: " if len(sides) > 1 else ""
-        found = [item for item in sides[name].warnings if not mixed or item.code not in EXPLAINED_BY_MIXED_PRESSURES]
-        warnings += [replace(item, text=prefix + item.text) for item in (*pressures, *clipped, *found)]
+    units = units_of(tests)
+    sides, warnings = _each_side(tests, options, units)
     lag = next(iter(sides.values())).described.lag
     files = dict.fromkeys(file for side in sides.values() for item in side.described.tests for file in item.files)
     model = ValveModel(
@@ -96,11 +80,46 @@ def identify_sides(
         knee_window=options.knee_window,
         sides={name: side.model for name, side in sides.items()},
         warnings=most_serious_first(
-            (*about_recordings(tests), *([warn("two-sides")] if len(sides) > 1 else []), *warnings)
+            (
+                *(item.in_units(units) for item in about_recordings(tests)),
+                *([warn("two-sides").in_units(units)] if len(sides) > 1 else []),
+                *warnings,
+            )
         ),
         record=dict(record or {}),
     )
-    model = rounded(model, DECIMALS)
+    # Rounded as they are, factors of a small unit would lose their digits.
+    model = replace(rounded(model, DECIMALS), recorded_units=units)
     return Identification(
         model=model, sides={name: replace(side, model=model.sides[name]) for name, side in sides.items()}
     )
+
+
+def _each_side(
+    tests: Sequence[RampTest], options: IdentifyOptions, units: RecordedUnits
+) -> tuple[dict[str, SideIdentification], list[Warning_]]:
+    """Identify each side that was recorded; warnings and a refusal are in the units of the recordings."""
+    sides: dict[str, SideIdentification] = {}
+    warnings: list[Warning_] = []
+    for name, sign in SIDES.items():
+        of_side = tests_of_side(tests, sign, options.u_max)
+        if not of_side:
+            continue
+        in_side = units.of_side(name)
+        mixed = about_mixed_pressures(of_side)
+        pressures = (*mixed, *about_single_pressures(of_side, mixed))
+        of_side, side_options, clipped = without_clipping(of_side, options)
+        try:
+            sides[name] = identify_side(of_side, side_options)
+        except InputError as error:
+            # Ramps of several pressures taken for one test may be refused for any reason: the cause is this.
+            cause = f"; it may be that {in_units(mixed[0].text, in_side)}" if mixed else ""
+            reason = in_units(error, in_side) + cause
+            if not sides:
+                raise InputError(reason) from error
+            warnings.append(warn("side-refused", side=name, reason=reason).in_units(in_side))
+            continue
+        prefix = f"{name} side: " if len(sides) > 1 else ""
+        found = [item for item in sides[name].warnings if not mixed or item.code not in EXPLAINED_BY_MIXED_PRESSURES]
+        warnings += [item.of_side(prefix).in_units(in_side) for item in (*pressures, *clipped, *found)]
+    return sides, warnings

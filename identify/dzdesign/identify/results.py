@@ -2,9 +2,10 @@
 
 from dataclasses import dataclass
 
+from dzdesign.identify.data_quality.catalogue import Finding
 from dzdesign.identify.fitting.constrained_fits import KneeFit
 from dzdesign.identify.knees.described_tests import DescribedTests
-from dzdesign.identify.valve.model import ValveModel, Warning_
+from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.side_model import SideModel
 
 
@@ -15,7 +16,7 @@ class SideIdentification:
     model: SideModel
     described: DescribedTests
     knees: KneeFit
-    warnings: tuple[Warning_, ...]
+    warnings: tuple[Finding, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

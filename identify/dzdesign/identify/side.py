@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.core.worded import all_of, worded
 from dzdesign.identify.constants import L_MIN, MPA
 from dzdesign.identify.data_quality.side_warnings import find_warnings
 from dzdesign.identify.fitting.certifying import Certified, Tested, certify_thresholds, opening_curve
@@ -78,15 +79,19 @@ def _reference(described: tuple[DescribedTest, ...], dp0: float | None) -> int:
     """Return the index of the test at dP0."""
     if described[0].dp is None:
         if dp0 is not None:
-            raise InputError(
-                f"dP0 = {dp0 / MPA:g} MPa was asked for, but '{described[0].test.source}' has no column of dP"
-            )
+            no_column = "dP0 = {dp0:g MPa} was asked for, but '{source}' has no column of dP"
+            raise InputError(worded(no_column, dp0=dp0 / MPA, source=described[0].test.source))
         return 0
     dp = np.array([item.dp for item in described])
     index = int(np.argmin(np.abs(np.log(dp / (dp0 or PAPER_DP0)))))
     if dp0 is not None and abs(dp[index] - dp0) > REFERENCE_TOLERANCE * dp0:
-        tested = ", ".join(f"{value / MPA:.3g}" for value in dp)
-        raise InputError(f"dP0 = {dp0 / MPA:g} MPa is not among the tested pressure drops ({tested} MPa)")
+        tested = all_of([worded("{dp:.3g #MPa}", dp=value / MPA) for value in dp[:-1]], ", ")
+        raise InputError(
+            worded(
+                "dP0 = {dp0:g MPa} is not among the tested pressure drops ({tested}{comma}{last:.3g MPa})",
+                dp0=dp0 / MPA, tested=tested, comma=", " if dp.size > 1 else "", last=dp[-1] / MPA,
+            )
+        )  # fmt: skip
     return index
 
 
@@ -124,7 +129,7 @@ def _side_model(
         certificate=BoundsBasis(
             confidence=options.confidence,
             guard=guard,
-            level_L_min=max(shape.dead_zone.noise_level for item in described for shape in item.branches) / L_MIN,
+            level_L_min=group.noise_level / L_MIN,
             repeatability=_repeatability(group.between(guarding.column)),
         ),
         identified=joint.curves,
@@ -140,9 +145,13 @@ def _refuse_unlike_repeats(between: BetweenRamps, threshold: Threshold) -> None:
     """Refuse repeats that differ so much, and are so few, that the next closing may lie anywhere."""
     if between.origin == "repeats" and between.degrees < FEW_DEGREES and threshold.bound.min() <= 0:
         raise InputError(
-            f"ramps at one pressure drop differ: their thresholds scatter by {1e3 * between.sd:.0f} mV (one standard "
-            f"deviation, degrees of freedom: {between.degrees:.0f}), so that no lower bound above zero follows; record "
-            "two more ramps there, or leave out the one that is unlike the rest"
+            worded(
+                "ramps at one pressure drop differ: their thresholds scatter by {sd:.0f mV} (one standard deviation, "
+                "degrees of freedom: {degrees:.0f}), so that no lower bound above zero follows; record two more ramps "
+                "there, or leave out the one that is unlike the rest",
+                sd=1e3 * between.sd,
+                degrees=between.degrees,
+            )
         )
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from dzdesign.assess.assessment import Assessment
 from dzdesign.core.artefact_types import Artefact, schema_of
 from dzdesign.core.documents import written_by
+from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.identify.valve.model import ValveModel
@@ -69,3 +70,8 @@ class Chain:
     curves: Mapping[str, str] = field(default_factory=dict)
     faults: tuple[str, ...] = ()
     missing: tuple[str, ...] = ()
+
+    @property
+    def recorded_units(self) -> RecordedUnits:
+        """The units of the valve's recordings; without a valve V, MPa and L/min."""
+        return self.valve.recorded_units if self.valve else AS_COMPUTED

@@ -10,6 +10,7 @@ from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 from dzdesign.core.artefact_files import TOOL
+from dzdesign.core.strict_templates import strict_templates
 from dzdesign.derivation.presentation.writer import anchor
 from dzdesign.report.figures.figure import PALETTE, ReportFigure, data_uri
 from dzdesign.report.sections.cells import Table
@@ -145,16 +146,7 @@ def report_of(page: Page, faults: tuple[str, ...]) -> Report:
 
 def render(page: Page) -> str:
     """Return a page as HTML."""
-    import jinja2
-
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("dzdesign.report", "templates"),
-        undefined=jinja2.StrictUndefined,
-        keep_trailing_newline=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        autoescape=True,
-    )
+    environment = strict_templates("dzdesign.report", lstrip_blocks=True, autoescape=True)
     environment.filters.update(data_uri=data_uri, anchor=anchor, words=_words, cell=_cell)
     content = {each.name: getattr(page, each.name) for each in fields(page)}
     html: str = environment.get_template(page.template).render(tool=TOOL, palette=PALETTE, **content)

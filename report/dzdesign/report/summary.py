@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from dzdesign.core.units import span_MPa
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED
 from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.model import ValveModel
@@ -80,12 +80,12 @@ def _limits(chain: Chain) -> list[Check]:
 
 def key_figures(chain: Chain) -> tuple[Figure, ...]:
     """Return the numbers that matter; what they are read from decides which of them there are."""
-    evidence = chain.evidence
+    evidence, units = chain.evidence, chain.recorded_units
     inputs = evidence.inputs if evidence else ()
     loops = evidence.closed_loop.pressures if evidence else ()
     figures: list[Figure] = []
     if loops:
-        figures += [_dead_zone(loops, "opening"), _dead_zone(loops, "closing"), _at_zero(loops)]
+        figures += [_dead_zone(loops, "opening", units), _dead_zone(loops, "closing", units), _at_zero(loops, units)]
     elif chain.valve:
         figures.append(_threshold(chain.valve))
     if chain.compensator:
@@ -95,85 +95,90 @@ def key_figures(chain: Chain) -> tuple[Figure, ...]:
     return tuple(figures)
 
 
-def _dead_zone(loops: Sequence[PressureResult], branch: str) -> Figure:
+def _dead_zone(loops: Sequence[PressureResult], branch: str, units: RecordedUnits) -> Figure:
     before = 100 * max(getattr(each, f"dead_zone_{branch}") for each in loops)
     residual = [100 * getattr(each, f"residual_{branch}") for each in loops]
     after, least = max(residual), min(residual)
     return Figure(
         label=f"Dead zone on {branch}",
         value=f"{before:.1f} % → {after:.1f} %",
-        note=f"of command at the onset of flow, without → with; {worst_of(loops)}"
+        note=f"of command at the onset of flow, without → with; {worst_of(loops, units)}"
         + (f". With: {least:.1f} to {after:.1f} %" if len(loops) > 1 else "")
-        + _read(loops, branch),
+        + _read(loops, branch, units),
     )
 
 
-def _read(loops: Sequence[PressureResult], branch: str) -> str:
+def _read(loops: Sequence[PressureResult], branch: str, units: RecordedUnits) -> str:
     """Say what is read at the reading flow, where it is most, and what an ideal line would read there."""
     worst = max(loops, key=lambda each: float(getattr(each, f"reading_{branch}")))
     return (
-        f". Read at {worst.reading_flow_L_min:.2f} L/min: {100 * getattr(worst, f'reading_{branch}'):.1f} %, of which "
-        f"{100 * worst.ideal_line:.1f} % an ideal line's"
+        f". Read at {units.text(worst.reading_flow_L_min, '.2f L/min')}: {100 * getattr(worst, f'reading_{branch}'):.1f} "
+        f"%, of which {100 * worst.ideal_line:.1f} % an ideal line's"
     )
 
 
-def worst_of(loops: Sequence[PressureResult]) -> str:
+def worst_of(loops: Sequence[PressureResult], units: RecordedUnits) -> str:
     """Say of how many runs a figure is the worst: of two sides the pressure drops of each."""
     if len(loops) == 1:
-        return f"at {loops[0].dp_MPa:.2f} MPa, the one pressure drop tested"
+        return f"at {units.text(loops[0].dp_MPa, '.2f MPa')}, the one pressure drop tested"
     counts = Counter(each.side for each in loops)
     if len(counts) == 1:
         return f"the worst of {len(loops)} pressure drops"
     return "the worst of " + " and ".join(f"{counted(n, 'pressure drop')} {side}" for side, n in counts.items())
 
 
-def _at_zero(loops: Sequence[PressureResult]) -> Figure:
+def _at_zero(loops: Sequence[PressureResult], units: RecordedUnits) -> Figure:
     worst = max(loops, key=lambda each: (each.q_zero_L_min, each.unseen_below_L_min or 0.0))
     bare = max(loops, key=lambda each: each.q_zero_without_beta_L_min)
     flow, unseen = worst.q_zero_L_min, worst.unseen_below_L_min
     hidden = "" if unseen is None else "; less than that the recordings don't show"
-    value = worst.in_words(flow) if unseen is not None else f"{flow:.3g}"
+    value = worst.in_words(flow, units) if unseen is not None else units.number(flow, ".3g L/min")
+    unit = units.label("L/min")
     return Figure(
         label="Flow at zero command",
-        value="none" if flow <= 1e-9 and unseen is None else f"{value} L/min",
-        note=f"in the simulated loop, after closing, {worst_of(loops)}{hidden}; without β it would be "
-        f"{bare.in_words(bare.q_zero_without_beta_L_min)} L/min",
+        value="none" if flow <= 1e-9 and unseen is None else f"{value} {unit}",
+        note=f"in the simulated loop, after closing, {worst_of(loops, units)}{hidden}; without β it would be "
+        f"{bare.in_words(bare.q_zero_without_beta_L_min, units)} {unit}",
         kind="text" if flow <= 1e-9 else "bad",
     )
 
 
 def _threshold(valve: ValveModel) -> Figure:
     name, side = next(iter(valve.sides.items()))
+    units = valve.recorded_units
+    # A share of a signal that is not zero at zero command is no share of its reading.
+    of = "of full command" if units.command.at_zero else f"of {units.text(valve.u_max_V, 'g V')}"
     opens = [100 * (test.u_knee_rising_V or test.u_guard_V) / valve.u_max_V for test in side.tests]
     span = f"; {min(opens):.1f} to {max(opens):.1f} % over {len(opens)} pressure drops"
     return Figure(
         label="Dead zone of the valve",
         value=f"{max(opens):.1f} %",
-        note=f"of {valve.u_max_V:g} V, on opening, {name} commands"
+        note=f"{of}, on opening, {name} commands"
         + (span if len(opens) > 1 else ", at one pressure drop"),
     )
 
 
 def _certificate(compensator: Compensator, inputs: Sequence[InputCheck]) -> Figure:
     worst = min((law.certificate for law in laws_of(compensator).values()), key=lambda one: one.smallest_margin_V)
-    low, high = map(float, worst.dp_MPa)
+    units, (low, high) = compensator.valve.recorded_units, map(float, worst.dp_MPa)
     least = min((1e3 * each.smallest_margin_V for each in inputs), default=0.0)
     if exceeded := sum(each.over_compensated for each in inputs):
         return Figure(
             label="Certificate",
             value="EXCEEDED",
             note=f"at {whole(exceeded)} pressure codes the C drives the valve at zero command above the "
-            f"{worst.guard} threshold's {100 * worst.confidence:g} % bound, by up to {-least:.2f} mV",
+            f"{worst.guard} threshold's {100 * worst.confidence:g} % bound, by up to {units.text(-least, '.2f mV')}",
             kind="bad",
         )
     return Figure(
         label="Certificate",
         value=f"{100 * worst.confidence:g} %",
         note=f"confidence that the drive at zero command stays below the {worst.guard} threshold "
-        f"{span_MPa(low, high)}; smallest margin {1e3 * float(worst.smallest_margin_V):.3f} mV of the exact law under "
+        f"{units.span(low, high, '.2f MPa')}; smallest margin "
+        f"{units.text(1e3 * float(worst.smallest_margin_V), '.3f mV')} of the exact law under "
         "the certified offset, half a count kept for the rounding"
-        + (f"; {least:.3f} mV of the C's compare values under the threshold's bound" if inputs else "")
-        + f". Flow below {worst.level_L_min:.2f} L/min counts as none"
+        + (f"; {units.text(least, '.3f mV')} of the C's compare values under the threshold's bound" if inputs else "")
+        + f". Flow below {units.text(worst.level_L_min, '.2f L/min')} counts as none"
         + _premise(compensator),
     )
 
@@ -185,8 +190,9 @@ def _premise(compensator: Compensator) -> str:
     largest = max((1e3 * each.sd_V for each in assumed if each.origin == "assumed"), default=None)
     if largest is None:
         return ""
+    shown = compensator.valve.recorded_units.text(largest, ".3g mV")
     return (
-        f". It holds only if the valve repeats to {largest:.3g} mV (standard deviation from ramp to ramp), which is "
+        f". It holds only if the valve repeats to {shown} (standard deviation from ramp to ramp), which is "
         "assumed: no repeated ramps show it (no-repeats)"
     )
 

@@ -96,6 +96,7 @@ FAULTS = {
 
 @needs_compiler
 @pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.slow
 def test_a_fault_in_the_scaling_is_seen_in_the_core(fault, example_compensator, tmp_path, monkeypatch):
     """Design, codegen and verify share the scaling, so they agree on a wrong one; the way in volts does not."""
     true_line = scaling.law_in_counts

@@ -18,6 +18,7 @@ from dzdesign.design.options import DesignOptions
 from dzdesign.design.side_law import Sides
 from dzdesign.design.signal_text import command_signal, parse_signal
 from dzdesign.design.target_inputs import Converter
+from dzdesign.design.zero_band import CommandError
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.exhaustive.drive_check import drive_samples as sequence
 from dzdesign.verify.exhaustive.exact_drive import STEP_UNIT, DriveModel
@@ -35,6 +36,7 @@ class Drive(ctypes.Structure):
         *((name, ctypes.c_uint16) for name in ("compare_a", "compare_b", "status", "law")),
         ("side", ctypes.c_int16),
         ("ticks", ctypes.c_uint16),
+        ("at_rest", ctypes.c_uint16),
         ("ramped", ctypes.c_int32),
     ]
 
@@ -84,13 +86,17 @@ def options_named(name: str) -> DesignOptions:
             dither_peak=Fraction(3, 100),
             output_max=Fraction(3, 4),
         ),
-        "quick ramps, no window": full_options(window=Fraction(0), ramp_up_s=(0.001, 0.02), ramp_down_s=(0.0, 0.003)),
+        "quick ramps, small error": full_options(
+            command_error=CommandError(offset_codes=0, noise_codes=1), ramp_up_s=(0.001, 0.02), ramp_down_s=(0.0, 0.003)
+        ),
+        "two solenoids, no transition": DesignOptions(signals=full.signals, transition=Fraction(0)),
     }[name]
 
 
 SETS = (
     "everything", "two solenoids alone", "turned, same pressures", "one solenoid, ramps",
-    "one solenoid, turned, live zero, dither", "quick ramps, no window",
+    "one solenoid, turned, live zero, dither", "quick ramps, small error",
+    "two solenoids, no transition",
 )  # fmt: skip
 
 
@@ -125,12 +131,18 @@ def test_the_firmware_does_what_the_model_does(name):
 
 ONE_SIDE = "one solenoid, turned, live zero, dither"
 FAULTS = [
-    ("command > WINDOW_CODES", "command >= WINDOW_CODES", "everything"),
+    ("(command > LEAVE_ZERO)", "(command >= LEAVE_ZERO)", "everything"),
+    ("(away > LEAVE_ZERO)", "(away >= LEAVE_ZERO)", "two solenoids alone"),
+    ("(away > LEAVE_ZERO)", "(away > ZERO_BAND)", "two solenoids alone"),
+    ("(away <= ZERO_BAND)", "(away <= LEAVE_ZERO)", "two solenoids alone"),
+    ("(drive->side < 0) ? -command : command", "command", "two solenoids alone"),
+    ("(drive->at_rest != 0u) ? (uint16_t)COMMAND_ZERO : ", "", "two solenoids alone"),
+    ("(command <= ZERO_BAND)", "(command <= LEAVE_ZERO)", "one solenoid, ramps"),
     ("drive->ticks < DITHER_TICKS", "drive->ticks <= DITHER_TICKS", "everything"),
     ("(drive->side < 0) ? (uint16_t)compare : 0u", "(uint16_t)compare", "everything"),
     ("RAMP_UP_NEGATIVE, RAMP_DOWN_NEGATIVE)", "RAMP_UP_POSITIVE, RAMP_DOWN_NEGATIVE)", "everything"),
     ("        drive->ramped = 0;\n    } else", "    } else", "everything"),
-    ("        drive->side = 0;\n        drive->ramped = 0;", "        drive->ramped = 0;", "everything"),
+    ("        drive->side = 0;\n        drive->at", "        drive->at", "everything"),
     ("if (compare > DZ_COMPARE_LIMIT)", "if (compare > 65535u)", "everything"),
     ("if (compare == 0u)", "if (compare == 1u)", ONE_SIDE),
     ("compare -= DITHER_COUNTS;", ";", ONE_SIDE),
@@ -157,10 +169,10 @@ PRESSURES = (2400, 1500)  # sound on both sensors
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_noise_inside_the_window_never_changes_the_side(side):
-    """A zero command with noise of one per cent, after each of the sides has been driven."""
+    """A zero command with noise up to the band's outer end, after each of the sides has been driven."""
     compensator = compensator_named("two solenoids alone")
-    window, zero = compensator.drive_functions.window_codes, compensator.signals.command.zero_code
-    assert window >= 0.0097 * compensator.signals.command.span(1)
+    window, zero = compensator.drive_functions.leave_zero_codes, compensator.signals.command.zero_code
+    assert window == 15 + 15 + 4 + 4 + 1  # offset, half the gain error, noise; another noise and a code
     firmware, rng = Firmware(compensator), np.random.default_rng(2)
     firmware.sample(zero + side * 500, *PRESSURES)
     for noise in (*rng.integers(-window, window + 1, 5000), window, -window):
@@ -173,7 +185,7 @@ def test_noise_inside_the_window_never_changes_the_side(side):
 
 def test_from_rest_noise_drives_neither():
     compensator = compensator_named("two solenoids alone")
-    firmware, window = Firmware(compensator), compensator.drive_functions.window_codes
+    firmware, window = Firmware(compensator), compensator.drive_functions.leave_zero_codes
     for noise in range(-window, window + 1):
         firmware.sample(compensator.signals.command.zero_code + noise, *PRESSURES)
         firmware.tick()
@@ -287,13 +299,18 @@ def test_beta_for_the_telemetry_is_that_of_the_side():
             assert getattr(core, name)(ctypes.c_uint16(a), ctypes.c_uint16(b)) == int(beta * 2**15)
 
 
-def test_the_plain_drive_is_the_law_alone():
+def test_the_plain_drive_is_the_law_and_rests_at_zero_until_the_bands_outer_end():
     compensator = golden_compensator("f28335", GOLDENS)
-    firmware = Firmware(compensator)
-    for command in range(0, 4096, 13):
+    inner, outer = compensator.zero_band_codes, compensator.drive_functions.leave_zero_codes
+    assert (inner, outer) == (19, 24)
+    firmware, offset = Firmware(compensator), compensator.compare(0, 500)
+    for command in (*range(0, 4096), *range(4095, -1, -1)):  # up, and down again
+        rising = firmware.state.at_rest
         firmware.sample(command, 1500, 1000)
         firmware.tick()
-        assert firmware.outputs == (compensator.compare(command, 500), 0, 0)
+        rests = command <= (outer if rising else inner)
+        assert firmware.outputs == (offset if rests else compensator.compare(command, 500), 0, 0)
+        assert firmware.state.at_rest == rests
 
 
 def test_what_the_firmwares_integers_cannot_hold_is_refused(wording):
@@ -304,5 +321,5 @@ def test_what_the_firmwares_integers_cannot_hold_is_refused(wording):
     functions = replace(plain.drive_functions, ramp_up=(1, 0))
     nodes = (32768,) * (signals.largest_difference(1) // plain.beta_step_codes + 2)
     with wording.refusal(InputError):
-        sides = Sides(positive=replace(plain.positive, beta=nodes))
+        sides = Sides(positive=replace(plain.positive, beta=nodes, transition_beta=nodes))
         replace(plain, signals=signals, drive_functions=functions, sides=sides)

@@ -91,7 +91,7 @@ def test_a_seeded_violation_is_found(rule, tmp_path):
 
 
 def test_a_deviation_without_its_justification_is_found(tmp_path):
-    header = written(tmp_path, "plain", "wide") / "dz_comp.h"
+    header = written(tmp_path, "default", "wide") / "dz_comp.h"
     text = header.read_text()
     assert "deviation from rule 2.5 (advisory) in DZ_COMPARE_MAX, " in text
     header.write_text(text.replace("in DZ_COMPARE_MAX, ", "in "))

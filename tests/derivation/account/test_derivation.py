@@ -128,6 +128,7 @@ def changed(number, **changes):
     return [replace(e, **changes) if e.number == number else e for e in STATEMENTS]
 
 
+@pytest.mark.slow
 def test_what_rests_on_a_failed_statement_does_not_hold():
     members = BY_NUMBER["(8)"].members
     outcome = {v.number: v for v in verify_statements(changed("(8)", members=(2 * members[0], members[1])))}
@@ -224,6 +225,7 @@ def test_a_condition_ruled_out_by_published_numbers_is_no_condition():
     assert words(1) == "follows if beta = 1 (necessary)"
 
 
+@pytest.mark.slow
 def test_a_piecewise_claim_needs_a_case_for_every_branch():
     selector = BY_NUMBER["L2"]
     verdict = {v.number: v for v in verify_statements(changed("L2", cases=selector.cases[:1]))}["L2"]
@@ -305,6 +307,7 @@ def test_a_copy_is_not_a_premise(wording):
     wording("the account: a copy", str(caught.value))
 
 
+@pytest.mark.slow
 def test_unknown_and_repeated_statements_are_rejected(wording):
     with pytest.raises(RequirementError) as caught:
         verify_statements(with_grounds("(13)", "(99)"))

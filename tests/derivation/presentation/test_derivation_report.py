@@ -141,6 +141,7 @@ def read_back(text):
     return sympy.sympify(text, locals=names_in_text())
 
 
+@pytest.mark.slow
 def test_what_is_printed_is_what_was_proved(expressions):
     read = [one for one in expressions if not one.has(sympy.Piecewise)]
     assert len(read) > 150
@@ -457,6 +458,7 @@ def test_derive_prints_the_account_and_holds(derive, verdicts, rendered):
     assert f"{len(verdicts)} of {len(verdicts)} statements have the verdict expected of them" in printed.out
 
 
+@pytest.mark.slow
 def test_a_wrong_equation_makes_derive_fail_and_is_named(derive, wrong_verdicts):
     status, printed = derive(found=wrong_verdicts)
     assert status == 1

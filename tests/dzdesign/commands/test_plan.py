@@ -54,6 +54,7 @@ def test_json_has_the_same_and_its_numbers_fit_together(capsys):
     assert origins["noise"] == "given" and origins["repeatability"] == "assumed"
 
 
+@pytest.mark.slow
 def test_a_loss_out_of_reach_is_exit_status_1_and_says_what_is_largest(capsys):
     status, plan = planned(capsys, *QUICK, "--loss", "20 mV")
     assert status == 1 and plan["reached"] is False
@@ -75,6 +76,7 @@ def test_what_should_be_known_is_noted(capsys, options, words):
     assert any(words in note for note in plan["notes"]), plan["notes"]
 
 
+@pytest.mark.slow
 def test_a_pilot_replaces_the_assumptions_and_options_replace_the_pilots(capsys, pilot, tmp_path):
     path = tmp_path / "pilot.json"
     path.write_bytes(to_json_bytes(pilot))

@@ -98,6 +98,7 @@ class TestScatter:
             # Scatter is no noise of the meter, and no soft edge.
             assert test.noise_L_min == pytest.approx(0.05, rel=0.2)
 
+    @pytest.mark.slow
     def test_a_valve_that_repeats_costs_little(self):
         """On average the bound lies at most three standard errors of one ramp lower than by noise alone."""
         lower, six = [], (1.0, 1.8, 2.6, 3.4, 4.2, 5.0)

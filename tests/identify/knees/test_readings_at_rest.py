@@ -89,6 +89,7 @@ class TestZero:
         tests = [recordings(0.0, zero=zero, pressures=(dp,))[0] for zero, dp in zip(zeros, PRESSURES, strict=True)]
         assert not warned(identify(tests, OPTIONS), "leak")
 
+    @pytest.mark.slow
     def test_slow_noise_is_no_leak(self):
         feigned = 0
         for seed in range(8):

@@ -154,6 +154,7 @@ def test_valves_recorded_as_planned_come_out_as_predicted(minutes, name, truth):
     assert achieved(planned, truth, 30, 11) == pytest.approx(planned.prediction.loss, rel=AGREEMENT)
 
 
+@pytest.mark.slow
 def test_a_few_valves_come_out_as_predicted_and_worse_ones_do_not():
     planned = plan_series(VALVE, BENCH, request(10)).chosen
     assert achieved(planned, PlannedBench(), 12, 5) == pytest.approx(planned.prediction.loss, rel=AGREEMENT)

@@ -1,13 +1,18 @@
 """Ports, units and staircases as loggers write them: benchmarks/identify/corpus_units.py, and that its faults show."""
 
+from dataclasses import replace
+
 import corpus_units
 import numpy as np
 import pytest
 
-from dzdesign.identify.knees import characteristic
+from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
+from dzdesign.identify import identification
+from dzdesign.identify.constants import L_MIN
+from dzdesign.identify.knees import meter_floor
 from dzdesign.identify.ramps import splitting
 from dzdesign.identify.ramps.staircases import find_staircase
-from dzdesign.identify.reading import column_labels, ramp_files
+from dzdesign.identify.reading import column_labels, ramp_files, units_of_columns
 from dzdesign.identify.reading.metering_edge import MeteringEdge, metering_edge
 
 CASES = {case.name: case for case in corpus_units.cases()}
@@ -38,8 +43,45 @@ def test_a_staircase_taken_for_a_ramp_is_seen(name, tmp_path, monkeypatch):
 
 
 def test_a_floor_that_levels_hide_is_seen(tmp_path, monkeypatch):
-    monkeypatch.setattr(characteristic, "floor_of_levels", lambda *_: 0.0)
+    monkeypatch.setattr(meter_floor, "floor_of_levels", lambda *_: 0.0)
     assert "a floor of 0 L/min" in corpus_units.fault_of(CASES["stairs_7"], tmp_path)
+
+
+def forget_the_units(monkeypatch):
+    monkeypatch.setattr(identification, "units_of", lambda tests: AS_COMPUTED)
+
+
+def take_a_gallon_for_the_imperial_one(monkeypatch):
+    monkeypatch.setattr(units_of_columns, "L_MIN", L_MIN * 3.785411784 / 4.54609)
+
+
+def forget_what_is_zero(monkeypatch):
+    found = units_of_columns._command_unit
+    monkeypatch.setattr(units_of_columns, "_command_unit", lambda *args: replace(found(*args), at_zero=0.0))
+
+
+def forget_that_a_reading_falls_on_the_negative_side(monkeypatch):
+    monkeypatch.setattr(RecordedUnits, "of_side", lambda self, side: self)
+
+
+def read_a_signal_as_its_column(monkeypatch):
+    monkeypatch.setattr(units_of_columns, "read_signal_range", lambda *args, **more: None)
+
+
+@pytest.mark.parametrize(
+    ("fault", "name"),
+    [
+        (forget_the_units, "ports_2"),
+        (forget_the_units, "unit_5"),
+        (take_a_gallon_for_the_imperial_one, "unit_1"),
+        (forget_what_is_zero, "unit_3"),
+        (forget_that_a_reading_falls_on_the_negative_side, "bipolar_0"),
+        (read_a_signal_as_its_column, "unit_8"),
+    ],
+)
+def test_numbers_in_a_wrong_unit_are_seen(fault, name, tmp_path, monkeypatch):
+    fault(monkeypatch)
+    assert "misread" in corpus_units.fault_of(CASES[name], tmp_path)
 
 
 def test_a_ramp_in_coarse_steps_is_no_staircase():

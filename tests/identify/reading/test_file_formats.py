@@ -11,6 +11,7 @@ from nptdms import ChannelObject, RootObject, TdmsWriter
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.reading.ramp_files import read_ramp_file
+from dzdesign.identify.reading.time_stamps import start_of
 from tests.identify.reading.test_ramp_files import DP, HEADER, ROWS, TIME, Q, U, assert_is_the_ramp
 
 COLUMNS = dict(zip(HEADER.split(","), (TIME, U, DP, Q), strict=True))
@@ -117,6 +118,86 @@ def test_dates_are_seconds_since_the_first(read):
     dates = {**COLUMNS, "time_s": start + np.round(TIME * 1e6).astype("timedelta64[us]")}
     test = read(frame("write_parquet", {"time" if k == "time_s" else k: v for k, v in dates.items()}))
     np.testing.assert_allclose(test.time, TIME, atol=1e-6)
+
+
+BEGUN = np.datetime64("2026-03-01T08:00:00.500000", "us")
+DATES = BEGUN + np.round(TIME * 1e6).astype("timedelta64[us]")
+
+
+def timed(column, label="time"):
+    return {label if key == "time_s" else key: column if key == "time_s" else data for key, data in COLUMNS.items()}
+
+
+def zoned(zone, write="write_parquet"):
+    """Return a table whose column of time has a zone; its dates are those of the wall clock there."""
+    clock = pl.Series(DATES).dt.replace_time_zone("UTC").dt.convert_time_zone(zone)
+    return frame(write, timed(clock))
+
+
+def waveform(start, offset=0.0, dates=False):
+    """Return a TDMS file as LabVIEW writes a waveform, or channels with one of dates."""
+    out = io.BytesIO()
+    properties = {"wf_increment": 0.04, "wf_start_offset": offset, "wf_samples": ROWS}
+    properties |= {} if start is None else {"wf_start_time": start}
+    with TdmsWriter(out) as writer:
+        objects = [
+            ChannelObject("bench", name, data, properties={"unit_string": unit} | ({} if dates else properties))
+            for name, (data, unit) in PLAIN.items() if name != "time"
+        ]  # fmt: skip
+        objects += [ChannelObject("bench", "time", DATES)] if dates else []
+        writer.write_segment([RootObject(), *objects])
+    return out.getvalue()
+
+
+def of_hdf5(attributes, data=TIME):
+    out = io.BytesIO()
+    with h5py.File(out, "w") as file:
+        for name, (column, unit) in PLAIN.items():
+            file[name] = data if name == "time" else column
+            for key, text in (attributes if name == "time" else {"units": unit}).items():
+                file[name].attrs[key] = text
+    return out.getvalue()
+
+
+UTC, LOCAL = "2026-03-01 08:00:00.5Z", "2026-03-01 08:00:00.5"
+
+
+@pytest.mark.parametrize(
+    ("content", "stamp"),
+    [
+        (waveform(BEGUN), UTC),
+        (waveform(np.datetime64("1904-01-01T00:00:00", "us")), ""),  # as LabVIEW writes a start that it does not know
+        (waveform(None), ""),
+        (waveform(None, dates=True), UTC),
+        (frame("write_parquet", timed(DATES)), LOCAL),
+        (frame("write_ipc", timed(DATES)), LOCAL),
+        (zoned("UTC"), UTC),
+        (zoned("Asia/Tokyo"), UTC),
+        (zoned("America/New_York", "write_ipc"), UTC),
+        (frame("write_parquet", timed(DATES - BEGUN)), ""),
+        (of_hdf5({"units": "seconds since 2026-03-01 08:00:00.5"}), UTC),
+        (of_hdf5({"units": "s since 2026-03-01T10:00:00.5+02:00"}), UTC),
+        (of_hdf5({"units": "seconds since 2026-03-01"}), "2026-03-01 00:00:00Z"),
+        (of_hdf5({"units": "s", "start": "2026-03-01T09:00:00.5+01:00"}), UTC),
+        (of_hdf5({"units": "s", "start": "2026-03-01T08:00:00.5"}), LOCAL),
+        (of_hdf5({"units": "s", "start": "of the bench"}), ""),
+        (of_hdf5({"units": "s"}), ""),
+        (mat(), ""),  # the date in its head is that of writing
+    ],
+)
+def test_the_date_of_recording_is_read_where_a_file_states_it(read, content, stamp):
+    test = read(content)
+    assert_is_the_ramp(test)
+    assert test.stamp == (start_of(stamp) if stamp else None)
+    assert test.started == (test.stamp and test.stamp.seconds)
+
+
+def test_a_clock_counts_from_its_date_on(read):
+    """What is in the file is the date of its zero, which need not be its first sample."""
+    late = read(waveform(BEGUN, offset=2.5))
+    assert late.stamp == start_of(UTC) and late.time[0] == pytest.approx(2.5)
+    epoch = read(of_hdf5({"units": "seconds since 1970-01-01 00:00:00"}, TIME + 1772352000.5))
+    assert epoch.stamp.seconds + epoch.time[0] == pytest.approx(start_of(UTC).seconds)
 
 
 @pytest.mark.parametrize("name", [name for name in GOOD if name not in ("mat 4",)])

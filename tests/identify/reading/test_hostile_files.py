@@ -76,6 +76,7 @@ def test_a_hostile_recording(tmp_path, monkeypatch, name):
     assert len(line) < 2000
 
 
+@pytest.mark.slow
 def test_the_reader_of_the_next_file_is_another_after_a_crash(tmp_path):
     (tmp_path / "ramp.mat").write_bytes(GOOD["mat 5"])
     assert "crashed, SIG" in outcome(read_ramp_file, write("MAT of cells in cells", tmp_path))

@@ -97,6 +97,7 @@ def test_report_makes_the_same_bytes_again(copied, capsys):
     assert (copied / "r.html").read_bytes() == before
 
 
+@pytest.mark.slow
 def test_the_json_of_the_command_names_the_report(made, capsys):
     lot = made.parent / "lot"
     assert main(["batch", str(lot), "-o", str(made), *OPTIONS, "--json"]) == 1

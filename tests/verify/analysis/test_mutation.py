@@ -160,7 +160,11 @@ def test_the_command_line_adds_the_row_and_the_list(firmware_folder, tmp_path, c
 def test_a_negative_side_and_the_drive_of_both_have_their_killers(full):
     for file, old, new, killer in (
         ("dz_comp_negative.c", "#define REVERSE ", "#define REVERSE 1", "inputs"),
-        ("dz_drive.c", "command > WINDOW_CODES", "command >= WINDOW_CODES", "drive"),
+        ("dz_drive.c", "command > LEAVE_ZERO", "command >= LEAVE_ZERO", "drive"),
+        ("dz_drive.c", "away > LEAVE_ZERO", "away >= LEAVE_ZERO", "drive"),
+        ("dz_drive.c", "away <= ZERO_BAND", "away < ZERO_BAND", "drive"),
+        ("dz_drive.c", "drive->at_rest = 1u;\n        drive->ramped", "drive->ramped", "drive"),
+        ("dz_comp_negative.c", "#define ZERO_BAND 34u", "#define ZERO_BAND 33u", "inputs"),
         ("dz_drive.c", "drive->ticks >= DITHER_PERIOD", "drive->ticks > DITHER_PERIOD", "drive"),
     ):
         outcome = full.judge(edited(full, file, old, new))
@@ -181,7 +185,7 @@ def test_a_fault_high_up_a_slow_ramp_is_seen(example_valve, tmp_path):
 
 
 def test_a_wrong_drive_is_named_by_field_and_sample(full):
-    text = full.sources["dz_drive.c"].replace("command > WINDOW_CODES", "command >= WINDOW_CODES")
+    text = full.sources["dz_drive.c"].replace("command > LEAVE_ZERO", "command >= LEAVE_ZERO")
     found = full._drive.edited("dz_drive.c", text.encode()).check(full._drive_samples)
     assert found.faults > 0 and found.first_wrong.split()[0] in FIELDS and "with codes" in found.first_wrong
     assert isinstance(full._drive, CompiledDrive)

@@ -14,7 +14,7 @@ from dzdesign.design.designing import design
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.closed_loop.dead_zone import compare_at_pressure
 from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence
-from dzdesign.verify.closed_loop.plant import plants_from_tests
+from dzdesign.verify.closed_loop.stand_in import stand_in_of
 from tests.support.golden_firmware import FULL, full_options
 from tests.support.synthetic import needs_compiler
 
@@ -35,9 +35,10 @@ def compared(folder, side: int = 1, change=lambda compensator: compensator, **op
     firmware = generate(compensator, "f28335")
     write_folder(folder, firmware.files, firmware.manifest)
     name = "positive" if side > 0 else "negative"
-    plant = plants_from_tests(valve().sides[name], 10.0)[3.0]
-    loop = ClosedLoop(plant, folder, compensator, side)
-    return loop, compare_at_pressure(loop, 3.0, 1.0, QUICK, name)
+    identified = valve().sides[name]
+    loop = ClosedLoop(stand_in_of(identified, 10.0), folder, compensator, side)
+    recorded = identified.tests[1].recorded
+    return loop, compare_at_pressure(loop, 3.0, 1.0, QUICK, name, reading_flow_L_min=0.6, recorded=recorded)
 
 
 @pytest.mark.slow
@@ -58,7 +59,8 @@ def test_ramps_far_slower_than_the_command_change_none_of_the_results(tmp_path, 
 def test_without_waiting_the_ramps_lag_would_be_read_as_dead_zone(tmp_path):
     loop, slow = compared(tmp_path / "slow", ramp_up_s=(60.0, 60.0), ramp_down_s=(60.0, 60.0))
     loop.slowest_ramp_s = 0.0
-    hasty = compare_at_pressure(loop, 3.0, 1.0, QUICK)
+    recorded = valve().sides["positive"].tests[1].recorded
+    hasty = compare_at_pressure(loop, 3.0, 1.0, QUICK, reading_flow_L_min=0.6, recorded=recorded)
     assert hasty.result.q_max_L_min < 0.7 * slow.result.q_max_L_min
     assert hasty.result.residual_opening > slow.result.residual_opening + 0.005
     assert hasty.result.q_zero_L_min > 1, "zero command, and the ramp is still on its way there"

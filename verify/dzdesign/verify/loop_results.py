@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import Sha256, quantity
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.verify.closed_loop.plant import Plant
 
 
@@ -61,22 +62,23 @@ class PressureResult:
     q_max_direct_L_min: Annotated[Flow, about("Largest flow without compensator.")]
     q_max_L_min: Annotated[Flow, about("Largest flow with it.")]
 
-    def in_words(self, flow_L_min: float) -> str:
-        """Return a flow with two decimals; what the recordings can't show is no 0.00."""
-        return flow_in_words(flow_L_min, self.unseen_below_L_min)
+    def in_words(self, flow_L_min: float, units: RecordedUnits) -> str:
+        """Return a flow to two decimals of a L/min; what the recordings can't show is no 0.00."""
+        return flow_in_words(flow_L_min, self.unseen_below_L_min, units)
 
 
-def flow_in_words(flow_L_min: float, unseen_below_L_min: float | None) -> str:
-    """Return a flow in L/min with two decimals, or below which flow it is where no more is known.
+def flow_in_words(flow_L_min: float, unseen_below_L_min: float | None, units: RecordedUnits) -> str:
+    """Return a flow to two decimals of a L/min, or below which flow it is where no more is known; without its unit.
 
     Examples
     --------
-    >>> flow_in_words(0.0, 0.63), flow_in_words(0.71, 0.63), flow_in_words(0.0, None)
+    >>> units = RecordedUnits()
+    >>> flow_in_words(0.0, 0.63, units), flow_in_words(0.71, 0.63, units), flow_in_words(0.0, None, units)
     ('below 0.63', '0.71', '0.00')
     """
     if unseen_below_L_min is not None and flow_L_min < unseen_below_L_min:
-        return f"below {unseen_below_L_min:.2f}"
-    return f"{flow_L_min:.2f}"
+        return f"below {units.number(unseen_below_L_min, '.2f L/min')}"
+    return units.number(flow_L_min, ".2f L/min")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,9 +129,9 @@ class ScenarioResult:
         """Whether the pressure drop jumps in it."""
         return "pressure_drop_then_MPa" in self.figures
 
-    def in_words(self, flow_L_min: float) -> str:
-        """Return a flow with two decimals; what the recordings can't show is no 0.00."""
-        return flow_in_words(flow_L_min, self.unseen_below_L_min)
+    def in_words(self, flow_L_min: float, units: RecordedUnits) -> str:
+        """Return a flow to two decimals of a L/min; what the recordings can't show is no 0.00."""
+        return flow_in_words(flow_L_min, self.unseen_below_L_min, units)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -27,7 +27,7 @@ def certificate_lines(compensator: Compensator, sign: int) -> list[str]:
         f"{1e3 * float(certificate.smallest_margin_V):.3g} mV at the least beyond {_counted(compensator)}"
     )
     if certificate.guard == "closing":
-        text += f", so that nothing flows; flow below {certificate.level_L_min:.2f} L/min counts as none."
+        text += f", so that less than {certificate.level_L_min:.2f} L/min flows: what the recordings can't show."
     else:
         text += ". After closing, flow may remain: the closing threshold lies lower, and is not the one guarded."
     lot = lot_in_words(compensator)

@@ -6,7 +6,7 @@ from dzdesign.design.drive_functions import RAMP_UNIT
 
 HERE = "codegen/dzdesign/codegen/core/drive_constants.py"
 OPTIONS, SIGNALS = "design/dzdesign/design/options.py", "design/dzdesign/design/signals.py"
-ZERO_BAND = "design/dzdesign/design/zero_band.py"
+PLAY, ZERO_BAND = "design/dzdesign/design/play.py", "design/dzdesign/design/zero_band.py"
 INT32_MAX = 2**31 - 1
 #: Bits of the status word, and what each says.
 STATUS_BITS = {
@@ -68,6 +68,8 @@ def drive_constants(compensator: Compensator) -> list[Define]:
         found.append(_zero_band(compensator))
     if bipolar or compensator.zero_band_codes:
         found.append(_leave_zero(compensator))
+    if functions.has_play:
+        found += _play(compensator)
     if functions.has_ramp:
         found += _ramps(compensator)
     if functions.dither_counts:
@@ -105,6 +107,40 @@ def _leave_zero(compensator: Compensator) -> Define:
         data=("drive_functions.leave_zero_codes", "signals.command", "u_max_V"),
         generator=ZERO_BAND,
     )
+
+
+def _play(compensator: Compensator) -> list[Define]:
+    signals, functions = compensator.signals, compensator.drive_functions
+    codes, band = functions.play_codes, compensator.transition_codes
+    found = [
+        Define(symbol="TRANSITION_CODES", value=band, literal="int32",
+               equation="codes of command behind the zero band over which the play comes in, the law's transition",
+               engineering=_share(compensator, band), data=("transition_codes", "signals.command", "u_max_V"),
+               rounding="a power of two", generator=OPTIONS),
+        Define(symbol="PLAY_NOISE", value=functions.play_noise_codes, literal="int32",
+               equation="codes that the command strays to either side without turning",
+               engineering=_share(compensator, functions.play_noise_codes),
+               data=("drive_functions.play_noise_codes", "signals.command", "u_max_V"), generator=PLAY),
+        Define(symbol="PLAY_CODES", value=codes, literal="int32",
+               equation="codes of travel from the one branch to the other", engineering=_share(compensator, codes),
+               data=("drive_functions.play_codes", "signals.command", "u_max_V"), rounding="a power of two",
+               generator=PLAY),
+        Define(symbol="PLAY_SHIFT", value=(codes * band).bit_length() - 1,
+               equation="from travel times codes of the transition to the share of the play",
+               engineering=f"1/({codes} * {band})", data=("drive_functions.play_codes", "transition_codes"),
+               rounding="the share is rounded down to a count", generator=HERE),
+    ]  # fmt: skip
+    for place, sign in enumerate(signals.signs):
+        counts = functions.play_counts[place]
+        share = counts / signals.compare_max
+        found.append(
+            Define(symbol=f"PLAY_{'POSITIVE' if sign > 0 else 'NEGATIVE'}", value=counts, literal="int32",
+                   equation="counts by which a falling command is driven lower than a rising one",
+                   engineering=f"{share:.3%} of full drive, {share * float(compensator.u_max_V):.4g} V",
+                   rounding="rounded to nearest", generator=PLAY,
+                   data=("drive_functions.play_counts", "signals.compare_max", "u_max_V"))
+        )  # fmt: skip
+    return found
 
 
 def _ramps(compensator: Compensator) -> list[Define]:

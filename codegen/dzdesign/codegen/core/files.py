@@ -151,6 +151,7 @@ def _drive_words(compensator: Compensator) -> Values:
         "zero_band": compensator.zero_band_codes > 0,
         "away": "command" if compensator.negative is None else "away",
         "ramp": functions.has_ramp,
+        "play": functions.has_play,
         "dither": functions.dither_counts > 0,
         "rises": signals.command.direction(1) > 0,
         "sample_Hz": signals.sample_Hz,

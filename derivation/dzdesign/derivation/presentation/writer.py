@@ -5,6 +5,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping
 from typing import Any, ClassVar
 
+from dzdesign.core.strict_templates import strict_templates
 from dzdesign.derivation.presentation.content import DerivationReport
 from dzdesign.derivation.presentation.prose import Code, Formula, Part, Reference, Words
 
@@ -65,16 +66,7 @@ class Writer(ABC):
 
 def write(kind: type[Writer], report: DerivationReport) -> str:
     """Return a whole document in a notation."""
-    import jinja2
-
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("dzdesign.derivation.presentation", "templates"),
-        undefined=jinja2.StrictUndefined,
-        keep_trailing_newline=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        **kind.SYNTAX,
-    )
+    environment = strict_templates("dzdesign.derivation.presentation", lstrip_blocks=True, **kind.SYNTAX)
     environment.filters.update(kind({entry.number for entry in report.statements}).filters())
     return str(environment.get_template(kind.TEMPLATE).render(content=report))
 

@@ -1,30 +1,59 @@
-"""What the recordings leave open from ramp to ramp: no repeats, an order that hides a drift, a drift that is there."""
+"""What the recordings leave open from ramp to ramp: no repeats, unlike ones, an order that hides a drift, a drift."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
-from dzdesign.identify.data_quality.catalogue import warn
+from dzdesign.identify.data_quality.catalogue import Finding, warn
 from dzdesign.identify.knees.between_ramps import ASSUMED_REPEATABILITY, FEW_DEGREES
+from dzdesign.identify.knees.described_tests import DescribedTest
+from dzdesign.identify.knees.scatter_checks import ScatterChecks
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.repeatability import Repeatability
 
 #: Standard errors from which a drift is said, and share of u_max from which it matters.
 DRIFT_SIGNIFICANCE, SMALLEST_DRIFT = 3.0, 1e-3
+#: Shares of u_max from which an outlying ramp's distance, and the scatter of ramps like their neighbours, matter.
+SMALLEST_DISTANCE, SMALLEST_SCATTER = 1e-3, 5e-4
 
 
-def about_ramps(found: Repeatability, count: int, options: IdentifyOptions) -> Iterator[Warning_]:
-    """Yield the warnings about what differs from ramp to ramp, of the guarded branch of `count` tests."""
+def about_ramps(
+    found: Repeatability, checks: ScatterChecks, tests: Sequence[DescribedTest], options: IdentifyOptions
+) -> Iterator[Finding]:
+    """Yield the warnings about what differs from ramp to ramp, on the guarded branch."""
+    count = len(tests)
     sd_mV, degrees = 1e3 * found.sd_V, found.degrees_of_freedom
     if found.origin == "assumed":
         yield warn("no-repeats", percent=100 * ASSUMED_REPEATABILITY, sd_mV=sd_mV)
     elif degrees is not None and options.repeatability is not None:
         percent = 100 * found.sd_V / options.u_max
         yield warn("repeatability", sd_mV=sd_mV, percent=percent, declared=100 * options.repeatability)
-    elif degrees is not None and degrees < FEW_DEGREES:
+    elif degrees is not None and degrees < FEW_DEGREES and not checks.largest:
         yield warn("few-repeats", sd_mV=sd_mV, differences=degrees)
+    yield from _about_premises(found, checks, tests, options.u_max)
     if found.no_drift == "order of pressure" or (found.no_drift == "order unknown" and count > 1):
         yield warn("order", None, "unknown" if found.no_drift == "order unknown" else "of-pressure")
     if found.drift_V is not None and found.drift_se_V is not None:
         least = max(DRIFT_SIGNIFICANCE * found.drift_se_V, SMALLEST_DRIFT * options.u_max)
         if abs(found.drift_V) > least:
             yield warn("drift", drift_mV=1e3 * found.drift_V, se_mV=1e3 * found.drift_se_V)
+
+
+def _about_premises(
+    found: Repeatability, checks: ScatterChecks, tests: Sequence[DescribedTest], u_max: float
+) -> Iterator[Finding]:
+    """Yield what the repeats say against a scatter that is normal, alike at all pressure drops, and independent."""
+    largest, outlying = checks.largest, checks.outlying
+    if largest and found.origin == "repeats":
+        yield warn(
+            "unequal-scatter",
+            tests[largest.test].test.source,
+            sd_mV=1e3 * largest.sd,
+            others_mV=1e3 * largest.of_others,
+            differences=largest.degrees,
+        )
+    if outlying and abs(outlying.distance) > SMALLEST_DISTANCE * u_max:
+        names = [tests[test].ramps[number] for test, number in outlying.ramps]
+        case, distance_mV = "one" if len(names) == 1 else "pair", 1e3 * outlying.distance
+        said = {"distance_mV": distance_mV, "apart_mV": abs(distance_mV), "ratio": outlying.ratio}
+        yield warn("outlying-ramp", names[0], case, other=names[-1], **said)
+    if checks.serial is not None and found.sd_V > SMALLEST_SCATTER * u_max:
+        yield warn("serial-scatter", correlation=checks.serial)

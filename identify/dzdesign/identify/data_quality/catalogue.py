@@ -1,13 +1,15 @@
 """The catalogue of warnings, `warnings.toml`: what is printed of each code, what it means and what to do about it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
-from typing import Literal
+from typing import Literal, Protocol, TypeVar
 
 import msgspec
 
+from dzdesign.core.recorded_units import RecordedUnits
+from dzdesign.core.worded import Worded, in_units, worded
 from dzdesign.identify.valve.model import Warning_
 
 
@@ -37,7 +39,24 @@ def catalogue() -> dict[str, Entry]:
     return msgspec.toml.decode(files(__package__).joinpath("warnings.toml").read_bytes(), type=dict[str, Entry])
 
 
-def warn(code: str, source: str | None = None, case: str = "", **numbers: object) -> Warning_:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """A warning whose text waits for the units of the recordings."""
+
+    code: str
+    text: Worded
+    source: str | None
+
+    def of_side(self, prefix: str) -> "Finding":
+        """Return it with a word on which side it is about."""
+        return replace(self, text=worded("{prefix}{text}", prefix=prefix, text=self.text))
+
+    def in_units(self, units: RecordedUnits) -> Warning_:
+        """Return the warning as valve.json holds it."""
+        return Warning_(code=self.code, text=in_units(self.text, units), source=self.source)
+
+
+def warn(code: str, source: str | None = None, case: str = "", **numbers: object) -> Finding:
     """Return a warning of the catalogue.
 
     A code that has several texts names one by `case`; `numbers` are what stands in it. No source: it is about all
@@ -45,10 +64,18 @@ def warn(code: str, source: str | None = None, case: str = "", **numbers: object
     """
     text = catalogue()[code].text
     text = text if isinstance(text, str) else text[case]
-    return Warning_(code=code, text=" ".join(text.split()).format(**numbers), source=source)
+    return Finding(code=code, text=worded(" ".join(text.split()), **numbers), source=source)
 
 
-def most_serious_first(warnings: Sequence[Warning_]) -> tuple[Warning_, ...]:
+class _Coded(Protocol):
+    @property
+    def code(self) -> str: ...
+
+
+AnyWarning = TypeVar("AnyWarning", bound=_Coded)
+
+
+def most_serious_first(warnings: Sequence[AnyWarning]) -> tuple[AnyWarning, ...]:
     """Return warnings in the order of the catalogue; those of one code stay as they stand."""
     rank = {code: place for place, code in enumerate(catalogue())}
     return tuple(sorted(warnings, key=lambda warning: rank.get(warning.code, len(rank))))

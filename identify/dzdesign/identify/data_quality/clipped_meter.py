@@ -10,11 +10,10 @@ from dataclasses import replace
 import numpy as np
 
 from dzdesign.identify.constants import L_MIN
-from dzdesign.identify.data_quality.catalogue import warn
+from dzdesign.identify.data_quality.catalogue import Finding, warn
 from dzdesign.identify.knees.readings_at_rest import FEWEST_AT_REST, readings_at_rest
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_test import RampTest
-from dzdesign.identify.valve.model import Warning_
 
 #: Readings within this share of the largest are one reading.
 ONE_READING = 1e-6
@@ -26,7 +25,7 @@ STAYS, BELOW = 0.4, 0.005
 
 def without_clipping(
     tests: Sequence[RampTest], options: IdentifyOptions
-) -> tuple[list[RampTest], IdentifyOptions, tuple[Warning_, ...]]:
+) -> tuple[list[RampTest], IdentifyOptions, tuple[Finding, ...]]:
     """Return the recordings with a zero wherever the meter was cut off, the floor that this means, and what to say.
 
     A floor that is declared stays, unless the meter was cut off above it.

@@ -5,10 +5,9 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from dzdesign.identify.constants import L_MIN
-from dzdesign.identify.data_quality.catalogue import warn
+from dzdesign.identify.data_quality.catalogue import Finding, warn
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.side_model import SideModel
 
 #: Shift of the knees by the meter's lag, over u_max, above which a tenth of it matters.
@@ -23,7 +22,7 @@ SMALL_SHIFT = 5e-5
 READINGS_A_LEVEL = 5
 
 
-def about_the_meter(side: SideModel, group: DescribedTests, options: IdentifyOptions) -> Iterator[Warning_]:
+def about_the_meter(side: SideModel, group: DescribedTests, options: IdentifyOptions) -> Iterator[Finding]:
     """Yield the warnings about the flow meter, of one side."""
     yield from _about_zeros(group.zero_L_min)
     yield from _about_a_leak(side)
@@ -33,13 +32,13 @@ def about_the_meter(side: SideModel, group: DescribedTests, options: IdentifyOpt
     yield from _about_lag_and_order(side, group)
 
 
-def _about_zeros(zero_L_min: Mapping[str, float]) -> Iterator[Warning_]:
+def _about_zeros(zero_L_min: Mapping[str, float]) -> Iterator[Finding]:
     leak = "; if it is a leak, the valve passes it whatever the compensator does"
     for source, zero in zero_L_min.items():
         yield warn("meter-zero", source, zero_L_min=zero, leak=leak if zero > 0 else "")
 
 
-def _about_a_leak(side: SideModel) -> Iterator[Warning_]:
+def _about_a_leak(side: SideModel) -> Iterator[Finding]:
     worst = max(side.tests, key=lambda test: test.leak_L_min)
     if worst.leak_L_min > 0 and worst.dp_MPa:
         shift_mV = 1e3 * max(test.leak_L_min / test.slope_L_min_V for test in side.tests)
@@ -47,7 +46,7 @@ def _about_a_leak(side: SideModel) -> Iterator[Warning_]:
         yield warn("leak", worst.source, "at-rest", per_MPa=leak / worst.dp_MPa, leak_L_min=leak, shift_mV=shift_mV)
 
 
-def _about_the_noise_level(side: SideModel, options: IdentifyOptions) -> Iterator[Warning_]:
+def _about_the_noise_level(side: SideModel, options: IdentifyOptions) -> Iterator[Finding]:
     if options.noise_level is None:
         return
     declared, worst = options.noise_level / L_MIN, max(side.tests, key=lambda test: test.noise_level_L_min)
@@ -55,7 +54,7 @@ def _about_the_noise_level(side: SideModel, options: IdentifyOptions) -> Iterato
         yield warn("noise-level", worst.source, declared_L_min=declared, level_L_min=worst.noise_level_L_min)
 
 
-def _about_steps(side: SideModel, tests: tuple[DescribedTest, ...], options: IdentifyOptions) -> Iterator[Warning_]:
+def _about_steps(side: SideModel, tests: tuple[DescribedTest, ...], options: IdentifyOptions) -> Iterator[Finding]:
     """Say of a flow in coarse steps that a logger which cuts off, instead of rounding, puts all thresholds too high."""
     levels = [np.unique(item.test.q) for item in tests]
     steps = [
@@ -76,7 +75,7 @@ def _about_steps(side: SideModel, tests: tuple[DescribedTest, ...], options: Ide
         )
 
 
-def _about_the_lag(group: DescribedTests, options: IdentifyOptions) -> Iterator[Warning_]:
+def _about_the_lag(group: DescribedTests, options: IdentifyOptions) -> Iterator[Finding]:
     rates = [shape.prepared.branch.rate for item in group.tests for shape in item.branches]
     rates = [rate for rate in rates if rate > 0]
     fastest, lag = max(rates, default=0.0), group.lag
@@ -93,7 +92,7 @@ def _about_the_lag(group: DescribedTests, options: IdentifyOptions) -> Iterator[
         yield warn("lag-contradicted", None, "rates", lag_s=lag.seconds, found_s=found, se_s=se)
 
 
-def _about_lag_and_order(side: SideModel, group: DescribedTests) -> Iterator[Warning_]:
+def _about_lag_and_order(side: SideModel, group: DescribedTests) -> Iterator[Finding]:
     """Say of a declared lag that it puts the closing knee above the opening one by more than its tolerance may."""
     lag = group.lag
     if lag.origin != "declared" or lag.seconds == 0 or None in group.tests[0].shapes:

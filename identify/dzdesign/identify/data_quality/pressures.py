@@ -8,14 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from dzdesign.core.worded import Worded, all_of, worded
 from dzdesign.identify.constants import FULL_SWEEP, L_MIN, MPA
-from dzdesign.identify.data_quality.catalogue import warn
+from dzdesign.identify.data_quality.catalogue import Finding, warn
 from dzdesign.identify.ramps.command import despiked
 from dzdesign.identify.ramps.pooling import SAME_PRESSURE
 from dzdesign.identify.ramps.splitting import SHUT
 from dzdesign.identify.reading.named_pressure import claimed_pressures, contradicts
 from dzdesign.identify.reading.ramp_test import RampTest
-from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.ramp_result import TestResult
 
 #: Pressure drops that differ by less than this share are one number: averaging may round the last digit.
@@ -44,12 +44,12 @@ GROSSLY_APART = 0.3
 FALLS, GROWS_TOO_LITTLE, GROWS_TOO_MUCH = 0.9, 2.5, 1.75
 
 
-def about_mixed_pressures(tests: Sequence[RampTest]) -> tuple[Warning_, ...]:
+def about_mixed_pressures(tests: Sequence[RampTest]) -> tuple[Finding, ...]:
     """Return what tells that recordings of several pressure drops pass for one: a stuck sensor, or else their flows."""
     return tuple(about_a_stuck_sensor(tests)) or tuple(about_mixtures(tests))
 
 
-def about_single_pressures(tests: Sequence[RampTest], mixed: Sequence[Warning_]) -> tuple[Warning_, ...]:
+def about_single_pressures(tests: Sequence[RampTest], mixed: Sequence[Finding]) -> tuple[Finding, ...]:
     """Return what is weak in the pressure drop of single recordings; of a stuck one not that it was typed in.
 
     Beside a stuck sensor, which `mixed` may tell of, there is nothing more to say.
@@ -61,7 +61,7 @@ def about_single_pressures(tests: Sequence[RampTest], mixed: Sequence[Warning_])
     return (*stuck, *(item for item in about_typed_pressures(tests) if item.source not in known))
 
 
-def about_a_stuck_sensor(tests: Sequence[RampTest]) -> Iterator[Warning_]:
+def about_a_stuck_sensor(tests: Sequence[RampTest]) -> Iterator[Finding]:
     """Yield a warning if the recordings of one side show one pressure drop, noise aside, and must have several."""
     recorded = [test.dp for test in tests if test.dp is not None and not test.dp_is_declared]
     if len(tests) < 2 or len(recorded) < len(tests):
@@ -76,15 +76,19 @@ def about_a_stuck_sensor(tests: Sequence[RampTest]) -> Iterator[Warning_]:
     explained = max(means) / min(means)
     top, flows = _flows_at_one_command(tests)
     claims = claimed_pressures([test.source for test in tests])
-    signs = []
+    signs: list[Worded] = []
     if min(flows) > 0 and max(flows) > (1 + SAME_FLOW) * explained**0.5 * min(flows):
-        signs.append(f"the flows at {top:.3g} V differ by {max(flows) / min(flows) - 1:.0%}")
+        signs.append(worded("the flows at {u_V:.3g V} differ by {by:.0%}", u_V=top, by=max(flows) / min(flows) - 1))
     if claims and max(claims) > (1 + SAME_FLOW) * explained * min(claims):
-        signs.append("the files' names say different ones")
+        signs.append(worded("the files' names say different ones"))
     if signs:
         one = high - low <= ONE_NUMBER * high
-        about = f"{high / MPA:.6g} MPa in every row of" if one else f"{low / MPA:.4g} to {high / MPA:.4g} MPa in"
-        yield warn("pressure-stuck", None, "all", about=about, count=len(tests), signs=" and ".join(signs))
+        about = worded(
+            "{high:.6g MPa} in every row of" if one else "{low:.4g #MPa} to {high:.4g MPa} in",
+            low=low / MPA,
+            high=high / MPA,
+        )
+        yield warn("pressure-stuck", None, "all", about=about, count=len(tests), signs=all_of(signs))
 
 
 def _stands_still(every: np.ndarray, low: float, middle: float, high: float) -> bool:
@@ -106,7 +110,7 @@ def _flows_at_one_command(tests: Sequence[RampTest]) -> tuple[float, list[float]
     return top, [flow if flow > SMALL_FLOW * max(flows) else 0.0 for flow in flows]
 
 
-def about_stuck_recordings(tests: Sequence[RampTest]) -> Iterator[Warning_]:
+def about_stuck_recordings(tests: Sequence[RampTest]) -> Iterator[Finding]:
     """Yield a warning for each recording whose pressure drop is one number to the last digit, and should not be.
 
     That is so where other recordings' readings scatter, or where the file's name says another pressure.
@@ -123,7 +127,7 @@ def about_stuck_recordings(tests: Sequence[RampTest]) -> Iterator[Warning_]:
             yield warn("pressure-stuck", test.source, "one", dp_MPa=dp / MPA, signs=" and ".join(signs))
 
 
-def about_typed_pressures(tests: Sequence[RampTest]) -> Iterator[Warning_]:
+def about_typed_pressures(tests: Sequence[RampTest]) -> Iterator[Finding]:
     """Yield a warning for each recording, if the pressure drop of every one is one number: nothing was measured."""
     recorded = [test for test in tests if test.dp is not None and not test.dp_is_declared]
     typed = [(dp, test.source) for test in recorded if (dp := _one_number(test)) is not None]
@@ -147,7 +151,7 @@ def _scatters(test: RampTest) -> bool:
     return float(np.mean(np.diff(test.dp) != 0)) > CHANGES and np.unique(inner).size >= SCATTERED_LEVELS
 
 
-def about_mixtures(tests: Sequence[RampTest]) -> Iterator[Warning_]:
+def about_mixtures(tests: Sequence[RampTest]) -> Iterator[Finding]:
     """Yield a warning for each pressure drop at which recordings, taken as one test, differ grossly in their flow."""
     highest = max(float(despiked(test.u).max()) for test in tests)
     whole = [test for test in tests if despiked(test.u).max() >= FULL_SWEEP * highest]
@@ -185,7 +189,7 @@ def _at_one_pressure(tests: Sequence[RampTest]) -> Iterator[tuple[float, list[Ra
         steady = steady[len(group) :]
 
 
-def about_flow_gains(tests: Sequence[TestResult]) -> Iterator[Warning_]:
+def about_flow_gains(tests: Sequence[TestResult]) -> Iterator[Finding]:
     """Yield a warning for each test whose flow gain contradicts its pressure drop, by those of the other tests.
 
     The gain beyond the knee, and not the flow at one command, is compared: a supply at its limit and a knee that moves

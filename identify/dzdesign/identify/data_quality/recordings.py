@@ -2,22 +2,23 @@
 
 from collections.abc import Iterator, Sequence
 
-from dzdesign.identify.data_quality.catalogue import most_serious_first, warn
+from dzdesign.identify.data_quality.catalogue import Finding, most_serious_first, warn
+from dzdesign.identify.data_quality.recording_order import about_order
 from dzdesign.identify.reading.clock import ASSUMED_MS
 from dzdesign.identify.reading.metering_edge import EDGES
 from dzdesign.identify.reading.ramp_test import RampTest
-from dzdesign.identify.valve.model import Warning_
 
 #: Files that a text lists.
 NAMED_FILES = 3
 
 
-def about_recordings(tests: Sequence[RampTest]) -> tuple[Warning_, ...]:
+def about_recordings(tests: Sequence[RampTest]) -> tuple[Finding, ...]:
     """Return what is to be said of the recordings themselves, the most serious first."""
-    return most_serious_first([*_about_simulation(tests), *(item for test in tests for item in _about_one(test))])
+    of_each = (item for test in tests for item in _about_one(test))
+    return most_serious_first([*_about_simulation(tests), *about_order(tests), *of_each])
 
 
-def _about_one(test: RampTest) -> Iterator[Warning_]:
+def _about_one(test: RampTest) -> Iterator[Finding]:
     if test.clock_doubt:
         yield warn("time-unit", test.source, "taken" if test.clock_doubt == ASSUMED_MS else "not-taken")
     if test.side_without_dp:
@@ -29,11 +30,13 @@ def _about_one(test: RampTest) -> Iterator[Warning_]:
         yield warn("side-refused", test.source, side=test.side_without_dp, reason=reason)
     if test.no_values:
         yield warn("missing-samples", test.source, numbers=test.no_values)
+    if test.cut:
+        yield warn("cut-ramp", test.source, ramps="; ".join(test.cut))
     if test.run > 1:
         yield warn("thinned", test.source, rows=test.rows_read, run=test.run, samples=test.time.size)
 
 
-def _about_simulation(tests: Sequence[RampTest]) -> Iterator[Warning_]:
+def _about_simulation(tests: Sequence[RampTest]) -> Iterator[Finding]:
     made_up = [test.source for test in tests if test.simulated]
     if not made_up:
         return

@@ -7,7 +7,7 @@ import numpy as np
 
 from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.data_quality.between_ramps import about_ramps
-from dzdesign.identify.data_quality.catalogue import warn
+from dzdesign.identify.data_quality.catalogue import Finding, warn
 from dzdesign.identify.data_quality.flow_meter import about_the_meter
 from dzdesign.identify.data_quality.knee_errors import about_errors
 from dzdesign.identify.data_quality.pressures import about_flow_gains
@@ -15,9 +15,9 @@ from dzdesign.identify.data_quality.sweeps import about_sweeps
 from dzdesign.identify.knees.characteristic import TAIL
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
 from dzdesign.identify.knees.meter_lag import softness_of_filter
+from dzdesign.identify.knees.scatter_checks import ScatterChecks
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.guard_curve import PremiseCheck
-from dzdesign.identify.valve.model import Warning_
 from dzdesign.identify.valve.side_model import SideModel
 
 #: A softer edge than this share of u_max between knee and the tail's zero is said.
@@ -36,7 +36,7 @@ def find_warnings(
     departure: np.ndarray,
     refused: PremiseCheck | None,
     options: IdentifyOptions,
-) -> tuple[Warning_, ...]:
+) -> tuple[Finding, ...]:
     """Return the warnings about one side.
 
     `departure` (T,) says by how much each test's threshold departs from one direction with the pressure drop, V; zero
@@ -44,7 +44,7 @@ def find_warnings(
     """
     return (
         *about_the_meter(side, group, options),
-        *about_ramps(side.certificate.repeatability, len(side.tests), options),
+        *about_ramps(side.certificate.repeatability, _checks(side, group), group.tests, options),
         *(
             warn(
                 "not-monotone",
@@ -70,18 +70,22 @@ def find_warnings(
     )
 
 
-def _about_premise(side: SideModel, refused: PremiseCheck) -> Warning_:
+def _about_premise(side: SideModel, refused: PremiseCheck) -> Finding:
     return warn("premise-refused", premise=refused.premise, p=refused.lack_of_fit_p, taken=side.curve.premise)
 
 
-def _about_hysteresis(side: SideModel, u_max: float) -> Iterator[Warning_]:
+def _checks(side: SideModel, group: DescribedTests) -> ScatterChecks:
+    return group.between(1 if side.certificate.guard == "closing" else 0).checks
+
+
+def _about_hysteresis(side: SideModel, u_max: float) -> Iterator[Finding]:
     for test in side.tests:
         gap = (test.u_knee_rising_V or 0.0) - (test.u_knee_falling_V or math.inf)
         if gap > WIDE_HYSTERESIS * u_max:
             yield warn("hysteresis", test.source, gap_mV=1e3 * gap, percent=100 * gap / u_max)
 
 
-def _about_pressure(side: SideModel, tests: tuple[DescribedTest, ...]) -> Iterator[Warning_]:
+def _about_pressure(side: SideModel, tests: tuple[DescribedTest, ...]) -> Iterator[Finding]:
     if side.reference.dp_MPa is None:
         yield warn("no-pressure", side.tests[0].source)
     elif len(side.tests) == 1:
@@ -105,7 +109,7 @@ def _sag(item: DescribedTest) -> float:
     return 1 - float(np.median(test.dp[test.u >= 0.97 * test.u.max()])) / item.dp
 
 
-def _about_the_edge(side: SideModel, group: DescribedTests, u_max: float) -> Iterator[Warning_]:
+def _about_the_edge(side: SideModel, group: DescribedTests, u_max: float) -> Iterator[Finding]:
     floor = group.floor / L_MIN
     if floor > 0:
         yield warn("onset-hidden", floor_L_min=floor)

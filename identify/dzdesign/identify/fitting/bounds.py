@@ -73,10 +73,10 @@ def lower_bounds(
     """
     from scipy.special import stdtrit
 
-    tail = 1 - (1 - confidence) / threshold.size
+    tail = between.tail(confidence, threshold.size)
     degrees = between.degrees_of_freedom(noise_se, DEGREES_OF_FREEDOM)
     # What the repeats scatter by may be less than their noise by chance: the noise alone counts too.
-    bounds = [threshold - stdtrit(DEGREES_OF_FREEDOM, tail) * noise_se]
+    bounds = [threshold - stdtrit(DEGREES_OF_FREEDOM, 1 - (1 - confidence) / threshold.size) * noise_se]
     drift, uneven = (between.drift.change, between.drift.uneven) if between.drift else (0.0, 0.0)
     for state in (-0.5, 0.5):
         error = np.sqrt(between.variance_of_next(noise_se, state))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.core.worded import worded
 from dzdesign.identify.fitting.casadi_problems import SOLVER_LOCK, branch_numbers, offset_solver, solver_with_numbers
 from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.valve.staircase import Direction
@@ -199,8 +200,11 @@ def fit_offset(
     """
     if ceiling.min() <= 0:
         raise InputError(
-            f"the threshold's lower bound is {ceiling.min():.3f} V, not above zero: no dead zone can be compensated "
-            "without opening the valve at zero command; check the ramp tests and the meter's zero"
+            worded(
+                "the threshold's lower bound is {bound:.3f V}, not above zero: no dead zone can be compensated without "
+                "opening the valve at zero command; check the ramp tests and the meter's zero",
+                bound=ceiling.min(),
+            )
         )
     lowest = float(ceiling.min())
     largest = max(float(guard_se.max()), np.finfo(float).tiny)  # an exact table has no errors

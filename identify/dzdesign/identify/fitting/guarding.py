@@ -16,6 +16,7 @@ from dzdesign.identify.fitting.bounds import (
 )
 from dzdesign.identify.fitting.constrained_fits import KneeFit, fit_knees
 from dzdesign.identify.fitting.premises import confidence_at_tests
+from dzdesign.identify.fitting.soft_edges import find_softness
 from dzdesign.identify.knees.between_ramps import BetweenRamps
 from dzdesign.identify.knees.described_tests import DescribedTests
 from dzdesign.identify.options import IdentifyOptions
@@ -109,7 +110,8 @@ def order_knees(
 
 
 def bound_threshold(group: DescribedTests, knees: OrderedKnees, options: IdentifyOptions) -> Threshold:
-    """Bound the knee, or the tail's zero where that lies below the knee by more than its error: a soft edge."""
+    """Bound the knee, or below it what a soft edge still passes: the tail's zero, if that lies below by more than its
+    error, and where the flow falls to the noise level."""
     shapes = [item.branch(knees.column) for item in group.tests]
     knee, knee_se = knees.knee, knees.knee_se
     zero = np.array([shape.tail.zero for shape in shapes])
@@ -138,10 +140,18 @@ def bound_threshold(group: DescribedTests, knees: OrderedKnees, options: Identif
     zero_bound = lower_bounds(zero, zero_se, between, options.confidence, zero_budget)
     # What averages show below the knee at one pressure drop is one edge's, which all tests have.
     depth = max(shape.dead_zone.depth for shape in shapes)
+    value = np.minimum(np.where(soft, zero, knee), knee - depth)
+    bound = np.minimum(np.where(soft, np.minimum(knee_bound, zero_bound), knee_bound), knee_bound - depth)
+    # Where the edge may pass more than the level below the knee, as credible as the bound is sure. Both errors are of
+    # different readings, so they add by their squares.
+    softness = find_softness(
+        shapes, knee, level=group.noise_level, lag=group.lag, confidence=options.confidence, u_max=options.u_max
+    )
+    margin = np.hypot(knee - knee_bound, softness.at_most - softness.likely)
     return Threshold(
-        np.minimum(np.where(soft, zero, knee), knee - depth),
+        np.minimum(value, knee - softness.likely),
         np.where(soft, zero_se, knee_se),
-        np.minimum(np.where(soft, np.minimum(knee_bound, zero_bound), knee_bound), knee_bound - depth),
+        np.minimum(bound, knee - softness.likely - margin),
         lag_budget,
     )
 

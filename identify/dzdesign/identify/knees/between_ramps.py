@@ -9,6 +9,9 @@ with `when` from -1/2 at the first ramp of the series to 1/2 at the last. Least 
 pressure drop can be told apart, and the residuals, pooled over all pressure drops, the scatter. The ramps are then
 brought to the state in the middle of the series, so that those pooled to one test lie on one line; `fitting.bounds`
 allows for the next closing at any state that the series has seen.
+
+The premise is a normal scatter, as large at all pressure drops and independent from ramp to ramp. Where the repeats
+refuse one variance for all, that of the pressure drop with the largest scatter counts everywhere.
 """
 
 import math
@@ -19,6 +22,7 @@ import numpy as np
 
 from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.knees.gated_line import fit_line
+from dzdesign.identify.knees.scatter_checks import ScatterChecks, check_scatter
 from dzdesign.identify.valve.repeatability import NoDrift, Origin
 
 #: Standard deviation of the thresholds from ramp to ramp, over u_max, taken where nothing tells it: data sheets of
@@ -38,6 +42,8 @@ NOTHING = 1e-9
 CONTRADICTED = 1e-3
 #: Smallest share of the noise in a variance that is counted in its degrees of freedom.
 SMALLEST_SHARE = 1e-3
+#: Scatter over u_max below which pressure drops don't differ in it.
+FINEST = 1e-5
 #: Share of itself by which a drift that flattens out, as of oil that warms up, departs from a straight one at most.
 UNEVEN = 0.4
 
@@ -70,6 +76,8 @@ class BetweenRamps:
     no_drift: NoDrift
     #: By how much each ramp of each test stands off the middle of the series and of its test's ramps, V.
     shifts: tuple[np.ndarray, ...]
+    #: What the repeats say against the premises. Where one scatter is the largest, `sd`, `degrees` and `noise` are its.
+    checks: ScatterChecks
 
     def covariance_of_mean(self, noise_se: np.ndarray) -> np.ndarray:
         """Return the covariance of the thresholds in the middle of the series, V² (T, T).
@@ -134,6 +142,18 @@ class BetweenRamps:
         degrees: np.ndarray = of_noise / np.maximum(share, SMALLEST_SHARE) ** 2
         return degrees
 
+    def tail(self, confidence: float, tests: int) -> float:
+        """Return the probability with which the bound of each test holds, where those of all have that confidence.
+
+        Bonferroni; but the largest of several scatters counts for all tests, and is large enough for all of them where
+        it is for one that scatters alone: with more that do, the largest of theirs is less often found too small.
+        """
+        return confidence if self._largest_counts else 1 - (1 - confidence) / tests
+
+    @property
+    def _largest_counts(self) -> bool:
+        return self.origin == "repeats" and self.checks.largest is not None
+
     def _noise(self, noise_se: np.ndarray) -> np.ndarray:
         """Return what the noise adds, V²: all of it, or what exceeds the average ramp's where `sd` has that in it."""
         own = np.diag(self.covariance)[: noise_se.size]
@@ -181,7 +201,12 @@ def compare_ramps(known: RampKnees, counts: Sequence[int], *, declared: float | 
     squares, noise = float(residual @ residual), float(known.noise.mean()) if residual.size else 0.0
     origin = _origin(squares, noise, degrees, declared, u_max)
     measured = origin == "repeats"
+    least = known.noise + (FINEST * u_max) ** 2
+    checks = check_scatter(residual, design, known.test, known.number, least, known.when)
     sd = math.sqrt(squares / degrees) if measured else ASSUMED_REPEATABILITY * u_max if declared is None else declared
+    of_sd = (float(degrees), noise) if measured else (math.inf, 0.0)
+    if measured and checks.largest:
+        sd, of_sd = checks.largest.sd, (checks.largest.degrees, checks.largest.noise)
     rows = told if no_drift else np.ones(count + 1, dtype=bool)
     # A test without a ramp that tells its knee counts as one ramp.
     covariance = np.eye(rows.size)
@@ -190,11 +215,8 @@ def compare_ramps(known: RampKnees, counts: Sequence[int], *, declared: float | 
     if not no_drift:
         # Where a bend of the drift would show, it is in the scatter already.
         shows = measured and _error_of_last(np.column_stack([design, (2 * clock) ** 2])) <= TOLD_APART
-        drift = Drift(
-            change=float(found[-1]),
-            change_se=math.sqrt((sd**2 + noise * (not measured)) * covariance[-1, -1]),
-            uneven=0.0 if shows else UNEVEN * abs(float(found[-1])),
-        )
+        error = math.sqrt((sd**2 + noise * (not measured)) * covariance[-1, -1])
+        drift = Drift(change=float(found[-1]), change_se=error, uneven=0.0 if shows else UNEVEN * abs(float(found[-1])))
     # Only what exceeds the noise is scatter of the valve: to move ramps by their noise would blur the edge.
     kept = max(1 - noise * degrees / squares, 0.0) if degrees > 0 and squares > 0 else 0.0
     moved = kept * residual + (drift.change * clock if drift else 0.0)
@@ -203,13 +225,14 @@ def compare_ramps(known: RampKnees, counts: Sequence[int], *, declared: float | 
         shifts[row][number] = shift
     return BetweenRamps(
         sd=sd,
-        degrees=float(degrees) if measured else math.inf,
+        degrees=of_sd[0],
         origin=origin,
-        noise=noise if measured else 0.0,
+        noise=of_sd[1],
         covariance=covariance,
         drift=drift,
         no_drift=no_drift,
         shifts=shifts,
+        checks=checks,
     )
 
 

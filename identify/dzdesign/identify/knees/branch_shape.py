@@ -38,6 +38,8 @@ class BranchShape:
     variance_inflation: float
     outliers: int
     dropped: float
+    #: Standard deviation of a reading while the valve is shut, m³/s.
+    noise: float
     #: Flow from which on a single reading counts as flow: the meter's floor, its noise or `USEFUL_FLOW`, whichever is
     #: largest.
     level: float

@@ -9,12 +9,11 @@ import numpy as np
 from dzdesign.identify.knees.branch_shape import BranchShape, Tail
 from dzdesign.identify.knees.dead_zone import look_into_dead_zone
 from dzdesign.identify.knees.gated_line import GATE, GatedLine, PreparedBranch, fit_line
-from dzdesign.identify.knees.level_floor import floor_of_levels
 from dzdesign.identify.knees.line_fitting import inflation_by_blocks
 from dzdesign.identify.knees.linear_region import StraightParts, find_straight_parts
 from dzdesign.identify.knees.noise import measure_roughness, robust_sigma, variance_inflation
-from dzdesign.identify.knees.profile import crossing, flow_at_top, hole_within, smooth_profile
-from dzdesign.identify.knees.spool_ripple import spool_ripple
+from dzdesign.identify.knees.profile import crossing, hole_within
+from dzdesign.identify.knees.spool_ripple import spool_ripples
 from dzdesign.identify.ramps.branches import bin_branch
 
 #: Standard deviations of a shut reading above which the mean of a bin is flow.
@@ -43,10 +42,16 @@ def describe_branches(
     `noise_level` and errors are those of `find_straight_parts`.
     """
     parts = find_straight_parts(reads, u_max=u_max, window=window, noise_level=noise_level)
-    return [_describe(parts, index, read, longest_lag, u_max) for index, read in enumerate(reads)]
+    ripples = spool_ripples(reads, parts.lines, u_max)
+    return [
+        _describe(parts, index, read, ripple, longest_lag, u_max)
+        for index, (read, ripple) in enumerate(zip(reads, ripples, strict=True))
+    ]
 
 
-def _describe(parts: StraightParts, index: int, read: PreparedBranch, longest_lag: float, u_max: float) -> BranchShape:
+def _describe(
+    parts: StraightParts, index: int, read: PreparedBranch, ripple: float, longest_lag: float, u_max: float
+) -> BranchShape:
     line, level, noise = parts.lines[index], parts.levels[index], parts.noises[index]
     branch, kept = read.branch, line.kept
     dead_zone = look_into_dead_zone(
@@ -75,44 +80,15 @@ def _describe(parts: StraightParts, index: int, read: PreparedBranch, longest_la
         variance_inflation=line.variance_inflation,
         outliers=line.outliers,
         dropped=line.dropped,
+        noise=noise,
         level=level,
         dead_zone=dead_zone,
         tail=tail,
         onset=onset,
         onset_se=onset_se,
-        ripple=spool_ripple(read, line, u_max),
+        ripple=ripple,
         saturates=read.y_max < 0.93 * line.slope * (branch.u.max() - line.knee),
     )
-
-
-def find_meter_floor(u: np.ndarray, q: np.ndarray, u_max: float) -> float | None:
-    """Return the flow at which the meter wakes up, m³/s, or 0 if it shows no floor; None if that can't be told.
-
-    A meter with a floor reads (about) zero, then jumps: between its noise and its floor there are next to no
-    readings, although the ramp sweeps those flows at the same pace as the flows above. Where rows are missing the ramp
-    did not sweep them, and the flows that nobody recorded look like a floor.
-    """
-    u_profile, q_profile = smooth_profile(u, q, u_max)
-    q_max = flow_at_top(u_profile, q_profile)
-    start, half = (crossing(u_profile, q_profile, share * q_max) for share in (0.12, 0.5))
-    straight = int(np.sum((u >= start) & (u <= half)))
-    density = straight / (0.38 * q_max)  # readings per unit of flow where the valve is known to open smoothly
-    shut = q[u < 0.5 * start]
-    if shut.size >= 5 and u_profile.size < 200:  # a staircase skips flows, whatever the meter
-        return floor_of_levels(u, q, shut, (start, half))
-    if shut.size < 5 or straight < 100:
-        return 0.0
-    noise = robust_sigma(shut)
-    lowest = max(3 * noise, 1e-3 * q_max)
-    # Near the opening only: far below it, thousands of shut readings would put some of their noise into the gap.
-    # It reaches down to where the profile leaves the noise, or a soft edge's small flows would be cut off and missed.
-    near = u > min(start - 0.5 * (half - start), crossing(u_profile, q_profile, lowest))
-    readings = np.sort(q[near & (q > lowest) & (q < 0.5 * q_max)])
-    expected = density * (readings - lowest)
-    gap = np.flatnonzero((np.arange(readings.size) < 0.1 * expected) & (expected > 20))
-    floor = float(readings[gap[-1]]) if gap.size else 0.0
-    low, high = (crossing(u_profile, q_profile, flow) for flow in (lowest, floor))
-    return None if floor and hole_within(u_profile, low, high, u_max) else floor
 
 
 def _without_outliers(u: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

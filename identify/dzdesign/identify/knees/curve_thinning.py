@@ -16,6 +16,8 @@ from dzdesign.identify.valve.recorded_curve import MOST_POINTS, SAG_STEPS, Recor
 #: A line between two points is halved where the flow, averaged over so many bins (0.5 % of full command), departs from
 #: it by more than this share of the test's largest flow, and by more than its own noise explains, standard errors.
 AVERAGED, TOLERANCE, NOISE_ERRORS = 5, 2.5e-3, 4.0
+#: Readings within this share of a step of the flow tell the pressure drop there.
+NEAR_STEP = 0.1
 #: Decimals of a point, V and L/min: far below what a recording tells.
 COMMAND_DIGITS, FLOW_DIGITS = 4, 4
 
@@ -132,8 +134,7 @@ def _sag(branches: list[Branch], leak: float, q_max_L_min: float) -> tuple[float
         return None
     dp = np.concatenate([branch.dp for branch in branches if branch.dp is not None])
     steps = np.concatenate([branch.q + leak for branch in branches]) / (q_max_L_min * L_MIN) * SAG_STEPS
-    found = {
-        step: float(np.median(dp[near])) for step in range(SAG_STEPS + 1) if (near := np.abs(steps - step) < 0.25).any()
-    }
+    about = {step: dp[np.abs(steps - step) < NEAR_STEP] for step in range(SAG_STEPS + 1)}
+    found = {step: float(np.median(near)) for step, near in about.items() if near.size}
     nodes = np.interp(np.arange(SAG_STEPS + 1), list(found), list(found.values()))
     return tuple(round(float(node) / MPA, FLOW_DIGITS) for node in nodes)

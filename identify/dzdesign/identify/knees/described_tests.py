@@ -65,6 +65,11 @@ class DescribedTests:
     #: What differs from ramp to ramp, of the rising and of the falling branch; None where there is none.
     between_ramps: tuple[BetweenRamps | None, BetweenRamps | None]
 
+    @property
+    def noise_level(self) -> float:
+        """The largest of the branches' noise levels, m³/s: flow below which there is none."""
+        return max(shape.dead_zone.noise_level for item in self.tests for shape in item.branches)
+
     def between(self, column: int) -> BetweenRamps:
         """Return what differs from ramp to ramp on the rising (0) or falling (1) branch; ValueError without it."""
         found = self.between_ramps[column]

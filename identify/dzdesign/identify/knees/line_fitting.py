@@ -3,6 +3,7 @@
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.core.worded import worded
 from dzdesign.identify.knees.gated_line import GATE, GatedLine, PreparedBranch, fit_line
 from dzdesign.identify.knees.noise import measure_roughness, median
 from dzdesign.identify.knees.profile import crossing
@@ -142,7 +143,15 @@ def _refuse_no_line(u: np.ndarray, window: tuple[float, float], floor: float, so
     """Refuse samples that hold no straight line: too few above the meter's floor, or all at one command."""
     if u.size < FEWEST or np.ptp(u) == 0:
         raise InputError(
-            f"'{source}': {u.size} samples at {np.unique(u).size} levels of the command lie between {window[0]:.0%} "
-            f"and {window[1]:.0%} of the largest flow and above half the meter's floor of {floor * 6e4:.3g} L/min, "
-            "expected at least 5 at 2 levels; record a slower ramp or more levels, or correct --meter-floor"
+            worded(
+                "'{source}': {count} samples at {levels} levels of the command lie between {low:.0%} and {high:.0%} of "
+                "the largest flow and above half the meter's floor of {floor:.3g L/min}, expected at least 5 at 2 "
+                "levels; record a slower ramp or more levels, or correct --meter-floor",
+                source=source,
+                count=u.size,
+                levels=np.unique(u).size,
+                low=window[0],
+                high=window[1],
+                floor=floor * 6e4,
+            )
         )

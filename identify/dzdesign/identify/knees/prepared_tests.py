@@ -7,12 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.core.worded import worded
 from dzdesign.identify.constants import FULL_SWEEP, L_MIN
 from dzdesign.identify.knees.between_ramps import BetweenRamps, compare_ramps, knees_of_ramps
 from dzdesign.identify.knees.branch_shape import BranchShape
-from dzdesign.identify.knees.characteristic import describe_branches, find_meter_floor
+from dzdesign.identify.knees.characteristic import describe_branches
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
 from dzdesign.identify.knees.gated_line import prepare_branch
+from dzdesign.identify.knees.meter_floor import find_meter_floor
 from dzdesign.identify.knees.meter_lag import MeterLag, find_lag
 from dzdesign.identify.knees.profile import largest_flow
 from dzdesign.identify.knees.readings_at_rest import find_rest_flows
@@ -27,6 +29,8 @@ from dzdesign.identify.ramps.command import despiked
 from dzdesign.identify.ramps.pooling import PooledTest, name_of_ramp, pool_ramps
 from dzdesign.identify.ramps.splitting import Ramp, nominal_dp, split_ramps
 from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.reading.series_order import with_clock_of_series
+from dzdesign.identify.reading.units_of_columns import units_of
 
 logger = logging.getLogger(__name__)
 
@@ -44,14 +48,13 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
     """
     rest = find_rest_flows(tests, options.u_max)
     tests = [replace(test, q=test.q - flow) for test, flow in zip(tests, rest.flows, strict=True)]
-    if len(tests) == 1 and tests[0].started is None:
-        tests = [replace(tests[0], started=0.0)]  # its own clock is common to all of its ramps
+    tests = with_clock_of_series(tests)
     ramps = split_recordings(tests, options, options.meter_lag or 0.0)
     lag = find_lag(ramps, options)
     pooled = pool_ramps(ramps if lag.origin != "identified" else split_recordings(tests, options, lag.seconds))
     pooled = _in_order_of_pressure(pooled)
     for left_out in dict.fromkeys(part for item in pooled for part in item.left_out):
-        logger.info("%s", left_out)
+        logger.info("%s", left_out.in_words(units_of(tests)))
     _refuse_what_shows_no_dead_zone(pooled, options)
     floor = options.meter_floor if options.meter_floor is not None else found_floor(pooled, options)
     described = _described(pooled, floor, lag, options)
@@ -82,9 +85,8 @@ def split_recordings(tests: Sequence[RampTest], options: IdentifyOptions, lag: f
     for test in tests:
         top = float(despiked(test.u).max())
         if top > 1.05 * options.u_max:
-            raise InputError(
-                f"'{test.source}': the command reaches {top:.2f} V, above u_max = {options.u_max:g} V; give --u-max"
-            )
+            above = "'{source}': the command reaches {top:.2f V}, above u_max = {u_max:g V}; give --u-max"
+            raise InputError(worded(above, source=test.source, top=top, u_max=options.u_max))
         if test.dp is None and len(tests) > 1:
             raise InputError(
                 f"'{test.source}' has no column of dP (or pA and pB); several ramp tests can only be told apart by it: "
@@ -108,9 +110,13 @@ def split_recordings(tests: Sequence[RampTest], options: IdentifyOptions, lag: f
 
 def _no_ramp(test: RampTest) -> InputError:
     return InputError(
-        f"'{test.source}' holds no ramp of the command from near zero up: it runs from {test.u.min():.2f} to "
-        f"{test.u.max():.2f} V, expected a sweep over half of the command at least, without jumps; record it so, from "
-        "below the threshold"
+        worded(
+            "'{source}' holds no ramp of the command from near zero up: it runs from {low:.2f #V} to {high:.2f V}, "
+            "expected a sweep over half of the command at least, without jumps; record it so, from below the threshold",
+            source=test.source,
+            low=test.u.min(),
+            high=test.u.max(),
+        )
     )
 
 
@@ -123,10 +129,9 @@ def _refuse_what_shows_no_dead_zone(pooled: list[PooledTest], options: IdentifyO
 
 
 def found_floor(pooled: list[PooledTest], options: IdentifyOptions) -> float:
-    """Return the largest meter floor that any branch shows (one meter, so one floor), m³/s; 0 if none can tell."""
-    branches = (branch for item in pooled for branch in item.branches if branch is not None)
-    floors = (find_meter_floor(branch.u, branch.q, options.u_max) for branch in branches)
-    return max((floor for floor in floors if floor is not None), default=0.0)
+    """Return the meter's floor as the branches show it, m³/s; 0 if none can tell."""
+    branches = [branch for item in pooled for branch in item.branches if branch is not None]
+    return find_meter_floor(branches, options.u_max)
 
 
 def _described(pooled: list[PooledTest], floor: float, lag: MeterLag, options: IdentifyOptions) -> list[DescribedTest]:
@@ -193,9 +198,14 @@ def _in_order_of_pressure(pooled: list[PooledTest]) -> list[PooledTest]:
 def _refuse_mixed_branches(described: list[DescribedTest]) -> None:
     """Refuse tests of which some have a branch that others lack: they can't be compared."""
     for column, name in ((0, "rising"), (1, "falling")):
-        lacking = [item.test.source for item in described if item.shapes[column] is None]
+        lacking = [item for item in described if item.shapes[column] is None]
         if lacking and len(lacking) < len(described):
-            raise InputError(
-                f"'{lacking[0]}' has no {name} branch while other ramp tests have one; "
+            by_option = next((part for part in lacking[0].left_out if part.reason == "option"), None)
+            remedy = (
                 "record every pressure drop up and down, or leave that file out"
+                if by_option is None
+                else f"--from and --to leave out {by_option.from_s:.1f} to {by_option.to_s:.1f} s of it, and with that "
+                "a branch: choose seconds before and after a whole ramp, or leave that file out"
             )
+            source = lacking[0].test.source
+            raise InputError(f"'{source}' has no {name} branch while other ramp tests have one; {remedy}")

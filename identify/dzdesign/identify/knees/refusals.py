@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.core.worded import worded
 from dzdesign.identify.constants import L_MIN, LARGEST_DP, MPA, SMALLEST_DP
 from dzdesign.identify.knees.gated_line import PreparedBranch
 from dzdesign.identify.knees.noise import robust_sigma
@@ -27,13 +28,23 @@ def refuse_a_wrong_pressure(source: str, dp: float | None) -> None:
         return
     if 0 < dp < SMALLEST_DP or dp > LARGEST_DP:
         raise InputError(
-            f"'{source}': the pressure drop is {dp / MPA:.3g} MPa, expected {SMALLEST_DP / MPA:g} to "
-            f"{LARGEST_DP / MPA:g} MPa; correct the unit in the header (mPa is a thousandth of a pascal)"
+            worded(
+                "'{source}': the pressure drop is {dp:.3g MPa}, expected {least:g #MPa} to {most:g MPa}; correct the "
+                "unit in the header (mPa is a thousandth of a pascal)",
+                source=source,
+                dp=dp / MPA,
+                least=SMALLEST_DP / MPA,
+                most=LARGEST_DP / MPA,
+            )
         )
     if dp <= 0:
         raise InputError(
-            f"'{source}': the pressure drop is {dp / MPA:.3f} MPa, expected a positive one; "
-            "swap pA and pB, or correct the sign of dP"
+            worded(
+                "'{source}': the pressure drop is {dp:.3f MPa}, expected a positive one; swap pA and pB, or correct "
+                "the sign of dP",
+                source=source,
+                dp=dp / MPA,
+            )
         )
 
 
@@ -48,15 +59,26 @@ def refuse_a_shut_valve(source: str, branches: Sequence[Branch | None], u_max: f
             continue
         if rise < -least:
             raise InputError(
-                f"'{source}': the flow falls with the command, by {-rise / L_MIN:.3f} L/min from zero to "
-                f"{branch.u.max():.2f} V, expected one that rises; reverse the sign of Q, or leave cells blank where "
-                "the logger wrote a number for a missing sample"
+                worded(
+                    "'{source}': the flow falls with the command, by {fall:.3f L/min} from zero to {top:.2f V}, "
+                    "expected one that rises; reverse the sign of Q, or leave cells blank where the logger wrote a "
+                    "number for a missing sample",
+                    source=source,
+                    fall=-rise / L_MIN,
+                    top=branch.u.max(),
+                )
             )
         raise InputError(
-            f"'{source}': the valve never opens, as far as the meter shows: the flow at {branch.u.max():.2f} V is "
-            f"{rise / L_MIN:.3f} L/min above that at zero, expected more than {least / L_MIN:.3f} (6 times the "
-            f"meter's noise of {noise / L_MIN:.3f} L/min); check the solenoid, the supply and the column of Q, or "
-            "average the readings"
+            worded(
+                "'{source}': the valve never opens, as far as the meter shows: the flow at {top:.2f V} is "
+                "{rise:.3f L/min} above that at zero, expected more than {least:.3f #L/min} (6 times the meter's noise "
+                "of {noise:.3f L/min}); check the solenoid, the supply and the column of Q, or average the readings",
+                source=source,
+                top=branch.u.max(),
+                rise=rise / L_MIN,
+                least=least / L_MIN,
+                noise=noise / L_MIN,
+            )
         )
 
 
@@ -76,10 +98,17 @@ def refuse_a_jump(read: PreparedBranch, u_max: float) -> None:
     if np.mean((share > MIDDLE[0]) & (share < MIDDLE[1])) >= FEWEST_IN_THE_MIDDLE:
         return
     raise InputError(
-        f"'{read.source}': the flow jumps at {0.5 * (low + high):.2f} V: of {inside.sum()} readings there next to none "
-        f"lies between {MIDDLE[0]:.0%} and {MIDDLE[1]:.0%} of the largest flow of {read.y_max / L_MIN:.3g} L/min, "
-        "expected a straight rise; either the meter starts above that (take one of a smaller range, or leave out this "
-        "pressure drop) or the valve only switches"
+        worded(
+            "'{source}': the flow jumps at {at:.2f V}: of {count} readings there next to none lies between {least:.0%} "
+            "and {most:.0%} of the largest flow of {flow:.3g L/min}, expected a straight rise; either the meter starts "
+            "above that (take one of a smaller range, or leave out this pressure drop) or the valve only switches",
+            source=read.source,
+            at=0.5 * (low + high),
+            count=inside.sum(),
+            least=MIDDLE[0],
+            most=MIDDLE[1],
+            flow=read.y_max / L_MIN,
+        )
     )
 
 
@@ -89,7 +118,14 @@ def refuse_an_impossible_knee(branch: Branch, knee: float, source: str, u_max: f
     if max(lowest - EXTRAPOLATED * u_max, 0.0) <= knee <= highest:
         return
     raise InputError(
-        f"'{source}': the knee on {'opening' if branch.rising else 'closing'} comes out at {knee:.2f} V, expected it "
-        f"within the command that was swept, {lowest:.2f} to {highest:.2f} V; look at the flow below it for a leak or "
-        "a pump that came up late, and choose a --knee-window in which the flow is straight"
+        worded(
+            "'{source}': the knee on {way} comes out at {knee:.2f V}, expected it within the command that was swept, "
+            "{lowest:.2f #V} to {highest:.2f V}; look at the flow below it for a leak or a pump that came up late, and "
+            "choose a --knee-window in which the flow is straight",
+            source=source,
+            way="opening" if branch.rising else "closing",
+            knee=knee,
+            lowest=lowest,
+            highest=highest,
+        )
     )

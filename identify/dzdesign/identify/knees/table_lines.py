@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.core.worded import worded
 from dzdesign.identify.knees.gated_line import GatedLine, PreparedBranch, fit_line
 from dzdesign.identify.knees.noise import Roughness
 from dzdesign.identify.knees.profile import crossing
@@ -71,8 +72,16 @@ def _refuse_a_jump_between_levels(read: PreparedBranch) -> None:
     if before <= JUMP * max(after, 0.0):
         return
     raise InputError(
-        f"'{read.source}': the flow jumps between {u[opened - 1]:.2f} and {u[opened]:.2f} V, from "
-        f"{max(share[opened - 1], 0.0):.0%} to {share[opened]:.0%} of the largest flow of {read.y_max * 6e4:.3g} "
-        f"L/min, {before / after if after > 0 else np.inf:.3g} times as steep as above it, expected a straight rise; "
-        "record levels in between, or, if the meter shows nothing below some flow, take one of a smaller range"
+        worded(
+            "'{source}': the flow jumps between {shut:.2f #V} and {open:.2f V}, from {least:.0%} to {most:.0%} of the "
+            "largest flow of {flow:.3g L/min}, {steeper:.3g} times as steep as above it, expected a straight rise; "
+            "record levels in between, or, if the meter shows nothing below some flow, take one of a smaller range",
+            source=read.source,
+            shut=u[opened - 1],
+            open=u[opened],
+            least=max(share[opened - 1], 0.0),
+            most=share[opened],
+            flow=read.y_max * 6e4,
+            steeper=before / after if after > 0 else np.inf,
+        )
     )

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.identify.constants import L_MIN, MPA
 from dzdesign.identify.knees.linear_region import ABOVE_LEVEL, NOISE_LEVEL, USEFUL_FLOW, WIDER
 from dzdesign.identify.knees.meter_lag import MeterLag
@@ -173,6 +174,7 @@ class Pilot:
     meter_zero: float
     #: s; None where the pilot could not tell it.
     meter_lag: float | None
+    recorded_units: RecordedUnits
 
 
 def read_pilot(model: ValveModel) -> Pilot:
@@ -185,7 +187,7 @@ def read_pilot(model: ValveModel) -> Pilot:
     InputError
         If its pressure drops are not known.
     """
-    side = next(iter(model.sides.values()))
+    name, side = next(iter(model.sides.items()))
     if any(test.dp_MPa is None for test in side.tests):
         raise InputError(
             "the pilot series was recorded without a pressure drop, and a plan needs it; record it, or declare it by "
@@ -212,6 +214,7 @@ def read_pilot(model: ValveModel) -> Pilot:
         meter_floor=L_MIN * model.meter.floor_L_min,
         meter_zero=L_MIN * model.meter.zero_L_min,
         meter_lag=None if model.meter.lag_is == "unknown" else model.meter.lag_s,
+        recorded_units=model.recorded_units.of_side(name),
     )
 
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 from dzdesign.core.result_display import ShownInNotebooks
-from dzdesign.core.units import span_MPa
 from dzdesign.identify.constants import MPA
 from dzdesign.identify.planning.premises import Bench, ExpectedValve
 from dzdesign.identify.planning.search import Plan, PlannedSeries, Request
@@ -71,10 +71,17 @@ class SeriesPlan(ShownInNotebooks):
     u_max_V: float
     sample_rate_Hz: float
     pause_s: float
+    #: Of the pilot series, in which a person sees the plan.
+    recorded_units: RecordedUnits
 
 
 def series_plan(
-    plan: Plan, valve: ExpectedValve, bench: Bench, request: Request, premises: Sequence[Premise]
+    plan: Plan,
+    valve: ExpectedValve,
+    bench: Bench,
+    request: Request,
+    premises: Sequence[Premise],
+    units: RecordedUnits = AS_COMPUTED,
 ) -> SeriesPlan:
     """Return a plan in the units of a bench, with what should be known beside it."""
     series = plan.chosen.series
@@ -88,10 +95,11 @@ def series_plan(
         wanted_mV=wanted,
         reached=plan.reached,
         premises=tuple(premises),
-        notes=tuple(_notes(plan, valve, request, premises)),
+        notes=tuple(_notes(plan, valve, request, premises, units)),
         u_max_V=bench.u_max,
         sample_rate_Hz=bench.sample_rate,
         pause_s=bench.pause,
+        recorded_units=units,
     )
 
 
@@ -128,7 +136,9 @@ def _rounded(values: np.ndarray) -> list[float]:
     return [float(f"{value:.{DIGITS}g}") for value in values]
 
 
-def _notes(plan: Plan, valve: ExpectedValve, request: Request, premises: Sequence[Premise]) -> list[str]:
+def _notes(
+    plan: Plan, valve: ExpectedValve, request: Request, premises: Sequence[Premise], units: RecordedUnits
+) -> list[str]:
     """Return what should be known beside the numbers."""
     found, notes = plan.chosen.prediction, []
     if request.wanted is not None and not plan.reached:
@@ -138,22 +148,22 @@ def _notes(plan: Plan, valve: ExpectedValve, request: Request, premises: Sequenc
         }  # fmt: skip
         largest = max(shares, key=lambda name: shares[name])
         notes.append(
-            f"no series within {request.budget / 60:g} min reaches the loss wanted, {1e3 * request.wanted:.4g} mV: the "
-            f"best one has {1e3 * found.loss:.4g} mV, of which {1e3 * shares[largest]:.4g} mV by {largest}; extend "
-            "--budget, or reduce that"
+            f"no series within {request.budget / 60:g} min reaches the loss wanted, "
+            f"{units.text(1e3 * request.wanted, '.4g mV')}: the best one has {units.text(1e3 * found.loss, '.4g mV')}, "
+            f"of which {units.text(1e3 * shares[largest], '.4g mV')} by {largest}; extend --budget, or reduce that"
         )
     lowest = float(valve.threshold.min())
     if found.loss >= lowest:
         notes.append(
-            f"the loss exceeds the threshold, {1e3 * lowest:.4g} mV: identify will refuse such recordings, because no "
-            "positive offset can be certified; reduce the largest share"
+            f"the loss exceeds the threshold, {units.text(1e3 * lowest, '.4g mV')}: identify will refuse such "
+            "recordings, because no positive offset can be certified; reduce the largest share"
         )
     low, high = float(valve.dp[0]), float(valve.dp[-1])
     outside = request.dp_range[0] < (1 - SAME_PRESSURE) * low or request.dp_range[1] > (1 + SAME_PRESSURE) * high
     if outside:
         notes.append(
-            f"the pilot series ran {span_MPa(low / MPA, high / MPA)}; beyond that its nearest threshold is taken, and "
-            "the steps between the tests are predicted too small"
+            f"the pilot series ran {units.span(low / MPA, high / MPA, '.2f MPa')}; beyond that its nearest threshold "
+            "is taken, and the steps between the tests are predicted too small"
         )
     if found.trend_found < MOSTLY_FOUND:
         notes.append(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.identify.plots.frame import HUES
 from dzdesign.identify.valve.guard_curve import CertifiedCurve
 from dzdesign.identify.valve.side_model import SideModel
@@ -23,54 +24,67 @@ BOUND_NAMES = {"line": "certified line", "smooth": "certified bound", "monotone"
 BOUND_POINTS = 201
 
 
-def draw_thresholds(axes: "Axes", side: SideModel, curve: CertifiedCurve) -> None:
+def draw_thresholds(axes: "Axes", side: SideModel, curve: CertifiedCurve, units: RecordedUnits) -> None:
     """Draw knees and onsets with their errors, and of one guard the bounds on the interval and the largest offset."""
-    dp = tested_pressures(side)
+    dp = units.convert(tested_pressures(side), "MPa")
+    lower, offset = (units.convert(np.array(values), "V") for values in (curve.u_lower_V, curve.offset_V))
     for branch, word, marker, _, hue in BRANCHES:
         for what, face, size in (("knee", HUES[hue], 5.5), ("onset", "none", 8.5)):
             at = [getattr(test, f"u_{what}_{branch}_V") for test in side.tests]
             seen = [i for i, value in enumerate(at) if value is not None]
             if seen:
                 error = [2 * (getattr(side.tests[i], f"u_{what}_{branch}_se_V") or 0.0) for i in seen]
-                axes.errorbar(dp[seen], [at[i] for i in seen], yerr=error, fmt=marker, ms=size, mfc=face,
+                known = units.convert(np.array([at[i] for i in seen]), "V")
+                axes.errorbar(dp[seen], known, yerr=units.convert(np.array(error), "dV"), fmt=marker, ms=size, mfc=face,
                               mec=HUES[hue], ecolor=HUES[hue], capsize=3, lw=1, label=f"{what} {word} ± 2 s.e.",
                               zorder=4)  # fmt: skip
-    axes.plot(dp, curve.u_lower_V, "_", ms=13, mew=2, color=HUES["ink"], label="lower bound, at the test", zorder=5)
+    axes.plot(dp, lower, "_", ms=13, mew=2, color=HUES["ink"], label="lower bound, at the test", zorder=5)
     if len(dp) > 1:
-        draw_bound(axes, side, curve, 1.0, BOUND_NAMES[curve.premise])
-    axes.plot(curve.offset_dp_MPa or dp, curve.offset_V, "D-.", ms=3, lw=1.3, color=HUES["purple"],
-              label="largest certified offset", zorder=6)  # fmt: skip
-    axes.set_ylabel("command u (V)")
+        draw_bound(axes, side, curve, units, BOUND_NAMES[curve.premise])
+    nodes = units.convert(np.array(curve.offset_dp_MPa), "MPa") if curve.offset_dp_MPa else dp
+    axes.plot(nodes, offset, "D-.", ms=3, lw=1.3, color=HUES["purple"], label="largest certified offset",
+              zorder=6)  # fmt: skip
+    axes.set_ylabel(f"command u ({units.label('V')})")
+    if units.falling:
+        axes.invert_yaxis()
     if side.tests[0].dp_MPa is None:
         axes.set(xlabel="pressure drop dP (not recorded)", xticks=[])
     else:
-        axes.set_xlabel("pressure drop dP (MPa)")
+        axes.set_xlabel(f"pressure drop dP ({units.label('MPa')})")
 
 
-def draw_bound(axes: "Axes", side: SideModel, curve: CertifiedCurve, unit_V: float, label: str) -> None:
-    """Draw what is certified of a threshold on the whole interval, over `unit_V`."""
+def draw_bound(
+    axes: "Axes", side: SideModel, curve: CertifiedCurve, units: RecordedUnits, label: str, over_V: float | None = None
+) -> None:
+    """Draw what is certified of a threshold on the whole interval: in the units of the recordings, or `over_V`."""
+
+    def shown(volts: np.ndarray) -> np.ndarray:
+        return units.convert(volts, "V") if over_V is None else volts / over_V
+
     bound = curve.bound(side.trend or "flat")
-    dp = [float(end) for end in (bound.pieces[0].from_MPa, *(piece.to_MPa for piece in bound.pieces))]
+    dp = np.array([float(end) for end in (bound.pieces[0].from_MPa, *(piece.to_MPa for piece in bound.pieces))])
     if curve.premise == "monotone":
-        steps = [float(piece.low_V) / unit_V for piece in bound.pieces]
-        axes.stairs(steps, dp, baseline=None, color=HUES["green"], lw=2, label=label)
+        steps = shown(np.array([float(piece.low_V) for piece in bound.pieces]))
+        axes.stairs(steps, units.convert(dp, "MPa"), baseline=None, color=HUES["green"], lw=2, label=label)
         return
     fine = np.unique(np.concatenate([dp, np.linspace(dp[0], dp[-1], BOUND_POINTS)]))
-    axes.plot(fine, bound.in_doubles(fine) / unit_V, "-", color=HUES["green"], lw=2, label=label)
+    axes.plot(units.convert(fine, "MPa"), shown(bound.in_doubles(fine)), "-", color=HUES["green"], lw=2, label=label)
 
 
-def draw_beta(axes: "Axes", side: SideModel, curve: CertifiedCurve) -> None:
+def draw_beta(axes: "Axes", side: SideModel, curve: CertifiedCurve, units: RecordedUnits) -> None:
     """Draw beta of both branches with its error; over the identified u_min0 the certified offset and its bound."""
     u_min0 = side.reference.u_min_V
     for (_, word, marker, dash, hue), name in zip(BRANCHES, ("opening", "closing"), strict=True):
         if name in side.identified:
             found = side.identified[name]
-            axes.errorbar(found.dp_MPa, found.beta, yerr=[2 * se for se in found.beta_se], fmt=marker + dash, ms=5,
+            dp = units.convert(np.array(found.dp_MPa), "MPa")
+            axes.errorbar(dp, found.beta, yerr=[2 * se for se in found.beta_se], fmt=marker + dash, ms=5,
                           color=HUES[hue], capsize=3, lw=1.2, label=f"β(dP) {word} ± 2 s.e.")  # fmt: skip
-    draw_bound(axes, side, curve, u_min0, f"{BOUND_NAMES[curve.premise]} / u_min0")
-    axes.plot(curve.offset_dp_MPa, np.array(curve.offset_V) / u_min0, "D-.", color=HUES["purple"], ms=3, lw=1.4,
+    draw_bound(axes, side, curve, units, f"{BOUND_NAMES[curve.premise]} / u_min0", u_min0)
+    nodes = units.convert(np.array(curve.offset_dp_MPa), "MPa")
+    axes.plot(nodes, np.array(curve.offset_V) / u_min0, "D-.", color=HUES["purple"], ms=3, lw=1.4,
               label="largest certified offset / u_min0")  # fmt: skip
-    axes.set(xlabel="pressure drop dP (MPa)", ylabel="β (no unit)")
+    axes.set(xlabel=f"pressure drop dP ({units.label('MPa')})", ylabel="β (no unit)")
 
 
 def tested_pressures(side: SideModel) -> np.ndarray:

@@ -15,6 +15,7 @@ import numpy as np
 
 from dzdesign.core.artefact_files import open_bytes, sha256_of_file
 from dzdesign.core.errors import InputError
+from dzdesign.core.recorded_units import Quantity, Unit
 from dzdesign.identify.reading.binary.array_table import read_binary_table
 from dzdesign.identify.reading.binary.registry import LONGEST_MARK, format_of
 from dzdesign.identify.reading.clock import ASSUMED_MS, clock_doubt, may_count_ms, never_back, seconds_of_day_times
@@ -26,6 +27,8 @@ from dzdesign.identify.reading.scaling import scaling_of
 from dzdesign.identify.reading.table import QUOTED_CHARACTERS, Table
 from dzdesign.identify.reading.text.table_reader import read_text_table
 from dzdesign.identify.reading.thinning import thin
+from dzdesign.identify.reading.time_stamps import Start
+from dzdesign.identify.reading.units_of_columns import units_of_columns
 
 #: Fewest complete rows in which two branches with a threshold could stand.
 MIN_ROWS = 20
@@ -77,16 +80,11 @@ def read_ramp_file(
     _refuse_too_few_rows(path, recording)
     thinned = thin(recording.rows)
     time, u, q, *measured = (np.array(column) for column in thinned.rows)
-    clock = recording.clock
-    doubt = clock_doubt(time, u, unit_stated=bool(clock.unit)) if recording.may_count_ms else ""
-    if doubt == ASSUMED_MS:
-        time /= 1e3
-    elif not clock.unit:
-        scaling_of(path, "time", clock, u_max)  # says that it lacks one
+    doubt = _doubt_of_clock(path, recording, time, u)
     return RampTest(
         source=path.name.encode(errors="replace").decode(),
         sha256=sha256,
-        time=time,
+        time=time / 1e3 if doubt == ASSUMED_MS else time,
         u=u,
         q=q,
         dp=measured[0] if measured else None,
@@ -98,7 +96,9 @@ def read_ramp_file(
         clock_doubt=doubt,
         simulated=recording.simulated,
         no_values=recording.no_values,
-        started=recording.started,
+        stamp=recording.stamp,
+        started=recording.stamp.seconds if recording.stamp else None,
+        units=recording.units,
     )
 
 
@@ -114,9 +114,19 @@ class _Recording:
     simulated: bool
     may_count_ms: bool
     no_values: str
-    started: float | None
+    stamp: Start | None
     dp_from: tuple[str, str]
     side_without_dp: str
+    units: Mapping[Quantity, tuple[Unit, ...]]
+
+
+def _doubt_of_clock(path: Path, recording: _Recording, time: np.ndarray, u: np.ndarray) -> str:
+    """Return what is doubtful about the unit of the time, as `clock_doubt` does; refuse one that nobody knows."""
+    clock = recording.clock
+    doubt = clock_doubt(time, u, unit_stated=bool(clock.unit)) if recording.may_count_ms else ""
+    if not clock.unit and doubt != ASSUMED_MS:
+        scaling_of(path, "time", clock, u_max=1.0)  # says that it lacks one
+    return doubt
 
 
 def _refuse_too_few_rows(path: Path, recording: _Recording) -> None:
@@ -183,9 +193,10 @@ def _read_recording(
         simulated=_is_marked(table.comments),
         may_count_ms=sample_rate is None and not is_clock and may_count_ms(rows[0], longest_step=np.inf),
         no_values=describe_placeholders(placeholders),
-        started=table.started(found["time"].label) if is_clock else None,
+        stamp=table.started(found["time"].label) if sample_rate is None else None,
         dp_from=edge.in_words(labels),
         side_without_dp=side_without_dp(edge, labels, table.path, data["u"], u_max),
+        units=units_of_columns(table.path, found, u_max),
     )
 
 

@@ -1,9 +1,12 @@
 """`RampTest`: one recorded ramp test, as all rooms of identify take it."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from dzdesign.core.recorded_units import Quantity, Unit
+from dzdesign.identify.reading.time_stamps import Start
 from dzdesign.identify.valve.left_out import LeftOut
 
 
@@ -50,10 +53,15 @@ class RampTest:
     clock_doubt: str = ""
     simulated: bool = False
     no_values: str = ""
-    #: Time of `time` = 0 on a clock common to all recordings, s; None if it is not known.
+    #: Date and time of `time` = 0 that the recording itself states, and time on the clock of the series that counts, s.
+    stamp: Start | None = None
     started: float | None = None
     #: What the engineer has left out of the file.
     left_out: tuple[LeftOut, ...] = ()
+    #: Ramps that this cuts, each with the branches of it that are lost: ``ramp 2, 12.3 to 62.1 s (falling)``.
+    cut: tuple[str, ...] = ()
+    #: Units of the file's columns, each once; `u`, `dp` and `q` are in SI.
+    units: Mapping[Quantity, tuple[Unit, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for array in (self.time, self.u, self.q, self.dp):

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from dzdesign.core.errors import InputError, nearest, one_line
+from dzdesign.identify.reading.time_stamps import Start
 
 #: Characters of a cell, and columns of a file, that a message quotes.
 QUOTED_CHARACTERS, QUOTED_COLUMNS = 40, 12
@@ -77,8 +78,8 @@ class Table(ABC):
         """Return a column of dates or times of day, as `is_clock` tells, as seconds since the first row of the file."""
         raise TypeError(f"column '{label}' holds numbers")
 
-    def started(self, label: str) -> float | None:
-        """Return the date and time of the first row of such a column, s on one calendar; None if they are not known."""
+    def started(self, label: str) -> Start | None:
+        """Return the date and time at which a column of time counts zero; None if they are not known."""
         return None
 
     def found_labels(self) -> str:

@@ -7,6 +7,7 @@ part of a date is the day and which the month matters only where a recording goe
 
 import datetime
 import re
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,6 +31,15 @@ MIDNIGHT = DAY / 2
 #: Days that no recording goes on for: a reading of two dates with more between them is not what was meant.
 LONGEST_RECORDING = 300
 EXAMPLE = "2026-11-22 03:04:05.123, 22.11.2026 03:04:05,123 or 03:04:05.123"
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """Date and time at which a clock counts zero."""
+
+    #: s since the first day of the calendar; UTC where the zone is stated, else on the logger's own clock.
+    seconds: float
+    has_zone: bool
 
 
 def is_stamp(cell: str) -> bool:
@@ -78,14 +88,12 @@ def seconds_of_stamps(cells: "pl.Series", where: str) -> np.ndarray:
     return seconds - known[0] if known.size else seconds
 
 
-def start_of(cell: str) -> float | None:
-    """Return the date and time in a cell as seconds since the first day of the calendar, UTC if it states its zone.
-
-    None where it has no date, or one whose day and month can't be told apart.
+def start_of(cell: str) -> Start | None:
+    """Return the date and time in a cell; None where it has no date, or one whose day and month can't be told apart.
 
     Examples
     --------
-    >>> start_of("2026-11-22 03:04:05") - start_of("22.11.2026 03:04:04,5"), start_of("03:04:05")
+    >>> start_of("2026-11-22 03:04:05").seconds - start_of("22.11.2026 03:04:04,5").seconds, start_of("03:04:05")
     (0.5, None)
     """
     found = re.match(STAMP, cell)
@@ -95,7 +103,7 @@ def start_of(cell: str) -> float | None:
     _, hour, minute, second, half, zone = found.groups()
     hours = int(hour) % 12 + 12 * (half in ("P", "p")) if half else int(hour)
     of_day = 3600.0 * hours + 60.0 * int(minute) + float(re.sub("[,:]", ".", second))
-    return DAY * days.pop() + of_day - (_zone(zone) if zone else 0.0)
+    return Start(DAY * days.pop() + of_day - (_zone(zone) if zone else 0.0), has_zone=bool(zone))
 
 
 def _different(texts: "pl.Series") -> list[str]:

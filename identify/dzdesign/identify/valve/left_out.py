@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import quantity
+from dzdesign.core.recorded_units import RecordedUnits
 
 #: Why, for people.
 REASONS = {
@@ -39,7 +40,8 @@ class LeftOut:
         quantity("MPa", "Lowest and highest pressure drop in it; null where that is unknown."),
     ]
 
-    def __str__(self) -> str:
+    def in_words(self, units: RecordedUnits) -> str:
         """Return it as `-v` prints it."""
-        dp = "" if self.dp_MPa is None else f" ({self.dp_MPa[0]:.3g} to {self.dp_MPa[1]:.3g} MPa)"
+        low, high = self.dp_MPa or (0.0, 0.0)
+        dp = "" if self.dp_MPa is None else f" ({units.number(low, '.3g MPa')} to {units.text(high, '.3g MPa')})"
         return f"'{self.recording}', {self.from_s:.1f} to {self.to_s:.1f} s left out: {REASONS[self.reason]}{dp}"

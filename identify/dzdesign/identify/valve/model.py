@@ -8,6 +8,7 @@ from msgspec import Meta
 
 from dzdesign.core.artefact_types import Artefact, RuleError, quantity, schema_of
 from dzdesign.core.errors import InputError
+from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.identify.valve.quantity_types import Flow, Probability
 from dzdesign.identify.valve.side_model import SideModel
@@ -87,6 +88,13 @@ class ValveModel(ShownInNotebooks, Artefact):
         tuple[Literal["positive", "negative"], ...], Meta(description="Sides without a usable recording.")
     ] = field(init=False)
     warnings: Annotated[tuple[Warning_, ...], Meta(description="In the order in which they matter.")]
+    recorded_units: Annotated[
+        RecordedUnits,
+        Meta(
+            description="Units of the recordings, in which a person sees what stands here in V, MPa and L/min; of a "
+            "quantity that the recordings have in several units, those."
+        ),
+    ] = AS_COMPUTED
 
     def __post_init__(self) -> None:
         if not self.sides or not set(self.sides) <= set(SIDES):

@@ -78,8 +78,8 @@ class TestResult:
     u_guard_V: Annotated[
         Voltage,
         Meta(
-            description="Threshold that the certificate protects: on the guarded branch the knee, or the tail's zero "
-            "where the edge is soft."
+            description="Threshold that the certificate protects: on the guarded branch the knee, or below it what a "
+            "soft edge still passes, the tail's zero or where the flow falls to the noise level."
         ),
     ]
     u_guard_lower_V: Annotated[Voltage, Meta(description="Its lower confidence bound.")]

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.identify.valve.quantity_types import Voltage, VoltageError
 
 Origin = Literal["repeats", "declared", "assumed"]
@@ -46,7 +47,7 @@ class Repeatability:
         if not (self.drift_V is None) == (self.drift_se_V is None) == bool(self.no_drift):
             raise RuleError("the drift, its standard error and the reason that there is none contradict one another")
 
-    def in_words(self) -> str:
+    def in_words(self, units: RecordedUnits) -> str:
         """Return by how much the guarded threshold scatters from ramp to ramp, and drifts, and how that is known."""
         how = {
             "repeats": f"measured on repeats, {self.degrees_of_freedom or 0:.0f} degrees of freedom",
@@ -54,11 +55,12 @@ class Repeatability:
             "assumed": "assumed, for want of repeats",
         }
         drift = (
-            f"drift from the first ramp to the last {1e3 * self.drift_V:+.1f} ± {1e3 * self.drift_se_V:.1f} mV"
+            f"drift from the first ramp to the last {units.number(1e3 * self.drift_V, '+.1f mV')} ± "
+            f"{units.text(1e3 * self.drift_se_V, '.1f mV')}"
             if self.drift_V is not None and self.drift_se_V is not None
             else f"no drift in the model ({self.no_drift})"
         )
         return (
-            f"standard deviation {1e3 * self.sd_V:.1f} mV ({how[self.origin]}), in the bound for the next closing or "
-            f"opening; {drift}"
+            f"standard deviation {units.text(1e3 * self.sd_V, '.1f mV')} ({how[self.origin]}), in the bound for the "
+            f"next closing or opening; {drift}"
         )

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.report.figures.figure import (
     CYCLE,
     LIGHT,
@@ -15,7 +16,6 @@ from dzdesign.report.figures.figure import (
     legend_below,
     new_figure,
     side_words,
-    span,
     titled_axes,
     to_report_figure,
 )
@@ -28,13 +28,13 @@ if TYPE_CHECKING:
 NEAR_ZERO = 15.0
 
 
-def loop_figure(curves: Curves, side: str, both: bool) -> ReportFigure:
+def loop_figure(curves: Curves, side: str, both: bool, units: RecordedUnits) -> ReportFigure:
     """Draw flow over command without and with the compensator, whole and near zero, from closed_loop_<side>.csv."""
     ends = [name.removeprefix("q_with_") for name in curves.columns if name.startswith("q_with_")]
     figure = new_figure(3.9, top=0.3, right=0.5)
     wide, near = figure.subplots(1, 2, width_ratios=(1.35, 1), gridspec_kw={"wspace": 0.36})
-    _draw_whole(wide, curves, ends)
-    _draw_near_zero(near, curves, ends)
+    _draw_whole(wide, curves, ends, units)
+    _draw_near_zero(near, curves, ends, units)
     starts = {
         which: [_first_flow(curves, f"q_{which}_{end}") for end in ends] for which in ("without", "with")
     }
@@ -44,48 +44,55 @@ def loop_figure(curves: Curves, side: str, both: bool) -> ReportFigure:
         f"Closed loop: a ramp up and down, the generated C driving the simulated valve{side_words(side, both)}. Of "
         "two branches the one at lower commands is closing; what lies between is the valve's hysteresis.",
         f"Flow over command at {len(ends)} pressure drops. First flow on the ramp up: without the "
-        f"compensator at {span(starts['without'], '%', 1)}, with it at {span(starts['with'], '%', 1)} of full command.",
+        f"compensator at {_percents(starts['without'])}, with it at {_percents(starts['with'])} of full command.",
         curves.text,
     )
 
 
-def _draw_whole(axes: "Axes", curves: Curves, ends: Sequence[str]) -> None:
+def _percents(values: Sequence[float]) -> str:
+    return f"{min(values):.1f} to {max(values):.1f} %"
+
+
+def _draw_whole(axes: "Axes", curves: Curves, ends: Sequence[str], units: RecordedUnits) -> None:
     command, labels = curves.columns["command_percent"], []
     for index, end in enumerate(ends):
         hue = LIGHT[CYCLE[index % len(CYCLE)]]
-        driven = curves.columns[f"q_with_{end}"]
-        axes.plot(command, curves.columns[f"q_without_{end}"], ":", color=hue, lw=1.4)
+        bare, driven = (
+            units.convert(curves.columns[f"q_{which}_{end}"], "L/min") for which in ("without", "with")
+        )
+        axes.plot(command, bare, ":", color=hue, lw=1.4)
         axes.plot(command, driven, "-", color=hue, lw=1.5)
-        labels.append((100.0, float(driven.max()), _pressure(end), hue))
+        labels.append((100.0, float(driven.max()), _pressure(end, units), hue))
     label_ends(axes, labels)
     axes.plot([], [], "-", color=LIGHT["soft"], label="with")
     axes.plot([], [], ":", color=LIGHT["soft"], label="without")
     axes.legend(loc="upper left", title="the compensator", alignment="left")
-    axes.set(xlabel="command (% of full)", ylabel="flow Q (L/min)", xlim=(0, 100), ylim=(0, None),
-             title="whole range; dP in MPa at the end")  # fmt: skip
+    axes.set(xlabel="command (% of full)", ylabel=f"flow Q ({units.label('L/min')})", xlim=(0, 100), ylim=(0, None),
+             title=f"whole range; dP in {units.label('MPa')} at the end")  # fmt: skip
 
 
-def _draw_near_zero(axes: "Axes", curves: Curves, ends: Sequence[str]) -> None:
+def _draw_near_zero(axes: "Axes", curves: Curves, ends: Sequence[str], units: RecordedUnits) -> None:
     command, labels, top = curves.columns["command_percent"], [], 0.0
     opening = np.arange(command.size) <= int(np.argmax(command))
     for index, end in enumerate(ends):
-        hue, driven = LIGHT[CYCLE[index % len(CYCLE)]], curves.columns[f"q_with_{end}"]
+        hue, driven = LIGHT[CYCLE[index % len(CYCLE)]], units.convert(curves.columns[f"q_with_{end}"], "L/min")
         for dash, branch in (("-", opening), ("--", ~opening)):
             inside = branch & (command <= NEAR_ZERO)
             axes.plot(command[inside], driven[inside], dash, color=hue, lw=1.5)
             top = max(top, float(driven[inside].max()))
             if dash == "-":
-                labels.append((NEAR_ZERO, float(driven[inside][-1]), _pressure(end), hue))
+                labels.append((NEAR_ZERO, float(driven[inside][-1]), _pressure(end, units), hue))
     label_ends(axes, labels)
-    for dash, word in (("-", "opening, dP in MPa at the end"), ("--", "closing")):
+    for dash, word in (("-", f"opening, dP in {units.label('MPa')} at the end"), ("--", "closing")):
         axes.plot([], [], dash, color=LIGHT["soft"], label=word)
     axes.legend(loc="upper left")
-    axes.set(xlabel="command (% of full)", ylabel="flow Q (L/min)", xlim=(0, NEAR_ZERO), ylim=(0, 1.1 * top or 1),
+    flow = f"flow Q ({units.label('L/min')})"
+    axes.set(xlabel="command (% of full)", ylabel=flow, xlim=(0, NEAR_ZERO), ylim=(0, 1.1 * top or 1),
              title="with the compensator, near zero")  # fmt: skip
 
 
-def _pressure(end: str) -> str:
-    return f"{float(end.removesuffix('_MPa_L_min')):.2f}"
+def _pressure(end: str, units: RecordedUnits) -> str:
+    return units.number(float(end.removesuffix("_MPa_L_min")), ".2f MPa")
 
 
 def _first_flow(curves: Curves, column: str) -> float:
@@ -94,7 +101,9 @@ def _first_flow(curves: Curves, column: str) -> float:
     return float(flowing[0]) if flowing.size else 100.0
 
 
-def dead_zone_figure(pressures: Sequence[PressureResult], side: str, both: bool) -> ReportFigure:
+def dead_zone_figure(
+    pressures: Sequence[PressureResult], side: str, both: bool, units: RecordedUnits
+) -> ReportFigure:
     """Draw the dead zone of one side on both branches over the pressure drop, before and after."""
     figure, axes = titled_axes(3.0, side, both, legend_rows=1)
     dp = [each.dp_MPa for each in pressures]
@@ -105,9 +114,10 @@ def dead_zone_figure(pressures: Sequence[PressureResult], side: str, both: bool)
         "residual_closing": ("with, closing", "v", "--", "blue"),
     }
     percent = {key: [100 * getattr(each, key) for each in pressures] for key in lines}
+    at = units.convert(np.array(dp), "MPa")
     for key, (label, marker, dash, hue) in lines.items():
-        axes.plot(dp, percent[key], dash, marker=marker, ms=5.5, lw=1.6, color=LIGHT[hue], label=label)
-    axes.set(xlabel="pressure drop dP (MPa)", ylabel="dead zone (% of command)", ylim=(0, None))
+        axes.plot(at, percent[key], dash, marker=marker, ms=5.5, lw=1.6, color=LIGHT[hue], label=label)
+    axes.set(xlabel=f"pressure drop dP ({units.label('MPa')})", ylabel="dead zone (% of command)", ylim=(0, None))
     legend_below(figure, 4)
     worst = {key: max(values) for key, values in percent.items()}
     return to_report_figure(

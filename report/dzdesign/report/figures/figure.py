@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.identify.plots.frame import HUES
 
 if TYPE_CHECKING:
@@ -42,6 +43,10 @@ PALETTE = {name: (light, DARK[name]) for name, light in LIGHT.items()}
 #: For a series over the pressure drop: hues in turn.
 CYCLE = ("blue", "vermilion", "green", "purple", "orange", "ink")
 WIDTH = 7.4
+#: Left margin, and the width of numbers on the axis for which it has room: of ``5.150``.
+LEFT, TICKS_IN_MARGIN = 0.6, 0.345
+#: Of the numbers on axes, points.
+TICK_SIZE = 8.5
 #: Of Matplotlib, while a figure is drawn.
 STYLE = {
     "font.family": "DejaVu Sans",
@@ -49,8 +54,8 @@ STYLE = {
     "axes.labelsize": 9,
     "axes.titlesize": 9.5,
     "axes.titlelocation": "left",
-    "xtick.labelsize": 8.5,
-    "ytick.labelsize": 8.5,
+    "xtick.labelsize": TICK_SIZE,
+    "ytick.labelsize": TICK_SIZE,
     "legend.fontsize": 8.5,
     "legend.frameon": False,
     "axes.grid": True,
@@ -140,7 +145,7 @@ def new_figure(height: float, *, legend_rows: int = 0, right: float = 0.2, top: 
     FigureCanvasSVG(figure)
     bottom = 0.5 + (0.1 + 0.2 * legend_rows if legend_rows else 0.0)
     figure.subplots_adjust(
-        left=0.6 / WIDTH, right=1 - right / WIDTH, bottom=bottom / height, top=1 - top / height
+        left=LEFT / WIDTH, right=1 - right / WIDTH, bottom=bottom / height, top=1 - top / height
     )
     return figure
 
@@ -161,9 +166,9 @@ def side_words(name: str, both: bool) -> str:
     return f", {name} commands" if both else ""
 
 
-def span(values: "Sequence[float] | np.ndarray", unit: str, digits: int) -> str:
+def span(values: "Sequence[float] | np.ndarray", form: str, units: RecordedUnits) -> str:
     """Return from where to where values run, with their unit."""
-    return f"{min(values):.{digits}f} to {max(values):.{digits}f} {unit}"
+    return f"{units.number(min(values), form)} to {units.text(max(values), form)}"
 
 
 def legend_below(figure: "Figure", columns: int) -> None:
@@ -191,9 +196,23 @@ def label_ends(axes: "Axes", labels: Sequence[tuple[float, float, str, str]]) ->
 
 def to_report_figure(figure: "Figure", name: str, caption: str, description: str, csv: str) -> ReportFigure:
     """Return a figure as the page shows it; see `ReportFigure`."""
+    _make_room_for_ticks(figure)
     return ReportFigure(
         name=name, caption=caption, description=description, svg=_svg_of(figure, name, description), csv=csv
     )
+
+
+def _make_room_for_ticks(figure: "Figure") -> None:
+    """Widen the margin of a single panel whose numbers are wider than the usual ones: counts, or many digits."""
+    if len(figure.axes) != 1:
+        return
+    low, high = sorted(figure.axes[0].get_ylim())
+    ticks = [tick for tick in figure.axes[0].get_yticks() if low <= tick <= high]
+    labels = figure.axes[0].yaxis.get_major_formatter().format_ticks(ticks)
+    em = max((sum(0.32 if sign in ".," else 0.64 for sign in label) for label in labels), default=0.0)
+    surplus = TICK_SIZE * em / 72 - TICKS_IN_MARGIN
+    if surplus > 0:
+        figure.subplots_adjust(left=(LEFT + surplus + 0.04) / WIDTH)
 
 
 def _svg_of(figure: "Figure", name: str, description: str) -> str:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.compensator import Compensator
 from dzdesign.identify.plots.valve_curves import BOUND_NAMES, BRANCHES, draw_beta, draw_thresholds
 from dzdesign.identify.valve.side_model import SideModel
@@ -21,7 +22,7 @@ from dzdesign.report.figures.figure import (
 from dzdesign.report.sections.cells import counted
 
 
-def lines_figure(side: SideModel, name: str, both: bool) -> ReportFigure:
+def lines_figure(side: SideModel, name: str, both: bool, units: RecordedUnits) -> ReportFigure:
     """Draw the straight parts that were fitted, and the knees that they give, one hue a pressure drop."""
     figure, axes = titled_axes(3.5, name, both, right=0.65)
     rows, labels = [], []
@@ -35,17 +36,24 @@ def lines_figure(side: SideModel, name: str, both: bool) -> ReportFigure:
             flows = np.array(share) * test.q_max_L_min
             ends = knee + flows / test.slope_L_min_V
             far = max(far, (float(ends[1]), float(flows[1])))
-            axes.plot([knee, ends[0]], [0, flows[0]], ":", color=hue, lw=1.2)
-            axes.plot(ends, flows, dash, color=hue, lw=1.8)
-            axes.plot(knee, 0, marker, color=hue, ms=5, clip_on=False, zorder=4)
+            shown, shown_knee = units.convert(ends, "V"), units.convert(knee, "V")
+            shown_flows = units.convert(flows, "L/min")
+            axes.plot([shown_knee, shown[0]], [0, shown_flows[0]], ":", color=hue, lw=1.2)
+            axes.plot(shown, shown_flows, dash, color=hue, lw=1.8)
+            axes.plot(shown_knee, 0, marker, color=hue, ms=5, clip_on=False, zorder=4)
             rows.append([test.dp_MPa, word, knee, *ends.round(4).tolist(), *flows.round(4).tolist()])
-        labels.append((*far, "dP not recorded" if test.dp_MPa is None else f"{test.dp_MPa:.2f} MPa", hue))
+        place = units.convert(far[0], "V"), units.convert(far[1], "L/min")
+        labels.append((*place, "dP not recorded" if test.dp_MPa is None else units.text(test.dp_MPa, ".2f MPa"), hue))
     label_ends(axes, labels)
     for _, word, marker, dash, _ in BRANCHES:
         axes.plot([], [], dash, marker=marker, color=LIGHT["soft"], label=word)
     axes.plot([], [], ":", color=LIGHT["soft"], label="extrapolated to the knee")
     axes.legend(loc="upper left")
-    axes.set(xlabel="valve command u (V)", ylabel="flow Q (L/min)", ylim=(0, None))
+    axes.set(
+        xlabel=f"valve command u ({units.label('V')})", ylabel=f"flow Q ({units.label('L/min')})", ylim=(0, None)
+    )
+    if units.falling:
+        axes.invert_xaxis()
     return to_report_figure(
         figure,
         f"fit-{name}",
@@ -54,19 +62,19 @@ def lines_figure(side: SideModel, name: str, both: bool) -> ReportFigure:
         + ". Samples and residuals are drawn by dzdesign identify --plots: the recordings are not part of an "
         "artefact folder.",
         f"Straight lines of flow over command of {counted(len(side.tests), 'pressure drop')}; they meet zero "
-        f"flow at the knees, {span([row[2] for row in rows], 'V', 3)}.",
+        f"flow at the knees, {span([row[2] for row in rows], '.3f V', units)}.",
         csv_text(("dp_MPa", "branch", "knee_V", "from_V", "to_V", "from_L_min", "to_L_min"), rows),
     )
 
 
-def thresholds_figure(side: SideModel, guard: str, name: str, both: bool) -> ReportFigure:
+def thresholds_figure(side: SideModel, guard: str, name: str, both: bool, units: RecordedUnits) -> ReportFigure:
     """Draw the thresholds over the pressure drop, and what is certified of the guarded one."""
     curve = side.certified[guard]
     several = len(side.tests) > 1
     pieces = curve.bound(side.trend or "flat").pieces if several else ()
     least_to_next = [round(float(piece.least(piece.from_MPa, piece.to_MPa)), 7) for piece in pieces]
     figure, axes = titled_axes(3.8, name, both, legend_rows=2)
-    draw_thresholds(axes, side, curve)
+    draw_thresholds(axes, side, curve, units)
     legend_below(figure, 4)
     return to_report_figure(
         figure,
@@ -79,9 +87,9 @@ def thresholds_figure(side: SideModel, guard: str, name: str, both: bool) -> Rep
             if several
             else "its lower bound. One pressure drop was tested, and nothing is certified at another."
         ),
-        f"Thresholds over the pressure drop: the {guard} threshold lies at {span(curve.u_threshold_V, 'V', 3)}, "
-        f"its lower bound at {span(curve.u_lower_V, 'V', 3)}, the largest certified offset at "
-        f"{span(curve.u_offset_V, 'V', 3)}.",
+        f"Thresholds over the pressure drop: the {guard} threshold lies at "
+        f"{span(curve.u_threshold_V, '.3f V', units)}, its lower bound at {span(curve.u_lower_V, '.3f V', units)}, the "
+        f"largest certified offset at {span(curve.u_offset_V, '.3f V', units)}.",
         csv_text(
             ("dp_MPa", "knee_opening_V", "knee_closing_V", "onset_opening_V", "onset_closing_V", "threshold_V",
              "lower_bound_V", "offset_V", "certified_up_to_next_V"),
@@ -99,7 +107,7 @@ def thresholds_figure(side: SideModel, guard: str, name: str, both: bool) -> Rep
 
 
 def beta_figure(
-    side: SideModel, guard: str, name: str, both: bool, compensator: Compensator | None
+    side: SideModel, guard: str, name: str, both: bool, compensator: Compensator | None, units: RecordedUnits
 ) -> ReportFigure | None:
     """Draw beta between what the bounds allow and, where there is a compensator, its table of integers.
 
@@ -110,7 +118,7 @@ def beta_figure(
         return None
     dp, u_min0 = np.array(curve.dp_MPa), side.reference.u_min_V
     figure, axes = titled_axes(3.6, name, both, legend_rows=2)
-    draw_beta(axes, side, curve)
+    draw_beta(axes, side, curve, units)
     rows: list[list[str | float | None]] = [
         [f"identified, {branch}", at, value, se, volts]
         for branch, found in side.identified.items()
@@ -124,22 +132,23 @@ def beta_figure(
         where, nodes, of_the_C = _beta_table(compensator, name)
         table = nodes * of_the_C / u_min0  # with a transition the C counts from the opening threshold
         near = (where >= dp[0] - 0.1 * np.ptp(dp)) & (where <= dp[-1] + 0.1 * np.ptp(dp))
-        axes.plot(where[near], table[near], ".-", color=LIGHT["ink"], ms=4, lw=1, label="the C's offset / u_min0")
+        shown = units.convert(where[near], "MPa")
+        axes.plot(shown, table[near], ".-", color=LIGHT["ink"], ms=4, lw=1, label="the C's offset / u_min0")
         rows += [
             ["C", round(float(x), 6), round(float(y), 7), None, round(float(y * of_the_C), 7)]
             for x, y in zip(where, nodes, strict=True)
         ]
     legend_below(figure, 3)
-    beta = side.beta
-    low, high = min(beta.beta), max(beta.beta)
+    low, high = min(side.beta.beta), max(side.beta.beta)
+    shares = [volts / u_min0 for volts in curve.offset_V]
     return to_report_figure(
         figure,
         f"beta-{name}",
         f"β over the pressure drop{side_words(name, both)}: the identified thresholds over that at dP0, u_min0 = "
-        f"{u_min0:.4f} V (Eq. 5), with their error; and over the same u_min0 what is certified of the {guard} "
-        "threshold, under which the law puts out its offset at zero command." + _about_the_table(compensator),
-        f"Identified beta lies between {low:.4f} and {high:.4f} over {dp[0]:.2f} to {dp[-1]:.2f} MPa, the largest "
-        f"certified offset at {span(np.array(curve.offset_V) / u_min0, '', 4).strip()} of u_min0.",
+        f"{units.text(u_min0, '.4f V')} (Eq. 5), with their error; and over the same u_min0 what is certified of the "
+        f"{guard} threshold, under which the law puts out its offset at zero command." + _about_the_table(compensator),
+        f"Identified beta lies between {low:.4f} and {high:.4f} over {span(dp, '.2f MPa', units)}, the largest "
+        f"certified offset at {min(shares):.4f} to {max(shares):.4f} of u_min0.",
         csv_text(("of", "dp_MPa", "beta", "beta_se", "u_V"), rows),
     )
 

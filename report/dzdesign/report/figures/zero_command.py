@@ -2,16 +2,20 @@
 
 import numpy as np
 
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.report.figures.figure import LIGHT, Curves, ReportFigure, legend_below, new_figure, to_report_figure
 
 
-def zero_figure(curves: Curves, side: str, guard: str) -> ReportFigure:
+def zero_figure(curves: Curves, side: str, guard: str, units: RecordedUnits) -> ReportFigure:
     """Draw the drive at zero command under the threshold's lower bound, at every code of the tested interval.
 
     From zero_command_<side>.csv.
     """
     dp, drive, bound = (curves.columns[name] for name in ("dp_MPa", "drive_V", "bound_V"))
     above = drive > bound
+    least = int(np.argmin(bound - drive))
+    margin, at = units.text(1e3 * (bound - drive)[least], ".2f mV"), units.text(dp[least], ".2f MPa")
+    dp, drive, bound = units.convert(dp, "MPa"), units.convert(drive, "V"), units.convert(bound, "V")
     figure = new_figure(3.4, legend_rows=2)
     axes = figure.subplots()
     axes.fill_between(dp, drive, bound, where=~above, step="mid", color=LIGHT["green"], alpha=0.16, lw=0,
@@ -21,12 +25,13 @@ def zero_figure(curves: Curves, side: str, guard: str) -> ReportFigure:
     if above.any():
         axes.fill_between(dp, drive, bound, where=above, step="mid", facecolor="none", edgecolor=LIGHT["vermilion"],
                           hatch="xxxx", lw=1, label="OVER-COMPENSATED")  # fmt: skip
-    least = int(np.argmin(bound - drive))
     axes.plot(dp[least], drive[least], "o", ms=9, mfc="none", mec=LIGHT["ink"], mew=1.3)
-    axes.annotate(f"{1e3 * (bound - drive)[least]:.2f} mV", (dp[least], drive[least]), xytext=(9, 7),
+    axes.annotate(margin, (dp[least], drive[least]), xytext=(9, 7),
                   textcoords="offset points", ha="left", va="bottom", fontsize=8.5)  # fmt: skip
     axes.margins(y=0.14)
-    axes.set(xlabel="pressure drop dP (MPa)", ylabel="command u (V)")
+    axes.set(xlabel=f"pressure drop dP ({units.label('MPa')})", ylabel=f"command u ({units.label('V')})")
+    if units.falling:
+        axes.invert_yaxis()
     legend_below(figure, 2)
     return to_report_figure(
         figure,
@@ -34,7 +39,6 @@ def zero_figure(curves: Curves, side: str, guard: str) -> ReportFigure:
         f"Zero command, {side} side, where it matters most: the drive against what is certified, at "
         "every code of the tested interval. Ringed: the smallest margin. Outside the interval nothing is certified.",
         f"At {int(above.sum())} of {dp.size} codes of the pressure drop the drive at zero command lies above the "
-        f"threshold's lower bound; the smallest margin is {1e3 * (bound - drive)[least]:.2f} mV at {dp[least]:.2f} "
-        "MPa.",
+        f"threshold's lower bound; the smallest margin is {margin} at {at}.",
         curves.text,
     )

@@ -3,13 +3,16 @@
 from collections.abc import Sequence
 
 from dzdesign.assess.assessment import Assessment
+from dzdesign.assess.limits import LimitResult
 from dzdesign.assess.quantities import Quantity, Reading
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.report.page import Section
 from dzdesign.report.reproduction import Outcome, PaperNumber, Reproduction
-from dzdesign.report.sections.cells import Cell, Table, in_number_font, number, table_of, verdict
+from dzdesign.report.sections.cells import Cell, Table, in_number_font, number, recorded, table_of, verdict
 
 #: Decimals in the unit of a quantity.
 DECIMALS = {"%": 2, "L/min": 3, "L/min/V": 4}
+IN_RECORDED_UNITS = ("L/min", "L/min/V")
 
 
 def acceptance_section(assessment: Assessment | None, reproduction: Reproduction | None) -> Section:
@@ -66,28 +69,34 @@ def _limits_table(assessment: Assessment) -> Table:
         ("verdict", lambda one: verdict(one.holds)),
         ("quantity", lambda one: _quantity(assessment, one.quantity).name),
         ("where", lambda one: one.place),
-        ("limit", lambda one: in_number_font(f"{one.limit:.4g} {one.unit}")),
+        ("limit", lambda one: in_number_font(_limit(one, assessment.recorded_units))),
         ("found", lambda one: one.text),
     )
 
 
+def _limit(one: LimitResult, units: RecordedUnits) -> str:
+    known = one.unit in IN_RECORDED_UNITS
+    return units.text(one.limit, f".4g {one.unit}") if known else f"{one.limit:.4g} {one.unit}"
+
+
 def _before_after_table(assessment: Assessment) -> Table:
     """Return each quantity before and after, at every pressure drop."""
+    units = assessment.recorded_units
     compared = [item for item in assessment.pressures if item.readings("after")]
     rows = [
-        (item, quantity, _reading(quantity.unit, both.before), _reading(quantity.unit, both.after))
+        (item, quantity, _reading(quantity.unit, both.before, units), _reading(quantity.unit, both.after, units))
         for item in compared or assessment.pressures
         for quantity, both in ((_quantity(assessment, key), both) for key, both in item.quantities.items())
     ]
     return table_of(
         "Recordings without and with the compensator, at the pressure drops that have both",
         [row for row in rows if {row[2], row[3]} - {"–", "not seen"}],
-        ("dP (MPa)", lambda row: number(row[0].dp_MPa, 2)),
+        (f"dP ({units.label('MPa')})", lambda row: recorded(row[0].dp_MPa, ".2f MPa", units)),
         ("commands", lambda row: row[0].side),
         ("quantity", lambda row: row[1].name),
         ("before", lambda row: in_number_font(row[2])),
         ("after", lambda row: in_number_font(row[3])),
-        ("unit", lambda row: row[1].unit),
+        ("unit", lambda row: units.label(row[1].unit) if row[1].unit in IN_RECORDED_UNITS else row[1].unit),
     )
 
 
@@ -95,11 +104,16 @@ def _quantity(assessment: Assessment, key: str) -> Quantity:
     return assessment.quantities.get(key) or Quantity(name=key, unit="", formula="")
 
 
-def _reading(unit: str, reading: Reading | None) -> str:
+def _reading(unit: str, reading: Reading | None, units: RecordedUnits) -> str:
     """Return a value, or the bound of what can't be seen."""
     if reading is None:
         return "–"
     digits = DECIMALS.get(unit, 3)
+
+    def text(value: float) -> str:
+        known = unit in IN_RECORDED_UNITS
+        return (recorded(value, f".{digits}f {unit}", units) if known else number(value, digits)).text
+
     if reading.value is not None:
-        return number(reading.value, digits).text
-    return "not seen" if reading.at_most is None else f"≤ {number(reading.at_most, digits).text}"
+        return text(reading.value)
+    return "not seen" if reading.at_most is None else f"≤ {text(reading.at_most)}"

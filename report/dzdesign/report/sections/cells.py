@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.core.verdicts import verdict_words
 
 #: The sign beside a verdict, so that its colour is not its only carrier, and its kind.
@@ -72,6 +73,20 @@ def number(value: float | None, digits: int, sign: str = "") -> Cell:
     if float(text) == 0:
         text = f"{0.0:{sign}.{digits}f}"
     return in_number_font(text.replace("-", "−"))
+
+
+def recorded(value: float | None, form: str, units: RecordedUnits) -> Cell:
+    """Return a number in the unit of the recordings; `form` is that of `RecordedUnits.number`.
+
+    Examples
+    --------
+    >>> recorded(1.25, ".1f V", RecordedUnits()).text, recorded(None, ".1f V", RecordedUnits()).text
+    ('1.2', '–')
+    """
+    if value is None:
+        return in_number_font("–")
+    text = units.number(value, form)
+    return in_number_font(text.replace("-", "−") if text.strip("-0.") else text.removeprefix("-"))
 
 
 def in_number_font(text: str) -> Cell:

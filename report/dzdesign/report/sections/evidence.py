@@ -1,9 +1,10 @@
 """Sections on the evidence: every input, closed loop, requirements."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 
 from dzdesign.core.errors import InputError
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.core.verdicts import NOT_CHECKED
 from dzdesign.report.chain import Chain
 from dzdesign.report.compensator_sides import laws_of
@@ -12,7 +13,17 @@ from dzdesign.report.figures.figure import Curves, ReportFigure
 from dzdesign.report.figures.input_map import map_figure
 from dzdesign.report.figures.zero_command import zero_figure
 from dzdesign.report.page import Section
-from dzdesign.report.sections.cells import Cell, Table, from_to, in_number_font, number, table_of, verdict, whole
+from dzdesign.report.sections.cells import (
+    Cell,
+    Table,
+    from_to,
+    in_number_font,
+    number,
+    recorded,
+    table_of,
+    verdict,
+    whole,
+)
 from dzdesign.verify.closed_loop.evidence_curves import closed_loop_name, input_map_name, read_curves, zero_command_name
 from dzdesign.verify.evidence import Evidence, InputCheck
 from dzdesign.verify.loop_results import ClosedLoopResult, MonteCarlo, PressureResult, ScenarioResult, Spread
@@ -49,7 +60,7 @@ def inputs_section(chain: Chain) -> Section:
         if map_curves and law and chain.compensator:
             figures.append(map_figure(map_curves, zero_curves, chain.compensator, each))
         if zero_curves and law:
-            figures.append(zero_figure(zero_curves, side, law.certificate.guard))
+            figures.append(zero_figure(zero_curves, side, law.certificate.guard, chain.recorded_units.of_side(side)))
         for curves, name in ((map_curves, input_map_name(side)), (zero_curves, zero_command_name(side))):
             if curves is None or law is None:
                 missing = f"{name} or its compensator is missing; `dzdesign verify` makes it."
@@ -77,21 +88,22 @@ def loop_section(chain: Chain) -> Section:
     if not loop.pressures:
         return Section(missing=f"{NOT_CHECKED}: the closed loop did not run, see the requirements.")
     sides = dict.fromkeys(each.side for each in loop.pressures)
-    figures, missing = [], ""
+    figures, missing, units = [], "", chain.recorded_units
     for side in sides:
-        figures.append(dead_zone_figure([each for each in loop.pressures if each.side == side], side, len(sides) > 1))
+        of_side = [each for each in loop.pressures if each.side == side]
+        figures.append(dead_zone_figure(of_side, side, len(sides) > 1, units))
         curves = _curves(chain, closed_loop_name(side))
         if curves is None:
             missing = f"{closed_loop_name(side)} is missing, so the ramps are not drawn; `dzdesign verify` makes it."
         else:
-            figures.append(loop_figure(curves, side, len(sides) > 1))
+            figures.append(loop_figure(curves, side, len(sides) > 1, units))
     return Section(
         figures=figures,
         tables=(
-            loops_table(loop.pressures),
-            readings_table(loop.pressures),
-            scenarios_table(evidence.scenarios),
-            series_table(evidence.monte_carlo),
+            loops_table(loop.pressures, units),
+            readings_table(loop.pressures, units),
+            scenarios_table(evidence.scenarios, units),
+            series_table(evidence.monte_carlo, units),
             plant_table(loop),
         ),
         lines=(_plant_line(loop),),
@@ -129,14 +141,15 @@ def plant_table(loop: ClosedLoopResult) -> Table | None:
     )
 
 
-def readings_table(pressures: Sequence[PressureResult]) -> Table:
+def readings_table(pressures: Sequence[PressureResult], units: RecordedUnits) -> Table:
     """Return the dead zones read at the reading flow, beside what an ideal line would read there."""
-    flows = from_to([each.reading_flow_L_min for each in pressures], ".2f")
+    flows = [each.reading_flow_L_min for each in pressures]
     return table_of(
-        f"Dead zones read at {flows} L/min, in per cent of command; an ideal line rises straight from zero command",
+        f"Dead zones read {units.span(min(flows), max(flows), '.2f L/min')}, in per cent of command; an ideal line "
+        "rises straight from zero command",
         pressures,
         ("side", lambda one: one.side),
-        ("dP (MPa)", lambda one: number(one.dp_MPa, 2)),
+        (f"dP ({units.label('MPa')})", lambda one: recorded(one.dp_MPa, ".2f MPa", units)),
         ("opening without (%)", lambda one: number(100 * one.reading_opening_without, 1)),
         ("opening with (%)", lambda one: number(100 * one.reading_opening, 1)),
         ("closing without (%)", lambda one: number(100 * one.reading_closing_without, 1)),
@@ -145,59 +158,67 @@ def readings_table(pressures: Sequence[PressureResult]) -> Table:
     )
 
 
-def loops_table(pressures: Sequence[PressureResult]) -> Table:
+def loops_table(pressures: Sequence[PressureResult], units: RecordedUnits) -> Table:
     """Return dead zones and flows of the closed loop."""
+    flow = units.label("L/min")
     return table_of(
-        "Dead zones at the onset of flow in per cent of command, flows in L/min",
+        f"Dead zones at the onset of flow in per cent of command, flows in {flow}",
         pressures,
         ("side", lambda one: one.side),
-        ("dP (MPa)", lambda one: number(one.dp_MPa, 2)),
+        (f"dP ({units.label('MPa')})", lambda one: recorded(one.dp_MPa, ".2f MPa", units)),
         ("opening without (%)", lambda one: number(100 * one.dead_zone_opening, 1)),
         ("opening with (%)", lambda one: number(100 * one.residual_opening, 1)),
         ("closing without (%)", lambda one: number(100 * one.dead_zone_closing, 1)),
         ("closing with (%)", lambda one: number(100 * one.residual_closing, 1)),
-        ("at zero without β (L/min)", lambda one: in_number_font(one.in_words(one.q_zero_without_beta_L_min))),
-        ("at zero (L/min)", lambda one: in_number_font(one.in_words(one.q_zero_L_min))),
-        ("largest without (L/min)", lambda one: number(one.q_max_direct_L_min, 2)),
-        ("largest with (L/min)", lambda one: number(one.q_max_L_min, 2)),
+        (f"at zero without β ({flow})", lambda one: in_number_font(one.in_words(one.q_zero_without_beta_L_min, units))),
+        (f"at zero ({flow})", lambda one: in_number_font(one.in_words(one.q_zero_L_min, units))),
+        (f"largest without ({flow})", lambda one: recorded(one.q_max_direct_L_min, ".2f L/min", units)),
+        (f"largest with ({flow})", lambda one: recorded(one.q_max_L_min, ".2f L/min", units)),
     )
 
 
-def scenarios_table(scenarios: Sequence[ScenarioResult]) -> Table | None:
+def scenarios_table(scenarios: Sequence[ScenarioResult], units: RecordedUnits) -> Table | None:
     """Return each scenario at the pressure drop where it is worst; None if there are none."""
     worst: dict[str, ScenarioResult] = {}
     for each in sorted(scenarios, key=lambda one: (one.q_zero_L_min, one.q_peak_at_zero_L_min, one.dp_MPa)):
         worst[each.name] = each
     if not worst:
         return None
+    flow = units.label("L/min")
     return table_of(
         "Beside ramps: each scenario at the pressure drop where it is worst",
         [worst[name] for name in dict.fromkeys(each.name for each in scenarios)],
         ("scenario", lambda one: one.name),
-        ("dP (MPa)", lambda one: number(one.dp_MPa, 2)),
-        ("at zero, at the end (L/min)", lambda one: in_number_font(one.in_words(one.q_zero_L_min))),
-        ("on the way, at most (L/min)", lambda one: in_number_font(one.in_words(one.q_peak_at_zero_L_min))),
+        (f"dP ({units.label('MPa')})", lambda one: recorded(one.dp_MPa, ".2f MPa", units)),
+        (f"at zero, at the end ({flow})", lambda one: in_number_font(one.in_words(one.q_zero_L_min, units))),
+        (f"on the way, at most ({flow})", lambda one: in_number_font(one.in_words(one.q_peak_at_zero_L_min, units))),
         ("required", lambda one: "must be shut at the end" if one.must_shut else "no core can know: not required"),
     )
 
 
-def series_table(series: MonteCarlo | None) -> Table | None:
+def series_table(series: MonteCarlo | None, units: RecordedUnits) -> Table | None:
     """Return the quantiles of a series of plants; None if none was run."""
     if series is None:
         return None
 
-    def spread(of: Spread, factor: float) -> Cell:
-        middle, low, high = (f"{factor * value:.2f}" for value in (of.p50, of.p01, of.p99))
+    def spread(of: Spread, shown: Callable[[float], str]) -> Cell:
+        middle, low, high = map(shown, (of.p50, of.p01, of.p99))
         return in_number_font(f"{middle} ({low} to {high})")
+
+    def percent(share: float) -> str:
+        return f"{100 * share:.2f}"
+
+    def flow(value: float) -> str:
+        return units.number(value, ".2f L/min")
 
     return table_of(
         "Series of plants: median (1 to 99 %). No requirement: the certificate is of the tests' valve",
         series.pressures,
         ("side", lambda one: one.side),
-        ("dP (MPa)", lambda one: number(one.dp_MPa, 2)),
-        ("opening with (%)", lambda one: spread(one.residual_opening, 100)),
-        ("closing with (%)", lambda one: spread(one.residual_closing, 100)),
-        ("at zero (L/min)", lambda one: spread(one.q_zero_L_min, 1)),
+        (f"dP ({units.label('MPa')})", lambda one: recorded(one.dp_MPa, ".2f MPa", units)),
+        ("opening with (%)", lambda one: spread(one.residual_opening, percent)),
+        ("closing with (%)", lambda one: spread(one.residual_closing, percent)),
+        (f"at zero ({units.label('L/min')})", lambda one: spread(one.q_zero_L_min, flow)),
         ("plants that leak", lambda one: in_number_font(f"{one.leaking} of {one.plants}")),
     )
 

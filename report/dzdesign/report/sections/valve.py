@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.core.units import chance
 from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.model import ValveModel
@@ -9,7 +10,7 @@ from dzdesign.identify.valve.side_model import SideModel
 from dzdesign.report.compensator_sides import laws_of
 from dzdesign.report.figures.valve import beta_figure, lines_figure, thresholds_figure
 from dzdesign.report.page import Section
-from dzdesign.report.sections.cells import Table, counted, number, table_of
+from dzdesign.report.sections.cells import Cell, Table, counted, recorded, table_of
 
 LAG = {"declared": "declared", "identified": "from ramps of two rates", "unknown": "none declared"}
 
@@ -22,24 +23,27 @@ def valve_sections(valve: ValveModel | None, compensator: Compensator | None) ->
     both = len(valve.sides) > 1
     fits, thresholds, tables, betas = [], [], [], []
     for name, side in valve.sides.items():
-        law = laws_of(compensator).get(name)
+        law, units = laws_of(compensator).get(name), valve.recorded_units.of_side(name)
         guard = law.certificate.guard if law else side.certificate.guard
-        fits.append(lines_figure(side, name, both))
-        thresholds.append(thresholds_figure(side, guard, name, both))
-        tables.append(thresholds_table(side, guard, f"Thresholds, {name} commands"))
-        betas.append(beta_figure(side, guard, name, both, compensator if law else None))
-    meter = valve.meter
+        fits.append(lines_figure(side, name, both, units))
+        thresholds.append(thresholds_figure(side, guard, name, both, units))
+        tables.append(thresholds_table(side, guard, f"Thresholds, {name} commands", units))
+        betas.append(beta_figure(side, guard, name, both, compensator if law else None, units))
+    meter, units = valve.meter, valve.recorded_units
+    shown = units.in_words()
     return {
         "data": Section(
             figures=fits,
             lines=(
                 f"{counted(sum(len(side.tests) for side in valve.sides.values()), 'ramp test')}; full command "
-                f"{valve.u_max_V:g} V.",
-                f"Flow meter: floor {meter.floor_L_min:.2f} L/min; lag taken as {meter.lag_s:.3g} s "
+                f"{units.text(valve.u_max_V, 'g V')}.",
+                *([f"Units: {shown}; the files and the curves as CSV are in V, MPa and L/min."] if shown else []),
+                f"Flow meter: floor {units.text(meter.floor_L_min, '.2f L/min')}; lag taken as {meter.lag_s:.3g} s "
                 f"({LAG[meter.lag_is]}).",
-                *(_trend(name, side) for name, side in valve.sides.items()),
+                *(_trend(name, side, units.of_side(name)) for name, side in valve.sides.items()),
                 *(
-                    f"{name.capitalize()} commands, from ramp to ramp: {side.certificate.repeatability.in_words()}."
+                    f"{name.capitalize()} commands, from ramp to ramp: "
+                    f"{side.certificate.repeatability.in_words(units)}."
                     for name, side in valve.sides.items()
                 ),
                 *(f"{name.capitalize()} commands: not tested." for name in valve.untested_sides),
@@ -60,16 +64,17 @@ def valve_sections(valve: ValveModel | None, compensator: Compensator | None) ->
     }
 
 
-def _trend(name: str, side: SideModel) -> str:
+def _trend(name: str, side: SideModel, units: RecordedUnits) -> str:
     stroke = (
         f"{name.capitalize()} commands: drive range of the valve k x_max/u_max = {side.k_x_max_over_u_max:.4f}, the "
         "command from the knee to full stroke as a share of full command"
     )
     if side.trend is None or side.trend_change_V is None or side.trend_change_se_V is None or side.trend_p is None:
         return f"{stroke}; how the threshold moves with the pressure drop can't be said from one ramp test."
-    change, error = 1e3 * side.trend_change_V, 1e3 * side.trend_change_se_V
+    change = units.number(1e3 * side.trend_change_V, "+.1f mV")
+    error = units.text(1e3 * side.trend_change_se_V, ".1f mV")
     return (
-        f"{stroke}; trend of the threshold with the pressure drop: {side.trend}, {change:+.1f} ± {error:.1f} mV "
+        f"{stroke}; trend of the threshold with the pressure drop: {side.trend}, {change} ± {error} "
         f"over the tested range ({chance(side.trend_p)})."
     )
 
@@ -79,23 +84,28 @@ def _first_of(ramps: Sequence[str]) -> str:
     return f"{ramps[0]} and {len(ramps) - 1} more" if len(ramps) > 1 else ramps[0]
 
 
-def thresholds_table(side: SideModel, guard: str, title: str) -> Table:
+def thresholds_table(side: SideModel, guard: str, title: str, units: RecordedUnits) -> Table:
     """Return the thresholds of each ramp test, with the lower bounds of the guarded one."""
-    leaks = (("leak (L/min)", lambda row: number(row[0].leak_L_min, 2)),)
+    command, dp, flow = (units.label(unit) for unit in ("V", "MPa", "L/min"))
+
+    def cell(value: float | None, form: str) -> Cell:
+        return recorded(value, form, units)
+
+    leaks = ((f"leak ({flow})", lambda row: cell(row[0].leak_L_min, ".2f L/min")),)
     return table_of(
         title,
         zip(side.tests, side.certified[guard].u_lower_V, strict=True),
-        ("dP (MPa)", lambda row: number(row[0].dp_MPa, 3)),
-        ("knee opening (V)", lambda row: number(row[0].u_knee_rising_V, 3)),
-        ("knee closing (V)", lambda row: number(row[0].u_knee_falling_V, 3)),
-        ("onset opening (V)", lambda row: number(row[0].u_onset_rising_V, 3)),
-        ("onset closing (V)", lambda row: number(row[0].u_onset_falling_V, 3)),
-        ("s.e. of knee (mV)", lambda row: number(1e3 * row[0].u_knee_se_V, 1)),
-        (f"lower bound, {guard} (V)", lambda row: number(row[1], 3)),
-        ("slope (L/min/V)", lambda row: number(row[0].slope_L_min_V, 3)),
-        ("largest flow (L/min)", lambda row: number(row[0].q_max_L_min, 2)),
-        ("noise (L/min)", lambda row: number(row[0].noise_L_min, 3)),
-        ("noise level (L/min)", lambda row: number(row[0].noise_level_L_min, 2)),
+        (f"dP ({dp})", lambda row: cell(row[0].dp_MPa, ".3f MPa")),
+        (f"knee opening ({command})", lambda row: cell(row[0].u_knee_rising_V, ".3f V")),
+        (f"knee closing ({command})", lambda row: cell(row[0].u_knee_falling_V, ".3f V")),
+        (f"onset opening ({command})", lambda row: cell(row[0].u_onset_rising_V, ".3f V")),
+        (f"onset closing ({command})", lambda row: cell(row[0].u_onset_falling_V, ".3f V")),
+        (f"s.e. of knee ({units.label('mV')})", lambda row: cell(1e3 * row[0].u_knee_se_V, ".1f mV")),
+        (f"lower bound, {guard} ({command})", lambda row: cell(row[1], ".3f V")),
+        (f"slope ({units.label('L/min/V')})", lambda row: cell(row[0].slope_L_min_V, ".3f L/min/V")),
+        (f"largest flow ({flow})", lambda row: cell(row[0].q_max_L_min, ".2f L/min")),
+        (f"noise ({flow})", lambda row: cell(row[0].noise_L_min, ".3f L/min")),
+        (f"noise level ({flow})", lambda row: cell(row[0].noise_level_L_min, ".2f L/min")),
         *(leaks if any(test.leak_L_min for test in side.tests) else ()),
         ("ramp test", lambda row: _first_of(row[0].ramps)),
     )

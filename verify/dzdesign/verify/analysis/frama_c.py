@@ -132,6 +132,8 @@ def _pieces(law: ExactLaw, ending: str, tried: range) -> str:
         f"#define NOT_OF_A {_invalid(a)}",
         f"#define NOT_OF_B {_invalid(b)}",
         f"#define RAMPED {furthest * CODES}L",
+        f"#define FURTHEST {furthest}",
+        f"#define TRAVEL {law.compensator.drive_functions.play_codes}",
         f"#define PRESSURE_ENDS {{{', '.join(_braces(_kinds(law, a, code)) for code in tried)}}}",
     ]
     return "\n".join(lines) + "\n"

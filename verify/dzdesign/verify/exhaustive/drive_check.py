@@ -19,7 +19,11 @@ Codes = tuple[int, int, int]
 SEED, SAMPLES = 11, 3000
 #: A ramp that is not put anywhere; share of the samples before which it is.
 STAYS, PUT_SHARE = -(2**31), 0.04
-FIELDS = ("compare_a", "compare_b", "status", "law", "side", "ticks", "at_rest", "ramped")
+#: A command that no converter gives.
+INVALID = 65535
+#: The dragged point of a play is put as a number from this on; beyond the transition so far apart are the commands.
+PLAYED_SHIFTED, PLAYED_STRIDE = 8192, 61
+FIELDS = ("compare_a", "compare_b", "status", "law", "side", "ticks", "at_rest", "rising", "played", "ramped")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,29 +102,54 @@ def window_samples(compensator: Compensator) -> list[tuple[Codes, int]]:
 def every_state(compensator: Compensator) -> list[tuple[Codes, int, int]]:
     """Return every valid command from every state of rest and side: codes, the ramp's place and `state_word`.
 
-    The ramp is put where the command is, so that it does not hold it back.
+    The ramp is put where the command is, so that it does not hold it back. After a command that is not valid the drive
+    must be at rest, so one is tried from each state too, and a command between the ends of the zero band behind it.
+    With a play every command of the zero band and the transition, and some beyond, come from every direction of travel,
+    the dragged point wherever the noise may leave it.
     """
-    signals, command = compensator.signals, compensator.signals.command
-    sides = (1,) if len(signals.signs) == 1 else (-1, 0, 1)
-    rests = (0, 1) if compensator.zero_band_codes else (0,)
-    if not compensator.zero_band_codes and len(sides) == 1:
+    command, functions = compensator.signals.command, compensator.drive_functions
+    bipolar = len(compensator.signals.signs) == 2
+    if not compensator.zero_band_codes and not bipolar:
         return []
-    ramps = any(compensator.drive_functions.ramp_up + compensator.drive_functions.ramp_down)
-    rng = np.random.default_rng(SEED)
-    made = []
-    for side, rest in product(sides, rests):
-        for code in range(command.valid_codes[0], command.valid_codes[1] + 1):
-            pressures = (rng.integers(*sensor.valid_codes) for sensor in (signals.pressure_a, signals.pressure_b))
-            p_a, p_b = map(int, pressures)
-            away = command.direction(1) * (code - command.zero_code)
-            reached = away if len(sides) == 3 else max(away, 0)
-            made.append(((code, p_a, p_b), reached * STEP_UNIT if ramps else STAYS, state_word(side, rest)))
-    return made
+    low, high = command.valid_codes
+    between = command.zero_code + command.direction(1) * (compensator.zero_band_codes + 1)
+    whole = functions.play_codes if functions.has_play else 0
+    asked = []
+    for side, rest in product((-1, 0, 1) if bipolar else (1,), (0, 1) if compensator.zero_band_codes else (0,)):
+        word = state_word(side, rest, whole)
+        asked += [(code, word) for code in (*range(low, high + 1), INVALID)] + [(between, STAYS)]
+        if not functions.has_play or not side or rest:
+            continue
+        strays = functions.play_noise_codes + 1
+        end = compensator.transition_end + strays
+        places = {*range(end), *range(end, command.span(side), PLAYED_STRIDE), command.span(side)}
+        for away, rising, stray in product(sorted(places), range(whole + 1), (-strays, 0, strays)):
+            played = max(away + stray, 0)
+            code = command.zero_code + command.direction(side) * away
+            asked.append((code, state_word(side, rest, rising, played)))
+    return [_with_pressures(compensator, code, word, index) for index, (code, word) in enumerate(asked)]
 
 
-def state_word(side: int, rest: int) -> int:
-    """Return a driven side, -1 to 1, and whether the drive is at rest, in one number."""
-    return 2 * (side + 1) + rest
+def _with_pressures(compensator: Compensator, code: int, word: int, index: int) -> tuple[Codes, int, int]:
+    """Return a command with valid pressures, ever others, and the ramp's place beside the state."""
+    signals, functions = compensator.signals, compensator.drive_functions
+    p_a, p_b = (
+        low + index * stride % (high - low + 1)
+        for (low, high), stride in ((signals.pressure_a.valid_codes, 1001), (signals.pressure_b.valid_codes, 619))
+    )
+    away = signals.command.direction(1) * (code - signals.command.zero_code)
+    place = away if len(signals.signs) == 2 else max(away, 0)
+    return (code, p_a, p_b), place * STEP_UNIT if functions.has_ramp and code != INVALID else STAYS, word
+
+
+def state_word(side: int, rest: int, rising: int = 0, played: int = 0) -> int:
+    """Return a driven side, -1 to 1, whether the drive is at rest, and the play's travel and point in one number."""
+    return rest | side + 1 << 1 | rising << 3 | played + PLAYED_SHIFTED << 9
+
+
+def state_of(word: int) -> tuple[int, int, bool, int]:
+    """Return the travel, the side, whether at rest and the point of a `state_word`."""
+    return word >> 3 & 63, (word >> 1 & 3) - 1, bool(word & 1), (word >> 9) - PLAYED_SHIFTED
 
 
 class PreparedDrive:
@@ -144,7 +173,7 @@ class PreparedDrive:
                 if places[index - 1] != STAYS:
                     model.position = Fraction(places[index - 1], STEP_UNIT)
                 if words[index - 1] != STAYS:
-                    model.side, model.at_rest = words[index - 1] // 2 - 1, bool(words[index - 1] % 2)
+                    model.rising, model.side, model.at_rest, model.played = state_of(words[index - 1])
                 model.sample(*codes)
             for _ in range(self.ticks_per_sample):
                 model.tick()

@@ -7,6 +7,7 @@ the dither is a square wave about the law.
 
 from dataclasses import dataclass, field
 from fractions import Fraction
+from math import floor
 
 from dzdesign.design.compensator import Compensator
 
@@ -30,6 +31,9 @@ class DriveModel:
     tick_of_wave: int = 0
     #: Whether the command counts as zero.
     at_rest: bool = False
+    #: Of the play: the command without its noise, in codes from zero, and how far it counts as rising.
+    played: int = 0
+    rising: int = 0
     #: Command after the ramps, in codes from zero; positive commands above zero.
     position: Fraction = field(default_factory=Fraction)
 
@@ -37,6 +41,7 @@ class DriveModel:
         self.both = len(self.compensator.signals.signs) == 2
         self.has_rest = self.compensator.zero_band_codes > 0
         self.side, self.at_rest = 0 if self.both else 1, self.has_rest
+        self._turn_at_zero()
 
     def sample(self, command: int, p_a: int, p_b: int) -> None:
         """Take new codes."""
@@ -46,18 +51,46 @@ class DriveModel:
             self.status = self._status(command, p_a, p_b, 1)
             self.law, self.side, self.position = 0, 0 if self.both else 1, Fraction(0)
             self.at_rest = self.has_rest
+            self._turn_at_zero()
             return
         away = signals.command.direction(1) * (command - signals.command.zero_code)
         if any(functions.ramp_up + functions.ramp_down):
             self._ramp(away)
             away = int(self.position)  # towards zero: never more command than the ramp has reached
+        driven = self.side
         if self.both and abs(away) > functions.leave_zero_codes:
             self.side = 1 if away > 0 else -1
         if self.has_rest:
             away = self._past_rest(away)
+        if self.at_rest or self.side != driven:
+            self._turn_at_zero()
         code = signals.command.zero_code + signals.command.direction(1) * away
         self.status = self._status(command, p_a, p_b, self.side or 1)
         self.law = self._law(code, p_a, p_b) if self.side else 0
+        if functions.has_play and self.side and not self.at_rest:
+            self.law = max(self.law - floor(self._lowered_by_play(away * self.side)), 0)
+
+    def _turn_at_zero(self) -> None:
+        """Forget the travel: from zero command on, what comes is a rise."""
+        functions = self.compensator.drive_functions
+        self.played, self.rising = 0, functions.play_codes if functions.has_play else 0
+
+    def _lowered_by_play(self, towards: int) -> Fraction:
+        """Return by how many counts the law is lowered, for a command of so many codes towards full.
+
+        The play operator drags a point along that stays within the noise's peak of the command; its travel, held to the
+        play's codes, says how far the command rises. Of the valve's hysteresis a falling command takes the share of
+        the transition that lies behind it.
+        """
+        functions, compensator = self.compensator.drive_functions, self.compensator
+        before = self.played
+        if abs(towards - self.played) > functions.play_noise_codes:
+            self.played = towards - functions.play_noise_codes * (1 if towards > self.played else -1)
+        self.rising = min(max(self.rising + self.played - before, 0), functions.play_codes)
+        width = functions.play_counts[0 if self.side > 0 else 1]
+        past = min(max(towards - compensator.zero_band_codes, 0), compensator.transition_codes)
+        falling = Fraction(functions.play_codes - self.rising, functions.play_codes)
+        return width * falling * Fraction(past, compensator.transition_codes)
 
     def _past_rest(self, away: int) -> int:
         """Return the command that counts: it leaves its rest beyond the band's outer end, and comes back at its inner.
@@ -125,4 +158,4 @@ class DriveModel:
     def state(self) -> tuple[int, ...]:
         """Everything that `struct dz_drive` holds, in its order."""
         ramped = self.position * STEP_UNIT
-        return (*self.outputs, self.law, self.side, self.tick_of_wave, int(self.at_rest), int(ramped))
+        return (*self.outputs, self.law, self.side, self.tick_of_wave, int(self.at_rest), self.rising, self.played, int(ramped))

@@ -13,6 +13,7 @@ from dzdesign.identify.reading.binary.file_format import FileFormat
 from dzdesign.identify.reading.binary.reader_process import list_columns, read_columns
 from dzdesign.identify.reading.binary.reader_server import ListedColumn
 from dzdesign.identify.reading.table import Table
+from dzdesign.identify.reading.time_stamps import Start, start_of
 
 
 @final
@@ -50,6 +51,10 @@ class ArrayTable(Table):
         if label not in self._loaded:
             self.load([label])
         return self._loaded.pop(label)
+
+    def started(self, label: str) -> Start | None:
+        """Return the date and time at which a column of time counts zero, where the file states them."""
+        return start_of(self.columns[label][1].start)
 
     def place(self, row: int) -> str:
         """Return ``sample 8``: such files have no rows that an editor would count."""

@@ -1,6 +1,6 @@
 """What a module of `formats` declares: how a file format is recognised, and what finds the columns of such a file."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +10,8 @@ import numpy as np
 
 #: Names of an attribute or property that holds a column's unit.
 UNIT_PROPERTIES = ("unit_string", "unit", "units", "Unit", "Units", "NI_UnitDescription")
+#: Date before which no logger wrote a file: where a clock is not known, programs write the beginning of their calendar.
+FIRST_LOGGER = np.datetime64("1980-01-02", "us")
 #: A matrix has at most this many columns, or rows: its longer side is time.
 MOST_COLUMNS = 256
 #: Kinds of NumPy's types that are columns: numbers, texts, objects and times; and those of them that are numbers.
@@ -25,6 +27,8 @@ class FileColumn:
     ----------
     group, name, unit : str
         As the file states them, or "". Two columns may have one name in different groups.
+    start : str
+        Of a column of time: date and time at which it counts zero, as `stamp_of` writes it; or "".
     kind : str
         Kind of NumPy's type: one of `NUMBER_KINDS` for numbers.
     size : int
@@ -39,6 +43,7 @@ class FileColumn:
     read: Callable[[], np.ndarray]
     group: str = ""
     unit: str = ""
+    start: str = ""
 
 
 @final
@@ -69,9 +74,21 @@ class FileFormat:
     hint: str = ""
 
 
-def unit_among(properties: Mapping[str, object]) -> str:
-    """Return the unit among a column's properties, or an empty string."""
-    for name in UNIT_PROPERTIES:
+def stamp_of(moment: Any, zone: str) -> str:
+    """Return a NumPy date and time as text with its zone, which may lack; empty where it is none a logger writes.
+
+    Examples
+    --------
+    >>> stamp_of(np.datetime64("2026-11-22T03:04:05.5"), "Z"), stamp_of(np.datetime64("1904-01-01T00:00:00"), "Z")
+    ('2026-11-22T03:04:05.500000Z', '')
+    """
+    moment = np.datetime64(moment, "us")
+    return "" if np.isnat(moment) or moment < FIRST_LOGGER else f"{moment}{zone}"
+
+
+def unit_among(properties: Mapping[str, object], names: Sequence[str] = UNIT_PROPERTIES) -> str:
+    """Return the unit, or the text of other `names`, among a column's properties, or an empty string."""
+    for name in names:
         value = properties.get(name)
         if isinstance(value, bytes | str | np.ndarray) and np.size(value) == 1:
             value = np.asarray(value).item()

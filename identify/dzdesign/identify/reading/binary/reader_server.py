@@ -40,6 +40,7 @@ class ListedColumn(msgspec.Struct, frozen=True, kw_only=True):
     group: str
     name: str
     unit: str
+    start: str
     size: int
 
 
@@ -80,7 +81,9 @@ def _read(request: Request) -> tuple[Answer, list[np.ndarray]]:
         found = list(islice(find(file, path, stack), MOST_FOUND + 1))
         if not request.numbers:
             listed = (
-                ListedColumn(group=column.group, name=column.name, unit=column.unit, size=int(column.size))
+                ListedColumn(
+                    group=column.group, name=column.name, unit=column.unit, start=column.start, size=int(column.size)
+                )
                 for column in found
             )
             return Answer(columns=tuple(listed)), []

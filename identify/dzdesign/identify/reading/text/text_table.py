@@ -12,7 +12,7 @@ import numpy as np
 from dzdesign.core.errors import InputError
 from dzdesign.identify.reading.table import QUOTED_CHARACTERS, Table
 from dzdesign.identify.reading.text.decimal_marks import BETWEEN_THOUSANDS, FEW_ROWS, DecimalMarks
-from dzdesign.identify.reading.time_stamps import EXAMPLE, is_stamp, is_unclear, seconds_of_stamps, start_of
+from dzdesign.identify.reading.time_stamps import EXAMPLE, Start, is_stamp, is_unclear, seconds_of_stamps, start_of
 
 if TYPE_CHECKING:
     import polars as pl
@@ -108,9 +108,9 @@ class TextTable(Table):
             )
         return is_stamp(cell)
 
-    def started(self, label: str) -> float | None:
-        """Return the date and time of the first row, s; None where the column has no dates."""
-        return start_of(self._first(label))
+    def started(self, label: str) -> Start | None:
+        """Return the date and time of the first row; None where the column has no dates."""
+        return start_of(self._first(label)) if self.is_clock(label) else None
 
     def seconds(self, label: str) -> np.ndarray:
         """Return a column of dates or times of day as seconds since the first row of the file."""

@@ -6,12 +6,13 @@
 
 #include "dz_drive.h"
 
-#define FIELDS 8
+#define FIELDS 10
 
 static long wrong_field(const struct dz_drive *drive, const int32_t *expected)
 {
     const int32_t found[FIELDS] = {drive->compare_a, drive->compare_b, drive->status, drive->law,
-                                   drive->side,      drive->ticks,     drive->at_rest, drive->ramped};
+                                   drive->side,      drive->ticks,     drive->at_rest,
+                                   drive->rising,    drive->played,    drive->ramped};
 
     for (long field = 0; field < FIELDS; field++) {
         if (found[field] != expected[field]) {
@@ -74,8 +75,10 @@ static int run(FILE *file)
                 drive.ramped = places[sample]; /* a slow ramp is put where samples would take minutes to bring it */
             }
             if (words[sample] != INT32_MIN) {
-                drive.side = (int16_t)(words[sample] / 2 - 1);
-                drive.at_rest = (uint16_t)(words[sample] % 2);
+                drive.at_rest = (uint16_t)(words[sample] & 1);
+                drive.side = (int16_t)(((words[sample] >> 1) & 3) - 1);
+                drive.rising = (uint16_t)((words[sample] >> 3) & 63);
+                drive.played = (int16_t)((words[sample] >> 9) - 8192);
             }
             dz_drive_sample(&drive, codes[3 * sample], codes[3 * sample + 1], codes[3 * sample + 2]);
         }

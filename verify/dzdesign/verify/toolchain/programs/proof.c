@@ -94,6 +94,8 @@ void drive(void)
     drive.side = (int16_t)Frama_C_interval(-1, 1);
     drive.ticks = anything();
     drive.at_rest = (uint16_t)Frama_C_interval(0, 1);
+    drive.rising = (uint16_t)Frama_C_interval(0, TRAVEL);
+    drive.played = (int16_t)Frama_C_interval(-(FURTHEST), FURTHEST);
     drive.ramped = Frama_C_long_interval(-(RAMPED), RAMPED);
     if (Frama_C_interval(0, 1)) {
         dz_drive_sample(&drive, command(), anything(), anything());

@@ -1,4 +1,4 @@
-"""Parquet and Feather (Arrow IPC): a column of dates or times becomes seconds since the first row."""
+"""Parquet and Feather (Arrow IPC): dates and times become seconds since the first row, whose date is kept."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 
-from dzdesign.identify.reading.binary.file_format import FileColumn, FileFormat
+from dzdesign.identify.reading.binary.file_format import FileColumn, FileFormat, stamp_of
 
 if TYPE_CHECKING:
     import polars as pl
@@ -33,7 +33,8 @@ def _columns(scan: "pl.LazyFrame") -> Iterator[FileColumn]:
     for name, dtype in scan.collect_schema().items():
         column = scan.select(pl.col(name))
         if dtype.is_temporal():
-            yield FileColumn(name=name, unit="s", kind="f", size=size, read=partial(_seconds, column))
+            start = _start(column, dtype) if isinstance(dtype, pl.Datetime) and size else ""
+            yield FileColumn(name=name, unit="s", kind="f", size=size, read=partial(_seconds, column), start=start)
         elif dtype.is_numeric():
             yield FileColumn(name=name, kind="f", size=size, read=partial(_numbers, column))
 
@@ -41,6 +42,11 @@ def _columns(scan: "pl.LazyFrame") -> Iterator[FileColumn]:
 def _numbers(column: "pl.LazyFrame") -> np.ndarray:
     series = column.collect().to_series()
     return np.asarray(series.cast(float).fill_null(float("nan")).to_numpy())
+
+
+def _start(column: "pl.LazyFrame", dtype: "pl.Datetime") -> str:
+    """Return the date and time of the first row; NumPy's is UTC where the column has a time zone."""
+    return stamp_of(column.first().collect().to_series().to_numpy()[0], "Z" if dtype.time_zone else "")
 
 
 def _seconds(column: "pl.LazyFrame") -> np.ndarray:

@@ -1,7 +1,13 @@
-"""HDF5: datasets, and the fields of compound ones; MATLAB 7.3 is HDF5 too, its texts and cells left aside."""
+"""HDF5: datasets, and the fields of compound ones; MATLAB 7.3 is HDF5 too, its texts and cells left aside.
 
+A dataset of time says from when it counts by a unit of the CF conventions (netCDF), ``seconds since 2026-11-22
+03:04:05``, UTC unless that says otherwise, or by an attribute ``start`` of the NeXus format, ISO 8601.
+"""
+
+import re
 from collections.abc import Iterator
 from contextlib import ExitStack
+from dataclasses import replace
 from functools import partial
 from math import prod
 from pathlib import Path
@@ -15,9 +21,14 @@ from dzdesign.identify.reading.binary.file_format import (
     columns_of_array,
     unit_among,
 )
+from dzdesign.identify.reading.time_stamps import is_stamp
 
 #: A chunk is unpacked whole: one of more bytes is refused.
 LARGEST_CHUNK = 1 << 26
+#: Characters of a unit that are looked at.
+LONGEST_UNIT = 80
+#: A unit of time with the date and time from which it counts; what names a zone after it, and by how much it is off.
+SINCE = re.compile(r"(\w+) since (.+?)(?:\s*(Z|UTC|[-+]\d\d:?\d\d))?", re.IGNORECASE)
 #: Classes of MATLAB that hold no numbers.
 NO_NUMBERS = (b"char", b"cell", b"function_handle")
 
@@ -51,7 +62,8 @@ def _refuse_what_is_not_here(item: Any, place: str, path: Path) -> None:
 def _columns_of_dataset(item: Any, place: str) -> Iterator[FileColumn]:
     group, _, name = place.rpartition("/")
     if not item.dtype.names and item.dtype.kind in NUMBER_KINDS:
-        yield from columns_of_array(item, name, group=group, unit=unit_among(item.attrs))
+        unit, start = _unit_and_start(unit_among(item.attrs), unit_among(item.attrs, ("start",)))
+        yield from (replace(column, start=start) for column in columns_of_array(item, name, group=group, unit=unit))
     for field in item.dtype.names or ():
         dtype = item.dtype[field]
         if item.ndim == 1 and dtype.shape == () and dtype.kind in "fiubSUO":
@@ -59,6 +71,16 @@ def _columns_of_dataset(item: Any, place: str) -> Iterator[FileColumn]:
             yield FileColumn(group=place, name=field, kind=dtype.kind, size=item.size, read=read)
         elif item.size * dtype.itemsize <= LARGEST_CHUNK:
             yield from columns_of_array(item[field], field, group=place)
+
+
+def _unit_and_start(unit: str, start: str) -> tuple[str, str]:
+    """Return the unit of a dataset, and of one of time the date and time from which it counts; empty if unknown."""
+    since = SINCE.fullmatch(unit[:LONGEST_UNIT])
+    if since is None:
+        return unit, start if is_stamp(start) else ""
+    midnight = "" if ":" in since[2] else " 00:00:00"
+    stamp = f"{since[2]}{midnight}{(since[3] or 'Z').upper()}"
+    return since[1], stamp if is_stamp(stamp) else ""
 
 
 def _field(item: Any, field: str) -> Any:

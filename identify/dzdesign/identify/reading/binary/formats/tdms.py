@@ -1,4 +1,4 @@
-"""TDMS, as LabVIEW and FlexLogger write it: a waveform channel brings a column of time."""
+"""TDMS, as LabVIEW and FlexLogger write it: a waveform channel brings a column of time; its dates are UTC."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -8,7 +8,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.reading.binary.file_format import FileColumn, FileFormat, unit_among
+from dzdesign.identify.reading.binary.file_format import FileColumn, FileFormat, stamp_of, unit_among
 
 
 def _columns(file: BinaryIO, path: Path, stack: ExitStack) -> Iterator[FileColumn]:
@@ -26,8 +26,9 @@ def _columns(file: BinaryIO, path: Path, stack: ExitStack) -> Iterator[FileColum
             size = len(channel)
             if channel.dtype.kind == "M":
                 yield FileColumn(
-                    group=group.name, name=channel.name, unit="s", kind="f", size=size, read=_seconds(channel)
-                )
+                    group=group.name, name=channel.name, unit="s", kind="f", size=size, read=_seconds(channel),
+                    start=stamp_of(channel[0], "Z") if size else "",
+                )  # fmt: skip
                 continue
             if channel.dtype.kind in "fiubSUO" and size >= 2:
                 yield FileColumn(
@@ -39,11 +40,13 @@ def _columns(file: BinaryIO, path: Path, stack: ExitStack) -> Iterator[FileColum
                 has_time = True
                 start = channel.properties.get("wf_start_offset", 0.0)
                 times = np.linspace(start, start + (size - 1) * step, size)
-                yield from _of_time(group.name, times)
+                yield _of_time(group.name, times, channel.properties.get("wf_start_time"))
 
 
-def _of_time(group: str, times: np.ndarray) -> Iterator[FileColumn]:
-    yield FileColumn(group=group, name="time_s", unit="s", kind="f", size=times.size, read=lambda: times)
+def _of_time(group: str, times: np.ndarray, start: Any) -> FileColumn:
+    """Return the column of time of a waveform, which counts from the start that its channel states."""
+    stamp = stamp_of(start, "Z") if isinstance(start, np.datetime64) else ""
+    return FileColumn(group=group, name="time_s", unit="s", kind="f", size=times.size, read=lambda: times, start=stamp)
 
 
 def _samples(channel: Any) -> Any:

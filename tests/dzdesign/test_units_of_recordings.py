@@ -1,0 +1,228 @@
+"""What a person is shown is in the units of the recordings, from `identify` to the report; files and keys are not."""
+
+import io
+import json
+import re
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
+
+import pytest
+from bench_loggers import command_text
+from corpus_units import BOTH_WAYS, bench, ramp
+
+from dzdesign.command_line.cli import main
+from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.identify.identification import identify_sides
+from dzdesign.identify.plots.frame import plot_style
+from dzdesign.identify.plots.valve_plots import draw_figures
+from dzdesign.identify.reading.ramp_files import read_ramp_file
+from dzdesign.identify.reading.units_of_columns import units_of
+from dzdesign.identify.valve.model import ValveModel
+from dzdesign.report.chain import Chain
+from dzdesign.report.figures.figure import figure_style
+from dzdesign.report.sections.valve import valve_sections
+from dzdesign.report.summary import key_figures
+
+#: A number in the units in which all is computed; a range or an example is quoted.
+COMPUTED = re.compile(r"\d\s?(mV|V|MPa|L/min)\b")
+COLUMNS = "u=set (mA):4..20 mA = 0..10 V"
+BIPOLAR = "u=set (mA):4..20 mA = -10..10 V"
+LAG = ("--meter-lag", "0 s +- 0.02 s")
+#: The bench's truth on opening and closing, in mA of 4..20 mA = 0..10 V.
+OPENS, CLOSES = 4 + 1.6 * 4.66, 4 + 1.6 * 4.54
+
+
+def write_ramp(folder, name, dp, seed, command=None, scale=lambda u: 4 + 1.6 * u, gain=1.0, **options):
+    rows = bench(command or ramp(20.0), edge=dp, seed=seed, **options)
+    rows["Q"] = gain * rows["Q"]
+    path = folder / name
+    path.write_text(command_text(rows, "set (mA)", scale(rows["u"]), flow="gpm"), encoding="utf-8")
+    return str(path)
+
+
+def run(*words) -> tuple[int, str]:
+    out = io.StringIO()
+    with redirect_stdout(out), redirect_stderr(out):
+        status = main([str(word) for word in words])
+    return status, out.getvalue()
+
+
+def numbers_as_computed(text):
+    """Return numbers in V, MPa or L/min in lines that are about the recordings."""
+    plain = re.sub(r"'[^']*'|\"[^\"]*\"|\([^()]*\.\.[^()]*\)", "", text)
+    lines = [line for line in plain.splitlines() if not re.match(r"(command|pressure [AB]): code", line)]
+    return [found[0] for line in lines for found in COMPUTED.finditer(line)]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("recordings")
+
+
+@pytest.fixture(scope="module")
+def ramps(folder):
+    return [write_ramp(folder, f"r{dp:g}_{n}.csv", dp, seed=n + int(10 * dp)) for dp in (1.0, 4.0) for n in (1, 2)]
+
+
+@pytest.fixture(scope="module")
+def printed(folder, ramps):
+    status, text = run("identify", *ramps, "--columns", COLUMNS, *LAG, "-o", folder / "valve.json")
+    assert status == 0, text
+    return text
+
+
+@pytest.fixture(scope="module")
+def valve(folder, printed):
+    return read_artefact((folder / "valve.json").read_bytes(), ValveModel, "valve.json")
+
+
+def test_the_files_stay_in_volts_and_say_what_is_shown(folder, printed):
+    document = json.loads((folder / "valve.json").read_text(encoding="utf-8"))
+    test = document["sides"]["positive"]["tests"][0]
+    assert abs(test["u_knee_rising_V"] - 4.66) < 0.02 and abs(test["dp_MPa"] - 1) < 0.02 and test["q_max_L_min"] > 12
+    command = document["recorded_units"]["command"]
+    assert (command["unit"], command["at_zero"], command["factor"]) == ("mA", 4.0, 1.6)
+    assert document["recorded_units"]["pressure"] == {"unit": "bar", "factor": 10.0}
+    assert document["recorded_units"]["flow"]["factor"] == pytest.approx(1 / 3.785411784, rel=1e-11)
+
+
+def test_identify_plan_and_design_print_no_other_unit(folder, printed):
+    pages = {
+        "identify": printed,
+        "plan": run("plan", folder / "valve.json", "--budget", "10 min")[1],
+        "design": run("design", folder / "valve.json", "-o", folder / "compensator.json")[1],
+    }
+    for name, text in pages.items():
+        assert not numbers_as_computed(text), name
+        assert "bar" in text and "mA" in text and "gpm" in text, name
+    row = next(line for line in printed.splitlines() if line.lstrip().startswith("r1_1")).split()
+    assert float(row[-7]) == pytest.approx(OPENS, abs=0.03) and float(row[-6]) == pytest.approx(CLOSES, abs=0.03)
+    assert re.search(r"offset 11\.\d+ mA", pages["design"]) and re.search(r"4 to 20 mA in", pages["plan"])
+
+
+def test_warnings_carry_the_units_in_the_file_too(valve):
+    texts = {warning.code: warning.text for warning in valve.warnings}
+    assert "mA" in texts["few-repeats"] and not any(numbers_as_computed(text) for text in texts.values())
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"gain": 0.0}, r"at \d+\.\d+ mA is -?\d\.\d+ gpm above that at zero"),
+        ({"gain": -1.0}, r"by \d\.\d+ gpm from zero to \d+\.\d\d mA"),
+        ({"scale": lambda u: 4 + 0.05 * u}, r"runs from \d\.\d+ to 4\.\d+ mA"),
+        ({"dp": 1e-7}, r"the pressure drop is \S+ bar, expected \S+ to \S+ bar"),
+    ],
+)
+def test_refusals_speak_of_what_was_recorded(options, said, tmp_path):
+    dp = options.pop("dp", 1.0)
+    status, text = run("identify", write_ramp(tmp_path, "bad.csv", dp, 5, **options), "--columns", COLUMNS)
+    assert status == 2 and re.search(said, text), text
+    assert not numbers_as_computed(text)
+
+
+def test_u_max_is_said_in_the_unit_of_the_command(tmp_path):
+    path = write_ramp(tmp_path, "high.csv", 1.0, 6)
+    status, text = run("identify", path, "--columns", COLUMNS, "--u-max", "5 V")
+    assert status == 2 and re.search(r"reaches 20\.\d\d mA, above u_max = 12 mA", text), text
+
+
+def test_plots_are_drawn_in_the_units_of_the_recordings(folder, ramps):
+    found = identify_sides([read_ramp_file(path, columns={"u": COLUMNS[2:]}) for path in map(Path, ramps)])
+    with plot_style():
+        figures = dict(draw_figures(found))
+    flow, thresholds = figures["flow_1_MPa"], figures["thresholds"]
+    edge = next(axes for axes in flow.axes if axes.get_title() == "the edge, enlarged")
+    assert (edge.get_xlabel(), edge.get_ylabel()[-5:]) == ("command u (mA)", "(gpm)")
+    assert edge.get_xlim()[0] < CLOSES < OPENS < edge.get_xlim()[1]
+    whole = next(axes for axes in flow.axes if axes.get_title() == "whole range")
+    assert whole.get_xlim() == pytest.approx((4, 20), abs=0.05) and 3 < whole.get_ylim()[1] < 6
+    axes = thresholds.axes[0]
+    assert (axes.get_ylabel(), axes.get_xlabel()) == ("command u (mA)", "pressure drop dP (bar)")
+    assert axes.get_xlim()[0] < 10 < 40 < axes.get_xlim()[1] and axes.get_ylim()[0] < CLOSES < axes.get_ylim()[1]
+    assert not any(numbers_as_computed(figure.get_suptitle()) for figure in figures.values())
+
+
+def test_the_report_leads_with_them(valve):
+    with figure_style():
+        sections = valve_sections(valve, None)
+    table = sections["thresholds"].tables[0]
+    columns = dict(zip(table.columns, table.rows[0], strict=True))
+    assert float(columns["knee opening (mA)"].text) == pytest.approx(OPENS, abs=0.03)
+    assert float(columns["dP (bar)"].text) == pytest.approx(10, abs=0.2)
+    assert float(columns["slope (gpm/mA)"].text) == pytest.approx(3.5 / 3.785 / 1.6, rel=0.05)
+    figures = [figure for section in sections.values() for figure in section.figures if figure]
+    for figure in figures:
+        assert not numbers_as_computed(figure.description + figure.caption), figure.name
+    assert ">valve command u (mA)<" in figures[0].svg and ">pressure drop dP (bar)<" in figures[1].svg
+    assert "knee_V" in figures[0].csv.splitlines()[0]  # a file is in V
+    assert not numbers_as_computed(" ".join(sections["data"].lines))
+    assert not any(numbers_as_computed(f"{each.value} {each.note}") for each in key_figures(Chain(valve=valve)))
+
+
+def test_assess_prints_them(folder, ramps, tmp_path):
+    after = [write_ramp(tmp_path, f"after_{n}.csv", 1.0, seed=40 + n) for n in (1, 2)]
+    limits = "flow_at_zero = 0.001 L/min"
+    output = tmp_path / "assessment.json"
+    words = ["assess", *ramps[:2], "--after", *after, "--columns", COLUMNS, *LAG, "--limits", limits, "-o", output]
+    status, text = run(*words, "--plots", tmp_path / "plots")
+    assert status in (0, 1) and output.exists(), text
+    assert not numbers_as_computed(text) and "10.0 bar" in text and "gpm/mA" in text
+    document = json.loads(output.read_text(encoding="utf-8"))
+    assert document["pressures"][0]["quantities"]["largest_flow"]["before"]["value"] > 12  # L/min
+    assert document["recorded_units"]["flow"]["unit"] == "gpm"
+
+
+def test_a_declared_pressure_drop_is_shown_as_it_was_declared(tmp_path):
+    path = write_ramp(tmp_path, "no_dp.csv", 2.0, 7)
+    lines = [",".join(line.split(",")[:2] + line.split(",")[3:]) for line in Path(path).read_text().splitlines()]
+    Path(path).write_text("\n".join(lines), encoding="utf-8")
+    status, text = run("identify", path, "--columns", COLUMNS, "--dp", "290 psi", "-o", tmp_path / "valve.json")
+    assert status == 0 and "dP (psi)" in text and re.search(r"\s290\.0\s", text), text
+
+
+def test_a_side_whose_reading_falls_counts_outwards(tmp_path):
+    def scale(u):
+        return 12 + 0.8 * u
+
+    path = write_ramp(tmp_path, "both.csv", 1.0, 8, command=BOTH_WAYS, scale=scale, positive=False)
+    status, text = run("identify", path, "--columns", BIPOLAR, *LAG, "-o", tmp_path / "valve.json")
+    assert status == 0 and "12 mA being zero" in text and "count from zero command outwards" in text
+    valve = read_artefact((tmp_path / "valve.json").read_bytes(), ValveModel, "valve.json")
+    negative = next(part for part in text.split("Thresholds")[2:] if "negative side" in part)
+    row = next(line for line in negative.splitlines() if "both.csv" in line).split()
+    assert float(row[-7]) == pytest.approx(12 - 0.8 * 3.26, abs=0.02)
+    table = valve_sections(valve, None)["thresholds"].tables[1]
+    assert float(table.rows[0][1].text) == pytest.approx(12 - 0.8 * 3.26, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("header", "shown"),
+    [
+        ("time_s,u_V,dP_MPa,Q_Lmin", ("V", "MPa", "L/min")),
+        ("t [ms],u [mV],dP [N/mm2],Q [l/min]", ("mV", "MPa", "L/min")),
+        ("time_s,u (%),dP (barg),Q (lpm)", ("%", "bar", "L/min")),
+        ("time_s,u_V,dP_psid,Q_m3s", ("V", "psi", "m3/s")),
+        ("time_s,u_V,dP_kPa,Q_gpm", ("V", "kPa", "gpm")),
+        ("time_s,u_V,pA_bar,pB_bar,Q_Lmin", ("V", "bar", "L/min")),
+        ("time_s,u_V,pA_bar,pB_psi,Q_Lmin", ("V", "MPa", "L/min")),
+        ("time_s,u_V,Q_Lmin", ("V", "MPa", "L/min")),
+    ],
+)
+def test_units_are_those_of_the_columns(header, shown, tmp_path):
+    path = tmp_path / "ramp.csv"
+    rows = [",".join(str(1e-3 * (row + place)) for place in range(header.count(",") + 1)) for row in range(1, 60)]
+    path.write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
+    units = units_of([read_ramp_file(path)])
+    assert (units.command.unit, units.pressure.unit, units.flow.unit) == shown
+
+
+def test_a_mixture_is_shown_in_what_the_file_holds(tmp_path):
+    bar, psi = (tmp_path / f"{unit}.csv" for unit in ("bar", "psi"))
+    for path in (bar, psi):
+        rows = "\n".join(f"{row},{0.1 * row},{1 + row},{row}" for row in range(40))
+        path.write_text(f"time_s,u_V,dP_{path.stem},Q_gpm\n{rows}\n", encoding="utf-8")
+    tests = [read_ramp_file(path) for path in (bar, psi)]
+    assert units_of(tests) == units_of(tests[::-1])
+    assert (units_of(tests).pressure.unit, units_of(tests).flow.unit) == ("MPa", "gpm")
+    assert units_of(tests).differ == ("pressure",)

@@ -1,0 +1,118 @@
+"""The recorded curve in valve.json: few points, its error as stated, what is hidden stays hidden."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dzdesign.core.artefact_types import RuleError
+from dzdesign.identify.identification import identify
+from dzdesign.identify.knees import curve_thinning
+from dzdesign.identify.knees.curve_thinning import TOLERANCE
+from dzdesign.identify.valve.recorded_curve import MOST_POINTS, RecordedBranch, RecordedCurve
+from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
+
+
+def bent_ramp(dp_MPa, seed=0, **changes):
+    """A ramp of a valve without a straight part: a soft edge, then a bend, then a plateau; and its truth."""
+    ramp = synthetic_ramp(dp_MPa, Truth(noise=0.0), seed=seed)
+    up = np.arange(ramp.u.size) < ramp.u.size // 2
+    beyond = np.maximum(ramp.u - np.where(up, 4.0, 3.8), 0.0)
+    true = np.minimum(1.5 * beyond**1.5 + 2.0 * beyond, 20.0)
+    noise = 0.1 * np.random.default_rng([seed, 7]).standard_normal(true.size)
+    return replace(ramp, q=(true + noise) * L_MIN, **changes), true
+
+
+def means(u, q, up):
+    """Mean command and flow of each branch in 200 bins of command, by NumPy's histogram alone."""
+    for part in (up, ~up):
+        count, edges = np.histogram(u[part], bins=200, range=(0, 10))
+        total, _ = np.histogram(u[part], bins=edges, weights=q[part])
+        yield (edges[:-1] + edges[1:]) / 2, total / np.maximum(count, 1)
+
+
+def test_few_points_come_as_near_as_they_say():
+    ramp, _ = bent_ramp(2.0)
+    (test,) = identify([ramp]).positive.tests
+    up = np.arange(ramp.u.size) < ramp.u.size // 2
+    for branch, (u, q) in zip(test.recorded.branches, means(ramp.u, ramp.q / L_MIN, up), strict=True):
+        assert 8 <= len(branch.u_V) <= MOST_POINTS
+        assert branch.error_L_min <= 3 * TOLERANCE * test.recorded.q_max_L_min
+        seen = u > branch.u_seen_V + 0.05
+        assert np.abs(branch.flow_at(u) - q)[seen].max() <= branch.error_L_min + 0.05
+        assert np.all(branch.flow_at(u[u < branch.u_seen_V - 0.05]) < test.noise_level_L_min)
+
+
+def test_the_truth_is_nearer_to_the_curve_than_the_noise():
+    ramp, true = bent_ramp(2.0, seed=4)
+    (test,) = identify([ramp]).positive.tests
+    up = np.arange(ramp.u.size) < ramp.u.size // 2
+    for branch, part in zip(test.recorded.branches, (up, ~up), strict=True):
+        part = part & (ramp.u > branch.u_seen_V)
+        assert np.abs(branch.flow_at(ramp.u[part]) - true[part]).max() < 0.1
+
+
+def test_single_wrong_readings_leave_no_trace():
+    clean, _ = bent_ramp(2.0, seed=2)
+    q = clean.q.copy()
+    q[np.random.default_rng(3).choice(q.size, 40, replace=False)] = 0.0
+    found = [identify([ramp]).positive.tests[0].recorded for ramp in (clean, replace(clean, q=q))]
+    u = np.linspace(4.3, 9.9, 500)
+    for one, other in zip(found[0].branches, found[1].branches, strict=True):
+        assert np.abs(one.flow_at(u) - other.flow_at(u)).max() < 0.1
+
+
+def test_a_meter_with_a_floor_shows_no_edge_and_the_curve_has_none():
+    """The readings jump from 0 to 0.6 L/min: the curve goes down to the knee instead, in a straight line."""
+    (test,) = identify([synthetic_ramp(2.0, Truth(floor=0.6, noise=0.02))]).positive.tests
+    for branch, knee in zip(test.recorded.branches, (5.4, 5.3), strict=True):
+        assert branch.u_seen_V == pytest.approx(knee + 0.15, abs=0.03)
+        assert branch.command_at(1e-6) == pytest.approx(knee, abs=0.03)
+
+
+def test_the_supplys_sag_is_kept():
+    ramp = synthetic_ramp(2.0, Truth(sag=0.3, noise=0.02))
+    (test,) = identify([ramp]).positive.tests
+    dp = np.array(test.recorded.dp_at_flow_MPa)
+    assert dp[0] == pytest.approx(2.0, abs=0.005) and dp[-1] == pytest.approx(1.4, abs=0.02)
+    assert np.all(np.diff(dp) < 0)
+
+
+def test_one_branch_stands_for_both():
+    (test,) = identify([synthetic_ramp(1.0, Truth(), falling=False)]).positive.tests
+    assert test.recorded.falling is None
+    assert test.recorded.closing is test.recorded.opening is test.recorded.rising
+
+
+def branch(u=(0.0, 5.0, 10.0), q=(0.0, 0.0, 20.0)):
+    return RecordedBranch(u_V=u, q_L_min=q, u_seen_V=5.1, error_L_min=0.0)
+
+
+def test_where_a_flow_is_passed():
+    assert branch().command_at(10.0) == pytest.approx(7.5)
+    assert branch().command_at(0.0) == 0.0
+    assert branch().command_at(20.1) is None
+    assert branch().flow_at(np.array([-1.0, 6.0, 11.0])).tolist() == [0.0, 4.0, 20.0]
+
+
+@pytest.mark.parametrize(
+    ("make", "case"),
+    [
+        (lambda: branch(q=(0.0, 1.0)), "as many"),
+        (lambda: branch(u=(0.0, 5.0, 5.0)), "rising"),
+        (lambda: RecordedCurve(rising=None, falling=None, dp_at_flow_MPa=None), "a branch"),
+        (lambda: RecordedCurve(rising=branch(), falling=None, dp_at_flow_MPa=(1.0, 0.9)), "steps"),
+    ],
+    ids=["as many", "rising", "a branch", "steps"],
+)
+def test_a_curve_that_is_none_is_refused(make, case, wording):
+    with wording.refusal(RuleError):
+        make()
+
+
+def test_points_are_found_in_few_rounds(monkeypatch):
+    """By halving, all stretches at once, whatever the number of samples."""
+    calls, kept = [], curve_thinning._least_squares
+    monkeypatch.setattr(curve_thinning, "_least_squares", lambda u, q, at: calls.append(at.size) or kept(u, q, at))
+    identify([bent_ramp(2.0)[0]])
+    assert len(calls) <= 2 * 9 and max(calls) <= MOST_POINTS
