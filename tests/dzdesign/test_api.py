@@ -221,7 +221,7 @@ def test_a_compensator_whose_certificate_does_not_follow_is_not_generated(exampl
 
 def test_what_a_notebook_shows_is_escaped(example_valve, example_compensator, example_firmware):
     side = example_valve.positive
-    tests = (replace(side.tests[0], source=HOSTILE), *side.tests[1:])
+    tests = (replace(side.tests[0], source=HOSTILE, ramps=(HOSTILE,)), *side.tests[1:])
     valve = replace(
         example_valve,
         sides={"positive": replace(side, tests=tests)},

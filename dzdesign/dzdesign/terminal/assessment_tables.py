@@ -17,7 +17,9 @@ DECIMALS = {"%": 2, "L/min": 3, "L/min/V": 4}
 
 def print_assessment(assessment: "Assessment") -> None:
     """Print each pressure drop, the reasons of what is not observable, formulas, notes and limits."""
-    page, units = new_console(), assessment.recorded_units
+    from dzdesign.identify.valve.model import lag_in_words
+
+    page, units, meter = new_console(), assessment.recorded_units, assessment.meter
     for item in _shown_pressures(assessment):
         put_table(page, _table_of(item, units))
     lines = [
@@ -25,7 +27,7 @@ def print_assessment(assessment: "Assessment") -> None:
         *_remarks(assessment),
         f"{assessment.terms[0].upper()}{assessment.terms[1:]}:",
         *(f"  {text}" for text in _formulas(assessment)),
-        meter_line(assessment.meter, units),
+        meter_line(meter.floor_L_min, lag_in_words(meter.lag_s, meter.lag_is), units),
         *(f"note [{each.code}] {f'{each.source}: ' if each.source else ''}{each.text}" for each in assessment.notes),
         *_limits(assessment),
     ]
